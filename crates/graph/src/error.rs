@@ -1,0 +1,171 @@
+//! What can be wrong with an input or a result, one variant per mistake.
+//!
+//! Every variant names the place by number, so that the message points at the line of a file or the
+//! entry of an array that has to change.
+
+use crate::{ClusterId, ColorId};
+
+/// An inconsistent input, or a result that a check refuses.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum GraphError {
+    /// More entries than 32-bit offsets can address.
+    #[error("{count} {what} are too many: at most 4294967295 fit; split the problem")]
+    TooMany {
+        /// What there is too much of.
+        what: &'static str,
+        /// How many there are.
+        count: usize,
+    },
+    /// CSR offsets that do not start at 0, or an empty offsets array.
+    #[error("offsets must start with 0 and hold one entry more than there are rows")]
+    OffsetsStart,
+    /// CSR offsets that go down.
+    #[error("offsets go down from {before} to {after} at row {row}; they must not decrease")]
+    OffsetsDecrease {
+        /// The row that would have a negative length.
+        row: usize,
+        /// Its first offset.
+        before: u32,
+        /// Its second, smaller offset.
+        after: u32,
+    },
+    /// CSR offsets that do not end at the number of values.
+    #[error("offsets end at {last}, but there are {values} values; both must agree")]
+    OffsetsEnd {
+        /// The last offset.
+        last: u32,
+        /// The number of values.
+        values: usize,
+    },
+    /// A constraint on a particle that does not exist.
+    #[error(
+        "constraint {constraint} names particle {particle}, but there are {particles} particles (from 0)"
+    )]
+    ParticleOutOfRange {
+        /// The constraint.
+        constraint: usize,
+        /// The particle it names.
+        particle: u32,
+        /// The number of particles.
+        particles: usize,
+    },
+    /// A constraint that names one particle twice.
+    #[error("constraint {constraint} names particle {particle} twice; list each particle once")]
+    RepeatedParticle {
+        /// The constraint.
+        constraint: usize,
+        /// The particle named twice.
+        particle: u32,
+    },
+    /// An edge to a vertex that does not exist.
+    #[error("edge {edge} names vertex {vertex}, but there are {vertices} vertices (from 0)")]
+    VertexOutOfRange {
+        /// The position of the edge in the input.
+        edge: usize,
+        /// The vertex it names.
+        vertex: u32,
+        /// The number of vertices.
+        vertices: usize,
+    },
+    /// An edge from a vertex to itself, which no coloring can satisfy.
+    #[error(
+        "edge {edge} joins vertex {vertex} to itself; such a graph has no coloring, leave the edge out"
+    )]
+    SelfLoop {
+        /// The position of the edge in the input.
+        edge: usize,
+        /// The vertex.
+        vertex: u32,
+    },
+    /// A label that is no cluster number of a clustering of this size.
+    #[error(
+        "constraint {constraint} is labeled {cluster}, but cluster numbers must be below {constraints}"
+    )]
+    LabelOutOfRange {
+        /// The constraint.
+        constraint: usize,
+        /// Its label.
+        cluster: ClusterId,
+        /// The number of constraints, which bounds the number of clusters.
+        constraints: usize,
+    },
+    /// A clustering whose counts do not match its labels.
+    #[error(
+        "cluster {cluster} is recorded with {recorded} constraints, but {found} constraints carry its label"
+    )]
+    ClusterSize {
+        /// The cluster.
+        cluster: ClusterId,
+        /// The recorded size.
+        recorded: usize,
+        /// The number of labels.
+        found: usize,
+    },
+    /// A clustering whose list of vacant numbers is not the set of its empty clusters.
+    #[error("cluster {cluster} is empty or listed as vacant, but not both exactly once")]
+    Vacancy {
+        /// The cluster.
+        cluster: ClusterId,
+    },
+    /// Two things of different length that describe the same items.
+    #[error("{what}: expected {expected} entries, found {found}")]
+    Length {
+        /// What was compared.
+        what: &'static str,
+        /// How many entries were needed.
+        expected: usize,
+        /// How many there are.
+        found: usize,
+    },
+    /// Two adjacent vertices of one color.
+    #[error("vertices {first} and {second} are adjacent and both have color {color}")]
+    SameColor {
+        /// The smaller vertex.
+        first: u32,
+        /// The larger vertex.
+        second: u32,
+        /// Their color.
+        color: ColorId,
+    },
+    /// Two constraints of one color on one particle.
+    #[error(
+        "constraints {first} and {second} both have color {color} and share particle {particle}"
+    )]
+    SharedParticle {
+        /// The smaller constraint.
+        first: u32,
+        /// The larger constraint.
+        second: u32,
+        /// Their color.
+        color: ColorId,
+        /// The particle both touch.
+        particle: u32,
+    },
+    /// A constraint that a schedule leaves out.
+    #[error("constraint {constraint} is not in the schedule")]
+    Unscheduled {
+        /// The constraint.
+        constraint: usize,
+    },
+    /// A constraint that a schedule would solve twice.
+    #[error("constraint {constraint} is in the schedule more than once")]
+    ScheduledTwice {
+        /// The constraint.
+        constraint: u32,
+    },
+    /// Two clusters that a schedule would solve at the same time although they share a particle.
+    #[error(
+        "clusters {first} and {second} run together in color {color} but share particle {particle}"
+    )]
+    ClustersCollide {
+        /// The cluster met first.
+        first: ClusterId,
+        /// The cluster met second.
+        second: ClusterId,
+        /// The color both run in.
+        color: ColorId,
+        /// The particle both touch.
+        particle: u32,
+    },
+}

@@ -1,0 +1,137 @@
+//! How good a coloring is: how many colors, and how even.
+//!
+//! Few colors mean few steps; even colors mean that each step keeps the whole machine busy. The
+//! numbers are those of the paper's Table 2, with the formulas spelled out because the paper gives
+//! none for its chi-squared column. Cost: O(vertices + colors).
+
+use crate::Coloring;
+
+/// The evenness of k color classes with sizes `n_c` that sum to N.
+///
+/// Classes without a member count, since a solver steps through them too. A coloring without
+/// vertices has all fields 0, except `max_over_mean`, which is 1 when there is nothing to balance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct ColoringMetrics {
+    /// k, the largest label plus one.
+    pub colors: usize,
+    /// N, the number of vertices or their total weight.
+    pub total: u64,
+    /// The size of the smallest class.
+    pub min: u64,
+    /// The size of the largest class.
+    pub max: u64,
+    /// `max - min`.
+    pub range: u64,
+    /// N / k.
+    pub mean: f64,
+    /// Population standard deviation: `sqrt(sum_c (n_c - N/k)^2 / k)`.
+    pub std: f64,
+    /// Reduced chi-squared against equal sizes: `sum_c (n_c - N/k)^2 / (N/k) / (k - 1)`; 0 for k <
+    /// 2.
+    pub chi2: f64,
+    /// Largest class over mean: the slowdown against even classes when each runs at the speed of
+    /// its size.
+    pub max_over_mean: f64,
+}
+
+impl ColoringMetrics {
+    /// Every vertex counts 1. O(vertices + colors).
+    ///
+    /// ```
+    /// use incise_graph::{ColorId, Coloring, ColoringMetrics};
+    ///
+    /// let metrics = ColoringMetrics::by_vertices(&Coloring::new([0, 0, 0, 1].map(ColorId).to_vec()));
+    /// assert_eq!((metrics.colors, metrics.range, metrics.std, metrics.chi2), (2, 2, 1.0, 1.0));
+    /// ```
+    #[must_use]
+    pub fn by_vertices(coloring: &Coloring) -> Self {
+        let mut classes = vec![0; coloring.color_count()];
+        for color in coloring.colors() {
+            classes[color.index()] += 1;
+        }
+        Self::of_classes(&classes)
+    }
+
+    /// Vertex `v` counts `weights[v]`, for example the number of constraints of cluster `v`
+    /// ([`Clustering::sizes`](crate::Clustering::sizes)), by which a vacant cluster counts nothing.
+    /// O(vertices + colors).
+    ///
+    /// # Panics
+    /// If there is not one weight per vertex.
+    #[must_use]
+    pub fn by_weights(coloring: &Coloring, weights: &[u32]) -> Self {
+        assert_eq!(
+            weights.len(),
+            coloring.vertex_count(),
+            "one weight per vertex"
+        );
+        let mut classes = vec![0; coloring.color_count()];
+        for (color, &weight) in coloring.colors().iter().zip(weights) {
+            classes[color.index()] += u64::from(weight);
+        }
+        Self::of_classes(&classes)
+    }
+
+    fn of_classes(classes: &[u64]) -> Self {
+        let colors = classes.len();
+        let total = classes.iter().sum();
+        let min = classes.iter().copied().min().unwrap_or(0);
+        let max = classes.iter().copied().max().unwrap_or(0);
+        let k = colors.max(1) as f64;
+        let mean = total as f64 / k;
+        let squares: f64 = classes
+            .iter()
+            .map(|&size| (size as f64 - mean).powi(2))
+            .sum();
+        let balanced = total == 0;
+        Self {
+            colors,
+            total,
+            min,
+            max,
+            range: max - min,
+            mean,
+            std: (squares / k).sqrt(),
+            chi2: if balanced || colors < 2 {
+                0.0
+            } else {
+                squares / mean / (k - 1.0)
+            },
+            max_over_mean: if balanced { 1.0 } else { max as f64 / mean },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ColorId;
+
+    #[test]
+    fn weights_replace_counts() {
+        let coloring = Coloring::new([0, 1, 2, 2].map(ColorId).to_vec());
+        let metrics = ColoringMetrics::by_weights(&coloring, &[4, 1, 0, 1]);
+        assert_eq!(
+            (metrics.total, metrics.min, metrics.max, metrics.range),
+            (6, 1, 4, 3)
+        );
+        assert_eq!((metrics.mean, metrics.max_over_mean), (2.0, 2.0));
+        // Deviations 2, -1, -1: squares sum to 6.
+        assert!((metrics.std - 2f64.sqrt()).abs() < 1e-15);
+        assert_eq!(metrics.chi2, 1.5);
+    }
+
+    #[test]
+    fn even_classes_and_nothing() {
+        let even = ColoringMetrics::by_vertices(&Coloring::new([0, 1, 1, 0].map(ColorId).to_vec()));
+        assert_eq!((even.std, even.chi2, even.max_over_mean), (0.0, 0.0, 1.0));
+        let none = ColoringMetrics::by_vertices(&Coloring::default());
+        assert_eq!(
+            (none.colors, none.total, none.mean, none.std, none.chi2),
+            (0, 0, 0.0, 0.0, 0.0)
+        );
+        let one = ColoringMetrics::by_vertices(&Coloring::new(vec![ColorId(0); 3]));
+        assert_eq!((one.colors, one.chi2), (1, 0.0));
+    }
+}

@@ -1,0 +1,99 @@
+//! The graph of an incidence is the relation "shares a particle", and quotients commute with it.
+
+use incise_graph::{ClusterId, Clustering, ConstraintGraph, Incidence};
+use petgraph::graph::UnGraph;
+use proptest::collection::{btree_set, vec};
+use proptest::prelude::*;
+
+/// Up to 30 constraints of arity 0 to 5 on up to 12 particles.
+fn incidences() -> impl Strategy<Value = Incidence> {
+    (1u32..12).prop_flat_map(|particles| {
+        let arity = 0..=5.min(particles as usize);
+        vec(btree_set(0..particles, arity), 0..30).prop_map(move |constraints| {
+            Incidence::from_constraints(particles as usize, constraints).unwrap()
+        })
+    })
+}
+
+fn clustered() -> impl Strategy<Value = (Incidence, Clustering)> {
+    incidences().prop_flat_map(|incidence| {
+        let n = u32::try_from(incidence.constraint_count()).unwrap();
+        let label = prop_oneof![9 => (0..n.max(1)).prop_map(ClusterId), 1 => Just(ClusterId::NONE)];
+        vec(label, n as usize)
+            .prop_map(move |labels| (incidence.clone(), Clustering::from_labels(labels).unwrap()))
+    })
+}
+
+/// Do two constraints share a particle?
+fn share(incidence: &Incidence, a: usize, b: usize) -> bool {
+    incidence
+        .particles_of(a)
+        .iter()
+        .any(|p| incidence.particles_of(b).contains(p))
+}
+
+proptest! {
+    #[test]
+    fn edges_are_shared_particles(incidence in incidences()) {
+        let graph = ConstraintGraph::from_incidence(&incidence);
+        let n = incidence.constraint_count();
+        prop_assert_eq!(graph.vertex_count(), n);
+        for a in 0..n {
+            let expected: Vec<u32> =
+                (0u32..).zip(0..n).filter(|&(_, b)| b != a && share(&incidence, a, b)).map(|(id, _)| id).collect();
+            prop_assert_eq!(graph.neighbors(a), &expected[..]);
+        }
+    }
+
+    #[test]
+    fn both_lists_of_an_incidence_say_the_same(incidence in incidences()) {
+        for p in 0..incidence.particle_count() {
+            let expected: Vec<u32> = (0u32..)
+                .zip(0..incidence.constraint_count())
+                .filter(|&(_, c)| incidence.particles_of(c).iter().any(|&q| q as usize == p))
+                .map(|(id, _)| id)
+                .collect();
+            prop_assert_eq!(incidence.constraints_of(p), &expected[..]);
+        }
+    }
+
+    #[test]
+    fn quotients_commute((incidence, clustering) in clustered()) {
+        let by_particles = ConstraintGraph::from_incidence(&incidence.quotient(&clustering));
+        let by_edges = ConstraintGraph::from_incidence(&incidence).quotient(&clustering);
+        prop_assert_eq!(by_particles, by_edges);
+    }
+
+    #[test]
+    fn no_clusters_change_nothing(incidence in incidences()) {
+        let graph = ConstraintGraph::from_incidence(&incidence);
+        prop_assert_eq!(&graph.quotient(&Clustering::none(graph.vertex_count())), &graph);
+    }
+
+    #[test]
+    fn edge_lists_and_petgraph_round_trip(incidence in incidences()) {
+        let graph = ConstraintGraph::from_incidence(&incidence);
+        let mut edges: Vec<(u32, u32)> = graph.edges().map(|(a, b)| (b, a)).collect();
+        edges.reverse();
+        prop_assert_eq!(&ConstraintGraph::from_edges(graph.vertex_count(), &edges).unwrap(), &graph);
+        prop_assert_eq!(&ConstraintGraph::try_from(&UnGraph::from(&graph)).unwrap(), &graph);
+    }
+
+    #[test]
+    fn random_edits_keep_the_books((incidence, mut clustering) in clustered(), edits in vec((0usize..40, 0usize..40), 0..60)) {
+        let limit = incidence.constraint_count().max(40);
+        for (constraint, other) in edits {
+            let known = |c: usize| c < clustering.constraint_count();
+            let joined = if known(other) { clustering.cluster_of(other) } else { None };
+            if known(constraint) && clustering.cluster_of(constraint).is_some() {
+                clustering.remove(constraint);
+            } else if let Some(cluster) = joined {
+                clustering.assign(constraint, cluster);
+            } else {
+                clustering.new_cluster(constraint);
+            }
+            clustering.check().unwrap();
+            prop_assert!(clustering.cluster_count() <= limit);
+        }
+    }
+}

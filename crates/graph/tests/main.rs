@@ -1,0 +1,6 @@
+//! Properties of the vocabulary, against definitions too slow to ship.
+
+#![expect(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
+mod graph;
+mod schedule;
