@@ -1,0 +1,70 @@
+//! All triangular faces of a set of tets, sorted so that the sides of one face are neighbors in the list.
+//!
+//! A side is one face seen from one tet. Its three particles, in ascending order, and its place `4 * tet + local face`
+//! are packed into one `u128`, so that sorting needs no indirection. Sorting 4 n packed keys is the cost:
+//! O(n log n), about 3 ms for 11,000 tets.
+
+use crate::{ParticleId, TetId};
+
+/// The corners of the four faces of a positive tet, each counterclockwise when seen from outside.
+const LOCAL_FACES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+
+/// One face of one tet; orders by face first, then by tet.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Side(u128);
+
+impl Side {
+    fn new(tets: &[[ParticleId; 4]], tet: usize, local: usize) -> Self {
+        let mut face = outward_face(tets[tet], local).map(|p| p.0);
+        face.sort_unstable();
+        let place = u32::try_from(4 * tet + local).expect("the mesh has fewer than 2^30 tets");
+        let [a, b, c] = face.map(u128::from);
+        Self(a << 96 | b << 64 | c << 32 | u128::from(place))
+    }
+
+    /// The tet this side belongs to.
+    pub(crate) fn tet(self) -> TetId {
+        TetId(self.place() / 4)
+    }
+
+    /// Which of the tet's four faces it is.
+    pub(crate) fn local(self) -> usize {
+        self.place() as usize % 4
+    }
+
+    /// Position of the side in the order by tet, then local face.
+    #[expect(clippy::cast_possible_truncation, reason = "the low 32 bits are the place")]
+    pub(crate) fn place(self) -> u32 {
+        self.0 as u32
+    }
+
+    /// The particles of the face in ascending order.
+    #[expect(clippy::cast_possible_truncation, reason = "takes one 32-bit lane at a time")]
+    pub(crate) fn face(self) -> [ParticleId; 3] {
+        [96, 64, 32].map(|shift| ParticleId((self.0 >> shift) as u32))
+    }
+
+    fn same_face(&self, other: &Self) -> bool {
+        self.0 >> 32 == other.0 >> 32
+    }
+}
+
+/// One face of a tet, counterclockwise when seen from outside a positive tet.
+pub(crate) fn outward_face(tet: [ParticleId; 4], local: usize) -> [ParticleId; 3] {
+    LOCAL_FACES[local].map(|corner| tet[corner])
+}
+
+/// The faces of the tets for which `keep` holds, sorted.
+pub(crate) fn sorted_sides(tets: &[[ParticleId; 4]], keep: impl Fn(usize) -> bool) -> Vec<Side> {
+    let mut sides = Vec::with_capacity(4 * tets.len());
+    for tet in (0..tets.len()).filter(|&tet| keep(tet)) {
+        sides.extend((0..4).map(|local| Side::new(tets, tet, local)));
+    }
+    sides.sort_unstable();
+    sides
+}
+
+/// The sides of each distinct face, in order.
+pub(crate) fn by_face(sides: &[Side]) -> impl Iterator<Item = &[Side]> {
+    sides.chunk_by(Side::same_face)
+}

@@ -1,0 +1,39 @@
+//! Signed distances of simple solids and their smooth blends, negative inside.
+//!
+//! Source: I. Quilez, "Distance functions" and "Smooth minimum" (articles); the ellipsoid is only a bound of the
+//! distance, scaled from the unit ball, which is all that stuffing needs. Constant time.
+
+use glam::DVec3;
+
+/// A ball around the origin.
+pub(super) fn ball(p: DVec3, radius: f64) -> f64 {
+    p.length() - radius
+}
+
+/// An axis-aligned box around the origin.
+pub(super) fn cuboid(p: DVec3, half: DVec3) -> f64 {
+    let beyond = p.abs() - half;
+    beyond.max(DVec3::ZERO).length() + beyond.max_element().min(0.0)
+}
+
+/// A ring in the xy plane around the origin.
+pub(super) fn torus(p: DVec3, ring: f64, tube: f64) -> f64 {
+    let from_ring = (p.x * p.x + p.y * p.y).sqrt() - ring;
+    (from_ring * from_ring + p.z * p.z).sqrt() - tube
+}
+
+/// An axis-aligned ellipsoid; the result is between the distance and the distance in the direction of the center.
+pub(super) fn ellipsoid(p: DVec3, center: DVec3, radii: DVec3) -> f64 {
+    (((p - center) / radii).length() - 1.0) * radii.min_element()
+}
+
+/// The union of two solids with the crease between them filled over a width of about `k`.
+pub(super) fn smooth_union(a: f64, b: f64, k: f64) -> f64 {
+    let overlap = (k - (a - b).abs()).max(0.0);
+    a.min(b) - overlap * overlap / (4.0 * k)
+}
+
+/// The first solid without the second, the new edge rounded over a width of about `k`.
+pub(super) fn smooth_difference(a: f64, b: f64, k: f64) -> f64 {
+    -smooth_union(-a, b, k)
+}

@@ -1,0 +1,16 @@
+//! Meshes from formulas: boxes on a grid, and smooth solids filled by isosurface stuffing.
+//!
+//! Only `+`, `-`, `*`, `/`, square root, minimum, maximum and absolute value are used, so that the same call gives the
+//! same bits on every platform.
+
+mod distance;
+mod grid;
+mod search;
+mod shapes;
+mod stencil;
+mod stuffing;
+
+pub use grid::kuhn_box;
+pub use search::generate;
+pub use shapes::Shape;
+pub use stuffing::{Lattice, stuff};

@@ -1,0 +1,112 @@
+//! How isosurface stuffing fills one lattice tet: the stencils, with the rules for the diagonals.
+//!
+//! A lattice tet has corners inside (+), outside (-) or on the surface (0), and a cut point on each edge from + to -.
+//! What remains of it inside is a tet, a pyramid or a prism. Where a face with two + corners loses its - corner, a
+//! quadrilateral is left that two lattice tets share; both must choose the same diagonal, and the choice decides the
+//! dihedral angles. Each quadrilateral is the rest of a triangle with one long and two short edges:
+//!
+//! - the long edge is cut: the diagonal runs from the inside end of the long edge to the cut of the short one;
+//! - both short edges are cut: the *parity rule*. The ends of the long edge differ in one of the signs of their offset
+//!   from the lost corner, so exactly one of them exceeds it in an even number of coordinates. The diagonal starts there.
+//!
+//! In the prism with two + and two - corners the two shared diagonals then always have different ends, and only one
+//! diagonal of the third quadrilateral, which lies on the surface, makes three tets possible.
+//!
+//! Source: F. Labelle and J. R. Shewchuk, "Isosurface Stuffing: Fast Tetrahedral Meshes with Good Dihedral Angles",
+//! 2007, section 3 and figure 3. Constant time per tet.
+
+/// Where a lattice vertex lies.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Side {
+    Inside,
+    Surface,
+    Outside,
+}
+
+/// A corner of a lattice tet. Coordinates are in half spacings: all even for cube corners, all odd for cube centers.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Corner {
+    pub(super) vertex: usize,
+    pub(super) at: [i32; 3],
+    pub(super) side: Side,
+}
+
+/// A corner of an output tet: a lattice vertex, or the cut point between an inside and an outside one.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Node {
+    Vertex(Corner),
+    Cut(Corner, Corner),
+}
+
+/// Whether two vertices of one lattice tet are joined by a long edge: both cube corners or both cube centers.
+pub(super) fn is_long(a: Corner, b: Corner) -> bool {
+    (a.at[0] ^ b.at[0]) & 1 == 0
+}
+
+/// Whether the quadrilateral left of the face `p`, `q` (inside), `m` (outside) has its diagonal at `p`, not at `q`.
+fn diagonal_at_first(p: Corner, q: Corner, m: Corner) -> bool {
+    if is_long(p, q) {
+        (0..3).filter(|&axis| p.at[axis] > m.at[axis]).count() % 2 == 0
+    } else {
+        is_long(p, m)
+    }
+}
+
+/// Calls `emit` for each output tet of a lattice tet. The corners of the output come in no particular orientation.
+pub(super) fn fill(tet: [Corner; 4], mut emit: impl FnMut([Node; 4])) {
+    use Node::{Cut, Vertex};
+    let select = |side| {
+        let mut found = [tet[0]; 4];
+        let mut count = 0;
+        for corner in tet.into_iter().filter(|corner| corner.side == side) {
+            found[count] = corner;
+            count += 1;
+        }
+        (found, count)
+    };
+    let (inside, insides) = select(Side::Inside);
+    let (outside, outsides) = select(Side::Outside);
+    let (surface, _) = select(Side::Surface);
+
+    match (insides, outsides) {
+        (0, _) => {}
+        (_, 0) => emit(tet.map(Vertex)),
+        (1, _) => {
+            let p = inside[0];
+            emit(tet.map(|c| if c.side == Side::Outside { Cut(p, c) } else { Vertex(c) }));
+        }
+        (2, 1) => {
+            // A pyramid over the quadrilateral, with the surface vertex on top.
+            let (m, top) = (outside[0], Vertex(surface[0]));
+            let (p, q) = diagonal_first(inside[0], inside[1], m);
+            emit([Vertex(p), Vertex(q), Cut(q, m), top]);
+            emit([Vertex(p), Cut(q, m), Cut(p, m), top]);
+        }
+        (2, _) => {
+            let (m, n) = (outside[0], outside[1]);
+            let (p, q) = diagonal_first(inside[0], inside[1], m);
+            debug_assert!(diagonal_at_first(q, p, n), "the shared diagonals have different ends");
+            emit([Vertex(p), Cut(p, m), Cut(p, n), Cut(q, m)]);
+            emit([Vertex(p), Vertex(q), Cut(p, n), Cut(q, m)]);
+            emit([Vertex(q), Cut(q, m), Cut(q, n), Cut(p, n)]);
+        }
+        (_, _) => {
+            // One inside corner, `r`, is joined to the outside one by the long edge. Both its diagonals end there.
+            let m = outside[0];
+            let [p, q, r] = match [0, 1, 2].map(|i| is_long(inside[i], m)) {
+                [true, _, _] => [inside[1], inside[2], inside[0]],
+                [_, true, _] => [inside[0], inside[2], inside[1]],
+                _ => [inside[0], inside[1], inside[2]],
+            };
+            let (p, q) = diagonal_first(p, q, m);
+            emit([Vertex(r), Cut(p, m), Cut(q, m), Cut(r, m)]);
+            emit([Vertex(r), Vertex(p), Vertex(q), Cut(q, m)]);
+            emit([Vertex(r), Vertex(p), Cut(q, m), Cut(p, m)]);
+        }
+    }
+}
+
+/// The two inside corners of a quadrilateral, the one with the diagonal first.
+fn diagonal_first(p: Corner, q: Corner, m: Corner) -> (Corner, Corner) {
+    if diagonal_at_first(p, q, m) { (p, q) } else { (q, p) }
+}

@@ -1,0 +1,182 @@
+//! The boundary surface of a mesh: the faces that belong to one tet only, turned outward.
+//!
+//! All faces are sorted by their particles; those that occur once are the boundary. Cost: O(n log n).
+
+use glam::DVec3;
+
+use crate::faces::{by_face, outward_face, sorted_sides};
+use crate::{ParticleId, TetId, TetMesh};
+
+/// Triangles, counterclockwise when seen from outside, and the tet behind each.
+///
+/// The order is by tet, then by local face, the faces of a tet `[a, b, c, d]` being `acb`, `abd`, `adc`, `bcd`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Surface {
+    /// The corners of each triangle.
+    pub triangles: Vec<[ParticleId; 3]>,
+    /// The tet each triangle is a face of.
+    pub tets: Vec<TetId>,
+}
+
+impl TetMesh {
+    /// The boundary of the mesh. Faces with more than one tet are inside, whatever their orientation.
+    ///
+    /// # Panics
+    /// From 2³⁰ tets on.
+    ///
+    /// # Example
+    /// ```
+    /// use incise_mesh::{generate, glam::DVec3};
+    ///
+    /// let mesh = generate::kuhn_box([3, 2, 1], DVec3::ONE);
+    /// let surface = mesh.surface();
+    /// assert_eq!(surface.triangles.len(), 2 * 2 * (3 * 2 + 2 * 1 + 1 * 3));
+    /// assert_eq!(surface.euler_characteristic(), 2);
+    /// assert!((surface.volume(&mesh.positions) - 1.0).abs() < 1e-15);
+    /// ```
+    #[must_use]
+    pub fn surface(&self) -> Surface {
+        let sides = sorted_sides(&self.tets, |_| true);
+        let mut boundary: Vec<u32> =
+            by_face(&sides).filter(|sides| sides.len() == 1).map(|sides| sides[0].place()).collect();
+        boundary.sort_unstable();
+        Surface {
+            triangles: boundary
+                .iter()
+                .map(|&place| outward_face(self.tets[place as usize / 4], place as usize % 4))
+                .collect(),
+            tets: boundary.iter().map(|&place| TetId(place / 4)).collect(),
+        }
+    }
+}
+
+impl Surface {
+    /// The volume enclosed by the surface in m³, by the divergence theorem.
+    ///
+    /// # Panics
+    /// If a corner has no position.
+    #[must_use]
+    pub fn volume(&self, positions: &[DVec3]) -> f64 {
+        // Seen from a point of the surface instead of a far origin, the terms do not cancel.
+        let Some(origin) = self.triangles.first().map(|t| positions[t[0].index()]) else {
+            return 0.0;
+        };
+        let corner = |p: ParticleId| positions[p.index()] - origin;
+        self.triangles.iter().map(|&[a, b, c]| corner(a).cross(corner(b)).dot(corner(c))).sum::<f64>() / 6.0
+    }
+
+    /// Whether every directed edge is matched by one in the opposite direction: the surface has no rim.
+    #[must_use]
+    pub fn is_closed(&self) -> bool {
+        let mut forward = Vec::with_capacity(3 * self.triangles.len());
+        forward.extend(self.directed_edges());
+        let mut backward: Vec<_> = forward.iter().map(|&[a, b]| [b, a]).collect();
+        forward.sort_unstable();
+        backward.sort_unstable();
+        forward == backward
+    }
+
+    /// Whether the surface is closed and has no edge or particle where it touches itself: each edge has two triangles,
+    /// and the triangles at each particle form a single fan.
+    ///
+    /// # Panics
+    /// From 2³¹ triangles on.
+    #[must_use]
+    pub fn is_manifold(&self) -> bool {
+        let mut edges: Vec<_> = self.directed_edges().collect();
+        edges.sort_unstable();
+        let unique = edges.windows(2).all(|pair| pair[0] != pair[1]);
+        if !unique || !self.is_closed() {
+            return false;
+        }
+        // Around a particle, corner (p; a, b) is followed by the corner (p; b, c). One fan visits them all.
+        let mut corners = Vec::with_capacity(3 * self.triangles.len());
+        for &[a, b, c] in &self.triangles {
+            corners.extend([(a, b, c), (b, c, a), (c, a, b)]);
+        }
+        corners.sort_unstable();
+        corners.chunk_by(|s, t| s.0 == t.0).all(|fan| {
+            let start = fan[0].1;
+            let mut here = start;
+            let mut steps = 0;
+            loop {
+                let Ok(at) = fan.binary_search_by_key(&here, |corner| corner.1) else {
+                    return false;
+                };
+                here = fan[at].2;
+                steps += 1;
+                if here == start || steps > fan.len() {
+                    return steps == fan.len();
+                }
+            }
+        })
+    }
+
+    /// Vertices - edges + triangles: 2 for each sphere-like part, 0 for each torus-like one.
+    #[must_use]
+    #[expect(clippy::cast_possible_wrap, reason = "counts of things in memory")]
+    pub fn euler_characteristic(&self) -> isize {
+        let mut particles: Vec<_> = self.triangles.iter().flatten().copied().collect();
+        particles.sort_unstable();
+        particles.dedup();
+        let mut edges: Vec<_> = self.directed_edges().map(|[a, b]| [a.min(b), a.max(b)]).collect();
+        edges.sort_unstable();
+        edges.dedup();
+        particles.len() as isize - edges.len() as isize + self.triangles.len() as isize
+    }
+
+    fn directed_edges(&self) -> impl Iterator<Item = [ParticleId; 2]> {
+        self.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ids<const N: usize>(particles: [u32; N]) -> [ParticleId; N] {
+        particles.map(ParticleId)
+    }
+
+    #[test]
+    fn faces_of_one_tet_look_outward() {
+        let mesh =
+            TetMesh { positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z], tets: vec![ids([0, 1, 2, 3])] };
+        let surface = mesh.surface();
+        assert_eq!(surface.triangles, [ids([0, 2, 1]), ids([0, 1, 3]), ids([0, 3, 2]), ids([1, 2, 3])]);
+        assert_eq!(surface.tets, [TetId(0); 4]);
+        assert!((surface.volume(&mesh.positions) - 1.0 / 6.0).abs() < 1e-16);
+        assert!(surface.is_closed() && surface.is_manifold());
+    }
+
+    #[test]
+    fn shared_face_is_inside() {
+        let mesh = TetMesh {
+            positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE],
+            tets: vec![ids([0, 1, 2, 3]), ids([1, 2, 3, 4])],
+        };
+        let surface = mesh.surface();
+        assert_eq!(surface.triangles.len(), 6);
+        assert_eq!(surface.euler_characteristic(), 2);
+        assert!((surface.volume(&mesh.positions) - mesh.total_volume()).abs() < 1e-15);
+    }
+
+    #[test]
+    fn tets_that_share_only_a_particle_or_an_edge_are_closed_but_not_manifold() {
+        let corners = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, -DVec3::X, -DVec3::Y, -DVec3::Z];
+        let touching = [[0, 4, 6, 5], [0, 3, 4, 5]];
+        for second in touching {
+            let mesh = TetMesh { positions: corners.clone(), tets: vec![ids([0, 1, 2, 3]), ids(second)] };
+            let surface = mesh.surface();
+            assert!(surface.is_closed() && !surface.is_manifold());
+        }
+    }
+
+    #[test]
+    fn a_hole_is_noticed() {
+        let mesh = TetMesh { positions: vec![DVec3::ZERO; 4], tets: vec![ids([0, 1, 2, 3])] };
+        let mut surface = mesh.surface();
+        surface.triangles.pop();
+        assert!(!surface.is_closed() && !surface.is_manifold());
+    }
+}
