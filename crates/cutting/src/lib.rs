@@ -1,1 +1,53 @@
-//! stub
+//! Cutting tetrahedral meshes: planes and swept blades in, one [`CutDelta`] out.
+//!
+//! A [`CuttableMesh`] holds a mesh at rest. [`cut_plane`] cuts it with a whole plane at once; a [`Sweep`] moves a blade
+//! through it frame by frame. Both work where the blade is, in the body's present, deformed state, and cut the rest
+//! shape at the same fractions of its edges. Both change the mesh in place and return what they changed; nobody has to
+//! compare before and after.
+//!
+//! - Crossed edges get a particle, the tets around them are split by ordered bisection ([`split_tet`]): the mesh
+//!   conforms by construction, no tet is ever flat or inverted, volume is kept.
+//! - Crossings close to a particle move to it ([`CutOptions::snap`]), which keeps the new tets well shaped.
+//! - The body comes apart where faces are cut through and stays whole around the front of an unfinished stroke.
+//!
+//! ```
+//! use glam::DVec3;
+//! use incise_cutting::{CutOptions, CuttableMesh, Plane, cut_plane};
+//! use incise_mesh::generate::kuhn_box;
+//!
+//! let mut body = CuttableMesh::new(kuhn_box([4, 2, 2], DVec3::new(2.0, 1.0, 1.0)))?;
+//! let positions = body.mesh().positions.clone();
+//! let plane = Plane { point: DVec3::new(0.8, 0.0, 0.0), normal: DVec3::X };
+//! let delta = cut_plane(&mut body, &positions, &plane, &CutOptions::default())?;
+//! println!("{} tets cut into {}", delta.removed.len(), delta.added.len());
+//! assert_eq!(body.mesh().pieces().count, 2);
+//! # Ok::<(), incise_cutting::CutError>(())
+//! ```
+//!
+//! This crate knows nothing of constraints, solvers, colors or the GPU.
+
+mod bisect;
+mod cuttable;
+mod delta;
+mod error;
+mod meet;
+mod near;
+mod operation;
+mod options;
+mod plane;
+mod stars;
+mod surface;
+mod sweep;
+
+pub use bisect::{SplitEdge, split_tet};
+pub use cuttable::CuttableMesh;
+pub use delta::{AddedTet, CutDelta, EdgePoint, RelinkedTet, RemovedTet};
+pub use error::CutError;
+pub use options::CutOptions;
+pub use plane::{Plane, cut_plane};
+pub use sweep::Sweep;
+
+/// The example of the README, run as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

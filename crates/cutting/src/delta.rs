@@ -1,0 +1,137 @@
+//! [`CutDelta`]: everything a cut changed, the only way a cut leaves this crate.
+//!
+//! Mesh, solver, clusters and colors consume the same delta instead of comparing before and after. Particles are only
+//! ever appended. A cut tet's slot is taken over by its first child and the other children are appended, so tets stay
+//! dense and no other tet changes its number.
+
+use glam::DVec3;
+use incise_mesh::{ParticleId, TetId, TetMesh};
+
+/// A new particle on an edge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EdgePoint {
+    /// The ends of the edge; both have smaller ids than the new particle.
+    pub ends: [ParticleId; 2],
+    /// Where on the edge: 0 at the first end, 1 at the second. The same parameter interpolates rest position,
+    /// position, velocity and whatever else is carried by particles, so that mass, momentum and volume are kept.
+    pub parameter: f64,
+}
+
+impl EdgePoint {
+    /// The value at the point of a quantity carried by particles.
+    #[must_use]
+    pub fn interpolate(&self, values: &[DVec3]) -> DVec3 {
+        let [a, b] = self.ends.map(|p| values[p.index()]);
+        a + (b - a) * self.parameter
+    }
+}
+
+/// A tet as it was before it was cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RemovedTet {
+    /// Its slot, which its first child has taken over.
+    pub tet: TetId,
+    /// The corners it had.
+    pub corners: [ParticleId; 4],
+}
+
+/// A child of a cut tet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AddedTet {
+    /// Its slot.
+    pub tet: TetId,
+    /// The slot of the removed tet that it is a part of.
+    pub parent: TetId,
+    /// Its corners.
+    pub corners: [ParticleId; 4],
+    /// On which side of the cut it lies: the side the normal points to or the other one.
+    pub positive: bool,
+}
+
+/// A whole tet that now hangs on copies of some of its corners.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RelinkedTet {
+    /// Its slot.
+    pub tet: TetId,
+    /// Its corners before.
+    pub before: [ParticleId; 4],
+    /// Its corners now.
+    pub after: [ParticleId; 4],
+}
+
+/// Everything one cut changed.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CutDelta {
+    /// Number of particles before the cut; new ones follow: first the points, then the copies.
+    pub particles_before: usize,
+    /// Number of tets before the cut.
+    pub tets_before: usize,
+    /// New particles on edges: point `i` is particle `particles_before + i`.
+    pub points: Vec<EdgePoint>,
+    /// New particles where the body came apart, each a copy of the particle named here: copy `i` is particle
+    /// `particles_before + points.len() + i`.
+    pub copies: Vec<ParticleId>,
+    /// The cut tets, ascending.
+    pub removed: Vec<RemovedTet>,
+    /// Their children, ascending by parent, then by slot.
+    pub added: Vec<AddedTet>,
+    /// Tets that were not cut but have other corners now, ascending.
+    pub relinked: Vec<RelinkedTet>,
+    /// Particles that the surface was bent to by snapping.
+    pub snapped: usize,
+    /// The smallest volume of a child as a fraction of its parent's (1 if none was cut).
+    pub worst_volume_ratio: f64,
+}
+
+impl CutDelta {
+    /// Whether the cut changed nothing.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty() && self.copies.is_empty() && self.added.is_empty()
+    }
+
+    /// Number of particles after the cut.
+    #[must_use]
+    pub fn particles_after(&self) -> usize {
+        self.particles_before + self.points.len() + self.copies.len()
+    }
+
+    /// Number of tets after the cut.
+    #[must_use]
+    pub fn tets_after(&self) -> usize {
+        self.tets_before + self.added.len() - self.removed.len()
+    }
+
+    /// Extends a quantity carried by particles to the new ones: interpolated on edges, repeated for copies.
+    ///
+    /// # Panics
+    /// If `values` does not have an entry for each particle before the cut.
+    pub fn extend_particles(&self, values: &mut Vec<DVec3>) {
+        assert_eq!(
+            values.len(),
+            self.particles_before,
+            "one value for each particle before the cut"
+        );
+        for point in &self.points {
+            values.push(point.interpolate(values));
+        }
+        for source in &self.copies {
+            values.push(values[source.index()]);
+        }
+    }
+
+    /// Applies the delta to a copy of the mesh as it was before the cut.
+    ///
+    /// # Panics
+    /// If the mesh is not the one the delta was made from.
+    pub fn apply(&self, mesh: &mut TetMesh) {
+        self.extend_particles(&mut mesh.positions);
+        mesh.tets.resize(self.tets_after(), [ParticleId(0); 4]);
+        for added in &self.added {
+            mesh.tets[added.tet.index()] = added.corners;
+        }
+        for relinked in &self.relinked {
+            mesh.tets[relinked.tet.index()] = relinked.after;
+        }
+    }
+}

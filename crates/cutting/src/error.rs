@@ -1,0 +1,66 @@
+//! [`CutError`]: what can be wrong with a stroke.
+
+use incise_mesh::MeshError;
+
+/// Why a stroke was refused. Nothing has been changed when one of these is returned.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CutError {
+    /// The mesh to be cut is broken.
+    #[error("the mesh cannot be cut: {0}")]
+    Mesh(#[from] MeshError),
+    /// A number of the stroke is infinite or not a number.
+    #[error("{what} of the stroke is {value}: it must be finite")]
+    NonFinite {
+        /// The part of the stroke.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// The normal of a plane has no direction.
+    #[error("the plane's normal has length {length:e}: give it a direction")]
+    ZeroNormal {
+        /// The length of the normal.
+        length: f64,
+    },
+    /// A blade without length cannot cut.
+    #[error(
+        "the blade has {points} point(s) and length {length:e}: it needs at least two different points"
+    )]
+    ShortBlade {
+        /// Number of points of the polyline.
+        points: usize,
+        /// Its total length.
+        length: f64,
+    },
+    /// A blade changed its number of points during a stroke.
+    #[error(
+        "the blade had {before} points at the last pose and has {now} now: a stroke keeps its blade"
+    )]
+    BladeChanged {
+        /// Points at the last pose.
+        before: usize,
+        /// Points now.
+        now: usize,
+    },
+    /// Snap distance outside its range.
+    #[error("snap is {value}: it must lie between 0 and 0.25 of an edge")]
+    Snap {
+        /// The value given.
+        value: f64,
+    },
+    /// Tolerance outside its range.
+    #[error("tolerance is {value:e}: it must lie between 1e-12 and 0.01 of an edge")]
+    Tolerance {
+        /// The value given.
+        value: f64,
+    },
+    /// Positions do not belong to the mesh.
+    #[error("{given} positions were given for a mesh of {expected} particles")]
+    PositionCount {
+        /// Particles of the mesh.
+        expected: usize,
+        /// Positions given.
+        given: usize,
+    },
+}

@@ -1,0 +1,7 @@
+//! Strokes on generated meshes: every mesh checked after every cut, pieces against an independent count.
+
+#![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
+
+mod bodies;
+mod planes;
+mod sweeps;

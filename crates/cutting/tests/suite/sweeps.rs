@@ -1,0 +1,370 @@
+//! Blades swept through resting and moving bodies.
+
+use glam::DVec3;
+use incise_cutting::{CutError, CutOptions, CuttableMesh, Plane, Sweep, cut_plane};
+use incise_mesh::TetMesh;
+use incise_mesh::generate::{Shape, generate, kuhn_box};
+use proptest::prelude::*;
+
+use crate::bodies::{body, check_cut, jittered_box, noise, pieces_by_sign};
+
+fn options(snap: f64) -> CutOptions {
+    CutOptions {
+        snap,
+        ..CutOptions::default()
+    }
+}
+
+/// Moves a blade along a path of offsets in `frames` steps through a body whose particles are at `motion(rest, time)`,
+/// time going from 0 to 1. Checks everything after every frame.
+fn sweep(
+    body: &mut CuttableMesh,
+    blade: &[DVec3],
+    offset: impl Fn(f64) -> DVec3,
+    motion: impl Fn(DVec3, f64) -> DVec3,
+    frames: usize,
+    snap: f64,
+) {
+    let pose = |time| blade.iter().map(|x| *x + offset(time)).collect::<Vec<_>>();
+    let now = |mesh: &TetMesh, time| {
+        mesh.positions
+            .iter()
+            .map(|x| motion(*x, time))
+            .collect::<Vec<_>>()
+    };
+    let mut stroke = Sweep::new(body, &now(body.mesh(), 0.0), &pose(0.0), options(snap)).unwrap();
+    for frame in 1..=frames {
+        let time = frame as f64 / frames as f64;
+        let before = body.mesh().clone();
+        let delta = stroke
+            .advance(body, &now(&before, time), &pose(time))
+            .unwrap();
+        check_cut(&before, body, &delta);
+    }
+}
+
+fn still(x: DVec3, _: f64) -> DVec3 {
+    x
+}
+
+/// A long blade and its path, sweeping the whole plane around `center` that holds both.
+fn whole_plane(center: DVec3, along: DVec3, normal: DVec3) -> ([DVec3; 2], DVec3, DVec3) {
+    let along = (along - normal * along.dot(normal) / normal.length_squared()).normalize();
+    let path = normal.normalize().cross(along);
+    (
+        [center - along * 4.0, center + along * 4.0],
+        path * -3.0,
+        path * 3.0,
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(80))]
+
+    /// On a body at rest a blade swept through a plane does what the plane does at once.
+    #[test]
+    fn a_swept_plane_is_the_plane(
+        kind in 0_usize..6, seed in any::<u64>(), frames in 1_usize..40,
+        snap in prop::sample::select(vec![0.0, 0.05, 0.1, 0.2]),
+    ) {
+        let mesh = body(kind, seed);
+        let normal = DVec3::from_array([0, 1, 2].map(|k| noise(seed, k)));
+        let along = DVec3::from_array([3, 4, 5].map(|k| noise(seed, k)));
+        prop_assume!(normal.length() > 0.1 && normal.cross(along).length() > 0.1);
+        let center = mesh.positions.iter().sum::<DVec3>() / mesh.positions.len() as f64;
+        let (blade, from, to) = whole_plane(center, along, normal);
+
+        let mut swept = CuttableMesh::new(mesh.clone()).unwrap();
+        sweep(&mut swept, &blade, |t| from.lerp(to, t), still, frames, snap);
+        let mut at_once = CuttableMesh::new(mesh.clone()).unwrap();
+        cut_plane(&mut at_once, &mesh.positions, &Plane { point: center, normal }, &options(snap)).unwrap();
+
+        prop_assert_eq!(swept.mesh().pieces().count, at_once.mesh().pieces().count);
+        prop_assert_eq!(swept.mesh().tets.len(), at_once.mesh().tets.len());
+        let volumes = |body: &CuttableMesh| {
+            let mut volumes = body.mesh().pieces().volumes(body.mesh());
+            volumes.sort_by(f64::total_cmp);
+            volumes
+        };
+        for (a, b) in volumes(&swept).into_iter().zip(volumes(&at_once)) {
+            prop_assert!((a - b).abs() < 1e-9, "{} against {}", a, b);
+        }
+    }
+
+    /// A body that swings and bends meanwhile comes apart all the same, with no thread left between frames.
+    #[test]
+    fn a_moving_body(
+        kind in prop::sample::select(vec![1_usize, 2, 4]), seed in any::<u64>(), frames in 5_usize..60,
+        snap in prop::sample::select(vec![0.0, 0.1]),
+    ) {
+        let mesh = body(kind, seed);
+        let normal = DVec3::from_array([0, 1, 2].map(|k| noise(seed, k)));
+        let along = DVec3::from_array([3, 4, 5].map(|k| noise(seed, k)));
+        prop_assume!(normal.length() > 0.1 && normal.cross(along).length() > 0.1);
+        let center = mesh.positions.iter().sum::<DVec3>() / mesh.positions.len() as f64;
+        let (blade, from, to) = whole_plane(center, along, normal);
+        let swing = DVec3::from_array([6, 7, 8].map(|k| 0.2 * noise(seed, k)));
+        let motion = |x: DVec3, t: f64| {
+            let wave = 4.0 * t * (1.0 - t);
+            x + swing * wave + 0.1 * wave * DVec3::new(x.y * x.z, x.z * x.x, x.x * x.y)
+        };
+        let mut cut = CuttableMesh::new(mesh.clone()).unwrap();
+        sweep(&mut cut, &blade, |t| from.lerp(to, t), motion, frames, snap);
+        // Thick convex bodies come apart in two; chips at the rim may come off besides where the cut is curved.
+        let pieces = cut.mesh().pieces();
+        let mut volumes = pieces.volumes(cut.mesh());
+        volumes.sort_by(f64::total_cmp);
+        prop_assert!(pieces.count >= 2, "one piece is left");
+        let second = volumes[volumes.len() - 2];
+        prop_assert!(second > 0.01 * mesh.total_volume(), "the second piece has {second}");
+    }
+}
+
+/// The blade stops half-way: one piece. It goes on: two.
+#[test]
+fn half_way_and_on() {
+    let mut body = CuttableMesh::new(jittered_box(5, 0.2, 3)).unwrap();
+    let blade = [DVec3::new(0.45, -1.0, 0.0), DVec3::new(0.52, 2.0, 0.0)];
+    let pose = |z: f64| blade.map(|x| x + DVec3::Z * z);
+    let rest = |body: &CuttableMesh| body.mesh().positions.clone();
+    let mut stroke = Sweep::new(&body, &rest(&body), &pose(1.2), options(0.1)).unwrap();
+    for frame in 1..=24 {
+        let before = body.mesh().clone();
+        let delta = stroke
+            .advance(
+                &mut body,
+                &before.positions,
+                &pose(1.2 - 0.06 * f64::from(frame)),
+            )
+            .unwrap();
+        check_cut(&before, &body, &delta);
+        if frame == 12 {
+            assert_eq!(body.mesh().pieces().count, 1);
+            assert!(!body.mesh().positions.len().eq(&216), "but it has been cut");
+            // Standing still cuts nothing.
+            let before = body.mesh().clone();
+            let delta = stroke
+                .advance(&mut body, &before.positions, &pose(1.2 - 0.06 * 12.0))
+                .unwrap();
+            assert!(delta.is_empty());
+        }
+    }
+    assert_eq!(body.mesh().pieces().count, 2);
+}
+
+/// A second stroke from the other side meets the first and overlaps it by a tet.
+#[test]
+fn two_strokes_that_meet() {
+    for (snap, x, depth) in [
+        (0.0, 0.4, 0.77),
+        (0.1, 0.4, 0.913),
+        (0.1, 0.41371, 0.7),
+        (0.0, 0.5, 0.77),
+    ] {
+        let mut body = CuttableMesh::new(kuhn_box([4; 3], DVec3::ONE)).unwrap();
+        let blade = [DVec3::new(x, -1.0, 0.0), DVec3::new(x, 2.0, 0.0)];
+        sweep(
+            &mut body,
+            &blade,
+            |t| DVec3::Z * (1.3 - t * depth),
+            still,
+            10,
+            snap,
+        );
+        assert_eq!(body.mesh().pieces().count, 1);
+        sweep(
+            &mut body,
+            &blade,
+            |t| DVec3::Z * (1.2 * t - 0.3),
+            still,
+            10,
+            snap,
+        );
+        assert_eq!(
+            body.mesh().pieces().count,
+            2,
+            "snap {snap}, x {x}, depth {depth}"
+        );
+    }
+}
+
+/// Crossing strokes of half depth leave one piece, of full depth four.
+#[test]
+fn crossing_strokes() {
+    for (depth, pieces) in [(0.5, 1), (1.2, 4)] {
+        let mut body = CuttableMesh::new(jittered_box(5, 0.15, 11)).unwrap();
+        let first = [DVec3::new(0.47, -1.0, 1.1), DVec3::new(0.47, 2.0, 1.1)];
+        let second = [DVec3::new(-1.0, 0.53, 1.1), DVec3::new(2.0, 0.53, 1.1)];
+        sweep(
+            &mut body,
+            &first,
+            |t| DVec3::NEG_Z * t * depth,
+            still,
+            9,
+            0.1,
+        );
+        sweep(
+            &mut body,
+            &second,
+            |t| DVec3::NEG_Z * t * depth,
+            still,
+            9,
+            0.1,
+        );
+        assert_eq!(body.mesh().pieces().count, pieces);
+    }
+}
+
+/// Two strokes at the same time, each following the other's cuts, their fronts more than a tet apart.
+#[test]
+fn strokes_at_the_same_time() {
+    for (snap, lead) in [(0.1, -0.4), (0.1, 0.4), (0.0, 0.4)] {
+        let mut body = CuttableMesh::new(jittered_box(5, 0.15, 12)).unwrap();
+        let blades = [
+            [DVec3::new(0.47, -1.0, 1.6), DVec3::new(0.47, 2.0, 1.6)],
+            [
+                DVec3::new(-1.0, 0.53, 1.6 - lead),
+                DVec3::new(2.0, 0.53, 1.6 - lead),
+            ],
+        ];
+        let rest = body.mesh().positions.clone();
+        let mut strokes =
+            blades.map(|blade| Sweep::new(&body, &rest, &blade, options(snap)).unwrap());
+        for frame in 1..=22 {
+            for i in 0..2 {
+                let before = body.mesh().clone();
+                let pose = blades[i].map(|x| x - DVec3::Z * 0.1 * f64::from(frame));
+                let delta = strokes[i]
+                    .advance(&mut body, &before.positions, &pose)
+                    .unwrap();
+                check_cut(&before, &body, &delta);
+                strokes[1 - i].follow(&body, &delta);
+            }
+        }
+        assert_eq!(body.mesh().pieces().count, 4, "snap {snap}, lead {lead}");
+    }
+}
+
+/// A bent blade cuts a wedge out.
+#[test]
+fn a_bent_blade() {
+    let mut body = CuttableMesh::new(jittered_box(6, 0.1, 5)).unwrap();
+    let blade = [
+        DVec3::new(0.2, 0.0, 1.4),
+        DVec3::new(0.5, 0.0, 0.45),
+        DVec3::new(0.8, 0.0, 1.4),
+    ];
+    sweep(
+        &mut body,
+        &blade,
+        |t| DVec3::Y * (-0.2 + 1.4 * t),
+        still,
+        30,
+        0.1,
+    );
+    assert_eq!(body.mesh().pieces().count, 2);
+}
+
+/// A curved path: the blade sweeps a quarter of a circle around an edge of the box.
+#[test]
+fn a_curved_path() {
+    let mut body = CuttableMesh::new(jittered_box(6, 0.1, 6)).unwrap();
+    let blade = [DVec3::new(0.0, -1.0, 0.0), DVec3::new(0.0, 2.0, 0.0)];
+    let circle = |t: f64| {
+        let angle = std::f64::consts::FRAC_PI_2 * (1.2 * t - 0.1);
+        DVec3::new(angle.cos(), 0.0, angle.sin()) * 0.6
+    };
+    sweep(&mut body, &blade, circle, still, 40, 0.1);
+    assert_eq!(body.mesh().pieces().count, 2);
+    let smaller = body
+        .mesh()
+        .pieces()
+        .volumes(body.mesh())
+        .into_iter()
+        .fold(1.0, f64::min);
+    let quarter = std::f64::consts::PI * 0.36 / 4.0;
+    assert!(
+        (smaller / quarter - 1.0).abs() < 0.05,
+        "{smaller} against {quarter}"
+    );
+}
+
+/// A blade whose end stays inside cuts a slit: one piece, but a longer boundary.
+#[test]
+fn a_short_blade_cuts_a_slit() {
+    let mesh = kuhn_box([6; 3], DVec3::ONE);
+    let triangles = mesh.surface().triangles.len();
+    let mut body = CuttableMesh::new(mesh).unwrap();
+    let blade = [DVec3::new(0.45, 0.5, 1.2), DVec3::new(0.45, 2.0, 1.2)];
+    sweep(
+        &mut body,
+        &blade,
+        |t| DVec3::NEG_Z * t * 1.5,
+        still,
+        12,
+        0.1,
+    );
+    assert_eq!(body.mesh().pieces().count, 1);
+    assert!(body.mesh().surface().triangles.len() > triangles + 20);
+}
+
+/// A blade that only dips into a tet without meeting an edge, or misses, changes nothing.
+#[test]
+fn no_edge_no_cut() {
+    let mut body = CuttableMesh::new(kuhn_box([1; 3], DVec3::ONE)).unwrap();
+    let point = DVec3::new(0.5, 0.3, 0.1);
+    let blade = [point, point + DVec3::new(0.01, 0.01, 0.0)];
+    sweep(&mut body, &blade, |t| DVec3::Y * 0.02 * t, still, 3, 0.1);
+    sweep(&mut body, &blade, |t| DVec3::splat(5.0 + t), still, 3, 0.1);
+    assert_eq!(body.mesh().tets.len(), 6);
+}
+
+/// The liver of the main job, swinging, sliced by a long blade.
+#[test]
+fn a_swinging_liver() {
+    let mesh = generate(Shape::Liver, 2000).unwrap();
+    let x = 0.05;
+    let mut body = CuttableMesh::new(mesh.clone()).unwrap();
+    let blade = [DVec3::new(x, -2.0, 0.0), DVec3::new(x, 2.0, 0.0)];
+    let motion = |p: DVec3, t: f64| p + DVec3::new(0.05 * t * p.z, 0.0, -0.1 * t * p.x * p.x);
+    sweep(
+        &mut body,
+        &blade,
+        |t| DVec3::Z * (0.9 - 1.8 * t),
+        motion,
+        60,
+        0.1,
+    );
+    assert_eq!(
+        body.mesh().pieces().count,
+        pieces_by_sign(&mesh, |p| mesh.positions[p].x > x)
+    );
+}
+
+#[test]
+fn bad_blades_are_refused() {
+    let body = CuttableMesh::new(kuhn_box([1; 3], DVec3::ONE)).unwrap();
+    let positions = body.mesh().positions.clone();
+    let new = |blade: &[DVec3]| Sweep::new(&body, &positions, blade, CutOptions::default());
+    assert!(matches!(
+        new(&[DVec3::ZERO]),
+        Err(CutError::ShortBlade { points: 1, .. })
+    ));
+    assert!(matches!(
+        new(&[DVec3::ONE, DVec3::ONE]),
+        Err(CutError::ShortBlade { points: 2, .. })
+    ));
+    assert!(matches!(
+        new(&[DVec3::ONE, DVec3::NAN]),
+        Err(CutError::NonFinite { .. })
+    ));
+    let mut stroke = new(&[DVec3::ONE, DVec3::ZERO]).unwrap();
+    let mut body = body.clone();
+    let changed = stroke.advance(&mut body, &positions, &[DVec3::ONE; 3]);
+    assert!(matches!(
+        changed,
+        Err(CutError::BladeChanged { before: 2, now: 3 })
+    ));
+    let infinite = stroke.advance(&mut body, &positions, &[DVec3::ONE, DVec3::INFINITY]);
+    assert!(matches!(infinite, Err(CutError::NonFinite { .. })));
+}
