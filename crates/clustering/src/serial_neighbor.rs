@@ -26,7 +26,7 @@ use incise_graph::{ClusterId, Clustering, ConstraintGraph};
 /// use incise_clustering::serial_neighbor;
 /// use incise_graph::{ClusterId, ConstraintGraph};
 ///
-/// // A star with center 4: seed 0 takes the center, and the other leaves are left without a free neighbor.
+/// // A star with center 4: seed 0 takes the center, the other leaves find no free neighbor.
 /// let star = ConstraintGraph::from_edges(5, &[(4, 0), (4, 1), (4, 2), (4, 3)])?;
 /// let clustering = serial_neighbor(&star, NonZeroUsize::MIN.saturating_add(2));
 /// assert_eq!(clustering.labels(), [0, 1, 2, 3, 0].map(ClusterId));

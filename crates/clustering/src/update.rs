@@ -33,12 +33,13 @@ use crate::ClusteringError;
 /// use incise_clustering::update_local;
 /// use incise_graph::{ClusterId, Clustering};
 ///
-/// // Tets 0 to 3 in two clusters. Tet 1 is cut into four, tet 2 into three; 1 and 2 are used again.
+/// // Tets 0 to 3 in two clusters. Tet 1 is cut into four, tet 2 into three; both numbers are
+/// // used again.
 /// let mut clustering = Clustering::from_labels([0, 0, 1, 1].map(ClusterId).to_vec())?;
 /// let limit = NonZeroUsize::MIN.saturating_add(3);
 /// let new = update_local(&mut clustering, &[1, 2], &[0, 4, 7], &[1, 4, 5, 6, 2, 7, 8], limit)?;
 /// assert_eq!(new, [ClusterId(2), ClusterId(3)]);
-/// assert_eq!((clustering.size(ClusterId(0)), clustering.size(new[0]), clustering.size(new[1])), (1, 4, 3));
+/// assert_eq!([ClusterId(0), new[0], new[1]].map(|k| clustering.size(k)), [1, 4, 3]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn update_local(

@@ -44,7 +44,8 @@ proptest! {
         let members = clustering.members();
         let placed: Vec<Vec<u32>> = new.iter().map(|k| members.members(k.index()).to_vec()).collect();
         prop_assert_eq!(placed.iter().map(Vec::len).sum::<usize>(), values.len());
-        let expected: usize = pieces.iter().take(removed.len()).map(|&count| (count as usize).div_ceil(ks)).sum();
+        let parts = |&count: &u32| (count as usize).div_ceil(ks);
+        let expected: usize = pieces.iter().take(removed.len()).map(parts).sum();
         prop_assert_eq!(new.len(), expected);
         for (group, &c) in offsets.windows(2).zip(&removed) {
             // No new cluster mixes two groups.
@@ -72,7 +73,9 @@ proptest! {
         let new = update_local(&mut clustering, &[cut], &[0, 4], &[cut, 40, 41, 42], limit).unwrap();
         let clusters = ConstraintGraph::from_incidence(&after.quotient(&clustering));
         let numbers: Vec<u32> = new.iter().map(|k| k.0).collect();
-        extend_first_fit(&mut coloring, &numbers, |k, list| list.extend_from_slice(clusters.neighbors(k as usize)));
+        extend_first_fit(&mut coloring, &numbers, |k, list| {
+            list.extend_from_slice(clusters.neighbors(k as usize));
+        });
         coloring.verify(&clusters).unwrap();
         Schedule::new(&clustering, &coloring).check(&after).unwrap();
     }

@@ -27,7 +27,9 @@ use crate::first_fit::FirstFit;
 /// // A path 0 - 1 - 2; then vertex 1 is replaced and vertex 3 joins it.
 /// let mut coloring = Coloring::new([0, 1, 0].map(ColorId).to_vec());
 /// let after = ConstraintGraph::from_edges(4, &[(0, 1), (1, 3), (2, 3)])?;
-/// extend_first_fit(&mut coloring, &[1, 3], |v, list| list.extend_from_slice(after.neighbors(v as usize)));
+/// extend_first_fit(&mut coloring, &[1, 3], |v, list| {
+///     list.extend_from_slice(after.neighbors(v as usize));
+/// });
 /// coloring.verify(&after)?;
 /// assert_eq!(coloring.colors(), [0, 1, 0, 2].map(ColorId));
 /// # Ok::<(), incise_graph::GraphError>(())

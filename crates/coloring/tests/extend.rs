@@ -25,7 +25,9 @@ proptest! {
         let new: Vec<u32> = new.into_iter().collect();
         let before = greedy(&without(&graph, &new));
         let mut after = before.clone();
-        extend_first_fit(&mut after, &new, |v, list| list.extend_from_slice(graph.neighbors(v as usize)));
+        extend_first_fit(&mut after, &new, |v, list| {
+            list.extend_from_slice(graph.neighbors(v as usize));
+        });
         after.verify(&graph).unwrap();
         for v in (0..).take(graph.vertex_count()).filter(|v| !new.contains(v)) {
             prop_assert_eq!(after.color(v as usize), before.color(v as usize));
@@ -41,7 +43,9 @@ proptest! {
         let mut new: Vec<u32> = (0..).take(graph.vertex_count()).skip(kept).collect();
         new.reverse();
         let mut coloring = Coloring::new(greedy(&without(&graph, &new)).colors()[..kept].to_vec());
-        extend_first_fit(&mut coloring, &new, |v, list| list.extend_from_slice(graph.neighbors(v as usize)));
+        extend_first_fit(&mut coloring, &new, |v, list| {
+            list.extend_from_slice(graph.neighbors(v as usize));
+        });
         coloring.verify(&graph).unwrap();
     }
 }
