@@ -1,1 +1,7 @@
-//! stub
+//! Clusterings against a slow reading of the paper's algorithm, and local updates against
+//! recounting everything.
+
+#![expect(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
+mod serial_neighbor;
+mod update;

@@ -1,1 +1,8 @@
-//! stub
+//! Colorings against the sequential oracle, a slow model of the rounds, bounds and thread counts.
+
+#![expect(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
+mod extend;
+mod generators;
+mod oracle;
+mod rounds;

@@ -19,7 +19,7 @@ use crate::{Classes, ClusterId, GraphError};
 /// use incise_graph::Clustering;
 ///
 /// let mut clustering = Clustering::none(3);
-/// // Cut: constraint 1 goes; constraints 1 (its slot, used again) and 3 (appended) come, as one cluster.
+/// // A cut: constraint 1 goes; its slot is used again, and constraint 3 is appended, as one cluster.
 /// let old = clustering.remove(1);
 /// let new = clustering.new_cluster(1);
 /// clustering.assign(3, new);

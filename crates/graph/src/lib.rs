@@ -28,7 +28,7 @@
 //! schedule.check(&incidence)?;
 //! for color in 0..schedule.color_count() {
 //!     for slot in schedule.clusters(color) {
-//!         // These blocks touch different particles: run them in parallel, each block from front to back.
+//!         // These blocks share no particle: run them in parallel, each from front to back.
 //!         for &spring in schedule.constraints(slot) {
 //!             let _ends = incidence.particles_of(spring as usize);
 //!         }

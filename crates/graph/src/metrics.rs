@@ -41,7 +41,8 @@ impl ColoringMetrics {
     /// ```
     /// use incise_graph::{ColorId, Coloring, ColoringMetrics};
     ///
-    /// let metrics = ColoringMetrics::by_vertices(&Coloring::new([0, 0, 0, 1].map(ColorId).to_vec()));
+    /// let coloring = Coloring::new([0, 0, 0, 1].map(ColorId).to_vec());
+    /// let metrics = ColoringMetrics::by_vertices(&coloring);
     /// assert_eq!((metrics.colors, metrics.range, metrics.std, metrics.chi2), (2, 2, 1.0, 1.0));
     /// ```
     #[must_use]

@@ -39,8 +39,11 @@ proptest! {
         let n = incidence.constraint_count();
         prop_assert_eq!(graph.vertex_count(), n);
         for a in 0..n {
-            let expected: Vec<u32> =
-                (0u32..).zip(0..n).filter(|&(_, b)| b != a && share(&incidence, a, b)).map(|(id, _)| id).collect();
+            let expected: Vec<u32> = (0u32..)
+                    .zip(0..n)
+                    .filter(|&(_, b)| b != a && share(&incidence, a, b))
+                    .map(|(id, _)| id)
+                    .collect();
             prop_assert_eq!(graph.neighbors(a), &expected[..]);
         }
     }
@@ -80,7 +83,10 @@ proptest! {
     }
 
     #[test]
-    fn random_edits_keep_the_books((incidence, mut clustering) in clustered(), edits in vec((0usize..40, 0usize..40), 0..60)) {
+    fn random_edits_keep_the_books(
+        (incidence, mut clustering) in clustered(),
+        edits in vec((0usize..40, 0usize..40), 0..60),
+    ) {
         let limit = incidence.constraint_count().max(40);
         for (constraint, other) in edits {
             let known = |c: usize| c < clustering.constraint_count();

@@ -27,16 +27,25 @@ proptest! {
         expected.sort_unstable();
         let order: Vec<u32> = expected.iter().map(|&(_, _, c)| c).collect();
         prop_assert_eq!(schedule.order(), &order[..]);
-        let slots: Vec<u32> = (0..schedule.cluster_count()).flat_map(|s| schedule.constraints(s).to_vec()).collect();
+        let slots: Vec<u32> = (0..schedule.cluster_count())
+            .flat_map(|s| schedule.constraints(s).to_vec())
+            .collect();
         prop_assert_eq!(slots, &order[..]);
-        let colors: Vec<u32> =
-            (0..schedule.color_count()).flat_map(|c| schedule.color_constraints(c).to_vec()).collect();
+        let colors: Vec<u32> = (0..schedule.color_count())
+            .flat_map(|c| schedule.color_constraints(c).to_vec())
+            .collect();
         prop_assert_eq!(colors, order);
     }
 
     #[test]
-    fn check_agrees_with_the_coloring((clustering, coloring) in inputs(), arity in 1u32..4, particles in 4u32..30) {
-        let rows = (0u32..).zip(clustering.labels()).map(|(c, _)| (0..arity).map(move |i| (c * 7 + i) % particles));
+    fn check_agrees_with_the_coloring(
+        (clustering, coloring) in inputs(),
+        arity in 1u32..4,
+        particles in 4u32..30,
+    ) {
+        let rows = (0u32..)
+            .zip(clustering.labels())
+            .map(|(c, _)| (0..arity).map(move |i| (c * 7 + i) % particles));
         let incidence = Incidence::from_constraints(particles as usize, rows).unwrap();
         let proper = coloring.verify_incidence(&incidence.quotient(&clustering)).is_ok();
         prop_assert_eq!(Schedule::new(&clustering, &coloring).check(&incidence).is_ok(), proper);

@@ -1,0 +1,92 @@
+//! Algorithm 2, held to a word-by-word version of it and to what it promises.
+
+use std::num::NonZeroUsize;
+
+use incise_clustering::serial_neighbor;
+use incise_coloring::{greedy, scgc};
+use incise_graph::{ClusterId, Clustering, ConstraintGraph, Incidence, Schedule};
+use proptest::collection::{btree_set, vec};
+use proptest::prelude::*;
+
+/// Constraints of arity 1 to 4 on a few particles.
+fn incidences() -> impl Strategy<Value = Incidence> {
+    (4u32..40).prop_flat_map(|particles| {
+        vec(btree_set(0..particles, 1..=4), 0..60)
+            .prop_map(move |rows| Incidence::from_constraints(particles as usize, rows).unwrap())
+    })
+}
+
+/// The algorithm as printed, with sets for sets.
+fn as_printed(graph: &ConstraintGraph, ks: usize) -> Vec<Vec<u32>> {
+    let mut unclustered: Vec<u32> = (0..).take(graph.vertex_count()).collect(); // Line 1.
+    let mut clusters = Vec::new(); // Line 2.
+    for v in 0..graph.vertex_count() {
+        let Some(place) = unclustered.iter().position(|&u| u as usize == v) else {
+            continue;
+        }; // Lines 3-4.
+        let mut cluster = vec![unclustered.remove(place)]; // Lines 5-6.
+        let free: Vec<u32> = unclustered
+            .iter()
+            .copied()
+            .filter(|u| graph.neighbors(v).contains(u))
+            .collect(); // Line 7.
+        for &u in free.iter().take(ks - 1) {
+            // Lines 8-10.
+            cluster.push(u);
+            unclustered.retain(|&other| other != u);
+        }
+        clusters.push(cluster); // Line 11.
+    }
+    clusters
+}
+
+proptest! {
+    #[test]
+    fn equals_the_printed_algorithm(incidence in incidences(), ks in 1usize..12) {
+        let graph = ConstraintGraph::from_incidence(&incidence);
+        let clustering = serial_neighbor(&graph, NonZeroUsize::new(ks).unwrap());
+        clustering.check().unwrap();
+        prop_assert_eq!(&serial_neighbor(&graph, NonZeroUsize::new(ks).unwrap()), &clustering);
+        let expected = as_printed(&graph, ks);
+        prop_assert_eq!(clustering.cluster_count(), expected.len());
+        prop_assert_eq!(clustering.occupied(), expected.len());
+        prop_assert!(clustering.max_size() <= ks);
+        let found = clustering.members();
+        for (k, members) in expected.iter().enumerate() {
+            // The seed comes first in both and is the smallest member.
+            prop_assert_eq!(found.members(k), &members[..]);
+            let seed = members[0] as usize;
+            prop_assert!(members[1..].iter().all(|u| graph.neighbors(seed).contains(u)));
+        }
+        // A partition: every constraint in exactly one cluster.
+        prop_assert!(clustering.labels().iter().all(|&k| k != ClusterId::NONE));
+        prop_assert_eq!(clustering.sizes().iter().sum::<u32>() as usize, graph.vertex_count());
+    }
+
+    #[test]
+    fn size_one_is_no_clustering(incidence in incidences()) {
+        let graph = ConstraintGraph::from_incidence(&incidence);
+        prop_assert_eq!(serial_neighbor(&graph, NonZeroUsize::MIN), Clustering::none(graph.vertex_count()));
+    }
+
+    #[test]
+    fn clusters_can_be_colored_and_scheduled(incidence in incidences(), ks in 1usize..12) {
+        let graph = ConstraintGraph::from_incidence(&incidence);
+        let clustering = serial_neighbor(&graph, NonZeroUsize::new(ks).unwrap());
+        let quotient = graph.quotient(&clustering);
+        let coloring = scgc(&quotient).coloring;
+        prop_assert_eq!(&coloring, &greedy(&quotient));
+        coloring.verify_incidence(&incidence.quotient(&clustering)).unwrap();
+        prop_assert!(coloring.color_count() >= incidence.quotient(&clustering).clique_bound());
+        Schedule::new(&clustering, &coloring).check(&incidence).unwrap();
+    }
+}
+
+#[test]
+fn empty_graph() {
+    let none = ConstraintGraph::from_edges(0, &[]).unwrap();
+    assert_eq!(
+        serial_neighbor(&none, NonZeroUsize::MAX),
+        Clustering::none(0)
+    );
+}

@@ -1,0 +1,124 @@
+//! The colors each vertex may still get, a bit per color, as many words as its neighborhood asks
+//! for.
+//!
+//! A vertex with h neighbors of higher priority ends below color h, or at it, so its palette starts
+//! as {0, ..., h} (ECL-GC) and only ever shrinks. All palettes lie in one array. Words are atomics
+//! because several neighbors may remove colors from one palette in the same phase; removal
+//! commutes, so the result does not depend on who was first. `Relaxed` is enough: phases that read
+//! are separated from phases that write by the joins of the thread pool.
+
+use std::sync::atomic::AtomicU64;
+use std::sync::atomic::Ordering::Relaxed;
+
+/// One palette per vertex.
+#[derive(Debug)]
+pub(crate) struct Palettes {
+    offsets: Vec<u32>,
+    words: Vec<AtomicU64>,
+}
+
+impl Palettes {
+    /// Palette `v` holds the colors below `sizes[v]`, of which there must be at least one.
+    pub(crate) fn new(sizes: impl Iterator<Item = u32>) -> Self {
+        let mut offsets = vec![0];
+        let mut words = Vec::new();
+        for size in sizes {
+            let full = size as usize / 64;
+            words.extend((0..full).map(|_| AtomicU64::new(u64::MAX)));
+            if !size.is_multiple_of(64) {
+                words.push(AtomicU64::new((1 << (size % 64)) - 1));
+            }
+            // Fewer words than the graph has directed edges and vertices together, each below 2^32.
+            offsets.push(u32::try_from(words.len()).expect("palettes hold fewer than 2^32 words"));
+        }
+        Self { offsets, words }
+    }
+
+    fn words(&self, v: u32) -> &[AtomicU64] {
+        &self.words[self.offsets[v as usize] as usize..self.offsets[v as usize + 1] as usize]
+    }
+
+    /// May `v` still get `color`?
+    pub(crate) fn contains(&self, v: u32, color: u32) -> bool {
+        let word = self.words(v).get(color as usize / 64);
+        word.is_some_and(|word| word.load(Relaxed) >> (color % 64) & 1 == 1)
+    }
+
+    /// Takes `color` from `v`; nothing happens if it is not there.
+    pub(crate) fn remove(&self, v: u32, color: u32) {
+        if self.contains(v, color) {
+            self.words(v)[color as usize / 64].fetch_and(!(1 << (color % 64)), Relaxed);
+        }
+    }
+
+    /// The smallest color of `v`, which is known to be `from` or larger.
+    pub(crate) fn first(&self, v: u32, from: u32) -> u32 {
+        for (index, word) in (0..).zip(self.words(v)).skip(from as usize / 64) {
+            let bits = word.load(Relaxed);
+            if bits != 0 {
+                return index * 64 + bits.trailing_zeros();
+            }
+        }
+        unreachable!("vertex {v} has more colors than neighbors that can take them")
+    }
+
+    /// Have `u` and `v` no color in common?
+    pub(crate) fn disjoint(&self, u: u32, v: u32) -> bool {
+        let pairs = self.words(u).iter().zip(self.words(v));
+        pairs
+            .into_iter()
+            .all(|(a, b)| a.load(Relaxed) & b.load(Relaxed) == 0)
+    }
+
+    /// Takes from `v` all but its `count` smallest colors.
+    pub(crate) fn keep_first(&self, v: u32, count: u32) {
+        let mut room = count;
+        for word in self.words(v) {
+            let mut bits = word.load(Relaxed);
+            let held = bits.count_ones();
+            if held > room {
+                for _ in room..held {
+                    bits &= !(1 << (63 - bits.leading_zeros()));
+                }
+                word.store(bits, Relaxed);
+            }
+            room = room.saturating_sub(held);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn colors(palettes: &Palettes, v: u32) -> Vec<u32> {
+        (0..300)
+            .filter(|&color| palettes.contains(v, color))
+            .collect()
+    }
+
+    #[test]
+    fn sizes_around_words() {
+        let sizes = [1, 63, 64, 65, 128, 130];
+        let palettes = Palettes::new(sizes.into_iter());
+        for (v, size) in (0..).zip(sizes) {
+            assert_eq!(colors(&palettes, v), (0..size).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn palettes_shrink() {
+        let palettes = Palettes::new([130, 70, 2].into_iter());
+        for color in 0..65 {
+            palettes.remove(0, color);
+        }
+        palettes.remove(2, 99);
+        assert_eq!(palettes.first(0, 0), 65);
+        assert!(!palettes.disjoint(0, 1));
+        assert!(palettes.disjoint(0, 2));
+        palettes.keep_first(0, 3);
+        assert_eq!(colors(&palettes, 0), [65, 66, 67]);
+        palettes.keep_first(1, 66);
+        assert_eq!(colors(&palettes, 1), (0..66).collect::<Vec<_>>());
+    }
+}
