@@ -380,8 +380,7 @@ mod tests {
 
     #[test]
     fn dihedral_angles_keep_the_bound_for_any_function() {
-        for seed in 0..6 {
-            let scale = [0.7, 1.0, 1.7][seed as usize % 3];
+        for (seed, scale) in [(0, 0.7), (1, 1.0), (2, 1.7), (3, 0.7), (4, 1.0), (5, 1.7)] {
             let region = |p: DVec3| noise(p / scale, seed).max((p.abs() - 9.0).max_element());
             let lattice = Lattice::covering(
                 DVec3::splat(-9.0),
