@@ -99,7 +99,11 @@ impl CheckReport {
             Fault::Crowded { .. } => &mut self.crowded,
             Fault::Overlapping { .. } => &mut self.overlapping,
         } += 1;
-        if self.first.as_ref().is_none_or(|first| first.rank() > fault.rank()) {
+        if self
+            .first
+            .as_ref()
+            .is_none_or(|first| first.rank() > fault.rank())
+        {
             self.first = Some(fault);
         }
     }
@@ -124,7 +128,10 @@ impl fmt::Display for CheckReport {
             return write!(f, "no faults");
         };
         let kinds = [
-            (self.non_finite, "particles with a coordinate that is not finite"),
+            (
+                self.non_finite,
+                "particles with a coordinate that is not finite",
+            ),
             (self.out_of_range, "tets with a corner that does not exist"),
             (self.repeated, "tets with a repeated corner"),
             (self.non_positive, "tets that are flat or inverted"),
@@ -143,26 +150,61 @@ impl fmt::Display for CheckReport {
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NonFinite { particle, position: p } => {
-                write!(f, "particle {particle} is at ({}, {}, {}), correct its coordinates", p.x, p.y, p.z)
+            Self::NonFinite {
+                particle,
+                position: p,
+            } => {
+                write!(
+                    f,
+                    "particle {particle} is at ({}, {}, {}), correct its coordinates",
+                    p.x, p.y, p.z
+                )
             }
-            Self::OutOfRange { tet, corner, particles } => {
-                write!(f, "tet {tet} has the corner {corner} but there are only {particles} particles, from 0 on")
+            Self::OutOfRange {
+                tet,
+                corner,
+                particles,
+            } => {
+                write!(
+                    f,
+                    "tet {tet} has the corner {corner} but there are only {particles} particles, from 0 on"
+                )
             }
             Self::Repeated { tet, particle } => {
-                write!(f, "tet {tet} has particle {particle} twice, remove the tet or correct its corners")
+                write!(
+                    f,
+                    "tet {tet} has particle {particle} twice, remove the tet or correct its corners"
+                )
             }
             Self::NonPositive { tet, volume } if *volume < 0.0 => {
-                write!(f, "tet {tet} has the volume {volume:e} m³, exchange two of its corners")
+                write!(
+                    f,
+                    "tet {tet} has the volume {volume:e} m³, exchange two of its corners"
+                )
             }
             Self::NonPositive { tet, volume } => {
-                write!(f, "tet {tet} has the volume {volume:e} m³, remove it or move its corners")
+                write!(
+                    f,
+                    "tet {tet} has the volume {volume:e} m³, remove it or move its corners"
+                )
             }
-            Self::Crowded { face: [a, b, c], tets } => {
-                write!(f, "face ({a}, {b}, {c}) has {tets} tets, remove all but two")
+            Self::Crowded {
+                face: [a, b, c],
+                tets,
+            } => {
+                write!(
+                    f,
+                    "face ({a}, {b}, {c}) has {tets} tets, remove all but two"
+                )
             }
-            Self::Overlapping { face: [a, b, c], tets: [t, u] } => {
-                write!(f, "tets {t} and {u} lie on the same side of face ({a}, {b}, {c}), remove or turn one")
+            Self::Overlapping {
+                face: [a, b, c],
+                tets: [t, u],
+            } => {
+                write!(
+                    f,
+                    "tets {t} and {u} lie on the same side of face ({a}, {b}, {c}), remove or turn one"
+                )
             }
         }
     }
@@ -195,7 +237,11 @@ impl TetMesh {
             return Err(MeshError::Empty);
         }
         let report = self.check_report();
-        if report.is_sound() { Ok(()) } else { Err(MeshError::Faulty(Box::new(report))) }
+        if report.is_sound() {
+            Ok(())
+        } else {
+            Err(MeshError::Faulty(Box::new(report)))
+        }
     }
 
     /// Counts every breach of every rule. A mesh without tets breaks none.
@@ -207,10 +253,15 @@ impl TetMesh {
         let mut report = CheckReport::default();
         for (p, &position) in self.positions.iter().enumerate() {
             if !position.is_finite() {
-                report.note(Fault::NonFinite { particle: ParticleId::new(p), position });
+                report.note(Fault::NonFinite {
+                    particle: ParticleId::new(p),
+                    position,
+                });
             }
         }
-        let sound: Vec<bool> = (0..self.tets.len()).map(|t| self.check_tet(TetId::new(t), &mut report)).collect();
+        let sound: Vec<bool> = (0..self.tets.len())
+            .map(|t| self.check_tet(TetId::new(t), &mut report))
+            .collect();
 
         let sides = sorted_sides(&self.tets, |t| sound[t]);
         for face in by_face(&sides) {
@@ -218,13 +269,22 @@ impl TetMesh {
                 [_] => {}
                 [s, t] => {
                     let turns = [s, t].map(|side| {
-                        is_ascending_cycle(outward_face(self.tets[side.tet().index()], side.local()))
+                        is_ascending_cycle(outward_face(
+                            self.tets[side.tet().index()],
+                            side.local(),
+                        ))
                     });
                     if turns[0] == turns[1] {
-                        report.note(Fault::Overlapping { face: s.face(), tets: [s.tet(), t.tet()] });
+                        report.note(Fault::Overlapping {
+                            face: s.face(),
+                            tets: [s.tet(), t.tet()],
+                        });
                     }
                 }
-                _ => report.note(Fault::Crowded { face: face[0].face(), tets: face.len() }),
+                _ => report.note(Fault::Crowded {
+                    face: face[0].face(),
+                    tets: face.len(),
+                }),
             }
         }
         report
@@ -235,11 +295,18 @@ impl TetMesh {
         let corners = self.tets[tet.index()];
         let particles = self.positions.len();
         if let Some(&corner) = corners.iter().find(|c| c.index() >= particles) {
-            report.note(Fault::OutOfRange { tet, corner, particles });
+            report.note(Fault::OutOfRange {
+                tet,
+                corner,
+                particles,
+            });
             return false;
         }
         if let Some(i) = (1..4).find(|&i| corners[..i].contains(&corners[i])) {
-            report.note(Fault::Repeated { tet, particle: corners[i] });
+            report.note(Fault::Repeated {
+                tet,
+                particle: corners[i],
+            });
             return false;
         }
         let positions = self.corners(tet);
@@ -247,7 +314,10 @@ impl TetMesh {
         if positions.iter().all(|p| p.is_finite()) {
             let orientation = orientation(positions);
             if orientation.is_nan() || orientation <= 0.0 {
-                report.note(Fault::NonPositive { tet, volume: orientation / 6.0 });
+                report.note(Fault::NonPositive {
+                    tet,
+                    volume: orientation / 6.0,
+                });
             }
         }
         true

@@ -49,7 +49,9 @@ pub enum MeshError {
     },
 
     /// A field (named values per particle or per cell) with the wrong number of values.
-    #[error("field {name:?} has {found} values but {expected} are needed: give one for each element")]
+    #[error(
+        "field {name:?} has {found} values but {expected} are needed: give one for each element"
+    )]
     FieldLength {
         /// The name of the field.
         name: String,

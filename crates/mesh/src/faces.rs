@@ -33,13 +33,19 @@ impl Side {
     }
 
     /// Position of the side in the order by tet, then local face.
-    #[expect(clippy::cast_possible_truncation, reason = "the low 32 bits are the place")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "the low 32 bits are the place"
+    )]
     pub(crate) fn place(self) -> u32 {
         self.0 as u32
     }
 
     /// The particles of the face in ascending order.
-    #[expect(clippy::cast_possible_truncation, reason = "takes one 32-bit lane at a time")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "takes one 32-bit lane at a time"
+    )]
     pub(crate) fn face(self) -> [ParticleId; 3] {
         [96, 64, 32].map(|shift| ParticleId((self.0 >> shift) as u32))
     }

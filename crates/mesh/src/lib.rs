@@ -5,6 +5,7 @@ mod error;
 mod faces;
 pub mod generate;
 mod ids;
+pub mod io;
 mod orientation;
 mod pieces;
 mod quality;

@@ -29,7 +29,11 @@ use crate::{TetId, TetMesh};
 /// ```
 #[must_use]
 pub fn orientation([a, b, c, d]: [DVec3; 4]) -> f64 {
-    let [a, b, c, d] = [a, b, c, d].map(|p| Coord3D { x: p.x, y: p.y, z: p.z });
+    let [a, b, c, d] = [a, b, c, d].map(|p| Coord3D {
+        x: p.x,
+        y: p.y,
+        z: p.z,
+    });
     // The predicate calls a tet positive whose last corner lies below the first three: the opposite of ours.
     -orient3d(a, b, c, d)
 }
@@ -74,7 +78,12 @@ mod tests {
 
     #[test]
     fn agrees_under_every_permutation_of_the_corners() {
-        let corners = [dvec3(0.1, 0.1, 0.1), dvec3(0.2, 0.2, 0.2), dvec3(0.3, 0.3, 0.3 + 1e-17), dvec3(0.7, 0.3, 0.9)];
+        let corners = [
+            dvec3(0.1, 0.1, 0.1),
+            dvec3(0.2, 0.2, 0.2),
+            dvec3(0.3, 0.3, 0.3 + 1e-17),
+            dvec3(0.7, 0.3, 0.9),
+        ];
         let reference = orientation(corners).signum();
         let even = [[1, 2, 0, 3], [1, 0, 3, 2], [3, 2, 1, 0]];
         for order in even {
@@ -86,11 +95,20 @@ mod tests {
     fn only_negative_tets_are_flipped() {
         let ids = |tet: [u32; 4]| tet.map(ParticleId);
         let mut mesh = TetMesh {
-            positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, DVec3::X + DVec3::Y],
+            positions: vec![
+                DVec3::ZERO,
+                DVec3::X,
+                DVec3::Y,
+                DVec3::Z,
+                DVec3::X + DVec3::Y,
+            ],
             tets: vec![ids([0, 1, 2, 3]), ids([0, 2, 1, 3]), ids([0, 1, 2, 4])],
         };
         assert_eq!(mesh.orient_positively(), 1);
-        assert_eq!(mesh.tets, [ids([0, 1, 2, 3]), ids([0, 2, 3, 1]), ids([0, 1, 2, 4])]);
+        assert_eq!(
+            mesh.tets,
+            [ids([0, 1, 2, 3]), ids([0, 2, 3, 1]), ids([0, 1, 2, 4])]
+        );
         assert_eq!(mesh.orient_positively(), 0);
     }
 }

@@ -42,7 +42,10 @@ impl TetMesh {
                 sets.unite(a.0, other.0);
             }
         }
-        Pieces::number(self.tets.iter().map(|tet| sets.root(tet[0].0)), self.positions.len())
+        Pieces::number(
+            self.tets.iter().map(|tet| sets.root(tet[0].0)),
+            self.positions.len(),
+        )
     }
 
     /// The pieces that are solid throughout: tets are connected when they share a face.
@@ -59,7 +62,10 @@ impl TetMesh {
                 sets.unite(pair[0].tet().0, pair[1].tet().0);
             }
         }
-        Pieces::number((0..self.tets.len()).map(|t| sets.root(TetId::new(t).0)), self.tets.len())
+        Pieces::number(
+            (0..self.tets.len()).map(|t| sets.root(TetId::new(t).0)),
+            self.tets.len(),
+        )
     }
 }
 
@@ -100,7 +106,10 @@ impl Pieces {
                 *label
             })
             .collect();
-        Self { labels, count: count as usize }
+        Self {
+            labels,
+            count: count as usize,
+        }
     }
 }
 
@@ -110,7 +119,9 @@ struct Sets {
 
 impl Sets {
     fn new(count: usize) -> Self {
-        Self { parents: (0..count).map(|i| TetId::new(i).0).collect() }
+        Self {
+            parents: (0..count).map(|i| TetId::new(i).0).collect(),
+        }
     }
 
     fn root(&mut self, mut element: u32) -> u32 {
@@ -138,13 +149,26 @@ mod tests {
     #[test]
     fn an_edge_holds_particles_together_but_not_faces() {
         let mesh = TetMesh {
-            positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, -DVec3::X, -DVec3::Y],
+            positions: vec![
+                DVec3::ZERO,
+                DVec3::X,
+                DVec3::Y,
+                DVec3::Z,
+                -DVec3::X,
+                -DVec3::Y,
+            ],
             tets: vec![[0, 1, 2, 3].map(ParticleId), [0, 4, 5, 3].map(ParticleId)],
         };
         let pieces = mesh.pieces();
-        assert_eq!((pieces.count, pieces.labels.as_slice()), (1, [0, 0].as_slice()));
+        assert_eq!(
+            (pieces.count, pieces.labels.as_slice()),
+            (1, [0, 0].as_slice())
+        );
         let strict = mesh.face_pieces();
-        assert_eq!((strict.count, strict.labels.as_slice()), (2, [0, 1].as_slice()));
+        assert_eq!(
+            (strict.count, strict.labels.as_slice()),
+            (2, [0, 1].as_slice())
+        );
         assert_eq!(strict.volumes(&mesh), [1.0 / 6.0; 2]);
         assert_eq!(strict.sizes(), [1, 1]);
     }
@@ -152,7 +176,10 @@ mod tests {
     #[test]
     fn labels_follow_the_order_of_the_tets() {
         let tets = [[8, 9, 10, 11], [0, 1, 2, 3], [11, 12, 13, 14], [4, 5, 6, 7]];
-        let mesh = TetMesh { positions: vec![DVec3::ZERO; 15], tets: tets.map(|t| t.map(ParticleId)).to_vec() };
+        let mesh = TetMesh {
+            positions: vec![DVec3::ZERO; 15],
+            tets: tets.map(|t| t.map(ParticleId)).to_vec(),
+        };
         assert_eq!(mesh.pieces().labels, [0, 1, 0, 2]);
         assert_eq!(mesh.face_pieces().labels, [0, 1, 2, 3]);
     }

@@ -77,14 +77,19 @@ pub fn tet_quality(corners: [DVec3; 4]) -> TetQuality {
 
     let inradius = 3.0 * volume / areas.iter().sum::<f64>();
     let [u, v, w] = [b - a, c - a, d - a];
-    let circumcenter =
-        (u.length_squared() * v.cross(w) + v.length_squared() * w.cross(u) + w.length_squared() * u.cross(v))
-            / (12.0 * volume);
+    let circumcenter = (u.length_squared() * v.cross(w)
+        + v.length_squared() * w.cross(u)
+        + w.length_squared() * u.cross(v))
+        / (12.0 * volume);
     TetQuality {
         min_altitude: 3.0 * volume / largest_area,
         min_dihedral: min_angle,
         max_dihedral: max_angle,
-        radius_ratio: if volume == 0.0 { 0.0 } else { 3.0 * inradius / circumcenter.length() },
+        radius_ratio: if volume == 0.0 {
+            0.0
+        } else {
+            3.0 * inradius / circumcenter.length()
+        },
     }
 }
 

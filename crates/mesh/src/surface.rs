@@ -37,8 +37,10 @@ impl TetMesh {
     #[must_use]
     pub fn surface(&self) -> Surface {
         let sides = sorted_sides(&self.tets, |_| true);
-        let mut boundary: Vec<u32> =
-            by_face(&sides).filter(|sides| sides.len() == 1).map(|sides| sides[0].place()).collect();
+        let mut boundary: Vec<u32> = by_face(&sides)
+            .filter(|sides| sides.len() == 1)
+            .map(|sides| sides[0].place())
+            .collect();
         boundary.sort_unstable();
         Surface {
             triangles: boundary
@@ -62,7 +64,11 @@ impl Surface {
             return 0.0;
         };
         let corner = |p: ParticleId| positions[p.index()] - origin;
-        self.triangles.iter().map(|&[a, b, c]| corner(a).cross(corner(b)).dot(corner(c))).sum::<f64>() / 6.0
+        self.triangles
+            .iter()
+            .map(|&[a, b, c]| corner(a).cross(corner(b)).dot(corner(c)))
+            .sum::<f64>()
+            / 6.0
     }
 
     /// Whether every directed edge is matched by one in the opposite direction: the surface has no rim.
@@ -119,14 +125,19 @@ impl Surface {
         let mut particles: Vec<_> = self.triangles.iter().flatten().copied().collect();
         particles.sort_unstable();
         particles.dedup();
-        let mut edges: Vec<_> = self.directed_edges().map(|[a, b]| [a.min(b), a.max(b)]).collect();
+        let mut edges: Vec<_> = self
+            .directed_edges()
+            .map(|[a, b]| [a.min(b), a.max(b)])
+            .collect();
         edges.sort_unstable();
         edges.dedup();
         particles.len() as isize - edges.len() as isize + self.triangles.len() as isize
     }
 
     fn directed_edges(&self) -> impl Iterator<Item = [ParticleId; 2]> {
-        self.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
+        self.triangles
+            .iter()
+            .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
     }
 }
 
@@ -140,10 +151,20 @@ mod tests {
 
     #[test]
     fn faces_of_one_tet_look_outward() {
-        let mesh =
-            TetMesh { positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z], tets: vec![ids([0, 1, 2, 3])] };
+        let mesh = TetMesh {
+            positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z],
+            tets: vec![ids([0, 1, 2, 3])],
+        };
         let surface = mesh.surface();
-        assert_eq!(surface.triangles, [ids([0, 2, 1]), ids([0, 1, 3]), ids([0, 3, 2]), ids([1, 2, 3])]);
+        assert_eq!(
+            surface.triangles,
+            [
+                ids([0, 2, 1]),
+                ids([0, 1, 3]),
+                ids([0, 3, 2]),
+                ids([1, 2, 3])
+            ]
+        );
         assert_eq!(surface.tets, [TetId(0); 4]);
         assert!((surface.volume(&mesh.positions) - 1.0 / 6.0).abs() < 1e-16);
         assert!(surface.is_closed() && surface.is_manifold());
@@ -163,10 +184,21 @@ mod tests {
 
     #[test]
     fn tets_that_share_only_a_particle_or_an_edge_are_closed_but_not_manifold() {
-        let corners = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, -DVec3::X, -DVec3::Y, -DVec3::Z];
+        let corners = vec![
+            DVec3::ZERO,
+            DVec3::X,
+            DVec3::Y,
+            DVec3::Z,
+            -DVec3::X,
+            -DVec3::Y,
+            -DVec3::Z,
+        ];
         let touching = [[0, 4, 6, 5], [0, 3, 4, 5]];
         for second in touching {
-            let mesh = TetMesh { positions: corners.clone(), tets: vec![ids([0, 1, 2, 3]), ids(second)] };
+            let mesh = TetMesh {
+                positions: corners.clone(),
+                tets: vec![ids([0, 1, 2, 3]), ids(second)],
+            };
             let surface = mesh.surface();
             assert!(surface.is_closed() && !surface.is_manifold());
         }
@@ -174,7 +206,10 @@ mod tests {
 
     #[test]
     fn a_hole_is_noticed() {
-        let mesh = TetMesh { positions: vec![DVec3::ZERO; 4], tets: vec![ids([0, 1, 2, 3])] };
+        let mesh = TetMesh {
+            positions: vec![DVec3::ZERO; 4],
+            tets: vec![ids([0, 1, 2, 3])],
+        };
         let mut surface = mesh.surface();
         surface.triangles.pop();
         assert!(!surface.is_closed() && !surface.is_manifold());

@@ -40,7 +40,9 @@ impl TetMesh {
     /// The sum of the signed volumes of all tets in m³.
     #[must_use]
     pub fn total_volume(&self) -> f64 {
-        (0..self.tets.len()).map(|t| self.volume(TetId::new(t))).sum()
+        (0..self.tets.len())
+            .map(|t| self.volume(TetId::new(t)))
+            .sum()
     }
 }
 

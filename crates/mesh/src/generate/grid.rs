@@ -47,8 +47,13 @@ pub fn kuhn_box(cells: [usize; 3], size: DVec3) -> TetMesh {
         for j in 0..=ny {
             for i in 0..=nx {
                 // Multiplying before dividing puts the far sides exactly on `size`.
-                let coordinate = |axis: usize, n: usize| size[axis] * (n as f64) / (cells[axis].max(1) as f64);
-                mesh.positions.push(DVec3::new(coordinate(0, i), coordinate(1, j), coordinate(2, k)));
+                let coordinate =
+                    |axis: usize, n: usize| size[axis] * (n as f64) / (cells[axis].max(1) as f64);
+                mesh.positions.push(DVec3::new(
+                    coordinate(0, i),
+                    coordinate(1, j),
+                    coordinate(2, k),
+                ));
             }
         }
     }
@@ -78,9 +83,11 @@ mod tests {
 
     #[test]
     fn boxes_are_exact_sound_and_closed() {
-        for (cells, size) in
-            [([1, 1, 1], DVec3::ONE), ([3, 4, 5], dvec3(0.3, 0.7, 1.1)), ([7, 1, 2], dvec3(10.0, 0.1, 3.0))]
-        {
+        for (cells, size) in [
+            ([1, 1, 1], DVec3::ONE),
+            ([3, 4, 5], dvec3(0.3, 0.7, 1.1)),
+            ([7, 1, 2], dvec3(10.0, 0.1, 3.0)),
+        ] {
             let mesh = kuhn_box(cells, size);
             mesh.check().expect("the box is sound");
             let surface = mesh.surface();

@@ -5,12 +5,14 @@
 
 mod distance;
 mod grid;
+mod lattice;
 mod search;
 mod shapes;
 mod stencil;
 mod stuffing;
 
 pub use grid::kuhn_box;
+pub use lattice::Lattice;
 pub use search::generate;
 pub use shapes::Shape;
-pub use stuffing::{Lattice, stuff};
+pub use stuffing::stuff;

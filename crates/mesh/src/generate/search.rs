@@ -22,7 +22,7 @@ const SPACINGS: usize = 14;
 /// A mesh of the shape with `tets` tets to within 2 %.
 ///
 /// The mesh is sound ([`TetMesh::check`]), a single piece also by faces, with a manifold surface of the shape's
-/// topology and dihedral angles between 10.7 and 164.8 degrees. Deterministic on all platforms.
+/// topology. Deterministic on all platforms.
 ///
 /// # Errors
 /// [`MeshError::TetCount`] for fewer than [`Shape::smallest_tet_count`] or more than a million tets.
@@ -37,8 +37,12 @@ const SPACINGS: usize = 14;
 /// # Ok::<(), incise_mesh::MeshError>(())
 /// ```
 pub fn generate(shape: Shape, tets: usize) -> Result<TetMesh, MeshError> {
-    let refused =
-        || MeshError::TetCount { shape: shape.name(), wanted: tets, smallest: shape.smallest_tet_count(), largest: LARGEST };
+    let refused = || MeshError::TetCount {
+        shape: shape.name(),
+        wanted: tets,
+        smallest: shape.smallest_tet_count(),
+        largest: LARGEST,
+    };
     if !(shape.smallest_tet_count()..=LARGEST).contains(&tets) {
         return Err(refused());
     }
@@ -62,7 +66,11 @@ pub fn generate(shape: Shape, tets: usize) -> Result<TetMesh, MeshError> {
                 break;
             }
             let guess = spacing * cube_root(count as f64 / tets as f64).clamp(0.7, 1.4);
-            spacing = if fine < guess && guess < coarse { guess } else { 0.5 * (fine + coarse) };
+            spacing = if fine < guess && guess < coarse {
+                guess
+            } else {
+                0.5 * (fine + coarse)
+            };
         }
     }
     Err(refused())
@@ -79,7 +87,12 @@ fn is_faithful(mesh: &TetMesh, shape: Shape) -> bool {
 /// The points of the additive sequence of Roberts (2018), which fills the unit cube evenly.
 fn shift(n: u32) -> DVec3 {
     let n = f64::from(n) + 0.5;
-    (n * dvec3(0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_3)).fract()
+    (n * dvec3(
+        0.819_172_513_396_164_4,
+        0.671_043_606_703_789_2,
+        0.549_700_477_901_970_3,
+    ))
+    .fract()
 }
 
 /// The cube root of a positive number by Newton's method, since the library function may differ between platforms.

@@ -31,7 +31,14 @@ pub enum Shape {
 
 impl Shape {
     /// All shapes.
-    pub const ALL: [Self; 6] = [Self::Sphere, Self::Box, Self::Beam, Self::Torus, Self::Plate, Self::Liver];
+    pub const ALL: [Self; 6] = [
+        Self::Sphere,
+        Self::Box,
+        Self::Beam,
+        Self::Torus,
+        Self::Plate,
+        Self::Liver,
+    ];
 
     /// The names of all shapes, in the order of [`ALL`](Self::ALL).
     pub const NAMES: [&str; 6] = ["sphere", "box", "beam", "torus", "plate", "liver"];
@@ -53,7 +60,10 @@ impl Shape {
         Self::ALL
             .into_iter()
             .find(|shape| shape.name() == name)
-            .ok_or_else(|| MeshError::UnknownShape { name: name.to_owned(), known: Self::NAMES.join(", ") })
+            .ok_or_else(|| MeshError::UnknownShape {
+                name: name.to_owned(),
+                known: Self::NAMES.join(", "),
+            })
     }
 
     /// The name of the shape, in lower case.
@@ -103,7 +113,7 @@ impl Shape {
     /// The volume in m³, to about a percent.
     pub(super) const fn volume(self) -> f64 {
         match self {
-            Self::Sphere => 0.5236,
+            Self::Sphere => 0.52,
             Self::Box => 1.0,
             Self::Beam => 0.0625,
             Self::Torus => 0.1554,

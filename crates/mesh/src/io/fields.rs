@@ -1,0 +1,54 @@
+//! Named values per particle or per cell, to be written beside a mesh.
+
+use glam::DVec3;
+
+use crate::MeshError;
+
+/// Values with a name, such as `velocity` in m/s. Values that are not finite are written as they are.
+#[derive(Clone, Copy, Debug)]
+pub struct Field<'a> {
+    /// The name shown in viewers.
+    pub name: &'a str,
+    /// One value for each element.
+    pub values: Values<'a>,
+}
+
+/// The values of a field.
+#[derive(Clone, Copy, Debug)]
+pub enum Values<'a> {
+    /// A number for each element.
+    Scalars(&'a [f64]),
+    /// A vector for each element.
+    Vectors(&'a [DVec3]),
+}
+
+/// The fields of a file; none by default.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Fields<'a> {
+    /// Fields with one value for each particle.
+    pub particles: &'a [Field<'a>],
+    /// Fields with one value for each cell: each tet of a mesh, each triangle of a surface.
+    pub cells: &'a [Field<'a>],
+}
+
+impl Fields<'_> {
+    /// Refuses fields of the wrong length.
+    pub(super) fn check(&self, particles: usize, cells: usize) -> Result<(), MeshError> {
+        for (fields, expected) in [(self.particles, particles), (self.cells, cells)] {
+            for field in fields {
+                let found = match field.values {
+                    Values::Scalars(values) => values.len(),
+                    Values::Vectors(values) => values.len(),
+                };
+                if found != expected {
+                    return Err(MeshError::FieldLength {
+                        name: field.name.to_owned(),
+                        expected,
+                        found,
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+}

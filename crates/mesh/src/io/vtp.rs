@@ -1,0 +1,74 @@
+//! VTK XML poly data (`.vtp`): a surface with fields, the lightest file for one frame of an animation.
+//!
+//! Only particles on the surface are written, in ascending order, with their values. Source: "VTK XML Formats"
+//! (Kitware). Linear.
+
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::{Fields, write_atomically, xml};
+use crate::{MeshError, Surface};
+
+/// Writes a surface at the given (rest or deformed) positions of all particles in meters, with fields.
+///
+/// Particle fields have one value for each position, used or not; cell fields one for each triangle.
+///
+/// # Errors
+/// [`MeshError::FieldLength`] for a field of another length, [`MeshError::Io`] if the file cannot be written.
+///
+/// # Panics
+/// If a corner has no position.
+///
+/// # Example
+/// ```
+/// use incise_mesh::{generate::kuhn_box, glam::DVec3, io};
+///
+/// let mesh = kuhn_box([2, 2, 2], DVec3::ONE);
+/// let path = std::env::temp_dir().join(format!("incise-doc-{}.vtp", std::process::id()));
+/// io::write_vtp(&path, &mesh.surface(), &mesh.positions, io::Fields::default())?;
+/// # std::fs::remove_file(path).ok();
+/// # Ok::<(), incise_mesh::MeshError>(())
+/// ```
+pub fn write_vtp(
+    path: impl AsRef<Path>,
+    surface: &Surface,
+    positions: &[DVec3],
+    fields: Fields<'_>,
+) -> Result<(), MeshError> {
+    let triangles = &surface.triangles;
+    fields.check(positions.len(), triangles.len())?;
+    let mut used: Vec<usize> = triangles.iter().flatten().map(|p| p.index()).collect();
+    used.sort_unstable();
+    used.dedup();
+    let mut places = vec![0_i64; positions.len()];
+    for (place, &particle) in (0..).zip(&used) {
+        places[particle] = place;
+    }
+    write_atomically(path, |out| {
+        xml::open(out, "PolyData")?;
+        writeln!(out, "<PolyData>")?;
+        let (points, polys) = (used.len(), triangles.len());
+        writeln!(
+            out,
+            "<Piece NumberOfPoints=\"{points}\" NumberOfVerts=\"0\" NumberOfLines=\"0\" NumberOfStrips=\"0\" \
+             NumberOfPolys=\"{polys}\">"
+        )?;
+        xml::fields(out, "PointData", fields.particles, Some(&used))?;
+        xml::fields(out, "CellData", fields.cells, None)?;
+        xml::positions(out, used.iter().map(|&particle| positions[particle]))?;
+        writeln!(out, "<Polys>")?;
+        let corners = triangles
+            .iter()
+            .flatten()
+            .map(|p| places[p.index()].to_le_bytes());
+        xml::integers(out, "Int64", "connectivity", corners)?;
+        xml::integers(
+            out,
+            "Int64",
+            "offsets",
+            (1_i64..).take(polys).map(|i| (3 * i).to_le_bytes()),
+        )?;
+        writeln!(out, "</Polys>\n</Piece>\n</PolyData>\n</VTKFile>")
+    })
+}

@@ -1,0 +1,158 @@
+//! The parts that the XML formats of VTK have in common: data arrays in base64, and escaped names.
+//!
+//! Numbers are stored as little-endian binary, encoded in base64: exact, a third of the size of text, and valid XML.
+//!
+//! Source: "VTK XML Formats" (Kitware); base64 after RFC 4648, section 4.
+
+use std::fmt::{self, Display};
+use std::io::{self, Write};
+
+use glam::DVec3;
+
+use super::fields::{Field, Values};
+
+/// The opening line of a file of the given type.
+pub(super) fn open(out: &mut dyn Write, kind: &str) -> io::Result<()> {
+    writeln!(out, "<?xml version=\"1.0\"?>")?;
+    writeln!(
+        out,
+        "<VTKFile type=\"{kind}\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">"
+    )
+}
+
+/// An array of integers; `kind` is `Int64` or `UInt8`.
+pub(super) fn integers<const N: usize>(
+    out: &mut dyn Write,
+    kind: &str,
+    name: &str,
+    values: impl Iterator<Item = [u8; N]>,
+) -> io::Result<()> {
+    array(out, kind, name, 1, values)
+}
+
+/// The positions of a mesh.
+pub(super) fn positions(
+    out: &mut dyn Write,
+    positions: impl Iterator<Item = DVec3>,
+) -> io::Result<()> {
+    writeln!(out, "<Points>")?;
+    vectors(out, "Points", positions)?;
+    writeln!(out, "</Points>")
+}
+
+/// A section of fields; `pick` chooses and orders the elements to write, `None` all of them.
+pub(super) fn fields(
+    out: &mut dyn Write,
+    tag: &str,
+    fields: &[Field<'_>],
+    pick: Option<&[usize]>,
+) -> io::Result<()> {
+    writeln!(out, "<{tag}>")?;
+    for field in fields {
+        match (field.values, pick) {
+            (Values::Scalars(v), None) => scalars(out, field.name, v.iter().copied())?,
+            (Values::Scalars(v), Some(pick)) => {
+                scalars(out, field.name, pick.iter().map(|&i| v[i]))?;
+            }
+            (Values::Vectors(v), None) => vectors(out, field.name, v.iter().copied())?,
+            (Values::Vectors(v), Some(pick)) => {
+                vectors(out, field.name, pick.iter().map(|&i| v[i]))?;
+            }
+        }
+    }
+    writeln!(out, "</{tag}>")
+}
+
+fn scalars(out: &mut dyn Write, name: &str, values: impl Iterator<Item = f64>) -> io::Result<()> {
+    array(out, "Float64", name, 1, values.map(f64::to_le_bytes))
+}
+
+fn vectors(out: &mut dyn Write, name: &str, values: impl Iterator<Item = DVec3>) -> io::Result<()> {
+    array(
+        out,
+        "Float64",
+        name,
+        3,
+        values.flat_map(|v| v.to_array()).map(f64::to_le_bytes),
+    )
+}
+
+fn array<const N: usize>(
+    out: &mut dyn Write,
+    kind: &str,
+    name: &str,
+    components: usize,
+    values: impl Iterator<Item = [u8; N]>,
+) -> io::Result<()> {
+    let data: Vec<u8> = values.flatten().collect();
+    let name = Escaped(name);
+    writeln!(
+        out,
+        "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" format=\"binary\">"
+    )?;
+    // One base64 text for the length and the data together.
+    let mut bytes = (data.len() as u64).to_le_bytes().to_vec();
+    bytes.extend(data);
+    base64(out, &bytes)?;
+    writeln!(out, "\n</DataArray>")
+}
+
+fn base64(out: &mut dyn Write, bytes: &[u8]) -> io::Result<()> {
+    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    for group in bytes.chunks(3) {
+        let byte = |i: usize| u32::from(group.get(i).copied().unwrap_or(0));
+        let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
+        let mut digits = [18, 12, 6, 0].map(|shift| DIGITS[(bits >> shift) as usize % 64]);
+        digits[group.len() + 1..].fill(b'=');
+        out.write_all(&digits)?;
+    }
+    Ok(())
+}
+
+/// A text inside an XML attribute; control characters, which XML forbids, become spaces.
+pub(super) struct Escaped<'a>(pub(super) &'a str);
+
+impl Display for Escaped<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for c in self.0.chars() {
+            match c {
+                '&' => f.write_str("&amp;")?,
+                '<' => f.write_str("&lt;")?,
+                '>' => f.write_str("&gt;")?,
+                '"' => f.write_str("&quot;")?,
+                c if c.is_control() => f.write_str(" ")?,
+                c => write!(f, "{c}")?,
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn base64_of_the_standard() {
+        for (plain, encoded) in [
+            ("", ""),
+            ("f", "Zg=="),
+            ("fo", "Zm8="),
+            ("foo", "Zm9v"),
+            ("foob", "Zm9vYg=="),
+            ("foobar", "Zm9vYmFy"),
+        ] {
+            let mut out = Vec::new();
+            base64(&mut out, plain.as_bytes()).unwrap();
+            assert_eq!(out, encoded.as_bytes());
+        }
+    }
+
+    #[test]
+    fn names_are_escaped() {
+        assert_eq!(
+            Escaped("a<b> & \"c\"\n").to_string(),
+            "a&lt;b&gt; &amp; &quot;c&quot; "
+        );
+    }
+}
