@@ -1,1 +1,41 @@
-//! stub
+//! Cuts soft bodies in real time.
+//!
+//! This is the facade: a [`Scene`] says what is simulated, a [`Simulation`] moves it frame by frame, cuts included.
+//! The crates behind it are useful alone and re-exported here: [`mesh`], [`graph`], [`coloring`], [`clustering`],
+//! [`cutting`], [`xpbd`].
+//!
+//! ```
+//! use incise::{Scene, Simulation};
+//!
+//! let mut scene = Scene::built_in(); // a liver, sliced by a moving blade
+//! # scene.body[0].shape = Some(incise::scene::ShapeSpec { kind: "liver".into(), tets: 1000 });
+//! let mut simulation = Simulation::new(&scene)?;
+//! for _ in 0..3 {
+//!     let report = simulation.step()?;
+//!     println!("frame {}: {} tets, {:.1} ms", report.frame, report.tets, report.ms.total);
+//! }
+//! let triangles = simulation.surface().triangles;
+//! let positions = simulation.positions();
+//! # assert!(!triangles.is_empty() && !positions.is_empty());
+//! # Ok::<(), incise::Error>(())
+//! ```
+
+mod backend;
+mod body;
+mod error;
+mod plan;
+pub mod report;
+pub mod scene;
+mod simulation;
+mod strokes;
+
+pub use error::Error;
+pub use incise_clustering as clustering;
+pub use incise_coloring as coloring;
+pub use incise_cutting as cutting;
+pub use incise_graph as graph;
+pub use incise_mesh as mesh;
+pub use incise_xpbd as xpbd;
+pub use report::FrameReport;
+pub use scene::Scene;
+pub use simulation::Simulation;

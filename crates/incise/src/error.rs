@@ -1,0 +1,89 @@
+//! [`Error`]: why a scene or a simulation was refused.
+
+use std::path::PathBuf;
+
+use incise_clustering::ClusteringError;
+use incise_coloring::ColoringError;
+use incise_cutting::CutError;
+use incise_graph::GraphError;
+use incise_mesh::MeshError;
+use incise_xpbd::XpbdError;
+
+/// Why a scene could not be read or run.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A scene file could not be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A scene is not valid TOML or has a key that does not exist or has the wrong type.
+    #[error("{}{message}", line.map_or(String::new(), |line| format!("line {line}: ")))]
+    Parse {
+        /// The line, counted from 1, if known.
+        line: Option<usize>,
+        /// What is wrong.
+        message: String,
+    },
+    /// A value of a scene lies outside its range.
+    #[error("{field} is {value}: it must be {range}")]
+    Value {
+        /// The key, as in `body[0].scale`.
+        field: String,
+        /// Its value.
+        value: String,
+        /// What it must be.
+        range: String,
+    },
+    /// A body's mesh.
+    #[error("{field}: {source}")]
+    Mesh {
+        /// The body.
+        field: String,
+        /// What is wrong with it.
+        source: MeshError,
+    },
+    /// A body's material or a setting of the solver.
+    #[error("{field}.{source}")]
+    Xpbd {
+        /// The part of the scene.
+        field: String,
+        /// What is wrong with it.
+        source: XpbdError,
+    },
+    /// A stroke.
+    #[error("{field}: {source}")]
+    Cut {
+        /// The stroke.
+        field: String,
+        /// What is wrong with it.
+        source: CutError,
+    },
+    /// The name of a coloring.
+    #[error("solver.coloring: {0}")]
+    Coloring(#[from] ColoringError),
+    /// The name of a clustering.
+    #[error("solver.clustering: {0}")]
+    Clustering(#[from] ClusteringError),
+    /// A derived structure no longer agrees with what it is derived from: a defect of this library.
+    #[error("internal check failed: {0}")]
+    Inconsistent(String),
+    /// The threads could not be started.
+    #[error("cannot start {threads} threads: {message}")]
+    Threads {
+        /// How many.
+        threads: usize,
+        /// Why.
+        message: String,
+    },
+}
+
+impl From<GraphError> for Error {
+    fn from(error: GraphError) -> Self {
+        Self::Inconsistent(error.to_string())
+    }
+}

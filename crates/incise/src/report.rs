@@ -1,0 +1,153 @@
+//! [`FrameReport`]: what a frame did, as one line of JSON.
+//!
+//! Only quantities that were computed appear.
+
+use std::time::Duration;
+
+use incise_cutting::CutDelta;
+use serde::Serialize;
+
+/// What a frame did.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct FrameReport {
+    /// Number of the frame, from 0.
+    pub frame: u64,
+    /// Simulated time at its end in s.
+    pub time_s: f64,
+    /// Particles.
+    pub particles: usize,
+    /// Tets.
+    pub tets: usize,
+    /// Clusters with at least one tet.
+    pub clusters: usize,
+    /// Colors.
+    pub colors: usize,
+    /// Pieces: sets of tets connected through shared particles.
+    pub pieces: usize,
+    /// What was cut, if anything.
+    pub cut: Option<CutReport>,
+    /// Wall time by stage.
+    pub ms: Milliseconds,
+    /// Residuals of the last substep.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub residual: Option<ResidualReport>,
+    /// Energies in J.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub energy: Option<EnergyReport>,
+    /// Volume in m³.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub volume: Option<f64>,
+    /// Volume over volume at rest, minus 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub volume_error: Option<f64>,
+    /// The smallest volume of a tet as a fraction of its volume at rest.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub min_volume_ratio: Option<f64>,
+    /// The largest speed of a particle in m/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_speed: Option<f64>,
+    /// Tets without volume or turned inside out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub inverted_tets: Option<usize>,
+    /// The largest `E Δt² / (ρ h²)` of a tet: accurate up to about 0.5.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kappa: Option<f64>,
+    /// Particles that had to be put back because they would have become infinite; absent if none.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub repaired: usize,
+    /// Where it was computed: `cpu`.
+    pub backend: &'static str,
+    /// In which precision: `f32` or `f64`.
+    pub precision: &'static str,
+}
+
+fn is_zero(count: &usize) -> bool {
+    *count == 0
+}
+
+/// What a frame's strokes cut.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct CutReport {
+    /// Tets that were cut.
+    pub tets_cut: usize,
+    /// Tets they were cut into.
+    pub tets_created: usize,
+    /// New particles, on edges and as copies.
+    pub particles_created: usize,
+    /// Particles the surface was bent to.
+    pub snapped: usize,
+    /// The smallest volume of a new tet as a fraction of the one it was cut from.
+    pub worst_volume_ratio: f64,
+}
+
+impl CutReport {
+    /// Adds what a stroke changed.
+    pub(crate) fn add(&mut self, delta: &CutDelta) {
+        self.tets_cut += delta.removed.len();
+        self.tets_created += delta.added.len();
+        self.particles_created += delta.points.len() + delta.copies.len();
+        self.snapped += delta.snapped;
+        self.worst_volume_ratio = self.worst_volume_ratio.min(delta.worst_volume_ratio);
+    }
+}
+
+impl Default for CutReport {
+    fn default() -> Self {
+        Self {
+            tets_cut: 0,
+            tets_created: 0,
+            particles_created: 0,
+            snapped: 0,
+            worst_volume_ratio: 1.0,
+        }
+    }
+}
+
+/// Wall time by stage in ms; stages that did not happen took none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Milliseconds {
+    /// Cutting the mesh and handing the cut to the solver.
+    pub cut: f64,
+    /// Updating clusters.
+    pub cluster: f64,
+    /// Coloring new clusters.
+    pub color: f64,
+    /// Sorting the schedule.
+    pub schedule: f64,
+    /// Sending to a device.
+    pub upload: f64,
+    /// Solving.
+    pub solve: f64,
+    /// Fetching from a device.
+    pub readback: f64,
+    /// Everything else: positions, pieces, reported quantities.
+    pub other: f64,
+    /// The whole frame.
+    pub total: f64,
+}
+
+/// Residuals of the last substep.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ResidualReport {
+    /// What XPBD drops, in kg·m.
+    pub primal: f64,
+    /// What it iterates on, without unit.
+    pub dual: f64,
+}
+
+/// Energies in J.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct EnergyReport {
+    /// Of motion.
+    pub kinetic: f64,
+    /// Of deformation.
+    pub elastic: f64,
+    /// Of height, relative to the origin.
+    pub gravity: f64,
+}
+
+/// A duration in ms.
+pub(crate) fn milliseconds(duration: Duration) -> f64 {
+    duration.as_secs_f64() * 1e3
+}

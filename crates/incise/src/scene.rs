@@ -1,0 +1,432 @@
+//! [`Scene`]: what is simulated, as written in a scene file.
+//!
+//! A scene names what it needs; what it does not name is not computed. Every key has a documented default, unknown
+//! keys are errors that name the nearest known one. The format is TOML; the structs are the documentation of its keys.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::Error;
+
+/// A scene.
+///
+/// ```
+/// let scene = incise::Scene::from_toml(
+///     r#"
+///     [world]
+///     gravity = [0.0, 0.0, -9.81]
+///
+///     [[body]]
+///     shape = { kind = "beam", tets = 1000 }
+///     young_modulus = 1e5
+///     "#,
+/// )?;
+/// assert_eq!(scene.body.len(), 1);
+/// assert_eq!(scene.solver.substeps, 5);
+/// # Ok::<(), incise::Error>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// What is reported beside times and counts.
+    #[serde(default, skip_serializing_if = "ReportSpec::is_empty")]
+    pub report: ReportSpec,
+    /// What acts on all bodies.
+    #[serde(default)]
+    pub world: WorldSpec,
+    /// How it is computed.
+    #[serde(default)]
+    pub solver: SolverSpec,
+    /// The bodies.
+    #[serde(default)]
+    pub body: Vec<BodySpec>,
+    /// The cuts.
+    #[serde(default)]
+    pub stroke: Vec<StrokeSpec>,
+}
+
+/// What is reported, and how often.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReportSpec {
+    /// Every how many frames, at least 1.
+    #[serde(default = "one")]
+    pub every: u64,
+    /// Which quantities; they cost time only in the frames that report them.
+    #[serde(default)]
+    pub quantities: Vec<Quantity>,
+}
+
+impl ReportSpec {
+    fn is_empty(&self) -> bool {
+        self.quantities.is_empty()
+    }
+}
+
+impl Default for ReportSpec {
+    fn default() -> Self {
+        Self {
+            every: 1,
+            quantities: Vec::new(),
+        }
+    }
+}
+
+/// Something to report that has to be computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Quantity {
+    /// Primal and dual residual of the last substep.
+    Residual,
+    /// Kinetic, elastic and gravitational energy.
+    Energy,
+    /// Volume, its error, the smallest volume ratio of a tet and the number of inverted tets.
+    Volume,
+    /// The largest speed.
+    Speed,
+    /// The control number of the substep: see `incise_xpbd::Solver::kappa`.
+    Kappa,
+}
+
+/// What acts on all bodies.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WorldSpec {
+    /// Acceleration in m/s²; absent: none.
+    pub gravity: Option<[f64; 3]>,
+    /// A floor; absent: none.
+    pub ground: Option<GroundSpec>,
+}
+
+/// A horizontal floor; up is z.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GroundSpec {
+    /// Its height in m.
+    pub height: f64,
+    /// Coefficient of friction.
+    #[serde(default)]
+    pub friction: f64,
+}
+
+/// How it is computed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SolverSpec {
+    /// Time of a frame in s.
+    pub time_step: f64,
+    /// Equal parts of a frame.
+    pub substeps: u32,
+    /// Passes over the constraints in a substep; 1 is what converges.
+    pub iterations: u32,
+    /// How a pass is made.
+    pub method: Method,
+    /// Factor on each correction.
+    pub relaxation: f64,
+    /// How constraints are put together: `none` or `serial:K`.
+    pub clustering: String,
+    /// How clusters are colored: `scgc` or `greedy`.
+    pub coloring: String,
+    /// Width of the numbers.
+    pub precision: Precision,
+}
+
+impl Default for SolverSpec {
+    fn default() -> Self {
+        Self {
+            time_step: 0.016,
+            substeps: 5,
+            iterations: 1,
+            method: Method::GaussSeidel,
+            relaxation: 1.0,
+            clustering: "serial:10".to_owned(),
+            coloring: "scgc".to_owned(),
+            precision: Precision::F32,
+        }
+    }
+}
+
+/// How a pass over the constraints is made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Method {
+    /// Color after color, each constraint seeing the corrections before it.
+    #[default]
+    GaussSeidel,
+}
+
+/// Width of the numbers the solver computes with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Precision {
+    /// Single: 32 bits.
+    #[default]
+    F32,
+    /// Double: 64 bits.
+    F64,
+}
+
+impl Precision {
+    /// The name as written in a scene.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::F32 => "f32",
+            Self::F64 => "f64",
+        }
+    }
+}
+
+/// A body: its mesh, where it is and what it is made of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BodySpec {
+    /// A mesh file, relative to the scene file. Either this or `shape`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mesh: Option<PathBuf>,
+    /// A generated shape of longest side 1. Either this or `mesh`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shape: Option<ShapeSpec>,
+    /// Factor on the mesh's coordinates.
+    #[serde(default = "unit")]
+    pub scale: f64,
+    /// Where the mesh's origin goes, in m.
+    #[serde(default)]
+    pub position: [f64; 3],
+    /// Young's modulus in Pa.
+    #[serde(default = "soft")]
+    pub young_modulus: f64,
+    /// Poisson's ratio, at least 0 and below 0.5.
+    #[serde(default = "nearly_incompressible")]
+    pub poisson_ratio: f64,
+    /// Mass density in kg/m³.
+    #[serde(default = "water")]
+    pub density: f64,
+    /// Damping time in s: see `incise_xpbd::Material::damping`.
+    #[serde(default)]
+    pub damping: f64,
+    /// Particles that do not move, in m in the world.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fixed: Vec<Region>,
+}
+
+/// A generated shape.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ShapeSpec {
+    /// `box`, `beam`, `sphere`, `torus`, `liver` or `plate`.
+    pub kind: String,
+    /// Wanted number of tets; the result is within 2%.
+    pub tets: usize,
+}
+
+/// Some of a body's particles.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Region {
+    /// Those on the side of a plane that its normal points to.
+    HalfSpace {
+        /// A point on the plane.
+        point: [f64; 3],
+        /// Its normal.
+        normal: [f64; 3],
+    },
+    /// Those in an axis-aligned box.
+    Box {
+        /// The corner with the smallest coordinates.
+        low: [f64; 3],
+        /// The corner with the largest coordinates.
+        high: [f64; 3],
+    },
+    /// Those in a sphere.
+    Sphere {
+        /// Its center.
+        center: [f64; 3],
+        /// Its radius.
+        radius: f64,
+    },
+    /// Those with these numbers in the body's mesh.
+    Particles(Vec<u32>),
+}
+
+/// A cut.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
+pub enum StrokeSpec {
+    /// A whole plane, at once.
+    Plane {
+        /// The frame at whose start it cuts.
+        frame: u64,
+        /// A point on the plane in m.
+        point: [f64; 3],
+        /// Its normal.
+        normal: [f64; 3],
+        /// Snap distance as a fraction of an edge.
+        #[serde(default = "tenth")]
+        snap: f64,
+    },
+    /// A blade moved along a path, cutting as it goes.
+    Sweep {
+        /// The frames at whose start the blade is at the path's start and end.
+        frames: [u64; 2],
+        /// The blade: a polyline in m.
+        blade: Vec<[f64; 3]>,
+        /// Offsets of the blade in m, passed through at equal times.
+        path: Vec<[f64; 3]>,
+        /// Snap distance as a fraction of an edge.
+        #[serde(default = "tenth")]
+        snap: f64,
+    },
+}
+
+impl StrokeSpec {
+    /// The last frame in which the stroke cuts.
+    #[must_use]
+    pub fn last_frame(&self) -> u64 {
+        match self {
+            Self::Plane { frame, .. } => *frame,
+            Self::Sweep { frames, .. } => frames[1],
+        }
+    }
+}
+
+impl Scene {
+    /// The built-in scene: a generated liver held at one side, sliced by a moving blade.
+    ///
+    /// # Panics
+    /// Never: a test reads it.
+    #[must_use]
+    pub fn built_in() -> Self {
+        Self::from_toml(include_str!("../scenes/liver.toml")).expect("the built-in scene is valid")
+    }
+
+    /// Reads a scene from a file; mesh files named in it are relative to it.
+    ///
+    /// # Errors
+    /// If the file cannot be read or is not a valid scene.
+    pub fn load(path: &Path) -> Result<Self, Error> {
+        let text = std::fs::read_to_string(path).map_err(|source| Error::Read {
+            path: path.to_owned(),
+            source,
+        })?;
+        let mut scene = Self::from_toml(&text)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        for mesh in scene.body.iter_mut().filter_map(|body| body.mesh.as_mut()) {
+            *mesh = folder.join(&mesh);
+        }
+        Ok(scene)
+    }
+
+    /// Reads a scene from TOML.
+    ///
+    /// # Errors
+    /// If it is not valid TOML, or a key is unknown or of the wrong type: the message names the line and, for an
+    /// unknown key, the nearest known one.
+    pub fn from_toml(text: &str) -> Result<Self, Error> {
+        toml::from_str(text).map_err(|error| {
+            let line = error
+                .span()
+                .map(|span| text[..span.start.min(text.len())].matches('\n').count() + 1);
+            Error::Parse {
+                line,
+                message: with_suggestion(error.message()),
+            }
+        })
+    }
+
+    /// The scene as TOML.
+    ///
+    /// # Errors
+    /// If a path in it is not valid UTF-8.
+    pub fn to_toml(&self) -> Result<String, Error> {
+        toml::to_string(self).map_err(|error| Error::Parse {
+            line: None,
+            message: error.to_string(),
+        })
+    }
+
+    /// The first frame after all strokes.
+    #[must_use]
+    pub fn frames_needed(&self) -> u64 {
+        self.stroke
+            .iter()
+            .map(|stroke| stroke.last_frame() + 1)
+            .max()
+            .unwrap_or(0)
+    }
+}
+
+/// Adds the nearest known name to a message like ``unknown field `a`, expected `b` or `c` ``.
+fn with_suggestion(message: &str) -> String {
+    let names: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
+    let message = message.trim_end().replace('\n', " ");
+    match names.split_first() {
+        Some((unknown, known)) if message.starts_with("unknown") => {
+            match nearest(unknown, known.iter().copied()) {
+                Some(name) => format!("unknown key or value '{unknown}': did you mean '{name}'?"),
+                None => format!("unknown key or value '{unknown}'"),
+            }
+        }
+        _ => message,
+    }
+}
+
+/// The known name most like `unknown`.
+#[must_use]
+pub fn nearest<'a>(unknown: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let likeness = |name: &&str| strsim::jaro_winkler(unknown, name);
+    known
+        .into_iter()
+        .max_by(|a, b| likeness(a).total_cmp(&likeness(b)))
+}
+
+fn one() -> u64 {
+    1
+}
+fn unit() -> f64 {
+    1.0
+}
+fn soft() -> f64 {
+    1e5
+}
+fn nearly_incompressible() -> f64 {
+    0.45
+}
+fn water() -> f64 {
+    1000.0
+}
+fn tenth() -> f64 {
+    0.1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn built_in_scene_survives_a_round_trip() {
+        let scene = Scene::built_in();
+        assert_eq!(Scene::from_toml(&scene.to_toml().unwrap()).unwrap(), scene);
+    }
+
+    #[test]
+    fn unknown_keys_name_the_nearest() {
+        let message = |text: &str| Scene::from_toml(text).unwrap_err().to_string();
+        assert_eq!(
+            message("[world]\ngravty = [0, 0, 0]"),
+            "line 2: unknown key or value 'gravty': did you mean 'gravity'?"
+        );
+        assert!(message("[solver]\nmethod = \"gaus-seidel\"").contains("'gauss-seidel'"));
+        assert!(message("[[stroke]]\nkind = \"plain\"").contains("'plane'"));
+        assert!(message("[[body]]\nfixed = [{ halfspace = {} }]").contains("'half_space'"));
+        assert!(
+            message(
+                "[[stroke]]\nkind = \"plane\"\nframe = 1\npoint=[0,0,0]\nnormal=[0,0,1]\nsnp=1"
+            )
+            .contains("'snap'")
+        );
+        assert!(message("[world\n").starts_with("line 1: "));
+    }
+}

@@ -1,0 +1,236 @@
+//! [`Timeline`]: the strokes of a scene, carried out frame by frame.
+
+use glam::DVec3;
+use incise_cutting::{CutDelta, CutError, CutOptions, CuttableMesh, Plane, Sweep, cut_plane};
+
+use crate::Error;
+use crate::body::{finite, value};
+use crate::scene::StrokeSpec;
+
+/// A stroke and how far it is.
+#[derive(Debug)]
+struct Stroke {
+    field: String,
+    spec: StrokeSpec,
+    sweep: Option<Sweep>,
+}
+
+/// The strokes that are not finished.
+#[derive(Debug, Default)]
+pub(crate) struct Timeline {
+    strokes: Vec<Stroke>,
+    added: usize,
+    /// Smallest snap distance: rounding of the positions in the solver's precision.
+    tolerance: f64,
+}
+
+impl Timeline {
+    pub(crate) fn new(tolerance: f64) -> Self {
+        Self {
+            strokes: Vec::new(),
+            added: 0,
+            tolerance,
+        }
+    }
+
+    /// Adds a stroke, if all its values are in their ranges.
+    pub(crate) fn add(&mut self, spec: StrokeSpec) -> Result<(), Error> {
+        let field = format!("stroke[{}]", self.added);
+        let cut = |source: CutError| Error::Cut {
+            field: field.clone(),
+            source,
+        };
+        match &spec {
+            StrokeSpec::Plane {
+                point,
+                normal,
+                snap,
+                ..
+            } => {
+                self.options(*snap).check().map_err(cut)?;
+                plane(*point, *normal).unit_normal().map_err(cut)?;
+            }
+            StrokeSpec::Sweep {
+                frames,
+                blade,
+                path,
+                snap,
+            } => {
+                self.options(*snap).check().map_err(cut)?;
+                if frames[0] >= frames[1] {
+                    let range = "two frames, the second after the first";
+                    return Err(value(
+                        format!("{field}.frames"),
+                        format!("{frames:?}"),
+                        range,
+                    ));
+                }
+                if path.len() < 2 {
+                    return Err(value(
+                        format!("{field}.path"),
+                        format!("{} point(s)", path.len()),
+                        "at least two",
+                    ));
+                }
+                for &offset in path {
+                    finite(&format!("{field}.path"), offset)?;
+                }
+                for &point in blade {
+                    finite(&format!("{field}.blade"), point)?;
+                }
+                let length: f64 = blade
+                    .windows(2)
+                    .map(|ends| vector(ends[0]).distance(vector(ends[1])))
+                    .sum();
+                if blade.len() < 2 || length == 0.0 {
+                    return Err(cut(CutError::ShortBlade {
+                        points: blade.len(),
+                        length,
+                    }));
+                }
+            }
+        }
+        self.strokes.push(Stroke {
+            field,
+            spec,
+            sweep: None,
+        });
+        self.added += 1;
+        Ok(())
+    }
+
+    /// Carries out what is due in `frame`; hands each delta to `follow` before the next stroke moves. `positions` is
+    /// kept current.
+    pub(crate) fn advance(
+        &mut self,
+        frame: u64,
+        cuttable: &mut CuttableMesh,
+        positions: &mut Vec<DVec3>,
+        mut follow: impl FnMut(&CuttableMesh, &CutDelta) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        for i in 0..self.strokes.len() {
+            let tolerance = self.tolerance;
+            let Some(delta) = self.strokes[i].advance(frame, tolerance, cuttable, positions)?
+            else {
+                continue;
+            };
+            if delta.is_empty() {
+                continue;
+            }
+            delta.extend_particles(positions);
+            for other in self.strokes.iter_mut().enumerate().filter(|(j, _)| *j != i) {
+                if let Some(sweep) = &mut other.1.sweep {
+                    sweep.follow(cuttable, &delta);
+                }
+            }
+            follow(cuttable, &delta)?;
+        }
+        self.strokes
+            .retain(|stroke| frame < stroke.spec.last_frame());
+        Ok(())
+    }
+
+    fn options(&self, snap: f64) -> CutOptions {
+        CutOptions {
+            snap,
+            tolerance: self.tolerance,
+        }
+    }
+}
+
+impl Stroke {
+    fn advance(
+        &mut self,
+        frame: u64,
+        tolerance: f64,
+        cuttable: &mut CuttableMesh,
+        positions: &[DVec3],
+    ) -> Result<Option<CutDelta>, Error> {
+        let cut = |source| Error::Cut {
+            field: self.field.clone(),
+            source,
+        };
+        match &self.spec {
+            StrokeSpec::Plane {
+                frame: due,
+                point,
+                normal,
+                snap,
+            } if *due <= frame => {
+                let options = CutOptions {
+                    snap: *snap,
+                    tolerance,
+                };
+                cut_plane(cuttable, positions, &plane(*point, *normal), &options)
+                    .map(Some)
+                    .map_err(cut)
+            }
+            StrokeSpec::Sweep {
+                frames: [first, last],
+                blade,
+                path,
+                snap,
+            } if *first <= frame => {
+                let elapsed = (frame.min(*last) - first) as f64 / (last - first) as f64;
+                let offset = along(path, elapsed);
+                let pose: Vec<DVec3> = blade.iter().map(|x| vector(*x) + offset).collect();
+                if let Some(sweep) = &mut self.sweep {
+                    return sweep
+                        .advance(cuttable, positions, &pose)
+                        .map(Some)
+                        .map_err(cut);
+                }
+                let options = CutOptions {
+                    snap: *snap,
+                    tolerance,
+                };
+                self.sweep = Some(Sweep::new(cuttable, positions, &pose, options).map_err(cut)?);
+                Ok(None)
+            }
+            _ => Ok(None),
+        }
+    }
+}
+
+/// The point at a fraction of a path whose points are passed at equal times.
+fn along(path: &[[f64; 3]], fraction: f64) -> DVec3 {
+    let (mut from, mut to, mut rest) = (path[0], path[0], fraction * (path.len() - 1) as f64);
+    for &next in &path[1..] {
+        (from, to) = (to, next);
+        if rest <= 1.0 {
+            break;
+        }
+        rest -= 1.0;
+    }
+    vector(from).lerp(vector(to), rest.min(1.0))
+}
+
+fn plane(point: [f64; 3], normal: [f64; 3]) -> Plane {
+    Plane {
+        point: vector(point),
+        normal: vector(normal),
+    }
+}
+
+fn vector(v: [f64; 3]) -> DVec3 {
+    DVec3::from_array(v)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_passes_through_its_points() {
+        let path = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 4.0, 0.0]];
+        for (fraction, expected) in [
+            (0.0, [0.0, 0.0, 0.0]),
+            (0.25, [0.5, 0.0, 0.0]),
+            (0.5, [1.0, 0.0, 0.0]),
+            (0.75, [1.0, 2.0, 0.0]),
+            (1.0, [1.0, 4.0, 0.0]),
+        ] {
+            assert_eq!(along(&path, fraction).to_array(), expected);
+        }
+    }
+}

@@ -1,0 +1,317 @@
+//! [`Solver`]: the particles and tet constraints of a simulation, and how a cut edits them.
+//!
+//! Constraints keep the numbers of the mesh's tets; the order of solving is a [`Schedule`]'s business and comes from
+//! outside with every step. Topology changes arrive as single edits (a new particle between two others, a copy, a tet
+//! replaced), each in constant time, so that a cut costs what it touches.
+
+use glam::DVec3;
+
+use crate::neo_hookean::TetConstraint;
+use crate::{Material, Real, XpbdError};
+
+/// The state of a simulation in one precision.
+///
+/// # Example
+/// A tet falls freely for one frame.
+/// ```
+/// use glam::DVec3;
+/// use incise_graph::{Clustering, ColorId, Coloring, Schedule};
+/// use incise_xpbd::{Material, Solver, StepSettings};
+///
+/// let rest = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+/// let material = Material { young_modulus: 1e4, poisson_ratio: 0.4, density: 1e3, damping: 0.0 };
+/// let mut solver = Solver::<f64>::new(&rest);
+/// solver.add_material(material)?;
+/// solver.push_tet([0, 1, 2, 3], rest, 0);
+/// for p in 0..4 {
+///     solver.set_mass(p, 1000.0 / 6.0 / 4.0);
+/// }
+/// let schedule = Schedule::new(&Clustering::none(1), &Coloring::new(vec![ColorId(0)]));
+/// let settings = StepSettings { gravity: Some(DVec3::NEG_Z), ..StepSettings::new(0.1) };
+/// solver.step(&schedule, &settings)?;
+/// assert!((solver.position(0).z + 0.01).abs() < 1e-12); // z = -g t², the closed form of one step
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Solver<R: Real> {
+    /// Position and inverse mass of each particle, together in one cache line part.
+    pub(crate) particles: Vec<[R::Atomic; 4]>,
+    pub(crate) previous: Vec<R::Vector>,
+    pub(crate) velocities: Vec<R::Vector>,
+    pub(crate) masses: Vec<f64>,
+    pub(crate) fixed: Vec<bool>,
+    pub(crate) tets: Vec<TetConstraint<R>>,
+    pub(crate) material_of: Vec<u16>,
+    pub(crate) materials: Vec<Material>,
+    /// Kept only while a step has more than one iteration or is asked for its residuals.
+    pub(crate) multipliers: Vec<[R::Atomic; 2]>,
+    /// Positions before the constraints are solved, kept only for residuals.
+    pub(crate) predicted: Vec<R::Vector>,
+}
+
+impl<R: Real> Solver<R> {
+    /// Particles at rest at `positions`, without mass and without constraints.
+    #[must_use]
+    pub fn new(positions: &[DVec3]) -> Self {
+        let mut solver = Self {
+            particles: Vec::new(),
+            previous: Vec::new(),
+            velocities: Vec::new(),
+            masses: Vec::new(),
+            fixed: Vec::new(),
+            tets: Vec::new(),
+            material_of: Vec::new(),
+            materials: Vec::new(),
+            multipliers: Vec::new(),
+            predicted: Vec::new(),
+        };
+        for &x in positions {
+            solver.push_particle(R::from_dvec3(x), R::Vector::default(), false);
+        }
+        solver
+    }
+
+    /// Number of particles.
+    #[must_use]
+    pub fn particle_count(&self) -> usize {
+        self.particles.len()
+    }
+
+    /// Number of tets.
+    #[must_use]
+    pub fn tet_count(&self) -> usize {
+        self.tets.len()
+    }
+
+    /// Adds a material and returns its number.
+    ///
+    /// # Errors
+    /// If the material does not pass [`Material::check`].
+    ///
+    /// # Panics
+    /// With more than 65,536 materials.
+    pub fn add_material(&mut self, material: Material) -> Result<u16, XpbdError> {
+        material.check()?;
+        self.materials.push(material);
+        Ok(u16::try_from(self.materials.len() - 1).expect("at most 65,536 materials"))
+    }
+
+    /// Appends a tet with its rest shape. Its mass is not added to the particles: see [`Solver::set_mass`].
+    ///
+    /// # Panics
+    /// If a particle or the material does not exist.
+    pub fn push_tet(&mut self, particles: [u32; 4], rest: [DVec3; 4], material: u16) {
+        let constraint = self.constraint(particles, rest, material);
+        self.tets.push(constraint);
+        self.material_of.push(material);
+    }
+
+    /// Gives a tet's place to another tet of the same material.
+    ///
+    /// # Panics
+    /// If the tet or a particle does not exist.
+    pub fn replace_tet(&mut self, tet: usize, particles: [u32; 4], rest: [DVec3; 4]) {
+        self.tets[tet] = self.constraint(particles, rest, self.material_of[tet]);
+    }
+
+    /// Hangs a tet on other particles that are copies of its own.
+    ///
+    /// # Panics
+    /// If the tet or a particle does not exist.
+    pub fn relink_tet(&mut self, tet: usize, particles: [u32; 4]) {
+        self.check_particles(particles);
+        self.tets[tet].particles = particles;
+    }
+
+    fn constraint(&self, particles: [u32; 4], rest: [DVec3; 4], material: u16) -> TetConstraint<R> {
+        self.check_particles(particles);
+        TetConstraint::new(particles, rest, &self.materials[usize::from(material)])
+    }
+
+    fn check_particles(&self, particles: [u32; 4]) {
+        assert!(
+            particles
+                .iter()
+                .all(|&p| (p as usize) < self.particles.len()),
+            "the particles of a tet exist"
+        );
+    }
+
+    /// The material of a tet.
+    ///
+    /// # Panics
+    /// If the tet does not exist.
+    #[must_use]
+    pub fn material_of(&self, tet: usize) -> u16 {
+        self.material_of[tet]
+    }
+
+    /// The mass density at rest of a tet's material in kg/m³.
+    ///
+    /// # Panics
+    /// If the tet does not exist.
+    #[must_use]
+    pub fn density_of(&self, tet: usize) -> f64 {
+        self.materials[usize::from(self.material_of[tet])].density
+    }
+
+    /// The particles of a tet.
+    ///
+    /// # Panics
+    /// If the tet does not exist.
+    #[must_use]
+    pub fn tet_particles(&self, tet: usize) -> [u32; 4] {
+        self.tets[tet].particles
+    }
+
+    /// Appends a particle on the edge from `a` to `b`: position and velocity are interpolated, and it is fixed if both
+    /// ends are. It has no mass yet.
+    ///
+    /// # Panics
+    /// If an end does not exist.
+    pub fn push_particle_between(&mut self, a: usize, b: usize, parameter: f64) {
+        let t = R::from_f64(parameter);
+        let [x, y] = [a, b].map(|p| self.vector(p));
+        let [u, v] = [self.velocities[a], self.velocities[b]];
+        self.push_particle(
+            x + (y - x) * t,
+            u + (v - u) * t,
+            self.fixed[a] && self.fixed[b],
+        );
+    }
+
+    /// Appends a particle in the state of another one. It has no mass yet.
+    ///
+    /// # Panics
+    /// If the particle does not exist.
+    pub fn push_copy(&mut self, of: usize) {
+        self.push_particle(self.vector(of), self.velocities[of], self.fixed[of]);
+    }
+
+    fn push_particle(&mut self, x: R::Vector, velocity: R::Vector, fixed: bool) {
+        let [a, b, c] = R::components(x);
+        self.particles
+            .push([a.cell(), b.cell(), c.cell(), R::ZERO.cell()]);
+        self.previous.push(x);
+        self.velocities.push(velocity);
+        self.masses.push(0.0);
+        self.fixed.push(fixed);
+    }
+
+    /// Sets the mass of a particle in kg. A particle without mass does not move.
+    ///
+    /// # Panics
+    /// If the particle does not exist or the mass is negative or not finite.
+    pub fn set_mass(&mut self, particle: usize, mass: f64) {
+        assert!(
+            mass.is_finite() && mass >= 0.0,
+            "a mass is finite and not negative"
+        );
+        self.masses[particle] = mass;
+        self.set_weight(particle);
+    }
+
+    /// Fixes a particle where it is, or lets it go.
+    ///
+    /// # Panics
+    /// If the particle does not exist.
+    pub fn set_fixed(&mut self, particle: usize, fixed: bool) {
+        self.fixed[particle] = fixed;
+        if fixed {
+            self.velocities[particle] = R::Vector::default();
+        }
+        self.set_weight(particle);
+    }
+
+    fn set_weight(&self, particle: usize) {
+        let inverse = R::from_f64(1.0 / self.masses[particle]);
+        // A mass so small that its inverse overflows belongs to a speck that could only do harm if it moved.
+        let free = !self.fixed[particle] && inverse.is_finite();
+        (if free { inverse } else { R::ZERO }).store(&self.particles[particle][3]);
+    }
+
+    /// Whether a particle is fixed.
+    ///
+    /// # Panics
+    /// If the particle does not exist.
+    #[must_use]
+    pub fn is_fixed(&self, particle: usize) -> bool {
+        self.fixed[particle]
+    }
+
+    /// The mass of a particle in kg.
+    ///
+    /// # Panics
+    /// If the particle does not exist.
+    #[must_use]
+    pub fn mass(&self, particle: usize) -> f64 {
+        self.masses[particle]
+    }
+
+    /// The position of a particle in m.
+    ///
+    /// # Panics
+    /// If the particle does not exist.
+    #[must_use]
+    pub fn position(&self, particle: usize) -> DVec3 {
+        R::to_dvec3(self.vector(particle))
+    }
+
+    /// Moves a particle.
+    ///
+    /// # Panics
+    /// If the particle does not exist or the position is not finite in this precision.
+    pub fn set_position(&mut self, particle: usize, position: DVec3) {
+        let x = R::components(R::from_dvec3(position));
+        assert!(x.into_iter().all(R::is_finite), "positions are finite");
+        for (value, cell) in x.into_iter().zip(&self.particles[particle]) {
+            value.store(cell);
+        }
+    }
+
+    /// The velocity of a particle in m/s.
+    ///
+    /// # Panics
+    /// If the particle does not exist.
+    #[must_use]
+    pub fn velocity(&self, particle: usize) -> DVec3 {
+        R::to_dvec3(self.velocities[particle])
+    }
+
+    /// Sets the velocity of a particle in m/s.
+    ///
+    /// # Panics
+    /// If the particle does not exist or the velocity is not finite.
+    pub fn set_velocity(&mut self, particle: usize, velocity: DVec3) {
+        assert!(velocity.is_finite(), "velocities are finite");
+        self.velocities[particle] = R::from_dvec3(velocity);
+    }
+
+    /// Writes the positions of all particles to `out`.
+    pub fn positions(&self, out: &mut Vec<DVec3>) {
+        out.clear();
+        out.extend((0..self.particles.len()).map(|p| self.position(p)));
+    }
+
+    #[inline]
+    pub(crate) fn vector(&self, particle: usize) -> R::Vector {
+        load::<R>(&self.particles[particle])
+    }
+}
+
+#[inline]
+pub(crate) fn load<R: Real>(particle: &[R::Atomic; 4]) -> R::Vector {
+    R::vector(
+        R::load(&particle[0]),
+        R::load(&particle[1]),
+        R::load(&particle[2]),
+    )
+}
+
+#[inline]
+pub(crate) fn store<R: Real>(particle: &[R::Atomic; 4], x: R::Vector) {
+    let [a, b, c] = R::components(x);
+    a.store(&particle[0]);
+    b.store(&particle[1]);
+    c.store(&particle[2]);
+}
