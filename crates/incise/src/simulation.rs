@@ -60,6 +60,8 @@ pub struct Simulation {
     plan: Plan,
     timeline: Timeline,
     positions: Vec<DVec3>,
+    /// Whether a particle lies on a cut; empty before the first.
+    on_cut: Vec<bool>,
     initial_volume: f64,
     pieces: usize,
     next_frame: u64,
@@ -124,6 +126,7 @@ impl Simulation {
             initial_volume: cuttable.mesh().total_volume(),
             pieces: cuttable.mesh().pieces().count,
             positions: Vec::new(),
+            on_cut: Vec::new(),
             cuttable,
             solver,
             plan,
@@ -212,6 +215,7 @@ impl Simulation {
             solver,
             plan,
             pieces,
+            on_cut,
             ..
         } = self;
         let mut report: Option<CutReport> = None;
@@ -220,6 +224,11 @@ impl Simulation {
             solver.follow(delta, cuttable);
             plan.follow(delta, cuttable, ms)?;
             report.get_or_insert_default().add(delta);
+            on_cut.resize(delta.particles_before, false);
+            on_cut.resize(delta.particles_after(), true);
+            for source in &delta.copies {
+                on_cut[source.index()] = true;
+            }
             if !delta.copies.is_empty() {
                 let start = Instant::now();
                 *pieces = cuttable.mesh().pieces().count;
@@ -300,6 +309,13 @@ impl Simulation {
     #[must_use]
     pub fn surface(&self) -> Surface {
         self.cuttable.mesh().surface()
+    }
+
+    /// Whether each particle lies where a stroke cut; empty before the first cut. A boundary triangle with all three
+    /// is part of a cut face.
+    #[must_use]
+    pub fn on_cut(&self) -> &[bool] {
+        &self.on_cut
     }
 
     /// The clusters of tets.

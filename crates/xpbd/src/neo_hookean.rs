@@ -70,7 +70,7 @@ impl<R: Real> TetConstraint<R> {
     }
 
     /// Both constraints and their gradients.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn evaluate(&self, x: [R::Vector; 4]) -> Evaluation<R> {
         let [f1, f2, f3] = self.deformation(x);
         let norm = (R::dot(f1, f1) + R::dot(f2, f2) + R::dot(f3, f3)).sqrt();
@@ -103,7 +103,7 @@ impl<R: Real> TetConstraint<R> {
     /// The changes of both multipliers that satisfy both constraints to first order, `None` if there is no way to.
     ///
     /// `rates` are the damped rates `γ ∇C · (x - xₙ)` with `damping` γ; both are zero without damping.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn solve(
         &self,
         e: &Evaluation<R>,

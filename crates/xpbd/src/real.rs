@@ -68,6 +68,7 @@ pub trait Real:
     fn store(self, cell: &Self::Atomic);
 
     /// Rounds a vector of doubles to this precision.
+    #[inline]
     fn from_dvec3(v: DVec3) -> Self::Vector {
         Self::vector(
             Self::from_f64(v.x),
@@ -77,6 +78,7 @@ pub trait Real:
     }
 
     /// The vector in double precision.
+    #[inline]
     fn to_dvec3(v: Self::Vector) -> DVec3 {
         DVec3::from_array(Self::components(v).map(Self::to_f64))
     }
@@ -91,36 +93,47 @@ macro_rules! real {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
 
+            #[inline]
             fn from_f64(value: f64) -> Self {
                 $from_f64(value)
             }
+            #[inline]
             fn to_f64(self) -> f64 {
                 f64::from(self)
             }
+            #[inline]
             fn sqrt(self) -> Self {
                 self.sqrt()
             }
+            #[inline]
             fn is_finite(self) -> bool {
                 self.is_finite()
             }
+            #[inline]
             fn vector(x: Self, y: Self, z: Self) -> $vector {
                 <$vector>::new(x, y, z)
             }
+            #[inline]
             fn components(v: $vector) -> [Self; 3] {
                 v.to_array()
             }
+            #[inline]
             fn dot(a: $vector, b: $vector) -> Self {
                 a.dot(b)
             }
+            #[inline]
             fn cross(a: $vector, b: $vector) -> $vector {
                 a.cross(b)
             }
+            #[inline]
             fn cell(self) -> $atomic {
                 <$atomic>::new(self.to_bits())
             }
+            #[inline]
             fn load(cell: &$atomic) -> Self {
                 Self::from_bits(cell.load(Ordering::Relaxed))
             }
+            #[inline]
             fn store(self, cell: &$atomic) {
                 cell.store(self.to_bits(), Ordering::Relaxed);
             }
@@ -132,6 +145,7 @@ macro_rules! real {
     clippy::cast_possible_truncation,
     reason = "rounding to single precision is the purpose"
 )]
+#[inline]
 fn round_to_f32(value: f64) -> f32 {
     value as f32
 }

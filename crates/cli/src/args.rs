@@ -1,0 +1,155 @@
+//! The arguments of every command.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// Cuts soft bodies in real time.
+#[derive(Debug, Parser)]
+#[command(
+    name = "incise",
+    version,
+    about = "Cuts soft bodies in real time",
+    long_about = "Cuts soft bodies in real time.\n\nWithout a command, runs the built-in scene: a generated liver, \
+                  held at one side, sliced by a moving blade over 200 frames. Files go to out/.",
+    after_help = "Example: incise run scene.toml --mesh liver.vtk --frames 100 --out result"
+)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    pub(crate) command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Simulate a scene and write what happens.
+    Run(RunArguments),
+    /// Cluster and color the constraints of a mesh.
+    Color(ColorArguments),
+    /// Look at, convert and generate meshes.
+    Mesh {
+        #[command(subcommand)]
+        command: MeshCommand,
+    },
+}
+
+#[derive(Debug, Default, Args)]
+#[command(
+    after_help = "Example: incise run --mesh liver.vtk --precision f64 --threads 2 --frames 160 --check"
+)]
+pub(crate) struct RunArguments {
+    /// The scene file; without one, the built-in liver.
+    pub(crate) scene: Option<PathBuf>,
+    /// Use this mesh for the scene's first body.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) mesh: Option<PathBuf>,
+    /// Number of frames [default: 200, or more if a stroke ends later].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub(crate) frames: Option<u64>,
+    /// Where to compute; auto takes the best there is.
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) backend: BackendName,
+    /// Width of the numbers [default: as the scene says].
+    #[arg(long, value_enum)]
+    pub(crate) precision: Option<PrecisionName>,
+    /// Number of threads [default: one for each core]. The result is the same for any number.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub(crate) threads: Option<u16>,
+    /// Folder for scene, frames, surfaces and last mesh.
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    pub(crate) out: Option<PathBuf>,
+    /// Write one JSON object per frame to this file as well.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) jsonl: Option<PathBuf>,
+    /// Write the last mesh at rest to this file; as .vtu with its deformed positions.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) save_mesh: Option<PathBuf>,
+    /// Write no pictures. This version draws none; accepted so that scripts stay the same.
+    #[arg(long)]
+    pub(crate) no_pictures: bool,
+    /// Recompute and compare everything after every cut; slow.
+    #[arg(long)]
+    pub(crate) check: bool,
+    /// Print nothing but errors.
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example: incise color liver.vtk --clustering serial:5 --csv colors.csv --json"
+)]
+pub(crate) struct ColorArguments {
+    /// A tetrahedral mesh.
+    pub(crate) input: PathBuf,
+    /// The coloring: scgc or greedy.
+    #[arg(long, value_name = "NAME", default_value = "scgc")]
+    pub(crate) algorithm: String,
+    /// The clustering: none or serial:K.
+    #[arg(long, value_name = "NAME", default_value = "none")]
+    pub(crate) clustering: String,
+    /// Where to compute.
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) backend: BackendName,
+    /// Seed of randomized algorithms; scgc and greedy use none.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) seed: u64,
+    /// Write cluster and color of each constraint to this file.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) csv: Option<PathBuf>,
+    /// Print one JSON object instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum MeshCommand {
+    /// Check a mesh and say what it is like.
+    #[command(after_help = "Example: incise mesh info liver.vtk --json")]
+    Info {
+        /// The mesh.
+        file: PathBuf,
+        /// Print one JSON object instead of a table.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Read a mesh in one format and write it in another; formats go by file ending.
+    #[command(after_help = "Example: incise mesh convert liver.node liver.vtu")]
+    Convert {
+        /// The mesh to read.
+        input: PathBuf,
+        /// The file to write.
+        output: PathBuf,
+    },
+    /// Generate a shape of longest side 1.
+    #[command(after_help = "Example: incise mesh generate torus --tets 5000 torus.vtk")]
+    Generate {
+        /// box, beam, sphere, torus, plate or liver.
+        shape: String,
+        /// Wanted number of tets; the result is within 2%.
+        #[arg(long, value_name = "N")]
+        tets: usize,
+        /// The file to write.
+        output: PathBuf,
+    },
+}
+
+/// Where to compute.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ValueEnum)]
+pub(crate) enum BackendName {
+    /// The processor.
+    Cpu,
+    /// A graphics card; this version has no such backend.
+    Gpu,
+    /// The best there is.
+    #[default]
+    Auto,
+}
+
+/// Width of the numbers.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum PrecisionName {
+    /// Single: 32 bits.
+    F32,
+    /// Double: 64 bits.
+    F64,
+}

@@ -1,0 +1,47 @@
+//! [`Failure`]: why a command ended, and the exit code that says whose fault it was.
+
+use std::process::ExitCode;
+
+use incise::Error;
+use incise::mesh::MeshError;
+
+/// Why a command ended early.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// The input cannot be used: exit code 2.
+    Input(anyhow::Error),
+    /// The run failed: exit code 1.
+    Run(anyhow::Error),
+}
+
+impl Failure {
+    /// Says it in one sentence and returns the exit code.
+    #[expect(
+        clippy::print_stderr,
+        reason = "this is where the command line speaks of errors"
+    )]
+    pub(crate) fn report(&self) -> ExitCode {
+        let (error, code) = match self {
+            Self::Input(error) => (error, 2),
+            Self::Run(error) => (error, 1),
+        };
+        eprintln!("error: {error:#}");
+        ExitCode::from(code)
+    }
+}
+
+/// What cannot be read, understood or written is the input's fault; what goes wrong later is ours.
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        match error {
+            Error::Inconsistent(_) => Self::Run(error.into()),
+            _ => Self::Input(error.into()),
+        }
+    }
+}
+
+impl From<MeshError> for Failure {
+    fn from(error: MeshError) -> Self {
+        Self::Input(error.into())
+    }
+}

@@ -1,0 +1,213 @@
+//! The files of a run: scene, frames, surfaces and last mesh.
+//!
+//! Lines are collected under a temporary name and get their own when the run has ended well; all other files are
+//! written beside and renamed. So a name always stands for a complete file.
+
+use std::fs::{self, File};
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use incise::mesh::glam::DVec3;
+use incise::mesh::io::{Field, Fields, Values, write_atomically, write_pvd, write_vtp, write_vtu};
+use incise::{Scene, Simulation};
+
+use crate::failure::Failure;
+
+/// About how many surfaces a run saves.
+const SURFACES: u64 = 50;
+
+/// A file of lines that gets its name in the end.
+#[derive(Debug)]
+struct Lines {
+    path: PathBuf,
+    temporary: PathBuf,
+    file: Option<BufWriter<File>>,
+}
+
+impl Lines {
+    fn create(path: &Path) -> anyhow::Result<Self> {
+        anyhow::ensure!(
+            !path.is_dir(),
+            "cannot write {}: it is a folder",
+            path.display()
+        );
+        let mut name = path.file_name().unwrap_or_default().to_owned();
+        name.push(format!(".partial-{}", std::process::id()));
+        let temporary = path.with_file_name(name);
+        let file =
+            File::create(&temporary).with_context(|| format!("cannot write {}", path.display()))?;
+        Ok(Self {
+            path: path.to_owned(),
+            temporary,
+            file: Some(BufWriter::new(file)),
+        })
+    }
+
+    fn push(&mut self, line: &str) -> anyhow::Result<()> {
+        if let Some(file) = &mut self.file {
+            writeln!(file, "{line}")
+                .with_context(|| format!("cannot write {}", self.path.display()))?;
+        }
+        Ok(())
+    }
+
+    fn finish(mut self) -> anyhow::Result<()> {
+        if let Some(mut file) = self.file.take() {
+            let written = file
+                .flush()
+                .and_then(|()| fs::rename(&self.temporary, &self.path));
+            written.with_context(|| format!("cannot write {}", self.path.display()))?;
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Lines {
+    fn drop(&mut self) {
+        if self.file.take().is_some() {
+            // The run has failed; there is nobody left to tell about this too.
+            let _ = fs::remove_file(&self.temporary);
+        }
+    }
+}
+
+/// Where a run's files go.
+#[derive(Debug)]
+pub(crate) struct Output {
+    folder: PathBuf,
+    lines: Vec<Lines>,
+    surfaces: Vec<(f64, String)>,
+    save_every: u64,
+    last_frame: u64,
+}
+
+impl Output {
+    /// Makes the folder and opens the files, so that what cannot be written is known before the run.
+    pub(crate) fn create(
+        folder: &Path,
+        jsonl: Option<&Path>,
+        scene: &Scene,
+        frames: u64,
+    ) -> Result<Self, Failure> {
+        let open = || -> anyhow::Result<Vec<Lines>> {
+            fs::create_dir_all(folder)
+                .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+            let mut lines = vec![Lines::create(&folder.join("frames.jsonl"))?];
+            if let Some(path) = jsonl {
+                lines.push(Lines::create(path)?);
+            }
+            Ok(lines)
+        };
+        let lines = open().map_err(Failure::Input)?;
+        let toml = scene.to_toml()?;
+        write_atomically(folder.join("scene.toml"), |file| {
+            file.write_all(toml.as_bytes())
+        })?;
+        Ok(Self {
+            folder: folder.to_owned(),
+            lines,
+            surfaces: Vec::new(),
+            save_every: frames.div_ceil(SURFACES),
+            last_frame: frames - 1,
+        })
+    }
+
+    /// Writes the line of a frame, and its surface if it is one to save.
+    pub(crate) fn frame(&mut self, simulation: &Simulation) -> anyhow::Result<()> {
+        let report = simulation.report();
+        let line = serde_json::to_string(report)?;
+        for lines in &mut self.lines {
+            lines.push(&line)?;
+        }
+        if report.frame.is_multiple_of(self.save_every) || report.frame == self.last_frame {
+            let name = format!("surface_{:05}.vtp", report.frame);
+            let surface = simulation.surface();
+            let on_cut = |p: usize| simulation.on_cut().get(p).copied().unwrap_or(false);
+            let cut: Vec<f64> = surface
+                .triangles
+                .iter()
+                .map(|triangle| f64::from(u8::from(triangle.iter().all(|p| on_cut(p.index())))))
+                .collect();
+            let cells = [Field {
+                name: "cut",
+                values: Values::Scalars(&cut),
+            }];
+            let fields = Fields {
+                particles: &[],
+                cells: &cells,
+            };
+            write_vtp(
+                self.folder.join(&name),
+                &surface,
+                simulation.positions(),
+                fields,
+            )?;
+            self.surfaces.push((report.time_s, name));
+        }
+        Ok(())
+    }
+
+    /// Writes what is known at the end and gives all files their names.
+    pub(crate) fn finish(self, simulation: &Simulation) -> anyhow::Result<()> {
+        write_pvd(self.folder.join("surface.pvd"), &self.surfaces)?;
+        let mesh = simulation.mesh();
+        let numbers = |of: &dyn Fn(usize) -> u32| {
+            (0..mesh.tets.len())
+                .map(|t| f64::from(of(t)))
+                .collect::<Vec<_>>()
+        };
+        let cluster = |t: usize| simulation.clustering().labels()[t];
+        let clusters = numbers(&|t| cluster(t).0);
+        let colors = numbers(&|t| simulation.coloring().color(cluster(t).index()).0);
+        let labels = mesh.pieces().labels;
+        let pieces = numbers(&|t| labels[t]);
+        let particles = [Field {
+            name: "rest_position",
+            values: Values::Vectors(&mesh.positions),
+        }];
+        let cells = [
+            ("cluster", &clusters),
+            ("color", &colors),
+            ("piece", &pieces),
+        ]
+        .map(|(name, values)| Field {
+            name,
+            values: Values::Scalars(values),
+        });
+        let fields = Fields {
+            particles: &particles,
+            cells: &cells,
+        };
+        write_vtu(
+            self.folder.join("mesh.vtu"),
+            simulation.positions(),
+            &mesh.tets,
+            fields,
+        )?;
+        self.lines.into_iter().try_for_each(Lines::finish)
+    }
+}
+
+/// Writes the mesh at rest; as `.vtu` with the deformed positions, which other formats have no place for.
+pub(crate) fn save_mesh(path: &Path, simulation: &Simulation) -> anyhow::Result<()> {
+    let mesh = simulation.mesh();
+    if path
+        .extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("vtu"))
+    {
+        let positions: &[DVec3] = simulation.positions();
+        let particles = [Field {
+            name: "position",
+            values: Values::Vectors(positions),
+        }];
+        let fields = Fields {
+            particles: &particles,
+            cells: &[],
+        };
+        write_vtu(path, &mesh.positions, &mesh.tets, fields)?;
+    } else {
+        incise::mesh::io::write(path, mesh)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,110 @@
+//! `incise run`: simulates a scene.
+
+use std::path::Path;
+
+use anyhow::anyhow;
+use incise::scene::Precision;
+use incise::{Scene, Simulation};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::args::{BackendName, PrecisionName, RunArguments};
+use crate::failure::Failure;
+use crate::output::{Output, save_mesh};
+use crate::summary::Summary;
+
+/// Frames of a run that does not say.
+const FRAMES: u64 = 200;
+
+#[expect(
+    clippy::print_stdout,
+    reason = "the table is the result of the command"
+)]
+pub(crate) fn run(arguments: &RunArguments) -> Result<(), Failure> {
+    require_cpu(arguments.backend)?;
+    let scene = scene(arguments)?;
+    let frames = arguments
+        .frames
+        .unwrap_or_else(|| scene.frames_needed().max(FRAMES));
+    let mut simulation = match arguments.threads {
+        Some(threads) => Simulation::with_threads(&scene, usize::from(threads))?,
+        None => Simulation::new(&scene)?,
+    };
+    let folder = arguments.out.as_deref().unwrap_or(Path::new("out"));
+    let mut output = Output::create(folder, arguments.jsonl.as_deref(), &scene, frames)?;
+
+    let kappa = simulation.kappa();
+    let mut summary = Summary::new(simulation.report());
+    let mut checked = 0;
+    let progress = progress(frames, arguments.quiet);
+    for _ in 0..frames {
+        let report = simulation.step()?;
+        progress.set_message(format!(
+            "{} tets, {} pieces, {} colors",
+            report.tets, report.pieces, report.colors
+        ));
+        summary.add(report);
+        if arguments.check && report.cut.is_some() {
+            simulation.check()?;
+            checked += 1;
+        }
+        output.frame(&simulation).map_err(Failure::Run)?;
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    output.finish(&simulation).map_err(Failure::Run)?;
+    if let Some(path) = &arguments.save_mesh {
+        save_mesh(path, &simulation).map_err(Failure::Input)?;
+    }
+    if !arguments.quiet {
+        println!("{}", summary.table([kappa, simulation.kappa()]));
+        if arguments.check {
+            println!(
+                "checked after each of {checked} cuts: mesh, volume at rest, masses, clusters, colors, pieces"
+            );
+        }
+        println!("files are in {}", folder.display());
+    }
+    Ok(())
+}
+
+/// The scene as asked for, with what the command line changes.
+fn scene(arguments: &RunArguments) -> Result<Scene, Failure> {
+    let mut scene = match &arguments.scene {
+        None => Scene::built_in(),
+        Some(path) => Scene::load(path).map_err(|error| {
+            Failure::Input(anyhow::Error::from(error).context(path.display().to_string()))
+        })?,
+    };
+    if let Some(mesh) = &arguments.mesh {
+        let body = scene.body.first_mut();
+        let body =
+            body.ok_or_else(|| Failure::Input(anyhow!("--mesh needs a scene with a [[body]]")))?;
+        body.mesh = Some(mesh.clone());
+        body.shape = None;
+    }
+    match arguments.precision {
+        Some(PrecisionName::F32) => scene.solver.precision = Precision::F32,
+        Some(PrecisionName::F64) => scene.solver.precision = Precision::F64,
+        None => {}
+    }
+    Ok(scene)
+}
+
+/// Refuses a backend that this version does not have.
+pub(crate) fn require_cpu(backend: BackendName) -> Result<(), Failure> {
+    match backend {
+        BackendName::Cpu | BackendName::Auto => Ok(()),
+        BackendName::Gpu => Err(Failure::Input(anyhow!(
+            "this version has no GPU backend: use --backend cpu or auto"
+        ))),
+    }
+}
+
+fn progress(frames: u64, quiet: bool) -> ProgressBar {
+    if quiet {
+        return ProgressBar::hidden();
+    }
+    let style = ProgressStyle::with_template("{bar:40} frame {pos}/{len}  {msg}  {elapsed}");
+    // A template that does not parse is no reason not to simulate.
+    ProgressBar::new(frames).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}

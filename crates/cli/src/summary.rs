@@ -1,0 +1,131 @@
+//! The table at the end of a run.
+
+use comfy_table::presets::UTF8_FULL_CONDENSED;
+use comfy_table::{CellAlignment, Table};
+use incise::FrameReport;
+use incise::report::Milliseconds;
+
+/// Name and time of each stage that has one.
+type Stage = (&'static str, fn(&Milliseconds) -> f64);
+const STAGES: [Stage; 7] = [
+    ("cut", |ms| ms.cut),
+    ("cluster", |ms| ms.cluster),
+    ("color", |ms| ms.color),
+    ("schedule", |ms| ms.schedule),
+    ("solve", |ms| ms.solve),
+    ("other", |ms| ms.other),
+    ("total", |ms| ms.total),
+];
+
+/// What the frames of a run had in common, and the table of it.
+#[derive(Debug)]
+pub(crate) struct Summary {
+    times: Vec<Milliseconds>,
+    cutting: Vec<Milliseconds>,
+    tets_before: usize,
+    worst_volume_ratio: f64,
+    repaired: usize,
+    last: FrameReport,
+}
+
+impl Summary {
+    /// `before` is the report before the first frame.
+    pub(crate) fn new(before: &FrameReport) -> Self {
+        Self {
+            times: Vec::new(),
+            cutting: Vec::new(),
+            tets_before: before.tets,
+            worst_volume_ratio: 1.0,
+            repaired: 0,
+            last: before.clone(),
+        }
+    }
+
+    pub(crate) fn add(&mut self, report: &FrameReport) {
+        self.times.push(report.ms);
+        if let Some(cut) = &report.cut {
+            self.cutting.push(report.ms);
+            self.worst_volume_ratio = self.worst_volume_ratio.min(cut.worst_volume_ratio);
+        }
+        self.repaired += report.repaired;
+        self.last = report.clone();
+    }
+
+    /// The times by stage, then the counts.
+    pub(crate) fn table(&self, kappa: [f64; 2]) -> String {
+        let mut stages = Table::new();
+        stages.load_style(UTF8_FULL_CONDENSED);
+        stages.set_header([
+            "ms per frame",
+            "median",
+            "worst",
+            "median of cutting frames",
+        ]);
+        for (name, stage) in STAGES {
+            let [all, cutting] = [&self.times, &self.cutting].map(|times| sorted(times, stage));
+            let row = [
+                name.to_owned(),
+                middle(&all),
+                all.last().map_or("-".into(), ms),
+                middle(&cutting),
+            ];
+            stages.add_row(row);
+        }
+        let mut counts = Table::new();
+        counts.load_style(UTF8_FULL_CONDENSED);
+        let total: f64 = self.times.iter().map(|ms| ms.total).sum();
+        let frames = self.times.len();
+        counts.add_row([
+            "frames".to_owned(),
+            format!("{frames} ({} with a cut)", self.cutting.len()),
+        ]);
+        counts.add_row([
+            "frames per second".to_owned(),
+            format!("{:.1}", 1e3 * frames as f64 / total),
+        ]);
+        counts.add_row([
+            "tets before, after".to_owned(),
+            format!("{}, {}", self.tets_before, self.last.tets),
+        ]);
+        counts.add_row(["particles".to_owned(), self.last.particles.to_string()]);
+        counts.add_row(["pieces".to_owned(), self.last.pieces.to_string()]);
+        counts.add_row([
+            "clusters, colors".to_owned(),
+            format!("{}, {}", self.last.clusters, self.last.colors),
+        ]);
+        counts.add_row([
+            "worst volume ratio of a cut".to_owned(),
+            format!("{:.2e}", self.worst_volume_ratio),
+        ]);
+        counts.add_row([
+            "kappa before, after".to_owned(),
+            format!("{:.2}, {:.2}", kappa[0], kappa[1]),
+        ]);
+        if self.repaired > 0 {
+            counts.add_row([
+                "particles put back (do not trust)".to_owned(),
+                self.repaired.to_string(),
+            ]);
+        }
+        for table in [&mut stages, &mut counts] {
+            for column in table.column_iter_mut().skip(1) {
+                column.set_cell_alignment(CellAlignment::Right);
+            }
+        }
+        format!("{stages}\n{counts}")
+    }
+}
+
+fn sorted(times: &[Milliseconds], stage: fn(&Milliseconds) -> f64) -> Vec<f64> {
+    let mut times: Vec<f64> = times.iter().map(stage).collect();
+    times.sort_by(f64::total_cmp);
+    times
+}
+
+fn middle(sorted: &[f64]) -> String {
+    sorted.get(sorted.len() / 2).map_or("-".into(), ms)
+}
+
+fn ms(value: &f64) -> String {
+    format!("{value:.3}")
+}
