@@ -53,3 +53,8 @@ pub use pieces::Pieces;
 pub use quality::{QualitySummary, TetQuality, tet_quality};
 pub use surface::Surface;
 pub use tet_mesh::{TetMesh, signed_volume};
+
+/// Compiles the example of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
