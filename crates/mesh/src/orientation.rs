@@ -35,7 +35,8 @@ pub fn orientation([a, b, c, d]: [DVec3; 4]) -> f64 {
         z: p.z,
     });
     // The predicate calls a tet positive whose last corner lies below the first three: the opposite of ours.
-    -orient3d(a, b, c, d)
+    // Subtracting, not negating, never gives -0.
+    0.0 - orient3d(a, b, c, d)
 }
 
 impl TetMesh {

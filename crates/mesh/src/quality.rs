@@ -55,13 +55,7 @@ pub struct QualitySummary {
 pub fn tet_quality(corners: [DVec3; 4]) -> TetQuality {
     let [a, b, c, d] = corners;
     let volume = signed_volume(corners);
-    // Outward normals, as long as twice the area.
-    let normals = [
-        (c - b).cross(d - b),
-        (d - a).cross(c - a),
-        (b - a).cross(d - a),
-        (c - a).cross(b - a),
-    ];
+    let normals = outward_normals(corners);
     let areas = normals.map(|n| n.length() / 2.0);
     let largest_area = areas.into_iter().fold(0.0, f64::max);
 
@@ -91,6 +85,16 @@ pub fn tet_quality(corners: [DVec3; 4]) -> TetQuality {
             3.0 * inradius / circumcenter.length()
         },
     }
+}
+
+/// The outward normals of the faces opposite each corner, as long as twice the area.
+pub(crate) fn outward_normals([a, b, c, d]: [DVec3; 4]) -> [DVec3; 4] {
+    [
+        (c - b).cross(d - b),
+        (d - a).cross(c - a),
+        (b - a).cross(d - a),
+        (c - a).cross(b - a),
+    ]
 }
 
 impl TetMesh {

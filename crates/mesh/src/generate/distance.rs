@@ -22,7 +22,7 @@ pub(super) fn torus(p: DVec3, ring: f64, tube: f64) -> f64 {
     (from_ring * from_ring + p.z * p.z).sqrt() - tube
 }
 
-/// An axis-aligned ellipsoid; the result is between the distance and the distance in the direction of the center.
+/// An axis-aligned ellipsoid: right in sign, in size at most the distance.
 pub(super) fn ellipsoid(p: DVec3, center: DVec3, radii: DVec3) -> f64 {
     (((p - center) / radii).length() - 1.0) * radii.min_element()
 }

@@ -1,13 +1,13 @@
 //! The lattice on which level sets are sampled, and the search for the surface on its edges.
 //!
-//! Cubic cells, whose corners and centers together form a body-centered cubic lattice: the points that, among lattices,
-//! make the best-shaped tets. Constant time.
+//! Cubic cells, whose corners and centers together form a body-centered cubic lattice,
+//! whose natural tets are all alike and well shaped. Constant time.
 
 use glam::DVec3;
 
 use crate::MeshError;
 
-/// Cells a lattice may have: the tables then take about 8 GiB.
+/// Cells a lattice may have: the tables then take about 5 GiB.
 const MAX_CELLS: usize = 1 << 26;
 
 /// Cubic cells whose corners and centers are the vertices of a body-centered cubic lattice.
@@ -82,7 +82,7 @@ impl Lattice {
     }
 }
 
-/// Where the function is zero on the edge between an inside and an outside vertex, to about 1e-4 of its length.
+/// Where the function is zero on the edge between an inside and an outside vertex, to about 1e-6 of its values there.
 ///
 /// False position with the Illinois modification: the bracket always holds a change of sign.
 pub(super) fn root(ends: [DVec3; 2], values: [f64; 2], distance: &impl Fn(DVec3) -> f64) -> DVec3 {

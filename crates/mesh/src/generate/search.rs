@@ -2,27 +2,31 @@
 //!
 //! The number of tets is close to 12 volume / spacing³, but jumps whenever a layer of lattice vertices enters or leaves
 //! the shape, by several percent for flat sides and small meshes. The spacing is searched by bisection sped up with that
-//! law; when a jump straddles the wanted number, the lattice is shifted against the shape and the search repeated. Shifts
-//! follow a low-discrepancy sequence, so that they are all different and the same for everyone.
+//! law; when a jump straddles the wanted number, the lattice is shifted against the shape and the search repeated, at
+//! last also turned, so that its layers meet no flat side all at once. Shifts follow a low-discrepancy sequence: they
+//! are all different and the same for everyone.
 //!
 //! Cost: a few stuffings for curved shapes, some dozens for flat ones.
 
-use glam::{DVec3, dvec3};
+use glam::{DMat3, DQuat, DVec3, dvec3};
 
 use super::{Lattice, Shape, stuff};
-use crate::{MeshError, TetMesh};
+use crate::quality::outward_normals;
+use crate::{MeshError, TetId, TetMesh};
 
 /// The largest number of tets that can be asked for.
 const LARGEST: usize = 1_000_000;
-/// Shifts of the lattice that are tried.
-const SHIFTS: u32 = 200;
+/// Shifts of the aligned lattice that are tried, then of the turned lattice.
+const SHIFTS: [u32; 2] = [24, 200];
 /// Spacings that are tried with one shift.
 const SPACINGS: usize = 14;
+/// The cosines of the dihedral angles 164.8 and 10.7 degrees.
+const DIHEDRAL_COSINES: [f64; 2] = [-0.965_016, 0.982_613];
 
 /// A mesh of the shape with `tets` tets to within 2 %.
 ///
 /// The mesh is sound ([`TetMesh::check`]), a single piece also by faces, with a manifold surface of the shape's
-/// topology. Deterministic on all platforms.
+/// topology and all dihedral angles between 10.7 and 164.8 degrees. Deterministic on all platforms.
 ///
 /// # Errors
 /// [`MeshError::TetCount`] for fewer than [`Shape::smallest_tet_count`] or more than a million tets.
@@ -37,51 +41,76 @@ const SPACINGS: usize = 14;
 /// # Ok::<(), incise_mesh::MeshError>(())
 /// ```
 pub fn generate(shape: Shape, tets: usize) -> Result<TetMesh, MeshError> {
-    let refused = || MeshError::TetCount {
-        shape: shape.name(),
-        wanted: tets,
-        smallest: shape.smallest_tet_count(),
-        largest: LARGEST,
-    };
-    if !(shape.smallest_tet_count()..=LARGEST).contains(&tets) {
-        return Err(refused());
-    }
-    let half = shape.half_extent();
-    let start = cube_root(12.0 * shape.volume() / tets as f64);
-    for shift in (0..SHIFTS).map(shift) {
-        let (mut fine, mut coarse) = (0.0, f64::INFINITY);
-        let mut spacing = start;
-        for _ in 0..SPACINGS {
-            let lattice = Lattice::covering(-half, half, spacing, shift)?;
-            let mesh = stuff(&lattice, |p| shape.signed_distance(p))?;
-            let count = mesh.tets.len();
-            if 50 * count.abs_diff(tets) <= tets {
-                if is_faithful(&mesh, shape) {
-                    return Ok(mesh);
-                }
-                break;
+    let smallest = shape.smallest_tet_count();
+    if (smallest..=LARGEST).contains(&tets) {
+        // Sides of the shape are then far from all directions of the lattice.
+        let turned = DMat3::from_quat(DQuat::from_xyzw(1.0, 2.0, 3.0, 5.0).normalize());
+        for (turn, shifts) in [DMat3::IDENTITY, turned].into_iter().zip(SHIFTS) {
+            if let Some(mesh) =
+                (0..shifts).find_map(|n| search(shape, tets, turn, shift(n)).transpose())
+            {
+                return mesh;
             }
-            *(if count > tets { &mut fine } else { &mut coarse }) = spacing;
-            if coarse - fine < 1e-4 * spacing {
-                break;
-            }
-            let guess = spacing * cube_root(count as f64 / tets as f64).clamp(0.7, 1.4);
-            spacing = if fine < guess && guess < coarse {
-                guess
-            } else {
-                0.5 * (fine + coarse)
-            };
         }
     }
-    Err(refused())
+    Err(MeshError::TetCount {
+        shape: shape.name(),
+        wanted: tets,
+        smallest,
+        largest: LARGEST,
+    })
 }
 
-/// Whether a mesh has the topology of the shape: too coarse a lattice breaks thin parts or closes holes.
+/// Looks for a spacing that gives the wanted number of tets on a lattice turned and shifted in a given way.
+fn search(
+    shape: Shape,
+    tets: usize,
+    turn: DMat3,
+    shift: DVec3,
+) -> Result<Option<TetMesh>, MeshError> {
+    let half = shape.half_extent();
+    // The turned lattice covers the box around the shape as seen along its own axes.
+    let covered = turn.transpose().abs() * half;
+    let (mut fine, mut coarse) = (0.0, f64::INFINITY);
+    let mut spacing = cube_root(12.0 * shape.volume() / tets as f64);
+    for _ in 0..SPACINGS {
+        let lattice = Lattice::covering(-covered, covered, spacing, shift)?;
+        let mut mesh = stuff(&lattice, |p| shape.signed_distance(turn * p))?;
+        let count = mesh.tets.len();
+        if 50 * count.abs_diff(tets) <= tets {
+            for position in &mut mesh.positions {
+                *position = turn * *position;
+            }
+            return Ok(Some(mesh).filter(|mesh| is_faithful(mesh, shape)));
+        }
+        *(if count > tets { &mut fine } else { &mut coarse }) = spacing;
+        if coarse - fine < 1e-4 * spacing {
+            break;
+        }
+        let guess = spacing * cube_root(count as f64 / tets as f64).clamp(0.7, 1.4);
+        spacing = if fine < guess && guess < coarse {
+            guess
+        } else {
+            0.5 * (fine + coarse)
+        };
+    }
+    Ok(None)
+}
+
+/// Whether a mesh has the topology of the shape, which too coarse a lattice breaks, and good angles.
 fn is_faithful(mesh: &TetMesh, shape: Shape) -> bool {
     let surface = mesh.surface();
     surface.euler_characteristic() == shape.euler_characteristic()
         && surface.is_manifold()
         && mesh.face_pieces().count == 1
+        && (0..mesh.tets.len()).all(|t| has_good_angles(mesh.corners(TetId::new(t))))
+}
+
+/// Whether the dihedral angles keep the bounds, judged by their cosines, which are the same on all platforms.
+fn has_good_angles(corners: [DVec3; 4]) -> bool {
+    let normals = outward_normals(corners).map(|n| n / n.length());
+    let [low, high] = DIHEDRAL_COSINES;
+    (0..4).all(|i| (0..i).all(|j| (low..=high).contains(&-normals[i].dot(normals[j]))))
 }
 
 /// The points of the additive sequence of Roberts (2018), which fills the unit cube evenly.

@@ -23,7 +23,7 @@ pub enum Shape {
     Beam,
     /// A ring in the xy plane, 1 across, with a tube of diameter 0.3.
     Torus,
-    /// A slab of 1 x 1 x 0.16.
+    /// A slab of 1 x 1 x 0.2.
     Plate,
     /// A liver: a large right lobe tapering to a thin left one.
     Liver,
@@ -90,8 +90,8 @@ impl Shape {
             Self::Sphere | Self::Box => DVec3::splat(0.5),
             Self::Beam => DVec3::new(0.5, 0.125, 0.125),
             Self::Torus => DVec3::new(0.5, 0.5, 0.15),
-            Self::Plate => DVec3::new(0.5, 0.5, 0.08),
-            Self::Liver => DVec3::new(0.5, 0.4, 0.4),
+            Self::Plate => DVec3::new(0.5, 0.5, 0.1),
+            Self::Liver => DVec3::new(0.5, 0.3, 0.27),
         }
     }
 
@@ -117,8 +117,8 @@ impl Shape {
             Self::Box => 1.0,
             Self::Beam => 0.0625,
             Self::Torus => 0.1554,
-            Self::Plate => 0.16,
-            Self::Liver => 0.15,
+            Self::Plate => 0.2,
+            Self::Liver => 0.112,
         }
     }
 }
@@ -131,10 +131,10 @@ impl fmt::Display for Shape {
 
 /// The liver: three blended ellipsoids without a ball.
 fn liver(p: DVec3) -> f64 {
-    let right = ellipsoid(p, dvec3(-0.2, 0.0, 0.0), dvec3(0.3, 0.25, 0.26));
-    let lower = ellipsoid(p, dvec3(-0.27, -0.12, -0.04), dvec3(0.17, 0.22, 0.2));
-    let left = ellipsoid(p, dvec3(0.2, 0.08, 0.03), dvec3(0.3, 0.11, 0.16));
+    let right = ellipsoid(p, dvec3(-0.2, 0.043, 0.0), dvec3(0.3, 0.25, 0.26));
+    let lower = ellipsoid(p, dvec3(-0.27, -0.077, -0.04), dvec3(0.17, 0.22, 0.2));
+    let left = ellipsoid(p, dvec3(0.2, 0.123, 0.03), dvec3(0.3, 0.11, 0.16));
     let lobes = smooth_union(smooth_union(right, lower, 0.08), left, 0.16);
-    let hollow = ball(p - dvec3(0.06, -0.26, 0.06), 0.2);
+    let hollow = ball(p - dvec3(0.06, -0.217, 0.06), 0.2);
     smooth_difference(lobes, hollow, 0.08)
 }

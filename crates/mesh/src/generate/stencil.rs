@@ -12,11 +12,12 @@
 //! In the prism with two + and two - corners the two shared diagonals then always have different ends, and only one
 //! diagonal of the third quadrilateral, which lies on the surface, makes three tets possible.
 //!
-//! At the extremes of moved vertices and cuts the angles lie between 9.2 and 161.7 degrees, whatever the function (a test
-//! tries them all). The paper proves 10.7 to 164.8 for its own table of diagonals, which may differ for the first rule.
+//! With moved vertices and cuts at their extremes, all angles lie between 9.2 and 161.7 degrees (a test tries them all).
+//! The paper proves 10.7 to 164.8 degrees, so its table of diagonals must differ somewhere, probably in the first rule;
+//! the opposite choice there falls to 7.2 degrees.
 //!
 //! Source: F. Labelle and J. R. Shewchuk, "Isosurface Stuffing: Fast Tetrahedral Meshes with Good Dihedral Angles",
-//! 2007, section 3 and figure 3. Constant time per tet.
+//! 2007. Constant time per tet.
 
 /// Where a lattice vertex lies.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

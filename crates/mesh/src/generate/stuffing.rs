@@ -5,9 +5,10 @@
 //! point so near that slivers would follow is moved onto it, which removes the other cuts at its edges. Each lattice tet
 //! is then filled from the stencils of the module `stencil`.
 //!
-//! Whatever the function, all dihedral angles lie between 9.2 and 161.7 degrees, faces match, and every tet is positive.
-//! Smooth surfaces that the lattice resolves stay well inside the bounds of the paper, 10.7 and 164.8 degrees. Features
-//! thinner than the spacing are lost, sharp edges are beveled.
+//! Whatever the function, faces match, every tet is positive, and the dihedral angles stay between 9.2 and 161.7 degrees.
+//! These bounds are not proved but found by trying all extremes of the stencils; they are not the 10.7 and 164.8 degrees
+//! that the paper proves, which smooth surfaces keep as a rule but not always. Features thinner than the spacing are
+//! lost, sharp edges are beveled.
 //!
 //! Source: F. Labelle and J. R. Shewchuk, "Isosurface Stuffing: Fast Tetrahedral Meshes with Good Dihedral Angles",
 //! 2007, for a uniform lattice. Cost: linear in the number of lattice cells, with two samples each.
@@ -18,16 +19,18 @@ use super::lattice::{Lattice, root};
 use super::stencil::{Corner, Node, Side, fill, is_long};
 use crate::{MeshError, ParticleId, TetMesh, signed_volume};
 
-/// A vertex moves onto a cut on a long edge nearer than this part of the edge (paper, table 2).
+/// A vertex moves onto a cut on a long edge nearer than this part of the edge (values of the paper).
 pub(super) const ALPHA_LONG: f64 = 0.24999;
 /// The same for short edges.
 pub(super) const ALPHA_SHORT: f64 = 0.41189;
 /// No entry in a table of indices.
 const NONE: u32 = u32::MAX;
+
 /// Fills the region where `distance` is negative with tets.
 ///
 /// `distance` takes a position in meters; it must be continuous, and only its sign matters for the shape of the result.
-/// The region must not reach the outermost layer of cells. The result has no unused particles. It has no tets when no lattice vertex lies inside.
+/// The region must not reach the outermost layer of cells. The result has no unused
+/// particles. It has no tets when no lattice vertex lies inside.
 ///
 /// Deterministic: the same function values give the same bits on every platform. Tets come in the order of the cells,
 /// x first, and particles in the order of their first use.

@@ -4,7 +4,7 @@
 //! |---|---|---|---|
 //! | `.vtk` | legacy VTK, ASCII, unstructured grid | yes | yes |
 //! | `.node`, `.ele` | TetGen, a pair of files | yes | yes |
-//! | `.vtu` | VTK XML unstructured grid with fields | | [`write`], [`write_vtu`] |
+//! | `.vtu` | VTK XML unstructured grid with fields | | [`write()`], [`write_vtu`] |
 //! | `.vtp` | VTK XML surface with fields | | [`write_vtp`] |
 //! | `.pvd` | ParaView collection of time steps | | [`write_pvd`] |
 //!

@@ -85,11 +85,16 @@ fn array<const N: usize>(
     values: impl Iterator<Item = [u8; N]>,
 ) -> io::Result<()> {
     let data: Vec<u8> = values.flatten().collect();
-    let name = Escaped(name);
-    writeln!(
+    write!(
         out,
-        "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" format=\"binary\">"
+        "<DataArray type=\"{kind}\" Name=\"{}\" format=\"binary\"",
+        Escaped(name)
     )?;
+    // Some readers make a table with one column of an array with one component.
+    if components > 1 {
+        write!(out, " NumberOfComponents=\"{components}\"")?;
+    }
+    writeln!(out, ">")?;
     // One base64 text for the length and the data together.
     let mut bytes = (data.len() as u64).to_le_bytes().to_vec();
     bytes.extend(data);

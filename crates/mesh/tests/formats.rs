@@ -1,0 +1,292 @@
+//! Files survive a round trip bit for bit, and no file, however broken, makes a reader panic.
+
+use std::fs;
+
+use incise_mesh::generate::kuhn_box;
+use incise_mesh::glam::{DVec3, dvec3};
+use incise_mesh::{MeshError, ParticleId, TetMesh, io, orientation};
+use proptest::prelude::*;
+
+/// Any finite double, all bit patterns alike: subnormal, huge, -0.
+fn coordinate() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        any::<u64>()
+            .prop_map(f64::from_bits)
+            .prop_filter("finite", |c| c.is_finite()),
+        prop::sample::select(vec![
+            -0.0,
+            0.1,
+            f64::MIN_POSITIVE,
+            5e-324,
+            f64::MAX,
+            f64::MIN,
+            f64::EPSILON
+        ]),
+    ]
+}
+
+fn mesh() -> impl Strategy<Value = TetMesh> {
+    let positions = prop::collection::vec(
+        [coordinate(), coordinate(), coordinate()].prop_map(DVec3::from),
+        4..30,
+    );
+    positions.prop_flat_map(|positions| {
+        let corner = (0..positions.len()).prop_map(ParticleId::new);
+        let tets = prop::collection::vec(
+            [corner.clone(), corner.clone(), corner.clone(), corner],
+            1..40,
+        );
+        tets.prop_map(move |tets| TetMesh {
+            positions: positions.clone(),
+            tets,
+        })
+    })
+}
+
+fn bits(mesh: &TetMesh) -> Vec<u64> {
+    mesh.positions
+        .iter()
+        .flat_map(|p| p.to_array())
+        .map(f64::to_bits)
+        .collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..Default::default() })]
+
+    #[test]
+    fn round_trips_keep_every_bit(mut mesh in mesh()) {
+        let folder = tempfile::tempdir().unwrap();
+        let vtk = folder.path().join("mesh.vtk");
+        io::write(&vtk, &mesh).unwrap();
+        let read = io::read(&vtk).unwrap();
+        prop_assert_eq!(bits(&read), bits(&mesh));
+        prop_assert_eq!(&read.tets, &mesh.tets);
+
+        // TetGen files are oriented when read.
+        let node = folder.path().join("mesh.node");
+        io::write(&node, &mesh).unwrap();
+        let read = io::read(folder.path().join("mesh.ele")).unwrap();
+        mesh.orient_positively();
+        prop_assert_eq!(bits(&read), bits(&mesh));
+        prop_assert_eq!(&read.tets, &mesh.tets);
+        prop_assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3);
+    }
+
+    #[test]
+    fn noise_in_a_file_is_no_reason_to_panic(place in 0..2000_usize, byte: u8, length in 0..8_usize) {
+        let folder = tempfile::tempdir().unwrap();
+        let mesh = kuhn_box([2, 1, 1], dvec3(0.1, 0.7, 1.3));
+        for name in ["mesh.vtk", "mesh.node", "mesh.ele"] {
+            let path = folder.path().join(name);
+            io::write(&path, &mesh).unwrap();
+            let mut bytes = fs::read(&path).unwrap();
+            let place = place % bytes.len();
+            let end = (place + length).min(bytes.len());
+            bytes[place..end].fill(byte);
+            fs::write(&path, bytes).unwrap();
+            if let Ok(mesh) = io::read(&path) {
+                assert!(mesh.positions.iter().all(|p| p.is_finite()));
+                assert!(mesh.tets.iter().flatten().all(|p| p.index() < mesh.positions.len()));
+            }
+        }
+    }
+}
+
+#[test]
+fn every_prefix_reads_or_errs() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = kuhn_box([1, 1, 1], dvec3(0.1, 0.7, 1.3));
+    for name in ["mesh.vtk", "mesh.node", "mesh.ele"] {
+        let path = folder.path().join(name);
+        io::write(&path, &mesh).unwrap();
+        let bytes = fs::read(&path).unwrap();
+        for end in 0..bytes.len() {
+            fs::write(&path, &bytes[..end]).unwrap();
+            match io::read(&path) {
+                Ok(read) => assert_eq!(read.positions.len(), mesh.positions.len()),
+                Err(error) => assert!(error.to_string().contains(&format!("{name}:")), "{error}"),
+            }
+        }
+        io::write(&path, &mesh).unwrap();
+    }
+}
+
+fn read_text(name: &str, text: &str) -> Result<TetMesh, MeshError> {
+    let folder = tempfile::tempdir().expect("there is a place for temporary files");
+    let path = folder.path().join(name);
+    fs::write(&path, text).expect("the file can be written");
+    io::read(path)
+}
+
+const HEADER: &str = "# vtk DataFile Version 2.0\n\u{e9}tude\nASCII\nDATASET UNSTRUCTURED_GRID\n";
+const POINTS: &str = "POINTS 5 float\n0 0 0 1 0 0\n0 1 0  0 0 1\n1 1 1\n";
+
+#[test]
+fn vtk_of_other_writers() {
+    let expected = [[0, 1, 2, 3].map(ParticleId), [1, 2, 3, 4].map(ParticleId)];
+    let old = "cells 2 10\n4 0 1 2 3 4 1 2 3 4\ncell_types 2\n10 10\n";
+    let new = "CELLS 3 8\nOFFSETS vtktypeint64\n0 4 8\nCONNECTIVITY vtktypeint64\n0 1 2 3 1 2 3 4\nCELL_TYPES 2\n10\n10\n";
+    let mixed = "CELLS 4 18\n3 0 1 2\n4 0 1 2 3\n4 1 2 3 4\n3 0 1 3\nCELL_TYPES 4\n5 10 10 5\n";
+    for cells in [old, new, mixed] {
+        let mesh = read_text("a.vtk", &format!("{HEADER}{POINTS}{cells}")).unwrap();
+        assert_eq!(mesh.tets, expected);
+        assert_eq!(mesh.positions[4], DVec3::ONE);
+        // Sections in another order, with others between and after; line ends of another system.
+        let fields = "FIELD FieldData 1\nTimeValue 1 1 double\n0.5\nMETADATA\nINFORMATION 0\n\n";
+        let data = "POINT_DATA 5\nSCALARS CELLS double 1\nLOOKUP_TABLE default\n1 2 3 4 5\n";
+        let text = format!("{HEADER}{fields}{cells}{POINTS}{data}").replace('\n', "\r\n");
+        assert_eq!(read_text("a.vtk", &text).unwrap().tets, expected);
+    }
+}
+
+#[test]
+fn vtk_errors_name_the_line() {
+    let cells = "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n";
+    let good = format!("{HEADER}{POINTS}{cells}");
+    for (from, to, expected) in [
+        ("ASCII", "BINARY", ":3: binary legacy VTK is not read yet"),
+        (
+            "UNSTRUCTURED_GRID",
+            "POLYDATA",
+            ":4: DATASET UNSTRUCTURED_GRID expected",
+        ),
+        (
+            "0 1 0  ",
+            "0 nan 0  ",
+            ":7: the coordinate nan is not finite",
+        ),
+        (
+            "0 1 0  ",
+            "0 -inf 0  ",
+            ":7: the coordinate -inf is not finite",
+        ),
+        (
+            "0 1 0  ",
+            "0 1e999 0  ",
+            ":7: the coordinate 1e999 is not finite",
+        ),
+        ("0 1 0  ", "0 1,5 0  ", ":7: \"1,5\" is not a coordinate"),
+        (
+            "4 0 1 2 3",
+            "4 0 1 2 7",
+            ":10: the cell 0 uses point 7 but there are 5",
+        ),
+        (
+            "4 0 1 2 3",
+            "4 0 1 2 -1",
+            ":10: \"-1\" is not a point of a cell",
+        ),
+        ("4 0 1 2 3", "3 0 1 2", ":10: the tet 0 has 3 points"),
+        (
+            "\n10\n",
+            "\n12\n",
+            ":10: none of the 1 cells is a tetrahedron",
+        ),
+        (
+            "CELLS 1 5",
+            "CELLS 1 4",
+            ":10: the cells need more than the 4 numbers",
+        ),
+        (
+            "POINTS 5",
+            "POINTS 99999999999999999",
+            ":8: \"CELLS\" is not a coordinate",
+        ),
+        (
+            "POINTS 5",
+            "POINTS -5",
+            ":5: \"-5\" is not the number of points",
+        ),
+        (
+            "CELLS 1 5",
+            "CELLS 18446744073709551615 18446744073709551615",
+            ":11: \"CELL_TYPES\" is not",
+        ),
+        ("float", "int", ":5: points of type \"int\""),
+        ("# vtk", "# not", ":1: the file does not start with"),
+    ] {
+        let error = read_text("a.vtk", &good.replacen(from, to, 1))
+            .expect_err(to)
+            .to_string();
+        let expected = expected.replace(":8: \"CELLS\"", ":9: \"CELLS\"");
+        assert!(error.contains(&expected), "{error} lacks {expected}");
+    }
+    let empty = format!("{HEADER}{POINTS}CELLS 0 0\nCELL_TYPES 0\n");
+    assert!(matches!(read_text("a.vtk", &empty), Err(MeshError::Empty)));
+}
+
+#[test]
+fn tetgen_of_other_writers() {
+    let folder = tempfile::tempdir().unwrap();
+    let [node, ele] = ["a.node", "a.ele"].map(|name| folder.path().join(name));
+    let points = "# points\n4 3 1 1 # counts\n1 0 0 0 7.5 1\n\n2 1 0 0 7.5 1\n3 0 1 0 7.5 0\n4 0 0 1 7.5 0\n# end\n";
+    fs::write(&node, points).unwrap();
+    fs::write(&ele, "1 4 1\n1 2 1 3 4 99\n# end").unwrap();
+    let mesh = io::read(&node).unwrap();
+    assert!(orientation(mesh.corners(incise_mesh::TetId(0))) > 0.0);
+    assert_eq!(mesh.tets[0], [1, 0, 3, 2].map(ParticleId));
+
+    for (text, expected) in [
+        (
+            "1 4 1\n1 0 1 2 3 99\n",
+            "a.ele:2: point 0 does not exist, there are 4 counted from 1",
+        ),
+        (
+            "2 4 1\n1 1 2 3 4 99\n",
+            "a.ele:2: the file ends early: 2 tets announced but 1 found",
+        ),
+        (
+            "1 4 1\n1 1 2 3\n",
+            "a.ele:2: the line ends before a point of a tet",
+        ),
+        ("1 8 1\n", "a.ele:1: the tets have 8 points"),
+    ] {
+        fs::write(&ele, text).unwrap();
+        let error = io::read(&node).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error} lacks {expected}");
+    }
+    fs::write(&node, points.replace("3 0 1 0", "5 0 1 0")).unwrap();
+    assert!(
+        io::read(&node)
+            .unwrap_err()
+            .to_string()
+            .contains("a.node:6: point 3 expected but 5 found")
+    );
+}
+
+#[test]
+fn unknown_endings_name_the_known_ones() {
+    let error = io::read("mesh.step").unwrap_err().to_string();
+    assert!(error.contains("mesh.step") && error.contains(".vtk, .node, .ele"));
+    assert!(
+        io::write("mesh", &TetMesh::default())
+            .unwrap_err()
+            .to_string()
+            .contains(".vtu")
+    );
+    assert!(
+        io::read("no/such/file.vtk")
+            .unwrap_err()
+            .to_string()
+            .starts_with("cannot read no")
+    );
+}
+
+#[test]
+fn fields_of_the_wrong_length_are_refused() {
+    let mesh = kuhn_box([1, 1, 1], DVec3::ONE);
+    let field = [io::Field {
+        name: "speed",
+        values: io::Values::Scalars(&[0.0; 7]),
+    }];
+    let fields = io::Fields {
+        particles: &field,
+        ..Default::default()
+    };
+    let error = io::write_vtu("never.vtu", &mesh.positions, &mesh.tets, fields).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "field \"speed\" has 7 values but 8 are needed: give one for each element"
+    );
+}

@@ -1,0 +1,6 @@
+//! Behavior of the crate as seen from outside; one binary, so that the tests link once.
+
+mod faults;
+mod formats;
+mod given;
+mod shapes;
