@@ -56,7 +56,10 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<(), Failure> {
         save_mesh(path, &simulation).map_err(Failure::Input)?;
     }
     if !arguments.quiet {
-        println!("{}", summary.table([kappa, simulation.kappa()]));
+        println!(
+            "{}",
+            summary.table([kappa, simulation.kappa()], &simulation.softened())
+        );
         if arguments.check {
             println!(
                 "checked after each of {checked} cuts: mesh, volume at rest, masses, clusters, colors, pieces"

@@ -3,7 +3,7 @@
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table};
 use incise::FrameReport;
-use incise::report::Milliseconds;
+use incise::report::{Milliseconds, SoftenedReport};
 
 /// Name and time of each stage that has one.
 type Stage = (&'static str, fn(&Milliseconds) -> f64);
@@ -52,7 +52,7 @@ impl Summary {
     }
 
     /// The times by stage, then the counts.
-    pub(crate) fn table(&self, kappa: [f64; 2]) -> String {
+    pub(crate) fn table(&self, kappa: [f64; 2], softened: &SoftenedReport) -> String {
         let mut stages = Table::new();
         stages.load_style(UTF8_FULL_CONDENSED);
         stages.set_header([
@@ -100,6 +100,15 @@ impl Summary {
         counts.add_row([
             "kappa before, after".to_owned(),
             format!("{:.2}, {:.2}", kappa[0], kappa[1]),
+        ]);
+        counts.add_row([
+            "tets softened to the kappa limit".to_owned(),
+            format!(
+                "{} ({:.2}% of the volume, up to {:.0} times)",
+                softened.tets,
+                100.0 * softened.volume_fraction,
+                softened.strongest
+            ),
         ]);
         if self.repaired > 0 {
             counts.add_row([

@@ -7,7 +7,9 @@
 //!
 //! A particle is put on the surface (snapped) only before any of its edges is split, else a corner already cut free
 //! could be cut off again as a chip of its own. So when the blade first meets an edge of a particle, the surface is
-//! continued by its tangent plane through all edges of the particle, which decides as a whole plane would.
+//! continued by its tangent plane through all edges of the particle, which decides as a whole plane would. Where the
+//! body moves, a later meeting may come closer to the particle than foreseen; the new particle then keeps the snap
+//! distance, which bends the surface as snapping does, the other way.
 //!
 //! Source: paper section 4.3, with the moving front as described here. Cost of a frame: a pass over particles and tets
 //! to find those near the blade, then the cut.
@@ -154,13 +156,17 @@ impl Sweep {
             }
             let snapped = self.snap(operation.cuttable, &hits);
             operation.delta.snapped += snapped.len();
-            let free = |hit: &&Hit| {
+            let free = |hit: &Hit| {
                 hit.crossing
                     .ends
                     .iter()
                     .all(|p| snapped.binary_search(p).is_err())
             };
-            let flagged: Vec<&Hit> = hits.iter().filter(free).collect();
+            let mut flagged: Vec<Hit> = hits.into_iter().filter(free).collect();
+            let reach = self.options.reach();
+            for hit in &mut flagged {
+                hit.crossing.parameter = hit.crossing.parameter.clamp(reach, 1.0 - reach);
+            }
             near = operation.split(&flagged.iter().map(|hit| hit.crossing).collect::<Vec<_>>());
             fresh.extend(&snapped);
             for hit in flagged {

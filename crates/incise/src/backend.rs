@@ -3,7 +3,7 @@
 use glam::DVec3;
 use incise_cutting::{CutDelta, CuttableMesh};
 use incise_mesh::{ParticleId, TetId};
-use incise_xpbd::Solver;
+use incise_xpbd::{KappaLimit, Solver};
 
 use crate::Error;
 use crate::body::Bodies;
@@ -30,6 +30,7 @@ pub(crate) use each;
 impl AnySolver {
     pub(crate) fn new(
         precision: Precision,
+        kappa_limit: Option<KappaLimit>,
         bodies: &Bodies,
         cuttable: &CuttableMesh,
     ) -> Result<Self, Error> {
@@ -40,6 +41,7 @@ impl AnySolver {
         };
         let mesh = cuttable.mesh();
         each!(&mut any, solver => {
+            solver.limit_kappa(kappa_limit);
             for (i, material) in bodies.materials.iter().enumerate() {
                 let field = format!("body[{i}]");
                 solver.add_material(*material).map_err(|source| Error::Xpbd { field, source })?;

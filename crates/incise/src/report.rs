@@ -5,6 +5,7 @@
 use std::time::Duration;
 
 use incise_cutting::CutDelta;
+use incise_xpbd::Softened;
 use serde::Serialize;
 
 /// What a frame did.
@@ -53,6 +54,9 @@ pub struct FrameReport {
     /// The largest `E Δt² / (ρ h²)` of a tet: accurate up to about 0.5.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kappa: Option<f64>,
+    /// The tets softened to keep the limit of kappa.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub softened: Option<SoftenedReport>,
     /// Particles that had to be put back because they would have become infinite; absent if none.
     #[serde(skip_serializing_if = "is_zero")]
     pub repaired: usize,
@@ -145,6 +149,32 @@ pub struct EnergyReport {
     pub elastic: f64,
     /// Of height, relative to the origin.
     pub gravity: f64,
+}
+
+/// Tets that are softer than their material, because no substep of this length could follow them.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct SoftenedReport {
+    /// How many.
+    pub tets: usize,
+    /// Their share of the volume at rest.
+    pub volume_fraction: f64,
+    /// The largest factor by which one's stiffness was divided.
+    pub strongest: f64,
+}
+
+impl From<Softened> for SoftenedReport {
+    fn from(softened: Softened) -> Self {
+        let Softened {
+            tets,
+            volume_fraction,
+            strongest,
+        } = softened;
+        Self {
+            tets,
+            volume_fraction,
+            strongest,
+        }
+    }
 }
 
 /// A duration in ms.

@@ -85,7 +85,7 @@ pub enum Quantity {
     Volume,
     /// The largest speed.
     Speed,
-    /// The control number of the substep: see `incise_xpbd::Solver::kappa`.
+    /// The control number of the substep (see `incise_xpbd::Solver::kappa`) and what was softened to keep its limit.
     Kappa,
 }
 
@@ -130,6 +130,8 @@ pub struct SolverSpec {
     pub coloring: String,
     /// Width of the numbers.
     pub precision: Precision,
+    /// Largest kappa of a tet, positive: stiffer ones, as cuts leave them, are softened to it. `inf` softens none.
+    pub kappa_limit: f64,
 }
 
 impl Default for SolverSpec {
@@ -143,6 +145,7 @@ impl Default for SolverSpec {
             clustering: "serial:10".to_owned(),
             coloring: "scgc".to_owned(),
             precision: Precision::F32,
+            kappa_limit: 1.0,
         }
     }
 }

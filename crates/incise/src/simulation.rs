@@ -9,14 +9,15 @@ use glam::DVec3;
 use incise_cutting::CuttableMesh;
 use incise_graph::{Clustering, Coloring, Schedule};
 use incise_mesh::{Surface, TetMesh};
-use incise_xpbd::{Ground, StepSettings};
+use incise_xpbd::{Ground, KappaLimit, StepSettings};
 use rayon::ThreadPool;
 
 use crate::backend::{AnySolver, each};
 use crate::body::{Bodies, finite, value};
 use crate::plan::Plan;
 use crate::report::{
-    CutReport, EnergyReport, FrameReport, Milliseconds, ResidualReport, milliseconds,
+    CutReport, EnergyReport, FrameReport, Milliseconds, ResidualReport, SoftenedReport,
+    milliseconds,
 };
 use crate::scene::{Precision, Quantity, StrokeSpec};
 use crate::strokes::Timeline;
@@ -112,7 +113,8 @@ impl Simulation {
             field: "body".into(),
             source,
         })?;
-        let solver = AnySolver::new(precision, &bodies, &cuttable)?;
+        let kappa_limit = kappa_limit(scene, &settings)?;
+        let solver = AnySolver::new(precision, kappa_limit, &bodies, &cuttable)?;
         let make_plan = || Plan::new(scene, cuttable.mesh());
         let plan = match &pool {
             Some(pool) => pool.install(make_plan),
@@ -270,7 +272,10 @@ impl Simulation {
                     report.inverted_tets = Some(volume.inverted);
                 }
                 Quantity::Speed => report.max_speed = Some(solver.max_speed()),
-                Quantity::Kappa => report.kappa = Some(solver.kappa(substep_time)),
+                Quantity::Kappa => {
+                    report.kappa = Some(solver.kappa(substep_time));
+                    report.softened = Some(solver.softened().into());
+                }
             }
         });
     }
@@ -342,6 +347,12 @@ impl Simulation {
         each!(&self.solver, solver => solver.kappa(self.settings.substep_time()))
     }
 
+    /// The tets that are softer than their material to keep the scene's limit of kappa.
+    #[must_use]
+    pub fn softened(&self) -> SoftenedReport {
+        each!(&self.solver, solver => solver.softened()).into()
+    }
+
     /// Recomputes everything derived and compares: the mesh, the lists around its particles, volume, masses, clusters,
     /// colors, schedule, pieces. O(n log n); for tests and on request.
     ///
@@ -371,6 +382,18 @@ impl Simulation {
         }
         Ok(())
     }
+}
+
+fn kappa_limit(scene: &Scene, settings: &StepSettings) -> Result<Option<KappaLimit>, Error> {
+    let kappa = scene.solver.kappa_limit;
+    if kappa.is_nan() || kappa <= 0.0 {
+        return Err(value("solver.kappa_limit", kappa, "positive"));
+    }
+    let substep_time = settings.substep_time();
+    Ok(kappa.is_finite().then_some(KappaLimit {
+        kappa,
+        substep_time,
+    }))
 }
 
 fn settings(scene: &Scene) -> Result<StepSettings, Error> {

@@ -50,8 +50,8 @@ mod step;
 
 pub use error::XpbdError;
 pub use material::Material;
-pub use measure::{Energy, Residuals, Volume};
+pub use measure::{Energy, Residuals, Softened, Volume};
 pub use real::Real;
 pub use settings::{Ground, StepSettings};
-pub use solver::Solver;
+pub use solver::{KappaLimit, Solver};
 pub use step::StepReport;

@@ -31,6 +31,17 @@ pub struct Volume {
     pub inverted: usize,
 }
 
+/// The tets that are softer than their material.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Softened {
+    /// How many.
+    pub tets: usize,
+    /// Their share of the volume at rest.
+    pub volume_fraction: f64,
+    /// The largest factor by which one's stiffness was divided.
+    pub strongest: f64,
+}
+
 /// How far the last substep is from a solution of its equations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Residuals {
@@ -58,7 +69,7 @@ impl<R: Real> Solver<R> {
             let (bulge, at_rest) = (f.determinant() - gamma, 1.0 - gamma);
             let density =
                 0.5 * mu * (squared - 3.0) + 0.5 * l * (bulge * bulge - at_rest * at_rest);
-            energy.elastic += self.rest_volume(t) * density;
+            energy.elastic += self.volumes[t] * density / self.softening(t);
         }
         energy
     }
@@ -73,7 +84,7 @@ impl<R: Real> Solver<R> {
             inverted: 0,
         };
         for t in 0..self.tet_count() {
-            let (rest, ratio) = (self.rest_volume(t), self.gradient(t).determinant());
+            let (rest, ratio) = (self.volumes[t], self.gradient(t).determinant());
             volume.rest += rest;
             volume.total += rest * ratio;
             volume.min_ratio = volume.min_ratio.min(ratio);
@@ -107,14 +118,28 @@ impl<R: Real> Solver<R> {
     #[must_use]
     pub fn kappa_of(&self, tet: usize, substep_time: f64) -> f64 {
         let material = &self.materials[usize::from(self.material_of[tet])];
-        // Row i of the inverse is the gradient of a barycentric coordinate: its length is one over an altitude.
-        let rows = self.inverse_rest(tet).transpose();
-        let (a, b, c) = (rows.x_axis, rows.y_axis, rows.z_axis);
-        let steepest = [a, b, c, a + b + c]
-            .into_iter()
-            .map(DVec3::length_squared)
-            .fold(0.0, f64::max);
-        material.young_modulus / material.density * substep_time * substep_time * steepest
+        self.tets[tet].kappa(material, substep_time)
+    }
+
+    /// The tets softened by [`Solver::limit_kappa`]. O(tets).
+    #[must_use]
+    pub fn softened(&self) -> Softened {
+        let mut softened = Softened {
+            tets: 0,
+            volume_fraction: 0.0,
+            strongest: 1.0,
+        };
+        for t in 0..self.tet_count() {
+            let factor = self.softening(t);
+            // Single precision keeps seven digits of it.
+            if factor > 1.0 + 1e-5 {
+                softened.tets += 1;
+                softened.volume_fraction += self.volumes[t];
+                softened.strongest = softened.strongest.max(factor);
+            }
+        }
+        softened.volume_fraction /= self.volumes.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        softened
     }
 
     /// The residuals of the last substep; `None` unless it was made by [`Solver::step_keeping_residuals`] with
@@ -162,8 +187,9 @@ impl<R: Real> Solver<R> {
         DMat3::from_cols(b - a, c - a, d - a) * self.inverse_rest(tet)
     }
 
-    fn rest_volume(&self, tet: usize) -> f64 {
+    /// By how much a tet was softened: 1 if not at all.
+    fn softening(&self, tet: usize) -> f64 {
         let material = &self.materials[usize::from(self.material_of[tet])];
-        1.0 / (material.mu() * self.tets[tet].compliance[0].to_f64())
+        self.tets[tet].compliance[0].to_f64() * material.mu() * self.volumes[tet]
     }
 }

@@ -57,6 +57,23 @@ impl<R: Real> TetConstraint<R> {
         }
     }
 
+    /// `E Δt² / (ρ h²)` with h the smallest altitude, of the unsoftened material.
+    pub(crate) fn kappa(&self, material: &Material, substep_time: f64) -> f64 {
+        let q = self.inverse_rest.map(R::to_f64);
+        let [a, b, c] = [0, 1, 2].map(|i| DVec3::new(q[3 * i], q[3 * i + 1], q[3 * i + 2]));
+        // The gradient of a barycentric coordinate is as long as one over an altitude.
+        let steepest = [a, b, c, a + b + c]
+            .into_iter()
+            .map(DVec3::length_squared)
+            .fold(0.0, f64::max);
+        material.young_modulus / material.density * substep_time * substep_time * steepest
+    }
+
+    /// Divides the stiffness by a factor.
+    pub(crate) fn soften(&mut self, factor: f64) {
+        self.compliance = self.compliance.map(|c| R::from_f64(c.to_f64() * factor));
+    }
+
     /// The columns of the deformation gradient F with the corners at `x`.
     #[inline]
     fn deformation(&self, x: [R::Vector; 4]) -> [R::Vector; 3] {

@@ -41,12 +41,24 @@ pub struct Solver<R: Real> {
     pub(crate) masses: Vec<f64>,
     pub(crate) fixed: Vec<bool>,
     pub(crate) tets: Vec<TetConstraint<R>>,
+    /// Volumes at rest in m³.
+    pub(crate) volumes: Vec<f64>,
     pub(crate) material_of: Vec<u16>,
     pub(crate) materials: Vec<Material>,
+    kappa_limit: Option<KappaLimit>,
     /// Kept only while a step has more than one iteration or is asked for its residuals.
     pub(crate) multipliers: Vec<[R::Atomic; 2]>,
     /// Positions before the constraints are solved, kept only for residuals.
     pub(crate) predicted: Vec<R::Vector>,
+}
+
+/// See [`Solver::limit_kappa`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KappaLimit {
+    /// The largest kappa of a tet.
+    pub kappa: f64,
+    /// The time of a substep in s.
+    pub substep_time: f64,
 }
 
 impl<R: Real> Solver<R> {
@@ -60,6 +72,8 @@ impl<R: Real> Solver<R> {
             masses: Vec::new(),
             fixed: Vec::new(),
             tets: Vec::new(),
+            volumes: Vec::new(),
+            kappa_limit: None,
             material_of: Vec::new(),
             materials: Vec::new(),
             multipliers: Vec::new(),
@@ -103,6 +117,7 @@ impl<R: Real> Solver<R> {
     pub fn push_tet(&mut self, particles: [u32; 4], rest: [DVec3; 4], material: u16) {
         let constraint = self.constraint(particles, rest, material);
         self.tets.push(constraint);
+        self.volumes.push(signed_volume(rest));
         self.material_of.push(material);
     }
 
@@ -112,6 +127,7 @@ impl<R: Real> Solver<R> {
     /// If the tet or a particle does not exist.
     pub fn replace_tet(&mut self, tet: usize, particles: [u32; 4], rest: [DVec3; 4]) {
         self.tets[tet] = self.constraint(particles, rest, self.material_of[tet]);
+        self.volumes[tet] = signed_volume(rest);
     }
 
     /// Hangs a tet on other particles that are copies of its own.
@@ -125,7 +141,24 @@ impl<R: Real> Solver<R> {
 
     fn constraint(&self, particles: [u32; 4], rest: [DVec3; 4], material: u16) -> TetConstraint<R> {
         self.check_particles(particles);
-        TetConstraint::new(particles, rest, &self.materials[usize::from(material)])
+        let material = &self.materials[usize::from(material)];
+        let mut tet = TetConstraint::new(particles, rest, material);
+        if let Some(limit) = self.kappa_limit {
+            let kappa = tet.kappa(material, limit.substep_time);
+            if kappa > limit.kappa {
+                tet.soften(kappa / limit.kappa);
+            }
+        }
+        tet
+    }
+
+    /// From now on, softens every new tet whose [`Solver::kappa`] at `substep_time` would exceed `kappa`, so that it
+    /// just meets it; `None` ends this.
+    ///
+    /// Cutting leaves tets so small that no affordable substep follows their vibrations; unsoftened, they do not
+    /// vibrate but collapse and throw their neighbors about. What was softened: [`Solver::softened`].
+    pub fn limit_kappa(&mut self, limit: Option<KappaLimit>) {
+        self.kappa_limit = limit;
     }
 
     fn check_particles(&self, particles: [u32; 4]) {
@@ -297,6 +330,10 @@ impl<R: Real> Solver<R> {
     pub(crate) fn vector(&self, particle: usize) -> R::Vector {
         load::<R>(&self.particles[particle])
     }
+}
+
+fn signed_volume([a, b, c, d]: [DVec3; 4]) -> f64 {
+    (b - a).cross(c - a).dot(d - a) / 6.0
 }
 
 #[inline]
