@@ -131,19 +131,17 @@ impl<'a> Operation<'a> {
 
     /// Takes the star of each of `seeds` (ascending, all on the surface) apart where it was cut through.
     ///
-    /// A face is cut if all its particles are `on_surface` and its two tets lie on different sides. The parts of a star
-    /// that hang together through faces that are not cut keep one particle each: the part with the lowest tet the old
-    /// one, the others a copy. Particles at the front of an unfinished stroke need no special case: their star still
-    /// hangs together around the front. This is the paper's shared-vertex criterion (section 4.3) put so that it also
-    /// holds for snapped particles, partial cuts and meshes cut before.
+    /// The parts of a star that hang together through faces that are not cut keep one particle each: the part with the
+    /// lowest tet the old one, the others a copy. Particles at the front of an unfinished stroke need no special case:
+    /// their star still hangs together around the front. This is the paper's shared-vertex criterion (section 4.3) put
+    /// so that it also holds for snapped particles, partial cuts and meshes cut before.
     ///
-    /// `on_surface` and `side` (given the rest positions) are asked about particles as they were before separation only. Cost: the sum of the
-    /// sizes of the stars.
+    /// `is_cut` is given the rest positions, the particles of a face and those of the tets on both sides of it, all as
+    /// they were before separation. Cost: the sum of the sizes of the stars.
     pub(crate) fn separate(
         &mut self,
         seeds: &[ParticleId],
-        on_surface: impl Fn(ParticleId) -> bool,
-        side: impl Fn(&[DVec3], [ParticleId; 4]) -> bool,
+        is_cut: impl Fn(&[DVec3], [ParticleId; 3], [[ParticleId; 4]; 2]) -> bool,
     ) {
         let first_copy = self.delta.particles_before + self.delta.points.len();
         let mut star: Vec<TetId> = Vec::new();
@@ -181,9 +179,9 @@ impl<'a> Operation<'a> {
                 let [(pair, first), (_, second)] = *shared else {
                     continue;
                 };
-                let whole = pair.iter().all(|&p| on_surface(source(p)));
-                let sides = [first, second].map(|i| side(rest, tets[star[i].index()].map(source)));
-                if !(whole && sides[0] != sides[1]) {
+                let face = [seed, pair[0], pair[1]].map(source);
+                let sides = [first, second].map(|i| tets[star[i].index()].map(source));
+                if !is_cut(rest, face, sides) {
                     let (a, b) = (root(&mut parent, first), root(&mut parent, second));
                     // The lower index becomes the root, so each part is named by its lowest tet.
                     parent[a.max(b)] = a.min(b);

@@ -119,7 +119,9 @@ pub fn cut_plane(
         .filter(|&p| on_surface[p])
         .map(ParticleId::new)
         .collect();
-    operation.separate(&seeds, |p| on_surface[p.index()], side);
+    operation.separate(&seeds, |rest, face, tets| {
+        face.iter().all(|p| on_surface[p.index()]) && side(rest, tets[0]) != side(rest, tets[1])
+    });
     Ok(operation.finish(side))
 }
 

@@ -181,11 +181,9 @@ impl Sweep {
         }
 
         let seeds = self.seeds(operation.cuttable, &fresh);
-        operation.separate(
-            &seeds,
-            |p| self.surface.contains(p),
-            |rest, c| self.surface.side(rest, c),
-        );
+        operation.separate(&seeds, |rest, face, tets| {
+            self.surface.cuts(rest, face, tets)
+        });
         let delta = operation.finish(|rest, c| self.surface.side(rest, c));
         now.extend(
             delta
