@@ -11,7 +11,7 @@
 use incise_graph::Schedule;
 use rayon::prelude::*;
 
-use crate::solver::{load, store};
+use crate::real::{load, store};
 use crate::{Ground, Real, Solver, StepSettings, XpbdError};
 
 /// Constraints in a color from which a second thread pays for its wake-up.
