@@ -131,16 +131,19 @@ impl<R: Real> Solver<R> {
             .collect();
         let mut dual = 0.0;
         for (t, tet) in self.tets.iter().enumerate() {
-            let x = tet.particles.map(|p| self.vector(p as usize));
-            let evaluation = tet.evaluate(x);
+            let tet = tet.to_f64();
+            let [k1, k2] = tet.stiffness.map(|k| k * substep_time * substep_time);
+            // A tet that takes no part, or so little that its compliance overflows, has nothing to satisfy.
+            if !((1.0 / k1).is_finite() && (1.0 / k2).is_finite()) {
+                continue;
+            }
+            let evaluation = tet.evaluate(tet.particles.map(|p| self.position(p as usize)));
             let [deviatoric, hydrostatic] = self.multipliers_of(t).map(R::to_f64);
-            let scale = 1.0 / (substep_time * substep_time);
-            let [a, b] = tet.compliance.map(|c| c.to_f64() * scale);
-            dual += (evaluation.deviatoric.to_f64() + a * deviatoric).powi(2);
-            dual += (evaluation.hydrostatic.to_f64() + b * hydrostatic).powi(2);
+            dual += (evaluation.deviatoric + deviatoric / k1).powi(2);
+            dual += (evaluation.hydrostatic + hydrostatic / k2).powi(2);
             for (k, &p) in tet.particles.iter().enumerate() {
-                let pull = R::to_dvec3(evaluation.deviatoric_gradients[k]) * deviatoric
-                    + R::to_dvec3(evaluation.hydrostatic_gradients[k]) * hydrostatic;
+                let pull = evaluation.deviatoric_gradients[k] * deviatoric
+                    + evaluation.hydrostatic_gradients[k] * hydrostatic;
                 primal[p as usize] -= pull;
             }
         }
@@ -164,6 +167,6 @@ impl<R: Real> Solver<R> {
 
     fn rest_volume(&self, tet: usize) -> f64 {
         let material = &self.materials[usize::from(self.material_of[tet])];
-        1.0 / (material.mu() * self.tets[tet].compliance[0].to_f64())
+        self.tets[tet].stiffness[0].to_f64() / material.mu()
     }
 }

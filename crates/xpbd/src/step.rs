@@ -29,7 +29,7 @@ pub struct StepReport {
 
 /// What a pass over the constraints has to do beyond the plain solve; each choice is compiled on its own.
 struct Pass<R> {
-    per_time_squared: R,
+    time_squared: R,
     per_time: R,
     relaxation: R,
 }
@@ -104,7 +104,7 @@ impl<R: Real> Solver<R> {
             self.predicted = (0..self.particles.len()).map(|p| self.vector(p)).collect();
         }
         let pass = Pass {
-            per_time_squared: R::from_f64(1.0 / (time * time)),
+            time_squared: R::from_f64(time * time),
             per_time: R::from_f64(1.0 / time),
             relaxation: R::from_f64(settings.relaxation),
         };
@@ -200,7 +200,7 @@ impl<R: Real> Solver<R> {
             &evaluation,
             weights,
             multipliers,
-            pass.per_time_squared,
+            pass.time_squared,
             damping,
             rates,
         );
