@@ -92,7 +92,8 @@ impl<R: Real> Solver<R> {
 
     /// The largest `E Δt² / (ρ h²)` over all tets, with h the smallest altitude: the square of the distance in tets
     /// that a wave of stress travels in a substep of `substep_time`. Up to about 0.5 a substep of one iteration is
-    /// accurate; above about 2 shear is far too soft, and well above 10 a body can collapse.
+    /// accurate; up to 1 a body at rest stays so; above about 2 shear is far too soft, and from 4 on even a body at
+    /// rest rings itself to pieces.
     #[must_use]
     pub fn kappa(&self, substep_time: f64) -> f64 {
         (0..self.tet_count())
