@@ -133,7 +133,8 @@ impl<R: Real> Solver<R> {
         let mut dual = 0.0;
         for (t, tet) in self.tets.iter().enumerate() {
             let tet = tet.to_f64();
-            let [k1, k2] = tet.stiffness.map(|k| k * substep_time * substep_time);
+            let k1 = tet.stiffness * substep_time * substep_time;
+            let k2 = tet.ratio * k1;
             // A tet that takes no part, or so little that its compliance overflows, has nothing to satisfy.
             if !((1.0 / k1).is_finite() && (1.0 / k2).is_finite()) {
                 continue;
@@ -168,6 +169,6 @@ impl<R: Real> Solver<R> {
 
     fn rest_volume(&self, tet: usize) -> f64 {
         let material = &self.materials[usize::from(self.material_of[tet])];
-        self.tets[tet].stiffness[0].to_f64() / material.mu()
+        self.tets[tet].stiffness.to_f64() / material.mu()
     }
 }

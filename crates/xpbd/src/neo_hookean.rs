@@ -19,8 +19,10 @@ pub(crate) struct TetConstraint<R> {
     pub(crate) particles: [u32; 4],
     /// Inverse of the rest edge matrix, row by row: row i is the gradient of the barycentric coordinate of corner i + 1.
     pub(crate) inverse_rest: [R; 9],
-    /// `μV` and `lV` in J: one over the compliances.
-    pub(crate) stiffness: [R; 2],
+    /// `μV` in J: one over the compliance of the deviatoric constraint.
+    pub(crate) stiffness: R,
+    /// `l/μ`: how much stiffer the hydrostatic constraint is.
+    pub(crate) ratio: R,
     pub(crate) gamma: R,
 }
 
@@ -40,15 +42,16 @@ impl<R: Real> TetConstraint<R> {
         let volume = edges.determinant() / 6.0;
         let inverse = edges.inverse();
         let rows = [inverse.row(0), inverse.row(1), inverse.row(2)];
-        let stiffness = [material.mu(), material.volume_stiffness()].map(|k| k * volume);
-        let entries = rows.iter().flat_map(|r| r.to_array()).chain(stiffness);
+        let stiffness = material.mu() * volume;
+        let entries = rows.iter().flat_map(|r| r.to_array()).chain([stiffness]);
         let sound = volume > 0.0 && entries.into_iter().all(|v| R::from_f64(v).is_finite());
         // A tet too flat to be represented takes no part: without stiffness it leaves its corners to its neighbors.
         let entry = |v: f64| if sound { R::from_f64(v) } else { R::ZERO };
         Self {
             particles,
             inverse_rest: std::array::from_fn(|i| entry(rows[i / 3][i % 3])),
-            stiffness: stiffness.map(entry),
+            stiffness: entry(stiffness),
+            ratio: R::from_f64(material.volume_stiffness() / material.mu()),
             gamma: R::from_f64(material.gamma()),
         }
     }
@@ -58,7 +61,8 @@ impl<R: Real> TetConstraint<R> {
         TetConstraint {
             particles: self.particles,
             inverse_rest: self.inverse_rest.map(R::to_f64),
-            stiffness: self.stiffness.map(R::to_f64),
+            stiffness: self.stiffness.to_f64(),
+            ratio: self.ratio.to_f64(),
             gamma: self.gamma.to_f64(),
         }
     }
@@ -121,33 +125,34 @@ impl<R: Real> TetConstraint<R> {
         damping: R,
         rates: [R; 2],
     ) -> Option<[R; 2]> {
+        let stiffness = self.stiffness * time_squared;
+        let weights = weights.map(|w| w * stiffness);
         let weighted = |g: &[R::Vector; 4], h: &[R::Vector; 4]| {
             weights[0] * R::dot(g[0], h[0])
                 + weights[1] * R::dot(g[1], h[1])
                 + weights[2] * R::dot(g[2], h[2])
                 + weights[3] * R::dot(g[3], h[3])
         };
-        let [k1, k2] = self.stiffness.map(|k| k * time_squared);
+        // The matrix is one plus [m11, m12; ratio · m12, ratio · m22].
         let damped = R::ONE + damping;
-        let m11 = k1 * (damped * weighted(&e.deviatoric_gradients, &e.deviatoric_gradients));
-        let m22 = k2 * (damped * weighted(&e.hydrostatic_gradients, &e.hydrostatic_gradients));
-        let s12 = damped * weighted(&e.deviatoric_gradients, &e.hydrostatic_gradients);
-        let (m12, m21) = (k1 * s12, k2 * s12);
+        let m11 = damped * weighted(&e.deviatoric_gradients, &e.deviatoric_gradients);
+        let m22 = damped * weighted(&e.hydrostatic_gradients, &e.hydrostatic_gradients);
+        let m12 = damped * weighted(&e.deviatoric_gradients, &e.hydrostatic_gradients);
         // At rest the gradients are parallel and only the one keeps the system regular. The difference is not negative
         // (Cauchy-Schwarz); where rounding says otherwise, it is noise. Overflow makes it NaN and stays so.
-        let parallel = m11 * m22 - m12 * m21;
+        let parallel = m11 * m22 - m12 * m12;
         let parallel = if parallel < R::ZERO {
             R::ZERO
         } else {
             parallel
         };
-        let determinant = parallel + m11 + m22 + R::ONE;
-        let b1 = -(k1 * (e.deviatoric + rates[0]) + multipliers[0]);
-        let b2 = -(k2 * (e.hydrostatic + rates[1]) + multipliers[1]);
-        let inverse = R::ONE / determinant;
-        let d1 = ((m22 + R::ONE) * b1 - m12 * b2) * inverse;
-        let d2 = ((m11 + R::ONE) * b2 - m21 * b1) * inverse;
-        (determinant.is_finite() && (d1 + d2).is_finite()).then_some([d1, d2])
+        let ratio = self.ratio;
+        let inverse = R::ONE / (ratio * (parallel + m22) + m11 + R::ONE);
+        let b1 = -(stiffness * (e.deviatoric + rates[0]) + multipliers[0]);
+        let b2 = -(stiffness * ratio * (e.hydrostatic + rates[1]) + multipliers[1]);
+        let d1 = ((ratio * m22 + R::ONE) * b1 - m12 * b2) * inverse;
+        let d2 = ((m11 + R::ONE) * b2 - ratio * m12 * b1) * inverse;
+        (d1 + d2).is_finite().then_some([d1, d2])
     }
 }
 
@@ -268,7 +273,7 @@ mod tests {
         for rest in [flat, inverted, [DVec3::ONE; 4]] {
             let tet = TetConstraint::<f32>::new([0, 1, 2, 3], rest, &RUBBER);
             assert_eq!(tet.inverse_rest, [0.0; 9]);
-            assert_eq!(tet.stiffness, [0.0; 2]);
+            assert_eq!(tet.stiffness, 0.0);
             let e = tet.evaluate(rest.map(|x| (x * 2.0).as_vec3()));
             assert_eq!(e.deviatoric_gradients, [glam::Vec3::ZERO; 4]);
             assert_eq!(e.hydrostatic_gradients, [glam::Vec3::ZERO; 4]);
