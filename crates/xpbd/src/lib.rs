@@ -55,3 +55,8 @@ pub use real::Real;
 pub use settings::{Ground, StepSettings};
 pub use solver::{KappaLimit, Solver};
 pub use step::StepReport;
+
+/// The example of the README, run as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -103,7 +103,8 @@ impl<R: Real> Solver<R> {
 
     /// The largest `E Δt² / (ρ h²)` over all tets, with h the smallest altitude: the square of the distance in tets
     /// that a wave of stress travels in a substep of `substep_time`. Up to about 0.5 a substep of one iteration is
-    /// accurate; above about 2 shear is far too soft, and well above 10 a body can collapse.
+    /// accurate; up to 1 a body at rest stays so; above about 2 shear is far too soft, and from 4 on even a body at
+    /// rest rings itself to pieces.
     #[must_use]
     pub fn kappa(&self, substep_time: f64) -> f64 {
         (0..self.tet_count())
@@ -156,16 +157,20 @@ impl<R: Real> Solver<R> {
             .collect();
         let mut dual = 0.0;
         for (t, tet) in self.tets.iter().enumerate() {
-            let x = tet.particles.map(|p| self.vector(p as usize));
-            let evaluation = tet.evaluate(x);
+            let tet = tet.to_f64();
+            let k1 = tet.stiffness * substep_time * substep_time;
+            let k2 = tet.ratio * k1;
+            // A tet that takes no part, or so little that its compliance overflows, has nothing to satisfy.
+            if !((1.0 / k1).is_finite() && (1.0 / k2).is_finite()) {
+                continue;
+            }
+            let evaluation = tet.evaluate(tet.particles.map(|p| self.position(p as usize)));
             let [deviatoric, hydrostatic] = self.multipliers_of(t).map(R::to_f64);
-            let scale = 1.0 / (substep_time * substep_time);
-            let [a, b] = tet.compliance.map(|c| c.to_f64() * scale);
-            dual += (evaluation.deviatoric.to_f64() + a * deviatoric).powi(2);
-            dual += (evaluation.hydrostatic.to_f64() + b * hydrostatic).powi(2);
+            dual += (evaluation.deviatoric + deviatoric / k1).powi(2);
+            dual += (evaluation.hydrostatic + hydrostatic / k2).powi(2);
             for (k, &p) in tet.particles.iter().enumerate() {
-                let pull = R::to_dvec3(evaluation.deviatoric_gradients[k]) * deviatoric
-                    + R::to_dvec3(evaluation.hydrostatic_gradients[k]) * hydrostatic;
+                let pull = evaluation.deviatoric_gradients[k] * deviatoric
+                    + evaluation.hydrostatic_gradients[k] * hydrostatic;
                 primal[p as usize] -= pull;
             }
         }
@@ -187,9 +192,12 @@ impl<R: Real> Solver<R> {
         DMat3::from_cols(b - a, c - a, d - a) * self.inverse_rest(tet)
     }
 
-    /// By how much a tet was softened: 1 if not at all.
+    /// By how much a tet was softened: 1 if not at all, also if it is too flat to take part.
     fn softening(&self, tet: usize) -> f64 {
         let material = &self.materials[usize::from(self.material_of[tet])];
-        self.tets[tet].compliance[0].to_f64() * material.mu() * self.volumes[tet]
+        match self.tets[tet].stiffness.to_f64() {
+            0.0 => 1.0,
+            stiffness => material.mu() * self.volumes[tet] / stiffness,
+        }
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! With deformation gradient F, the deviatoric constraint is `C_D = |F|` and the hydrostatic one `C_H = det F - γ`;
 //! half their squares over the compliances `1/(μV)` and `1/(lV)` are the energy exactly. At rest both gradients are
-//! parallel, so solving one after the other lets them fight; solved as one 2×2 system the rest shape stays at rest
-//! whatever the stiffness.
+//! parallel, so solving one after the other lets them fight; solved as one 2×2 system, a tet at rest stays at rest
+//! whatever the stiffness. (A body of many stays so up to a kappa of 2: rounding in one tet disturbs the next.)
 //!
 //! Source: Macklin and Müller 2021 (constraints), Ton-That et al. 2023 (block solve), paper equations 5 and 6. The
 //! paper prints a minus in its equation 6; its equation 3 gives the plus used here. Cost: about 390 operations, one
@@ -19,8 +19,10 @@ pub(crate) struct TetConstraint<R> {
     pub(crate) particles: [u32; 4],
     /// Inverse of the rest edge matrix, row by row: row i is the gradient of the barycentric coordinate of corner i + 1.
     pub(crate) inverse_rest: [R; 9],
-    /// `1/(μV)` and `1/(lV)` in 1/J.
-    pub(crate) compliance: [R; 2],
+    /// `μV` in J: one over the compliance of the deviatoric constraint.
+    pub(crate) stiffness: R,
+    /// `l/μ`: how much stiffer the hydrostatic constraint is.
+    pub(crate) ratio: R,
     pub(crate) gamma: R,
 }
 
@@ -40,20 +42,28 @@ impl<R: Real> TetConstraint<R> {
         let volume = edges.determinant() / 6.0;
         let inverse = edges.inverse();
         let rows = [inverse.row(0), inverse.row(1), inverse.row(2)];
-        let representable = |v: f64| R::from_f64(v).is_finite();
-        let sound = volume > 0.0
-            && rows
-                .iter()
-                .all(|r| r.to_array().into_iter().all(representable));
-        // A tet too flat to be represented takes no part: zero gradients leave its corners to its neighbors.
+        let stiffness = material.mu() * volume;
+        let entries = rows.iter().flat_map(|r| r.to_array()).chain([stiffness]);
+        let sound = volume > 0.0 && entries.into_iter().all(|v| R::from_f64(v).is_finite());
+        // A tet too flat to be represented takes no part: without stiffness it leaves its corners to its neighbors.
         let entry = |v: f64| if sound { R::from_f64(v) } else { R::ZERO };
-        let compliance =
-            [material.mu(), material.volume_stiffness()].map(|k| R::from_f64(1.0 / (k * volume)));
         Self {
             particles,
             inverse_rest: std::array::from_fn(|i| entry(rows[i / 3][i % 3])),
-            compliance,
+            stiffness: entry(stiffness),
+            ratio: R::from_f64(material.volume_stiffness() / material.mu()),
             gamma: R::from_f64(material.gamma()),
+        }
+    }
+
+    /// The same tet in double precision, for measurements.
+    pub(crate) fn to_f64(self) -> TetConstraint<f64> {
+        TetConstraint {
+            particles: self.particles,
+            inverse_rest: self.inverse_rest.map(R::to_f64),
+            stiffness: self.stiffness.to_f64(),
+            ratio: self.ratio.to_f64(),
+            gamma: self.gamma.to_f64(),
         }
     }
 
@@ -71,7 +81,7 @@ impl<R: Real> TetConstraint<R> {
 
     /// Divides the stiffness by a factor.
     pub(crate) fn soften(&mut self, factor: f64) {
-        self.compliance = self.compliance.map(|c| R::from_f64(c.to_f64() * factor));
+        self.stiffness = R::from_f64(self.stiffness.to_f64() / factor);
     }
 
     /// The columns of the deformation gradient F with the corners at `x`.
@@ -119,45 +129,171 @@ impl<R: Real> TetConstraint<R> {
 
     /// The changes of both multipliers that satisfy both constraints to first order, `None` if there is no way to.
     ///
-    /// `rates` are the damped rates `γ ∇C · (x - xₙ)` with `damping` γ; both are zero without damping.
+    /// `rates` are the damped rates `γ ∇C · (x - xₙ)` with `damping` γ; both are zero without damping. The equations
+    /// are multiplied by stiffness and time squared, which makes the matrix one plus numbers of the order of kappa: as
+    /// they are usually written, with compliances, they leave the range of single precision for a body of micrometers.
     #[inline(always)]
     pub(crate) fn solve(
         &self,
         e: &Evaluation<R>,
         weights: [R; 4],
         multipliers: [R; 2],
-        per_time_squared: R,
+        time_squared: R,
         damping: R,
         rates: [R; 2],
     ) -> Option<[R; 2]> {
+        let stiffness = self.stiffness * time_squared;
+        let weights = weights.map(|w| w * stiffness);
         let weighted = |g: &[R::Vector; 4], h: &[R::Vector; 4]| {
             weights[0] * R::dot(g[0], h[0])
                 + weights[1] * R::dot(g[1], h[1])
                 + weights[2] * R::dot(g[2], h[2])
                 + weights[3] * R::dot(g[3], h[3])
         };
-        let [a1, a2] = [
-            self.compliance[0] * per_time_squared,
-            self.compliance[1] * per_time_squared,
-        ];
+        // The matrix is one plus [m11, m12; ratio · m12, ratio · m22].
         let damped = R::ONE + damping;
-        let s11 = damped * weighted(&e.deviatoric_gradients, &e.deviatoric_gradients);
-        let s22 = damped * weighted(&e.hydrostatic_gradients, &e.hydrostatic_gradients);
-        let s12 = damped * weighted(&e.deviatoric_gradients, &e.hydrostatic_gradients);
-        // At rest the gradients are parallel and only the compliances keep the system regular. The first difference is
-        // not negative (Cauchy-Schwarz); where rounding says otherwise, it is noise.
-        let parallel = s11 * s22 - s12 * s12;
-        let parallel = if parallel > R::ZERO {
-            parallel
-        } else {
+        let m11 = damped * weighted(&e.deviatoric_gradients, &e.deviatoric_gradients);
+        let m22 = damped * weighted(&e.hydrostatic_gradients, &e.hydrostatic_gradients);
+        let m12 = damped * weighted(&e.deviatoric_gradients, &e.hydrostatic_gradients);
+        // At rest the gradients are parallel and only the one keeps the system regular. The difference is not negative
+        // (Cauchy-Schwarz); where rounding says otherwise, it is noise. Overflow makes it NaN and stays so.
+        let parallel = m11 * m22 - m12 * m12;
+        let parallel = if parallel < R::ZERO {
             R::ZERO
+        } else {
+            parallel
         };
-        let determinant = parallel + a1 * s22 + a2 * s11 + a1 * a2;
-        let b1 = -(e.deviatoric + a1 * multipliers[0] + rates[0]);
-        let b2 = -(e.hydrostatic + a2 * multipliers[1] + rates[1]);
-        let inverse = R::ONE / determinant;
-        let d1 = ((s22 + a2) * b1 - s12 * b2) * inverse;
-        let d2 = ((s11 + a1) * b2 - s12 * b1) * inverse;
-        (determinant > R::ZERO && (d1 + d2).is_finite()).then_some([d1, d2])
+        let ratio = self.ratio;
+        let inverse = R::ONE / (ratio * (parallel + m22) + m11 + R::ONE);
+        let b1 = -(stiffness * (e.deviatoric + rates[0]) + multipliers[0]);
+        let b2 = -(stiffness * ratio * (e.hydrostatic + rates[1]) + multipliers[1]);
+        let d1 = ((ratio * m22 + R::ONE) * b1 - m12 * b2) * inverse;
+        let d2 = ((m11 + R::ONE) * b2 - ratio * m12 * b1) * inverse;
+        (d1 + d2).is_finite().then_some([d1, d2])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const RUBBER: Material = Material {
+        young_modulus: 1e6,
+        poisson_ratio: 0.45,
+        density: 1e3,
+        damping: 0.0,
+    };
+
+    fn point() -> impl Strategy<Value = DVec3> {
+        prop::array::uniform3(-1.0..1.0f64).prop_map(DVec3::from_array)
+    }
+
+    /// A tet at rest of volume above 1e-3 in a cube of edge 2.
+    fn rest() -> impl Strategy<Value = [DVec3; 4]> {
+        let volume = |[a, b, c, d]: [DVec3; 4]| (b - a).cross(c - a).dot(d - a) / 6.0;
+        prop::array::uniform4(point()).prop_filter_map("flat", move |[a, b, c, d]| {
+            let rest = if volume([a, b, c, d]) > 0.0 {
+                [a, b, c, d]
+            } else {
+                [a, c, b, d]
+            };
+            (volume(rest) > 1e-3).then_some(rest)
+        })
+    }
+
+    /// Deformations of every kind: general (half of them inverted), nearly singular, mirrored.
+    fn deformation() -> impl Strategy<Value = DMat3> {
+        let columns = || prop::array::uniform3(point().prop_map(|v| v * 2.0));
+        let general = columns().prop_map(|[a, b, c]| DMat3::from_cols(a, b, c));
+        let singular = (columns(), -1.0..1.0f64)
+            .prop_map(|([a, b, c], s)| DMat3::from_cols(a, b, a * s + b + c * 1e-9));
+        let mirrored = columns().prop_map(|[a, b, c]| {
+            DMat3::from_diagonal(DVec3::new(1.0, 1.0, -1.0)) + DMat3::from_cols(a, b, c) * 0.05
+        });
+        let any = prop_oneof![general, singular, mirrored];
+        // At F = 0 the norm has no gradient; near it, differences cannot see it.
+        any.prop_filter("all but collapsed", |f| f.col(0).length() > 0.1)
+    }
+
+    proptest! {
+        /// Central differences of step h leave h² |Q|³ / |F|² (1e-9 of |Q|) and rounding 1e-16 |F| / h (1e-10 of |Q|);
+        /// the determinant is linear in each corner, so only rounding is left of it.
+        #[test]
+        fn gradients_are_the_slopes_of_the_constraints(
+            rest in rest(),
+            f in deformation(),
+            shift in point(),
+        ) {
+            let tet = TetConstraint::<f64>::new([0, 1, 2, 3], rest, &RUBBER);
+            let x = rest.map(|x| f * x + shift);
+            let e = tet.evaluate(x);
+            let q = tet.inverse_rest.iter().map(|v| v * v).sum::<f64>().sqrt();
+            let step = 1e-5 / q;
+            let size = e.deviatoric;
+            for k in 0..4 {
+                for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+                    let [low, high] = [-step, step].map(|s| {
+                        let mut moved = x;
+                        moved[k] += axis * s;
+                        tet.evaluate(moved)
+                    });
+                    let slope = (high.deviatoric - low.deviatoric) / (2.0 * step);
+                    let error = (slope - e.deviatoric_gradients[k].dot(axis)).abs();
+                    prop_assert!(error <= 1e-7 * q, "deviatoric: {error:e}, scale {q:e}");
+                    let slope = (high.hydrostatic - low.hydrostatic) / (2.0 * step);
+                    let error = (slope - e.hydrostatic_gradients[k].dot(axis)).abs();
+                    let scale = q * (size * size).max(size);
+                    prop_assert!(error <= 1e-7 * scale, "hydrostatic: {error:e}, scale {scale:e}");
+                }
+            }
+        }
+
+        /// What keeps momentum: corrections neither push nor turn a tet as a whole. In units of |Q|, |Q| |x|.
+        #[test]
+        fn gradients_neither_push_nor_turn(rest in rest(), f in deformation()) {
+            let tet = TetConstraint::<f64>::new([0, 1, 2, 3], rest, &RUBBER);
+            let x = rest.map(|x| f * x);
+            let e = tet.evaluate(x);
+            for gradients in [e.deviatoric_gradients, e.hydrostatic_gradients] {
+                let push: DVec3 = gradients.iter().sum();
+                let turn: DVec3 = (0..4).map(|k| x[k].cross(gradients[k])).sum();
+                let scale: f64 = gradients.iter().map(|g| g.length()).sum();
+                prop_assert!(push.length() <= 1e-14 * scale);
+                prop_assert!(turn.length() <= 1e-13 * scale * 20.0, "{turn}");
+            }
+        }
+    }
+
+    /// The multipliers at rest are those of the stress that both constraints hold against each other.
+    #[test]
+    fn multipliers_at_rest_are_the_exact_ones() {
+        let rest = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+        let tet = TetConstraint::<f64>::new([0, 1, 2, 3], rest, &RUBBER);
+        for time in [1e-6, 1e-3, 1.0] {
+            let weights = [0.024; 4];
+            let e = tet.evaluate(rest);
+            let change = tet
+                .solve(&e, weights, [0.0; 2], time * time, 0.0, [0.0; 2])
+                .expect("at rest there is a solution");
+            let stress = RUBBER.mu() / 6.0 * time * time;
+            assert!((change[0] / (-3.0f64.sqrt() * stress) - 1.0).abs() < 1e-9);
+            assert!((change[1] / stress - 1.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_tet_without_volume_takes_no_part() {
+        let flat = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::X + DVec3::Y];
+        let inverted = [DVec3::ZERO, DVec3::Y, DVec3::X, DVec3::Z];
+        for rest in [flat, inverted, [DVec3::ONE; 4]] {
+            let tet = TetConstraint::<f32>::new([0, 1, 2, 3], rest, &RUBBER);
+            assert_eq!(tet.inverse_rest, [0.0; 9]);
+            assert_eq!(tet.stiffness, 0.0);
+            let e = tet.evaluate(rest.map(|x| (x * 2.0).as_vec3()));
+            assert_eq!(e.deviatoric_gradients, [glam::Vec3::ZERO; 4]);
+            assert_eq!(e.hydrostatic_gradients, [glam::Vec3::ZERO; 4]);
+        }
     }
 }

@@ -152,3 +152,27 @@ fn round_to_f32(value: f64) -> f32 {
 
 real!(f32, Vec3, AtomicU32, round_to_f32);
 real!(f64, DVec3, AtomicU64, std::convert::identity);
+
+/// Whether all components are finite.
+pub(crate) fn finite<R: Real>(v: R::Vector) -> bool {
+    R::components(v).into_iter().all(R::is_finite)
+}
+
+/// The position of a particle.
+#[inline]
+pub(crate) fn load<R: Real>(particle: &[R::Atomic; 4]) -> R::Vector {
+    R::vector(
+        R::load(&particle[0]),
+        R::load(&particle[1]),
+        R::load(&particle[2]),
+    )
+}
+
+/// Moves a particle.
+#[inline]
+pub(crate) fn store<R: Real>(particle: &[R::Atomic; 4], x: R::Vector) {
+    let [a, b, c] = R::components(x);
+    a.store(&particle[0]);
+    b.store(&particle[1]);
+    c.store(&particle[2]);
+}

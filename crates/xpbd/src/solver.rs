@@ -7,6 +7,7 @@
 use glam::DVec3;
 
 use crate::neo_hookean::TetConstraint;
+use crate::real::{finite, load, store};
 use crate::{Material, Real, XpbdError};
 
 /// The state of a simulation in one precision.
@@ -63,6 +64,9 @@ pub struct KappaLimit {
 
 impl<R: Real> Solver<R> {
     /// Particles at rest at `positions`, without mass and without constraints.
+    ///
+    /// # Panics
+    /// If a position is not finite in this precision.
     #[must_use]
     pub fn new(positions: &[DVec3]) -> Self {
         let mut solver = Self {
@@ -162,12 +166,8 @@ impl<R: Real> Solver<R> {
     }
 
     fn check_particles(&self, particles: [u32; 4]) {
-        assert!(
-            particles
-                .iter()
-                .all(|&p| (p as usize) < self.particles.len()),
-            "the particles of a tet exist"
-        );
+        let exists = |&p: &u32| (p as usize) < self.particles.len();
+        assert!(particles.iter().all(exists), "the particles of a tet exist");
     }
 
     /// The material of a tet.
@@ -201,7 +201,7 @@ impl<R: Real> Solver<R> {
     /// ends are. It has no mass yet.
     ///
     /// # Panics
-    /// If an end does not exist.
+    /// If an end does not exist or the parameter puts the particle nowhere finite.
     pub fn push_particle_between(&mut self, a: usize, b: usize, parameter: f64) {
         let t = R::from_f64(parameter);
         let [x, y] = [a, b].map(|p| self.vector(p));
@@ -222,6 +222,7 @@ impl<R: Real> Solver<R> {
     }
 
     fn push_particle(&mut self, x: R::Vector, velocity: R::Vector, fixed: bool) {
+        assert!(finite::<R>(x), "positions are finite");
         let [a, b, c] = R::components(x);
         self.particles
             .push([a.cell(), b.cell(), c.cell(), R::ZERO.cell()]);
@@ -295,11 +296,9 @@ impl<R: Real> Solver<R> {
     /// # Panics
     /// If the particle does not exist or the position is not finite in this precision.
     pub fn set_position(&mut self, particle: usize, position: DVec3) {
-        let x = R::components(R::from_dvec3(position));
-        assert!(x.into_iter().all(R::is_finite), "positions are finite");
-        for (value, cell) in x.into_iter().zip(&self.particles[particle]) {
-            value.store(cell);
-        }
+        let x = R::from_dvec3(position);
+        assert!(finite::<R>(x), "positions are finite");
+        store::<R>(&self.particles[particle], x);
     }
 
     /// The velocity of a particle in m/s.
@@ -314,10 +313,11 @@ impl<R: Real> Solver<R> {
     /// Sets the velocity of a particle in m/s.
     ///
     /// # Panics
-    /// If the particle does not exist or the velocity is not finite.
+    /// If the particle does not exist or the velocity is not finite in this precision.
     pub fn set_velocity(&mut self, particle: usize, velocity: DVec3) {
-        assert!(velocity.is_finite(), "velocities are finite");
-        self.velocities[particle] = R::from_dvec3(velocity);
+        let v = R::from_dvec3(velocity);
+        assert!(finite::<R>(v), "velocities are finite");
+        self.velocities[particle] = v;
     }
 
     /// Writes the positions of all particles to `out`.
@@ -334,21 +334,4 @@ impl<R: Real> Solver<R> {
 
 fn signed_volume([a, b, c, d]: [DVec3; 4]) -> f64 {
     (b - a).cross(c - a).dot(d - a) / 6.0
-}
-
-#[inline]
-pub(crate) fn load<R: Real>(particle: &[R::Atomic; 4]) -> R::Vector {
-    R::vector(
-        R::load(&particle[0]),
-        R::load(&particle[1]),
-        R::load(&particle[2]),
-    )
-}
-
-#[inline]
-pub(crate) fn store<R: Real>(particle: &[R::Atomic; 4], x: R::Vector) {
-    let [a, b, c] = R::components(x);
-    a.store(&particle[0]);
-    b.store(&particle[1]);
-    c.store(&particle[2]);
 }

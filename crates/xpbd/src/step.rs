@@ -1,7 +1,7 @@
 //! [`Solver::step`]: one frame of XPBD by colored Gauss-Seidel.
 //!
 //! Each substep moves the particles as if they were free, corrects them constraint by constraint in the order of the
-//! schedule, and takes the velocities from where they ended. Clusters of one color share no particle and run in
+//! schedule, and adds to the velocities what the corrections moved. Clusters of one color share no particle and run in
 //! parallel; a color too small to be worth a second thread stays on one. Who computes never changes what is computed:
 //! the result is the same to the bit for any number of threads, which is that of the rayon pool this is called in.
 //!
@@ -11,7 +11,7 @@
 use incise_graph::Schedule;
 use rayon::prelude::*;
 
-use crate::solver::{load, store};
+use crate::real::{finite, load, store};
 use crate::{Ground, Real, Solver, StepSettings, XpbdError};
 
 /// Constraints in a color from which a second thread pays for its wake-up.
@@ -29,7 +29,7 @@ pub struct StepReport {
 
 /// What a pass over the constraints has to do beyond the plain solve; each choice is compiled on its own.
 struct Pass<R> {
-    per_time_squared: R,
+    time_squared: R,
     per_time: R,
     relaxation: R,
 }
@@ -104,7 +104,7 @@ impl<R: Real> Solver<R> {
             self.predicted = (0..self.particles.len()).map(|p| self.vector(p)).collect();
         }
         let pass = Pass {
-            per_time_squared: R::from_f64(1.0 / (time * time)),
+            time_squared: R::from_f64(time * time),
             per_time: R::from_f64(1.0 / time),
             relaxation: R::from_f64(settings.relaxation),
         };
@@ -120,7 +120,7 @@ impl<R: Real> Solver<R> {
                 self.project_to_ground(ground);
             }
         }
-        self.update_velocities(pass.per_time)
+        self.update_velocities(R::from_f64(time), pass.per_time)
     }
 
     /// Moves every free particle by its velocity.
@@ -200,7 +200,7 @@ impl<R: Real> Solver<R> {
             &evaluation,
             weights,
             multipliers,
-            pass.per_time_squared,
+            pass.time_squared,
             damping,
             rates,
         );
@@ -231,7 +231,8 @@ impl<R: Real> Solver<R> {
             .zip(&self.previous)
             .for_each(|(particle, previous)| {
                 let x = load::<R>(particle);
-                let depth = height - R::components(x)[2];
+                let [a, b, c] = R::components(x);
+                let depth = height - c;
                 if !(depth > R::ZERO && R::load(&particle[3]) > R::ZERO) {
                     return;
                 }
@@ -239,19 +240,29 @@ impl<R: Real> Solver<R> {
                 let slide = (dx * dx + dy * dy).sqrt();
                 let hold = friction * depth;
                 let share = if slide > hold { hold / slide } else { R::ONE };
-                store::<R>(particle, x + R::vector(-(dx * share), -(dy * share), depth));
+                store::<R>(particle, R::vector(a - dx * share, b - dy * share, height));
             });
     }
 
-    /// Takes the velocities from the motion; returns how many particles had to be put back.
-    fn update_velocities(&mut self, per_time: R) -> usize {
+    /// Adds the corrections to the velocities; returns how many particles had to be put back.
+    ///
+    /// In exact numbers the velocity is the motion over the time. But positions are rounded, and a velocity taken from
+    /// them would be wrong by their last digit over the time: in single precision a body in free fall would lose a
+    /// hundredth of its speed, and far from the origin it would hang in the air. The prediction, computed again to the
+    /// same bits, tells what part of the motion is correction; without correction the velocity stays as it is.
+    fn update_velocities(&mut self, time: R, per_time: R) -> usize {
         let particles = self.particles.par_iter().with_min_len(PARALLEL_PARTICLES);
         particles
             .zip(&self.previous)
             .zip(&mut self.velocities)
             .map(|((particle, previous), velocity)| {
-                let speed = (load::<R>(particle) - *previous) * per_time;
-                let finite = R::components(speed).into_iter().all(R::is_finite);
+                if R::load(&particle[3]) <= R::ZERO {
+                    *velocity = R::Vector::default();
+                    return 0;
+                }
+                let predicted = *previous + *velocity * time;
+                let speed = *velocity + (load::<R>(particle) - predicted) * per_time;
+                let finite = finite::<R>(speed);
                 *velocity = if finite { speed } else { R::Vector::default() };
                 if !finite {
                     store::<R>(particle, *previous);

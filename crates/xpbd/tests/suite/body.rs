@@ -1,0 +1,121 @@
+//! What the tests share: bodies made of boxes, their schedules, seeded noise.
+
+use glam::DVec3;
+use incise_clustering::cluster;
+use incise_coloring::{Algorithm, color};
+use incise_graph::{ConstraintGraph, Incidence, Schedule};
+use incise_mesh::{TetId, TetMesh};
+use incise_xpbd::{Material, Real, Solver, StepSettings};
+
+/// Rubber of a density that keeps numbers plain.
+pub(crate) const RUBBER: Material = Material {
+    young_modulus: 1e6,
+    poisson_ratio: 0.45,
+    density: 1000.0,
+    damping: 0.0,
+};
+
+/// The gravity of the tests that have one.
+pub(crate) const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, -9.81);
+
+/// A body at rest, a quarter of each tet's mass on each of its corners.
+pub(crate) fn body<R: Real>(mesh: &TetMesh, material: Material) -> Solver<R> {
+    let mut solver = Solver::new(&mesh.positions);
+    let material_number = solver.add_material(material).unwrap();
+    let mut masses = vec![0.0; mesh.positions.len()];
+    for t in 0..mesh.tets.len() {
+        let corners = mesh.tets[t].map(|p| p.0);
+        let rest = mesh.corners(TetId::new(t));
+        solver.push_tet(corners, rest, material_number);
+        for p in corners {
+            masses[p as usize] += material.density * mesh.volume(TetId::new(t)) / 4.0;
+        }
+    }
+    for (p, &mass) in masses.iter().enumerate() {
+        solver.set_mass(p, mass);
+    }
+    solver
+}
+
+/// The schedule of a mesh by a coloring algorithm and a clustering method such as `none` or `serial:10`.
+pub(crate) fn schedule(mesh: &TetMesh, coloring: Algorithm, clustering: &str) -> Schedule {
+    let corners = mesh.tets.iter().map(|tet| tet.map(|p| p.0));
+    let incidence = Incidence::from_constraints(mesh.positions.len(), corners).unwrap();
+    let graph = ConstraintGraph::from_incidence(&incidence);
+    let clusters = cluster(clustering.parse().unwrap(), &graph);
+    let schedule = Schedule::new(&clusters, &color(coloring, &graph.quotient(&clusters)));
+    schedule.check(&incidence).unwrap();
+    schedule
+}
+
+/// The plain schedule: greedy, without clusters.
+pub(crate) fn plain(mesh: &TetMesh) -> Schedule {
+    schedule(mesh, Algorithm::Greedy, "none")
+}
+
+/// One substep of one iteration of the time that gives the largest tet this `kappa`.
+pub(crate) fn substep<R: Real>(solver: &Solver<R>, kappa: f64) -> StepSettings {
+    StepSettings::new((kappa / solver.kappa(1.0)).sqrt())
+}
+
+/// Takes `count` frames; none may need a repair.
+pub(crate) fn advance<R: Real>(
+    solver: &mut Solver<R>,
+    schedule: &Schedule,
+    settings: &StepSettings,
+    count: usize,
+) {
+    for _ in 0..count {
+        assert_eq!(solver.step(schedule, settings).unwrap().repaired, 0);
+    }
+}
+
+/// The positions of all particles.
+pub(crate) fn positions<R: Real>(solver: &Solver<R>) -> Vec<DVec3> {
+    let mut out = Vec::new();
+    solver.positions(&mut out);
+    out
+}
+
+/// The largest distance between two lists of points.
+pub(crate) fn largest_distance(a: &[DVec3], b: &[DVec3]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let distances = a.iter().zip(b).map(|(x, y)| x.distance(*y));
+    distances.fold(0.0, f64::max)
+}
+
+/// Fails unless `value` is a number of at most `tolerance`.
+#[track_caller]
+pub(crate) fn within(what: &str, value: f64, tolerance: f64) {
+    assert!(
+        value <= tolerance,
+        "{what}: {value:e} is more than {tolerance:e}"
+    );
+}
+
+/// Seeded noise (`SplitMix64`), the same everywhere.
+pub(crate) struct Noise(pub(crate) u64);
+
+impl Noise {
+    /// Uniform in -1 .. 1.
+    pub(crate) fn scalar(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+
+    /// Uniform in the cube from -1 to 1.
+    pub(crate) fn vector(&mut self) -> DVec3 {
+        DVec3::new(self.scalar(), self.scalar(), self.scalar())
+    }
+}
+
+/// Displaces every particle by noise of at most `amount` in each coordinate.
+pub(crate) fn disturb<R: Real>(solver: &mut Solver<R>, amount: f64, seed: u64) {
+    let mut noise = Noise(seed);
+    for p in 0..solver.particle_count() {
+        solver.set_position(p, solver.position(p) + noise.vector() * amount);
+    }
+}
