@@ -35,6 +35,7 @@ mod near;
 mod operation;
 mod options;
 mod plane;
+mod sides;
 mod stars;
 mod surface;
 mod sweep;

@@ -11,6 +11,7 @@ use glam::DVec3;
 use incise_mesh::{ParticleId, TetId, signed_volume};
 
 use crate::delta::{AddedTet, CutDelta, EdgePoint, RelinkedTet, RemovedTet};
+use crate::sides::root;
 use crate::{CuttableMesh, SplitEdge, split_tet};
 
 /// An edge and where it is crossed.
@@ -20,6 +21,14 @@ pub(crate) struct Crossing {
     pub(crate) ends: [ParticleId; 2],
     /// Where: 0 at the first end, 1 at the second.
     pub(crate) parameter: f64,
+}
+
+/// A face with the tets on both sides.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SharedFace {
+    pub(crate) particles: [ParticleId; 3],
+    pub(crate) tets: [TetId; 2],
+    pub(crate) corners: [[ParticleId; 4]; 2],
 }
 
 /// A cut in progress.
@@ -136,13 +145,8 @@ impl<'a> Operation<'a> {
     /// their star still hangs together around the front. This is the paper's shared-vertex criterion (section 4.3) put
     /// so that it also holds for snapped particles, partial cuts and meshes cut before.
     ///
-    /// `is_cut` is given the rest positions, the particles of a face and those of the tets on both sides of it, all as
-    /// they were before separation. Cost: the sum of the sizes of the stars.
-    pub(crate) fn separate(
-        &mut self,
-        seeds: &[ParticleId],
-        is_cut: impl Fn(&[DVec3], [ParticleId; 3], [[ParticleId; 4]; 2]) -> bool,
-    ) {
+    /// `is_cut` is asked about faces as they were before separation. Cost: the sum of the sizes of the stars.
+    pub(crate) fn separate(&mut self, seeds: &[ParticleId], is_cut: impl Fn(&SharedFace) -> bool) {
         let first_copy = self.delta.particles_before + self.delta.points.len();
         let mut star: Vec<TetId> = Vec::new();
         let mut faces: Vec<([ParticleId; 2], usize)> = Vec::new();
@@ -158,7 +162,7 @@ impl<'a> Operation<'a> {
                     .checked_sub(first_copy)
                     .map_or(p, |copy| copies[copy])
             };
-            let (rest, tets) = (&self.cuttable.mesh.positions, &self.cuttable.mesh.tets);
+            let tets = &self.cuttable.mesh.tets;
             faces.clear();
             for (i, tet) in star.iter().enumerate() {
                 let corners = tets[tet.index()];
@@ -179,9 +183,13 @@ impl<'a> Operation<'a> {
                 let [(pair, first), (_, second)] = *shared else {
                     continue;
                 };
-                let face = [seed, pair[0], pair[1]].map(source);
-                let sides = [first, second].map(|i| tets[star[i].index()].map(source));
-                if !is_cut(rest, face, sides) {
+                let tets = [star[first], star[second]];
+                let face = SharedFace {
+                    particles: [seed, pair[0], pair[1]].map(source),
+                    tets,
+                    corners: tets.map(|t| self.cuttable.mesh.tets[t.index()].map(source)),
+                };
+                if !is_cut(&face) {
                     let (a, b) = (root(&mut parent, first), root(&mut parent, second));
                     // The lower index becomes the root, so each part is named by its lowest tet.
                     parent[a.max(b)] = a.min(b);
@@ -297,13 +305,4 @@ fn others_than(corners: [ParticleId; 4], particle: ParticleId) -> [ParticleId; 3
         *slot = corner;
     }
     others
-}
-
-/// The root of `i`, halving the path to it.
-fn root(parent: &mut [usize], mut i: usize) -> usize {
-    while parent[i] != i {
-        parent[i] = parent[parent[i]];
-        i = parent[i];
-    }
-    i
 }

@@ -106,7 +106,7 @@ pub fn cut_plane(
     distance.resize(distance.len() + flagged.len(), 0.0);
     on_surface.resize(on_surface.len() + flagged.len(), true);
 
-    let side = |_: &[DVec3], corners: [ParticleId; 4]| {
+    let side = |corners: [ParticleId; 4]| {
         let off = corners
             .iter()
             .filter(|p| !on_surface[p.index()])
@@ -119,10 +119,11 @@ pub fn cut_plane(
         .filter(|&p| on_surface[p])
         .map(ParticleId::new)
         .collect();
-    operation.separate(&seeds, |rest, face, tets| {
-        face.iter().all(|p| on_surface[p.index()]) && side(rest, tets[0]) != side(rest, tets[1])
+    operation.separate(&seeds, |face| {
+        let [one, other] = face.corners.map(side);
+        one != other && face.particles.iter().all(|p| on_surface[p.index()])
     });
-    Ok(operation.finish(side))
+    Ok(operation.finish(|_, corners| side(corners)))
 }
 
 /// The edges whose ends lie on different sides, ascending by their ends.

@@ -10,9 +10,6 @@ use incise_mesh::ParticleId;
 
 use crate::CutDelta;
 
-/// Cosine of the angle up to which a face lies along the surface: about half-way between along and across.
-const ALONG: f64 = 0.6;
-
 /// The tangent plane of the swept surface at a crossing, in the rest shape.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tangent {
@@ -119,55 +116,39 @@ impl SweptSurface {
         self.push_copies(&delta.copies);
     }
 
-    /// Whether the surface goes through a face: all its particles lie on it, and the tets beside were seen on different
-    /// sides. Where they were not (all particles snapped, or a stroke that came back), the face counts as cut if it
-    /// lies along the surface rather than across.
-    pub(crate) fn cuts(
-        &self,
-        rest: &[DVec3],
-        face: [ParticleId; 3],
-        tets: [[ParticleId; 4]; 2],
-    ) -> bool {
+    /// How much a face lies along the surface: the cosine of the angle between them, and less than that of any face on
+    /// the surface for one with a particle off it.
+    pub(crate) fn alignment(&self, rest: &[DVec3], face: [ParticleId; 3]) -> f64 {
         let [Some(a), Some(b), Some(c)] = face.map(|p| self.tangent(p)) else {
-            return false;
+            return -1.0;
         };
-        match tets.map(|tet| self.seen_side(tet)) {
-            [Some(one), Some(other)] => one != other,
-            _ => {
-                let [x, y, z] = face.map(|p| rest[p.index()]);
-                let across = (y - x).cross(z - x);
-                let along = a.normal + b.normal + c.normal;
-                across.dot(along).abs() > ALONG * across.length() * along.length()
-            }
-        }
+        let [x, y, z] = face.map(|p| rest[p.index()]);
+        let (across, along) = ((y - x).cross(z - x), a.normal + b.normal + c.normal);
+        across.dot(along).abs() / (across.length() * along.length())
     }
 
-    /// The side that the particles of a tet off the surface were seen on, if they agree.
-    fn seen_side(&self, corners: [ParticleId; 4]) -> Option<bool> {
-        let mut sides = corners
-            .into_iter()
-            .filter(|&p| !self.contains(p))
-            .map(|p| self.seen[p.index()]);
-        let first = sides.find(|&seen| seen != Seen::Never)?;
-        let agree = sides.all(|seen| seen == first || seen == Seen::Never);
-        match first {
-            Seen::On(side) if agree => Some(side),
-            _ => None,
-        }
-    }
-
-    /// The side of a tet that touches the surface: the one its particles were seen on, else the one most of it leans
-    /// to by the tangents of those on the surface.
+    /// The side of a tet that touches the surface: the one its particles off the surface were seen on if they agree,
+    /// else the one they, or without any the whole tet, lean to by the tangents of those on the surface.
     pub(crate) fn side(&self, rest: &[DVec3], corners: [ParticleId; 4]) -> bool {
-        self.seen_side(corners).unwrap_or_else(|| {
-            let tangents = corners.iter().filter_map(|&p| self.tangent(p));
-            let leaning = |t: Tangent| {
-                corners
-                    .iter()
-                    .map(|p| t.distance(rest[p.index()]))
-                    .sum::<f64>()
-            };
-            tangents.map(leaning).sum::<f64>() >= 0.0
-        })
+        let off = || corners.into_iter().filter(|&p| !self.contains(p));
+        let vote = |p: ParticleId| match self.seen[p.index()] {
+            Seen::On(true) => 1,
+            Seen::On(false) => -1,
+            _ => 0,
+        };
+        let votes: i32 = off().map(vote).sum();
+        if votes != 0 {
+            return votes > 0;
+        }
+        let leaning = |p: ParticleId| {
+            let tangents = corners.iter().filter_map(|&q| self.tangent(q));
+            tangents.map(|t| t.distance(rest[p.index()])).sum::<f64>()
+        };
+        let leans: f64 = if off().next().is_some() {
+            off().map(leaning).sum()
+        } else {
+            corners.into_iter().map(leaning).sum()
+        };
+        leans >= 0.0
     }
 }

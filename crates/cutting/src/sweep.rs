@@ -15,12 +15,13 @@
 //! to find those near the blade, then the cut.
 
 use glam::{DMat3, DVec3};
-use incise_mesh::{ParticleId, TetMesh};
+use incise_mesh::{ParticleId, TetId, TetMesh};
 
 use crate::meet::{Meeting, MovingSegment, meetings};
 use crate::near::near_tets;
 use crate::operation::{Crossing, Operation};
 use crate::plane::require_finite;
+use crate::sides::{GivenSides, Sides};
 use crate::surface::{SweptSurface, Tangent};
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
@@ -62,6 +63,7 @@ pub struct Sweep {
     surface: SweptSurface,
     /// Particles one of whose edges was met: whether they are on the surface is decided.
     decided: Vec<bool>,
+    given: GivenSides,
 }
 
 /// An edge met by the blade, with the surface there.
@@ -101,6 +103,7 @@ impl Sweep {
             before: positions.to_vec(),
             surface: SweptSurface::new(positions.len()),
             decided: vec![false; positions.len()],
+            given: GivenSides::default(),
         })
     }
 
@@ -168,6 +171,7 @@ impl Sweep {
                 hit.crossing.parameter = hit.crossing.parameter.clamp(reach, 1.0 - reach);
             }
             near = operation.split(&flagged.iter().map(|hit| hit.crossing).collect::<Vec<_>>());
+            self.given.forget(near.iter().copied());
             fresh.extend(&snapped);
             for hit in flagged {
                 fresh.push(ParticleId::new(now.len()));
@@ -181,8 +185,11 @@ impl Sweep {
         }
 
         let seeds = self.seeds(operation.cuttable, &fresh);
-        operation.separate(&seeds, |rest, face, tets| {
-            self.surface.cuts(rest, face, tets)
+        let along = tets_around(operation.cuttable, &seeds);
+        let mesh = &operation.cuttable.mesh;
+        let sides = Sides::new(mesh, &self.surface, &mut self.given, &along);
+        operation.separate(&seeds, |face| {
+            face.particles.iter().all(|&p| self.surface.contains(p)) && sides.differ(face.tets)
         });
         let delta = operation.finish(|rest, c| self.surface.side(rest, c));
         now.extend(
@@ -208,6 +215,7 @@ impl Sweep {
     /// If `cuttable` is not the mesh as `delta` left it.
     pub fn follow(&mut self, cuttable: &CuttableMesh, delta: &CutDelta) {
         delta.extend_particles(&mut self.before);
+        self.given.forget(delta.removed.iter().map(|tet| tet.tet));
         self.surface
             .follow(delta, &cuttable.mesh.positions, self.options.reach());
         self.decided.extend(
@@ -317,8 +325,16 @@ impl Sweep {
     }
 }
 
+/// The tets around the given particles, each once, ascending.
+fn tets_around(cuttable: &CuttableMesh, particles: &[ParticleId]) -> Vec<TetId> {
+    let mut tets: Vec<TetId> = particles.iter().flat_map(|&p| cuttable.around(p)).collect();
+    tets.sort_unstable();
+    tets.dedup();
+    tets
+}
+
 /// The edges of the given tets, each once, ascending.
-fn edges_of(mesh: &TetMesh, tets: &[incise_mesh::TetId]) -> Vec<[ParticleId; 2]> {
+fn edges_of(mesh: &TetMesh, tets: &[TetId]) -> Vec<[ParticleId; 2]> {
     let mut edges = Vec::with_capacity(6 * tets.len());
     for tet in tets {
         let c = mesh.tets[tet.index()];

@@ -1,0 +1,124 @@
+//! Which side of a swept surface the tets along it belong to.
+//!
+//! Most tets have a particle off the surface that tells. Those with all particles on it (snapped) join a neighbor,
+//! across the face that lies most across the surface: left to themselves they could be cut off on all sides and become
+//! chips. The method is Kruskal's: shared faces in ascending order of how much they lie along the surface, joining sets
+//! of tets as long as one of both has no side. A side once given is kept for the rest of the stroke, else a face could
+//! be open at one particle and closed at another. Cost: O(n log n) for n tets along the surface.
+
+use std::collections::HashMap;
+
+use incise_mesh::{ParticleId, TetId, TetMesh};
+
+use crate::surface::SweptSurface;
+
+/// The sides given to tets with all particles on the surface, for as long as they are not split.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct GivenSides(HashMap<TetId, bool>);
+
+impl GivenSides {
+    /// Forgets tets that were split.
+    pub(crate) fn forget(&mut self, split: impl IntoIterator<Item = TetId>) {
+        if !self.0.is_empty() {
+            split.into_iter().for_each(|tet| {
+                self.0.remove(&tet);
+            });
+        }
+    }
+}
+
+/// The tets along a surface with their sides.
+#[derive(Debug)]
+pub(crate) struct Sides {
+    /// Ascending by tet.
+    sides: Vec<(TetId, Option<bool>)>,
+}
+
+impl Sides {
+    /// Finds the sides of `tets`, which ascend.
+    pub(crate) fn new(
+        mesh: &TetMesh,
+        surface: &SweptSurface,
+        given: &mut GivenSides,
+        tets: &[TetId],
+    ) -> Self {
+        let told = |tet: &TetId| {
+            let corners = mesh.tets[tet.index()];
+            let whole = corners.iter().all(|&p| surface.contains(p));
+            if whole {
+                given.0.get(tet).copied()
+            } else {
+                Some(surface.side(&mesh.positions, corners))
+            }
+        };
+        let mut side: Vec<Option<bool>> = tets.iter().map(told).collect();
+        let open: Vec<usize> = (0..tets.len()).filter(|&i| side[i].is_none()).collect();
+        if !open.is_empty() {
+            let mut set: Vec<usize> = (0..tets.len()).collect();
+            for (_, one, other) in shared_faces(mesh, surface, tets) {
+                let (a, b) = (root(&mut set, one), root(&mut set, other));
+                if a != b && (side[a].is_none() || side[b].is_none()) {
+                    let joined = side[a].or(side[b]);
+                    set[a.max(b)] = a.min(b);
+                    side[a.min(b)] = joined;
+                }
+            }
+            for i in open {
+                side[i] = side[root(&mut set, i)];
+                given.0.extend(side[i].map(|side| (tets[i], side)));
+            }
+        }
+        Self {
+            sides: tets.iter().copied().zip(side).collect(),
+        }
+    }
+
+    /// Whether two tets are known to lie on different sides.
+    pub(crate) fn differ(&self, tets: [TetId; 2]) -> bool {
+        let side = |tet| {
+            let found = self.sides.binary_search_by_key(&tet, |entry| entry.0);
+            found.ok().and_then(|i| self.sides[i].1)
+        };
+        matches!(tets.map(side), [Some(one), Some(other)] if one != other)
+    }
+}
+
+/// Pairs of tets with a common face, by ascending alignment of the face with the surface.
+fn shared_faces(
+    mesh: &TetMesh,
+    surface: &SweptSurface,
+    tets: &[TetId],
+) -> Vec<(f64, usize, usize)> {
+    let mut faces: Vec<([ParticleId; 3], usize)> = Vec::with_capacity(4 * tets.len());
+    for (i, tet) in tets.iter().enumerate() {
+        let [a, b, c, d] = mesh.tets[tet.index()];
+        for mut face in [[b, c, d], [a, c, d], [a, b, d], [a, b, c]] {
+            face.sort_unstable();
+            faces.push((face, i));
+        }
+    }
+    faces.sort_unstable();
+    let pairs = faces
+        .chunk_by(|a, b| a.0 == b.0)
+        .filter(|same| same.len() == 2);
+    let mut shared: Vec<(f64, usize, usize)> = pairs
+        .map(|same| {
+            (
+                surface.alignment(&mesh.positions, same[0].0),
+                same[0].1,
+                same[1].1,
+            )
+        })
+        .collect();
+    shared.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+    shared
+}
+
+/// The root of `i`, halving the path to it.
+pub(crate) fn root(set: &mut [usize], mut i: usize) -> usize {
+    while set[i] != i {
+        set[i] = set[set[i]];
+        i = set[i];
+    }
+    i
+}
