@@ -2,8 +2,9 @@
 
 use glam::{DVec3, dvec3};
 use incise_graph::{Clustering, ColorId, Coloring, Schedule};
+use incise_mesh::TetId;
 use incise_mesh::generate::kuhn_box;
-use incise_xpbd::{Real, Solver};
+use incise_xpbd::{KappaLimit, Real, Solver};
 
 use crate::body::{RUBBER, body, largest_distance, plain, positions, substep, within};
 
@@ -60,6 +61,43 @@ fn rest_is_unstable_from_kappa_four_on_but_finite() {
             assert!(worst.is_finite() && worst > 1.0, "kappa {kappa}: {worst}");
         }
     }
+}
+
+/// The guard against that: tets softened to kappa 1 stay at rest where the unsoftened break up (see above), and it is
+/// said what was softened. Without a limit nothing is.
+#[test]
+fn the_kappa_limit_keeps_a_stiff_body_at_rest() {
+    let mesh = kuhn_box([8, 2, 2], dvec3(8.0, 2.0, 2.0) * CELL);
+    let mut solver = body::<f32>(&mesh, RUBBER);
+    let (schedule, settings) = (plain(&mesh), substep(&solver, 100.0));
+    assert_eq!(solver.softened().tets, 0);
+
+    let substep_time = settings.substep_time();
+    solver.limit_kappa(Some(KappaLimit {
+        kappa: 1.0,
+        substep_time,
+    }));
+    for t in 0..solver.tet_count() {
+        solver.replace_tet(t, solver.tet_particles(t), mesh.corners(TetId::new(t)));
+    }
+    let softened = solver.softened();
+    assert_eq!(softened.tets, solver.tet_count());
+    assert!((softened.volume_fraction - 1.0).abs() < 1e-12);
+    assert!(
+        (softened.strongest / 100.0 - 1.0).abs() < 1e-5,
+        "{}",
+        softened.strongest
+    );
+
+    let start = positions(&solver);
+    for _ in 0..1000 {
+        solver.step(&schedule, &settings).unwrap();
+    }
+    within(
+        "drift",
+        largest_distance(&positions(&solver), &start) / CELL,
+        1e-5,
+    );
 }
 
 /// One tet is solved exactly whatever the stiffness: both multipliers are the ones at rest and their pushes cancel.
