@@ -236,3 +236,26 @@ fn pieces_by_sign(mesh: &TetMesh, side: impl Fn(DVec3) -> bool) -> usize {
     used.dedup();
     used.len()
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    /// The scenes in `fixtures/` run, pass every check and end with the pieces they promise.
+    #[test]
+    fn fixtures_run() {
+        for (name, frames, pieces) in [("beam", 3, 1), ("crossing", 62, 4), ("two_bodies", 5, 4)] {
+            let path =
+                Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../fixtures/{name}.toml"));
+            let mut simulation = Simulation::new(&Scene::load(&path).unwrap()).unwrap();
+            for _ in 0..frames {
+                if simulation.step().unwrap().cut.is_some() {
+                    simulation.check().unwrap();
+                }
+            }
+            assert_eq!(simulation.report().pieces, pieces, "{name}");
+        }
+    }
+}
