@@ -39,3 +39,8 @@ pub use incise_xpbd as xpbd;
 pub use report::FrameReport;
 pub use scene::Scene;
 pub use simulation::Simulation;
+
+/// The example of the README, run as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
