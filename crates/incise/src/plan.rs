@@ -24,6 +24,7 @@ pub(crate) struct Plan {
 
 impl Plan {
     pub(crate) fn new(scene: &Scene, mesh: &TetMesh) -> Result<Self, Error> {
+        let _span = tracing::debug_span!("incise::plan").entered();
         let method: Method = scene.solver.clustering.parse()?;
         let algorithm = Algorithm::from_name(&scene.solver.coloring)?;
         let graph = ConstraintGraph::from_incidence(&incidence(mesh)?);
@@ -63,6 +64,7 @@ impl Plan {
     }
 
     fn update_clusters(&mut self, delta: &CutDelta) -> Result<Vec<ClusterId>, Error> {
+        let _span = tracing::debug_span!("incise::cluster").entered();
         let removed: Vec<u32> = delta.removed.iter().map(|tet| tet.tet.0).collect();
         let mut children: Vec<_> = delta
             .added
@@ -90,6 +92,7 @@ impl Plan {
 
     /// Colors the new clusters against all that share a particle with them.
     fn color_new(&mut self, new: &[ClusterId], delta: &CutDelta, cuttable: &CuttableMesh) {
+        let _span = tracing::debug_span!("incise::color").entered();
         let clustering = &self.clustering;
         let cluster_of = |tet: usize| {
             clustering
