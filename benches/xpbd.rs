@@ -1,0 +1,99 @@
+//! One substep of one iteration: both precisions, with and without damping, with and without clusters of ten tets, on
+//! one and two threads.
+//!
+//! The body hangs from one end and swings on from iteration to iteration, so that no step is the trivial one of a body
+//! at rest.
+
+// The same reason as in the library.
+#![expect(clippy::unwrap_used, reason = "benches stop at the first surprise")]
+
+use std::num::NonZeroUsize;
+
+use incise::clustering::serial_neighbor;
+use incise::coloring::scgc;
+use incise::graph::{Clustering, Schedule};
+use incise::mesh::TetId;
+use incise::mesh::glam::DVec3;
+use incise::xpbd::{Material, Real, Solver, StepSettings};
+use incise_benches::{Bench, Case};
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+fn main() {
+    let pools = [1, 2].map(|threads| {
+        let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+        (threads, pool.unwrap())
+    });
+    incise_benches::run("xpbd", |bench| {
+        let graph = bench.case.graph();
+        let none = Clustering::none(graph.vertex_count());
+        let serial = serial_neighbor(&graph, NonZeroUsize::MIN.saturating_add(9));
+        for (name, clustering) in [("none", none), ("serial10", serial)] {
+            let coloring = scgc(&graph.quotient(&clustering)).coloring;
+            let schedule = Schedule::new(&clustering, &coloring);
+            for (damping_name, damping) in [("undamped", 0.0), ("damped", 0.002)] {
+                for (threads, pool) in &pools {
+                    let rest = format!("{name}-{damping_name}-{threads}");
+                    substep::<f32>(bench, &format!("f32-{rest}"), damping, &schedule, pool);
+                    substep::<f64>(bench, &format!("f64-{rest}"), damping, &schedule, pool);
+                }
+            }
+        }
+    });
+}
+
+fn substep<R: Real>(
+    bench: &mut Bench<'_, '_>,
+    name: &str,
+    damping: f64,
+    schedule: &Schedule,
+    pool: &ThreadPool,
+) {
+    let mut solver = solver::<R>(bench.case, damping);
+    let settings = StepSettings {
+        gravity: Some(DVec3::new(0.0, 0.0, -9.81)),
+        ..StepSettings::new(5e-4)
+    };
+    bench.measure(name, |b| {
+        b.iter(|| {
+            let report = pool.install(|| solver.step(schedule, &settings)).unwrap();
+            assert_eq!(report.repaired, 0, "the measured step is an honest one");
+        });
+    });
+}
+
+/// The case in rubber, held at its low end in x. Scaled to one meter, so that the time of the substep suits any mesh.
+fn solver<R: Real>(case: &Case, damping: f64) -> Solver<R> {
+    let [low, high] = case.bounds();
+    let scale = 1.0 / (high - low).max_element();
+    let positions: Vec<DVec3> = case
+        .mesh
+        .positions
+        .iter()
+        .map(|&x| (x - low) * scale)
+        .collect();
+    let mut solver = Solver::new(&positions);
+    let material = Material {
+        young_modulus: 1e5,
+        poisson_ratio: 0.45,
+        density: 1000.0,
+        damping,
+    };
+    let rubber = solver.add_material(material).unwrap();
+    let mut masses = vec![0.0; positions.len()];
+    for (t, tet) in case.mesh.tets.iter().enumerate() {
+        let particles = tet.map(|p| p.0);
+        let rest = tet.map(|p| positions[p.index()]);
+        solver.push_tet(particles, rest, rubber);
+        let volume = case.mesh.volume(TetId::new(t)) * scale.powi(3);
+        for p in tet {
+            masses[p.index()] += 0.25 * material.density * volume;
+        }
+    }
+    for (p, &mass) in masses.iter().enumerate() {
+        solver.set_mass(p, mass);
+        if positions[p].x < 0.2 {
+            solver.set_fixed(p, true);
+        }
+    }
+    solver
+}
