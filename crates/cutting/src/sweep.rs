@@ -25,8 +25,6 @@ use crate::sides::{GivenSides, Sides};
 use crate::surface::{SweptSurface, Tangent};
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
-/// Rounds of splitting in one frame; a second one is needed where a bent blade crosses an edge twice.
-const ROUNDS: usize = 4;
 /// A meeting within this fraction of the edge's length from the tangent plane of an end is that same surface again,
 /// bent to its particles; one further away is another sheet of a stroke that came back.
 const SAME_SHEET: f64 = 0.25;
@@ -151,7 +149,8 @@ impl Sweep {
         let mut fresh: Vec<ParticleId> = Vec::new();
         let mut near = near_tets(cuttable.mesh(), &self.before, &now, &segments);
         let mut operation = Operation::begin(cuttable);
-        for _ in 0..ROUNDS {
+        // A segment meets an edge three times at most, so after as many rounds nothing can be left to split.
+        for _ in 0..=3 * segments.len() {
             let edges = edges_of(&operation.cuttable.mesh, &near);
             let hits = self.hits(operation.cuttable, &edges, &now, &segments);
             if hits.is_empty() {
