@@ -13,7 +13,7 @@ pub(crate) fn sound() -> Scene {
         gravity = [0.0, 0.0, -9.81]
         ground = { height = -2.0, friction = 0.5 }
         [[body]]
-        shape = { kind = "box", tets = 200 }
+        shape = { kind = "box", tets = 300 }
         fixed = [
             { half_space = { point = [0, 0, 0.4], normal = [0, 0, 1] } },
             { box = { low = [0, 0, 0], high = [1, 1, 1] } },
