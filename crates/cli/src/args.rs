@@ -26,6 +26,7 @@ pub(crate) enum Command {
     /// Cluster and color the constraints of a mesh.
     Color(ColorArguments),
     /// Look at, convert and generate meshes.
+    #[command(after_help = "Example: incise mesh generate liver --tets 5000 liver.vtk")]
     Mesh {
         #[command(subcommand)]
         command: MeshCommand,

@@ -14,6 +14,7 @@ use serde::Serialize;
 
 use crate::args::ColorArguments;
 use crate::failure::Failure;
+use crate::print::print;
 use crate::run::require_cpu;
 
 /// The object that `--json` prints.
@@ -46,10 +47,6 @@ struct Times {
     color: f64,
 }
 
-#[expect(
-    clippy::print_stdout,
-    reason = "the report is the result of the command"
-)]
 pub(crate) fn color(arguments: &ColorArguments) -> Result<(), Failure> {
     require_cpu(arguments.backend)?;
     let input = |error: anyhow::Error| Failure::Input(error);
@@ -115,9 +112,9 @@ pub(crate) fn color(arguments: &ColorArguments) -> Result<(), Failure> {
     }
     if arguments.json {
         let json = serde_json::to_string(&report).map_err(|error| Failure::Run(error.into()))?;
-        println!("{json}");
+        print(json)?;
     } else {
-        println!("{}", table(&report));
+        print(table(&report))?;
     }
     if verified {
         Ok(())

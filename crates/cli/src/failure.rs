@@ -25,9 +25,20 @@ impl Failure {
             Self::Input(error) => (error, 2),
             Self::Run(error) => (error, 1),
         };
-        eprintln!("error: {error:#}");
+        eprintln!("error: {}", sentence(error));
         ExitCode::from(code)
     }
+}
+
+/// The error and its causes in one line. Many errors name their cause themselves; it is not said twice.
+fn sentence(error: &anyhow::Error) -> String {
+    let mut sentence = error.to_string();
+    for cause in error.chain().skip(1).map(ToString::to_string) {
+        if !sentence.contains(&cause) {
+            sentence = format!("{sentence}: {cause}");
+        }
+    }
+    sentence.replace('\n', " ")
 }
 
 /// What cannot be read, understood or written is the input's fault; what goes wrong later is ours.

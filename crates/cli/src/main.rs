@@ -8,6 +8,7 @@ mod color;
 mod failure;
 mod mesh;
 mod output;
+mod print;
 mod run;
 mod summary;
 

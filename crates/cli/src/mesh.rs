@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use crate::args::MeshCommand;
 use crate::failure::Failure;
+use crate::print::print;
 
 /// The object that `incise mesh info --json` prints.
 #[derive(Debug, Serialize)]
@@ -44,10 +45,6 @@ pub(crate) fn mesh(command: &MeshCommand) -> Result<(), Failure> {
     }
 }
 
-#[expect(
-    clippy::print_stdout,
-    reason = "the report is the result of the command"
-)]
 fn info(file: &Path, json: bool) -> Result<(), Failure> {
     let mesh = io::read(file)?;
     mesh.check()
@@ -56,9 +53,9 @@ fn info(file: &Path, json: bool) -> Result<(), Failure> {
     let report = report(file, &mesh);
     if json {
         let json = serde_json::to_string(&report).map_err(|error| Failure::Run(error.into()))?;
-        println!("{json}");
+        print(json)?;
     } else {
-        println!("{}", table(&report));
+        print(table(&report))?;
     }
     Ok(())
 }

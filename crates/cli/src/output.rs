@@ -5,9 +5,11 @@
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::path::{self, Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use anyhow::Context;
+use incise::mesh::MeshError;
 use incise::mesh::glam::DVec3;
 use incise::mesh::io::{Field, Fields, Values, write_atomically, write_pvd, write_vtp, write_vtu};
 use incise::{Scene, Simulation};
@@ -27,13 +29,12 @@ struct Lines {
 
 impl Lines {
     fn create(path: &Path) -> anyhow::Result<Self> {
-        anyhow::ensure!(
-            !path.is_dir(),
-            "cannot write {}: it is a folder",
-            path.display()
-        );
+        require_file(path)?;
         let mut name = path.file_name().unwrap_or_default().to_owned();
-        name.push(format!(".partial-{}", std::process::id()));
+        // Numbered, so that two files of lines may have the same final name.
+        static COUNTER: AtomicU32 = AtomicU32::new(0);
+        let unique = COUNTER.fetch_add(1, Ordering::Relaxed);
+        name.push(format!(".partial-{}-{unique}", std::process::id()));
         let temporary = path.with_file_name(name);
         let file =
             File::create(&temporary).with_context(|| format!("cannot write {}", path.display()))?;
@@ -72,6 +73,15 @@ impl Drop for Lines {
     }
 }
 
+/// The scene with absolute paths, which mean the same wherever it is written to.
+fn movable(scene: &Scene) -> anyhow::Result<Scene> {
+    let mut scene = scene.clone();
+    for mesh in scene.body.iter_mut().filter_map(|body| body.mesh.as_mut()) {
+        *mesh = path::absolute(&*mesh)?;
+    }
+    Ok(scene)
+}
+
 /// Where a run's files go.
 #[derive(Debug)]
 pub(crate) struct Output {
@@ -90,6 +100,8 @@ impl Output {
         scene: &Scene,
         frames: u64,
     ) -> Result<Self, Failure> {
+        // Outermost last.
+        let missing: Vec<&Path> = folder.ancestors().take_while(|f| !f.exists()).collect();
         let open = || -> anyhow::Result<Vec<Lines>> {
             fs::create_dir_all(folder)
                 .with_context(|| format!("cannot make the folder {}", folder.display()))?;
@@ -97,12 +109,18 @@ impl Output {
             if let Some(path) = jsonl {
                 lines.push(Lines::create(path)?);
             }
+            let toml = movable(scene)?.to_toml()?;
+            write_atomically(folder.join("scene.toml"), |file| {
+                file.write_all(toml.as_bytes())
+            })?;
             Ok(lines)
         };
-        let lines = open().map_err(Failure::Input)?;
-        let toml = scene.to_toml()?;
-        write_atomically(folder.join("scene.toml"), |file| {
-            file.write_all(toml.as_bytes())
+        let lines = open().map_err(|error| {
+            for folder in missing {
+                // One that was not made, or that somebody has put something into, stays as it is.
+                let _ = fs::remove_dir(folder);
+            }
+            Failure::Input(error)
         })?;
         Ok(Self {
             folder: folder.to_owned(),
@@ -187,6 +205,37 @@ impl Output {
         )?;
         self.lines.into_iter().try_for_each(Lines::finish)
     }
+}
+
+/// The endings that [`save_mesh`] can write.
+const MESH_ENDINGS: [&str; 4] = ["vtk", "vtu", "node", "ele"];
+
+/// Refuses a file that [`save_mesh`] could not write after the run.
+pub(crate) fn require_mesh_file(path: &Path) -> Result<(), Failure> {
+    let ending = path.extension().unwrap_or_default();
+    if !MESH_ENDINGS
+        .iter()
+        .any(|known| ending.eq_ignore_ascii_case(known))
+    {
+        return Err(MeshError::UnknownFormat {
+            path: path.to_owned(),
+            known: ".vtk, .vtu, .node, .ele",
+        }
+        .into());
+    }
+    require_file(path).map_err(Failure::Input)
+}
+
+/// Refuses a path that no file can have.
+fn require_file(path: &Path) -> anyhow::Result<()> {
+    let why = match path.parent() {
+        _ if path.is_dir() => "it is a folder",
+        None => "it names no file",
+        // That of a bare name is empty.
+        Some(folder) if folder != Path::new("") && !folder.is_dir() => "there is no such folder",
+        Some(_) => return Ok(()),
+    };
+    anyhow::bail!("cannot write {}: {why}", path.display())
 }
 
 /// Writes the mesh at rest; as `.vtu` with the deformed positions, which other formats have no place for.

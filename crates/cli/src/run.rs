@@ -4,23 +4,23 @@ use std::path::Path;
 
 use anyhow::anyhow;
 use incise::scene::Precision;
-use incise::{Scene, Simulation};
+use incise::{Error, Scene, Simulation};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::args::{BackendName, PrecisionName, RunArguments};
 use crate::failure::Failure;
-use crate::output::{Output, save_mesh};
+use crate::output::{Output, require_mesh_file, save_mesh};
+use crate::print::print;
 use crate::summary::Summary;
 
 /// Frames of a run that does not say.
 const FRAMES: u64 = 200;
 
-#[expect(
-    clippy::print_stdout,
-    reason = "the table is the result of the command"
-)]
 pub(crate) fn run(arguments: &RunArguments) -> Result<(), Failure> {
     require_cpu(arguments.backend)?;
+    if let Some(path) = &arguments.save_mesh {
+        require_mesh_file(path)?;
+    }
     let scene = scene(arguments)?;
     let frames = arguments
         .frames
@@ -37,7 +37,9 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let mut checked = 0;
     let progress = progress(frames, arguments.quiet);
     for _ in 0..frames {
-        let report = simulation.step()?;
+        let report = simulation
+            .step()
+            .map_err(|error| Failure::Run(error.into()))?;
         progress.set_message(format!(
             "{} tets, {} pieces, {} colors",
             report.tets, report.pieces, report.colors
@@ -53,19 +55,16 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<(), Failure> {
     progress.finish_and_clear();
     output.finish(&simulation).map_err(Failure::Run)?;
     if let Some(path) = &arguments.save_mesh {
-        save_mesh(path, &simulation).map_err(Failure::Input)?;
+        save_mesh(path, &simulation).map_err(Failure::Run)?;
     }
     if !arguments.quiet {
-        println!(
-            "{}",
-            summary.table([kappa, simulation.kappa()], &simulation.softened())
-        );
+        print(summary.table([kappa, simulation.kappa()], &simulation.softened()))?;
         if arguments.check {
-            println!(
+            print(format_args!(
                 "checked after each of {checked} cuts: mesh, volume at rest, masses, clusters, colors, pieces"
-            );
+            ))?;
         }
-        println!("files are in {}", folder.display());
+        print(format_args!("files are in {}", folder.display()))?;
     }
     Ok(())
 }
@@ -74,8 +73,12 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<(), Failure> {
 fn scene(arguments: &RunArguments) -> Result<Scene, Failure> {
     let mut scene = match &arguments.scene {
         None => Scene::built_in(),
-        Some(path) => Scene::load(path).map_err(|error| {
-            Failure::Input(anyhow::Error::from(error).context(path.display().to_string()))
+        Some(path) => Scene::load(path).map_err(|error| match error {
+            // The others name the file themselves.
+            Error::Parse { .. } => {
+                Failure::Input(anyhow::Error::from(error).context(path.display().to_string()))
+            }
+            _ => error.into(),
         })?,
     };
     if let Some(mesh) = &arguments.mesh {

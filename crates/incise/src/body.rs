@@ -4,14 +4,12 @@
 
 use glam::DVec3;
 use incise_mesh::generate::{Shape, generate};
-use incise_mesh::{MeshError, ParticleId, TetMesh, io};
+use incise_mesh::{ParticleId, TetMesh, io};
 use incise_xpbd::Material;
 
+use crate::limits::{LARGEST_COORDINATE, coordinates, direction, value, within};
 use crate::scene::{BodySpec, Region};
 use crate::{Error, Scene};
-
-/// Coordinates beyond this many meters are taken for a mistake; squares and cubes stay finite in single precision.
-const LARGEST_COORDINATE: f64 = 1e9;
 
 /// All bodies of a scene as one mesh.
 pub(crate) struct Bodies {
@@ -50,28 +48,15 @@ impl Bodies {
             field: field.to_owned(),
             source,
         })?;
-        if !(spec.scale.is_finite() && spec.scale > 0.0) {
-            return Err(value(
-                format!("{field}.scale"),
-                spec.scale,
-                "positive and finite",
-            ));
-        }
-        finite(&format!("{field}.position"), spec.position)?;
-        let mesh = load(spec).map_err(|source| Error::Mesh {
-            field: field.to_owned(),
-            source,
-        })?;
-        mesh.check().map_err(|source| Error::Mesh {
-            field: field.to_owned(),
-            source,
-        })?;
+        within(&format!("{field}.scale"), spec.scale, 1e-9, 1e9)?;
+        let position = coordinates(&format!("{field}.position"), spec.position)?;
+        let mesh = load(field, spec)?;
 
         let body = u16::try_from(self.materials.len())
             .map_err(|_| value("body", "too many", "at most 65,536"))?;
         let first = self.mesh.positions.len();
         for x in mesh.positions {
-            let x = x * spec.scale + DVec3::from_array(spec.position);
+            let x = x * spec.scale + position;
             if x.abs().max_element() > LARGEST_COORDINATE {
                 return Err(value(
                     format!("{field}.scale"),
@@ -104,24 +89,24 @@ impl Bodies {
         };
         match region {
             Region::HalfSpace { point, normal } => {
-                let (point, normal) = (finite(field, *point)?, finite(field, *normal)?);
-                if normal == DVec3::ZERO {
-                    return Err(value(format!("{field}.normal"), "zero", "a direction"));
-                }
+                let point = coordinates(&format!("{field}.half_space.point"), *point)?;
+                let normal = direction(&format!("{field}.half_space.normal"), *normal)?;
                 fix(&|x| normal.dot(x - point) >= 0.0);
             }
             Region::Box { low, high } => {
-                let (low, high) = (finite(field, *low)?, finite(field, *high)?);
+                let low = coordinates(&format!("{field}.box.low"), *low)?;
+                let high = coordinates(&format!("{field}.box.high"), *high)?;
+                if !low.cmple(high).all() {
+                    let range = "such that low is at most high in all coordinates";
+                    return Err(value(format!("{field}.box"), "inside out", range));
+                }
                 fix(&|x| x.cmpge(low).all() && x.cmple(high).all());
             }
             Region::Sphere { center, radius } => {
-                let center = finite(field, *center)?;
+                let center = coordinates(&format!("{field}.sphere.center"), *center)?;
                 if !(radius.is_finite() && *radius >= 0.0) {
-                    return Err(value(
-                        format!("{field}.radius"),
-                        radius,
-                        "at least 0 and finite",
-                    ));
+                    let field = format!("{field}.sphere.radius");
+                    return Err(value(field, radius, "at least 0 and finite"));
                 }
                 fix(&|x| x.distance(center) <= *radius);
             }
@@ -130,11 +115,8 @@ impl Bodies {
                     let count = self.fixed.len() - first;
                     let fixed = self.fixed[first..].get_mut(p as usize);
                     *fixed.ok_or_else(|| {
-                        value(
-                            field,
-                            p,
-                            format!("below {count}, the body's number of particles"),
-                        )
+                        let range = format!("below {count}, the body's number of particles");
+                        value(format!("{field}.particles"), p, range)
                     })? = true;
                 }
             }
@@ -143,31 +125,23 @@ impl Bodies {
     }
 }
 
-fn load(spec: &BodySpec) -> Result<TetMesh, MeshError> {
-    match (&spec.mesh, &spec.shape) {
-        (Some(path), _) => io::read(path),
-        (None, Some(shape)) => generate(Shape::from_name(&shape.kind)?, shape.tets),
-        (None, None) => Err(MeshError::Empty),
-    }
-}
-
-/// An error about a value of the scene.
-pub(crate) fn value(
-    field: impl Into<String>,
-    value: impl ToString,
-    range: impl Into<String>,
-) -> Error {
-    Error::Value {
-        field: field.into(),
-        value: value.to_string(),
-        range: range.into(),
-    }
-}
-
-/// The vector, if it is finite.
-pub(crate) fn finite(field: &str, v: [f64; 3]) -> Result<DVec3, Error> {
-    match v.into_iter().find(|c| !c.is_finite()) {
-        Some(component) => Err(value(field, component, "finite")),
-        None => Ok(DVec3::from_array(v)),
-    }
+/// The body's mesh, sound.
+fn load(field: &str, spec: &BodySpec) -> Result<TetMesh, Error> {
+    let (key, mesh) = match (&spec.mesh, &spec.shape) {
+        (Some(path), None) => ("mesh", io::read(path)),
+        (None, Some(shape)) => {
+            let kind = Shape::from_name(&shape.kind);
+            ("shape", kind.and_then(|kind| generate(kind, shape.tets)))
+        }
+        (Some(_), Some(_)) => return Err(value(field, "given mesh and shape", "given only one")),
+        (None, None) => {
+            let range = "given either mesh or shape";
+            return Err(value(field, "without a mesh", range));
+        }
+    };
+    let checked = mesh.and_then(|mesh| mesh.check().map(|()| mesh));
+    checked.map_err(|source| Error::Mesh {
+        field: format!("{field}.{key}"),
+        source,
+    })
 }

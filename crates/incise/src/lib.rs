@@ -23,6 +23,7 @@
 mod backend;
 mod body;
 mod error;
+mod limits;
 mod plan;
 pub mod report;
 pub mod scene;

@@ -51,7 +51,7 @@ pub struct FrameReport {
     /// Tets without volume or turned inside out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub inverted_tets: Option<usize>,
-    /// The largest `E Δt² / (ρ h²)` of a tet: accurate up to about 0.5.
+    /// The largest `E Δt² / (ρ h²)` of a tet, had none been softened: accurate up to about 0.5.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kappa: Option<f64>,
     /// The tets softened to keep the limit of kappa.

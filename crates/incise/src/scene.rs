@@ -30,7 +30,7 @@ use crate::Error;
 #[serde(deny_unknown_fields)]
 pub struct Scene {
     /// What is reported beside times and counts.
-    #[serde(default, skip_serializing_if = "ReportSpec::is_empty")]
+    #[serde(default, skip_serializing_if = "ReportSpec::is_default")]
     pub report: ReportSpec,
     /// What acts on all bodies.
     #[serde(default)]
@@ -59,8 +59,8 @@ pub struct ReportSpec {
 }
 
 impl ReportSpec {
-    fn is_empty(&self) -> bool {
-        self.quantities.is_empty()
+    fn is_default(&self) -> bool {
+        *self == Self::default()
     }
 }
 
@@ -355,24 +355,36 @@ impl Scene {
     pub fn frames_needed(&self) -> u64 {
         self.stroke
             .iter()
-            .map(|stroke| stroke.last_frame() + 1)
+            .map(|stroke| stroke.last_frame().saturating_add(1))
             .max()
             .unwrap_or(0)
     }
 }
 
-/// Adds the nearest known name to a message like ``unknown field `a`, expected `b` or `c` ``.
+/// Adds the nearest known name to a message that lists what is known.
 fn with_suggestion(message: &str) -> String {
-    let names: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
     let message = message.trim_end().replace('\n', " ");
-    match names.split_first() {
-        Some((unknown, known)) if message.starts_with("unknown") => {
-            match nearest(unknown, known.iter().copied()) {
-                Some(name) => format!("unknown key or value '{unknown}': did you mean '{name}'?"),
-                None => format!("unknown key or value '{unknown}'"),
+    let (unknown, known): (&str, Vec<&str>) =
+        if let Some(names) = message.strip_prefix("unexpected keys in table: ") {
+            // As of a table with one of several sets of keys: `unexpected keys in table: a, available keys: b, c`.
+            let (unknown, known) = names
+                .split_once(", available keys: ")
+                .unwrap_or((names, ""));
+            let first = unknown.split(", ").next().unwrap_or(unknown);
+            (first, known.split(", ").collect())
+        } else if message.starts_with("unknown") {
+            // As in ``unknown field `a`, expected `b` or `c` ``.
+            let mut names = message.split('`').skip(1).step_by(2);
+            match names.next() {
+                Some(unknown) => (unknown, names.collect()),
+                None => return message,
             }
-        }
-        _ => message,
+        } else {
+            return message;
+        };
+    match nearest(unknown, known.into_iter().filter(|name| !name.is_empty())) {
+        Some(name) => format!("unknown key or value '{unknown}': did you mean '{name}'?"),
+        None => format!("unknown key or value '{unknown}'"),
     }
 }
 

@@ -13,13 +13,14 @@ use incise_xpbd::{Ground, KappaLimit, StepSettings};
 use rayon::ThreadPool;
 
 use crate::backend::{AnySolver, each};
-use crate::body::{Bodies, finite, value};
+use crate::body::Bodies;
+use crate::limits::{LARGEST_COORDINATE, coordinates, value, within};
 use crate::plan::Plan;
 use crate::report::{
     CutReport, EnergyReport, FrameReport, Milliseconds, ResidualReport, SoftenedReport,
     milliseconds,
 };
-use crate::scene::{Precision, Quantity, StrokeSpec};
+use crate::scene::{GroundSpec, Precision, Quantity, StrokeSpec};
 use crate::strokes::Timeline;
 use crate::{Error, Scene};
 
@@ -341,7 +342,7 @@ impl Simulation {
         &self.plan.schedule
     }
 
-    /// The largest `E Δt² / (ρ h²)` of a tet: up to about 0.5 the motion is accurate.
+    /// The largest `E Δt² / (ρ h²)` of a tet, had none been softened: up to about 0.5 the motion is accurate.
     #[must_use]
     pub fn kappa(&self) -> f64 {
         each!(&self.solver, solver => solver.kappa(self.settings.substep_time()))
@@ -405,16 +406,22 @@ fn settings(scene: &Scene) -> Result<StepSettings, Error> {
         gravity: scene
             .world
             .gravity
-            .map(|g| finite("world.gravity", g))
+            .map(|g| coordinates("world.gravity", g))
             .transpose()?,
-        ground: scene.world.ground.map(|g| Ground {
-            height: g.height,
-            friction: g.friction,
-        }),
+        ground: scene.world.ground.map(ground).transpose()?,
     };
     settings.check().map_err(|source| Error::Xpbd {
         field: "solver".into(),
         source,
     })?;
     Ok(settings)
+}
+
+fn ground(ground: GroundSpec) -> Result<Ground, Error> {
+    let GroundSpec { height, friction } = ground;
+    let far = LARGEST_COORDINATE;
+    Ok(Ground {
+        height: within("world.ground.height", height, -far, far)?,
+        friction: within("world.ground.friction", friction, 0.0, 1e3)?,
+    })
 }

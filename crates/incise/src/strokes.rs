@@ -4,7 +4,7 @@ use glam::DVec3;
 use incise_cutting::{CutDelta, CutError, CutOptions, CuttableMesh, Plane, Sweep, cut_plane};
 
 use crate::Error;
-use crate::body::{finite, value};
+use crate::limits::{coordinates, direction, value};
 use crate::scene::StrokeSpec;
 
 /// A stroke and how far it is.
@@ -34,21 +34,23 @@ impl Timeline {
     }
 
     /// Adds a stroke, if all its values are in their ranges.
-    pub(crate) fn add(&mut self, spec: StrokeSpec) -> Result<(), Error> {
+    pub(crate) fn add(&mut self, mut spec: StrokeSpec) -> Result<(), Error> {
         let field = format!("stroke[{}]", self.added);
-        let cut = |source: CutError| Error::Cut {
-            field: field.clone(),
+        let cut = |key: &str, source: CutError| Error::Cut {
+            field: format!("{field}.{key}"),
             source,
         };
-        match &spec {
+        match &mut spec {
             StrokeSpec::Plane {
                 point,
                 normal,
                 snap,
                 ..
             } => {
-                self.options(*snap).check().map_err(cut)?;
-                plane(*point, *normal).unit_normal().map_err(cut)?;
+                let options = self.options(*snap).check();
+                options.map_err(|source| cut("snap", source))?;
+                coordinates(&format!("{field}.point"), *point)?;
+                *normal = direction(&format!("{field}.normal"), *normal)?.to_array();
             }
             StrokeSpec::Sweep {
                 frames,
@@ -56,7 +58,8 @@ impl Timeline {
                 path,
                 snap,
             } => {
-                self.options(*snap).check().map_err(cut)?;
+                let options = self.options(*snap).check();
+                options.map_err(|source| cut("snap", source))?;
                 if frames[0] >= frames[1] {
                     let range = "two frames, the second after the first";
                     return Err(value(
@@ -72,21 +75,19 @@ impl Timeline {
                         "at least two",
                     ));
                 }
-                for &offset in path {
-                    finite(&format!("{field}.path"), offset)?;
+                for &offset in path.iter() {
+                    coordinates(&format!("{field}.path"), offset)?;
                 }
-                for &point in blade {
-                    finite(&format!("{field}.blade"), point)?;
+                for &point in blade.iter() {
+                    coordinates(&format!("{field}.blade"), point)?;
                 }
                 let length: f64 = blade
                     .windows(2)
                     .map(|ends| vector(ends[0]).distance(vector(ends[1])))
                     .sum();
                 if blade.len() < 2 || length == 0.0 {
-                    return Err(cut(CutError::ShortBlade {
-                        points: blade.len(),
-                        length,
-                    }));
+                    let points = blade.len();
+                    return Err(cut("blade", CutError::ShortBlade { points, length }));
                 }
             }
         }

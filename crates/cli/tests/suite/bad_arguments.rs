@@ -1,0 +1,127 @@
+//! Arguments that cannot be meant and places that cannot be written end like any other bad input.
+
+use crate::bad_input::{place, refused, refused_in_a_sentence};
+
+#[test]
+fn places_that_cannot_be_written() {
+    let place = place();
+    let run = |rest: &[&'static str]| [&["run", "scene.toml", "--frames", "2"], rest].concat();
+    // A path below a regular file exists for nobody, not even for the administrator.
+    for (rest, part) in [
+        (&["--out", "tet.vtk/out"][..], "tet.vtk/out"),
+        (&["--out", "tet.vtk"], "tet.vtk"),
+        (&["--jsonl", "tet.vtk/frames.jsonl"], "tet.vtk/frames.jsonl"),
+        (&["--jsonl", "none/frames.jsonl"], "none/frames.jsonl"),
+        (&["--jsonl", "."], "cannot write ."),
+        (&["--save-mesh", "tet.vtk/last.vtk"], "tet.vtk/last.vtk"),
+        (&["--save-mesh", "none/last.vtu"], "none/last.vtu"),
+        (&["--save-mesh", "last.xyz"], "last.xyz"),
+        (&["--save-mesh", "last"], "last"),
+        (&["--jsonl", "/"], "cannot write /"),
+        (
+            &["--out", "a/b/c", "--jsonl", "none/frames.jsonl"],
+            "none/frames.jsonl",
+        ),
+    ] {
+        refused_in_a_sentence(&place, &run(rest), &[part]);
+    }
+    for command in [
+        &["color", "tet.vtk", "--csv", "tet.vtk/colors.csv"][..],
+        &["color", "tet.vtk", "--csv", "none/colors.csv"],
+        &["mesh", "convert", "tet.vtk", "none/tet.vtk"],
+        &["mesh", "generate", "box", "--tets", "300", "none/box.vtk"],
+    ] {
+        refused_in_a_sentence(&place, command, &["cannot write"]);
+    }
+    refused_in_a_sentence(
+        &place,
+        &["mesh", "convert", "tet.vtk", "tet.xyz"],
+        &["tet.xyz", ".vtu"],
+    );
+}
+
+#[test]
+fn names_and_numbers_that_do_not_exist() {
+    let place = place();
+    for (command, parts) in [
+        (
+            &["run", "scene.toml", "--backend", "gpu"][..],
+            &["GPU", "--backend cpu"][..],
+        ),
+        (&["color", "tet.vtk", "--backend", "gpu"], &["GPU"]),
+        (
+            &["color", "tet.vtk", "--algorithm", "gredy"],
+            &["gredy", "scgc, greedy"],
+        ),
+        (
+            &["color", "tet.vtk", "--clustering", "serial:0"],
+            &["serial:0"],
+        ),
+        (
+            &["color", "tet.vtk", "--clustering", "serial:x"],
+            &["serial:x"],
+        ),
+        (&["color", "tet.vtk", "--clustering", "blocks"], &["blocks"]),
+        (
+            &["mesh", "generate", "cube", "--tets", "300", "a.vtk"],
+            &["cube", "box"],
+        ),
+        (
+            &["mesh", "generate", "box", "--tets", "0", "a.vtk"],
+            &["0 tets"],
+        ),
+        (
+            &["mesh", "generate", "box", "--tets", "99999999999", "a.vtk"],
+            &["99999999999 tets"],
+        ),
+        (
+            &["mesh", "generate", "box", "--tets", "300", "a.xyz"],
+            &["a.xyz"],
+        ),
+    ] {
+        refused_in_a_sentence(&place, command, parts);
+    }
+}
+
+/// Here the message has the form of the argument parser.
+#[test]
+fn arguments_that_do_not_exist() {
+    let place = place();
+    for (command, parts) in [
+        (
+            &["run", "scene.toml", "--frmes", "3"][..],
+            &["--frmes", "'--frames'"][..],
+        ),
+        (
+            &["color", "tet.vtk", "--algoritm", "scgc"],
+            &["--algoritm", "'--algorithm'"],
+        ),
+        (
+            &["mesh", "generate", "box", "--tet", "300", "a.vtk"],
+            &["--tet", "'--tets'"],
+        ),
+        (&["colr", "tet.vtk"], &["'colr'", "'color'"]),
+        (&["run", "scene.toml", "--frames", "0"], &["--frames"]),
+        (&["run", "scene.toml", "--frames", "-1"], &["-1"]),
+        (&["run", "scene.toml", "--frames", "many"], &["many"]),
+        (&["run", "scene.toml", "--threads", "0"], &["--threads"]),
+        (
+            &["run", "scene.toml", "--precision", "f16"],
+            &["f16", "f32"],
+        ),
+        (
+            &["run", "scene.toml", "--backend", "cpuu"],
+            &["cpuu", "'cpu'"],
+        ),
+        (
+            &["mesh", "generate", "box", "--tets", "-3", "a.vtk"],
+            &["-3"],
+        ),
+        (&["mesh", "generate", "box", "a.vtk"], &["--tets"]),
+        (&["run", "scene.toml", "--jsonl", ""], &["--jsonl"]),
+        (&["color"], &["INPUT"]),
+        (&["mesh"], &["info"]),
+    ] {
+        refused(&place, command, parts);
+    }
+}

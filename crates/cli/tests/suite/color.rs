@@ -1,0 +1,149 @@
+//! `incise color`: the promised keys, rows in the order of the input, and a coloring proved proper by this file alone.
+
+use std::collections::{HashMap, HashSet};
+
+use serde_json::Value;
+
+use crate::support::{Place, keys, names};
+
+const KEYS: &str = "input, constraints, particles, clusters, edges, algorithm, clustering, backend, seed, colors, \
+                    max_clique, std, range, chi2, rounds, verified, ms";
+
+/// The particles of the tets of a legacy VTK file as this program writes it.
+fn tets(vtk: &str) -> Vec<[usize; 4]> {
+    let mut lines = vtk.lines().skip_while(|line| !line.starts_with("CELLS "));
+    let count: usize = lines
+        .next()
+        .unwrap()
+        .split(' ')
+        .nth(1)
+        .unwrap()
+        .parse()
+        .unwrap();
+    let tets = lines.take(count).map(|line| {
+        let numbers: Vec<usize> = line.split(' ').map(|word| word.parse().unwrap()).collect();
+        assert_eq!(numbers[0], 4);
+        [numbers[1], numbers[2], numbers[3], numbers[4]]
+    });
+    tets.collect()
+}
+
+/// Cluster and color of each constraint; asserts header and order.
+fn rows(csv: &str) -> Vec<(usize, usize)> {
+    let mut lines = csv.lines();
+    assert_eq!(lines.next(), Some("constraint,cluster,color"));
+    let rows = lines.enumerate().map(|(i, line)| {
+        let numbers: Vec<usize> = line.split(',').map(|word| word.parse().unwrap()).collect();
+        assert_eq!((numbers.len(), numbers[0]), (3, i), "{line}");
+        (numbers[1], numbers[2])
+    });
+    rows.collect()
+}
+
+/// Two tets of different clusters that share a particle have different colors; a cluster has one color.
+fn assert_proper(tets: &[[usize; 4]], rows: &[(usize, usize)]) {
+    assert_eq!(tets.len(), rows.len());
+    let mut color_of = HashMap::new();
+    for &(cluster, color) in rows {
+        assert_eq!(
+            *color_of.entry(cluster).or_insert(color),
+            color,
+            "cluster {cluster} has two colors"
+        );
+    }
+    let mut owner = HashMap::new();
+    for (tet, &(cluster, color)) in tets.iter().zip(rows) {
+        for &particle in tet {
+            let first = *owner.entry((particle, color)).or_insert(cluster);
+            assert_eq!(
+                first, cluster,
+                "clusters {first} and {cluster} share particle {particle} and color {color}"
+            );
+        }
+    }
+}
+
+#[test]
+fn colorings_are_proper_and_reported_truly() {
+    let place = Place::with_mesh();
+    place.good(&["mesh", "generate", "torus", "--tets", "1200", "torus.node"]);
+    place.good(&["mesh", "convert", "torus.node", "torus.vtk"]);
+    for (file, source) in [("box.vtk", "box.vtk"), ("torus.ele", "torus.vtk")] {
+        let tets = tets(&place.read(source));
+        for clustering in ["none", "serial:5", "serial:10"] {
+            let mut all = Vec::new();
+            for algorithm in ["scgc", "greedy"] {
+                let report: Value = serde_json::from_str(&place.good(&[
+                    "color",
+                    file,
+                    "--algorithm",
+                    algorithm,
+                    "--clustering",
+                    clustering,
+                    "--csv",
+                    "colors.csv",
+                    "--json",
+                ]))
+                .unwrap();
+                let rows = rows(&place.read("colors.csv"));
+                assert_proper(&tets, &rows);
+                let clusters: HashSet<usize> = rows.iter().map(|row| row.0).collect();
+                let colors: HashSet<usize> = rows.iter().map(|row| row.1).collect();
+                assert_eq!(report["constraints"], tets.len());
+                assert_eq!(report["clusters"], clusters.len());
+                assert_eq!(report["colors"], colors.len());
+                assert!(report["max_clique"].as_u64() <= report["colors"].as_u64());
+                assert_eq!(
+                    (&report["algorithm"], &report["clustering"]),
+                    (&algorithm.into(), &clustering.into())
+                );
+                assert_eq!(
+                    (&report["verified"], &report["backend"]),
+                    (&true.into(), &"cpu".into())
+                );
+                assert_eq!(report["input"], file);
+                let limit = clustering
+                    .strip_prefix("serial:")
+                    .map_or(1, |limit| limit.parse().unwrap());
+                let mut sizes = HashMap::new();
+                for (cluster, _) in &rows {
+                    *sizes.entry(cluster).or_insert(0) += 1;
+                }
+                assert!(sizes.values().all(|size| *size <= limit), "{clustering}");
+                all.push(rows);
+            }
+            assert!(all[0] == all[1], "greedy and scgc differ with {clustering}");
+        }
+    }
+}
+
+#[test]
+fn the_object_has_exactly_the_promised_keys() {
+    let place = Place::with_mesh();
+    let text = place.good(&["color", "box.vtk", "--seed", "7", "--json"]);
+    assert_eq!(text.lines().count(), 1);
+    let report: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(keys(&report), names(KEYS));
+    assert_eq!(keys(&report["ms"]), names("read, graph, cluster, color"));
+    assert_eq!(
+        (&report["seed"], &report["clustering"], &report["algorithm"]),
+        (&7.into(), &"none".into(), &"scgc".into())
+    );
+    assert!(!text.contains("null"), "{text}");
+    assert_eq!(place.names("."), ["box.vtk"]);
+}
+
+#[test]
+fn without_json_there_is_a_table() {
+    let table = Place::with_mesh().good(&["color", "box.vtk", "--clustering", "serial:5"]);
+    for part in [
+        "box.vtk",
+        "colors",
+        "by scgc",
+        "(serial:5)",
+        "verified",
+        "yes",
+    ] {
+        assert!(table.contains(part), "{part} is not in\n{table}");
+    }
+}

@@ -1,0 +1,12 @@
+//! The real binary, run in folders of its own: what it prints, what it writes, what it leaves behind.
+
+#![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
+
+mod bad_arguments;
+mod bad_input;
+mod color;
+mod help;
+mod mesh;
+mod run;
+mod run_files;
+mod support;

@@ -1,0 +1,164 @@
+//! `incise run`: the table, and one JSON object per frame with the promised keys.
+
+use std::process::{Command, Stdio};
+
+use serde_json::Value;
+
+use crate::support::{Place, SCENE, keys, names};
+
+const ALWAYS: &str =
+    "frame, time_s, particles, tets, clusters, colors, pieces, cut, ms, backend, precision";
+
+/// The objects of a file of lines.
+fn frames(place: &Place, file: &str) -> Vec<Value> {
+    let text = place.read(file);
+    assert!(text.ends_with('\n'));
+    text.lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect()
+}
+
+#[test]
+fn a_run_prints_a_table_and_writes_its_files() {
+    let place = Place::with_scene();
+    let table = place.good(&["run", "scene.toml", "--frames", "4", "--no-pictures"]);
+    for part in [
+        "ms per frame",
+        "solve",
+        "4 (1 with a cut)",
+        "tets before, after",
+        "pieces",
+        "kappa",
+        "files are in out",
+    ] {
+        assert!(table.contains(part), "{part} is not in\n{table}");
+    }
+    let surfaces = [0, 1, 2, 3].map(|frame| format!("surface_{frame:05}.vtp"));
+    let mut expected = vec!["frames.jsonl", "mesh.vtu", "scene.toml", "surface.pvd"];
+    expected.extend(surfaces.iter().map(String::as_str));
+    assert_eq!(place.names("out"), expected);
+    assert_eq!(place.names("."), ["out", "scene.toml"]);
+    for surface in &surfaces {
+        assert!(place.read("out/surface.pvd").contains(surface));
+        assert!(
+            place
+                .read(&format!("out/{surface}"))
+                .contains("Name=\"cut\"")
+        );
+    }
+    let mesh = place.read("out/mesh.vtu");
+    for field in ["rest_position", "cluster", "color", "piece"] {
+        assert!(mesh.contains(&format!("Name=\"{field}\"")), "{field}");
+    }
+}
+
+#[test]
+fn every_line_has_exactly_the_promised_keys() {
+    let place = Place::with_scene();
+    place.good(&[
+        "run",
+        "scene.toml",
+        "--frames",
+        "4",
+        "--quiet",
+        "--jsonl",
+        "lines.jsonl",
+    ]);
+    assert_eq!(place.read("lines.jsonl"), place.read("out/frames.jsonl"));
+    let frames = frames(&place, "lines.jsonl");
+    assert_eq!(frames.len(), 4);
+    for (i, frame) in frames.iter().enumerate() {
+        assert_eq!(keys(frame), names(ALWAYS));
+        assert_eq!(
+            keys(&frame["ms"]),
+            names("cut, cluster, color, schedule, upload, solve, readback, other, total")
+        );
+        assert_eq!(
+            (&frame["frame"], &frame["backend"], &frame["precision"]),
+            (&i.into(), &"cpu".into(), &"f32".into())
+        );
+        assert_eq!(frame["pieces"], if i == 0 { 1 } else { 2 });
+        if i == 1 {
+            assert_eq!(
+                keys(&frame["cut"]),
+                names("tets_cut, tets_created, particles_created, snapped, worst_volume_ratio")
+            );
+        } else {
+            assert!(frame["cut"].is_null());
+        }
+    }
+}
+
+#[test]
+fn reports_appear_when_asked_for() {
+    let place = Place::new();
+    let report = "[report]\nevery = 2\nquantities = [\"residual\", \"energy\", \"volume\", \"speed\", \"kappa\"]\n";
+    place.write("scene.toml", report.to_owned() + SCENE);
+    place.good(&["run", "scene.toml", "--frames", "3", "--quiet"]);
+    let frames = frames(&place, "out/frames.jsonl");
+    let all = format!(
+        "{ALWAYS}, residual, energy, volume, volume_error, min_volume_ratio, max_speed, inverted_tets, kappa, softened"
+    );
+    for (frame, expected) in frames.iter().zip([all.as_str(), ALWAYS, &all]) {
+        assert_eq!(keys(frame), names(expected));
+    }
+    assert_eq!(keys(&frames[0]["residual"]), names("primal, dual"));
+    assert_eq!(
+        keys(&frames[0]["energy"]),
+        names("kinetic, elastic, gravity")
+    );
+}
+
+#[test]
+fn quiet_prints_nothing() {
+    let place = Place::with_scene();
+    assert_eq!(
+        place.good(&["run", "scene.toml", "--frames", "2", "--quiet", "--check"]),
+        ""
+    );
+}
+
+#[test]
+fn check_says_how_many_cuts_it_checked() {
+    let place = Place::new();
+    let second =
+        "[[stroke]]\nkind = \"plane\"\nframe = 3\npoint = [0, 0.02, 0]\nnormal = [0, 1, 0]\n";
+    place.write("scene.toml", SCENE.to_owned() + second);
+    for (frames, cuts) in [("1", 0), ("3", 1), ("5", 2)] {
+        let text = place.good(&["run", "scene.toml", "--frames", frames, "--check"]);
+        assert!(
+            text.contains(&format!("checked after each of {cuts} cuts")),
+            "{text}"
+        );
+    }
+}
+
+#[test]
+fn without_frames_all_strokes_are_carried_out() {
+    let place = Place::new();
+    let late = SCENE
+        .replace("frame = 1", "frame = 203")
+        .replace("tets = 300", "tets = 200");
+    place.write("scene.toml", late);
+    place.good(&["run", "scene.toml", "--quiet"]);
+    let frames = frames(&place, "out/frames.jsonl");
+    assert_eq!(frames.len(), 204);
+    assert_eq!(frames[203]["pieces"], 2);
+}
+
+/// A reader that stops reading, as `head` does, is no reason to panic.
+#[test]
+fn a_closed_pipe_is_no_failure() {
+    let place = Place::with_mesh();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_incise"))
+        .args(["mesh", "info", "box.vtk"])
+        .current_dir(place.path("."))
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(String::from_utf8(output.stderr).unwrap(), "");
+    assert!(output.status.success());
+}

@@ -1,0 +1,236 @@
+//! The files of `incise run`: the same for any number of threads, whole under their names, usable afterwards.
+
+use std::fs;
+
+use crate::support::{Place, SCENE};
+
+/// All but the times: those are of no two runs the same.
+fn same_files(place: &Place, a: &str, b: &str) {
+    assert_eq!(place.names(a), place.names(b));
+    for name in place.names(a).iter().filter(|name| *name != "frames.jsonl") {
+        let [a, b] = [a, b].map(|folder| place.read(&format!("{folder}/{name}")));
+        assert!(a == b, "{name} differs");
+    }
+}
+
+#[test]
+fn any_number_of_threads_writes_the_same_bytes() {
+    let place = Place::new();
+    // Large enough that threads share the work of a color.
+    let scene = SCENE
+        .replace("tets = 300", "tets = 9000")
+        .replace("[world]", "[solver]\nclustering = \"serial:20\"\n[world]");
+    place.write("scene.toml", scene);
+    for threads in ["1", "2"] {
+        place.good(&[
+            "run",
+            "scene.toml",
+            "--frames",
+            "3",
+            "--quiet",
+            "--threads",
+            threads,
+            "--out",
+            threads,
+        ]);
+    }
+    same_files(&place, "1", "2");
+}
+
+#[test]
+fn precision_is_as_asked_for() {
+    let place = Place::with_scene();
+    for precision in ["f32", "f64"] {
+        place.good(&[
+            "run",
+            "scene.toml",
+            "--frames",
+            "2",
+            "--quiet",
+            "--precision",
+            precision,
+            "--out",
+            precision,
+        ]);
+        let lines = place.read(&format!("{precision}/frames.jsonl"));
+        assert_eq!(
+            lines
+                .matches(&format!("\"precision\":\"{precision}\""))
+                .count(),
+            2
+        );
+        assert!(
+            place
+                .read(&format!("{precision}/scene.toml"))
+                .contains(&format!("precision = \"{precision}\""))
+        );
+    }
+    assert!(place.read("f32/mesh.vtu") != place.read("f64/mesh.vtu"));
+}
+
+#[test]
+fn the_written_scene_runs_again_to_the_same_files() {
+    let place = Place::new();
+    fs::create_dir(place.path("scenes")).unwrap();
+    place.good(&[
+        "mesh",
+        "generate",
+        "sphere",
+        "--tets",
+        "400",
+        "scenes/sphere.vtk",
+    ]);
+    place.write(
+        "scenes/scene.toml",
+        SCENE.replace(
+            "shape = { kind = \"box\", tets = 300 }",
+            "mesh = \"sphere.vtk\"",
+        ),
+    );
+    place.good(&[
+        "run",
+        "scenes/scene.toml",
+        "--frames",
+        "3",
+        "--quiet",
+        "--out",
+        "deep/first",
+    ]);
+    place.good(&[
+        "run",
+        "deep/first/scene.toml",
+        "--frames",
+        "3",
+        "--quiet",
+        "--out",
+        "second",
+    ]);
+    same_files(&place, "deep/first", "second");
+}
+
+#[test]
+fn a_mesh_from_the_command_line_replaces_that_of_the_scene() {
+    let place = Place::with_scene();
+    place.good(&["mesh", "generate", "torus", "--tets", "700", "torus.node"]);
+    place.good(&[
+        "run",
+        "scene.toml",
+        "--mesh",
+        "torus.node",
+        "--frames",
+        "1",
+        "--quiet",
+    ]);
+    let count = place
+        .read("torus.ele")
+        .lines()
+        .next()
+        .unwrap()
+        .split_whitespace()
+        .next()
+        .unwrap()
+        .to_owned();
+    assert!(
+        place
+            .read("out/frames.jsonl")
+            .contains(&format!("\"tets\":{count},"))
+    );
+}
+
+#[test]
+fn the_last_mesh_is_saved_in_every_format() {
+    let place = Place::with_scene();
+    for name in ["last.vtk", "last.vtu", "last.node", "LAST.VTU"] {
+        place.good(&[
+            "run",
+            "scene.toml",
+            "--frames",
+            "3",
+            "--quiet",
+            "--save-mesh",
+            name,
+        ]);
+    }
+    assert_eq!(
+        place.names("."),
+        [
+            "LAST.VTU",
+            "last.ele",
+            "last.node",
+            "last.vtk",
+            "last.vtu",
+            "out",
+            "scene.toml"
+        ]
+    );
+    assert!(place.read("last.vtu").contains("Name=\"position\""));
+    assert!(place.read("last.vtu") == place.read("LAST.VTU"));
+    // What was saved is the cut mesh, at rest, and sound.
+    for name in ["last.vtk", "last.node"] {
+        let info = place.good(&["mesh", "info", name, "--json"]);
+        assert!(info.contains("\"pieces\":2"), "{info}");
+    }
+}
+
+#[test]
+fn the_same_lines_may_be_asked_for_twice() {
+    let place = Place::with_scene();
+    place.good(&[
+        "run",
+        "scene.toml",
+        "--frames",
+        "3",
+        "--quiet",
+        "--jsonl",
+        "out/frames.jsonl",
+    ]);
+    assert_eq!(place.read("out/frames.jsonl").lines().count(), 3);
+    assert!(
+        place
+            .names("out")
+            .iter()
+            .all(|name| !name.contains("partial"))
+    );
+}
+
+/// A folder in the place of a surface makes the run fail in its middle.
+#[test]
+fn a_failed_run_leaves_nothing_half_written() {
+    let place = Place::with_scene();
+    fs::create_dir_all(place.path("out/surface_00002.vtp/full")).unwrap();
+    place.write("lines.jsonl", "of an earlier run\n");
+    let outcome = place.incise(&[
+        "run",
+        "scene.toml",
+        "--frames",
+        "4",
+        "--jsonl",
+        "lines.jsonl",
+        "--save-mesh",
+        "last.vtk",
+    ]);
+    assert_eq!(
+        (outcome.code, outcome.stdout.as_str()),
+        (1, ""),
+        "{outcome:?}"
+    );
+    assert_eq!(outcome.stderr.lines().count(), 1, "{outcome:?}");
+    assert!(outcome.stderr.contains("surface_00002.vtp"), "{outcome:?}");
+    let left = [
+        "scene.toml",
+        "surface_00000.vtp",
+        "surface_00001.vtp",
+        "surface_00002.vtp",
+    ];
+    assert_eq!(place.names("out"), left);
+    assert_eq!(place.names("."), ["lines.jsonl", "out", "scene.toml"]);
+    assert_eq!(place.read("lines.jsonl"), "of an earlier run\n");
+    for whole in &left[1..3] {
+        assert!(
+            place
+                .read(&format!("out/{whole}"))
+                .trim_end()
+                .ends_with("</VTKFile>")
+        );
+    }
+}

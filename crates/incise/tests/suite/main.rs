@@ -1,0 +1,15 @@
+//! The facade as its users see it: scenes in, frames out, and everything derived proved anew after every frame.
+
+#![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
+
+mod cutting;
+mod determinism;
+mod kappa;
+mod locality;
+mod mistakes;
+mod parsing;
+mod physics;
+mod regions;
+mod reports;
+mod support;
+mod values;
