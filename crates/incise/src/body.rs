@@ -48,6 +48,14 @@ impl Bodies {
             field: field.to_owned(),
             source,
         })?;
+        within(
+            &format!("{field}.young_modulus"),
+            spec.young_modulus,
+            1e-6,
+            1e15,
+        )?;
+        within(&format!("{field}.density"), spec.density, 1e-6, 1e9)?;
+        within(&format!("{field}.damping"), spec.damping, 0.0, 1e6)?;
         within(&format!("{field}.scale"), spec.scale, 1e-9, 1e9)?;
         let position = coordinates(&format!("{field}.position"), spec.position)?;
         let mesh = load(field, spec)?;

@@ -414,6 +414,7 @@ fn settings(scene: &Scene) -> Result<StepSettings, Error> {
         field: "solver".into(),
         source,
     })?;
+    within("solver.time_step", settings.time_step, 1e-9, 1e3)?;
     Ok(settings)
 }
 
