@@ -15,7 +15,7 @@ use crate::real::{finite, load, store};
 use crate::{Ground, Real, Solver, StepSettings, XpbdError};
 
 /// Constraints in a color from which a second thread pays for its wake-up.
-const PARALLEL_CONSTRAINTS: usize = 512;
+const PARALLEL_CONSTRAINTS: usize = 256;
 /// Particles a thread takes at a time.
 const PARALLEL_PARTICLES: usize = 4096;
 
@@ -162,11 +162,12 @@ impl<R: Real> Solver<R> {
                 solve(tets);
             } else {
                 let clusters = schedule.clusters(color);
-                let share = clusters.len().div_ceil(threads);
-                clusters
-                    .into_par_iter()
-                    .with_min_len(share)
-                    .for_each(|cluster| solve(schedule.constraints(cluster)));
+                (0..threads).into_par_iter().for_each(|thread| {
+                    let share = |part| clusters.start + clusters.len() * part / threads;
+                    for cluster in share(thread)..share(thread + 1) {
+                        solve(schedule.constraints(cluster));
+                    }
+                });
             }
         }
     }
