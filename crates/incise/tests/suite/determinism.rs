@@ -6,7 +6,7 @@ use incise::{Scene, Simulation};
 use crate::support::{body, hash, plane, scene, state, sweep};
 
 /// From this many tets on a color is solved by several threads: `PARALLEL_CONSTRAINTS` of the solver.
-const PARALLEL: usize = 512;
+const PARALLEL: usize = 256;
 
 /// A liver that falls onto the ground, is swept by a blade and halved by a plane.
 fn falling_liver() -> Scene {
