@@ -83,6 +83,11 @@ impl SweptSurface {
         };
     }
 
+    /// Whether a particle was seen on both sides.
+    pub(crate) fn is_seen_on_both(&self, particle: ParticleId) -> bool {
+        self.seen[particle.index()] == Seen::Both
+    }
+
     /// Appends the copies of particles.
     pub(crate) fn push_copies(&mut self, sources: &[ParticleId]) {
         for source in sources {

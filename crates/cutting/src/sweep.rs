@@ -28,6 +28,9 @@ use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 /// A meeting within this fraction of the edge's length from the tangent plane of an end is that same surface again,
 /// bent to its particles; one further away is another sheet of a stroke that came back.
 const SAME_SHEET: f64 = 0.25;
+/// A particle that the surface passed on both sides, and this time within this fraction of an edge, is put on it: the
+/// body between the two sheets is thinner than a tet, and cutting both would leave it as a thread.
+const BETWEEN: f64 = 0.5;
 
 /// A stroke in progress.
 ///
@@ -259,31 +262,30 @@ impl Sweep {
         hits
     }
 
-    /// Puts particles on the surface that it passes closely, and notes what the hits say of their ends.
+    /// Notes what the hits say of their ends, and puts those on the surface that it passes closely.
     fn snap(&mut self, cuttable: &CuttableMesh, hits: &[Hit]) -> Vec<ParticleId> {
+        for hit in hits {
+            let sides = [!hit.upwards, hit.upwards];
+            for (particle, side) in hit.crossing.ends.into_iter().zip(sides) {
+                self.surface.see(particle, side);
+            }
+        }
         let mut snapped: Vec<(ParticleId, Tangent)> = Vec::new();
         for hit in hits {
             let at = hit.crossing.parameter;
             for (particle, fraction) in hit.crossing.ends.into_iter().zip([at, 1.0 - at]) {
+                let undecided = !self.decided[particle.index()];
                 let close = fraction < self.options.tolerance
-                    || (!self.decided[particle.index()]
-                        && (fraction < self.options.snap
-                            || self.passes_closely(cuttable, particle, &hit.tangent)));
+                    || (undecided && fraction < self.options.snap)
+                    || (undecided && self.passes_closely(cuttable, particle, &hit.tangent))
+                    || (fraction < BETWEEN && self.surface.is_seen_on_both(particle));
                 if close && !self.surface.contains(particle) {
                     snapped.push((particle, hit.tangent));
                 }
             }
         }
-        for hit in hits {
-            for (particle, side) in hit
-                .crossing
-                .ends
-                .into_iter()
-                .zip([!hit.upwards, hit.upwards])
-            {
-                self.decided[particle.index()] = true;
-                self.surface.see(particle, side);
-            }
+        for particle in hits.iter().flat_map(|hit| hit.crossing.ends) {
+            self.decided[particle.index()] = true;
         }
         snapped.sort_by_key(|(particle, _)| *particle);
         snapped.dedup_by_key(|(particle, _)| *particle);
