@@ -5,7 +5,7 @@
 use std::num::NonZeroUsize;
 
 use incise::clustering::serial_neighbor;
-use incise::coloring::{greedy, scgc};
+use incise::coloring::{Order, greedy, scgc};
 
 fn main() {
     incise_benches::run("coloring", |bench| {
@@ -13,7 +13,9 @@ fn main() {
         let clusters = serial_neighbor(&tets, NonZeroUsize::MIN.saturating_add(9));
         let clusters = tets.quotient(&clusters);
         for (name, graph) in [("none", &tets), ("serial10", &clusters)] {
-            bench.measure(&format!("greedy-{name}"), |b| b.iter(|| greedy(graph)));
+            bench.measure(&format!("greedy-{name}"), |b| {
+                b.iter(|| greedy(graph, Order::LargestFirst));
+            });
             bench.measure(&format!("scgc-{name}"), |b| b.iter(|| scgc(graph)));
         }
     });

@@ -3,7 +3,7 @@
 use std::num::NonZeroUsize;
 
 use incise::clustering::serial_neighbor;
-use incise::coloring::greedy;
+use incise::coloring::{Order, greedy};
 use incise::graph::{ConstraintGraph, Schedule};
 
 fn main() {
@@ -12,7 +12,7 @@ fn main() {
         let incidence = case.incidence();
         let graph = ConstraintGraph::from_incidence(&incidence);
         let clustering = serial_neighbor(&graph, NonZeroUsize::MIN.saturating_add(9));
-        let coloring = greedy(&graph.quotient(&clustering));
+        let coloring = greedy(&graph.quotient(&clustering), Order::LargestFirst);
 
         bench.measure("incidence", |b| b.iter(|| case.incidence()));
         bench.measure("graph", |b| {

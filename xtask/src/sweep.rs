@@ -12,7 +12,7 @@ use clap::Args;
 use comfy_table::Table;
 use comfy_table::presets::ASCII_MARKDOWN;
 use incise::clustering::{Method, cluster};
-use incise::coloring::{greedy, scgc};
+use incise::coloring::{Order, greedy, scgc};
 use incise::graph::{ConstraintGraph, Incidence};
 use incise::mesh::TetMesh;
 use incise::mesh::glam::DVec3;
@@ -87,7 +87,7 @@ fn coloring(models: &[Model]) -> anyhow::Result<Table> {
             let result = scgc(&clusters);
             result.coloring.verify_incidence(&of_clusters)?;
             ensure!(
-                result.coloring == greedy(&clusters),
+                result.coloring == greedy(&clusters, Order::LargestFirst),
                 "{}: scgc and greedy differ",
                 model.name
             );

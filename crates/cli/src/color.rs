@@ -7,7 +7,7 @@ use anyhow::{Context, anyhow};
 use comfy_table::Table;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use incise::clustering::{Method, cluster};
-use incise::coloring::{Algorithm, greedy, scgc};
+use incise::coloring::{Algorithm, Order, greedy, scgc};
 use incise::graph::{Clustering, Coloring, ColoringMetrics, ConstraintGraph, Incidence};
 use incise::mesh::io;
 use serde::Serialize;
@@ -76,7 +76,7 @@ pub(crate) fn color(arguments: &ColorArguments) -> Result<(), Failure> {
             (result.coloring, result.stats.rounds)
         }
         // One pass after the other: a single round.
-        _ => (greedy(&clusters), 1),
+        _ => (greedy(&clusters, Order::LargestFirst), 1),
     };
     let color = clock.lap();
 

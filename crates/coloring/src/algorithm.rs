@@ -2,7 +2,7 @@
 
 use incise_graph::{Coloring, ConstraintGraph};
 
-use crate::{ColoringError, greedy, scgc};
+use crate::{ColoringError, Order, greedy, scgc};
 
 /// A coloring algorithm, chosen at run time.
 ///
@@ -58,7 +58,7 @@ impl Algorithm {
 pub fn color(algorithm: Algorithm, graph: &ConstraintGraph) -> Coloring {
     match algorithm {
         Algorithm::Scgc => scgc(graph).coloring,
-        Algorithm::Greedy => greedy(graph),
+        Algorithm::Greedy => greedy(graph, Order::LargestFirst),
     }
 }
 

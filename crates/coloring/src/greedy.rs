@@ -1,42 +1,33 @@
-//! Sequential first fit in priority order: what the parallel algorithm must reproduce.
+//! Sequential first fit: vertices choose one after the other, each the smallest color that no
+//! neighbor has.
 //!
-//! The vertices choose one after the other, most neighbors first (Welsh and Powell's order, with
-//! ties broken as in [`priority`](crate::priority)), each the smallest color free among its
-//! neighbors. Short enough to be believed, it is the oracle for [`scgc`](crate::scgc()). Cost: O(n
-//! log n + edges) time, O(n) memory.
+//! The order decides the number of colors ([`Order`]). In the order of the parallel algorithms,
+//! [`Order::LargestFirst`], it is their oracle: short enough to be believed, and equal to them bit
+//! for bit. Cost: that of the order, and one pass over the edges, or from incidence over the
+//! entries.
 
-use incise_graph::{ColorId, Coloring, ConstraintGraph};
+use incise_graph::Coloring;
 
-use crate::first_fit::FirstFit;
-use crate::priority_order;
+use crate::{Conflicts, Order, order};
 
-/// Colors `graph` sequentially, largest degree first.
+/// Colors sequentially in the given order.
 ///
-/// Proper, deterministic, labels without gaps, at most `max_degree() + 1` colors. O(n log n +
-/// edges).
+/// Proper, labels without gaps, at most one color more than the largest degree. Deterministic; a
+/// graph and the incidence it came from give the same. O(vertices + edges) beside the cost of
+/// [`order`]; from incidence O(entries), for every 64 colors over those constraints that need so
+/// many.
 ///
 /// ```
-/// use incise_coloring::greedy;
+/// use incise_coloring::{Order, greedy};
 /// use incise_graph::ConstraintGraph;
 ///
 /// let triangle = ConstraintGraph::from_edges(4, &[(0, 1), (1, 2), (2, 0), (2, 3)])?;
-/// let coloring = greedy(&triangle);
+/// let coloring = greedy(&triangle, Order::LargestFirst);
 /// coloring.verify(&triangle)?;
 /// assert_eq!(coloring.color_count(), 3);
 /// # Ok::<(), incise_graph::GraphError>(())
 /// ```
 #[must_use]
-pub fn greedy(graph: &ConstraintGraph) -> Coloring {
-    // A color too large for any palette stands for "none yet", so that it never counts as taken.
-    let mut colors = vec![ColorId(u32::MAX); graph.vertex_count()];
-    let mut first_fit = FirstFit::default();
-    for v in priority_order(graph) {
-        let neighbors = graph.neighbors(v as usize);
-        let color = first_fit.choose(
-            neighbors.len(),
-            neighbors.iter().map(|&u| colors[u as usize]),
-        );
-        colors[v as usize] = color;
-    }
-    Coloring::new(colors)
+pub fn greedy(conflicts: &impl Conflicts, by: Order) -> Coloring {
+    Coloring::new(conflicts.first_fit(&order(conflicts, by)))
 }

@@ -11,7 +11,7 @@
 //! nothing of meshes.
 //!
 //! ```
-//! use incise_coloring::{greedy, scgc};
+//! use incise_coloring::{Order, greedy, scgc};
 //! use incise_graph::{ConstraintGraph, Incidence};
 //!
 //! // A closed ring of five springs.
@@ -21,24 +21,29 @@
 //! let result = scgc(&graph);
 //! result.coloring.verify(&graph)?;
 //! assert_eq!(result.coloring.color_count(), 3);
-//! assert_eq!(result.coloring, greedy(&graph));
+//! assert_eq!(result.coloring, greedy(&graph, Order::LargestFirst));
 //! # Ok::<(), incise_graph::GraphError>(())
 //! ```
 
 mod algorithm;
+mod buckets;
+mod conflicts;
 mod error;
 mod extend;
 mod first_fit;
 mod greedy;
+mod order;
 mod palette;
 mod priority;
 mod scgc;
 
 pub use algorithm::{Algorithm, color};
+pub use conflicts::Conflicts;
 pub use error::ColoringError;
 pub use extend::extend_first_fit;
 pub use greedy::greedy;
-pub use priority::{hash, priority, priority_order};
+pub use order::{Order, order};
+pub use priority::{hash, priorities, priority_order};
 pub use scgc::{Scgc, ScgcStats, scgc};
 
 /// The example of the README, run as a test.

@@ -9,7 +9,7 @@
 //! first two entries decide alone, and a priority is one `u64`. Cost: O(1) each, O(n log n) for the
 //! order.
 
-use incise_graph::ConstraintGraph;
+use crate::Conflicts;
 
 /// A scrambled number; different for different `id`s. Integer arithmetic only, so the same
 /// everywhere.
@@ -21,39 +21,41 @@ pub fn hash(id: u32) -> u32 {
     (x >> 16) ^ x
 }
 
-/// The priority of a vertex: degree in the high 32 bits, hash in the low ones. Greater goes first;
-/// no two vertices of one graph are equal.
+/// The priority of every vertex: degree in the high 32 bits, hash in the low ones. Greater goes
+/// first; no two are equal.
 ///
-/// # Panics
-/// If the graph has no vertex `v`.
+/// Costs what [`Conflicts::degrees`] does.
 ///
 /// ```
-/// use incise_coloring::priority;
+/// use incise_coloring::priorities;
 /// use incise_graph::ConstraintGraph;
 ///
 /// let star = ConstraintGraph::from_edges(3, &[(0, 1), (1, 2)])?;
-/// assert!(priority(&star, 1) > priority(&star, 0), "the center goes first");
+/// let priorities = priorities(&star);
+/// assert!(priorities[1] > priorities[0], "the center goes first");
 /// # Ok::<(), incise_graph::GraphError>(())
 /// ```
 #[must_use]
-pub fn priority(graph: &ConstraintGraph, v: u32) -> u64 {
-    let degree = graph.degree(v as usize) as u64;
-    (degree << 32) | u64::from(hash(v))
+pub fn priorities(conflicts: &impl Conflicts) -> Vec<u64> {
+    let degrees = conflicts.degrees();
+    (0..)
+        .zip(degrees)
+        .map(|(v, degree)| (u64::from(degree) << 32) | u64::from(hash(v)))
+        .collect()
 }
 
-/// All vertices, highest priority first. O(n log n).
+/// All vertices, highest priority first. O(n log n) beside the priorities.
 #[must_use]
-pub fn priority_order(graph: &ConstraintGraph) -> Vec<u32> {
-    let mut order: Vec<(u64, u32)> = (0..)
-        .take(graph.vertex_count())
-        .map(|v| (priority(graph, v), v))
-        .collect();
+pub fn priority_order(conflicts: &impl Conflicts) -> Vec<u32> {
+    let mut order: Vec<(u64, u32)> = priorities(conflicts).into_iter().zip(0..).collect();
     order.sort_unstable_by(|a, b| b.cmp(a));
     order.into_iter().map(|(_, v)| v).collect()
 }
 
 #[cfg(test)]
 mod tests {
+    use incise_graph::ConstraintGraph;
+
     use super::*;
 
     #[test]
@@ -70,6 +72,7 @@ mod tests {
         let graph = ConstraintGraph::from_edges(5, &[(3, 0), (3, 1), (3, 2), (1, 0)]).unwrap();
         let order = priority_order(&graph);
         assert_eq!((order[0], order[3], order[4]), (3, 2, 4));
-        assert!(order.is_sorted_by(|&a, &b| priority(&graph, a) > priority(&graph, b)));
+        let keys = priorities(&graph);
+        assert!(order.is_sorted_by(|&a, &b| keys[a as usize] > keys[b as usize]));
     }
 }

@@ -41,7 +41,7 @@ use incise_graph::{ColorId, Coloring, ConstraintGraph};
 use rayon::prelude::*;
 
 use crate::palette::Palettes;
-use crate::priority;
+use crate::priorities;
 
 /// A coloring and how it came about.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -195,9 +195,7 @@ struct State<'g> {
 
 impl<'g> State<'g> {
     fn new(graph: &'g ConstraintGraph) -> Self {
-        let vertices = (0u32..).take(graph.vertex_count());
-        let rank: Vec<u64> = vertices.map(|v| priority(graph, v)).collect();
-        let rank = &rank;
+        let rank = &priorities(graph);
         let higher_of = |v: usize| {
             graph
                 .neighbors(v)

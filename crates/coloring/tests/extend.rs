@@ -1,6 +1,6 @@
 //! Local recoloring keeps a coloring proper and touches nothing else.
 
-use incise_coloring::{extend_first_fit, greedy};
+use incise_coloring::{Order, extend_first_fit, greedy};
 use incise_graph::{Coloring, ConstraintGraph};
 use proptest::collection::btree_set;
 use proptest::prelude::*;
@@ -23,7 +23,7 @@ proptest! {
         (Just(graph), btree_set(0..n.max(1), 0..=n as usize / 2))
     })) {
         let new: Vec<u32> = new.into_iter().collect();
-        let before = greedy(&without(&graph, &new));
+        let before = greedy(&without(&graph, &new), Order::LargestFirst);
         let mut after = before.clone();
         extend_first_fit(&mut after, &new, |v, list| {
             list.extend_from_slice(graph.neighbors(v as usize));
@@ -42,7 +42,7 @@ proptest! {
     })) {
         let mut new: Vec<u32> = (0..).take(graph.vertex_count()).skip(kept).collect();
         new.reverse();
-        let mut coloring = Coloring::new(greedy(&without(&graph, &new)).colors()[..kept].to_vec());
+        let mut coloring = Coloring::new(greedy(&without(&graph, &new), Order::LargestFirst).colors()[..kept].to_vec());
         extend_first_fit(&mut coloring, &new, |v, list| {
             list.extend_from_slice(graph.neighbors(v as usize));
         });

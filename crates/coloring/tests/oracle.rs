@@ -1,6 +1,6 @@
 //! `scgc` equals `greedy`, both are proper and within the bounds, and threads change nothing.
 
-use incise_coloring::{Algorithm, Scgc, color, greedy, priority_order, scgc};
+use incise_coloring::{Algorithm, Order, Scgc, color, greedy, priority_order, scgc};
 use incise_graph::{ClusterId, Clustering, ColorId, ConstraintGraph};
 use proptest::prelude::*;
 
@@ -17,7 +17,7 @@ fn with_threads(threads: usize, graph: &ConstraintGraph) -> Scgc {
 /// Everything that holds for any graph; returns the number of colors and the rounds.
 fn check(graph: &ConstraintGraph) -> (usize, usize) {
     let result = scgc(graph);
-    let oracle = greedy(graph);
+    let oracle = greedy(graph, Order::LargestFirst);
     result.coloring.verify(graph).unwrap();
     assert_eq!(result.coloring, oracle);
     assert!(oracle.color_count() <= graph.max_degree() + 1);
@@ -78,7 +78,9 @@ fn lattices_clustered_or_not() {
         let incidence = kuhn(n);
         let graph = ConstraintGraph::from_incidence(&incidence);
         assert!(check(&graph).0 >= incidence.clique_bound());
-        greedy(&graph).verify_incidence(&incidence).unwrap();
+        greedy(&graph, Order::LargestFirst)
+            .verify_incidence(&incidence)
+            .unwrap();
         for size in [2, 5, 6, 50] {
             let labels = (0..graph.vertex_count())
                 .map(|c| ClusterId::new(c / size))
@@ -87,7 +89,9 @@ fn lattices_clustered_or_not() {
             let clusters = incidence.quotient(&clustering);
             let quotient = graph.quotient(&clustering);
             assert!(check(&quotient).0 >= clusters.clique_bound());
-            greedy(&quotient).verify_incidence(&clusters).unwrap();
+            greedy(&quotient, Order::LargestFirst)
+                .verify_incidence(&clusters)
+                .unwrap();
         }
     }
 }
@@ -129,7 +133,7 @@ proptest! {
     #[test]
     fn random_graphs(graph in erdos_renyi(90)) {
         check(&graph);
-        let colors: Vec<usize> = greedy(&graph).colors().iter().map(|color| color.index()).collect();
+        let colors: Vec<usize> = greedy(&graph, Order::LargestFirst).colors().iter().map(|color| color.index()).collect();
         prop_assert_eq!(colors, definition(&graph));
     }
 }

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use incise_coloring::{greedy, priority, scgc};
+use incise_coloring::{Order, greedy, priorities, scgc};
 use incise_graph::ConstraintGraph;
 use proptest::prelude::*;
 
@@ -16,10 +16,11 @@ use crate::generators::{erdos_renyi, kuhn};
 /// Asserts at every undecided vertex of every round that shortcut 3 implies shortcut 1.
 fn model(graph: &ConstraintGraph, one: bool, three: bool) -> (Vec<usize>, usize) {
     let ids: Vec<u32> = (0..).take(graph.vertex_count()).collect();
+    let rank = priorities(graph);
     let higher: Vec<Vec<usize>> = ids
         .iter()
         .map(|&v| {
-            let above = |u: &&u32| priority(graph, **u) > priority(graph, v);
+            let above = |u: &&u32| rank[**u as usize] > rank[v as usize];
             graph
                 .neighbors(v as usize)
                 .iter()
@@ -64,7 +65,7 @@ fn model(graph: &ConstraintGraph, one: bool, three: bool) -> (Vec<usize>, usize)
 }
 
 fn compare(graph: &ConstraintGraph) {
-    let oracle: Vec<usize> = greedy(graph)
+    let oracle: Vec<usize> = greedy(graph, Order::LargestFirst)
         .colors()
         .iter()
         .map(|color| color.index())
