@@ -3,7 +3,7 @@
 use std::num::NonZeroUsize;
 
 use incise_clustering::serial_neighbor;
-use incise_coloring::{greedy, scgc};
+use incise_coloring::{Order, greedy, scgc};
 use incise_graph::{ClusterId, Clustering, ConstraintGraph, Incidence, Schedule};
 use proptest::collection::{btree_set, vec};
 use proptest::prelude::*;
@@ -75,7 +75,7 @@ proptest! {
         let clustering = serial_neighbor(&graph, NonZeroUsize::new(ks).unwrap());
         let quotient = graph.quotient(&clustering);
         let coloring = scgc(&quotient).coloring;
-        prop_assert_eq!(&coloring, &greedy(&quotient));
+        prop_assert_eq!(&coloring, &greedy(&quotient, Order::LargestFirst));
         coloring.verify_incidence(&incidence.quotient(&clustering)).unwrap();
         prop_assert!(coloring.color_count() >= incidence.quotient(&clustering).clique_bound());
         Schedule::new(&clustering, &coloring).check(&incidence).unwrap();
