@@ -26,7 +26,8 @@ use crate::first_fit::FirstFit;
 /// [`Incidence`] (constraints, in each other's way when they share a particle).
 ///
 /// Being in the way is mutual, and nobody is in its own way. Both implementations of one problem
-/// give equal results in every algorithm of this crate.
+/// give equal results in every algorithm of this crate, except where [`crowding`](Self::crowding)
+/// takes part.
 ///
 /// ```
 /// use incise_coloring::{Conflicts, Order, greedy};
@@ -51,6 +52,11 @@ pub trait Conflicts: Sync {
 
     /// The number of neighbors of every vertex, each counted once.
     fn degrees(&self) -> Vec<u32>;
+
+    /// How crowded it is around every vertex: a number not below its degree that is cheap to have.
+    ///
+    /// A graph has its degrees; incidence counts a neighbor once for every particle shared with it.
+    fn crowding(&self) -> Vec<u32>;
 
     /// All edges, in flat arrays: borrowed from a graph, built from incidence.
     fn graph(&self) -> Cow<'_, ConstraintGraph>;
@@ -88,6 +94,11 @@ impl Conflicts for ConstraintGraph {
             .windows(2)
             .map(|pair| pair[1] - pair[0])
             .collect()
+    }
+
+    /// O(vertices).
+    fn crowding(&self) -> Vec<u32> {
+        self.degrees()
     }
 
     /// O(1).
@@ -144,6 +155,15 @@ impl Conflicts for Incidence {
             });
         }
         degrees
+    }
+
+    /// O(entries).
+    fn crowding(&self) -> Vec<u32> {
+        let others = |&p: &u32| self.constraints_of(p as usize).len() as u64 - 1;
+        let crowding = |v| self.particles_of(v).iter().map(others).sum::<u64>();
+        (0..self.constraint_count())
+            .map(|v| u32::try_from(crowding(v)).unwrap_or(u32::MAX))
+            .collect()
     }
 
     /// O(sum over particles of valence squared).

@@ -26,25 +26,34 @@
 //! ```
 
 mod algorithm;
+mod auto;
 mod buckets;
 mod conflicts;
+mod dsatur;
 mod error;
 mod extend;
 mod first_fit;
 mod greedy;
+mod iterated_greedy;
 mod order;
 mod palette;
 mod priority;
+mod random;
 mod scgc;
+mod tabu;
 
 pub use algorithm::{Algorithm, color};
+pub use auto::{Auto, auto};
 pub use conflicts::Conflicts;
+pub use dsatur::dsatur;
 pub use error::ColoringError;
 pub use extend::extend_first_fit;
 pub use greedy::greedy;
+pub use iterated_greedy::iterated_greedy;
 pub use order::{Order, order};
 pub use priority::{hash, priorities, priority_order};
 pub use scgc::{Scgc, ScgcStats, scgc};
+pub use tabu::tabu;
 
 /// The example of the README, run as a test.
 #[cfg(doctest)]

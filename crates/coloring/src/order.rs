@@ -9,7 +9,8 @@
 //! (Tarjan and Yannakakis 1984); both pick from buckets in O(vertices + edges).
 
 use crate::buckets::{Buckets, Extreme};
-use crate::{Conflicts, hash, priority_order};
+use crate::random::Random;
+use crate::{Conflicts, priority_order};
 
 /// Who chooses first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -17,11 +18,15 @@ use crate::{Conflicts, hash, priority_order};
 pub enum Order {
     /// By number.
     Natural,
-    /// By a hash of this seed and the number; the same on every machine.
+    /// In an order drawn with this seed; the same on every machine.
     Random(u64),
     /// Most neighbors first, ties by hash: [`priority_order`], that of the parallel algorithms
     /// (Welsh and Powell 1967).
     LargestFirst,
+    /// Most neighbors first, counted the cheap way: [`Conflicts::crowding`], ties by number. From
+    /// incidence this needs no edges, but where neighbors share several particles it differs from
+    /// what a graph gives.
+    Crowded,
     /// Backwards: last whoever has the fewest neighbors among those not placed yet.
     SmallestLast,
     /// Next whoever has the most neighbors among those already placed (maximum cardinality search,
@@ -31,8 +36,8 @@ pub enum Order {
 
 /// All vertices of `conflicts`, those that choose first in front.
 ///
-/// Deterministic, and the same for a graph and the incidence it came from. O(n) for `Natural`, O(n
-/// log n) for `Random`, O(n log n + degrees) for `LargestFirst`, O(n + edges) for the other two,
+/// Deterministic, and but for `Crowded` the same for a graph and the incidence it came from. O(n)
+/// for `Natural`, O(n + entries) for `Crowded`, O(n) for `Random`, O(n log n + degrees) for `LargestFirst`, O(n + edges) for the other two,
 /// from incidence O(sum over particles of valence squared).
 ///
 /// ```
@@ -52,24 +57,36 @@ pub fn order(conflicts: &impl Conflicts, order: Order) -> Vec<u32> {
     match order {
         Order::Natural => natural().collect(),
         Order::Random(seed) => {
-            let mut keys: Vec<(u64, u32)> = natural().map(|v| (mix(seed, v), v)).collect();
-            keys.sort_unstable();
-            keys.into_iter().map(|(_, v)| v).collect()
+            let mut order: Vec<u32> = natural().collect();
+            Random::new(seed).shuffle(&mut order);
+            order
         }
         Order::LargestFirst => priority_order(conflicts),
+        Order::Crowded => most_crowded_first(conflicts),
         Order::SmallestLast => smallest_last(conflicts),
         Order::MaximumCardinality => maximum_cardinality(conflicts),
     }
 }
 
-/// A random-looking number for each pair (the finalizer of `SplitMix64`, which is a bijection).
-fn mix(seed: u64, v: u32) -> u64 {
-    let x = seed
-        .wrapping_mul(0x9e37_79b9_7f4a_7c15)
-        .wrapping_add(u64::from(v) << 32 | u64::from(hash(v)));
-    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ (x >> 31)
+/// Counting sort, descending and stable.
+fn most_crowded_first(conflicts: &impl Conflicts) -> Vec<u32> {
+    let crowding = conflicts.crowding();
+    let most = crowding.iter().max().map_or(0, |&most| most as usize);
+    // From the crowding to the place of the next vertex that has it.
+    let mut place = vec![0u32; most + 2];
+    for &crowding in &crowding {
+        place[most - crowding as usize + 1] += 1;
+    }
+    for i in 0..=most {
+        place[i + 1] += place[i];
+    }
+    let mut order = vec![0; crowding.len()];
+    for (v, &crowding) in (0..).zip(&crowding) {
+        let place = &mut place[most - crowding as usize];
+        order[*place as usize] = v;
+        *place += 1;
+    }
+    order
 }
 
 /// Takes the vertex with the fewest neighbors left, again and again, and reverses.

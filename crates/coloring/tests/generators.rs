@@ -1,7 +1,7 @@
 //! Graphs with known properties, and random ones.
 
 use incise_graph::{ConstraintGraph, Incidence};
-use proptest::collection::vec;
+use proptest::collection::{btree_set, vec};
 use proptest::prelude::*;
 
 /// Everybody adjacent to everybody.
@@ -65,6 +65,16 @@ pub(crate) fn erdos_renyi(max: u32) -> impl Strategy<Value = ConstraintGraph> {
                 .map(|(pair, _)| *pair)
                 .collect();
             ConstraintGraph::from_edges(n as usize, &edges).unwrap()
+        })
+    })
+}
+
+/// Constraints of zero to five particles each; few particles, so that some are crowded, or many.
+pub(crate) fn constraints(max: usize) -> impl Strategy<Value = Incidence> {
+    (1u32..60).prop_flat_map(move |particles| {
+        let one = btree_set(0..particles, 0..=5usize.min(particles as usize));
+        vec(one, 0..max).prop_map(move |constraints| {
+            Incidence::from_constraints(particles as usize, constraints).unwrap()
         })
     })
 }

@@ -79,6 +79,29 @@ impl Coloring {
         self.colors.push(color);
     }
 
+    /// Closes gaps: renames the colors, in order, to `0..distinct_colors()`. O(vertices + colors).
+    ///
+    /// ```
+    /// use incise_graph::{ColorId, Coloring};
+    ///
+    /// let mut coloring = Coloring::new([4, 1, 4].map(ColorId).to_vec());
+    /// coloring.compact();
+    /// assert_eq!(coloring.colors(), [1, 0, 1].map(ColorId));
+    /// ```
+    pub fn compact(&mut self) {
+        let mut name = vec![0u32; self.color_count()];
+        for color in &self.colors {
+            name[color.index()] = 1;
+        }
+        let mut next = 0;
+        for name in &mut name {
+            next += std::mem::replace(name, next);
+        }
+        for color in &mut self.colors {
+            *color = ColorId(name[color.index()]);
+        }
+    }
+
     /// The vertices of every color, ascending. O(vertices + colors).
     #[must_use]
     pub fn classes(&self) -> Classes {

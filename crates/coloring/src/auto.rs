@@ -1,0 +1,80 @@
+//! The default: few colors, quickly, and no longer than it takes.
+//!
+//! Constraints on one particle are a clique, so the most crowded particle bounds the number of
+//! colors from below, and a coloring that meets the bound is as good as any. On scanned bodies the
+//! first attempt often does. So the attempts go from cheap to dear and stop at the bound:
+//!
+//! 1. first fit, most crowded first ([`Order::Crowded`]);
+//! 2. a few passes of [`iterated_greedy`](crate::iterated_greedy());
+//! 3. first fit in [`Order::SmallestLast`], if that is better;
+//! 4. [`tabu`](crate::tabu()) for as many steps as there are vertices, for each color to lose.
+//!
+//! The steps are counted, not timed, so the result is the same on every machine.
+
+use incise_graph::Coloring;
+
+use crate::{Conflicts, Order, greedy, iterated_greedy, tabu};
+
+/// A coloring, what bounds it and what it took.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Auto {
+    /// The coloring.
+    pub coloring: Coloring,
+    /// [`Conflicts::clique_bound`]: if the coloring has as many colors, no other has fewer.
+    pub bound: usize,
+    /// Passes of iterated greedy.
+    pub passes: usize,
+    /// Steps of the search.
+    pub steps: usize,
+}
+
+/// Passes of iterated greedy: on scanned meshes three were enough where passes helped at all.
+const PASSES: usize = 5;
+
+/// Steps of the search for a color on small graphs.
+const MIN_STEPS: usize = 1000;
+
+/// Any fixed number will do.
+const SEED: u64 = 1;
+
+/// Colors with few colors; stops early where it can tell that there are no fewer.
+///
+/// Proper, deterministic, labels without gaps. A graph does not know its cliques, so it rarely
+/// stops early, and since [`Order::Crowded`] reads a graph differently, it may give another coloring than the
+/// incidence it came from. From O(entries) when the first attempt meets the bound to O(vertices *
+/// (degree + colors)) for each color lost and the last one tried.
+///
+/// ```
+/// use incise_coloring::auto;
+/// use incise_graph::Incidence;
+///
+/// let springs = Incidence::from_constraints(5, (0u32..5).map(|i| [i, (i + 1) % 5]))?;
+/// let result = auto(&springs);
+/// result.coloring.verify_incidence(&springs)?;
+/// assert_eq!((result.coloring.color_count(), result.bound), (3, 2));
+/// # Ok::<(), incise_graph::GraphError>(())
+/// ```
+#[must_use]
+pub fn auto(conflicts: &impl Conflicts) -> Auto {
+    let bound = conflicts.clique_bound();
+    let mut result = Auto {
+        coloring: greedy(conflicts, Order::Crowded),
+        bound,
+        passes: 0,
+        steps: 0,
+    };
+    let coloring = &mut result.coloring;
+    result.passes = iterated_greedy(conflicts, coloring, PASSES, bound, SEED);
+    if coloring.color_count() > bound {
+        // From here on every step walks neighbors: with the edges at hand that is faster.
+        let graph = conflicts.graph();
+        let smallest_last = greedy(&*graph, Order::SmallestLast);
+        if smallest_last.color_count() < coloring.color_count() {
+            *coloring = smallest_last;
+        }
+        let steps = coloring.vertex_count().max(MIN_STEPS);
+        result.steps = tabu(&*graph, coloring, bound, steps, SEED);
+    }
+    result
+}
