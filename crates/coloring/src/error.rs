@@ -12,4 +12,18 @@ pub enum ColoringError {
         /// The names that exist, separated by commas.
         known: String,
     },
+    /// An edit removes a vertex from a particle where it is not.
+    #[error("vertex {vertex} cannot be removed from particle {particle}: it is not there")]
+    NotThere {
+        /// The vertex.
+        vertex: u32,
+        /// The particle.
+        particle: u32,
+    },
+    /// A coloring that is not proper, or not about the same vertices.
+    #[error(transparent)]
+    Graph(#[from] incise_graph::GraphError),
+    /// A count that is kept up to date differs from what it counts.
+    #[error("the counts kept beside the coloring are wrong: this is a defect, please report it")]
+    Books,
 }

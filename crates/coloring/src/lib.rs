@@ -39,6 +39,7 @@ mod order;
 mod palette;
 mod priority;
 mod random;
+mod recoloring;
 mod scgc;
 mod tabu;
 
@@ -52,6 +53,7 @@ pub use greedy::greedy;
 pub use iterated_greedy::iterated_greedy;
 pub use order::{Order, order};
 pub use priority::{hash, priorities, priority_order};
+pub use recoloring::{Recolored, Recoloring};
 pub use scgc::{Scgc, ScgcStats, scgc};
 pub use tabu::tabu;
 

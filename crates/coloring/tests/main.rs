@@ -5,5 +5,6 @@
 mod extend;
 mod generators;
 mod oracle;
+mod recoloring;
 mod rounds;
 mod sequential;

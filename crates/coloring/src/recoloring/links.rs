@@ -1,0 +1,209 @@
+//! Incidence that changes: who is at which particle, in linked lists.
+//!
+//! A link joins a vertex (a constraint or a cluster) and a particle. It lies in two lists, that of
+//! its particle and that of its vertex. A cluster has a link for every one of its constraints at a
+//! particle, so the links are a multiset; the valence of a particle counts different vertices. How
+//! many particles have each valence is kept up to date, and with it the largest valence, which
+//! bounds the colors from below. Cost: O(links at the particle + links of the vertex) for a link
+//! added or removed; a removed link's place is used again.
+
+use incise_graph::Incidence;
+
+/// The end of a list.
+const NONE: u32 = u32::MAX;
+
+#[derive(Clone, Copy, Debug)]
+struct Link {
+    vertex: u32,
+    particle: u32,
+    next_at_particle: u32,
+    previous_at_particle: u32,
+    next_of_vertex: u32,
+}
+
+/// All links.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Links {
+    links: Vec<Link>,
+    /// Places to use again.
+    free: Vec<u32>,
+    /// Particle -> its first link.
+    at_particle: Vec<u32>,
+    /// Vertex -> its first link.
+    of_vertex: Vec<u32>,
+    /// Particle -> the number of different vertices there.
+    valence: Vec<u32>,
+    /// Valence -> the number of particles that have it.
+    histogram: Vec<u32>,
+}
+
+impl Links {
+    pub(super) fn vertex_count(&self) -> usize {
+        self.of_vertex.len()
+    }
+
+    pub(super) fn particle_count(&self) -> usize {
+        self.at_particle.len()
+    }
+
+    /// The largest valence.
+    pub(super) fn bound(&self) -> usize {
+        self.histogram.len().saturating_sub(1)
+    }
+
+    /// Is there any link of `v`?
+    pub(super) fn has(&self, v: u32) -> bool {
+        self.of_vertex
+            .get(v as usize)
+            .is_some_and(|&first| first != NONE)
+    }
+
+    /// Links a vertex and a particle; both may be new.
+    pub(super) fn add(&mut self, vertex: u32, particle: u32) {
+        grow(&mut self.of_vertex, vertex, NONE);
+        if self.particle_count() <= particle as usize {
+            let new = particle as usize + 1 - self.particle_count();
+            grow(&mut self.at_particle, particle, NONE);
+            grow(&mut self.valence, particle, 0);
+            self.count(0, new);
+        }
+        if !self.at(particle).any(|u| u == vertex) {
+            let valence = self.valence[particle as usize];
+            self.move_particle(particle, valence + 1);
+        }
+        let first = self.at_particle[particle as usize];
+        let link = Link {
+            vertex,
+            particle,
+            next_at_particle: first,
+            previous_at_particle: NONE,
+            next_of_vertex: self.of_vertex[vertex as usize],
+        };
+        let place = match self.free.pop() {
+            Some(place) => {
+                self.links[place as usize] = link;
+                place
+            }
+            None => {
+                self.links.push(link);
+                u32::try_from(self.links.len() - 1).expect("fewer than 2^32 links")
+            }
+        };
+        if first != NONE {
+            self.links[first as usize].previous_at_particle = place;
+        }
+        self.at_particle[particle as usize] = place;
+        self.of_vertex[vertex as usize] = place;
+    }
+
+    /// Removes one link between a vertex and a particle; false if there is none.
+    pub(super) fn remove(&mut self, vertex: u32, particle: u32) -> bool {
+        let Some(&first) = self.of_vertex.get(vertex as usize) else {
+            return false;
+        };
+        let mut before = NONE;
+        let mut place = first;
+        while place != NONE && self.links[place as usize].particle != particle {
+            before = place;
+            place = self.links[place as usize].next_of_vertex;
+        }
+        if place == NONE {
+            return false;
+        }
+        let link = self.links[place as usize];
+        match before {
+            NONE => self.of_vertex[vertex as usize] = link.next_of_vertex,
+            _ => self.links[before as usize].next_of_vertex = link.next_of_vertex,
+        }
+        match link.previous_at_particle {
+            NONE => self.at_particle[particle as usize] = link.next_at_particle,
+            before => self.links[before as usize].next_at_particle = link.next_at_particle,
+        }
+        if link.next_at_particle != NONE {
+            self.links[link.next_at_particle as usize].previous_at_particle =
+                link.previous_at_particle;
+        }
+        self.free.push(place);
+        if !self.at(particle).any(|u| u == vertex) {
+            let valence = self.valence[particle as usize];
+            self.move_particle(particle, valence - 1);
+        }
+        true
+    }
+
+    /// The vertex of each link at a particle.
+    fn at(&self, particle: u32) -> impl Iterator<Item = u32> {
+        let links = self.links_at(particle);
+        links.map(|link| link.vertex)
+    }
+
+    fn links_at(&self, particle: u32) -> impl Iterator<Item = &Link> {
+        let first = self.links.get(self.at_particle[particle as usize] as usize);
+        std::iter::successors(first, |link| self.links.get(link.next_at_particle as usize))
+    }
+
+    /// The particle of each link of a vertex.
+    pub(super) fn of(&self, v: u32) -> impl Iterator<Item = u32> {
+        let first = self.of_vertex.get(v as usize);
+        let first = first.and_then(|&first| self.links.get(first as usize));
+        let links =
+            std::iter::successors(first, |link| self.links.get(link.next_of_vertex as usize));
+        links.map(|link| link.particle)
+    }
+
+    /// The neighbors of a vertex, some of them several times.
+    pub(super) fn neighbors(&self, v: u32) -> impl Iterator<Item = u32> {
+        let all = self.of(v).flat_map(|particle| self.at(particle));
+        all.filter(move |&u| u != v)
+    }
+
+    /// The links as fixed incidence; vertices without any have no particles.
+    pub(super) fn incidence(&self) -> Incidence {
+        let rows = (0..).take(self.vertex_count()).map(|v| {
+            let mut particles: Vec<u32> = self.of(v).collect();
+            particles.sort_unstable();
+            particles.dedup();
+            particles
+        });
+        Incidence::from_constraints(self.particle_count(), rows)
+            .expect("particles are known and listed once")
+    }
+
+    /// Are the valences and their counts those of `incidence`?
+    pub(super) fn counts_agree(&self, incidence: &Incidence) -> bool {
+        let mut histogram = vec![0; self.histogram.len()];
+        let valences = (0..self.particle_count()).map(|p| incidence.constraints_of(p).len());
+        let mut agree = valences.clone().max().unwrap_or(0) == self.bound();
+        for (valence, &known) in valences.zip(&self.valence) {
+            agree &= valence == known as usize;
+            if let Some(count) = histogram.get_mut(valence) {
+                *count += 1;
+            }
+        }
+        agree && histogram == self.histogram
+    }
+
+    /// Gives a particle another valence.
+    fn move_particle(&mut self, particle: u32, valence: u32) {
+        let old = std::mem::replace(&mut self.valence[particle as usize], valence);
+        self.histogram[old as usize] -= 1;
+        self.count(valence as usize, 1);
+        while self.histogram.last() == Some(&0) {
+            self.histogram.pop();
+        }
+    }
+
+    fn count(&mut self, valence: usize, particles: usize) {
+        if self.histogram.len() <= valence {
+            self.histogram.resize(valence + 1, 0);
+        }
+        self.histogram[valence] += u32::try_from(particles).expect("particles fit in 32 bits");
+    }
+}
+
+/// Makes room for entry `index`.
+fn grow(list: &mut Vec<u32>, index: u32, value: u32) {
+    if list.len() <= index as usize {
+        list.resize(index as usize + 1, value);
+    }
+}

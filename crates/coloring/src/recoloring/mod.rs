@@ -1,0 +1,332 @@
+//! A coloring that follows edits: cut a constraint out, put others in, recolor only these.
+//!
+//! Removing constraints never makes a coloring improper, so everybody keeps their color. A vertex
+//! that got new particles keeps its color unless a neighbor has it. Whoever is left without one
+//! takes the smallest free color if the number of colors need not grow for it; else the first color
+//! whose holders around can all move to another one; else a new color. If that makes more colors
+//! than the limit, all is colored anew with [`auto`].
+//!
+//! The limit is the larger of two numbers, the colors of the last full coloring and the present
+//! clique bound, plus the slack. So colors grow only where the constraints themselves grow denser,
+//! or by the slack. The last full coloring may be one of a denser scene, though: whoever removes
+//! much should call [`recolor`](Recoloring::recolor) at a quiet moment.
+//!
+//! Cost of an edit: the links of the edited vertices and of those at their particles, counted in
+//! [`Recolored::visited`]; moving neighbors costs their neighborhoods in turn. None of it depends
+//! on the size of the rest.
+
+mod links;
+
+use incise_graph::{ColorId, Coloring, Incidence};
+
+use crate::conflicts::UNCOLORED;
+use crate::first_fit::FirstFit;
+use crate::{ColoringError, auto};
+use links::Links;
+
+/// What an edit did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Recolored {
+    /// Vertices that got a color, the same as before or another one; after a full coloring all of
+    /// them.
+    pub colored: usize,
+    /// Vertices outside of the edit that moved to another color.
+    pub displaced: usize,
+    /// Links looked at, the work of this edit; a full coloring is not counted.
+    pub visited: u64,
+    /// Was all colored anew?
+    pub full: bool,
+    /// The number of colors now.
+    pub colors: usize,
+    /// The clique bound now.
+    pub bound: usize,
+}
+
+/// Constraints, or clusters of constraints, and a proper coloring of them that follows edits.
+///
+/// Numbers of vertices and particles are the caller's and may grow at any time. A vertex without
+/// particles has color 0. Deterministic: the same edits give the same colors.
+///
+/// ```
+/// use incise_coloring::Recoloring;
+/// use incise_graph::Incidence;
+///
+/// // Two tets on a face. Tet 1 is cut: it goes, and three others come, one of them with its number.
+/// let tets = Incidence::from_constraints(5, [[0u32, 1, 2, 3], [1, 2, 3, 4]])?;
+/// let mut recoloring = Recoloring::new(&tets, 2);
+/// let removed = [1, 2, 3, 4].map(|particle| (1, particle));
+/// let children = [(1, [1, 2, 5, 4]), (2, [5, 2, 3, 4]), (3, [1, 5, 3, 4])];
+/// let added: Vec<(u32, u32)> = children
+///     .into_iter()
+///     .flat_map(|(tet, particles)| particles.map(|particle| (tet, particle)))
+///     .collect();
+/// let report = recoloring.apply(&removed, &added)?;
+/// assert_eq!((report.colored, report.full, report.colors), (3, false, 4));
+/// recoloring.coloring().verify_incidence(&recoloring.incidence())?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Recoloring {
+    links: Links,
+    coloring: Coloring,
+    /// The number of vertices of each color; the last is not 0.
+    sizes: Vec<u32>,
+    /// The number of colors after the last full coloring.
+    reference: usize,
+    slack: usize,
+}
+
+impl Recoloring {
+    /// Colors the constraints of `incidence` with [`auto`] and gets ready for edits.
+    ///
+    /// Edits may add up to `slack` colors before all is colored anew: 0 keeps the count as low as
+    /// full colorings do, `usize::MAX` never colors anew. Costs what [`auto`] does, plus O(sum over
+    /// particles of valence squared) once.
+    #[must_use]
+    pub fn new(incidence: &Incidence, slack: usize) -> Self {
+        let mut links = Links::default();
+        for v in (0..).take(incidence.constraint_count()) {
+            for &particle in incidence.particles_of(v as usize) {
+                links.add(v, particle);
+            }
+        }
+        let mut recoloring = Self {
+            links,
+            coloring: Coloring::default(),
+            sizes: Vec::new(),
+            reference: 0,
+            slack,
+        };
+        recoloring.recolor();
+        recoloring
+    }
+
+    /// The colors, one for every vertex number up to the largest ever used.
+    #[must_use]
+    pub fn coloring(&self) -> &Coloring {
+        &self.coloring
+    }
+
+    /// The number of colors: the largest label plus one. O(1).
+    #[must_use]
+    pub fn color_count(&self) -> usize {
+        self.sizes.len()
+    }
+
+    /// The largest number of vertices at one particle, below which no number of colors can be.
+    /// O(1).
+    #[must_use]
+    pub fn bound(&self) -> usize {
+        self.links.bound()
+    }
+
+    /// The most colors before all is colored anew.
+    #[must_use]
+    pub fn limit(&self) -> usize {
+        self.reference.max(self.bound()).saturating_add(self.slack)
+    }
+
+    /// The particles of all vertices as they are now. O(links log links).
+    #[must_use]
+    pub fn incidence(&self) -> Incidence {
+        self.links.incidence()
+    }
+
+    /// Removes and adds (vertex, particle) pairs and colors what needs a color.
+    ///
+    /// Removals come first. A vertex is removed by removing all its pairs, moved to a copy of a
+    /// particle by removing one pair and adding another. Pairs may repeat: a cluster has one for
+    /// each of its constraints at a particle. Cost: see the
+    /// [report](Recolored); if [`limit`](Self::limit) is exceeded, that of [`recolor`](Self::recolor).
+    ///
+    /// # Errors
+    /// A removed pair that does not exist. Nothing is changed then.
+    pub fn apply(
+        &mut self,
+        removed: &[(u32, u32)],
+        added: &[(u32, u32)],
+    ) -> Result<Recolored, ColoringError> {
+        let mut report = Recolored::default();
+        self.unlink(removed)?;
+        for &(v, particle) in added {
+            self.links.add(v, particle);
+        }
+        let before = self.coloring.vertex_count();
+        for _ in before..self.links.vertex_count() {
+            self.coloring.push(UNCOLORED);
+        }
+        report.visited += (removed.len() + added.len()) as u64;
+        let pairs = removed.iter().chain(added);
+        let mut touched: Vec<u32> = pairs.map(|&(v, _)| v).collect();
+        // New numbers that were skipped are touched, too: they are absent.
+        touched.extend((0..).take(self.links.vertex_count()).skip(before));
+        touched.sort_unstable();
+        touched.dedup();
+        let waiting = self.release(&touched, added, &mut report);
+        for v in waiting {
+            self.place(v, &mut report);
+        }
+        while self.sizes.last() == Some(&0) {
+            self.sizes.pop();
+        }
+        report.colors = self.color_count();
+        report.bound = self.bound();
+        if report.colors > self.limit() {
+            self.recolor();
+            report.full = true;
+            report.colored = self.coloring.vertex_count();
+            report.colors = self.color_count();
+        }
+        Ok(report)
+    }
+
+    /// Colors all anew with [`auto`], whose cost it has.
+    pub fn recolor(&mut self) {
+        let incidence = self.links.incidence();
+        self.coloring = auto(&incidence).coloring;
+        self.sizes = vec![0; self.coloring.color_count()];
+        for color in self.coloring.colors() {
+            self.sizes[color.index()] += 1;
+        }
+        self.reference = self.color_count();
+    }
+
+    /// Recomputes everything from the links and compares. O(links log links).
+    ///
+    /// # Errors
+    /// Two vertices of one color share a particle, or the books are wrong.
+    pub fn check(&self) -> Result<(), ColoringError> {
+        let incidence = self.links.incidence();
+        self.coloring.verify_incidence(&incidence)?;
+        let mut sizes = vec![0; self.coloring.color_count()];
+        for color in self.coloring.colors() {
+            sizes[color.index()] += 1;
+        }
+        if sizes == self.sizes && self.links.counts_agree(&incidence) {
+            Ok(())
+        } else {
+            Err(ColoringError::Books)
+        }
+    }
+
+    /// Removes all pairs, or none.
+    fn unlink(&mut self, removed: &[(u32, u32)]) -> Result<(), ColoringError> {
+        for (done, &(vertex, particle)) in removed.iter().enumerate() {
+            if !self.links.remove(vertex, particle) {
+                for &(vertex, particle) in &removed[..done] {
+                    self.links.add(vertex, particle);
+                }
+                return Err(ColoringError::NotThere { vertex, particle });
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes their color from touched vertices that cannot keep it; returns those that need one,
+    /// most crowded first.
+    fn release(
+        &mut self,
+        touched: &[u32],
+        added: &[(u32, u32)],
+        report: &mut Recolored,
+    ) -> Vec<u32> {
+        let mut gained: Vec<u32> = added.iter().map(|&(v, _)| v).collect();
+        gained.sort_unstable();
+        let mut waiting = Vec::new();
+        for &v in touched {
+            let color = self.coloring.color(v as usize);
+            if !self.links.has(v) {
+                self.set(v, ColorId(0));
+            } else if gained.binary_search(&v).is_ok() {
+                let mut crowding = 0;
+                let mut free = color != UNCOLORED;
+                for u in self.links.neighbors(v) {
+                    crowding += 1;
+                    free &= self.coloring.color(u as usize) != color;
+                }
+                report.visited += crowding;
+                if free {
+                    report.colored += 1;
+                } else {
+                    self.set(v, UNCOLORED);
+                    waiting.push((std::cmp::Reverse(crowding), v));
+                }
+            }
+        }
+        waiting.sort_unstable();
+        waiting.into_iter().map(|(_, v)| v).collect()
+    }
+
+    /// Finds a color for an uncolored vertex.
+    fn place(&mut self, v: u32, report: &mut Recolored) {
+        report.colored += 1;
+        let color = self.smallest_free(v, None, report);
+        // Below this, more colors cost nothing that a full coloring would not cost, too.
+        let accepted = self.reference.max(self.bound());
+        if color.index() >= accepted && self.displace(v, accepted, report) {
+            return;
+        }
+        self.set(v, color);
+    }
+
+    /// The smallest color, other than `except`, that no neighbor of `v` has.
+    fn smallest_free(&self, v: u32, except: Option<ColorId>, report: &mut Recolored) -> ColorId {
+        let mut taken: Vec<ColorId> = except.into_iter().collect();
+        let neighbors = self.links.neighbors(v);
+        taken.extend(neighbors.map(|u| self.coloring.color(u as usize)));
+        report.visited += taken.len() as u64;
+        FirstFit::default().choose(taken.len(), taken.into_iter())
+    }
+
+    /// Gives `v` the first color below `accepted` whose holders around can all move to other colors
+    /// below `accepted`.
+    ///
+    /// The holders of one color are not neighbors of each other, so none is in another's way, and
+    /// `v`, having no color yet, is in nobody's.
+    fn displace(&mut self, v: u32, accepted: usize, report: &mut Recolored) -> bool {
+        let mut around: Vec<(ColorId, u32)> = self
+            .links
+            .neighbors(v)
+            .map(|u| (self.coloring.color(u as usize), u))
+            .filter(|(color, _)| color.index() < accepted)
+            .collect();
+        around.sort_unstable();
+        around.dedup();
+        report.visited += around.len() as u64;
+        for holders in around.chunk_by(|a, b| a.0 == b.0) {
+            let color = holders[0].0;
+            let moves: Option<Vec<(u32, ColorId)>> = holders
+                .iter()
+                .map(|&(_, u)| {
+                    let other = self.smallest_free(u, Some(color), report);
+                    (other.index() < accepted).then_some((u, other))
+                })
+                .collect();
+            if let Some(moves) = moves {
+                report.displaced += moves.len();
+                for (u, other) in moves {
+                    self.set(u, other);
+                }
+                self.set(v, color);
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Changes a color and the sizes with it.
+    fn set(&mut self, v: u32, color: ColorId) {
+        let old = self.coloring.color(v as usize);
+        if old != UNCOLORED {
+            self.sizes[old.index()] -= 1;
+        }
+        if color != UNCOLORED {
+            if self.sizes.len() <= color.index() {
+                self.sizes.resize(color.index() + 1, 0);
+            }
+            self.sizes[color.index()] += 1;
+        }
+        self.coloring.set(v as usize, color);
+    }
+}

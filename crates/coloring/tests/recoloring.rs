@@ -1,0 +1,242 @@
+//! A coloring that follows edits stays proper, close to a fresh one, and local.
+
+use incise_coloring::{ColoringError, Recolored, Recoloring, auto};
+use incise_graph::Incidence;
+use proptest::collection::vec;
+use proptest::prelude::*;
+
+use crate::generators::kuhn;
+
+/// A small generator of numbers, so that scripts repeat (Numerical Recipes' LCG, high bits).
+struct Dice(u64);
+
+impl Dice {
+    fn below(&mut self, end: usize) -> usize {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        ((self.0 >> 33) as usize) % end
+    }
+}
+
+fn pairs(v: u32, particles: &[u32]) -> Vec<(u32, u32)> {
+    particles.iter().map(|&particle| (v, particle)).collect()
+}
+
+/// Cuts tets at random: the tet goes, and the three parts on each side come as one cluster each,
+/// with particles of their own where the cut separates.
+struct Script {
+    recoloring: Recoloring,
+    /// Vertex -> its particles, one list for each constraint in it; empty if it is gone.
+    tets: Vec<Vec<[u32; 4]>>,
+    particles: u32,
+    dice: Dice,
+}
+
+impl Script {
+    fn new(incidence: &Incidence, slack: usize, seed: u64) -> Self {
+        let tets = (0..incidence.constraint_count())
+            .map(|c| vec![incidence.particles_of(c).try_into().unwrap()])
+            .collect();
+        Self {
+            recoloring: Recoloring::new(incidence, slack),
+            tets,
+            particles: u32::try_from(incidence.particle_count()).unwrap(),
+            dice: Dice(seed),
+        }
+    }
+
+    /// One constraint out, two clusters of three in.
+    fn cut(&mut self) -> Recolored {
+        let v = loop {
+            let v = self.dice.below(self.tets.len());
+            if !self.tets[v].is_empty() {
+                break v;
+            }
+        };
+        let tet = self.tets[v].swap_remove(0);
+        let number = u32::try_from(v).unwrap();
+        let removed = pairs(number, &tet);
+        let [a, b, c, d] = tet;
+        let new: Vec<u32> = (self.particles..self.particles + 6).collect();
+        self.particles += 6;
+        // Two sides with particles of their own, as after a separating cut.
+        let sides = [
+            [
+                [a, new[0], new[1], new[2]],
+                [a, b, new[1], new[2]],
+                [a, b, new[2], c],
+            ],
+            [
+                [d, new[3], new[4], new[5]],
+                [d, b, new[4], new[5]],
+                [d, c, new[5], b],
+            ],
+        ];
+        let mut added = Vec::new();
+        for side in sides {
+            let cluster = u32::try_from(self.tets.len()).unwrap();
+            self.tets.push(side.to_vec());
+            added.extend(side.iter().flat_map(|tet| pairs(cluster, tet)));
+        }
+        self.recoloring.apply(&removed, &added).unwrap()
+    }
+
+    /// The particles of each vertex, from the script's own books.
+    fn incidence(&self) -> Incidence {
+        let rows = self.tets.iter().map(|tets| {
+            let mut particles: Vec<u32> = tets.iter().flatten().copied().collect();
+            particles.sort_unstable();
+            particles.dedup();
+            particles
+        });
+        Incidence::from_constraints(self.particles as usize, rows).unwrap()
+    }
+}
+
+/// A thousand cuts into a lattice of 3072 tets: proper after every one, never more colors than the
+/// stated limit, within the slack of a fresh coloring, and local.
+#[test]
+fn a_thousand_cuts() {
+    for (seed, slack) in [(11, 2), (12, 0)] {
+        let mut script = Script::new(&kuhn(8), slack, seed);
+        let mut visited = 0;
+        let mut full = 0;
+        for cut in 1..=1000 {
+            let report = script.cut();
+            let incidence = script.incidence();
+            script
+                .recoloring
+                .coloring()
+                .verify_incidence(&incidence)
+                .unwrap();
+            assert_eq!(report.bound, incidence.clique_bound());
+            assert!(report.colors <= script.recoloring.limit());
+            assert!(report.full || report.colored == 2);
+            visited += report.visited;
+            full += usize::from(report.full);
+            if cut % 50 == 0 {
+                script.recoloring.check().unwrap();
+                let fresh = auto(&incidence).coloring.color_count();
+                assert!(report.colors <= fresh + slack);
+            }
+        }
+        // The two new clusters have twelve links each, at particles with up to some thirty links.
+        assert!(visited < 1000 * 2 * 12 * 60, "{visited} links visited");
+        assert!(full < 20, "{full} full colorings");
+    }
+}
+
+/// What an edit looks at does not grow with the mesh.
+#[test]
+fn work_is_local() {
+    let visits = |cells: u32| {
+        let mut script = Script::new(&kuhn(cells), usize::MAX, 5);
+        let reports = (0..100).map(|_| script.cut().visited);
+        reports.max().unwrap()
+    };
+    let (small, large) = (visits(4), visits(12));
+    assert!(
+        large <= 2 * small,
+        "{small} visits at most in a small mesh, {large} in a large one"
+    );
+}
+
+#[test]
+fn edits_that_do_not_fit_change_nothing() {
+    let springs = Incidence::from_constraints(4, [[0u32, 1], [1, 2], [2, 3]]).unwrap();
+    let mut recoloring = Recoloring::new(&springs, 0);
+    let before = recoloring.coloring().clone();
+    for removed in [
+        &[(0, 0), (0, 2)][..],
+        &[(0, 0), (0, 0)],
+        &[(9, 0)],
+        &[(0, 99)],
+    ] {
+        let error = recoloring.apply(removed, &[(7, 0)]).unwrap_err();
+        assert!(matches!(error, ColoringError::NotThere { .. }), "{error}");
+        recoloring.check().unwrap();
+        assert_eq!(
+            (recoloring.coloring(), recoloring.incidence()),
+            (&before, springs.clone())
+        );
+    }
+    let report = recoloring.apply(&[], &[]).unwrap();
+    assert_eq!((report.colored, report.visited, report.full), (0, 0, false));
+    assert_eq!(recoloring.coloring(), &before);
+}
+
+/// Sixty-five constraints on one particle one after the other, and away again.
+#[test]
+fn a_clique_grows_and_goes() {
+    let none = Incidence::from_constraints(1, [[0u32; 0]; 0]).unwrap();
+    let mut recoloring = Recoloring::new(&none, 0);
+    for v in 0..65 {
+        let report = recoloring.apply(&[], &[(v, 0), (v, v + 1)]).unwrap();
+        assert_eq!(
+            (report.colors, report.bound),
+            (v as usize + 1, v as usize + 1)
+        );
+    }
+    for v in (1..65).rev() {
+        recoloring.apply(&[(v, 0)], &[]).unwrap();
+        assert_eq!(recoloring.bound(), v as usize);
+        recoloring.check().unwrap();
+    }
+    recoloring.recolor();
+    assert_eq!(recoloring.color_count(), 1);
+}
+
+/// Skipped numbers are absent vertices; a cluster loses one of two constraints at a particle.
+#[test]
+fn numbers_may_be_skipped_and_pairs_repeat() {
+    let none = Incidence::from_constraints(0, [[0u32; 0]; 0]).unwrap();
+    let mut recoloring = Recoloring::new(&none, 0);
+    recoloring.apply(&[], &[(5, 3), (5, 3), (6, 3)]).unwrap();
+    recoloring.check().unwrap();
+    assert_eq!(
+        (recoloring.coloring().vertex_count(), recoloring.bound()),
+        (7, 2)
+    );
+    recoloring.apply(&[(5, 3)], &[]).unwrap();
+    assert_eq!(recoloring.bound(), 2);
+    recoloring.apply(&[(5, 3)], &[]).unwrap();
+    assert_eq!(recoloring.bound(), 1);
+    recoloring.check().unwrap();
+}
+
+proptest! {
+    /// Any pairs in and out, also ones that make colored neighbors.
+    #[test]
+    fn random_scripts(
+        steps in vec((vec((0u32..12, 0u32..10), 0..8), vec(0usize..1000, 0..6)), 0..30),
+        slack in 0usize..4,
+    ) {
+        let none = Incidence::from_constraints(0, [[0u32; 0]; 0]).unwrap();
+        let mut recoloring = Recoloring::new(&none, slack);
+        let mut present: Vec<(u32, u32)> = Vec::new();
+        for (added, picks) in steps {
+            let mut removed = Vec::new();
+            for pick in picks {
+                if !present.is_empty() {
+                    removed.push(present.swap_remove(pick % present.len()));
+                }
+            }
+            let report = recoloring.apply(&removed, &added).unwrap();
+            present.extend(&added);
+            recoloring.check().unwrap();
+            prop_assert_eq!(report.colors, recoloring.coloring().color_count());
+            prop_assert!(report.colors <= recoloring.limit());
+            let mut expected: Vec<(u32, u32)> = present.clone();
+            expected.sort_unstable();
+            expected.dedup();
+            let incidence = recoloring.incidence();
+            let found: Vec<(u32, u32)> = (0..)
+                .take(incidence.constraint_count())
+                .flat_map(|v| pairs(v, incidence.particles_of(v as usize)))
+                .collect();
+            prop_assert_eq!(found, expected);
+        }
+    }
+}
