@@ -2,7 +2,7 @@
 
 use incise_graph::{Coloring, ConstraintGraph};
 
-use crate::{ColoringError, Order, greedy, scgc};
+use crate::{ColoringError, Order, auto, greedy, scgc};
 
 /// A coloring algorithm, chosen at run time.
 ///
@@ -18,6 +18,8 @@ use crate::{ColoringError, Order, greedy, scgc};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Algorithm {
+    /// [`auto`](crate::auto()), the default.
+    Auto,
     /// [`scgc`], parallel.
     Scgc,
     /// [`greedy`], sequential.
@@ -26,12 +28,13 @@ pub enum Algorithm {
 
 impl Algorithm {
     /// All algorithms, the default first.
-    pub const ALL: [Self; 2] = [Self::Scgc, Self::Greedy];
+    pub const ALL: [Self; 3] = [Self::Auto, Self::Scgc, Self::Greedy];
 
     /// The name, in lower case.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
+            Self::Auto => "auto",
             Self::Scgc => "scgc",
             Self::Greedy => "greedy",
         }
@@ -57,6 +60,7 @@ impl Algorithm {
 #[must_use]
 pub fn color(algorithm: Algorithm, graph: &ConstraintGraph) -> Coloring {
     match algorithm {
+        Algorithm::Auto => auto(graph).coloring,
         Algorithm::Scgc => scgc(graph).coloring,
         Algorithm::Greedy => greedy(graph, Order::LargestFirst),
     }
@@ -74,7 +78,7 @@ mod tests {
         let error = Algorithm::from_name("SCGC").unwrap_err();
         assert_eq!(
             error.to_string(),
-            "there is no coloring algorithm 'SCGC'; known are: scgc, greedy"
+            "there is no coloring algorithm 'SCGC'; known are: auto, scgc, greedy"
         );
     }
 }

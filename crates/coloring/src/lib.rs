@@ -3,8 +3,8 @@
 //!
 //! [`scgc`] is the paper's parallel algorithm (Algorithm 1), [`greedy`] the sequential one that
 //! defines its result: both give every vertex the smallest color that no neighbor of higher
-//! [`priority`] has, so they agree bit for bit, on any number of threads. [`extend_first_fit`]
-//! colors what a cut has added and leaves the rest alone. Nobody here has a limit on the number of
+//! priority has, so they agree bit for bit, on any number of threads. [`Recoloring`] colors what a
+//! cut has added and leaves the rest alone. Nobody here has a limit on the number of
 //! colors: palettes are as long as the degrees ask for.
 //!
 //! The algorithms take a [`ConstraintGraph`](incise_graph::ConstraintGraph) of anything; they know
@@ -31,7 +31,6 @@ mod buckets;
 mod conflicts;
 mod dsatur;
 mod error;
-mod extend;
 mod first_fit;
 mod greedy;
 mod iterated_greedy;
@@ -48,7 +47,6 @@ pub use auto::{Auto, auto};
 pub use conflicts::Conflicts;
 pub use dsatur::dsatur;
 pub use error::ColoringError;
-pub use extend::extend_first_fit;
 pub use greedy::greedy;
 pub use iterated_greedy::iterated_greedy;
 pub use order::{Order, order};

@@ -4,19 +4,23 @@ use std::num::NonZeroUsize;
 use std::time::Instant;
 
 use incise_clustering::{Method, cluster, update_local};
-use incise_coloring::{Algorithm, color, extend_first_fit};
-use incise_cutting::{CutDelta, CuttableMesh};
-use incise_graph::{ClusterId, Clustering, Coloring, ConstraintGraph, Incidence, Schedule};
-use incise_mesh::TetMesh;
+use incise_coloring::{Algorithm, Recoloring, color};
+use incise_cutting::CutDelta;
+use incise_graph::{Clustering, Coloring, ConstraintGraph, Incidence, Schedule};
+use incise_mesh::{ParticleId, TetId, TetMesh};
 
 use crate::report::{Milliseconds, milliseconds};
 use crate::{Error, Scene};
+
+/// Colors that cuts may add before all clusters are colored anew: each color is a barrier in every iteration, but a
+/// full coloring takes longer than a frame on a large body.
+const SLACK: usize = 2;
 
 /// Who is solved when.
 #[derive(Debug)]
 pub(crate) struct Plan {
     pub(crate) clustering: Clustering,
-    pub(crate) coloring: Coloring,
+    recoloring: Recoloring,
     pub(crate) schedule: Schedule,
     /// The largest size of a cluster.
     limit: NonZeroUsize,
@@ -31,39 +35,54 @@ impl Plan {
         let clustering = cluster(method, &graph);
         let coloring = color(algorithm, &graph.quotient(&clustering));
         let schedule = Schedule::new(&clustering, &coloring);
+        let tets = mesh.tets.iter().zip(clustering.labels());
+        let pairs = tets.flat_map(|(corners, cluster)| corners.map(|p| (cluster.0, p.0)));
+        let recoloring = Recoloring::with_coloring(pairs, coloring, SLACK)?;
         let limit = match method {
             Method::Serial(size) => size,
             _ => NonZeroUsize::MIN,
         };
         Ok(Self {
             clustering,
-            coloring,
+            recoloring,
             schedule,
             limit,
         })
     }
 
+    /// The color of each cluster.
+    pub(crate) fn coloring(&self) -> &Coloring {
+        self.recoloring.coloring()
+    }
+
     /// Follows a cut: the cut tets leave their clusters, the children on each side of each become new clusters, and
     /// these get colors; everything else stays. Only the schedule is sorted anew as a whole.
-    pub(crate) fn follow(
-        &mut self,
-        delta: &CutDelta,
-        cuttable: &CuttableMesh,
-        ms: &mut Milliseconds,
-    ) -> Result<(), Error> {
+    pub(crate) fn follow(&mut self, delta: &CutDelta, ms: &mut Milliseconds) -> Result<(), Error> {
         let start = Instant::now();
-        let new = self.update_clusters(delta)?;
+        let mut removed = Vec::with_capacity(4 * delta.removed.len());
+        for tet in &delta.removed {
+            self.pair_up(tet.tet, tet.corners, &mut removed);
+        }
+        self.update_clusters(delta)?;
         let clustered = Instant::now();
-        self.color_new(&new, delta, cuttable);
+        self.recolor(delta, removed)?;
         let colored = Instant::now();
-        self.schedule.rebuild(&self.clustering, &self.coloring);
+        self.schedule
+            .rebuild(&self.clustering, self.recoloring.coloring());
         ms.cluster += milliseconds(clustered - start);
         ms.color += milliseconds(colored - clustered);
         ms.schedule += milliseconds(colored.elapsed());
         Ok(())
     }
 
-    fn update_clusters(&mut self, delta: &CutDelta) -> Result<Vec<ClusterId>, Error> {
+    /// Lists the particles of a tet as pairs with its cluster.
+    fn pair_up(&self, tet: TetId, corners: [ParticleId; 4], pairs: &mut Vec<(u32, u32)>) {
+        if let Some(cluster) = self.clustering.cluster_of(tet.index()) {
+            pairs.extend(corners.map(|p| (cluster.0, p.0)));
+        }
+    }
+
+    fn update_clusters(&mut self, delta: &CutDelta) -> Result<(), Error> {
         let _span = tracing::debug_span!("incise::cluster").entered();
         let removed: Vec<u32> = delta.removed.iter().map(|tet| tet.tet.0).collect();
         let mut children: Vec<_> = delta
@@ -81,39 +100,29 @@ impl Plan {
                     .map_err(|_| Error::Inconsistent("too many tets".into()))?,
             );
         }
-        Ok(update_local(
+        update_local(
             &mut self.clustering,
             &removed,
             &offsets,
             &values,
             self.limit,
-        )?)
+        )?;
+        Ok(())
     }
 
-    /// Colors the new clusters against all that share a particle with them.
-    fn color_new(&mut self, new: &[ClusterId], delta: &CutDelta, cuttable: &CuttableMesh) {
+    /// Colors the new clusters, and old ones where the cut brought them new particles.
+    fn recolor(&mut self, delta: &CutDelta, mut removed: Vec<(u32, u32)>) -> Result<(), Error> {
         let _span = tracing::debug_span!("incise::color").entered();
-        let clustering = &self.clustering;
-        let cluster_of = |tet: usize| {
-            clustering
-                .cluster_of(tet)
-                .map_or(u32::MAX, |cluster| cluster.0)
-        };
-        let mut members: Vec<(u32, usize)> = delta
-            .added
-            .iter()
-            .map(|tet| (cluster_of(tet.tet.index()), tet.tet.index()))
-            .collect();
-        members.sort_unstable();
-        let new: Vec<u32> = new.iter().map(|cluster| cluster.0).collect();
-        extend_first_fit(&mut self.coloring, &new, |cluster, neighbors| {
-            let first = members.partition_point(|m| m.0 < cluster);
-            for &(_, tet) in members[first..].iter().take_while(|m| m.0 == cluster) {
-                for particle in cuttable.mesh().tets[tet] {
-                    neighbors.extend(cuttable.around(particle).map(|t| cluster_of(t.index())));
-                }
-            }
-        });
+        let mut added = Vec::with_capacity(4 * delta.added.len());
+        for tet in &delta.added {
+            self.pair_up(tet.tet, tet.corners, &mut added);
+        }
+        for tet in &delta.relinked {
+            self.pair_up(tet.tet, tet.before, &mut removed);
+            self.pair_up(tet.tet, tet.after, &mut added);
+        }
+        self.recoloring.apply(&removed, &added)?;
+        Ok(())
     }
 
     /// Proves clusters, colors and schedule against the mesh, from scratch.
@@ -126,7 +135,8 @@ impl Plan {
             )));
         }
         let incidence = incidence(mesh)?;
-        self.coloring
+        self.recoloring.check()?;
+        self.coloring()
             .verify_incidence(&incidence.quotient(&self.clustering))?;
         self.schedule.check(&incidence)?;
         Ok(())

@@ -126,7 +126,8 @@ pub struct SolverSpec {
     pub relaxation: f64,
     /// How constraints are put together: `none` or `serial:K`.
     pub clustering: String,
-    /// How clusters are colored: `scgc` or `greedy`.
+    /// How clusters are colored, by the name of an [`Algorithm`](incise_coloring::Algorithm). Clusters that cuts make are
+    /// colored one by one, until they need more colors than they should; then all are colored anew, with `auto`.
     pub coloring: String,
     /// Width of the numbers.
     pub precision: Precision,
@@ -143,7 +144,7 @@ impl Default for SolverSpec {
             method: Method::GaussSeidel,
             relaxation: 1.0,
             clustering: "serial:10".to_owned(),
-            coloring: "scgc".to_owned(),
+            coloring: "auto".to_owned(),
             precision: Precision::F32,
             kappa_limit: 1.0,
         }

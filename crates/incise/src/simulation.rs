@@ -225,7 +225,7 @@ impl Simulation {
         let mut counting = 0.0;
         timeline.advance(self.next_frame, cuttable, positions, |cuttable, delta| {
             solver.follow(delta, cuttable);
-            plan.follow(delta, cuttable, ms)?;
+            plan.follow(delta, ms)?;
             report.get_or_insert_default().add(delta);
             on_cut.resize(delta.particles_before, false);
             on_cut.resize(delta.particles_after(), true);
@@ -333,7 +333,7 @@ impl Simulation {
     /// The colors of the clusters.
     #[must_use]
     pub fn coloring(&self) -> &Coloring {
-        &self.plan.coloring
+        self.plan.coloring()
     }
 
     /// The order of solving.

@@ -58,6 +58,13 @@ impl Links {
             .is_some_and(|&first| first != NONE)
     }
 
+    /// Makes sure that there are `count` vertices at least.
+    pub(super) fn reserve_vertices(&mut self, count: usize) {
+        if self.of_vertex.len() < count {
+            self.of_vertex.resize(count, NONE);
+        }
+    }
+
     /// Links a vertex and a particle; both may be new.
     pub(super) fn add(&mut self, vertex: u32, particle: u32) {
         grow(&mut self.of_vertex, vertex, NONE);

@@ -85,20 +85,65 @@ impl Recoloring {
     /// particles of valence squared) once.
     #[must_use]
     pub fn new(incidence: &Incidence, slack: usize) -> Self {
+        let rows = (0..).take(incidence.constraint_count());
+        let pairs = rows.flat_map(|v| {
+            incidence
+                .particles_of(v as usize)
+                .iter()
+                .map(move |&p| (v, p))
+        });
+        let coloring = auto(incidence).coloring;
+        Self::linked(pairs, coloring, slack)
+    }
+
+    /// Takes (vertex, particle) pairs that are colored already; pairs may repeat, as in
+    /// [`apply`](Self::apply). O(sum over particles of pairs squared).
+    ///
+    /// # Errors
+    /// The coloring is not proper, or not about as many vertices as the pairs are.
+    ///
+    /// ```
+    /// use incise_coloring::Recoloring;
+    /// use incise_graph::{ColorId, Coloring};
+    ///
+    /// // Two clusters of two springs each along the particles 0 to 4.
+    /// let pairs = [(0, 0), (0, 1), (0, 1), (0, 2), (1, 2), (1, 3), (1, 3), (1, 4)];
+    /// let coloring = Coloring::new(vec![ColorId(0), ColorId(1)]);
+    /// let recoloring = Recoloring::with_coloring(pairs, coloring, 0)?;
+    /// assert_eq!((recoloring.color_count(), recoloring.bound()), (2, 2));
+    /// # Ok::<(), incise_coloring::ColoringError>(())
+    /// ```
+    pub fn with_coloring(
+        pairs: impl IntoIterator<Item = (u32, u32)>,
+        coloring: Coloring,
+        slack: usize,
+    ) -> Result<Self, ColoringError> {
+        let recoloring = Self::linked(pairs, coloring, slack);
+        recoloring
+            .coloring
+            .verify_incidence(&recoloring.links.incidence())?;
+        Ok(recoloring)
+    }
+
+    fn linked(
+        pairs: impl IntoIterator<Item = (u32, u32)>,
+        coloring: Coloring,
+        slack: usize,
+    ) -> Self {
         let mut links = Links::default();
-        for v in (0..).take(incidence.constraint_count()) {
-            for &particle in incidence.particles_of(v as usize) {
-                links.add(v, particle);
-            }
+        // Also vertices at the end that have no particles.
+        links.reserve_vertices(coloring.vertex_count());
+        for (v, particle) in pairs {
+            links.add(v, particle);
         }
         let mut recoloring = Self {
             links,
-            coloring: Coloring::default(),
+            coloring,
             sizes: Vec::new(),
             reference: 0,
             slack,
         };
-        recoloring.recolor();
+        recoloring.count();
         recoloring
     }
 
@@ -185,6 +230,11 @@ impl Recoloring {
     pub fn recolor(&mut self) {
         let incidence = self.links.incidence();
         self.coloring = auto(&incidence).coloring;
+        self.count();
+    }
+
+    /// Counts the classes of a coloring that is all new.
+    fn count(&mut self) {
         self.sizes = vec![0; self.coloring.color_count()];
         for color in self.coloring.colors() {
             self.sizes[color.index()] += 1;
