@@ -69,7 +69,7 @@ pub trait Conflicts: Sync {
     fn clique_bound(&self) -> usize;
 
     /// Gives each vertex, in the given order, the smallest color that no neighbor has got before.
-    /// Vertices not in `order` get none: [`UNCOLORED`].
+    /// Vertices not in `order` get none, which is written `ColorId(u32::MAX)`.
     ///
     /// # Panics
     /// If `order` names a vertex that does not exist.
