@@ -27,6 +27,7 @@
 
 mod algorithm;
 mod auto;
+mod balance;
 mod buckets;
 mod conflicts;
 mod dsatur;
@@ -44,6 +45,7 @@ mod tabu;
 
 pub use algorithm::{Algorithm, color};
 pub use auto::{Auto, auto};
+pub use balance::{BalanceStats, balance, balance_weights};
 pub use conflicts::Conflicts;
 pub use dsatur::dsatur;
 pub use error::ColoringError;
