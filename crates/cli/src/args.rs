@@ -23,7 +23,7 @@ pub(crate) struct Arguments {
 pub(crate) enum Command {
     /// Simulate a scene and write what happens.
     Run(RunArguments),
-    /// Cluster and color the constraints of a mesh.
+    /// Cluster and color the constraints of a mesh or the vertices of a graph.
     Color(ColorArguments),
     /// Look at, convert and generate meshes.
     #[command(after_help = "Example: incise mesh generate liver --tets 5000 liver.vtk")]
@@ -77,10 +77,11 @@ pub(crate) struct RunArguments {
 
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Example: incise color liver.vtk --clustering serial:5 --csv colors.csv --json"
+    after_help = "Example: incise color liver.vtk --clustering serial:5 --csv colors.csv --json\n\
+                  Example: incise color queen8_8.col --algorithm greedy"
 )]
 pub(crate) struct ColorArguments {
-    /// A tetrahedral mesh.
+    /// A tetrahedral mesh, or a graph: Matrix Market .mtx or DIMACS .col.
     pub(crate) input: PathBuf,
     /// The coloring: scgc or greedy.
     #[arg(long, value_name = "NAME", default_value = "scgc")]
@@ -94,7 +95,7 @@ pub(crate) struct ColorArguments {
     /// Seed of randomized algorithms; scgc and greedy use none.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) seed: u64,
-    /// Write cluster and color of each constraint to this file.
+    /// Write cluster and color of each constraint (of a graph: each vertex) to this file.
     #[arg(long, value_name = "FILE")]
     pub(crate) csv: Option<PathBuf>,
     /// Print one JSON object instead of a table.

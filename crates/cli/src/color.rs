@@ -1,51 +1,21 @@
-//! `incise color`: clusters and colors the constraints of a mesh.
+//! `incise color`: clusters and colors the constraints of a mesh or the vertices of a graph.
 
-use std::io::Write;
+mod input;
+mod report;
+
 use std::time::Instant;
 
-use anyhow::{Context, anyhow};
-use comfy_table::Table;
-use comfy_table::presets::UTF8_FULL_CONDENSED;
+use anyhow::anyhow;
 use incise::clustering::{Method, cluster};
 use incise::coloring::{Algorithm, Order, greedy, scgc};
-use incise::graph::{Clustering, Coloring, ColoringMetrics, ConstraintGraph, Incidence};
-use incise::mesh::io;
-use serde::Serialize;
+use incise::graph::ColoringMetrics;
 
 use crate::args::ColorArguments;
 use crate::failure::Failure;
 use crate::print::print;
 use crate::run::require_cpu;
-
-/// The object that `--json` prints.
-#[derive(Debug, Serialize)]
-struct ColorReport {
-    input: String,
-    constraints: usize,
-    particles: usize,
-    clusters: usize,
-    edges: usize,
-    algorithm: &'static str,
-    clustering: String,
-    backend: &'static str,
-    seed: u64,
-    colors: usize,
-    max_clique: usize,
-    std: f64,
-    range: u64,
-    chi2: f64,
-    rounds: usize,
-    verified: bool,
-    ms: Times,
-}
-
-#[derive(Debug, Serialize)]
-struct Times {
-    read: f64,
-    graph: f64,
-    cluster: f64,
-    color: f64,
-}
+use input::Format;
+use report::{ColorReport, Times, table, write_csv};
 
 pub(crate) fn color(arguments: &ColorArguments) -> Result<(), Failure> {
     require_cpu(arguments.backend)?;
@@ -57,17 +27,16 @@ pub(crate) fn color(arguments: &ColorArguments) -> Result<(), Failure> {
         .parse()
         .map_err(|error| input(anyhow::Error::from_boxed(Box::new(error))))?;
 
+    let format = Format::of(&arguments.input);
+    format.require(method).map_err(input)?;
+
     let mut clock = Clock(Instant::now());
-    let mesh = io::read(&arguments.input)?;
-    mesh.check()
-        .with_context(|| arguments.input.display().to_string())
-        .map_err(input)?;
+    let source = format.read(&arguments.input)?;
     let read = clock.lap();
-    let incidence = Incidence::from_constraints(mesh.positions.len(), mesh.tets.iter().copied());
-    let incidence = incidence.map_err(|error| input(error.into()))?;
-    let constraints = ConstraintGraph::from_incidence(&incidence);
+    let problem = source.problem().map_err(input)?;
+    let constraints = problem.graph();
     let graph = clock.lap();
-    let clustering = cluster(method, &constraints);
+    let clustering = cluster(method, constraints);
     let clusters = constraints.quotient(&clustering);
     let clustered = clock.lap();
     let (coloring, rounds) = match algorithm {
@@ -80,13 +49,13 @@ pub(crate) fn color(arguments: &ColorArguments) -> Result<(), Failure> {
     };
     let color = clock.lap();
 
-    let quotient = incidence.quotient(&clustering);
-    let verified = coloring.verify_incidence(&quotient).is_ok();
+    let proof = problem.check(&clustering, &coloring);
+    let verified = proof.verified;
     let metrics = ColoringMetrics::by_vertices(&coloring);
     let report = ColorReport {
         input: arguments.input.display().to_string(),
-        constraints: incidence.constraint_count(),
-        particles: incidence.particle_count(),
+        constraints: constraints.vertex_count(),
+        particles: problem.particle_count(),
         clusters: clustering.occupied(),
         edges: clusters.edge_count(),
         algorithm: algorithm.name(),
@@ -94,10 +63,9 @@ pub(crate) fn color(arguments: &ColorArguments) -> Result<(), Failure> {
         backend: "cpu",
         seed: arguments.seed,
         colors: metrics.colors,
-        max_clique: quotient.clique_bound(),
-        std: metrics.std,
-        range: metrics.range,
-        chi2: metrics.chi2,
+        max_clique: proof.clique,
+        evenness: metrics.into(),
+        by_constraints: ColoringMetrics::by_weights(&coloring, clustering.sizes()).into(),
         rounds,
         verified,
         ms: Times {
@@ -135,72 +103,4 @@ impl Clock {
         self.0 = now;
         lap.as_secs_f64() * 1e3
     }
-}
-
-fn write_csv(
-    path: &std::path::Path,
-    clustering: &Clustering,
-    coloring: &Coloring,
-) -> Result<(), Failure> {
-    io::write_atomically(path, |file| {
-        let mut file = std::io::BufWriter::new(file);
-        writeln!(file, "constraint,cluster,color")?;
-        for (constraint, cluster) in clustering.labels().iter().enumerate() {
-            writeln!(
-                file,
-                "{constraint},{cluster},{}",
-                coloring.color(cluster.index())
-            )?;
-        }
-        file.flush()
-    })?;
-    Ok(())
-}
-
-fn table(report: &ColorReport) -> Table {
-    let mut table = Table::new();
-    table.load_style(UTF8_FULL_CONDENSED);
-    table.set_header([report.input.as_str(), ""]);
-    let mut row = |name: &str, value: String| {
-        table.add_row([name.to_owned(), value]);
-    };
-    row(
-        "constraints, particles",
-        format!("{}, {}", report.constraints, report.particles),
-    );
-    row(
-        "clusters, edges between them",
-        format!(
-            "{}, {} ({})",
-            report.clusters, report.edges, report.clustering
-        ),
-    );
-    row(
-        "colors",
-        format!(
-            "{} by {} in {} round(s)",
-            report.colors, report.algorithm, report.rounds
-        ),
-    );
-    row(
-        "lower bound: clusters at one particle",
-        report.max_clique.to_string(),
-    );
-    row(
-        "class sizes: std, range, chi2",
-        format!("{:.2}, {}, {:.2}", report.std, report.range, report.chi2),
-    );
-    row(
-        "verified",
-        if report.verified { "yes" } else { "NO" }.to_owned(),
-    );
-    let ms = &report.ms;
-    row(
-        "ms: read, graph, cluster, color",
-        format!(
-            "{:.1}, {:.1}, {:.1}, {:.1}",
-            ms.read, ms.graph, ms.cluster, ms.color
-        ),
-    );
-    table
 }

@@ -9,6 +9,8 @@
 //! smaller ones; a row is the two lists one after the other. No row is ever sorted and no hash map
 //! is used: O(vertices + edges) after the edges are known.
 
+use std::cmp::Ordering;
+
 use crate::csr::{Csr, fits, offset};
 use crate::{Clustering, GraphError, Incidence};
 
@@ -104,6 +106,71 @@ impl ConstraintGraph {
             smaller.end_row();
         }
         Ok(Self::from_smaller(&smaller))
+    }
+
+    /// Takes a graph in CSR form: vertex `v` is adjacent to `values[offsets[v]..offsets[v + 1]]`.
+    ///
+    /// A row may list its neighbors in any order and name one several times; rows are sorted and
+    /// repeats count once. Both directions of an edge must be there. O(vertices + values), by two
+    /// transpositions: the first says who lists a vertex, the second sorts the rows, and a graph is
+    /// symmetric if they agree.
+    ///
+    /// # Errors
+    /// Offsets that do not start at 0, go down or end elsewhere than at `values.len()`; a neighbor
+    /// that does not exist; a vertex that is its own neighbor; an edge in one direction only, the
+    /// first by smaller, then by larger end; more than `u32::MAX` vertices or values.
+    ///
+    /// ```
+    /// use incise_graph::{ConstraintGraph, GraphError};
+    ///
+    /// let path = ConstraintGraph::from_csr(vec![0, 1, 3, 4], vec![1, 2, 0, 1])?;
+    /// assert_eq!(path.neighbors(1), [0, 2]);
+    ///
+    /// let one_sided = ConstraintGraph::from_csr(vec![0, 1, 1], vec![1]);
+    /// assert_eq!(one_sided, Err(GraphError::OneSided { from: 0, to: 1 }));
+    /// # Ok::<(), incise_graph::GraphError>(())
+    /// ```
+    pub fn from_csr(offsets: Vec<u32>, values: Vec<u32>) -> Result<Self, GraphError> {
+        fits("vertices", offsets.len().saturating_sub(1))?;
+        fits("directed edges", values.len())?;
+        let rows = Csr::new(offsets, values)?;
+        let vertices = rows.row_count();
+        let ends = (0..)
+            .zip(rows.rows())
+            .flat_map(|(v, row)| row.iter().map(move |&u| (v, u)));
+        for (edge, (v, vertex)) in ends.enumerate() {
+            if vertex as usize >= vertices {
+                return Err(GraphError::VertexOutOfRange {
+                    edge,
+                    vertex,
+                    vertices,
+                });
+            }
+            if vertex == v {
+                return Err(GraphError::SelfLoop { edge, vertex });
+            }
+        }
+        let listed_by = rows.transpose(vertices);
+        let sorted = listed_by.transpose(vertices);
+        let mut csr = Csr::with_rows(vertices);
+        for (v, (row, back)) in (0..).zip(sorted.rows().zip(listed_by.rows())) {
+            let (mut row, mut back) = (distinct(row), distinct(back));
+            loop {
+                // Where the two differ, the smaller one is missing in the other list.
+                match (row.next(), back.next()) {
+                    (None, None) => break,
+                    (Some(to), None) => return Err(GraphError::OneSided { from: v, to }),
+                    (None, Some(from)) => return Err(GraphError::OneSided { from, to: v }),
+                    (Some(to), Some(from)) => match to.cmp(&from) {
+                        Ordering::Less => return Err(GraphError::OneSided { from: v, to }),
+                        Ordering::Greater => return Err(GraphError::OneSided { from, to: v }),
+                        Ordering::Equal => csr.values.push(to),
+                    },
+                }
+            }
+            csr.end_row();
+        }
+        Ok(Self { csr })
     }
 
     /// Row `v` of `smaller` lists the neighbors of `v` below `v`, once each, in any order.
@@ -219,6 +286,11 @@ impl ConstraintGraph {
     }
 }
 
+/// The values of a sorted row, once each.
+fn distinct(row: &[u32]) -> impl Iterator<Item = u32> {
+    row.chunk_by(|a, b| a == b).map(|run| run[0])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -255,6 +327,65 @@ mod tests {
         assert_eq!(
             refuse(&[(1, 1)]),
             GraphError::SelfLoop { edge: 0, vertex: 1 }
+        );
+    }
+
+    #[test]
+    fn foreign_rows_are_sorted_and_merged() {
+        let triangle = ConstraintGraph::from_edges(4, &[(0, 1), (1, 3), (3, 0)]).unwrap();
+        let foreign =
+            ConstraintGraph::from_csr(vec![0, 3, 5, 5, 8], vec![3, 1, 3, 3, 0, 1, 0, 1]).unwrap();
+        assert_eq!(foreign, triangle);
+        let (offsets, values) = (triangle.offsets().to_vec(), triangle.values().to_vec());
+        assert_eq!(
+            ConstraintGraph::from_csr(offsets, values).unwrap(),
+            triangle
+        );
+        assert_eq!(
+            ConstraintGraph::from_csr(vec![0], vec![]).unwrap(),
+            ConstraintGraph::from_edges(0, &[]).unwrap()
+        );
+    }
+
+    #[test]
+    fn refuses_broken_rows() {
+        let refuse = |offsets: &[u32], values: &[u32]| {
+            ConstraintGraph::from_csr(offsets.to_vec(), values.to_vec()).unwrap_err()
+        };
+        assert_eq!(refuse(&[], &[]), GraphError::OffsetsStart);
+        assert_eq!(refuse(&[1, 1], &[0]), GraphError::OffsetsStart);
+        assert_eq!(
+            refuse(&[0, 2, 1], &[0]),
+            GraphError::OffsetsDecrease {
+                row: 1,
+                before: 2,
+                after: 1
+            }
+        );
+        assert_eq!(
+            refuse(&[0, 1], &[0, 1]),
+            GraphError::OffsetsEnd { last: 1, values: 2 }
+        );
+        assert_eq!(
+            refuse(&[0, 1, 2], &[1, 2]),
+            GraphError::VertexOutOfRange {
+                edge: 1,
+                vertex: 2,
+                vertices: 2
+            }
+        );
+        assert_eq!(
+            refuse(&[0, 1, 2], &[1, 1]),
+            GraphError::SelfLoop { edge: 1, vertex: 1 }
+        );
+        // 1 -> 0 and 2 -> 3 have no answer; then the same with the larger end listing.
+        assert_eq!(
+            refuse(&[0, 1, 3, 5, 6], &[2, 0, 2, 1, 3, 2]),
+            GraphError::OneSided { from: 1, to: 0 }
+        );
+        assert_eq!(
+            refuse(&[0, 2, 3, 3], &[2, 1, 0]),
+            GraphError::OneSided { from: 0, to: 2 }
         );
     }
 

@@ -37,6 +37,33 @@ pub(crate) fn accumulate(counts: &mut [u32]) {
 }
 
 impl Csr {
+    /// Takes rows from outside, whose values may be anything. O(rows).
+    ///
+    /// # Errors
+    /// Offsets that do not start at 0, go down or end elsewhere than at `values.len()`.
+    pub(crate) fn new(offsets: Vec<u32>, values: Vec<u32>) -> Result<Self, GraphError> {
+        if offsets.first() != Some(&0) {
+            return Err(GraphError::OffsetsStart);
+        }
+        for (row, pair) in offsets.windows(2).enumerate() {
+            if pair[1] < pair[0] {
+                return Err(GraphError::OffsetsDecrease {
+                    row,
+                    before: pair[0],
+                    after: pair[1],
+                });
+            }
+        }
+        let last = offsets[offsets.len() - 1];
+        if last as usize != values.len() {
+            return Err(GraphError::OffsetsEnd {
+                last,
+                values: values.len(),
+            });
+        }
+        Ok(Self { offsets, values })
+    }
+
     /// No rows yet, room for `rows`.
     pub(crate) fn with_rows(rows: usize) -> Self {
         let mut offsets = Vec::with_capacity(rows + 1);

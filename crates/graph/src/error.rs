@@ -61,7 +61,7 @@ pub enum GraphError {
     /// An edge to a vertex that does not exist.
     #[error("edge {edge} names vertex {vertex}, but there are {vertices} vertices (from 0)")]
     VertexOutOfRange {
-        /// The position of the edge in the input.
+        /// The position of the edge in the input; for CSR input, in the values.
         edge: usize,
         /// The vertex it names.
         vertex: u32,
@@ -73,10 +73,38 @@ pub enum GraphError {
         "edge {edge} joins vertex {vertex} to itself; such a graph has no coloring, leave the edge out"
     )]
     SelfLoop {
-        /// The position of the edge in the input.
+        /// The position of the edge in the input; for CSR input, in the values.
         edge: usize,
         /// The vertex.
         vertex: u32,
+    },
+    /// An edge that is listed in one direction only.
+    #[error(
+        "row {from} lists vertex {to}, but row {to} does not list vertex {from}; list each edge in both rows"
+    )]
+    OneSided {
+        /// The vertex whose row has the edge.
+        from: u32,
+        /// The vertex whose row lacks it.
+        to: u32,
+    },
+    /// A file whose content is not what its format says.
+    #[error("line {line}: {message}")]
+    Malformed {
+        /// The line, counted from 1; the last one if something is missing at the end.
+        line: usize,
+        /// What was found and what was expected.
+        message: String,
+    },
+    /// A source that failed while it was read.
+    #[error("cannot read line {line}: {message}")]
+    Unreadable {
+        /// The line, counted from 1.
+        line: usize,
+        /// The kind of failure.
+        kind: std::io::ErrorKind,
+        /// The answer of the source.
+        message: String,
     },
     /// A label that is no cluster number of a clustering of this size.
     #[error(

@@ -43,26 +43,7 @@ impl Incidence {
         fits("particles", particles)?;
         fits("constraints", offsets.len())?;
         fits("constraint-particle pairs", values.len())?;
-        if offsets.first() != Some(&0) {
-            return Err(GraphError::OffsetsStart);
-        }
-        for (row, pair) in offsets.windows(2).enumerate() {
-            if pair[1] < pair[0] {
-                return Err(GraphError::OffsetsDecrease {
-                    row,
-                    before: pair[0],
-                    after: pair[1],
-                });
-            }
-        }
-        let last = offsets[offsets.len() - 1];
-        if last as usize != values.len() {
-            return Err(GraphError::OffsetsEnd {
-                last,
-                values: values.len(),
-            });
-        }
-        let particles_of = Csr { offsets, values };
+        let particles_of = Csr::new(offsets, values)?;
         let mut seen_by = vec![usize::MAX; particles];
         for (constraint, row) in particles_of.rows().enumerate() {
             for &particle in row {

@@ -48,6 +48,7 @@ mod id;
 mod incidence;
 mod interop;
 mod metrics;
+mod read;
 mod schedule;
 
 pub use classes::Classes;
@@ -58,6 +59,7 @@ pub use error::GraphError;
 pub use id::{ClusterId, ColorId};
 pub use incidence::Incidence;
 pub use metrics::ColoringMetrics;
+pub use read::{read_dimacs, read_matrix_market};
 pub use schedule::Schedule;
 
 /// The example of the README, run as a test.

@@ -2,14 +2,16 @@
 //!
 //! Few colors mean few steps; even colors mean that each step keeps the whole machine busy. The
 //! numbers are those of the paper's Table 2, with the formulas spelled out because the paper gives
-//! none for its chi-squared column. Cost: O(vertices + colors).
+//! none for its chi-squared column, and the share of busy lanes on machines that run in groups.
+//! Cost: O(vertices + colors).
 
 use crate::Coloring;
 
 /// The evenness of k color classes with sizes `n_c` that sum to N.
 ///
 /// Classes without a member count, since a solver steps through them too. A coloring without
-/// vertices has all fields 0, except `max_over_mean`, which is 1 when there is nothing to balance.
+/// vertices has all fields 0, except `max_over_mean`, `lanes_32` and `lanes_256`, which are 1 when
+/// there is nothing to balance and no lane to keep busy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ColoringMetrics {
@@ -33,6 +35,12 @@ pub struct ColoringMetrics {
     /// Largest class over mean: the slowdown against even classes when each runs at the speed of
     /// its size.
     pub max_over_mean: f64,
+    /// Share of busy lanes when each class runs in groups of 32, the last one filled up with idle
+    /// lanes: `N / sum_c (32 ceil(n_c / 32))`. 32 lanes are a warp of a GPU.
+    pub lanes_32: f64,
+    /// The same for groups of 256: `N / sum_c (256 ceil(n_c / 256))`. 256 lanes are a common thread
+    /// block or workgroup.
+    pub lanes_256: f64,
 }
 
 impl ColoringMetrics {
@@ -58,6 +66,11 @@ impl ColoringMetrics {
     /// ([`Clustering::sizes`](crate::Clustering::sizes)), by which a vacant cluster counts nothing.
     /// O(vertices + colors).
     ///
+    /// `n_c` is then the work of class c in items of equal cost. So `lanes_32` and `lanes_256` are
+    /// those of a solver that gives each item a lane of its own; one that gives each cluster a lane
+    /// and works through it item by item has those of [`by_vertices`](Self::by_vertices), and idles
+    /// further while it waits for the largest cluster of a group.
+    ///
     /// # Panics
     /// If there is not one weight per vertex.
     #[must_use]
@@ -74,6 +87,7 @@ impl ColoringMetrics {
         Self::of_classes(&classes)
     }
 
+    /// Measures classes of these sizes.
     fn of_classes(classes: &[u64]) -> Self {
         let colors = classes.len();
         let total = classes.iter().sum();
@@ -86,6 +100,17 @@ impl ColoringMetrics {
             .map(|&size| (size as f64 - mean).powi(2))
             .sum();
         let balanced = total == 0;
+        let lanes = |width: u64| {
+            let occupied: u64 = classes
+                .iter()
+                .map(|size| size.div_ceil(width) * width)
+                .sum();
+            if balanced {
+                1.0
+            } else {
+                total as f64 / occupied as f64
+            }
+        };
         Self {
             colors,
             total,
@@ -100,6 +125,8 @@ impl ColoringMetrics {
                 squares / mean / (k - 1.0)
             },
             max_over_mean: if balanced { 1.0 } else { max as f64 / mean },
+            lanes_32: lanes(32),
+            lanes_256: lanes(256),
         }
     }
 }
@@ -121,6 +148,56 @@ mod tests {
         // Deviations 2, -1, -1: squares sum to 6.
         assert!((metrics.std - 2f64.sqrt()).abs() < 1e-15);
         assert_eq!(metrics.chi2, 1.5);
+    }
+
+    /// One class of each size: the lanes are counted here one by one.
+    #[test]
+    fn lanes_fill_up_whole_groups() {
+        for sizes in [
+            &[1][..],
+            &[31],
+            &[32],
+            &[33],
+            &[64, 1],
+            &[255, 256, 257],
+            &[100, 0, 7],
+        ] {
+            let colors: Vec<ColorId> = (0..)
+                .zip(sizes)
+                .flat_map(|(color, &size)| vec![ColorId(color); size])
+                .collect();
+            let total = colors.len() as f64;
+            let share = |width: usize| {
+                let mut lanes = 0;
+                for &size in sizes {
+                    let mut left = size;
+                    while left > 0 {
+                        lanes += width;
+                        left = left.saturating_sub(width);
+                    }
+                }
+                total / lanes as f64
+            };
+            let metrics = ColoringMetrics::by_vertices(&Coloring::new(colors));
+            assert_eq!(
+                (metrics.lanes_32, metrics.lanes_256),
+                (share(32), share(256)),
+                "{sizes:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn lanes_by_weights_count_items() {
+        let coloring = Coloring::new([0, 0, 1].map(ColorId).to_vec());
+        let metrics = ColoringMetrics::by_weights(&coloring, &[30, 10, 24]);
+        // 40 items take two groups of 32 and 24 one; either takes one of 256.
+        assert_eq!(
+            (metrics.lanes_32, metrics.lanes_256),
+            (64.0 / 96.0, 64.0 / 512.0)
+        );
+        let idle = ColoringMetrics::by_weights(&coloring, &[0, 0, 0]);
+        assert_eq!((idle.lanes_32, idle.lanes_256), (1.0, 1.0));
     }
 
     #[test]

@@ -1,6 +1,8 @@
 //! The graph of an incidence is the relation "shares a particle", and quotients commute with it.
 
-use incise_graph::{ClusterId, Clustering, ConstraintGraph, Incidence};
+use std::collections::BTreeSet;
+
+use incise_graph::{ClusterId, Clustering, ConstraintGraph, GraphError, Incidence};
 use petgraph::graph::UnGraph;
 use proptest::collection::{btree_set, vec};
 use proptest::prelude::*;
@@ -80,6 +82,43 @@ proptest! {
         edges.reverse();
         prop_assert_eq!(&ConstraintGraph::from_edges(graph.vertex_count(), &edges).unwrap(), &graph);
         prop_assert_eq!(&ConstraintGraph::try_from(&UnGraph::from(&graph)).unwrap(), &graph);
+    }
+
+    #[test]
+    fn foreign_rows_make_the_same_graph_or_name_what_is_one_sided(
+        rows in (1u32..9).prop_flat_map(|n| vec(vec(0..n, 0..6), n as usize)),
+        symmetric in any::<bool>(),
+    ) {
+        // No loops; both directions half of the time.
+        let mut rows: Vec<Vec<u32>> = (0..)
+            .zip(rows)
+            .map(|(v, row)| row.into_iter().filter(|&u| u != v).collect())
+            .collect();
+        if symmetric {
+            for v in 0..rows.len() {
+                for u in rows[v].clone() {
+                    rows[u as usize].push(u32::try_from(v).unwrap());
+                }
+            }
+        }
+        let listed: BTreeSet<(u32, u32)> = (0..)
+            .zip(&rows)
+            .flat_map(|(v, row)| row.iter().map(move |&u| (v, u)))
+            .collect();
+        let one_sided = listed
+            .iter()
+            .filter(|&&(from, to)| !listed.contains(&(to, from)))
+            .min_by_key(|&&(from, to)| (from.min(to), from.max(to)));
+        let expected = match one_sided {
+            Some(&(from, to)) => Err(GraphError::OneSided { from, to }),
+            None => ConstraintGraph::from_edges(rows.len(), &Vec::from_iter(listed)),
+        };
+        let mut offsets = vec![0];
+        offsets.extend(rows.iter().scan(0, |sum, row| {
+            *sum += u32::try_from(row.len()).unwrap();
+            Some(*sum)
+        }));
+        prop_assert_eq!(ConstraintGraph::from_csr(offsets, rows.concat()), expected);
     }
 
     #[test]

@@ -7,7 +7,9 @@ use serde_json::Value;
 use crate::support::{Place, keys, names};
 
 const KEYS: &str = "input, constraints, particles, clusters, edges, algorithm, clustering, backend, seed, colors, \
-                    max_clique, std, range, chi2, rounds, verified, ms";
+                    max_clique, std, range, chi2, max_over_mean, lanes_32, lanes_256, by_constraints, rounds, verified, ms";
+
+const EVENNESS: &str = "std, range, chi2, max_over_mean, lanes_32, lanes_256";
 
 /// The particles of the tets of a legacy VTK file as this program writes it.
 fn tets(vtk: &str) -> Vec<[usize; 4]> {
@@ -29,7 +31,7 @@ fn tets(vtk: &str) -> Vec<[usize; 4]> {
 }
 
 /// Cluster and color of each constraint; asserts header and order.
-fn rows(csv: &str) -> Vec<(usize, usize)> {
+pub(crate) fn rows(csv: &str) -> Vec<(usize, usize)> {
     let mut lines = csv.lines();
     assert_eq!(lines.next(), Some("constraint,cluster,color"));
     let rows = lines.enumerate().map(|(i, line)| {
@@ -63,6 +65,45 @@ fn assert_proper(tets: &[[usize; 4]], rows: &[(usize, usize)]) {
     }
 }
 
+/// The figures of a report on how even the colors are, computed again from the rows.
+pub(crate) fn assert_evenness(report: &Value, rows: &[(usize, usize)]) {
+    let close = |value: &Value, expected: f64| {
+        let value = value.as_f64().unwrap();
+        // Sums of a few thousand small whole numbers, in another order.
+        assert!(
+            (value - expected).abs() <= 1e-9 * expected.abs().max(1.0),
+            "{value} is not {expected} in {report}"
+        );
+    };
+    let by_cluster: HashSet<(usize, usize)> = rows.iter().copied().collect();
+    let colors_of_clusters: Vec<usize> = by_cluster.iter().map(|row| row.1).collect();
+    let colors_of_constraints: Vec<usize> = rows.iter().map(|row| row.1).collect();
+    for (figures, colors) in [
+        (report, colors_of_clusters),
+        (&report["by_constraints"], colors_of_constraints),
+    ] {
+        let mut sizes = HashMap::new();
+        for color in &colors {
+            *sizes.entry(color).or_insert(0usize) += 1;
+        }
+        let sizes: Vec<usize> = sizes.into_values().collect();
+        let (total, k) = (colors.len() as f64, sizes.len() as f64);
+        let mean = total / k;
+        let max = *sizes.iter().max().unwrap();
+        let squares: f64 = sizes.iter().map(|&n| (n as f64 - mean).powi(2)).sum();
+        let lanes = |width: usize| {
+            let lanes: usize = sizes.iter().map(|n| n.div_ceil(width) * width).sum();
+            total / lanes as f64
+        };
+        assert_eq!(figures["range"], max - sizes.iter().min().unwrap());
+        close(&figures["std"], (squares / k).sqrt());
+        close(&figures["chi2"], squares / mean / (k - 1.0));
+        close(&figures["max_over_mean"], max as f64 / mean);
+        close(&figures["lanes_32"], lanes(32));
+        close(&figures["lanes_256"], lanes(256));
+    }
+}
+
 #[test]
 fn colorings_are_proper_and_reported_truly() {
     let place = Place::with_mesh();
@@ -87,6 +128,7 @@ fn colorings_are_proper_and_reported_truly() {
                 .unwrap();
                 let rows = rows(&place.read("colors.csv"));
                 assert_proper(&tets, &rows);
+                assert_evenness(&report, &rows);
                 let clusters: HashSet<usize> = rows.iter().map(|row| row.0).collect();
                 let colors: HashSet<usize> = rows.iter().map(|row| row.1).collect();
                 assert_eq!(report["constraints"], tets.len());
@@ -124,6 +166,7 @@ fn the_object_has_exactly_the_promised_keys() {
     assert_eq!(text.lines().count(), 1);
     let report: Value = serde_json::from_str(&text).unwrap();
     assert_eq!(keys(&report), names(KEYS));
+    assert_eq!(keys(&report["by_constraints"]), names(EVENNESS));
     assert_eq!(keys(&report["ms"]), names("read, graph, cluster, color"));
     assert_eq!(
         (&report["seed"], &report["clustering"], &report["algorithm"]),
@@ -141,6 +184,8 @@ fn without_json_there_is_a_table() {
         "colors",
         "by scgc",
         "(serial:5)",
+        "constraints, particles",
+        "busy lanes",
         "verified",
         "yes",
     ] {

@@ -27,6 +27,15 @@ fn every_help_has_an_example() {
 }
 
 #[test]
+fn graphs_are_mentioned() {
+    let place = Place::new();
+    let help = place.good(&["color", "--help"]);
+    for part in [".mtx", ".col", "graph"] {
+        assert!(help.contains(part), "{part} is not in\n{help}");
+    }
+}
+
+#[test]
 fn the_version_is_that_of_the_package() {
     let version = Place::new().good(&["--version"]);
     assert_eq!(

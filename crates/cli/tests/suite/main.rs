@@ -3,8 +3,10 @@
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 
 mod bad_arguments;
+mod bad_graphs;
 mod bad_input;
 mod color;
+mod color_graph;
 mod help;
 mod mesh;
 mod run;

@@ -1,0 +1,201 @@
+//! What `incise color` colors: the tets of a mesh, or the vertices of a graph file.
+//!
+//! The two differ in three things: how they are read, which clusterings they allow, and what proves
+//! a coloring proper. From the graph on, everything is the same.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use anyhow::{Context, anyhow};
+use incise::clustering::Method;
+use incise::graph::{
+    Clustering, Coloring, ConstraintGraph, GraphError, Incidence, read_dimacs, read_matrix_market,
+};
+use incise::mesh::{MeshError, TetMesh, io};
+
+use crate::failure::Failure;
+
+/// What the ending of a file name promises.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Format {
+    /// Anything that may be a mesh.
+    Mesh,
+    /// `.mtx`
+    MatrixMarket,
+    /// `.col`
+    Dimacs,
+}
+
+/// What was in the file.
+#[derive(Debug)]
+pub(crate) enum Source {
+    Mesh(TetMesh),
+    Graph(ConstraintGraph),
+}
+
+/// What is to be colored.
+#[derive(Debug)]
+pub(crate) enum Problem {
+    /// The tets of a mesh, in each other's way when they share a particle.
+    Mesh(Incidence, ConstraintGraph),
+    Graph(ConstraintGraph),
+}
+
+/// What a second look at a coloring gives.
+#[derive(Debug)]
+pub(crate) struct Proof {
+    /// Whether the coloring is proper, by the input alone.
+    pub(crate) verified: bool,
+    /// So many clusters are known to be all in each other's way: of a mesh the most at one
+    /// particle, of a graph 2 if two clusters are adjacent.
+    pub(crate) clique: usize,
+}
+
+impl Format {
+    pub(crate) fn of(path: &Path) -> Self {
+        let ending = path.extension().unwrap_or_default().to_string_lossy();
+        match ending.to_ascii_lowercase().as_str() {
+            "mtx" => Self::MatrixMarket,
+            "col" => Self::Dimacs,
+            _ => Self::Mesh,
+        }
+    }
+
+    /// Refuses a clustering that needs more than a graph.
+    pub(crate) fn require(self, method: Method) -> anyhow::Result<()> {
+        match (self, method) {
+            (Self::Mesh, _) | (_, Method::None | Method::Serial(_)) => Ok(()),
+            _ => Err(anyhow!(
+                "the clustering '{method}' needs the particles of a mesh: use none or serial:K for a graph"
+            )),
+        }
+    }
+
+    pub(crate) fn read(self, path: &Path) -> Result<Source, Failure> {
+        match self {
+            Self::Mesh => read_mesh(path).map(Source::Mesh),
+            Self::MatrixMarket => read_graph(path, read_matrix_market),
+            Self::Dimacs => read_graph(path, read_dimacs),
+        }
+    }
+}
+
+fn read_mesh(path: &Path) -> Result<TetMesh, Failure> {
+    let mesh = io::read(path).map_err(|error| match error {
+        MeshError::UnknownFormat { .. } => {
+            Failure::Input(anyhow!("{error}; .mtx or .col for a graph"))
+        }
+        _ => error.into(),
+    })?;
+    mesh.check()
+        .with_context(|| path.display().to_string())
+        .map_err(Failure::Input)?;
+    Ok(mesh)
+}
+
+fn read_graph(
+    path: &Path,
+    read: impl Fn(BufReader<File>) -> Result<ConstraintGraph, GraphError>,
+) -> Result<Source, Failure> {
+    let name = path.display();
+    let result = match File::open(path) {
+        Ok(file) => read(BufReader::new(file)).map_err(|error| match error {
+            GraphError::Malformed { line, message } => anyhow!("{name}:{line}: {message}"),
+            GraphError::Unreadable { message, .. } => anyhow!("cannot read {name}: {message}"),
+            _ => anyhow!("{name}: {error}"),
+        }),
+        Err(error) => Err(anyhow!("cannot read {name}: {error}")),
+    };
+    result.map(Source::Graph).map_err(Failure::Input)
+}
+
+impl Source {
+    /// Finds out who is in whose way.
+    pub(crate) fn problem(self) -> anyhow::Result<Problem> {
+        match self {
+            Self::Graph(graph) => Ok(Problem::Graph(graph)),
+            Self::Mesh(mesh) => {
+                let incidence = Incidence::from_constraints(mesh.positions.len(), mesh.tets)?;
+                let graph = ConstraintGraph::from_incidence(&incidence);
+                Ok(Problem::Mesh(incidence, graph))
+            }
+        }
+    }
+}
+
+impl Problem {
+    pub(crate) fn graph(&self) -> &ConstraintGraph {
+        match self {
+            Self::Mesh(_, graph) | Self::Graph(graph) => graph,
+        }
+    }
+
+    /// A graph has none.
+    pub(crate) fn particle_count(&self) -> usize {
+        match self {
+            Self::Mesh(incidence, _) => incidence.particle_count(),
+            Self::Graph(_) => 0,
+        }
+    }
+
+    /// Proves a coloring of the clusters without the graph of the clusters that it was made from: a
+    /// mesh by its particles, a graph by its edges between different clusters.
+    pub(crate) fn check(&self, clustering: &Clustering, coloring: &Coloring) -> Proof {
+        match self {
+            Self::Mesh(incidence, _) => {
+                let clusters = incidence.quotient(clustering);
+                Proof {
+                    verified: coloring.verify_incidence(&clusters).is_ok(),
+                    clique: clusters.clique_bound(),
+                }
+            }
+            Self::Graph(graph) => {
+                let labels = clustering.labels();
+                let mut apart = graph
+                    .edges()
+                    .map(|(a, b)| (labels[a as usize], labels[b as usize]))
+                    .filter(|(a, b)| a != b)
+                    .peekable();
+                let clique = match apart.peek() {
+                    Some(_) => 2,
+                    None => clustering.occupied().min(1),
+                };
+                let verified = coloring.vertex_count() == clustering.cluster_count()
+                    && apart.all(|(a, b)| coloring.color(a.index()) != coloring.color(b.index()));
+                Proof { verified, clique }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use incise::graph::{ClusterId, ColorId};
+
+    /// A path of three springs, as incidence and as graph, in two clusters or three.
+    #[test]
+    fn only_proper_colorings_are_verified() -> anyhow::Result<()> {
+        let incidence = Incidence::from_constraints(4, [[0u32, 1], [1, 2], [2, 3]])?;
+        let graph = ConstraintGraph::from_incidence(&incidence);
+        let problems = [
+            Problem::Mesh(incidence, graph.clone()),
+            Problem::Graph(graph),
+        ];
+        for problem in &problems {
+            for (labels, colors, verified) in [
+                ([0, 1, 2], &[0, 1, 0][..], true),
+                ([0, 1, 2], &[0, 1, 1], false),
+                ([0, 0, 1], &[0, 1], true),
+                ([0, 0, 1], &[1, 1], false),
+            ] {
+                let clustering = Clustering::from_labels(labels.map(ClusterId).to_vec())?;
+                let coloring = Coloring::new(colors.iter().copied().map(ColorId).collect());
+                let proof = problem.check(&clustering, &coloring);
+                assert_eq!((proof.verified, proof.clique), (verified, 2), "{problem:?}");
+            }
+        }
+        Ok(())
+    }
+}
