@@ -54,7 +54,7 @@ pub use iterated_greedy::iterated_greedy;
 pub use order::{Order, order};
 pub use priority::{hash, priorities, priority_order};
 pub use recoloring::{Recolored, Recoloring};
-pub use scgc::{Scgc, ScgcStats, scgc};
+pub use scgc::{Scgc, ScgcStats, Shortcuts, jones_plassmann, scgc, scgc_with};
 pub use tabu::tabu;
 
 /// The example of the README, run as a test.
