@@ -12,6 +12,14 @@ pub enum ColoringError {
         /// The names that exist, separated by commas.
         known: String,
     },
+    /// A limit of rounds was reached before all vertices had a color.
+    #[error("{uncolored} vertices have no color after {rounds} rounds; allow more of them")]
+    TooManyRounds {
+        /// The rounds made.
+        rounds: usize,
+        /// Vertices without a color.
+        uncolored: usize,
+    },
     /// An edit removes a vertex from a particle where it is not.
     #[error("vertex {vertex} cannot be removed from particle {particle}: it is not there")]
     NotThere {

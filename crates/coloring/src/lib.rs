@@ -31,6 +31,7 @@ mod balance;
 mod buckets;
 mod conflicts;
 mod dsatur;
+mod ecl_gc;
 mod error;
 mod first_fit;
 mod greedy;
@@ -42,12 +43,15 @@ mod random;
 mod recoloring;
 mod scgc;
 mod tabu;
+mod vivace;
+mod wlc;
 
 pub use algorithm::{Algorithm, color};
 pub use auto::{Auto, auto};
 pub use balance::{BalanceStats, balance, balance_weights};
 pub use conflicts::Conflicts;
 pub use dsatur::dsatur;
+pub use ecl_gc::{EclGc, EclGcStats, ecl_gc};
 pub use error::ColoringError;
 pub use greedy::greedy;
 pub use iterated_greedy::iterated_greedy;
@@ -56,6 +60,8 @@ pub use priority::{hash, priorities, priority_order};
 pub use recoloring::{Recolored, Recoloring};
 pub use scgc::{Scgc, ScgcStats, Shortcuts, jones_plassmann, scgc, scgc_with};
 pub use tabu::tabu;
+pub use vivace::{Tie, Vivace, VivaceOptions, VivaceStats, vivace};
+pub use wlc::{Wlc, WlcStats, wlc};
 
 /// The example of the README, run as a test.
 #[cfg(doctest)]

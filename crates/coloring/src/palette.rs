@@ -51,6 +51,34 @@ impl Palettes {
         }
     }
 
+    /// Gives `color` to `v`, which must be below the size its palette had at first.
+    pub(crate) fn insert(&self, v: u32, color: u32) {
+        self.words(v)[color as usize / 64].fetch_or(1 << (color % 64), Relaxed);
+    }
+
+    /// The number of colors of `v`.
+    pub(crate) fn count(&self, v: u32) -> u32 {
+        let words = self.words(v).iter();
+        words.map(|word| word.load(Relaxed).count_ones()).sum()
+    }
+
+    /// The color of `v` that has `place` smaller ones before it; there must be one.
+    pub(crate) fn nth(&self, v: u32, place: u32) -> u32 {
+        let mut left = place;
+        for (index, word) in (0..).zip(self.words(v)) {
+            let mut bits = word.load(Relaxed);
+            let held = bits.count_ones();
+            if left < held {
+                for _ in 0..left {
+                    bits &= bits - 1;
+                }
+                return index * 64 + bits.trailing_zeros();
+            }
+            left -= held;
+        }
+        unreachable!("vertex {v} has no more than {place} colors")
+    }
+
     /// The smallest color of `v`, which is known to be `from` or larger.
     pub(crate) fn first(&self, v: u32, from: u32) -> u32 {
         for (index, word) in (0..).zip(self.words(v)).skip(from as usize / 64) {
@@ -118,6 +146,9 @@ mod tests {
         assert!(palettes.disjoint(0, 2));
         palettes.keep_first(0, 3);
         assert_eq!(colors(&palettes, 0), [65, 66, 67]);
+        assert_eq!((palettes.count(0), palettes.nth(0, 2)), (3, 67));
+        palettes.insert(0, 129);
+        assert_eq!((palettes.count(0), palettes.nth(0, 3)), (4, 129));
         palettes.keep_first(1, 66);
         assert_eq!(colors(&palettes, 1), (0..66).collect::<Vec<_>>());
     }

@@ -1,8 +1,19 @@
 //! Graphs with known properties, and random ones.
 
-use incise_graph::{ConstraintGraph, Incidence};
+use incise_graph::{Coloring, ConstraintGraph, Incidence};
 use proptest::collection::{btree_set, vec};
 use proptest::prelude::*;
+
+/// A fingerprint of a coloring: FNV-1a over the colors as little-endian 32-bit numbers.
+pub(crate) fn golden(coloring: &Coloring) -> u64 {
+    let bytes = coloring
+        .colors()
+        .iter()
+        .flat_map(|color| color.0.to_le_bytes());
+    bytes.fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+    })
+}
 
 /// Everybody adjacent to everybody.
 pub(crate) fn clique(n: u32) -> ConstraintGraph {

@@ -2,8 +2,10 @@
 
 #![expect(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
+mod balance;
 mod generators;
 mod oracle;
+mod parallel;
 mod recoloring;
 mod rounds;
 mod sequential;

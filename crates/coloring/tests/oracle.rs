@@ -1,10 +1,10 @@
 //! `scgc` equals `greedy`, both are proper and within the bounds, and threads change nothing.
 
 use incise_coloring::{Algorithm, Order, Scgc, color, greedy, priority_order, scgc};
-use incise_graph::{ClusterId, Clustering, ColorId, ConstraintGraph};
+use incise_graph::{ClusterId, Clustering, ConstraintGraph};
 use proptest::prelude::*;
 
-use crate::generators::{bipartite, clique, erdos_renyi, kuhn, path};
+use crate::generators::{bipartite, clique, erdos_renyi, golden, kuhn, path};
 
 fn with_threads(threads: usize, graph: &ConstraintGraph) -> Scgc {
     rayon::ThreadPoolBuilder::new()
@@ -105,19 +105,12 @@ fn threads_change_nothing() {
     }
 }
 
-/// Colors are part of the contract: a change of hash, order or rule shows here. FNV-1a over the
-/// colors as little-endian 32-bit numbers.
+/// Colors are part of the contract: a change of hash, order or rule shows here.
 #[test]
 fn golden_hash() {
     let graph = ConstraintGraph::from_incidence(&kuhn(8));
     let coloring = scgc(&graph).coloring;
-    let bytes = coloring
-        .colors()
-        .iter()
-        .flat_map(|color: &ColorId| color.0.to_le_bytes());
-    let hash = bytes.fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
-    });
+    let hash = golden(&coloring);
     assert_eq!((coloring.color_count(), hash), (34, 0x6c30_379c_9f35_058c));
 }
 

@@ -1,0 +1,117 @@
+//! WLC: color first, repair later, with worklists (Chen, Li and Yang 2017, data-driven speculative
+//! greedy; after Gebremedhin and Manne 2000).
+//!
+//! All vertices of a worklist take the smallest color that their neighbors do not have, at the same
+//! time, so neighbors may take the same. Of two such neighbors the one with the lower number loses
+//! its color and goes to the next worklist. The original finds losers while others are still losing
+//! theirs, so its result depends on timing; here a loser is who has a higher neighbor of the same
+//! color when all have chosen.
+//!
+//! On a machine whose threads all run at once, everybody near makes the same choice and few win: a
+//! clique loses all but one of its vertices in every round. Real machines take a worklist in
+//! pieces, and later pieces see what earlier ones chose. The size of a piece is a parameter here,
+//! the *chunk*: 1 is sequential first fit, the whole worklist is the worst case. Cost: O(edges of
+//! the worklist) a round; rounds up to the size of the largest clique within a chunk.
+
+use std::num::NonZeroUsize;
+
+use incise_graph::{ColorId, Coloring};
+use rayon::prelude::*;
+
+use crate::Conflicts;
+use crate::conflicts::UNCOLORED;
+use crate::first_fit::FirstFit;
+
+/// A coloring and how it came about.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Wlc {
+    /// The coloring.
+    pub coloring: Coloring,
+    /// Rounds and repairs.
+    pub stats: WlcStats,
+}
+
+/// What it took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct WlcStats {
+    /// Worklists until one was empty.
+    pub rounds: usize,
+    /// How often a vertex lost its color.
+    pub conflicts: usize,
+    /// How often a vertex looked at a neighbor, to choose or to compare.
+    pub edge_visits: u64,
+}
+
+/// Vertices per task at least.
+const GRAIN: usize = 64;
+
+/// Colors speculatively in parallel, in the current rayon thread pool; `chunk` vertices choose at
+/// the same time.
+///
+/// Proper, labels without gaps, at most one color more than the largest degree. The result depends
+/// on the chunk, but not on the number of threads, nor on whether a graph is given or the incidence
+/// it came from. O(edges of the worklist) a round.
+///
+/// ```
+/// use std::num::NonZeroUsize;
+///
+/// use incise_coloring::wlc;
+/// use incise_graph::ConstraintGraph;
+///
+/// let path = ConstraintGraph::from_edges(4, &[(0, 1), (1, 2), (2, 3)])?;
+/// let one = wlc(&path, NonZeroUsize::MIN);
+/// assert_eq!((one.coloring.color_count(), one.stats.rounds), (2, 1));
+/// let all = wlc(&path, NonZeroUsize::MAX);
+/// all.coloring.verify(&path)?;
+/// assert!(all.stats.conflicts > 0);
+/// # Ok::<(), incise_graph::GraphError>(())
+/// ```
+#[must_use]
+pub fn wlc(conflicts: &impl Conflicts, chunk: NonZeroUsize) -> Wlc {
+    let graph = conflicts.graph();
+    let mut colors = vec![UNCOLORED; graph.vertex_count()];
+    let mut stats = WlcStats::default();
+    let mut worklist: Vec<u32> = (0..).take(graph.vertex_count()).collect();
+    while !worklist.is_empty() {
+        stats.rounds += 1;
+        let mut losers = Vec::new();
+        for chunk in worklist.chunks(chunk.get()) {
+            let chosen: Vec<ColorId> = chunk
+                .par_iter()
+                .with_min_len(GRAIN)
+                .map_init(FirstFit::default, |first_fit, &v| {
+                    let neighbors = graph.neighbors(v as usize);
+                    let taken = neighbors.iter().map(|&u| colors[u as usize]);
+                    first_fit.choose(neighbors.len(), taken)
+                })
+                .collect();
+            for (&v, color) in chunk.iter().zip(chosen) {
+                colors[v as usize] = color;
+            }
+            let lost: Vec<u32> = chunk
+                .par_iter()
+                .with_min_len(GRAIN)
+                .copied()
+                .filter(|&v| {
+                    let own = colors[v as usize];
+                    let neighbors = graph.neighbors(v as usize);
+                    let higher = &neighbors[neighbors.partition_point(|&u| u < v)..];
+                    higher.iter().any(|&u| colors[u as usize] == own)
+                })
+                .collect();
+            for &v in &lost {
+                colors[v as usize] = UNCOLORED;
+            }
+            let degrees = chunk.iter().map(|&v| graph.degree(v as usize) as u64);
+            stats.edge_visits += 2 * degrees.sum::<u64>();
+            losers.extend(lost);
+        }
+        stats.conflicts += losers.len();
+        worklist = losers;
+    }
+    let mut coloring = Coloring::new(colors);
+    coloring.compact();
+    Wlc { coloring, stats }
+}
