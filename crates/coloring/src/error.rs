@@ -5,12 +5,20 @@
 #[non_exhaustive]
 pub enum ColoringError {
     /// No algorithm has this name.
-    #[error("there is no coloring algorithm '{name}'; known are: {known}")]
+    #[error(
+        "there is no coloring algorithm '{name}'; known are: auto, scgc, jones-plassmann, ecl-gc, vivace, wlc, mcs, greedy, dsatur, iterated-greedy, tabu"
+    )]
     UnknownAlgorithm {
         /// The name asked for.
         name: String,
-        /// The names that exist, separated by commas.
-        known: String,
+    },
+    /// An algorithm with a parameter that it has not.
+    #[error("coloring algorithm '{text}': {expected} expected behind the name")]
+    BadParameter {
+        /// What was written.
+        text: String,
+        /// What may stand behind the colon.
+        expected: &'static str,
     },
     /// A limit of rounds was reached before all vertices had a color.
     #[error("{uncolored} vertices have no color after {rounds} rounds; allow more of them")]

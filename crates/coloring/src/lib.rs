@@ -46,7 +46,7 @@ mod tabu;
 mod vivace;
 mod wlc;
 
-pub use algorithm::{Algorithm, color};
+pub use algorithm::{Algorithm, Colored, color};
 pub use auto::{Auto, auto};
 pub use balance::{BalanceStats, balance, balance_weights};
 pub use conflicts::Conflicts;
