@@ -85,7 +85,7 @@ pub(crate) struct ColorArguments {
     /// The coloring: scgc or greedy.
     #[arg(long, value_name = "NAME", default_value = "scgc")]
     pub(crate) algorithm: String,
-    /// The clustering: none or serial:K.
+    /// The clustering: none, serial:K, serial-loose:K, greedy-k:K or pressure:K.
     #[arg(long, value_name = "NAME", default_value = "none")]
     pub(crate) clustering: String,
     /// Where to compute.

@@ -67,7 +67,7 @@ pub(crate) fn color(arguments: &ColorArguments) -> Result<(), Failure> {
     let incidence = incidence.map_err(|error| input(error.into()))?;
     let constraints = ConstraintGraph::from_incidence(&incidence);
     let graph = clock.lap();
-    let clustering = cluster(method, &constraints);
+    let clustering = cluster(method, &incidence);
     let clusters = constraints.quotient(&clustering);
     let clustered = clock.lap();
     let (coloring, rounds) = match algorithm {

@@ -8,20 +8,25 @@
 //! already. The method is our own, in three steps:
 //!
 //! 1. **Grow.** Start at the particle of highest pressure; then add, again and again, the free
-//!    constraint whose particles shared with the cluster have the largest sum of pressures. Sharing
-//!    a particle that is under pressure counts for more, and sharing none for nothing.
-//! 2. **Absorb.** Growth leaves pockets that are too small. From a size limit of 16 on, clusters
-//!    grow to 15/16 of it only; then each cluster that is smaller than that is spread over its
-//!    neighbors if all its members find room.
+//!    constraint whose particles shared with the cluster have the largest sum of pressures, plus a
+//!    constant each. Sharing a particle under pressure counts for more.
+//! 2. **Absorb.** Growth leaves pockets. From a size limit of 16 on, clusters first grow to 15/16
+//!    of it only; then each that is smaller than that is spread over its neighbors, if all its
+//!    members find room there.
 //! 3. **Regrow.** For the worst particles, all clusters there and those around that have room are
-//!    dissolved and grown anew; each time, the particle counts as if it were under more pressure
-//!    than it is. The result is kept if the sum over the particles of 2^pressure went down, or the
-//!    number of clusters at the same sum; otherwise all is put back (ruin and recreate, Schrimpf
-//!    and others 2000). It ends when no attempt in a pass over the worst particles was kept, or when twice
-//!    as many constraints have been dissolved as there are.
+//!    dissolved and grown anew, with the particle apparently under more pressure than it is. The
+//!    result is kept if the sum over the particles of 2^pressure went down, or the number of
+//!    clusters at the same sum; otherwise all is put back (ruin and recreate, Schrimpf and others
+//!    2000). There are at most two passes over the worst particles, and no attempt begins after as many constraints
+//!    have been dissolved as there are.
 //!
-//! Cost: O(sum of arity * valence) score updates for growing, each with the logarithm of a heap, and
-//! a few times that for regrowing; memory O(entries).
+//! Clusters larger than a particle has constraints relieve it anyhow. There the number of clusters
+//! around a cluster decides, which compactness keeps low: from a size limit of 32 on, growth counts
+//! the particles shared with each member, every one the same, and there is no third step. Both
+//! numbers and the constant were chosen by measuring on tetrahedral meshes.
+//!
+//! Cost: O(sum of arity * valence) score updates, each with the logarithm of a heap, for growing,
+//! and at most a few times that for regrowing.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -34,12 +39,14 @@ use crate::parts::Parts;
 
 /// From this size on a part of each cluster, one over this, is kept for pockets.
 const RESERVE: usize = 16;
+/// From this size on compactness counts for more than pressure.
+const COMPACT: usize = 32;
+/// What sharing a particle is worth beside its pressure.
+const STEADY: u64 = 20;
 /// How much a particle gains in apparent pressure each time growth around it is repeated.
 const BOOST: u32 = 2;
 /// How often the worst particles are gone through at most.
-const PASSES: usize = 8;
-/// How many constraints are dissolved at most, as a multiple of all.
-const EFFORT: usize = 2;
+const PASSES: usize = 2;
 
 /// Clusters of up to `max_size` constraints such that few clusters meet at any particle.
 ///
@@ -68,6 +75,7 @@ pub fn pressure(incidence: &Incidence, max_size: NonZeroUsize) -> Clustering {
     let max_size = max_size.get();
     let mut growth = Growth {
         parts: Parts::new(incidence),
+        compact: max_size >= COMPACT,
         candidates: Candidates::new(constraints),
         boost: vec![0; incidence.particle_count()],
         started: Vec::new(),
@@ -85,15 +93,19 @@ pub fn pressure(incidence: &Incidence, max_size: NonZeroUsize) -> Clustering {
         }
     }
     growth.absorb(target, max_size);
-    growth.regrow_worst(max_size);
+    if !growth.compact {
+        growth.regrow_worst(max_size);
+    }
     growth.parts.finish()
 }
 
 /// Clusters being grown, dissolved and grown again.
 struct Growth<'a> {
     parts: Parts<'a>,
+    /// Whether growth goes by the number of shared particles alone.
+    compact: bool,
     candidates: Candidates,
-    /// Particle -> what it seems to have more of pressure than it has.
+    /// Particle -> apparent pressure beyond its own.
     boost: Vec<u32>,
     /// The clusters grown by the last call of `grow_around`.
     started: Vec<u32>,
@@ -156,12 +168,16 @@ impl Growth<'_> {
     fn raise_around(&mut self, c: u32) {
         let incidence = self.parts.incidence;
         for &p in incidence.particles_of(c as usize) {
-            if !self.parts.is_open_at(p) {
-                let weight = u64::from(self.weight(p));
-                for &d in incidence.constraints_of(p as usize) {
-                    if self.parts.is_free(d) {
-                        self.candidates.raise(d, weight);
-                    }
+            let amount = if self.compact {
+                1
+            } else if self.parts.is_open_at(p) {
+                continue;
+            } else {
+                u64::from(self.weight(p)) + STEADY
+            };
+            for &d in incidence.constraints_of(p as usize) {
+                if self.parts.is_free(d) {
+                    self.candidates.raise(d, amount);
                 }
             }
         }
@@ -256,7 +272,7 @@ impl Growth<'_> {
     /// Grows anew around the worst particles, pass after pass.
     fn regrow_worst(&mut self, max_size: usize) {
         let constraints = self.parts.incidence.constraint_count();
-        let mut effort = constraints.saturating_mul(EFFORT);
+        let mut effort = constraints;
         for _ in 0..PASSES {
             // Those with the largest pressure and with one less: the next to be the worst.
             let bound = self.parts.max_pressure();

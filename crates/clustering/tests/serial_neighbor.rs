@@ -2,19 +2,12 @@
 
 use std::num::NonZeroUsize;
 
-use incise_clustering::serial_neighbor;
-use incise_coloring::{greedy, scgc};
+use incise_clustering::{serial_neighbor, serial_neighbor_incidence};
+use incise_coloring::{Order, greedy, scgc};
 use incise_graph::{ClusterId, Clustering, ConstraintGraph, Incidence, Schedule};
-use proptest::collection::{btree_set, vec};
 use proptest::prelude::*;
 
-/// Constraints of arity 1 to 4 on a few particles.
-fn incidences() -> impl Strategy<Value = Incidence> {
-    (4u32..40).prop_flat_map(|particles| {
-        vec(btree_set(0..particles, 1..=4), 0..60)
-            .prop_map(move |rows| Incidence::from_constraints(particles as usize, rows).unwrap())
-    })
-}
+use crate::inputs::incidences;
 
 /// The algorithm as printed, with sets for sets.
 fn as_printed(graph: &ConstraintGraph, ks: usize) -> Vec<Vec<u32>> {
@@ -64,6 +57,13 @@ proptest! {
     }
 
     #[test]
+    fn incidence_gives_what_the_graph_gives(incidence in incidences(), ks in 1usize..70) {
+        let ks = NonZeroUsize::new(ks).unwrap();
+        let graph = ConstraintGraph::from_incidence(&incidence);
+        prop_assert_eq!(serial_neighbor_incidence(&incidence, ks), serial_neighbor(&graph, ks));
+    }
+
+    #[test]
     fn size_one_is_no_clustering(incidence in incidences()) {
         let graph = ConstraintGraph::from_incidence(&incidence);
         prop_assert_eq!(serial_neighbor(&graph, NonZeroUsize::MIN), Clustering::none(graph.vertex_count()));
@@ -75,7 +75,7 @@ proptest! {
         let clustering = serial_neighbor(&graph, NonZeroUsize::new(ks).unwrap());
         let quotient = graph.quotient(&clustering);
         let coloring = scgc(&quotient).coloring;
-        prop_assert_eq!(&coloring, &greedy(&quotient));
+        prop_assert_eq!(&coloring, &greedy(&quotient, Order::LargestFirst));
         coloring.verify_incidence(&incidence.quotient(&clustering)).unwrap();
         prop_assert!(coloring.color_count() >= incidence.quotient(&clustering).clique_bound());
         Schedule::new(&clustering, &coloring).check(&incidence).unwrap();

@@ -36,6 +36,7 @@ mod order;
 mod palette;
 mod priority;
 mod scgc;
+mod within;
 
 pub use algorithm::{Algorithm, color};
 pub use conflicts::Conflicts;
@@ -45,6 +46,7 @@ pub use greedy::greedy;
 pub use order::{Order, order};
 pub use priority::{hash, priorities, priority_order};
 pub use scgc::{Scgc, ScgcStats, scgc};
+pub use within::color_within_clusters;
 
 /// The example of the README, run as a test.
 #[cfg(doctest)]

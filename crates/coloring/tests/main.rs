@@ -6,3 +6,4 @@ mod extend;
 mod generators;
 mod oracle;
 mod rounds;
+mod within;

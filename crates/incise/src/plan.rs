@@ -27,19 +27,16 @@ impl Plan {
         let _span = tracing::debug_span!("incise::plan").entered();
         let method: Method = scene.solver.clustering.parse()?;
         let algorithm = Algorithm::from_name(&scene.solver.coloring)?;
-        let graph = ConstraintGraph::from_incidence(&incidence(mesh)?);
-        let clustering = cluster(method, &graph);
+        let incidence = incidence(mesh)?;
+        let graph = ConstraintGraph::from_incidence(&incidence);
+        let clustering = cluster(method, &incidence);
         let coloring = color(algorithm, &graph.quotient(&clustering));
         let schedule = Schedule::new(&clustering, &coloring);
-        let limit = match method {
-            Method::Serial(size) => size,
-            _ => NonZeroUsize::MIN,
-        };
         Ok(Self {
             clustering,
             coloring,
             schedule,
-            limit,
+            limit: method.max_size(),
         })
     }
 

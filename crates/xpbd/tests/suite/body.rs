@@ -42,7 +42,7 @@ pub(crate) fn schedule(mesh: &TetMesh, coloring: Algorithm, clustering: &str) ->
     let corners = mesh.tets.iter().map(|tet| tet.map(|p| p.0));
     let incidence = Incidence::from_constraints(mesh.positions.len(), corners).unwrap();
     let graph = ConstraintGraph::from_incidence(&incidence);
-    let clusters = cluster(clustering.parse().unwrap(), &graph);
+    let clusters = cluster(clustering.parse().unwrap(), &incidence);
     let schedule = Schedule::new(&clusters, &color(coloring, &graph.quotient(&clusters)));
     schedule.check(&incidence).unwrap();
     schedule
