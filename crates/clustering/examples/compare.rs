@@ -4,8 +4,9 @@
 //! cargo run --release -p incise-clustering --example compare -- 5,10 liver.vtk kuhn:24
 //! ```
 //!
-//! The first argument lists the cluster sizes; the others name mesh files, or `kuhn:N` for a box of
-//! N x N x N cubes cut into six tets each. The bound is the largest number of clusters at one
+//! The first argument lists the cluster sizes; the others name mesh files, `kuhn:N` for a box of
+//! N x N x N cubes cut into six tets each, or a generated shape and its number of tets, as
+//! `sphere:10000`. The bound is the largest number of clusters at one
 //! particle; colors are those of greedy coloring in maximum cardinality order; the time is the
 //! shortest of five runs on one thread and covers clustering only.
 
@@ -21,7 +22,7 @@ use std::time::{Duration, Instant};
 use incise_clustering::{Method, cluster, serial_neighbor};
 use incise_coloring::{Order, greedy};
 use incise_graph::{Clustering, ConstraintGraph, Incidence};
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::generate::{Shape, generate, kuhn_box};
 use incise_mesh::glam::DVec3;
 use incise_mesh::io;
 
@@ -34,8 +35,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("| mesh | K | method | clusters | n / K | bound | colors | ms |");
     println!("|---|---|---|---|---|---|---|---|");
     for name in arguments {
-        let mesh = match name.strip_prefix("kuhn:") {
-            Some(cells) => kuhn_box([cells.parse()?; 3], DVec3::ONE),
+        let mesh = match name.split_once(':') {
+            Some(("kuhn", cells)) => kuhn_box([cells.parse()?; 3], DVec3::ONE),
+            Some((shape, tets)) => generate(Shape::from_name(shape)?, tets.parse()?)?,
             None => io::read(&name)?,
         };
         let tets = mesh.tets.iter().copied();

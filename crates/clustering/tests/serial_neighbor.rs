@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 
 use incise_clustering::{serial_neighbor, serial_neighbor_incidence};
 use incise_coloring::{Order, greedy, scgc};
-use incise_graph::{ClusterId, Clustering, ConstraintGraph, Incidence, Schedule};
+use incise_graph::{ClusterId, Clustering, ConstraintGraph, Schedule};
 use proptest::prelude::*;
 
 use crate::inputs::incidences;
