@@ -81,7 +81,7 @@ fn coloring(models: &[Model]) -> anyhow::Result<Table> {
             Incidence::from_constraints(mesh.positions.len(), mesh.tets.iter().copied())?;
         let graph = ConstraintGraph::from_incidence(&incidence);
         for name in ["none", "serial:5", "serial:10"] {
-            let clustering = cluster(name.parse::<Method>()?, &graph);
+            let clustering = cluster(name.parse::<Method>()?, &incidence);
             let (clusters, of_clusters) =
                 (graph.quotient(&clustering), incidence.quotient(&clustering));
             let result = scgc(&clusters);

@@ -83,18 +83,25 @@ pub(crate) struct RunArguments {
 pub(crate) struct ColorArguments {
     /// A tetrahedral mesh, or a graph: Matrix Market .mtx or DIMACS .col.
     pub(crate) input: PathBuf,
-    /// The coloring: scgc or greedy.
-    #[arg(long, value_name = "NAME", default_value = "scgc")]
+    /// The coloring: auto, scgc, jones-plassmann, ecl-gc, vivace, wlc, mcs, greedy, dsatur, iterated-greedy or tabu.
+    ///
+    /// Some take a parameter: scgc:13 for shortcuts 1 and 3 only, vivace:4 for the shrinking factor, wlc:64 for the
+    /// chunk, greedy:ORDER with natural, random, largest-first, crowded or smallest-last, iterated-greedy:PASSES,
+    /// tabu:STEPS.
+    #[arg(long, value_name = "NAME", default_value = "auto")]
     pub(crate) algorithm: String,
-    /// The clustering: none or serial:K.
+    /// The clustering: none, serial:K, serial-loose:K, greedy-k:K or pressure:K.
     #[arg(long, value_name = "NAME", default_value = "none")]
     pub(crate) clustering: String,
     /// Where to compute.
     #[arg(long, value_enum, default_value_t)]
     pub(crate) backend: BackendName,
-    /// Seed of randomized algorithms; scgc and greedy use none.
+    /// Seed of vivace, greedy:random, iterated-greedy and tabu; the others use none.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) seed: u64,
+    /// Make the colors even, in clusters or in constraints, without adding any.
+    #[arg(long, value_enum, value_name = "BY", num_args = 0..=1, require_equals = true, default_missing_value = "clusters")]
+    pub(crate) balance: Option<BalanceName>,
     /// Write cluster and color of each constraint (of a graph: each vertex) to this file.
     #[arg(long, value_name = "FILE")]
     pub(crate) csv: Option<PathBuf>,
@@ -133,6 +140,24 @@ pub(crate) enum MeshCommand {
         /// The file to write.
         output: PathBuf,
     },
+}
+
+/// What is counted when colors are made even.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum BalanceName {
+    /// Clusters: what runs side by side on a wide machine.
+    Clusters,
+    /// Constraints: the work of a color.
+    Constraints,
+}
+
+impl BalanceName {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Clusters => "clusters",
+            Self::Constraints => "constraints",
+        }
+    }
 }
 
 /// Where to compute.

@@ -6,22 +6,26 @@ mod report;
 use std::time::Instant;
 
 use anyhow::anyhow;
-use incise::clustering::{Method, cluster};
-use incise::coloring::{Algorithm, Order, greedy, scgc};
-use incise::graph::ColoringMetrics;
+use incise::clustering::Method;
+use incise::coloring::{
+    Algorithm, Colored, Conflicts, balance, balance_weights, color as color_by,
+};
+use incise::graph::{Clustering, ColoringMetrics};
 
-use crate::args::ColorArguments;
+use crate::args::{BalanceName, ColorArguments};
 use crate::failure::Failure;
 use crate::print::print;
 use crate::run::require_cpu;
-use input::Format;
+use input::{Format, Problem};
 use report::{ColorReport, Times, table, write_csv};
 
 pub(crate) fn color(arguments: &ColorArguments) -> Result<(), Failure> {
     require_cpu(arguments.backend)?;
     let input = |error: anyhow::Error| Failure::Input(error);
-    let algorithm =
-        Algorithm::from_name(&arguments.algorithm).map_err(|error| input(error.into()))?;
+    let algorithm: Algorithm = arguments
+        .algorithm
+        .parse()
+        .map_err(|error| input(anyhow::Error::from_boxed(Box::new(error))))?;
     let method: Method = arguments
         .clustering
         .parse()
@@ -34,44 +38,49 @@ pub(crate) fn color(arguments: &ColorArguments) -> Result<(), Failure> {
     let source = format.read(&arguments.input)?;
     let read = clock.lap();
     let problem = source.problem().map_err(input)?;
-    let constraints = problem.graph();
     let graph = clock.lap();
-    let clustering = cluster(method, constraints);
-    let clusters = constraints.quotient(&clustering);
-    let clustered = clock.lap();
-    let (coloring, rounds) = match algorithm {
-        Algorithm::Scgc => {
-            let result = scgc(&clusters);
-            (result.coloring, result.stats.rounds)
+    let clustering = problem.cluster(method);
+    let (result, cluster, color) = match &problem {
+        Problem::Mesh(incidence) => {
+            let clusters = incidence.quotient(&clustering);
+            let cluster = clock.lap();
+            let result = colored(&clusters, algorithm, &clustering, arguments)?;
+            (result, cluster, clock.lap())
         }
-        // One pass after the other: a single round.
-        _ => (greedy(&clusters, Order::LargestFirst), 1),
+        Problem::Graph(graph) => {
+            let clusters = graph.quotient(&clustering);
+            let cluster = clock.lap();
+            let result = colored(&clusters, algorithm, &clustering, arguments)?;
+            (result, cluster, clock.lap())
+        }
     };
-    let color = clock.lap();
+    let coloring = result.coloring;
 
     let proof = problem.check(&clustering, &coloring);
     let verified = proof.verified;
     let metrics = ColoringMetrics::by_vertices(&coloring);
     let report = ColorReport {
         input: arguments.input.display().to_string(),
-        constraints: constraints.vertex_count(),
+        constraints: problem.vertex_count(),
         particles: problem.particle_count(),
         clusters: clustering.occupied(),
-        edges: clusters.edge_count(),
-        algorithm: algorithm.name(),
+        edges: proof.edges,
+        algorithm: algorithm.to_string(),
         clustering: method.to_string(),
         backend: "cpu",
         seed: arguments.seed,
+        balanced: arguments.balance.map(BalanceName::name),
         colors: metrics.colors,
         max_clique: proof.clique,
         evenness: metrics.into(),
         by_constraints: ColoringMetrics::by_weights(&coloring, clustering.sizes()).into(),
-        rounds,
+        rounds: result.rounds,
+        edge_visits: result.edge_visits,
         verified,
         ms: Times {
             read,
             graph,
-            cluster: clustered,
+            cluster,
             color,
         },
     };
@@ -91,6 +100,27 @@ pub(crate) fn color(arguments: &ColorArguments) -> Result<(), Failure> {
             "the coloring is not proper: this is a defect of incise, please report it"
         )))
     }
+}
+
+/// Colors the clusters and evens the colors out if that was asked for.
+fn colored(
+    clusters: &impl Conflicts,
+    algorithm: Algorithm,
+    clustering: &Clustering,
+    arguments: &ColorArguments,
+) -> Result<Colored, Failure> {
+    let mut result = color_by(algorithm, clusters, arguments.seed)
+        .map_err(|error| Failure::Run(error.into()))?;
+    match arguments.balance {
+        None => {}
+        Some(BalanceName::Clusters) => {
+            balance(clusters, &mut result.coloring);
+        }
+        Some(BalanceName::Constraints) => {
+            balance_weights(clusters, &mut result.coloring, clustering.sizes());
+        }
+    }
+    Ok(result)
 }
 
 /// Milliseconds from lap to lap.

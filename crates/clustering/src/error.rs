@@ -6,14 +6,16 @@
 pub enum ClusteringError {
     /// No clustering method has this name.
     #[error(
-        "there is no clustering '{text}'; write none, or serial:K with the largest cluster size K, as serial:10"
+        "there is no clustering '{text}'; write none, serial:K, serial-loose:K, greedy-k:K or pressure:K with a cluster size K, as serial:10"
     )]
     UnknownMethod {
         /// What was written.
         text: String,
     },
     /// A method whose cluster size is missing or no positive whole number.
-    #[error("clustering '{text}' needs a largest cluster size of at least 1, as serial:10")]
+    #[error(
+        "clustering '{text}' needs a largest cluster size of at least 1 after a colon, as serial:10"
+    )]
     BadSize {
         /// What was written.
         text: String,

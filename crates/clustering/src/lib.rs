@@ -3,36 +3,44 @@
 //! Colors run one after the other, so their number limits how parallel a solver is. Merging
 //! neighboring constraints into clusters and coloring the clusters needs fewer colors, converges
 //! better (Gauss-Seidel inside a cluster) and leaves a smaller graph to color. [`serial_neighbor`]
-//! is the paper's clustering (Algorithm 2); [`update_local`] changes only what a cut has touched
+//! is the paper's clustering (Algorithm 2), [`greedy_k_neighbor`] the one it compares with, and
+//! [`pressure`] one that aims at few colors; [`update_local`] changes only what a cut has touched
 //! (section 4.3).
 //!
-//! The algorithms take a [`ConstraintGraph`](incise_graph::ConstraintGraph) of anything; they know
-//! nothing of meshes.
+//! The algorithms take an [`Incidence`](incise_graph::Incidence) of anything; they know nothing of
+//! meshes. A graph alone is enough for [`serial_neighbor`].
 //!
 //! ```
 //! use std::num::NonZeroUsize;
 //!
-//! use incise_clustering::serial_neighbor;
-//! use incise_graph::{ConstraintGraph, Incidence};
+//! use incise_clustering::pressure;
+//! use incise_graph::Incidence;
 //!
 //! // A row of eight springs.
 //! let springs = Incidence::from_constraints(9, (0u32..8).map(|i| [i, i + 1]))?;
-//! let graph = ConstraintGraph::from_incidence(&springs);
 //!
-//! let pairs = serial_neighbor(&graph, NonZeroUsize::MIN.saturating_add(1));
+//! let pairs = pressure(&springs, NonZeroUsize::MIN.saturating_add(1));
 //! assert_eq!(pairs.occupied(), 4);
-//! assert_eq!(graph.quotient(&pairs).edge_count(), 3);
+//! // One row per pair: what a coloring has to keep apart.
+//! let clusters = springs.quotient(&pairs);
+//! assert_eq!(clusters.clique_bound(), 2);
 //! # Ok::<(), incise_graph::GraphError>(())
 //! ```
 
+mod candidates;
 mod error;
+mod greedy_k_neighbor;
 mod method;
+mod parts;
+mod pressure;
 mod serial_neighbor;
 mod update;
 
 pub use error::ClusteringError;
+pub use greedy_k_neighbor::greedy_k_neighbor;
 pub use method::{Method, cluster};
-pub use serial_neighbor::serial_neighbor;
+pub use pressure::pressure;
+pub use serial_neighbor::{serial_neighbor, serial_neighbor_incidence};
 pub use update::update_local;
 
 /// The example of the README, run as a test.

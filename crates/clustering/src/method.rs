@@ -4,52 +4,83 @@ use std::fmt;
 use std::num::NonZeroUsize;
 use std::str::FromStr;
 
-use incise_graph::{Clustering, ConstraintGraph};
+use incise_graph::{Clustering, Incidence};
 
-use crate::{ClusteringError, serial_neighbor};
+use crate::{ClusteringError, greedy_k_neighbor, pressure, serial_neighbor_incidence};
 
-/// A clustering method, chosen at run time; written `none` or `serial:10`.
+/// A clustering method, chosen at run time; written `none`, or a name and a size as in `serial:10`.
 ///
 /// ```
 /// use incise_clustering::{Method, cluster};
-/// use incise_graph::ConstraintGraph;
+/// use incise_graph::Incidence;
 ///
-/// let path = ConstraintGraph::from_edges(4, &[(0, 1), (1, 2), (2, 3)])?;
+/// let springs = Incidence::from_constraints(5, (0u32..4).map(|i| [i, i + 1]))?;
 /// let method: Method = "serial:2".parse()?;
-/// assert_eq!(cluster(method, &path).occupied(), 2);
-/// assert_eq!(cluster(Method::None, &path).occupied(), 4);
+/// assert_eq!(cluster(method, &springs).occupied(), 2);
+/// assert_eq!(cluster(Method::None, &springs).occupied(), 4);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Method {
-    /// Every constraint alone.
+    /// Every constraint alone: `none`.
     #[default]
     None,
-    /// [`serial_neighbor`] with this largest cluster size.
+    /// [`serial_neighbor`](crate::serial_neighbor) with this largest cluster size: `serial:K`.
     Serial(NonZeroUsize),
+    /// [`serial_neighbor`](crate::serial_neighbor) with up to this many constraints beside the
+    /// seed, so one more in all: `serial-loose:K`, the reading of the paper's counts.
+    SerialLoose(NonZeroUsize),
+    /// [`greedy_k_neighbor`] with this largest cluster size: `greedy-k:K`.
+    GreedyK(NonZeroUsize),
+    /// [`pressure`] with this largest cluster size: `pressure:K`.
+    Pressure(NonZeroUsize),
+}
+
+impl Method {
+    /// The largest size of a cluster.
+    ///
+    /// ```
+    /// use incise_clustering::Method;
+    ///
+    /// assert_eq!(Method::None.max_size().get(), 1);
+    /// assert_eq!("serial-loose:5".parse::<Method>()?.max_size().get(), 6);
+    /// # Ok::<(), incise_clustering::ClusteringError>(())
+    /// ```
+    #[must_use]
+    pub fn max_size(self) -> NonZeroUsize {
+        match self {
+            Self::None => NonZeroUsize::MIN,
+            Self::Serial(size) | Self::GreedyK(size) | Self::Pressure(size) => size,
+            Self::SerialLoose(beside) => beside.saturating_add(1),
+        }
+    }
 }
 
 impl FromStr for Method {
     type Err = ClusteringError;
 
     fn from_str(text: &str) -> Result<Self, ClusteringError> {
-        match text.split_once(':') {
-            None if text == "none" => Ok(Self::None),
-            None if text == "serial" => Err(ClusteringError::BadSize {
-                text: text.to_owned(),
-            }),
-            Some(("serial", size)) => {
-                size.parse()
-                    .map(Self::Serial)
-                    .map_err(|_| ClusteringError::BadSize {
-                        text: text.to_owned(),
-                    })
-            }
-            _ => Err(ClusteringError::UnknownMethod {
-                text: text.to_owned(),
-            }),
+        if text == "none" {
+            return Ok(Self::None);
         }
+        let (name, size) = text.split_once(':').unwrap_or((text, ""));
+        let method = match name {
+            "serial" => Self::Serial,
+            "serial-loose" => Self::SerialLoose,
+            "greedy-k" => Self::GreedyK,
+            "pressure" => Self::Pressure,
+            _ => {
+                return Err(ClusteringError::UnknownMethod {
+                    text: text.to_owned(),
+                });
+            }
+        };
+        size.parse()
+            .map(method)
+            .map_err(|_| ClusteringError::BadSize {
+                text: text.to_owned(),
+            })
     }
 }
 
@@ -58,16 +89,27 @@ impl fmt::Display for Method {
         match self {
             Self::None => f.write_str("none"),
             Self::Serial(size) => write!(f, "serial:{size}"),
+            Self::SerialLoose(size) => write!(f, "serial-loose:{size}"),
+            Self::GreedyK(size) => write!(f, "greedy-k:{size}"),
+            Self::Pressure(size) => write!(f, "pressure:{size}"),
         }
     }
 }
 
-/// Clusters `graph` by the given method. Deterministic.
+/// Clusters the constraints of `incidence` by the given method. Deterministic.
+///
+/// A graph that came without incidence can be clustered by
+/// [`serial_neighbor`](crate::serial_neighbor).
 #[must_use]
-pub fn cluster(method: Method, graph: &ConstraintGraph) -> Clustering {
+pub fn cluster(method: Method, incidence: &Incidence) -> Clustering {
+    let max_size = method.max_size();
     match method {
-        Method::None => Clustering::none(graph.vertex_count()),
-        Method::Serial(max_size) => serial_neighbor(graph, max_size),
+        Method::None => Clustering::none(incidence.constraint_count()),
+        Method::Serial(_) | Method::SerialLoose(_) => {
+            serial_neighbor_incidence(incidence, max_size)
+        }
+        Method::GreedyK(_) => greedy_k_neighbor(incidence, max_size),
+        Method::Pressure(_) => pressure(incidence, max_size),
     }
 }
 
@@ -77,7 +119,14 @@ mod tests {
 
     #[test]
     fn names_round_trip() {
-        for text in ["none", "serial:1", "serial:10"] {
+        for text in [
+            "none",
+            "serial:1",
+            "serial:10",
+            "serial-loose:5",
+            "greedy-k:7",
+            "pressure:256",
+        ] {
             assert_eq!(text.parse::<Method>().unwrap().to_string(), text);
         }
     }
@@ -91,6 +140,9 @@ mod tests {
             "serial:x",
             "serial",
             "serial:99999999999999999999",
+            "serial-loose:0",
+            "greedy-k",
+            "pressure:",
         ] {
             let error = text.parse::<Method>().unwrap_err();
             assert_eq!(
@@ -100,7 +152,7 @@ mod tests {
                 }
             );
         }
-        for text in ["", "None", "none:3", "cereal:3"] {
+        for text in ["", "None", "none:3", "cereal:3", "greedy:3", "pressure 3"] {
             let error = text.parse::<Method>().unwrap_err();
             assert_eq!(
                 error,
@@ -109,5 +161,22 @@ mod tests {
                 }
             );
         }
+        let message = "cereal:3".parse::<Method>().unwrap_err().to_string();
+        for name in [
+            "none",
+            "serial:K",
+            "serial-loose:K",
+            "greedy-k:K",
+            "pressure:K",
+        ] {
+            assert!(message.contains(name), "{message} lacks {name}");
+        }
+    }
+
+    #[test]
+    fn the_loose_reading_counts_the_seed_extra() {
+        let fan = Incidence::from_constraints(1, [[0u32]; 12]).unwrap();
+        let size = |name: &str| cluster(name.parse().unwrap(), &fan).max_size();
+        assert_eq!((size("serial:3"), size("serial-loose:3")), (3, 4));
     }
 }

@@ -3,5 +3,8 @@
 
 #![expect(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
+mod greedy_k_neighbor;
+mod inputs;
+mod methods;
 mod serial_neighbor;
 mod update;

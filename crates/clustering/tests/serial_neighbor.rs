@@ -2,19 +2,12 @@
 
 use std::num::NonZeroUsize;
 
-use incise_clustering::serial_neighbor;
+use incise_clustering::{serial_neighbor, serial_neighbor_incidence};
 use incise_coloring::{Order, greedy, scgc};
-use incise_graph::{ClusterId, Clustering, ConstraintGraph, Incidence, Schedule};
-use proptest::collection::{btree_set, vec};
+use incise_graph::{ClusterId, Clustering, ConstraintGraph, Schedule};
 use proptest::prelude::*;
 
-/// Constraints of arity 1 to 4 on a few particles.
-fn incidences() -> impl Strategy<Value = Incidence> {
-    (4u32..40).prop_flat_map(|particles| {
-        vec(btree_set(0..particles, 1..=4), 0..60)
-            .prop_map(move |rows| Incidence::from_constraints(particles as usize, rows).unwrap())
-    })
-}
+use crate::inputs::incidences;
 
 /// The algorithm as printed, with sets for sets.
 fn as_printed(graph: &ConstraintGraph, ks: usize) -> Vec<Vec<u32>> {
@@ -61,6 +54,13 @@ proptest! {
         // A partition: every constraint in exactly one cluster.
         prop_assert!(clustering.labels().iter().all(|&k| k != ClusterId::NONE));
         prop_assert_eq!(clustering.sizes().iter().sum::<u32>() as usize, graph.vertex_count());
+    }
+
+    #[test]
+    fn incidence_gives_what_the_graph_gives(incidence in incidences(), ks in 1usize..70) {
+        let ks = NonZeroUsize::new(ks).unwrap();
+        let graph = ConstraintGraph::from_incidence(&incidence);
+        prop_assert_eq!(serial_neighbor_incidence(&incidence, ks), serial_neighbor(&graph, ks));
     }
 
     #[test]

@@ -3,8 +3,8 @@
 use std::num::NonZeroUsize;
 
 use incise_clustering::{serial_neighbor, update_local};
-use incise_coloring::{extend_first_fit, scgc};
-use incise_graph::{ConstraintGraph, Incidence, Schedule};
+use incise_coloring::{Recoloring, scgc};
+use incise_graph::{ClusterId, ConstraintGraph, Incidence, Schedule};
 use proptest::collection::{btree_set, vec};
 use proptest::prelude::*;
 
@@ -65,18 +65,30 @@ proptest! {
         let incidence = Incidence::from_constraints(44, springs.clone()).unwrap();
         let graph = ConstraintGraph::from_incidence(&incidence);
         let mut clustering = serial_neighbor(&graph, limit);
-        let mut coloring = scgc(&graph.quotient(&clustering)).coloring;
+        let coloring = scgc(&graph.quotient(&clustering)).coloring;
+        let pairs = |c: usize, k: ClusterId, springs: &[Vec<u32>]| {
+            let particles = springs[c].clone();
+            particles.into_iter().map(move |p| (k.0, p))
+        };
+        let labels = clustering.labels().to_vec();
+        let all: Vec<(u32, u32)> = (0..40).flat_map(|c| pairs(c, labels[c], &springs)).collect();
+        let mut recoloring = Recoloring::with_coloring(all, coloring, 1).unwrap();
+        let cut = cut as usize;
+        let removed: Vec<(u32, u32)> = pairs(cut, labels[cut], &springs).collect();
         // One spring becomes four in a chain through three new particles.
-        springs[cut as usize] = vec![cut, 41];
-        springs.extend([vec![41, 42], vec![42, 43], vec![43, cut + 1]]);
-        let after = Incidence::from_constraints(44, springs).unwrap();
-        let new = update_local(&mut clustering, &[cut], &[0, 4], &[cut, 40, 41, 42], limit).unwrap();
-        let clusters = ConstraintGraph::from_incidence(&after.quotient(&clustering));
-        let numbers: Vec<u32> = new.iter().map(|k| k.0).collect();
-        extend_first_fit(&mut coloring, &numbers, |k, list| {
-            list.extend_from_slice(clusters.neighbors(k as usize));
-        });
-        coloring.verify(&clusters).unwrap();
-        Schedule::new(&clustering, &coloring).check(&after).unwrap();
+        let number = u32::try_from(cut).unwrap();
+        springs[cut] = vec![number, 41];
+        springs.extend([vec![41, 42], vec![42, 43], vec![43, number + 1]]);
+        let after = Incidence::from_constraints(44, springs.clone()).unwrap();
+        let values = [number, 40, 41, 42];
+        update_local(&mut clustering, &[number], &[0, 4], &values, limit).unwrap();
+        let labels = clustering.labels();
+        let new = values.map(|c| c as usize);
+        let added: Vec<(u32, u32)> = new.into_iter().flat_map(|c| pairs(c, labels[c], &springs)).collect();
+        recoloring.apply(&removed, &added).unwrap();
+        recoloring.check().unwrap();
+        let coloring = recoloring.coloring();
+        coloring.verify_incidence(&after.quotient(&clustering)).unwrap();
+        Schedule::new(&clustering, coloring).check(&after).unwrap();
     }
 }

@@ -44,6 +44,7 @@ mod recoloring;
 mod scgc;
 mod tabu;
 mod vivace;
+mod within;
 mod wlc;
 
 pub use algorithm::{Algorithm, Colored, color};
@@ -61,6 +62,7 @@ pub use recoloring::{Recolored, Recoloring};
 pub use scgc::{Scgc, ScgcStats, Shortcuts, jones_plassmann, scgc, scgc_with};
 pub use tabu::tabu;
 pub use vivace::{Tie, Vivace, VivaceOptions, VivaceStats, vivace};
+pub use within::color_within_clusters;
 pub use wlc::{Wlc, WlcStats, wlc};
 
 /// The example of the README, run as a test.

@@ -9,3 +9,4 @@ mod parallel;
 mod recoloring;
 mod rounds;
 mod sequential;
+mod within;

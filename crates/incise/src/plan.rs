@@ -6,7 +6,7 @@ use std::time::Instant;
 use incise_clustering::{Method, cluster, update_local};
 use incise_coloring::{Algorithm, Recoloring, color};
 use incise_cutting::CutDelta;
-use incise_graph::{Clustering, Coloring, ConstraintGraph, Incidence, Schedule};
+use incise_graph::{Clustering, Coloring, Incidence, Schedule};
 use incise_mesh::{ParticleId, TetId, TetMesh};
 
 use crate::report::{Milliseconds, milliseconds};
@@ -30,23 +30,19 @@ impl Plan {
     pub(crate) fn new(scene: &Scene, mesh: &TetMesh) -> Result<Self, Error> {
         let _span = tracing::debug_span!("incise::plan").entered();
         let method: Method = scene.solver.clustering.parse()?;
-        let algorithm = Algorithm::from_name(&scene.solver.coloring)?;
-        let graph = ConstraintGraph::from_incidence(&incidence(mesh)?);
-        let clustering = cluster(method, &graph);
-        let coloring = color(algorithm, &graph.quotient(&clustering));
+        let algorithm: Algorithm = scene.solver.coloring.parse()?;
+        let incidence = incidence(mesh)?;
+        let clustering = cluster(method, &incidence);
+        let coloring = color(algorithm, &incidence.quotient(&clustering), 0)?.coloring;
         let schedule = Schedule::new(&clustering, &coloring);
         let tets = mesh.tets.iter().zip(clustering.labels());
         let pairs = tets.flat_map(|(corners, cluster)| corners.map(|p| (cluster.0, p.0)));
         let recoloring = Recoloring::with_coloring(pairs, coloring, SLACK)?;
-        let limit = match method {
-            Method::Serial(size) => size,
-            _ => NonZeroUsize::MIN,
-        };
         Ok(Self {
             clustering,
             recoloring,
             schedule,
-            limit,
+            limit: method.max_size(),
         })
     }
 

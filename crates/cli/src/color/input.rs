@@ -1,14 +1,14 @@
 //! What `incise color` colors: the tets of a mesh, or the vertices of a graph file.
 //!
 //! The two differ in three things: how they are read, which clusterings they allow, and what proves
-//! a coloring proper. From the graph on, everything is the same.
+//! a coloring proper. A mesh is colored straight from the particles of its tets, without a graph.
 
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
 use anyhow::{Context, anyhow};
-use incise::clustering::Method;
+use incise::clustering::{Method, cluster, serial_neighbor};
 use incise::graph::{
     Clustering, Coloring, ConstraintGraph, GraphError, Incidence, read_dimacs, read_matrix_market,
 };
@@ -38,7 +38,7 @@ pub(crate) enum Source {
 #[derive(Debug)]
 pub(crate) enum Problem {
     /// The tets of a mesh, in each other's way when they share a particle.
-    Mesh(Incidence, ConstraintGraph),
+    Mesh(Incidence),
     Graph(ConstraintGraph),
 }
 
@@ -50,6 +50,8 @@ pub(crate) struct Proof {
     /// So many clusters are known to be all in each other's way: of a mesh the most at one
     /// particle, of a graph 2 if two clusters are adjacent.
     pub(crate) clique: usize,
+    /// The pairs of clusters that are in each other's way.
+    pub(crate) edges: usize,
 }
 
 impl Format {
@@ -65,7 +67,9 @@ impl Format {
     /// Refuses a clustering that needs more than a graph.
     pub(crate) fn require(self, method: Method) -> anyhow::Result<()> {
         match (self, method) {
-            (Self::Mesh, _) | (_, Method::None | Method::Serial(_)) => Ok(()),
+            (Self::Mesh, _) | (_, Method::None | Method::Serial(_) | Method::SerialLoose(_)) => {
+                Ok(())
+            }
             _ => Err(anyhow!(
                 "the clustering '{method}' needs the particles of a mesh: use none or serial:K for a graph"
             )),
@@ -117,24 +121,32 @@ impl Source {
             Self::Graph(graph) => Ok(Problem::Graph(graph)),
             Self::Mesh(mesh) => {
                 let incidence = Incidence::from_constraints(mesh.positions.len(), mesh.tets)?;
-                let graph = ConstraintGraph::from_incidence(&incidence);
-                Ok(Problem::Mesh(incidence, graph))
+                Ok(Problem::Mesh(incidence))
             }
         }
     }
 }
 
 impl Problem {
-    pub(crate) fn graph(&self) -> &ConstraintGraph {
+    pub(crate) fn vertex_count(&self) -> usize {
         match self {
-            Self::Mesh(_, graph) | Self::Graph(graph) => graph,
+            Self::Mesh(incidence) => incidence.constraint_count(),
+            Self::Graph(graph) => graph.vertex_count(),
+        }
+    }
+
+    /// Clusters by a method that the format allows.
+    pub(crate) fn cluster(&self, method: Method) -> Clustering {
+        match self {
+            Self::Mesh(incidence) => cluster(method, incidence),
+            Self::Graph(graph) => serial_neighbor(graph, method.max_size()),
         }
     }
 
     /// A graph has none.
     pub(crate) fn particle_count(&self) -> usize {
         match self {
-            Self::Mesh(incidence, _) => incidence.particle_count(),
+            Self::Mesh(incidence) => incidence.particle_count(),
             Self::Graph(_) => 0,
         }
     }
@@ -143,11 +155,12 @@ impl Problem {
     /// mesh by its particles, a graph by its edges between different clusters.
     pub(crate) fn check(&self, clustering: &Clustering, coloring: &Coloring) -> Proof {
         match self {
-            Self::Mesh(incidence, _) => {
+            Self::Mesh(incidence) => {
                 let clusters = incidence.quotient(clustering);
                 Proof {
                     verified: coloring.verify_incidence(&clusters).is_ok(),
                     clique: clusters.clique_bound(),
+                    edges: ConstraintGraph::from_incidence(&clusters).edge_count(),
                 }
             }
             Self::Graph(graph) => {
@@ -163,7 +176,11 @@ impl Problem {
                 };
                 let verified = coloring.vertex_count() == clustering.cluster_count()
                     && apart.all(|(a, b)| coloring.color(a.index()) != coloring.color(b.index()));
-                Proof { verified, clique }
+                Proof {
+                    verified,
+                    clique,
+                    edges: graph.quotient(clustering).edge_count(),
+                }
             }
         }
     }
@@ -178,10 +195,9 @@ mod tests {
     #[test]
     fn only_proper_colorings_are_verified() -> anyhow::Result<()> {
         let incidence = Incidence::from_constraints(4, [[0u32, 1], [1, 2], [2, 3]])?;
-        let graph = ConstraintGraph::from_incidence(&incidence);
         let problems = [
-            Problem::Mesh(incidence, graph.clone()),
-            Problem::Graph(graph),
+            Problem::Graph(ConstraintGraph::from_incidence(&incidence)),
+            Problem::Mesh(incidence),
         ];
         for problem in &problems {
             for (labels, colors, verified) in [

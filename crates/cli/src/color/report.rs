@@ -19,10 +19,12 @@ pub(crate) struct ColorReport {
     pub(crate) particles: usize,
     pub(crate) clusters: usize,
     pub(crate) edges: usize,
-    pub(crate) algorithm: &'static str,
+    pub(crate) algorithm: String,
     pub(crate) clustering: String,
     pub(crate) backend: &'static str,
     pub(crate) seed: u64,
+    /// By what the colors were made even, if they were.
+    pub(crate) balanced: Option<&'static str>,
     pub(crate) colors: usize,
     pub(crate) max_clique: usize,
     /// Counted in clusters; its fields are fields of the object.
@@ -31,6 +33,9 @@ pub(crate) struct ColorReport {
     /// Counted in constraints.
     pub(crate) by_constraints: Evenness,
     pub(crate) rounds: usize,
+    /// Where the algorithm counts them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) edge_visits: Option<u64>,
     pub(crate) verified: bool,
     pub(crate) ms: Times,
 }

@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 use incise_clustering::cluster;
-use incise_coloring::{Algorithm, color};
-use incise_graph::{ConstraintGraph, Incidence, Schedule};
+use incise_coloring::color;
+use incise_graph::{Incidence, Schedule};
 use incise_mesh::{TetId, TetMesh};
 use incise_xpbd::{Material, Real, Solver, StepSettings};
 
@@ -38,19 +38,20 @@ pub(crate) fn body<R: Real>(mesh: &TetMesh, material: Material) -> Solver<R> {
 }
 
 /// The schedule of a mesh by a coloring algorithm and a clustering method such as `none` or `serial:10`.
-pub(crate) fn schedule(mesh: &TetMesh, coloring: Algorithm, clustering: &str) -> Schedule {
+pub(crate) fn schedule(mesh: &TetMesh, coloring: &str, clustering: &str) -> Schedule {
     let corners = mesh.tets.iter().map(|tet| tet.map(|p| p.0));
     let incidence = Incidence::from_constraints(mesh.positions.len(), corners).unwrap();
-    let graph = ConstraintGraph::from_incidence(&incidence);
-    let clusters = cluster(clustering.parse().unwrap(), &graph);
-    let schedule = Schedule::new(&clusters, &color(coloring, &graph.quotient(&clusters)));
+    let clusters = cluster(clustering.parse().unwrap(), &incidence);
+    let quotient = incidence.quotient(&clusters);
+    let colored = color(coloring.parse().unwrap(), &quotient, 0).unwrap();
+    let schedule = Schedule::new(&clusters, &colored.coloring);
     schedule.check(&incidence).unwrap();
     schedule
 }
 
 /// The plain schedule: greedy, without clusters.
 pub(crate) fn plain(mesh: &TetMesh) -> Schedule {
-    schedule(mesh, Algorithm::Greedy, "none")
+    schedule(mesh, "greedy", "none")
 }
 
 /// One substep of one iteration of the time that gives the largest tet this `kappa`.

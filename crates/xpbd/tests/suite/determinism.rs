@@ -1,7 +1,6 @@
 //! The same bits for any number of threads, and from one release to the next.
 
 use glam::{DVec3, dvec3};
-use incise_coloring::Algorithm;
 use incise_mesh::generate::kuhn_box;
 use incise_xpbd::{Ground, Material, Real, StepSettings};
 
@@ -41,7 +40,7 @@ const DAMPED: Material = Material {
 /// The hash after some frames of a body of 48,000 tets on `threads` threads.
 fn state<R: Real>(threads: usize, clustering: &str, settings: &StepSettings) -> u64 {
     let mesh = kuhn_box([20, 20, 20], DVec3::ONE);
-    let schedule = schedule(&mesh, Algorithm::Scgc, clustering);
+    let schedule = schedule(&mesh, "scgc", clustering);
     // The solver shares a color out from 256 constraints on: most colors of this body are larger by far.
     let large = (0..schedule.color_count()).filter(|&c| schedule.color_constraints(c).len() > 1024);
     assert!(large.count() > 10);

@@ -1,7 +1,6 @@
 //! Energies and forces: rest, rotation, small strains, and that the solver's force is the slope of the energy.
 
 use glam::{DMat3, DQuat, DVec3, dvec3};
-use incise_coloring::Algorithm;
 use incise_mesh::{TetMesh, generate::kuhn_box};
 use incise_xpbd::{Material, Real, Solver};
 
@@ -150,7 +149,7 @@ fn the_solver_applies_the_slope_of_the_energy() {
         disturb(&mut solver, 0.1, 4);
         let force = slopes(&mut solver, 1e-6);
         let settings = substep(&solver, 1e-7);
-        let schedule = schedule(&mesh, Algorithm::Scgc, clustering);
+        let schedule = schedule(&mesh, "scgc", clustering);
         solver.step(&schedule, &settings).unwrap();
         let applied: Vec<DVec3> = (0..solver.particle_count())
             .map(|p| solver.velocity(p) * solver.mass(p) / settings.time_step)

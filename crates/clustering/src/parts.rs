@@ -1,0 +1,198 @@
+//! A clustering under construction: who is where, and the pressure on every particle.
+//!
+//! The *pressure* of a particle is the number of clusters that meet at it plus the number of its
+//! constraints that are still free. Before the first cluster it is the valence; each constraint
+//! that joins a cluster which is at the particle already takes one off; at the end it is the number
+//! of clusters that meet there.
+//!
+//! Members of a cluster are a linked list through all constraints, so clusters come and go without
+//! a list each. One cluster at a time is *open*: only it can be joined, and the particles it is at
+//! are marked. Cost: O(arity) per constraint that joins or is freed, O(members * arity) to open a
+//! cluster again.
+
+use incise_graph::{ClusterId, Clustering, Incidence};
+
+/// The end of a linked list, or the label of a free constraint.
+const NONE: u32 = u32::MAX;
+
+/// Labels, members and pressures.
+#[derive(Debug)]
+pub(crate) struct Parts<'a> {
+    pub(crate) incidence: &'a Incidence,
+    labels: Vec<u32>,
+    /// Cluster -> the member that joined last.
+    last: Vec<u32>,
+    /// Constraint -> the member that joined before it.
+    previous: Vec<u32>,
+    sizes: Vec<usize>,
+    /// Numbers of clusters without members.
+    vacant: Vec<u32>,
+    /// Particle -> clusters and free constraints there.
+    pressure: Vec<u32>,
+    /// Particle -> free constraints there.
+    free: Vec<u32>,
+    /// Particle -> the opening in which it was last found at the open cluster.
+    mark: Vec<u64>,
+    openings: u64,
+}
+
+impl<'a> Parts<'a> {
+    /// Every constraint free. O(constraints + particles).
+    pub(crate) fn new(incidence: &'a Incidence) -> Self {
+        let constraints = incidence.constraint_count();
+        let mut valence = vec![0; incidence.particle_count()];
+        for &p in incidence.values() {
+            valence[p as usize] += 1;
+        }
+        Self {
+            incidence,
+            labels: vec![NONE; constraints],
+            last: Vec::new(),
+            previous: vec![NONE; constraints],
+            sizes: Vec::new(),
+            vacant: Vec::new(),
+            pressure: valence.clone(),
+            free: valence,
+            mark: vec![0; incidence.particle_count()],
+            openings: 0,
+        }
+    }
+
+    pub(crate) fn is_free(&self, c: u32) -> bool {
+        self.labels[c as usize] == NONE
+    }
+
+    /// The cluster of `c`, which is in one.
+    pub(crate) fn cluster_of(&self, c: u32) -> u32 {
+        self.labels[c as usize]
+    }
+
+    pub(crate) fn pressure(&self, p: u32) -> u32 {
+        self.pressure[p as usize]
+    }
+
+    /// The largest pressure anywhere.
+    pub(crate) fn max_pressure(&self) -> u32 {
+        self.pressure.iter().copied().max().unwrap_or(0)
+    }
+
+    pub(crate) fn has_free(&self, p: u32) -> bool {
+        self.free[p as usize] > 0
+    }
+
+    /// The number of clusters numbered so far, vacant ones included.
+    pub(crate) fn cluster_count(&self) -> u32 {
+        (0..)
+            .zip(&self.sizes)
+            .last()
+            .map_or(0, |(k, _): (u32, _)| k + 1)
+    }
+
+    pub(crate) fn size(&self, cluster: u32) -> usize {
+        self.sizes[cluster as usize]
+    }
+
+    /// The members of a cluster, latest first.
+    pub(crate) fn members(&self, cluster: u32) -> impl Iterator<Item = u32> + '_ {
+        let listed = |c: u32| Some(c).filter(|&c| c != NONE);
+        std::iter::successors(listed(self.last[cluster as usize]), move |&c| {
+            listed(self.previous[c as usize])
+        })
+    }
+
+    /// Opens a new cluster without members.
+    pub(crate) fn start(&mut self) -> u32 {
+        self.openings += 1;
+        self.vacant.pop().unwrap_or_else(|| {
+            self.last.push(NONE);
+            self.sizes.push(0);
+            self.cluster_count() - 1
+        })
+    }
+
+    /// Opens a cluster that has members.
+    pub(crate) fn open(&mut self, cluster: u32) {
+        self.openings += 1;
+        let mut member = self.last[cluster as usize];
+        while member != NONE {
+            for &p in self.incidence.particles_of(member as usize) {
+                self.mark[p as usize] = self.openings;
+            }
+            member = self.previous[member as usize];
+        }
+    }
+
+    /// Whether the open cluster is at `p`.
+    pub(crate) fn is_open_at(&self, p: u32) -> bool {
+        self.mark[p as usize] == self.openings
+    }
+
+    /// Puts the free constraint `c` into the open cluster, which is `cluster`.
+    pub(crate) fn join(&mut self, c: u32, cluster: u32) {
+        self.labels[c as usize] = cluster;
+        self.previous[c as usize] = self.last[cluster as usize];
+        self.last[cluster as usize] = c;
+        self.sizes[cluster as usize] += 1;
+        for &p in self.incidence.particles_of(c as usize) {
+            let p = p as usize;
+            self.free[p] -= 1;
+            if self.mark[p] == self.openings {
+                self.pressure[p] -= 1;
+            }
+            self.mark[p] = self.openings;
+        }
+    }
+
+    /// Frees the member that joined last, of at least two.
+    pub(crate) fn free_last(&mut self, cluster: u32) {
+        let c = self.last[cluster as usize];
+        self.labels[c as usize] = NONE;
+        self.last[cluster as usize] = self.previous[c as usize];
+        self.sizes[cluster as usize] -= 1;
+        self.open(cluster);
+        for &p in self.incidence.particles_of(c as usize) {
+            let p = p as usize;
+            self.free[p] += 1;
+            if self.mark[p] == self.openings {
+                self.pressure[p] += 1;
+            }
+        }
+    }
+
+    /// Frees all members of a cluster. Its number is the next that [`start`](Self::start) gives.
+    pub(crate) fn dissolve(&mut self, cluster: u32) {
+        self.openings += 1;
+        let mut member = self.last[cluster as usize];
+        while member != NONE {
+            self.labels[member as usize] = NONE;
+            for &p in self.incidence.particles_of(member as usize) {
+                let p = p as usize;
+                self.free[p] += 1;
+                if self.mark[p] == self.openings {
+                    self.pressure[p] += 1;
+                }
+                self.mark[p] = self.openings;
+            }
+            member = self.previous[member as usize];
+        }
+        self.last[cluster as usize] = NONE;
+        self.sizes[cluster as usize] = 0;
+        self.vacant.push(cluster);
+    }
+
+    /// The finished clustering; clusters are numbered by their smallest member.
+    pub(crate) fn finish(self) -> Clustering {
+        let mut numbers = vec![NONE; self.last.len()];
+        let mut next = 0;
+        let labels = self.labels.iter().map(|&k| {
+            let number = &mut numbers[k as usize];
+            if *number == NONE {
+                *number = next;
+                next += 1;
+            }
+            ClusterId(*number)
+        });
+        Clustering::from_labels(labels.collect())
+            .expect("there are at most as many clusters as constraints")
+    }
+}
