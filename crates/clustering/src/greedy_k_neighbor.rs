@@ -24,8 +24,8 @@ use crate::candidates::Candidates;
 ///
 /// Ties go to the smallest number. Leftovers queue up in the order in which they became candidates:
 /// by the member whose joining made them so, then by the place of the shared particle in that
-/// member, then by number. If the queue is empty, the smallest free number starts. Deterministic. O(sum of
-/// arity * valence, times log), whatever `max_size` is.
+/// member, then by number. If the queue is empty, the smallest free number starts. Deterministic.
+/// O(sum over particles of valence squared, times log), whatever `max_size` is.
 ///
 /// ```
 /// use std::num::NonZeroUsize;

@@ -196,3 +196,55 @@ impl<'a> Parts<'a> {
             .expect("there are at most as many clusters as constraints")
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Compares the pressures and free counts with counting.
+    fn check(parts: &Parts<'_>) {
+        for p in (0..).take(parts.incidence.particle_count()) {
+            let constraints = parts.incidence.constraints_of(p as usize);
+            let free = constraints.iter().filter(|&&c| parts.is_free(c)).count();
+            let clustered = constraints.iter().filter(|&&c| !parts.is_free(c));
+            let mut clusters: Vec<u32> = clustered.map(|&c| parts.cluster_of(c)).collect();
+            clusters.sort_unstable();
+            clusters.dedup();
+            assert_eq!(parts.pressure(p) as usize, free + clusters.len(), "{p}");
+            assert_eq!(parts.has_free(p), free > 0);
+        }
+    }
+
+    #[test]
+    fn pressure_follows_every_step() {
+        let triangles = (0u32..6).map(|i| [0, i + 1, (i + 1) % 6 + 1]);
+        let wheel = Incidence::from_constraints(7, triangles).unwrap();
+        let mut parts = Parts::new(&wheel);
+        check(&parts);
+        let first = parts.start();
+        for c in [0, 1, 3] {
+            parts.join(c, first);
+            check(&parts);
+        }
+        let second = parts.start();
+        parts.join(2, second);
+        check(&parts);
+        assert_eq!((parts.pressure(0), parts.max_pressure()), (4, 4));
+        parts.open(first);
+        assert!(parts.is_open_at(2) && !parts.is_open_at(6));
+        parts.join(4, first);
+        check(&parts);
+        assert_eq!(parts.members(first).collect::<Vec<_>>(), [4, 3, 1, 0]);
+        parts.free_last(first);
+        check(&parts);
+        parts.dissolve(first);
+        check(&parts);
+        assert_eq!(parts.start(), first, "the number comes back");
+        for c in [0, 1, 3, 4, 5] {
+            parts.join(c, first);
+        }
+        check(&parts);
+        let labels = [0, 0, 1, 0, 0, 0].map(ClusterId);
+        assert_eq!(parts.finish().labels(), labels);
+    }
+}

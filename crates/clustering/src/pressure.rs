@@ -2,8 +2,8 @@
 //! anywhere.
 //!
 //! All clusters that meet at a particle need different colors, so the colors of the clustered graph
-//! are bounded below by the largest number of clusters at a particle, and coloring mostly reaches
-//! that bound. So this is what to lower. The pressure of a particle, its clusters plus its free
+//! are bounded below by the largest number of clusters at a particle, and on irregular meshes
+//! coloring comes close to that bound. So this is what to lower. The pressure of a particle, its clusters plus its free
 //! constraints, goes down by one whenever a constraint joins a cluster that is at the particle
 //! already. The method is our own, in three steps:
 //!
@@ -17,16 +17,16 @@
 //!    dissolved and grown anew, with the particle apparently under more pressure than it is. The
 //!    result is kept if the sum over the particles of 2^pressure went down, or the number of
 //!    clusters at the same sum; otherwise all is put back (ruin and recreate, Schrimpf and others
-//!    2000). There are at most two passes over the worst particles, and no attempt begins after as many constraints
-//!    have been dissolved as there are.
+//!    2000). There are at most two passes over the worst particles, and no attempt begins after as
+//!    many constraints have been dissolved as there are.
 //!
 //! Clusters larger than a particle has constraints relieve it anyhow. There the number of clusters
 //! around a cluster decides, which compactness keeps low: from a size limit of 32 on, growth counts
 //! the particles shared with each member, every one the same, and there is no third step. Both
 //! numbers and the constant were chosen by measuring on tetrahedral meshes.
 //!
-//! Cost: O(sum of arity * valence) score updates, each with the logarithm of a heap, for growing,
-//! and at most a few times that for regrowing.
+//! Cost: O(sum over particles of valence squared) score updates, each with the logarithm of a heap,
+//! for growing, and at most a few times that for regrowing.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -53,7 +53,7 @@ const PASSES: usize = 2;
 /// Every constraint is in one cluster. A cluster is connected: its members can be put in an order
 /// in which each but the first shares a particle with an earlier one. Clusters are numbered by
 /// their smallest member. Ties go to the smallest number; the arithmetic is in integers.
-/// Deterministic. O(sum of arity * valence, times log), whatever `max_size` is.
+/// Deterministic. O(sum over particles of valence squared, times log), whatever `max_size` is.
 ///
 /// ```
 /// use std::num::NonZeroUsize;

@@ -52,8 +52,8 @@ impl BlockSchedule {
     /// The schedule of clusters colored by `outer` (a color per cluster) whose members are colored
     /// by `inner` (a color per constraint).
     ///
-    /// Blocks of one color ascend by cluster, steps of a block by inner color, constraints of a step
-    /// by number. Vacant clusters get no block and unused inner colors no step. Constraints in no
+    /// Blocks of one color ascend by cluster, steps of a block by inner color, constraints of a
+    /// step by number. Vacant clusters get no block and unused inner colors no step. Constraints in no
     /// cluster are left out. The colorings are taken as they are; [`check`](Self::check) proves the
     /// result. O(constraints log block size + clusters + colors).
     ///
