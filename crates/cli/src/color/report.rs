@@ -24,6 +24,7 @@ pub(crate) struct ColorReport {
     pub(crate) backend: &'static str,
     pub(crate) seed: u64,
     /// By what the colors were made even, if they were.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) balanced: Option<&'static str>,
     pub(crate) colors: usize,
     pub(crate) max_clique: usize,

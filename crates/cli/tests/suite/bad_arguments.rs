@@ -51,7 +51,15 @@ fn names_and_numbers_that_do_not_exist() {
         (&["color", "tet.vtk", "--backend", "gpu"], &["GPU"]),
         (
             &["color", "tet.vtk", "--algorithm", "gredy"],
-            &["gredy", "scgc, greedy"],
+            &["gredy", "auto, scgc, jones-plassmann"],
+        ),
+        (
+            &["color", "tet.vtk", "--algorithm", "vivace:0"],
+            &["vivace:0", "whole number"],
+        ),
+        (
+            &["color", "tet.vtk", "--algorithm", "greedy:best"],
+            &["greedy:best", "smallest-last"],
         ),
         (
             &["color", "tet.vtk", "--clustering", "serial:0"],

@@ -113,7 +113,7 @@ fn colorings_are_proper_and_reported_truly() {
         let tets = tets(&place.read(source));
         for clustering in ["none", "serial:5", "serial:10"] {
             let mut all = Vec::new();
-            for algorithm in ["scgc", "greedy"] {
+            for algorithm in ["greedy", "scgc", "scgc:2", "jones-plassmann", "ecl-gc"] {
                 let report: Value = serde_json::from_str(&place.good(&[
                     "color",
                     file,
@@ -154,8 +154,69 @@ fn colorings_are_proper_and_reported_truly() {
                 assert!(sizes.values().all(|size| *size <= limit), "{clustering}");
                 all.push(rows);
             }
-            assert!(all[0] == all[1], "greedy and scgc differ with {clustering}");
+            let same = all.iter().all(|rows| *rows == all[0]);
+            assert!(
+                same,
+                "greedy and the parallel ones differ with {clustering}"
+            );
         }
+    }
+}
+
+/// What each name gives is proper by this file alone, and balancing keeps the number of colors.
+#[test]
+fn every_algorithm_and_clustering_can_be_named() {
+    let place = Place::with_mesh();
+    let tets = tets(&place.read("box.vtk"));
+    let color = |arguments: &[&str]| {
+        let all = [
+            &["color", "box.vtk", "--json", "--csv", "colors.csv"],
+            arguments,
+        ]
+        .concat();
+        let report: Value = serde_json::from_str(&place.good(&all)).unwrap();
+        let rows = rows(&place.read("colors.csv"));
+        assert_proper(&tets, &rows);
+        assert_evenness(&report, &rows);
+        assert_eq!(report["verified"], true);
+        assert!(report["rounds"].as_u64() >= Some(1));
+        report
+    };
+    for algorithm in [
+        "auto",
+        "vivace",
+        "vivace:4",
+        "wlc",
+        "wlc:10",
+        "mcs",
+        "greedy:natural",
+        "greedy:random",
+        "greedy:crowded",
+        "greedy:smallest-last",
+        "dsatur",
+        "iterated-greedy:20",
+        "tabu:500",
+    ] {
+        let report = color(&["--algorithm", algorithm, "--seed", "3"]);
+        assert_eq!(report["algorithm"], algorithm);
+    }
+    for clustering in [
+        "none",
+        "serial:5",
+        "serial-loose:5",
+        "greedy-k:5",
+        "pressure:5",
+    ] {
+        let plain = color(&["--clustering", clustering]);
+        let even = color(&["--clustering", clustering, "--balance"]);
+        assert_eq!(
+            (&even["colors"], &even["balanced"]),
+            (&plain["colors"], &"clusters".into())
+        );
+        assert!(even["range"].as_u64() <= plain["range"].as_u64().map(|range| range.min(2)));
+        let even = color(&["--clustering", clustering, "--balance=constraints"]);
+        let chi2 = |report: &Value| report["by_constraints"]["chi2"].as_f64().unwrap();
+        assert!(chi2(&even) <= chi2(&plain));
     }
 }
 
@@ -170,7 +231,7 @@ fn the_object_has_exactly_the_promised_keys() {
     assert_eq!(keys(&report["ms"]), names("read, graph, cluster, color"));
     assert_eq!(
         (&report["seed"], &report["clustering"], &report["algorithm"]),
-        (&7.into(), &"none".into(), &"scgc".into())
+        (&7.into(), &"none".into(), &"auto".into())
     );
     assert!(!text.contains("null"), "{text}");
     assert_eq!(place.names("."), ["box.vtk"]);
@@ -182,7 +243,7 @@ fn without_json_there_is_a_table() {
     for part in [
         "box.vtk",
         "colors",
-        "by scgc",
+        "by auto",
         "(serial:5)",
         "constraints, particles",
         "busy lanes",

@@ -79,8 +79,8 @@ fn results_are_those_of_the_last_version() {
          {body}damping = 0.001\n{strokes}"
     ));
     for (precision, golden) in [
-        (Precision::F32, 0x877f_0677_9de6_b4ad),
-        (Precision::F64, 0x94fe_0060_3386_9f95),
+        (Precision::F32, 0x9140_f6a1_8c40_30b2),
+        (Precision::F64, 0x335e_c5d0_ab24_8584),
     ] {
         scene.solver.precision = precision;
         let mut simulation = Simulation::with_threads(&scene, 2).unwrap();
