@@ -2,10 +2,13 @@
 //!
 //! One module per command; no algorithms of its own, except the slow ones that results are compared with.
 
+mod coloring;
 mod models;
 mod sweep;
 
 use clap::{Parser, Subcommand};
+use comfy_table::Table;
+use comfy_table::presets::ASCII_MARKDOWN;
 
 /// Sweeps over incise.
 #[derive(Debug, Parser)]
@@ -17,12 +20,23 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Color and cut meshes, check everything and write tables.
+    /// Cluster and color meshes in every way there is, and write tables.
+    Coloring(coloring::ColoringArguments),
+    /// Cut meshes, check everything and write a table.
     Sweep(sweep::SweepArguments),
 }
 
 fn main() -> anyhow::Result<()> {
     match Arguments::parse().command {
+        Command::Coloring(arguments) => coloring::coloring(&arguments),
         Command::Sweep(arguments) => sweep::sweep(&arguments),
     }
+}
+
+/// An empty table in Markdown.
+fn table<const N: usize>(header: [&str; N]) -> Table {
+    let mut table = Table::new();
+    table.load_style(ASCII_MARKDOWN);
+    table.set_header(header);
+    table
 }

@@ -1,25 +1,21 @@
-//! `cargo xtask sweep`: colors and cuts meshes, checks everything and writes tables.
+//! `cargo xtask sweep`: cuts meshes, checks everything and writes a table.
 //!
-//! Coloring: every mesh with every clustering and algorithm, verified from the incidence alone. Cutting: the built-in
-//! stroke on every mesh, once through the body at rest without snapping, where the number of pieces is known from the
-//! signs of the particles, and once in the built-in scene. After every cut everything derived is recomputed and
-//! compared, and at the end the volume at rest is compared with that at the start.
+//! The built-in stroke on every mesh, once through the body at rest without snapping, where the number of pieces is
+//! known from the signs of the particles, and once in the built-in scene. After every cut everything derived is
+//! recomputed and compared, and at the end the volume at rest is compared with that at the start.
 
 use std::path::PathBuf;
 
 use anyhow::ensure;
 use clap::Args;
 use comfy_table::Table;
-use comfy_table::presets::ASCII_MARKDOWN;
-use incise::clustering::{Method, cluster};
-use incise::coloring::{Order, greedy, scgc};
-use incise::graph::{ConstraintGraph, Incidence};
 use incise::mesh::TetMesh;
 use incise::mesh::glam::DVec3;
 use incise::scene::{Precision, StrokeSpec};
 use incise::{Scene, Simulation};
 
 use crate::models::{Model, models};
+use crate::table;
 
 #[derive(Debug, Args)]
 pub(crate) struct SweepArguments {
@@ -29,10 +25,10 @@ pub(crate) struct SweepArguments {
     /// Take the .vtk meshes of this folder instead of generated ones.
     #[arg(long, value_name = "DIR")]
     models: Option<PathBuf>,
-    /// Leave out meshes with more tets from cutting.
+    /// Leave out meshes with more tets.
     #[arg(long, value_name = "N", default_value_t = 60_000)]
     cut_at_most: usize,
-    /// Write the tables to this file as well.
+    /// Write the table to this file as well.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -43,68 +39,16 @@ pub(crate) struct SweepArguments {
 )]
 pub(crate) fn sweep(arguments: &SweepArguments) -> anyhow::Result<()> {
     let models = models(arguments.models.as_deref(), usize::MAX, arguments.quick)?;
-    let mut text = format!("## Coloring\n\n{}\n", coloring(&models)?);
     let small: Vec<&Model> = models
         .iter()
         .filter(|m| m.mesh.tets.len() <= arguments.cut_at_most)
         .collect();
-    text += &format!("\n## Cutting\n\n{}\n", cutting(&small)?);
+    let text = format!("## Cutting\n\n{}\n", cutting(&small)?);
     println!("{text}");
     if let Some(path) = &arguments.out {
         std::fs::write(path, text)?;
     }
     Ok(())
-}
-
-fn table<const N: usize>(header: [&str; N]) -> Table {
-    let mut table = Table::new();
-    table.load_style(ASCII_MARKDOWN);
-    table.set_header(header);
-    table
-}
-
-fn coloring(models: &[Model]) -> anyhow::Result<Table> {
-    let mut table = table([
-        "mesh",
-        "tets",
-        "clustering",
-        "clusters",
-        "edges",
-        "bound",
-        "colors",
-        "rounds",
-        "verified",
-    ]);
-    for model in models {
-        let mesh = &model.mesh;
-        let incidence =
-            Incidence::from_constraints(mesh.positions.len(), mesh.tets.iter().copied())?;
-        let graph = ConstraintGraph::from_incidence(&incidence);
-        for name in ["none", "serial:5", "serial:10"] {
-            let clustering = cluster(name.parse::<Method>()?, &incidence);
-            let (clusters, of_clusters) =
-                (graph.quotient(&clustering), incidence.quotient(&clustering));
-            let result = scgc(&clusters);
-            result.coloring.verify_incidence(&of_clusters)?;
-            ensure!(
-                result.coloring == greedy(&clusters, Order::LargestFirst),
-                "{}: scgc and greedy differ",
-                model.name
-            );
-            table.add_row([
-                model.name.clone(),
-                mesh.tets.len().to_string(),
-                name.to_owned(),
-                clustering.occupied().to_string(),
-                clusters.edge_count().to_string(),
-                of_clusters.clique_bound().to_string(),
-                result.coloring.color_count().to_string(),
-                result.stats.rounds.to_string(),
-                "yes".to_owned(),
-            ]);
-        }
-    }
-    Ok(table)
 }
 
 fn cutting(models: &[&Model]) -> anyhow::Result<Table> {
