@@ -173,7 +173,8 @@ impl FromStr for Algorithm {
 
 /// The shortcuts of a list of digits.
 fn shortcuts(digits: &str) -> Option<Shortcuts> {
-    Shortcuts::combinations()
+    Shortcuts::COMBINATIONS
+        .into_iter()
         .skip(1)
         .find(|&shortcuts| list(shortcuts) == digits)
 }

@@ -19,10 +19,11 @@
 //! of the original (fewer than 65,535 neighbors of higher priority) are gone. Cost: every pass
 //! looks at all edges of its undecided vertices.
 
-use incise_graph::{ColorId, Coloring, ConstraintGraph};
+use incise_graph::{ColorId, Coloring};
 use rayon::prelude::*;
 
-use crate::palette::Palettes;
+use crate::color_sets::ColorSets;
+use crate::higher::Higher;
 use crate::{Conflicts, priorities};
 
 /// A coloring and how it came about.
@@ -52,7 +53,7 @@ pub struct EclGcStats {
 }
 
 /// The degree from which on a vertex is large.
-const LARGE: u32 = 32;
+const LARGE: u64 = 32;
 
 /// Vertices per task at least.
 const GRAIN: usize = 256;
@@ -78,64 +79,31 @@ const NONE: u32 = u32::MAX;
 /// ```
 #[must_use]
 pub fn ecl_gc(conflicts: &impl Conflicts) -> EclGc {
-    let graph = conflicts.graph();
-    let higher = Higher::new(&graph);
+    let priorities = priorities(conflicts);
+    let higher = Higher::new(conflicts, &priorities);
+    // The degree is the first half of the priority.
+    let large: Vec<bool> = priorities.iter().map(|key| key >> 32 >= LARGE).collect();
     let mut stats = EclGcStats::default();
-    let mut colors = vec![NONE; graph.vertex_count()];
-    run_large(&graph, &higher, &mut colors, &mut stats);
-    run_small(&graph, &higher, &mut colors, &mut stats);
+    let mut colors = vec![NONE; large.len()];
+    run_large(&large, &higher, &mut colors, &mut stats);
+    run_small(&large, &higher, &mut colors, &mut stats);
     EclGc {
         coloring: Coloring::new(colors.into_iter().map(ColorId).collect()),
         stats,
     }
 }
 
-/// The neighbors of higher priority of every vertex.
-struct Higher {
-    offsets: Vec<usize>,
-    values: Vec<u32>,
-}
-
-impl Higher {
-    fn new(graph: &ConstraintGraph) -> Self {
-        let rank = priorities(graph);
-        let mut offsets = vec![0];
-        let mut values = Vec::with_capacity(graph.edge_count());
-        for (v, own) in rank.iter().enumerate() {
-            let neighbors = graph.neighbors(v).iter();
-            values.extend(neighbors.filter(|&&u| rank[u as usize] > *own));
-            offsets.push(values.len());
-        }
-        Self { offsets, values }
-    }
-
-    fn of(&self, v: u32) -> &[u32] {
-        &self.values[self.offsets[v as usize]..self.offsets[v as usize + 1]]
-    }
-
-    fn count(&self, v: u32) -> u32 {
-        // A row is shorter than the row of the graph, whose entries are numbered by 32 bits.
-        u32::try_from(self.of(v).len()).unwrap_or(NONE)
-    }
-}
-
 /// The first half. A large vertex waits for large ones only, as degree comes first in the priority.
-fn run_large(graph: &ConstraintGraph, higher: &Higher, colors: &mut [u32], stats: &mut EclGcStats) {
-    let degrees = graph.degrees();
+fn run_large(large: &[bool], higher: &Higher, colors: &mut [u32], stats: &mut EclGcStats) {
     let mut undecided: Vec<u32> = (0..)
-        .zip(&degrees)
-        .filter(|&(_, &degree)| degree >= LARGE)
-        .map(|(v, _)| v)
+        .take(large.len())
+        .filter(|&v| large[v as usize])
         .collect();
-    let sizes = (0..).zip(&degrees).map(|(v, &degree)| {
-        // Small vertices have their palettes elsewhere.
-        if degree >= LARGE {
-            higher.count(v) + 1
-        } else {
-            1
-        }
-    });
-    let palettes = Palettes::new(sizes);
+    let counts: Vec<u32> = higher.counts().collect();
+    // Small vertices have their palettes elsewhere.
+    let sizes = counts.iter().zip(large);
+    let sizes = sizes.map(|(count, &large)| if large { count + 1 } else { 1 });
+    let palettes = ColorSets::new(sizes);
     // The smallest color each may still get.
     let mut least = vec![0u32; colors.len()];
     while !undecided.is_empty() {
@@ -152,7 +120,7 @@ fn run_large(graph: &ConstraintGraph, higher: &Higher, colors: &mut [u32], stats
                     let color = colors[u as usize];
                     if color == NONE {
                         done = false;
-                        shortcut &= own < least[u as usize] || higher.count(u) < own;
+                        shortcut &= own < least[u as usize] || counts[u as usize] < own;
                     } else {
                         palettes.remove(v, color);
                     }
@@ -162,7 +130,7 @@ fn run_large(graph: &ConstraintGraph, higher: &Higher, colors: &mut [u32], stats
             })
             .collect();
         for (&v, &(best, decided, done)) in undecided.iter().zip(&outcomes) {
-            stats.edge_visits += u64::from(higher.count(v));
+            stats.edge_visits += u64::from(counts[v as usize]);
             least[v as usize] = best;
             if decided {
                 colors[v as usize] = best;
@@ -182,17 +150,16 @@ struct Small {
 }
 
 /// The second half: palettes in one word. The palette of a decided vertex is its color.
-fn run_small(graph: &ConstraintGraph, higher: &Higher, colors: &mut [u32], stats: &mut EclGcStats) {
+fn run_small(large: &[bool], higher: &Higher, colors: &mut [u32], stats: &mut EclGcStats) {
     let mut state: Vec<Small> = (0..)
-        .zip(graph.degrees())
-        .map(|(v, degree)| {
-            if degree >= LARGE {
+        .zip(large.iter().zip(higher.counts()))
+        .map(|(v, (&large, count)): (u32, _)| {
+            if large {
                 // Colors from 32 on are out of the reach of small vertices.
                 let color = colors[v as usize];
                 let palette = 1u32.checked_shl(color).unwrap_or(0);
                 return Small { palette, active: 0 };
             }
-            let count = higher.count(v);
             Small {
                 palette: u32::MAX >> (31 - count),
                 active: !(u32::MAX << count),

@@ -17,7 +17,7 @@
 use incise_graph::{ColorId, Coloring, ConstraintGraph};
 use rayon::prelude::*;
 
-use crate::palette::Palettes;
+use crate::color_sets::ColorSets;
 use crate::random::scramble;
 use crate::{ColoringError, Conflicts};
 
@@ -148,7 +148,7 @@ pub fn vivace(conflicts: &impl Conflicts, options: VivaceOptions) -> Result<Viva
 struct State<'g> {
     graph: &'g ConstraintGraph,
     options: VivaceOptions,
-    palettes: Palettes,
+    palettes: ColorSets,
     colors: Vec<u32>,
     /// What each vertex picked in this round.
     picked: Vec<u32>,
@@ -157,7 +157,7 @@ struct State<'g> {
 impl<'g> State<'g> {
     fn new(graph: &'g ConstraintGraph, options: VivaceOptions) -> Self {
         let degrees = graph.degrees();
-        let palettes = Palettes::new(degrees.iter().map(|degree| degree + 1));
+        let palettes = ColorSets::new(degrees.iter().map(|degree| degree + 1));
         for (v, degree) in (0..).zip(&degrees) {
             palettes.keep_first(v, degree / options.shrinking + 1);
         }

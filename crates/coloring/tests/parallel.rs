@@ -41,7 +41,7 @@ fn check(conflicts: &impl Conflicts) {
     let graph = conflicts.graph();
     let oracle = greedy(conflicts, Order::LargestFirst);
     let mut rounds = Vec::new();
-    for shortcuts in Shortcuts::combinations() {
+    for shortcuts in Shortcuts::COMBINATIONS {
         let result = scgc_with(conflicts, shortcuts);
         assert_eq!(result.coloring, oracle, "{shortcuts:?}");
         let stats = result.stats;
@@ -227,7 +227,7 @@ proptest! {
     fn random_constraints(incidence in constraints(90)) {
         check(&incidence);
         let graph = ConstraintGraph::from_incidence(&incidence);
-        for shortcuts in Shortcuts::combinations() {
+        for shortcuts in Shortcuts::COMBINATIONS {
             prop_assert_eq!(scgc_with(&incidence, shortcuts), scgc_with(&graph, shortcuts));
         }
         prop_assert_eq!(ecl_gc(&incidence), ecl_gc(&graph));
