@@ -6,8 +6,9 @@
 //!
 //! 1. first fit, most crowded first ([`Order::Crowded`]);
 //! 2. a few passes of [`iterated_greedy`](crate::iterated_greedy());
-//! 3. first fit in [`Order::SmallestLast`], if that is better;
-//! 4. [`tabu`](crate::tabu()) for as many steps as there are vertices, for each color to lose.
+//! 3. first fit in [`Order::SmallestLast`] and in [`Order::MaximumCardinality`];
+//! 4. [`tabu`](crate::tabu()) from the best so far, for as many steps as there are vertices, for each
+//!    color to lose.
 //!
 //! The steps are counted, not timed, so the result is the same on every machine.
 
@@ -33,17 +34,17 @@ pub struct Auto {
 const PASSES: usize = 5;
 
 /// Steps of the search for a color on small graphs.
-const MIN_STEPS: usize = 1000;
+const MIN_STEPS: usize = 5000;
 
 /// Any fixed number will do.
 const SEED: u64 = 1;
 
 /// Colors with few colors; stops early where it can tell that there are no fewer.
 ///
-/// Proper, deterministic, labels without gaps. A graph does not know its cliques, so it rarely
-/// stops early, and since [`Order::Crowded`] reads a graph differently, it may give another coloring than the
-/// incidence it came from. From O(entries) when the first attempt meets the bound to O(vertices *
-/// (degree + colors)) for each color lost and the last one tried.
+/// Proper, deterministic, labels without gaps. Since [`Order::Crowded`] and the bound read a graph
+/// differently, it may give another coloring than the incidence it came from. From O(entries) when
+/// the first attempt meets the bound to O(vertices * (degree + colors)) for each color lost and the
+/// last one tried.
 ///
 /// ```
 /// use incise_coloring::auto;
@@ -69,9 +70,13 @@ pub fn auto(conflicts: &impl Conflicts) -> Auto {
     if coloring.color_count() > bound {
         // From here on every step walks neighbors: with the edges at hand that is faster.
         let graph = conflicts.graph();
-        let smallest_last = greedy(&*graph, Order::SmallestLast);
-        if smallest_last.color_count() < coloring.color_count() {
-            *coloring = smallest_last;
+        for order in [Order::SmallestLast, Order::MaximumCardinality] {
+            if coloring.color_count() > bound {
+                let other = greedy(&*graph, order);
+                if other.color_count() < coloring.color_count() {
+                    *coloring = other;
+                }
+            }
         }
         let steps = coloring.vertex_count().max(MIN_STEPS);
         result.steps = tabu(&*graph, coloring, bound, steps, SEED);

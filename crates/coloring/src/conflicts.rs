@@ -20,6 +20,7 @@ use std::borrow::Cow;
 
 use incise_graph::{ColorId, ConstraintGraph, Incidence};
 
+use crate::clique::greedy_clique;
 use crate::first_fit::FirstFit;
 
 /// A set of vertices and who is in whose way: [`ConstraintGraph`] (vertices and edges) or
@@ -65,7 +66,7 @@ pub trait Conflicts: Sync {
     /// colors.
     ///
     /// From incidence, the largest number of constraints on one particle. A graph does not show its
-    /// cliques cheaply: 2 if there is an edge.
+    /// cliques: the largest one that a greedy search finds.
     fn clique_bound(&self) -> usize;
 
     /// Gives each vertex, in the given order, the smallest color that no neighbor has got before.
@@ -106,13 +107,9 @@ impl Conflicts for ConstraintGraph {
         Cow::Borrowed(self)
     }
 
-    /// O(1).
+    /// O(vertices + largest degree squared).
     fn clique_bound(&self) -> usize {
-        match (self.vertex_count(), self.edge_count()) {
-            (0, _) => 0,
-            (_, 0) => 1,
-            _ => 2,
-        }
+        greedy_clique(self)
     }
 
     /// O(vertices + edges).

@@ -29,6 +29,7 @@ mod algorithm;
 mod auto;
 mod balance;
 mod buckets;
+mod clique;
 mod color_sets;
 mod conflicts;
 mod dsatur;

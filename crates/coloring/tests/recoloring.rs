@@ -119,7 +119,8 @@ fn a_thousand_cuts() {
             if cut % 50 == 0 {
                 script.recoloring.check().unwrap();
                 let fresh = auto(&incidence).coloring.color_count();
-                assert!(report.colors <= fresh + slack);
+                // What auto reaches goes up and down by one as the constraints change.
+                assert!(report.colors <= fresh + slack.max(1));
             }
         }
         // The two new clusters have twelve links each, at particles with up to some thirty links.
