@@ -9,6 +9,7 @@ use std::path::Path;
 
 use anyhow::{Context, anyhow};
 use incise::clustering::{Method, cluster, serial_neighbor};
+use incise::coloring::Conflicts;
 use incise::graph::{
     Clustering, Coloring, ConstraintGraph, GraphError, Incidence, read_dimacs, read_matrix_market,
 };
@@ -48,7 +49,7 @@ pub(crate) struct Proof {
     /// Whether the coloring is proper, by the input alone.
     pub(crate) verified: bool,
     /// So many clusters are known to be all in each other's way: of a mesh the most at one
-    /// particle, of a graph 2 if two clusters are adjacent.
+    /// particle, of a graph the most that a greedy search finds.
     pub(crate) clique: usize,
     /// The pairs of clusters that are in each other's way.
     pub(crate) edges: usize,
@@ -168,18 +169,14 @@ impl Problem {
                 let mut apart = graph
                     .edges()
                     .map(|(a, b)| (labels[a as usize], labels[b as usize]))
-                    .filter(|(a, b)| a != b)
-                    .peekable();
-                let clique = match apart.peek() {
-                    Some(_) => 2,
-                    None => clustering.occupied().min(1),
-                };
+                    .filter(|(a, b)| a != b);
+                let clusters = graph.quotient(clustering);
                 let verified = coloring.vertex_count() == clustering.cluster_count()
                     && apart.all(|(a, b)| coloring.color(a.index()) != coloring.color(b.index()));
                 Proof {
                     verified,
-                    clique,
-                    edges: graph.quotient(clustering).edge_count(),
+                    clique: clusters.clique_bound(),
+                    edges: clusters.edge_count(),
                 }
             }
         }

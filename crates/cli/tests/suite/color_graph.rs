@@ -93,17 +93,20 @@ fn matrix_market(graph: &Known) -> String {
 #[test]
 fn known_graphs_get_enough_colors_and_not_too_many() {
     let place = Place::new();
-    for (name, graph) in [
-        ("mycielski3", mycielski(2)),
-        ("mycielski5", mycielski(4)),
-        ("queen5_5", queens()),
-        ("k33", complete(33)),
-        ("k1", complete(1)),
+    for (name, graph, clique) in [
+        ("mycielski3", mycielski(2), 2),
+        ("mycielski5", mycielski(4), 2),
+        ("queen5_5", queens(), 5),
+        ("k33", complete(33), 33),
+        ("k1", complete(1), 1),
     ] {
         let degree = |v: usize| graph.edges.iter().filter(|e| e.0 == v || e.1 == v).count();
         let most = (0..graph.vertices).map(degree).max().unwrap() + 1;
         place.write(&format!("{name}.col"), dimacs(&graph));
         place.write(&format!("{name}.MTX"), matrix_market(&graph));
+        let default = place.good(&["color", &format!("{name}.col"), "--json"]);
+        let default: Value = serde_json::from_str(&default).unwrap();
+        assert_eq!(default["colors"], graph.chromatic, "{name}");
         let mut all = Vec::new();
         for file in [format!("{name}.col"), format!("{name}.MTX")] {
             for algorithm in ["scgc", "greedy"] {
@@ -133,10 +136,7 @@ fn known_graphs_get_enough_colors_and_not_too_many() {
                 assert_eq!(report["clusters"], graph.vertices);
                 assert_eq!(report["edges"], graph.edges.len());
                 assert_eq!(report["particles"], 0);
-                assert_eq!(
-                    report["max_clique"],
-                    if graph.edges.is_empty() { 1 } else { 2 }
-                );
+                assert_eq!(report["max_clique"], clique);
                 assert_eq!(report["verified"], true);
                 if colors > 1 {
                     assert_evenness(&report, &rows);
