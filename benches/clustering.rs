@@ -6,7 +6,9 @@
 use std::num::NonZeroUsize;
 
 use criterion::BatchSize;
-use incise::clustering::{serial_neighbor, update_local};
+use incise::clustering::{
+    greedy_k_neighbor, pressure, serial_neighbor, serial_neighbor_incidence, update_local,
+};
 use incise::cutting::{CutDelta, CutOptions, CuttableMesh, Plane, cut_plane};
 use incise::mesh::glam::DVec3;
 use incise_benches::Case;
@@ -16,8 +18,21 @@ fn main() {
         let case = bench.case;
         let graph = case.graph();
         let [five, ten] = [4, 9].map(|more| NonZeroUsize::MIN.saturating_add(more));
-        bench.measure("serial5", |b| b.iter(|| serial_neighbor(&graph, five)));
-        bench.measure("serial10", |b| b.iter(|| serial_neighbor(&graph, ten)));
+        let incidence = case.incidence();
+        for (size, limit) in [(5, five), (10, ten)] {
+            bench.measure(&format!("serial{size}"), |b| {
+                b.iter(|| serial_neighbor_incidence(&incidence, limit));
+            });
+            bench.measure(&format!("greedy-k{size}"), |b| {
+                b.iter(|| greedy_k_neighbor(&incidence, limit));
+            });
+            bench.measure(&format!("pressure{size}"), |b| {
+                b.iter(|| pressure(&incidence, limit));
+            });
+        }
+        bench.measure("serial10-from-graph", |b| {
+            b.iter(|| serial_neighbor(&graph, ten));
+        });
 
         let clustering = serial_neighbor(&graph, ten);
         let delta = cut(case);
