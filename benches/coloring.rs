@@ -37,8 +37,9 @@ fn main() {
             measure("ecl-gc", &|| drop(ecl_gc(graph)));
             measure("wlc", &|| drop(wlc(graph, chunk)));
             let start = auto(incidence).coloring;
+            let one_each = vec![1; incidence.constraint_count()];
             measure("balance", &|| {
-                balance(incidence, &mut start.clone());
+                balance(incidence, &mut start.clone(), &one_each);
             });
         }
     });

@@ -7,9 +7,7 @@ use std::time::Instant;
 
 use anyhow::anyhow;
 use incise::clustering::Method;
-use incise::coloring::{
-    Algorithm, Colored, Conflicts, balance, balance_weights, color as color_by,
-};
+use incise::coloring::{Algorithm, Colored, Conflicts, balance, color as color_by};
 use incise::graph::{Clustering, ColoringMetrics};
 
 use crate::args::{BalanceName, ColorArguments};
@@ -114,10 +112,11 @@ fn colored(
     match arguments.balance {
         None => {}
         Some(BalanceName::Clusters) => {
-            balance(clusters, &mut result.coloring);
+            let one_each = vec![1; clusters.vertex_count()];
+            balance(clusters, &mut result.coloring, &one_each);
         }
         Some(BalanceName::Constraints) => {
-            balance_weights(clusters, &mut result.coloring, clustering.sizes());
+            balance(clusters, &mut result.coloring, clustering.sizes());
         }
     }
     Ok(result)

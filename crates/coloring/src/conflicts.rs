@@ -62,6 +62,9 @@ pub trait Conflicts: Sync {
     /// All edges, in flat arrays: borrowed from a graph, built from incidence.
     fn graph(&self) -> Cow<'_, ConstraintGraph>;
 
+    /// The incidence itself, if this is one: some questions are cheaper asked of particles.
+    fn incidence(&self) -> Option<&Incidence>;
+
     /// A number of vertices known to be all in each other's way, so that no coloring has fewer
     /// colors.
     ///
@@ -105,6 +108,11 @@ impl Conflicts for ConstraintGraph {
     /// O(1).
     fn graph(&self) -> Cow<'_, ConstraintGraph> {
         Cow::Borrowed(self)
+    }
+
+    /// O(1).
+    fn incidence(&self) -> Option<&Incidence> {
+        None
     }
 
     /// O(vertices + largest degree squared).
@@ -166,6 +174,11 @@ impl Conflicts for Incidence {
     /// O(sum over particles of valence squared).
     fn graph(&self) -> Cow<'_, ConstraintGraph> {
         Cow::Owned(ConstraintGraph::from_incidence(self))
+    }
+
+    /// O(1).
+    fn incidence(&self) -> Option<&Incidence> {
+        Some(self)
     }
 
     /// O(particles).

@@ -54,7 +54,7 @@ mod wlc;
 
 pub use algorithm::{Algorithm, Colored, color};
 pub use auto::{Auto, auto};
-pub use balance::{BalanceStats, balance, balance_weights};
+pub use balance::{BalanceStats, balance};
 pub use conflicts::Conflicts;
 pub use dsatur::dsatur;
 pub use ecl_gc::{EclGc, EclGcStats, ecl_gc};

@@ -1,141 +1,313 @@
-//! Chains of moves: from a heavy class to a light one through classes in between.
+//! Chains of moves through classes in between: v from A to B, u from B to C, and so on.
 //!
-//! Say that class a *gives* to class b if some vertex of a has no neighbor in b. Along a path of
-//! giving classes every vertex moves one class on, which leaves the weights in between as they are
-//! if the vertices weigh the same. The vertices of one path never get in each other's way: whoever
-//! enters a class meets nobody there that was not there before, and whoever leaves makes room. A
-//! round finds a giver for every pair of classes in one pass over all vertices, and then takes
-//! shortest paths, checking each giver again, since earlier paths of the round have changed things.
-//! Cost: O(vertices * (degree + colors) + paths * colors^2).
+//! A class can give to another if one of its members has no neighbor there. A shortest path in that
+//! graph of classes, from a heavy class to a light one, moves one vertex along each step. All of
+//! these moves can be made: a vertex enters a class where it has no neighbor, so it has none among
+//! those that stay either. If all of them have the same weight w, the classes in between keep their
+//! loads, and the sum of squares falls exactly if the light class and w together are lighter than
+//! the heavy one.
+//!
+//! Where that leads to no light class, a *detour* may: v takes the place of its only neighbor u in
+//! a class B, and u goes on to C. B keeps its load. A chain has at most one detour, and passes by B
+//! only there, so that its moves still do not meet.
+//!
+//! The graph of classes is never built: a search asks the members of the classes it comes by. A
+//! failed search proves that no direct moves lead from the classes it has seen before its detours
+//! to one light enough for this class, or for a lighter one. Later searches of the round stop
+//! there. A round in which all fail costs a question per vertex for direct moves and one per edge
+//! for detours, and again for those that several searches reach by a detour.
 
-use crate::Conflicts;
+use super::partition::{Members, NONE, Partition};
+use super::surroundings::Surroundings;
 
-use super::State;
+/// More than one vertex.
+const MANY: u32 = NONE - 1;
 
-/// Nobody.
-const NONE: u32 = u32::MAX;
+/// How a chain enters a class.
+#[derive(Clone, Copy, Debug)]
+struct Step {
+    /// The vertex that enters it.
+    mover: u32,
+    /// The vertex that takes the place of the mover, if it is pushed away, else [`NONE`].
+    pusher: u32,
+    /// The class of a mover that was pushed away, here or before in the chain, else [`NONE`].
+    detour: u32,
+}
 
-impl<C: Conflicts> State<'_, C> {
-    /// One round of chains; whether there was any.
-    pub(super) fn improve_by_chains(&mut self) -> bool {
-        let before = self.stats.chains;
-        let count = self.loads.len();
-        if self.spread() < 2 {
-            return false;
+impl Default for Step {
+    fn default() -> Self {
+        Self {
+            mover: NONE,
+            pusher: NONE,
+            detour: NONE,
         }
-        let mut givers = self.givers();
-        let mut heavy: Vec<usize> = (0..count).collect();
-        heavy.sort_by_key(|&class| (std::cmp::Reverse(self.loads[class]), class));
-        for from in heavy {
-            while self.chain(from, &mut givers) {
-                self.stats.chains += 1;
-            }
+    }
+}
+
+/// Arrays of the search, kept between calls.
+#[derive(Debug)]
+pub(super) struct Chains {
+    /// Vertices of positive weight, heavy ones first.
+    by_weight: Vec<u32>,
+    /// Classes in the order they were reached.
+    queue: Vec<u32>,
+    /// Class -> how it was reached.
+    steps: Vec<Step>,
+    /// Class -> the only neighbor there of the vertex at hand, or [`MANY`].
+    sole: Vec<u32>,
+    /// A bit per class: those reached in this search.
+    seen: Vec<u64>,
+    /// Those reached by direct moves alone, and `dead`.
+    closed: Vec<u64>,
+    /// Those from which direct moves lead nowhere in this round.
+    dead: Vec<u64>,
+    /// Those light enough for the source at hand.
+    targets: Vec<u64>,
+    /// Those that the vertex at hand cannot or need not enter.
+    taken: Vec<u64>,
+}
+
+impl Chains {
+    pub(super) fn new(partition: &Partition<'_>) -> Self {
+        let words = vec![0; partition.count().div_ceil(64)];
+        let ids = (0..)
+            .zip(partition.weights)
+            .filter(|(_, weight)| **weight > 0);
+        let mut by_weight: Vec<u32> = ids.map(|(v, _)| v).collect();
+        by_weight.sort_by_key(|&v| std::cmp::Reverse(partition.weights[v as usize]));
+        Self {
+            by_weight,
+            queue: Vec::new(),
+            steps: vec![Step::default(); partition.count()],
+            sole: vec![NONE; partition.count()],
+            seen: words.clone(),
+            closed: words.clone(),
+            dead: words.clone(),
+            targets: words.clone(),
+            taken: words,
         }
-        self.stats.chains > before
     }
 
-    /// The heaviest less the lightest class.
-    pub(super) fn spread(&self) -> u64 {
-        let most = self.loads.iter().max().copied().unwrap_or(0);
-        most - self.loads.iter().min().copied().unwrap_or(0)
+    /// Follows chains of each weight in turn, heavy ones first, until a round finds none; returns
+    /// their number.
+    pub(super) fn run(
+        &mut self,
+        partition: &mut Partition<'_>,
+        around: &mut impl Surroundings,
+    ) -> usize {
+        let mut members = Members::new(partition.class.len(), partition.count());
+        let by_weight = std::mem::take(&mut self.by_weight);
+        let mut total = 0;
+        let same =
+            |a: &u32, b: &u32| partition.weights[*a as usize] == partition.weights[*b as usize];
+        for group in by_weight.chunk_by(same) {
+            for &v in group.iter().rev() {
+                members.link(v, partition.class[v as usize]);
+            }
+            let weight = u64::from(partition.weights[group[0] as usize]);
+            loop {
+                let chains = self.round(weight, partition, &mut members, around);
+                total += chains;
+                if chains == 0 {
+                    break;
+                }
+            }
+            for &v in group {
+                members.unlink(v, partition.class[v as usize]);
+            }
+        }
+        self.by_weight = by_weight;
+        total
     }
 
-    /// For each pair of classes the lightest vertex of the first that fits into the second, row by
-    /// row.
-    fn givers(&mut self) -> Vec<u32> {
-        let count = self.loads.len();
-        let mut givers = vec![NONE; count * count];
-        for v in self.vertices() {
-            if self.weight(v) == 0 {
-                continue;
+    /// Searches from every class, heavy ones first, until each has failed.
+    fn round(
+        &mut self,
+        weight: u64,
+        partition: &mut Partition<'_>,
+        members: &mut Members,
+        around: &mut impl Surroundings,
+    ) -> usize {
+        let mut chains = 0;
+        self.dead.fill(0);
+        loop {
+            let alive = (0..)
+                .zip(&partition.loads)
+                .filter(|&(class, _)| !has(&self.dead, class) && members.any(class));
+            let Some((source, &load)) = alive.max_by_key(|&(class, load)| (load, !class)) else {
+                return chains;
+            };
+            self.targets.fill(0);
+            for (class, &other) in (0..).zip(&partition.loads) {
+                if other + weight < load {
+                    self.targets[class / 64] |= 1 << (class % 64);
+                }
             }
-            self.look_around(v);
-            let from = self.color(v);
-            for to in (0..count).filter(|&to| to != from) {
-                let giver = &mut givers[from * count + to];
-                if self.fits(to) && (*giver == NONE || self.weight(v) < self.weight(*giver)) {
-                    *giver = v;
+            if self.targets.iter().all(|&word| word == 0) {
+                return chains;
+            }
+            if let Some(target) = self.search(source, partition, members, around) {
+                chains += 1;
+                self.follow(source, target, partition, members, around);
+            } else {
+                self.dead.copy_from_slice(&self.closed);
+            }
+        }
+    }
+
+    /// Breadth first from `source` to a target, by direct moves; if there is none, once more from
+    /// where detours lead. Of several targets that one vertex can enter, the lightest is found.
+    fn search(
+        &mut self,
+        source: u32,
+        partition: &Partition<'_>,
+        members: &Members,
+        around: &impl Surroundings,
+    ) -> Option<u32> {
+        self.seen.copy_from_slice(&self.dead);
+        self.seen[source as usize / 64] |= 1 << (source % 64);
+        self.queue.clear();
+        self.queue.push(source);
+        self.steps[source as usize] = Step::default();
+        let target = self.search_direct(0, partition, members, around);
+        if target.is_some() {
+            return target;
+        }
+        self.closed.copy_from_slice(&self.seen);
+        let reached = self.queue.len();
+        let target = self.search_detours(partition, members, around);
+        target.or_else(|| self.search_direct(reached, partition, members, around))
+    }
+
+    /// Follows direct moves from the classes of the queue, beginning at place `at`.
+    fn search_direct(
+        &mut self,
+        mut at: usize,
+        partition: &Partition<'_>,
+        members: &Members,
+        around: &impl Surroundings,
+    ) -> Option<u32> {
+        while let Some(&class) = self.queue.get(at) {
+            at += 1;
+            let detour = self.steps[class as usize].detour;
+            for mover in members.of(class) {
+                let step = Step {
+                    mover,
+                    pusher: NONE,
+                    detour,
+                };
+                let target = self.open(step, partition, around);
+                if target.is_some() {
+                    return target;
                 }
             }
         }
-        givers
+        None
     }
 
-    /// Takes the first path from class `from`, in order of length, that lowers the sum of squares.
-    fn chain(&mut self, from: usize, givers: &mut [u32]) -> bool {
-        let count = self.loads.len();
-        // Breadth first; `parent` leads back.
-        let mut parent = vec![usize::MAX; count];
-        parent[from] = from;
-        let mut queue = vec![from];
-        let mut next = 0;
-        while next < queue.len() {
-            let class = queue[next];
-            next += 1;
-            for to in 0..count {
-                if parent[to] != usize::MAX || !self.still_gives(class, to, givers) {
-                    continue;
-                }
-                parent[to] = class;
-                queue.push(to);
-                let path = path_to(to, &parent, givers, count);
-                if self.lowers(&path) {
-                    for &(v, class) in &path {
-                        self.shift(v, class);
+    /// Finds what detours reach from the classes of the queue.
+    fn search_detours(
+        &mut self,
+        partition: &Partition<'_>,
+        members: &Members,
+        around: &impl Surroundings,
+    ) -> Option<u32> {
+        let reached = self.queue.len();
+        for at in 0..reached {
+            let class = self.queue[at];
+            for pusher in members.of(class) {
+                self.sole.fill(NONE);
+                around.visit_neighbors(pusher, |u| {
+                    let class = partition.class[u as usize];
+                    if class != NONE {
+                        let sole = &mut self.sole[class as usize];
+                        *sole = if *sole == NONE || *sole == u { u } else { MANY };
                     }
-                    return true;
+                });
+                for (detour, index) in (0..).zip(0..self.sole.len()) {
+                    let mover = self.sole[index];
+                    let pushes = mover != NONE
+                        && mover != MANY
+                        && partition.weights[mover as usize] == partition.weights[pusher as usize];
+                    // From closed classes nobody can go on.
+                    if pushes && !has(&self.closed, detour) {
+                        let step = Step {
+                            mover,
+                            pusher,
+                            detour,
+                        };
+                        let target = self.open(step, partition, around);
+                        if target.is_some() {
+                            return target;
+                        }
+                    }
                 }
             }
         }
-        false
+        None
     }
 
-    /// Is there still a known vertex to go from one class to the other?
-    fn still_gives(&mut self, from: usize, to: usize, givers: &mut [u32]) -> bool {
-        let giver = &mut givers[from * self.loads.len() + to];
-        if *giver == NONE {
-            return false;
+    /// Adds to the queue the classes that the mover of `step` can enter; the lightest target among
+    /// them.
+    fn open(
+        &mut self,
+        step: Step,
+        partition: &Partition<'_>,
+        around: &impl Surroundings,
+    ) -> Option<u32> {
+        self.taken.copy_from_slice(&self.seen);
+        around.add_taken(step.mover, &partition.class, &mut self.taken);
+        if step.detour != NONE {
+            self.taken[step.detour as usize / 64] |= 1 << (step.detour % 64);
         }
-        let v = *giver;
-        if self.color(v) == from {
-            self.look_around(v);
-            if self.fits(to) {
-                return true;
+        let start = self.queue.len();
+        for (base, word) in (0..).step_by(64).zip(0..self.taken.len()) {
+            // The last word has bits beyond the last class.
+            let classes = (partition.count() - 64 * word).min(64);
+            let mut free = !self.taken[word] & (u64::MAX >> (64 - classes));
+            self.seen[word] |= free;
+            while free != 0 {
+                let class: u32 = base + free.trailing_zeros();
+                free &= free - 1;
+                self.steps[class as usize] = step;
+                self.queue.push(class);
             }
         }
-        *giver = NONE;
-        false
+        let opened = self.queue[start..].iter().copied();
+        opened
+            .filter(|&class| has(&self.targets, class))
+            .min_by_key(|&class| (partition.loads[class as usize], class))
     }
 
-    /// Would these moves lower the sum of squared class weights?
-    fn lowers(&self, path: &[(u32, usize)]) -> bool {
-        let mut change = 0i128;
-        for (index, &(v, to)) in path.iter().enumerate() {
-            let weight = i128::from(self.weight(v));
-            if index == 0 {
-                change += squares(self.loads[self.color(v)], -weight);
+    /// Makes the moves that lead to `target`, the last one first.
+    fn follow(
+        &self,
+        source: u32,
+        target: u32,
+        partition: &mut Partition<'_>,
+        members: &mut Members,
+        around: &mut impl Surroundings,
+    ) {
+        let mut shift = |v: u32, to: u32| {
+            let from = partition.class[v as usize];
+            around.leave(v, from);
+            around.enter(v, to);
+            members.unlink(v, from);
+            members.link(v, to);
+            partition.shift(v, to);
+            from
+        };
+        let mut to = target;
+        while to != source {
+            let Step { mover, pusher, .. } = self.steps[to as usize];
+            to = shift(mover, to);
+            if pusher != NONE {
+                to = shift(pusher, to);
             }
-            let leaving = path.get(index + 1);
-            let leaving = leaving.map_or(0, |&(u, _)| i128::from(self.weight(u)));
-            change += squares(self.loads[to], weight - leaving);
         }
-        change < 0
     }
 }
 
-/// The change of the square of `load` when it changes by `by`.
-fn squares(load: u64, by: i128) -> i128 {
-    (2 * i128::from(load) + by) * by
-}
-
-/// The moves that lead to class `to`: each vertex with the class it goes to.
-fn path_to(to: usize, parent: &[usize], givers: &[u32], count: usize) -> Vec<(u32, usize)> {
-    let mut path = Vec::new();
-    let mut to = to;
-    while parent[to] != to {
-        path.push((givers[parent[to] * count + to], to));
-        to = parent[to];
-    }
-    path.reverse();
-    path
+fn has(words: &[u64], class: u32) -> bool {
+    words[class as usize / 64] >> (class % 64) & 1 == 1
 }
