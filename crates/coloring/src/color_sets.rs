@@ -17,16 +17,15 @@ pub(crate) struct ColorSets {
 }
 
 impl ColorSets {
-    /// Set `v` holds the colors below `sizes[v]`, of which there must be at least one.
-    pub(crate) fn new(sizes: impl Iterator<Item = u32>) -> Self {
+    /// Set `v` has room for the colors below `rooms[v].0` and holds those below `rooms[v].1`.
+    pub(crate) fn new(rooms: impl Iterator<Item = (u32, u32)>) -> Self {
         let mut offsets = vec![0];
         let mut words = Vec::new();
-        for size in sizes {
-            let full = size as usize / 64;
-            words.extend((0..full).map(|_| AtomicU64::new(u64::MAX)));
-            if !size.is_multiple_of(64) {
-                words.push(AtomicU64::new((1 << (size % 64)) - 1));
-            }
+        for (room, held) in rooms {
+            words.extend((0..room).step_by(64).map(|from| {
+                let bits = held.saturating_sub(from);
+                AtomicU64::new(if bits < 64 { (1 << bits) - 1 } else { u64::MAX })
+            }));
             // Fewer words than the graph has directed edges and vertices together, each below 2^32.
             offsets.push(u32::try_from(words.len()).expect("sets hold fewer than 2^32 words"));
         }
@@ -88,22 +87,6 @@ impl ColorSets {
         }
         unreachable!("vertex {v} has more colors than neighbors that can take them")
     }
-
-    /// Takes from `v` all but its `count` smallest colors.
-    pub(crate) fn keep_first(&self, v: u32, count: u32) {
-        let mut room = count;
-        for word in self.words(v) {
-            let mut bits = word.load(Relaxed);
-            let held = bits.count_ones();
-            if held > room {
-                for _ in room..held {
-                    bits &= !(1 << (63 - bits.leading_zeros()));
-                }
-                word.store(bits, Relaxed);
-            }
-            room = room.saturating_sub(held);
-        }
-    }
 }
 
 #[cfg(test)]
@@ -117,26 +100,29 @@ mod tests {
     #[test]
     fn sizes_around_words() {
         let sizes = [1, 63, 64, 65, 128, 130];
-        let sets = ColorSets::new(sizes.into_iter());
+        let full = ColorSets::new(sizes.into_iter().map(|size| (size, size)));
+        let small = ColorSets::new(sizes.into_iter().map(|size| (size, size.div_ceil(2))));
         for (v, size) in (0..).zip(sizes) {
-            assert_eq!(colors(&sets, v), (0..size).collect::<Vec<_>>());
+            assert_eq!(colors(&full, v), (0..size).collect::<Vec<_>>());
+            assert_eq!(colors(&small, v), (0..size.div_ceil(2)).collect::<Vec<_>>());
+            small.insert(v, size - 1);
+            assert_eq!(small.nth(v, small.count(v) - 1), size - 1);
         }
     }
 
     #[test]
-    fn sets_shrink() {
-        let sets = ColorSets::new([130, 70, 2].into_iter());
+    fn colors_go_and_come() {
+        let sets = ColorSets::new([(130, 130), (2, 2)].into_iter());
         for color in 0..65 {
             sets.remove(0, color);
         }
-        sets.remove(2, 99);
-        assert_eq!(sets.first(0, 0), 65);
-        sets.keep_first(0, 3);
-        assert_eq!(colors(&sets, 0), [65, 66, 67]);
-        assert_eq!((sets.count(0), sets.nth(0, 2)), (3, 67));
-        sets.insert(0, 129);
-        assert_eq!((sets.count(0), sets.nth(0, 3)), (4, 129));
-        sets.keep_first(1, 66);
-        assert_eq!(colors(&sets, 1), (0..66).collect::<Vec<_>>());
+        sets.remove(1, 99);
+        assert_eq!(
+            (sets.first(0, 0), sets.count(0), sets.nth(0, 2)),
+            (65, 65, 67)
+        );
+        sets.insert(0, 3);
+        assert_eq!((sets.first(0, 0), sets.count(0)), (3, 66));
+        assert_eq!(colors(&sets, 1), [0, 1]);
     }
 }

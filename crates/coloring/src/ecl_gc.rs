@@ -103,7 +103,7 @@ fn run_large(large: &[bool], higher: &Higher, colors: &mut [u32], stats: &mut Ec
     // Small vertices have their palettes elsewhere.
     let sizes = counts.iter().zip(large);
     let sizes = sizes.map(|(count, &large)| if large { count + 1 } else { 1 });
-    let palettes = ColorSets::new(sizes);
+    let palettes = ColorSets::new(sizes.map(|size| (size, size)));
     // The smallest color each may still get.
     let mut least = vec![0u32; colors.len()];
     while !undecided.is_empty() {

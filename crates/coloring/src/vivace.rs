@@ -157,10 +157,10 @@ struct State<'g> {
 impl<'g> State<'g> {
     fn new(graph: &'g ConstraintGraph, options: VivaceOptions) -> Self {
         let degrees = graph.degrees();
-        let palettes = ColorSets::new(degrees.iter().map(|degree| degree + 1));
-        for (v, degree) in (0..).zip(&degrees) {
-            palettes.keep_first(v, degree / options.shrinking + 1);
-        }
+        let rooms = degrees
+            .iter()
+            .map(|degree| (degree + 1, degree / options.shrinking + 1));
+        let palettes = ColorSets::new(rooms);
         Self {
             graph,
             options,
