@@ -32,17 +32,20 @@ impl ColorSets {
         Self { offsets, words }
     }
 
+    #[inline]
     fn words(&self, v: u32) -> &[AtomicU64] {
         &self.words[self.offsets[v as usize] as usize..self.offsets[v as usize + 1] as usize]
     }
 
     /// May `v` still get `color`?
+    #[inline]
     pub(crate) fn contains(&self, v: u32, color: u32) -> bool {
         let word = self.words(v).get(color as usize / 64);
         word.is_some_and(|word| word.load(Relaxed) >> (color % 64) & 1 == 1)
     }
 
     /// Takes `color` from `v`; nothing happens if it is not there.
+    #[inline]
     pub(crate) fn remove(&self, v: u32, color: u32) {
         if self.contains(v, color) {
             self.words(v)[color as usize / 64].fetch_and(!(1 << (color % 64)), Relaxed);
@@ -50,17 +53,20 @@ impl ColorSets {
     }
 
     /// Gives `color` to `v`, which must be below the size its set had at first.
+    #[inline]
     pub(crate) fn insert(&self, v: u32, color: u32) {
         self.words(v)[color as usize / 64].fetch_or(1 << (color % 64), Relaxed);
     }
 
     /// The number of colors of `v`.
+    #[inline]
     pub(crate) fn count(&self, v: u32) -> u32 {
         let words = self.words(v).iter();
         words.map(|word| word.load(Relaxed).count_ones()).sum()
     }
 
     /// The color of `v` that has `place` smaller ones before it; there must be one.
+    #[inline]
     pub(crate) fn nth(&self, v: u32, place: u32) -> u32 {
         let mut left = place;
         for (index, word) in (0..).zip(self.words(v)) {
@@ -78,6 +84,7 @@ impl ColorSets {
     }
 
     /// The smallest color of `v`, which is known to be `from` or larger.
+    #[inline]
     pub(crate) fn first(&self, v: u32, from: u32) -> u32 {
         for (index, word) in (0..).zip(self.words(v)).skip(from as usize / 64) {
             let bits = word.load(Relaxed);

@@ -13,6 +13,7 @@ pub(crate) struct FirstFit {
 
 impl FirstFit {
     /// The smallest color that is not among the `degree` or fewer `colors`.
+    #[inline]
     pub(crate) fn choose(
         &mut self,
         degree: usize,

@@ -14,6 +14,7 @@ impl Random {
     }
 
     /// The next number, any of 64 bits.
+    #[inline]
     pub(crate) fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         scramble(self.0)
@@ -21,6 +22,7 @@ impl Random {
 
     /// The next number below `end`, which must not be 0 and must fit in 32 bits; a little uneven
     /// where `end` comes near 2^32.
+    #[inline]
     pub(crate) fn below(&mut self, end: usize) -> usize {
         let index = ((self.next() >> 32) * end as u64) >> 32;
         usize::try_from(index).expect("the index is below `end`")
@@ -35,6 +37,7 @@ impl Random {
 }
 
 /// A bijection that looks random.
+#[inline]
 pub(crate) fn scramble(x: u64) -> u64 {
     let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
