@@ -14,6 +14,7 @@
 
 use incise_graph::Coloring;
 
+use crate::clique::clique_of_last_color;
 use crate::{Conflicts, Order, greedy, iterated_greedy, tabu};
 
 /// A coloring, what bounds it and what it took.
@@ -22,7 +23,8 @@ use crate::{Conflicts, Order, greedy, iterated_greedy, tabu};
 pub struct Auto {
     /// The coloring.
     pub coloring: Coloring,
-    /// [`Conflicts::clique_bound`]: if the coloring has as many colors, no other has fewer.
+    /// [`Conflicts::clique_bound`], or of a graph perhaps more: if the coloring has as many colors, no
+    /// other has fewer.
     pub bound: usize,
     /// Passes of iterated greedy.
     pub passes: usize,
@@ -58,28 +60,45 @@ const SEED: u64 = 1;
 /// ```
 #[must_use]
 pub fn auto(conflicts: &impl Conflicts) -> Auto {
-    let bound = conflicts.clique_bound();
     let mut result = Auto {
         coloring: greedy(conflicts, Order::Crowded),
-        bound,
+        bound: conflicts.clique_bound(),
         passes: 0,
         steps: 0,
     };
-    let coloring = &mut result.coloring;
-    result.passes = iterated_greedy(conflicts, coloring, PASSES, bound, SEED);
-    if coloring.color_count() > bound {
-        // From here on every step walks neighbors: with the edges at hand that is faster.
-        let graph = conflicts.graph();
-        for order in [Order::SmallestLast, Order::MaximumCardinality] {
-            if coloring.color_count() > bound {
-                let other = greedy(&*graph, order);
-                if other.color_count() < coloring.color_count() {
-                    *coloring = other;
-                }
-            }
-        }
-        let steps = coloring.vertex_count().max(MIN_STEPS);
-        result.steps = tabu(&*graph, coloring, bound, steps, SEED);
+    if !result.is_best(conflicts) {
+        let Auto {
+            coloring, bound, ..
+        } = &mut result;
+        result.passes = iterated_greedy(conflicts, coloring, PASSES, *bound, SEED);
     }
+    if result.is_best(conflicts) {
+        return result;
+    }
+    // From here on every step walks neighbors: with the edges at hand that is faster.
+    let graph = conflicts.graph();
+    for order in [Order::SmallestLast, Order::MaximumCardinality] {
+        let other = greedy(&*graph, order);
+        if other.color_count() < result.coloring.color_count() {
+            result.coloring = other;
+        }
+        if result.is_best(conflicts) {
+            return result;
+        }
+    }
+    let steps = graph.vertex_count().max(MIN_STEPS);
+    result.steps = tabu(&*graph, &mut result.coloring, result.bound, steps, SEED);
     result
+}
+
+impl Auto {
+    /// Are there as few colors as can be, as far as can be told? Looks for more cliques in a graph.
+    fn is_best(&mut self, conflicts: &impl Conflicts) -> bool {
+        let colors = self.coloring.color_count();
+        if conflicts.incidence().is_none() && colors > self.bound {
+            let clique = clique_of_last_color(&conflicts.graph(), &self.coloring);
+            self.bound = self.bound.max(clique);
+        }
+        colors <= self.bound
+    }
 }

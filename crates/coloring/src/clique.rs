@@ -3,18 +3,19 @@
 //! Incidence shows its cliques, a graph does not, and finding the largest is hard. But the graphs
 //! of constraints are full of cliques, and from a vertex of one most of it can be had greedily:
 //! take the neighbors in order of how many other neighbors they know, each that knows everybody
-//! taken so far. Tried from the vertices of largest degree only. Cost: O(vertices + starts * degree
-//! squared).
+//! taken so far. Good vertices to start from are those with many neighbors, and those that got the
+//! last color of a greedy coloring, since each of them has a neighbor of every other color. Cost:
+//! O(starts * degree squared), and one pass over the vertices.
 
 use std::cmp::Reverse;
 
-use incise_graph::ConstraintGraph;
+use incise_graph::{Coloring, ConstraintGraph};
 
-/// Vertices from which a clique is grown.
+/// Vertices from which a clique is grown at most.
 const STARTS: usize = 64;
 
-/// The size of the largest clique found.
-pub(crate) fn greedy_clique(graph: &ConstraintGraph) -> usize {
+/// The size of the largest clique found from the vertices of largest degree.
+pub(crate) fn clique_of_hubs(graph: &ConstraintGraph) -> usize {
     let mut starts: Vec<u32> = (0..).take(graph.vertex_count()).collect();
     let by_degree = |&v: &u32| (Reverse(graph.degree(v as usize)), v);
     if starts.len() > STARTS {
@@ -22,6 +23,18 @@ pub(crate) fn greedy_clique(graph: &ConstraintGraph) -> usize {
         starts.truncate(STARTS);
     }
     starts.sort_unstable_by_key(by_degree);
+    clique_from(graph, starts.into_iter())
+}
+
+/// The size of the largest clique found from vertices of the last color.
+pub(crate) fn clique_of_last_color(graph: &ConstraintGraph, coloring: &Coloring) -> usize {
+    let last = coloring.colors().iter().max();
+    let all = (0..).zip(coloring.colors());
+    let starts = all.filter(|(_, color)| Some(*color) == last);
+    clique_from(graph, starts.map(|(v, _)| v).take(STARTS))
+}
+
+fn clique_from(graph: &ConstraintGraph, starts: impl Iterator<Item = u32>) -> usize {
     let mut best = 0;
     // For each vertex the start that last looked at it, and how many of the clique know it.
     let mut near = vec![u32::MAX; graph.vertex_count()];
@@ -58,6 +71,8 @@ pub(crate) fn greedy_clique(graph: &ConstraintGraph) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use incise_graph::ColorId;
+
     use super::*;
 
     #[test]
@@ -67,9 +82,17 @@ mod tests {
             (0..10).flat_map(|b| (0..b).map(move |a| (a, b))).collect();
         edges.extend((10..60).map(|leaf| (0, leaf)));
         let graph = ConstraintGraph::from_edges(70, &edges).unwrap();
-        assert_eq!(greedy_clique(&graph), 10);
+        assert_eq!(clique_of_hubs(&graph), 10);
+        // From a leaf there is only an edge, from a vertex of the clique all of it.
+        let mut colors = vec![ColorId(0); 70];
+        colors[30] = ColorId(1);
+        let last =
+            |colors: &[ColorId]| clique_of_last_color(&graph, &Coloring::new(colors.to_vec()));
+        assert_eq!(last(&colors), 2);
+        colors[9] = ColorId(2);
+        assert_eq!(last(&colors), 10);
         let size = |vertices, edges: &[(u32, u32)]| {
-            greedy_clique(&ConstraintGraph::from_edges(vertices, edges).unwrap())
+            clique_of_hubs(&ConstraintGraph::from_edges(vertices, edges).unwrap())
         };
         assert_eq!((size(0, &[]), size(3, &[]), size(3, &[(0, 2)])), (0, 1, 2));
         // A ring of five has no triangle.

@@ -20,7 +20,7 @@ use std::borrow::Cow;
 
 use incise_graph::{ColorId, ConstraintGraph, Incidence};
 
-use crate::clique::greedy_clique;
+use crate::clique::clique_of_hubs;
 use crate::first_fit::FirstFit;
 
 /// A set of vertices and who is in whose way: [`ConstraintGraph`] (vertices and edges) or
@@ -117,7 +117,7 @@ impl Conflicts for ConstraintGraph {
 
     /// O(vertices + largest degree squared).
     fn clique_bound(&self) -> usize {
-        greedy_clique(self)
+        clique_of_hubs(self)
     }
 
     /// O(vertices + edges).
