@@ -1,27 +1,31 @@
-//! Colorings of constraint graphs: which constraints, or clusters of constraints, may run at the
-//! same time.
+//! Colorings of constraints, or of clusters of them: which may be solved at the same time.
 //!
-//! [`scgc`] is the paper's parallel algorithm (Algorithm 1), [`greedy`] the sequential one that
-//! defines its result: both give every vertex the smallest color that no neighbor of higher
-//! priority has, so they agree bit for bit, on any number of threads. [`Recoloring`] colors what a
-//! cut has added and leaves the rest alone. Nobody here has a limit on the number of
-//! colors: palettes are as long as the degrees ask for.
+//! Constraints of one color share no particle. [`auto`] finds a coloring with few colors, as few as
+//! can be where the most crowded particle proves it; [`balance`] makes the colors even;
+//! [`Recoloring`] follows constraints that come and go. [`scgc`] is the paper's parallel algorithm
+//! (Algorithm 1) with its shortcuts as flags; [`jones_plassmann`] and [`ecl_gc`] are its ancestors,
+//! and [`greedy`] in [`Order::LargestFirst`] defines the result of all three, bit for bit, on any
+//! number of threads. [`vivace`], [`wlc`], [`dsatur`], [`iterated_greedy`] and [`tabu`] complete the
+//! set; [`Algorithm`] names them all. There is no limit on the number of colors.
 //!
-//! The algorithms take a [`ConstraintGraph`](incise_graph::ConstraintGraph) of anything; they know
-//! nothing of meshes.
+//! Everything takes [`Conflicts`]: lists of particles per constraint
+//! ([`Incidence`](incise_graph::Incidence)), which is often enough and much faster than building a
+//! graph, or any graph ([`ConstraintGraph`](incise_graph::ConstraintGraph)). Nothing here knows of
+//! meshes.
 //!
 //! ```
-//! use incise_coloring::{Order, greedy, scgc};
+//! use incise_coloring::{Order, auto, greedy, scgc};
 //! use incise_graph::{ConstraintGraph, Incidence};
 //!
 //! // A closed ring of five springs.
 //! let ring = Incidence::from_constraints(5, (0u32..5).map(|i| [i, (i + 1) % 5]))?;
-//! let graph = ConstraintGraph::from_incidence(&ring);
+//! let coloring = auto(&ring).coloring;
+//! coloring.verify_incidence(&ring)?;
+//! assert_eq!(coloring.color_count(), 3);
 //!
-//! let result = scgc(&graph);
-//! result.coloring.verify(&graph)?;
-//! assert_eq!(result.coloring.color_count(), 3);
-//! assert_eq!(result.coloring, greedy(&graph, Order::LargestFirst));
+//! // In parallel, from the graph.
+//! let graph = ConstraintGraph::from_incidence(&ring);
+//! assert_eq!(scgc(&graph).coloring, greedy(&ring, Order::LargestFirst));
 //! # Ok::<(), incise_graph::GraphError>(())
 //! ```
 
