@@ -9,6 +9,7 @@
 use std::ops::Range;
 
 use crate::csr::offset;
+use crate::schedule::each_once;
 use crate::{ClusterId, Clustering, ColorId, Coloring, GraphError, Incidence, Schedule};
 
 /// Outer color -> blocks -> inner colors -> constraints.
@@ -183,25 +184,7 @@ impl BlockSchedule {
     /// particle; two constraints of one step on one particle, named with the place of the step in
     /// its block as the color.
     pub fn check(&self, incidence: &Incidence) -> Result<(), GraphError> {
-        let constraints = incidence.constraint_count();
-        let mut scheduled = vec![false; constraints];
-        for &constraint in &self.order {
-            match scheduled.get_mut(constraint as usize) {
-                None => {
-                    return Err(GraphError::Length {
-                        what: "block schedule",
-                        expected: constraints,
-                        found: constraint as usize + 1,
-                    });
-                }
-                Some(true) => return Err(GraphError::ScheduledTwice { constraint }),
-                Some(seen) => *seen = true,
-            }
-        }
-        let missing = |c: &usize| !scheduled[*c] && !incidence.particles_of(*c).is_empty();
-        if let Some(constraint) = (0..constraints).find(missing) {
-            return Err(GraphError::Unscheduled { constraint });
-        }
+        each_once("block schedule", &self.order, incidence)?;
         // Who was at each particle last.
         let mut last: Vec<Option<Visit>> = vec![None; incidence.particle_count()];
         for color in 0..self.color_count() {

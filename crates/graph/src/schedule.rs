@@ -214,26 +214,7 @@ impl Schedule {
     /// A constraint that is unknown, missing or there twice; two clusters of one color on one
     /// particle.
     pub fn check(&self, incidence: &Incidence) -> Result<(), GraphError> {
-        let constraints = incidence.constraint_count();
-        let mut scheduled = vec![false; constraints];
-        for &constraint in &self.order {
-            match scheduled.get_mut(constraint as usize) {
-                None => {
-                    let found = constraint as usize + 1;
-                    return Err(GraphError::Length {
-                        what: "schedule",
-                        expected: constraints,
-                        found,
-                    });
-                }
-                Some(true) => return Err(GraphError::ScheduledTwice { constraint }),
-                Some(seen) => *seen = true,
-            }
-        }
-        let missing = |c: &usize| !scheduled[*c] && !incidence.particles_of(*c).is_empty();
-        if let Some(constraint) = (0..constraints).find(missing) {
-            return Err(GraphError::Unscheduled { constraint });
-        }
+        each_once("schedule", &self.order, incidence)?;
         // The last slot and color that touched each particle.
         let mut touched = vec![(usize::MAX, usize::MAX); incidence.particle_count()];
         for color in 0..self.color_count() {
@@ -255,6 +236,34 @@ impl Schedule {
             }
         }
         Ok(())
+    }
+}
+
+/// An error unless `order` lists every constraint once; those without particles may be missing.
+pub(crate) fn each_once(
+    what: &'static str,
+    order: &[u32],
+    incidence: &Incidence,
+) -> Result<(), GraphError> {
+    let constraints = incidence.constraint_count();
+    let mut scheduled = vec![false; constraints];
+    for &constraint in order {
+        match scheduled.get_mut(constraint as usize) {
+            None => {
+                return Err(GraphError::Length {
+                    what,
+                    expected: constraints,
+                    found: constraint as usize + 1,
+                });
+            }
+            Some(true) => return Err(GraphError::ScheduledTwice { constraint }),
+            Some(seen) => *seen = true,
+        }
+    }
+    let missing = |c: &usize| !scheduled[*c] && !incidence.particles_of(*c).is_empty();
+    match (0..constraints).find(missing) {
+        Some(constraint) => Err(GraphError::Unscheduled { constraint }),
+        None => Ok(()),
     }
 }
 
