@@ -35,6 +35,9 @@ fn main() {
         measure("greedy-crowded", &|| {
             greedy(&case.incidence(), Order::Crowded)
         });
+        measure("greedy-largest-first", &|| {
+            greedy(&case.incidence(), Order::LargestFirst)
+        });
         measure("csr-greedy-natural", &|| natural(&graph()));
         measure("csr-greedy-largest-first", &|| {
             greedy(&graph(), Order::LargestFirst)

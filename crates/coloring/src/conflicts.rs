@@ -19,6 +19,7 @@
 use std::borrow::Cow;
 
 use incise_graph::{ColorId, ConstraintGraph, Incidence};
+use rayon::prelude::*;
 
 use crate::clique::clique_of_hubs;
 use crate::first_fit::FirstFit;
@@ -148,17 +149,22 @@ impl Conflicts for Incidence {
         }
     }
 
-    /// O(sum over particles of valence squared).
+    /// O(sum over particles of valence squared), in parallel in the current rayon thread pool.
     fn degrees(&self) -> Vec<u32> {
         let mut degrees = vec![0; self.constraint_count()];
-        let mut stamp = vec![u32::MAX; degrees.len()];
-        for (v, degree) in (0..).zip(&mut degrees) {
-            self.visit_neighbors(v, |u| {
-                let stamp = &mut stamp[u as usize];
-                *degree += u32::from(*stamp != v);
-                *stamp = v;
-            });
-        }
+        // A piece per thread, since each needs a stamp of its own for every constraint.
+        let piece = degrees.len().div_ceil(rayon::current_num_threads()).max(1);
+        let pieces = degrees.par_chunks_mut(piece).enumerate();
+        pieces.for_each(|(index, degrees)| {
+            let mut stamp = vec![u32::MAX; self.constraint_count()];
+            for (v, degree) in (0..).skip(index * piece).zip(degrees) {
+                self.visit_neighbors(v, |u| {
+                    let stamp = &mut stamp[u as usize];
+                    *degree += u32::from(*stamp != v);
+                    *stamp = v;
+                });
+            }
+        });
         degrees
     }
 

@@ -9,6 +9,8 @@
 //! first two entries decide alone, and a priority is one `u64`. Cost: O(1) each, O(n log n) for the
 //! order.
 
+use rayon::prelude::*;
+
 use crate::Conflicts;
 
 /// A scrambled number; different for different `id`s. Integer arithmetic only, so the same
@@ -48,7 +50,7 @@ pub fn priorities(conflicts: &impl Conflicts) -> Vec<u64> {
 #[must_use]
 pub fn priority_order(conflicts: &impl Conflicts) -> Vec<u32> {
     let mut order: Vec<(u64, u32)> = priorities(conflicts).into_iter().zip(0..).collect();
-    order.sort_unstable_by(|a, b| b.cmp(a));
+    order.par_sort_unstable_by(|a, b| b.cmp(a));
     order.into_iter().map(|(_, v)| v).collect()
 }
 
