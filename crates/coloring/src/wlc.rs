@@ -10,8 +10,10 @@
 //! On a machine whose threads all run at once, everybody near makes the same choice and few win: a
 //! clique loses all but one of its vertices in every round. Real machines take a worklist in
 //! pieces, and later pieces see what earlier ones chose. The size of a piece is a parameter here,
-//! the *chunk*: 1 is sequential first fit, the whole worklist is the worst case. Cost: O(edges of
-//! the worklist) a round; rounds up to the size of the largest clique within a chunk.
+//! the *chunk*: 1 is sequential first fit, the whole worklist is the worst case. Not in the
+//! original: after a round in which more than half of the worklist lost, the chunk is halved, so
+//! that no clique takes more rounds than about two logarithms of its size. Cost: O(edges of the
+//! worklist) a round; O(log vertices + log chunk) rounds.
 
 use std::num::NonZeroUsize;
 
@@ -48,7 +50,7 @@ pub struct WlcStats {
 const GRAIN: usize = 64;
 
 /// Colors speculatively in parallel, in the current rayon thread pool; `chunk` vertices choose at
-/// the same time.
+/// the same time, fewer after rounds in which most lost.
 ///
 /// Proper, labels without gaps, at most one color more than the largest degree. The result depends
 /// on the chunk, but not on the number of threads, nor on whether a graph is given or the incidence
@@ -74,10 +76,11 @@ pub fn wlc(conflicts: &impl Conflicts, chunk: NonZeroUsize) -> Wlc {
     let mut colors = vec![UNCOLORED; graph.vertex_count()];
     let mut stats = WlcStats::default();
     let mut worklist: Vec<u32> = (0..).take(graph.vertex_count()).collect();
+    let mut size = chunk.get().min(worklist.len());
     while !worklist.is_empty() {
         stats.rounds += 1;
         let mut losers = Vec::new();
-        for chunk in worklist.chunks(chunk.get()) {
+        for chunk in worklist.chunks(size) {
             let chosen: Vec<ColorId> = chunk
                 .par_iter()
                 .with_min_len(GRAIN)
@@ -109,6 +112,10 @@ pub fn wlc(conflicts: &impl Conflicts, chunk: NonZeroUsize) -> Wlc {
             losers.extend(lost);
         }
         stats.conflicts += losers.len();
+        if losers.len() > worklist.len() / 2 {
+            // With one vertex a chunk nobody loses, so this ends.
+            size = (size / 2).max(1);
+        }
         worklist = losers;
     }
     let mut coloring = Coloring::new(colors);

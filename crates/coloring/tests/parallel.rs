@@ -191,9 +191,17 @@ fn golden_hashes() {
         [
             (71, 1_875_300_665_919_296_404),
             (33, 7_105_074_515_219_873_475),
-            (33, 4_248_190_974_601_630_426),
+            (34, 11_244_840_884_543_282_536),
         ]
     );
+}
+
+/// In lock step a clique keeps one vertex a round; the chunk gives way before that takes forever.
+#[test]
+fn speculation_on_a_clique_ends_soon() {
+    let result = wlc(&clique(1500), NonZeroUsize::MAX);
+    assert_eq!(result.coloring.color_count(), 1500);
+    assert!(result.stats.rounds <= 25, "{} rounds", result.stats.rounds);
 }
 
 #[test]
