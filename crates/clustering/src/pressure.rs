@@ -3,9 +3,9 @@
 //!
 //! All clusters that meet at a particle need different colors, so the colors of the clustered graph
 //! are bounded below by the largest number of clusters at a particle, and on irregular meshes
-//! coloring comes close to that bound. So this is what to lower. The pressure of a particle, its clusters plus its free
-//! constraints, goes down by one whenever a constraint joins a cluster that is at the particle
-//! already. The method is our own, in three steps:
+//! coloring comes close to that bound. So this is what to lower. The pressure of a particle, its
+//! clusters plus its free constraints, goes down by one whenever a constraint joins a cluster that
+//! is at the particle already. The method is our own, in three steps:
 //!
 //! 1. **Grow.** Start at the particle of highest pressure; then add, again and again, the free
 //!    constraint whose particles shared with the cluster have the largest sum of pressures, plus a

@@ -7,8 +7,8 @@ use std::str::FromStr;
 use incise_graph::Coloring;
 
 use crate::{
-    ColoringError, Conflicts, Order, Shortcuts, VivaceOptions, auto, dsatur, ecl_gc, greedy,
-    iterated_greedy, scgc_with, tabu, vivace, wlc,
+    ColoringError, Conflicts, EclGc, Order, Scgc, Shortcuts, Vivace, VivaceOptions, Wlc, auto,
+    dsatur, ecl_gc, greedy, iterated_greedy, scgc_with, tabu, vivace, wlc,
 };
 
 /// A coloring algorithm, chosen at run time.
@@ -71,7 +71,7 @@ pub struct Colored {
     pub coloring: Coloring,
     /// Parallel rounds; 1 for the sequential algorithms.
     pub rounds: usize,
-    /// How often an uncolored vertex looked at a neighbor, where the algorithm counts it.
+    /// Looks at neighbors, where the algorithm counts them; its statistics say which.
     pub edge_visits: Option<u64>,
 }
 
@@ -232,24 +232,22 @@ pub fn color(
         rounds: 1,
         edge_visits: None,
     };
+    let parallel = |coloring, rounds, edge_visits| Colored {
+        coloring,
+        rounds,
+        edge_visits: Some(edge_visits),
+    };
     let bound = conflicts.clique_bound();
     Ok(match algorithm {
         Algorithm::Auto => sequential(auto(conflicts).coloring),
         Algorithm::Scgc(shortcuts) => {
-            let result = scgc_with(conflicts, shortcuts);
-            Colored {
-                coloring: result.coloring,
-                rounds: result.stats.rounds,
-                edge_visits: Some(result.stats.edge_visits),
-            }
+            let Scgc { coloring, stats } = scgc_with(conflicts, shortcuts);
+            parallel(coloring, stats.rounds, stats.edge_visits)
         }
         Algorithm::EclGc => {
-            let result = ecl_gc(conflicts);
-            Colored {
-                coloring: result.coloring,
-                rounds: result.stats.large_rounds + result.stats.small_rounds,
-                edge_visits: Some(result.stats.edge_visits),
-            }
+            let EclGc { coloring, stats } = ecl_gc(conflicts);
+            let rounds = stats.large_rounds + stats.small_rounds;
+            parallel(coloring, rounds, stats.edge_visits)
         }
         Algorithm::Vivace(factor) => {
             let options = VivaceOptions {
@@ -257,20 +255,12 @@ pub fn color(
                 seed,
                 ..VivaceOptions::default()
             };
-            let result = vivace(conflicts, options)?;
-            Colored {
-                coloring: result.coloring,
-                rounds: result.stats.rounds,
-                edge_visits: Some(result.stats.edge_visits),
-            }
+            let Vivace { coloring, stats } = vivace(conflicts, options)?;
+            parallel(coloring, stats.rounds, stats.edge_visits)
         }
         Algorithm::Wlc(chunk) => {
-            let result = wlc(conflicts, chunk);
-            Colored {
-                coloring: result.coloring,
-                rounds: result.stats.rounds,
-                edge_visits: Some(result.stats.edge_visits),
-            }
+            let Wlc { coloring, stats } = wlc(conflicts, chunk);
+            parallel(coloring, stats.rounds, stats.edge_visits)
         }
         Algorithm::Greedy(Order::Random(_)) => sequential(greedy(conflicts, Order::Random(seed))),
         Algorithm::Greedy(order) => sequential(greedy(conflicts, order)),

@@ -76,7 +76,8 @@ pub struct VivaceStats {
     pub labels: usize,
     /// How often a vertex ran out of colors.
     pub fed: usize,
-    /// How often an uncolored vertex looked at a neighbor.
+    /// The neighbors of the uncolored vertices, summed over the rounds. A round looks at each of them
+    /// up to three times.
     pub edge_visits: u64,
 }
 

@@ -42,7 +42,8 @@ pub struct WlcStats {
     pub rounds: usize,
     /// How often a vertex lost its color.
     pub conflicts: usize,
-    /// How often a vertex looked at a neighbor, to choose or to compare.
+    /// The neighbors of the vertices of all worklists, counted twice: to choose and, at most, to
+    /// compare.
     pub edge_visits: u64,
 }
 

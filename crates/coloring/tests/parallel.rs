@@ -152,7 +152,7 @@ fn threads_and_input_change_nothing() {
     let graph = ConstraintGraph::from_incidence(&incidence);
     let run = || {
         (
-            scgc(&graph),
+            Shortcuts::COMBINATIONS.map(|shortcuts| scgc_with(&graph, shortcuts)),
             jones_plassmann(&graph),
             ecl_gc(&graph),
             vivace(&graph, options(2, 9, Tie::HighestOfSame)).unwrap(),
@@ -163,7 +163,8 @@ fn threads_and_input_change_nothing() {
     for threads in [2, 3] {
         assert_eq!(with_threads(threads, run), one);
     }
-    assert_eq!(scgc(&incidence), one.0);
+    let from_incidence = |shortcuts| scgc_with(&incidence, shortcuts);
+    assert_eq!(Shortcuts::COMBINATIONS.map(from_incidence), one.0);
     assert_eq!(jones_plassmann(&incidence), one.1);
     assert_eq!(ecl_gc(&incidence), one.2);
     assert_eq!(

@@ -103,6 +103,7 @@ fn a_thousand_cuts() {
         let mut script = Script::new(&kuhn(8), slack, seed);
         let mut visited = 0;
         let mut full = 0;
+        let mut displaced = 0;
         for cut in 1..=1000 {
             let report = script.cut();
             let incidence = script.incidence();
@@ -116,6 +117,7 @@ fn a_thousand_cuts() {
             assert!(report.full || report.colored == 2);
             visited += report.visited;
             full += usize::from(report.full);
+            displaced += report.displaced;
             if cut % 50 == 0 {
                 script.recoloring.check().unwrap();
                 let fresh = auto(&incidence).coloring.color_count();
@@ -126,6 +128,7 @@ fn a_thousand_cuts() {
         // The two new clusters have twelve links each, at particles with up to some thirty links.
         assert!(visited < 1000 * 2 * 12 * 60, "{visited} links visited");
         assert!(full < 20, "{full} full colorings");
+        assert!(displaced > 0, "no neighbor ever had to move");
     }
 }
 
