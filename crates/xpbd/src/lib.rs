@@ -40,6 +40,7 @@
 //! leaves out the primal residual; use substeps, and watch [`Solver::kappa`].
 
 mod error;
+mod gauss_seidel;
 mod material;
 mod measure;
 mod neo_hookean;

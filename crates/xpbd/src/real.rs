@@ -168,6 +168,12 @@ pub(crate) fn load<R: Real>(particle: &[R::Atomic; 4]) -> R::Vector {
     )
 }
 
+/// The inverse mass of a particle in 1/kg; 0 if it does not move.
+#[inline]
+pub(crate) fn weight<R: Real>(particle: &[R::Atomic; 4]) -> R {
+    R::load(&particle[3])
+}
+
 /// Moves a particle.
 #[inline]
 pub(crate) fn store<R: Real>(particle: &[R::Atomic; 4], x: R::Vector) {

@@ -11,11 +11,10 @@
 use incise_graph::Schedule;
 use rayon::prelude::*;
 
-use crate::real::{finite, load, store};
+use crate::gauss_seidel::Pass;
+use crate::real::{finite, load, store, weight};
 use crate::{Ground, Real, Solver, StepSettings, XpbdError};
 
-/// Constraints in a color from which a second thread pays for its wake-up.
-const PARALLEL_CONSTRAINTS: usize = 256;
 /// Particles a thread takes at a time.
 const PARALLEL_PARTICLES: usize = 4096;
 
@@ -25,13 +24,6 @@ pub struct StepReport {
     /// Particles that would have become infinite or NaN and were put back where they were instead, counted once for
     /// each substep. Anything but 0 means the step is not to be trusted: use more substeps.
     pub repaired: usize,
-}
-
-/// What a pass over the constraints has to do beyond the plain solve; each choice is compiled on its own.
-struct Pass<R> {
-    time_squared: R,
-    per_time: R,
-    relaxation: R,
 }
 
 impl<R: Real> Solver<R> {
@@ -135,93 +127,13 @@ impl<R: Real> Solver<R> {
             .for_each(|((particle, previous), velocity)| {
                 let x = load::<R>(particle);
                 *previous = x;
-                if R::load(&particle[3]) > R::ZERO {
+                if weight::<R>(particle) > R::ZERO {
                     if let Some(change) = change {
                         *velocity += change;
                     }
                     store::<R>(particle, x + *velocity * time);
                 }
             });
-    }
-
-    /// One Gauss-Seidel pass over all constraints.
-    fn pass<const DAMPED: bool, const MULTIPLIERS: bool>(
-        &self,
-        schedule: &Schedule,
-        pass: &Pass<R>,
-    ) {
-        let threads = rayon::current_num_threads();
-        for color in 0..schedule.color_count() {
-            let solve = |tets: &[u32]| {
-                for &tet in tets {
-                    self.solve_tet::<DAMPED, MULTIPLIERS>(tet as usize, pass);
-                }
-            };
-            let tets = schedule.color_constraints(color);
-            if threads == 1 || tets.len() < PARALLEL_CONSTRAINTS {
-                solve(tets);
-            } else {
-                let clusters = schedule.clusters(color);
-                (0..threads).into_par_iter().for_each(|thread| {
-                    let share = |part| clusters.start + clusters.len() * part / threads;
-                    for cluster in share(thread)..share(thread + 1) {
-                        solve(schedule.constraints(cluster));
-                    }
-                });
-            }
-        }
-    }
-
-    #[inline]
-    fn solve_tet<const DAMPED: bool, const MULTIPLIERS: bool>(&self, tet: usize, pass: &Pass<R>) {
-        let constraint = &self.tets[tet];
-        let corners = constraint.particles.map(|p| &self.particles[p as usize]);
-        let x = corners.map(|corner| load::<R>(corner));
-        let weights = corners.map(|corner| R::load(&corner[3]));
-        let evaluation = constraint.evaluate(x);
-        let multipliers = if MULTIPLIERS {
-            self.multipliers_of(tet)
-        } else {
-            [R::ZERO; 2]
-        };
-        let (mut damping, mut rates) = (R::ZERO, [R::ZERO; 2]);
-        if DAMPED {
-            damping = R::from_f64(self.materials[usize::from(self.material_of[tet])].damping)
-                * pass.per_time;
-            let previous = constraint.particles.map(|p| self.previous[p as usize]);
-            let mut moved = [R::ZERO; 2];
-            for k in 0..4 {
-                let motion = x[k] - previous[k];
-                moved[0] = moved[0] + R::dot(evaluation.deviatoric_gradients[k], motion);
-                moved[1] = moved[1] + R::dot(evaluation.hydrostatic_gradients[k], motion);
-            }
-            rates = moved.map(|m| damping * m);
-        }
-        let change = constraint.solve(
-            &evaluation,
-            weights,
-            multipliers,
-            pass.time_squared,
-            damping,
-            rates,
-        );
-        let Some(change) = change else { return };
-        let change = change.map(|c| c * pass.relaxation);
-        for k in 0..4 {
-            let along = evaluation.deviatoric_gradients[k] * change[0]
-                + evaluation.hydrostatic_gradients[k] * change[1];
-            store::<R>(corners[k], x[k] + along * weights[k]);
-        }
-        if MULTIPLIERS {
-            for k in 0..2 {
-                (multipliers[k] + change[k]).store(&self.multipliers[tet][k]);
-            }
-        }
-    }
-
-    pub(crate) fn multipliers_of(&self, tet: usize) -> [R; 2] {
-        let [deviatoric, hydrostatic] = &self.multipliers[tet];
-        [R::load(deviatoric), R::load(hydrostatic)]
     }
 
     /// Lifts particles out of the ground; friction holds them back by at most its share of the depth.
@@ -234,7 +146,7 @@ impl<R: Real> Solver<R> {
                 let x = load::<R>(particle);
                 let [a, b, c] = R::components(x);
                 let depth = height - c;
-                if !(depth > R::ZERO && R::load(&particle[3]) > R::ZERO) {
+                if !(depth > R::ZERO && weight::<R>(particle) > R::ZERO) {
                     return;
                 }
                 let [dx, dy, _] = R::components(x - *previous);
@@ -257,7 +169,7 @@ impl<R: Real> Solver<R> {
             .zip(&self.previous)
             .zip(&mut self.velocities)
             .map(|((particle, previous), velocity)| {
-                if R::load(&particle[3]) <= R::ZERO {
+                if weight::<R>(particle) <= R::ZERO {
                     *velocity = R::Vector::default();
                     return 0;
                 }
