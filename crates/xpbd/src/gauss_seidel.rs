@@ -1,104 +1,109 @@
-//! One Gauss-Seidel pass over the tets: color after color, within a color in parallel.
+//! One pass over the tets: color after color, within a color in parallel, several tets in an instruction.
 //!
-//! Clusters of one color share no particle and run in parallel; a color too small to be worth a second thread stays on
-//! one.
+//! Clusters of one color share no particle. They are dealt to the threads in equal parts, and within a thread to the
+//! lanes of the processor; a color too small to be worth a second thread stays on one. Every tet sees the same numbers
+//! and rounds them in the same way whoever solves it, so threads and instruction sets change nothing but the time.
+//! A Jacobi pass goes the same way and writes elsewhere.
 //!
-//! Source: paper sections 3 and 4.1. Cost: 390 operations a tet.
+//! Source: paper sections 3 and 4.1. Cost: see [`crate::lanes`]; a barrier a color.
 
-use incise_graph::Schedule;
-use rayon::prelude::*;
+use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
-use crate::real::{load, store, weight};
-use crate::{Real, Solver};
+use crate::crew::in_rounds;
+use crate::lanes::{Kind, Pass, solve_block};
+use crate::{Form, Real};
 
-/// Constraints in a color from which a second thread pays for its wake-up.
-const PARALLEL_CONSTRAINTS: usize = 256;
+/// Blocks in a color from which a second thread pays: some microseconds of work.
+const PARALLEL_BLOCKS: usize = 32;
 
-/// What a pass over the constraints has to do beyond the plain solve; each choice is compiled on its own.
-pub(crate) struct Pass<R> {
-    pub(crate) time_squared: R,
-    pub(crate) per_time: R,
-    pub(crate) relaxation: R,
+struct Plain;
+struct Damped;
+struct Sequential;
+
+impl Kind for Plain {
+    const DAMPED: bool = false;
+    const SEQUENTIAL: bool = false;
 }
 
-impl<R: Real> Solver<R> {
-    /// One Gauss-Seidel pass over all constraints.
-    pub(crate) fn pass<const DAMPED: bool, const MULTIPLIERS: bool>(
-        &self,
-        schedule: &Schedule,
-        pass: &Pass<R>,
-    ) {
-        let threads = rayon::current_num_threads();
-        for color in 0..schedule.color_count() {
-            let solve = |tets: &[u32]| {
-                for &tet in tets {
-                    self.solve_tet::<DAMPED, MULTIPLIERS>(tet as usize, pass);
+impl Kind for Damped {
+    const DAMPED: bool = true;
+    const SEQUENTIAL: bool = false;
+}
+
+impl Kind for Sequential {
+    const DAMPED: bool = true;
+    const SEQUENTIAL: bool = true;
+}
+
+/// Makes a pass.
+pub(crate) fn run<R: Real>(level: Level, damped: bool, form: Form, pass: &Pass<'_, R>) {
+    match (form, damped) {
+        (Form::Block, false) => with::<R, Plain>(level, pass),
+        (Form::Block, true) => with::<R, Damped>(level, pass),
+        (Form::Sequential, _) => with::<R, Sequential>(level, pass),
+    }
+}
+
+/// Of the instruction sets of x86-64, SSE 4.2 has nothing over SSE 2 that the kernel needs.
+#[cfg(target_arch = "x86_64")]
+fn with<R: Real, K: Kind>(level: Level, pass: &Pass<'_, R>) {
+    if let Some(simd) = level.as_avx512() {
+        colors::<R, _, K>(simd, pass);
+    } else if let Some(simd) = level.as_avx2() {
+        colors::<R, _, K>(simd, pass);
+    } else {
+        let simd = level.as_sse2().expect("every x86-64 processor has SSE 2");
+        colors::<R, _, K>(simd, pass);
+    }
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn with<R: Real, K: Kind>(level: Level, pass: &Pass<'_, R>) {
+    dispatch!(level, simd => colors::<R, _, K>(simd, pass));
+}
+
+/// The tets in a block.
+pub(crate) fn lanes<R: Real>(level: Level) -> usize {
+    #[inline(always)]
+    fn length<R: Real, S: Simd>(_: S) -> usize {
+        R::Lanes::<S>::LEN
+    }
+    dispatch!(level, simd => length::<R, _>(simd))
+}
+
+#[inline(always)]
+fn colors<R: Real, S: Simd, K: Kind>(simd: S, pass: &Pass<'_, R>) {
+    let layout = pass.layout;
+    let threads = rayon::current_num_threads();
+    let chunks = |color: usize| {
+        let groups = layout.groups(color);
+        match layout.blocks(groups.clone()).len() {
+            0 => 0,
+            few if few < PARALLEL_BLOCKS => 1,
+            _ => threads.min(groups.len()),
+        }
+    };
+    let solve = |color: usize, chunk: usize| {
+        let (groups, chunks) = (layout.groups(color), chunks(color));
+        let share = |part: usize| groups.start + groups.len() * part / chunks;
+        let blocks = layout.blocks(share(chunk)..share(chunk + 1));
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                for block in blocks {
+                    solve_block::<R, S, K>(simd, pass, block);
                 }
-            };
-            let tets = schedule.color_constraints(color);
-            if threads == 1 || tets.len() < PARALLEL_CONSTRAINTS {
-                solve(tets);
-            } else {
-                let clusters = schedule.clusters(color);
-                (0..threads).into_par_iter().for_each(|thread| {
-                    let share = |part| clusters.start + clusters.len() * part / threads;
-                    for cluster in share(thread)..share(thread + 1) {
-                        solve(schedule.constraints(cluster));
-                    }
-                });
-            }
-        }
-    }
-
-    #[inline]
-    fn solve_tet<const DAMPED: bool, const MULTIPLIERS: bool>(&self, tet: usize, pass: &Pass<R>) {
-        let constraint = &self.tets[tet];
-        let corners = constraint.particles.map(|p| &self.particles[p as usize]);
-        let x = corners.map(|corner| load::<R>(corner));
-        let weights = corners.map(|corner| weight::<R>(corner));
-        let evaluation = constraint.evaluate(x);
-        let multipliers = if MULTIPLIERS {
-            self.multipliers_of(tet)
-        } else {
-            [R::ZERO; 2]
-        };
-        let (mut damping, mut rates) = (R::ZERO, [R::ZERO; 2]);
-        if DAMPED {
-            damping = R::from_f64(self.materials[usize::from(self.material_of[tet])].damping)
-                * pass.per_time;
-            let previous = constraint.particles.map(|p| self.previous[p as usize]);
-            let mut moved = [R::ZERO; 2];
-            for k in 0..4 {
-                let motion = x[k] - previous[k];
-                moved[0] = moved[0] + R::dot(evaluation.deviatoric_gradients[k], motion);
-                moved[1] = moved[1] + R::dot(evaluation.hydrostatic_gradients[k], motion);
-            }
-            rates = moved.map(|m| damping * m);
-        }
-        let change = constraint.solve(
-            &evaluation,
-            weights,
-            multipliers,
-            pass.time_squared,
-            damping,
-            rates,
+            },
         );
-        let Some(change) = change else { return };
-        let change = change.map(|c| c * pass.relaxation);
-        for k in 0..4 {
-            let along = evaluation.deviatoric_gradients[k] * change[0]
-                + evaluation.hydrostatic_gradients[k] * change[1];
-            store::<R>(corners[k], x[k] + along * weights[k]);
-        }
-        if MULTIPLIERS {
-            for k in 0..2 {
-                (multipliers[k] + change[k]).store(&self.multipliers[tet][k]);
+    };
+    let colors = layout.color_count();
+    if threads == 1 || (0..colors).all(|color| chunks(color) < 2) {
+        for color in 0..colors {
+            for chunk in 0..chunks(color) {
+                solve(color, chunk);
             }
         }
-    }
-
-    pub(crate) fn multipliers_of(&self, tet: usize) -> [R; 2] {
-        let [deviatoric, hydrostatic] = &self.multipliers[tet];
-        [R::load(deviatoric), R::load(hydrostatic)]
+    } else {
+        in_rounds(colors, chunks, solve);
     }
 }

@@ -39,8 +39,12 @@
 //! What it cannot do: iterating a large step does not converge to the implicit solution of that step, because XPBD
 //! leaves out the primal residual; use substeps, and watch [`Solver::kappa`].
 
+mod crew;
 mod error;
 mod gauss_seidel;
+mod jacobi;
+mod lanes;
+mod layout;
 mod material;
 mod measure;
 mod neo_hookean;
@@ -53,7 +57,7 @@ pub use error::XpbdError;
 pub use material::Material;
 pub use measure::{Energy, Residuals, Softened, Volume};
 pub use real::Real;
-pub use settings::{Ground, StepSettings};
+pub use settings::{Form, Ground, Method, StepSettings};
 pub use solver::{KappaLimit, Solver};
 pub use step::StepReport;
 

@@ -147,9 +147,7 @@ impl<R: Real> Solver<R> {
     /// `substep_time` and nothing was changed since.
     #[must_use]
     pub fn residuals(&self, substep_time: f64) -> Option<Residuals> {
-        if self.predicted.len() != self.particle_count()
-            || self.multipliers.len() != self.tet_count()
-        {
+        if self.predicted.len() != self.particle_count() || self.layout.stale {
             return None;
         }
         let mut primal: Vec<DVec3> = (0..self.particle_count())

@@ -1,13 +1,9 @@
-//! [`TetConstraint`]: a Stable Neo-Hookean tet as two constraints, solved together.
+//! [`TetConstraint`]: what a Stable Neo-Hookean tet is at rest, and its two constraints with their gradients.
 //!
-//! With deformation gradient F, the deviatoric constraint is `C_D = |F|` and the hydrostatic one `C_H = det F - γ`;
-//! half their squares over the compliances `1/(μV)` and `1/(lV)` are the energy exactly. At rest both gradients are
-//! parallel, so solving one after the other lets them fight; solved as one 2×2 system, a tet at rest stays at rest
-//! whatever the stiffness. (A body of many stays so up to a kappa of 2: rounding in one tet disturbs the next.)
+//! This is the plain form, one tet at a time: measurements use it in double precision, and it is the oracle of the
+//! kernel that steps use, [`crate::lanes`].
 //!
-//! Source: Macklin and Müller 2021 (constraints), Ton-That et al. 2023 (block solve), paper equations 5 and 6. The
-//! paper prints a minus in its equation 6; its equation 3 gives the plus used here. Cost: about 390 operations, one
-//! square root and three divisions a tet.
+//! Source: Macklin and Müller 2021. Cost: 220 operations a tet.
 
 use glam::{DMat3, DVec3};
 
@@ -126,13 +122,15 @@ impl<R: Real> TetConstraint<R> {
         let g3 = d1 * q[6] + d2 * q[7] + d3 * q[8];
         [-(g1 + g2 + g3), g1, g2, g3]
     }
+}
 
+#[cfg(test)]
+impl<R: Real> TetConstraint<R> {
     /// The changes of both multipliers that satisfy both constraints to first order, `None` if there is no way to.
     ///
     /// `rates` are the damped rates `γ ∇C · (x - xₙ)` with `damping` γ; both are zero without damping. The equations
     /// are multiplied by stiffness and time squared, which makes the matrix one plus numbers of the order of kappa: as
     /// they are usually written, with compliances, they leave the range of single precision for a body of micrometers.
-    #[inline(always)]
     pub(crate) fn solve(
         &self,
         e: &Evaluation<R>,

@@ -1,14 +1,20 @@
 //! [`Real`]: the scalar of a solver, `f32` or `f64`, with its vector and its shared cell.
 //!
-//! One source serves both precisions. Positions live in atomic cells: within a color every particle belongs to at most
+//! One source serves both precisions. Particles live in atomic cells: within a color every particle belongs to at most
 //! one cluster, so threads never meet, but the language cannot know that. Relaxed atomic loads and stores are plain
-//! moves on every processor of interest; they make the sharing safe at no cost.
+//! moves on every processor of interest; they make the sharing safe at no cost. A single-precision particle takes two
+//! cells of 64 bits, not four of 32: half the moves.
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
+use fearless_simd::{Level, Simd, SimdFloat, SimdFloatElement};
 use glam::{DVec3, Vec3};
+
+use crate::Form;
+use crate::gauss_seidel;
+use crate::lanes::Pass;
 
 /// A scalar that the solver can compute with: `f32` or `f64`.
 pub trait Real:
@@ -23,6 +29,7 @@ pub trait Real:
     + Mul<Output = Self>
     + Div<Output = Self>
     + Neg<Output = Self>
+    + SimdFloatElement
     + 'static
 {
     /// The vector of three such scalars.
@@ -38,6 +45,11 @@ pub trait Real:
         + Mul<Self, Output = Self::Vector>;
     /// A cell that threads may share.
     type Atomic: Debug + Send + Sync;
+    /// Four scalars that threads may share: the position of a particle and its inverse mass.
+    type Particle: Debug + Send + Sync;
+    /// As many scalars as an instruction of a processor takes.
+    #[doc(hidden)]
+    type Lanes<S: Simd>: SimdFloat<S, Element = Self>;
 
     /// Zero.
     const ZERO: Self;
@@ -66,6 +78,17 @@ pub trait Real:
     fn load(cell: &Self::Atomic) -> Self;
     /// Puts `self` into a cell.
     fn store(self, cell: &Self::Atomic);
+    /// A particle's cell that holds `values`.
+    fn particle(values: [Self; 4]) -> Self::Particle;
+    /// The values in a particle's cell.
+    fn read(particle: &Self::Particle) -> [Self; 4];
+    /// Puts values into a particle's cell.
+    fn write(particle: &Self::Particle, values: [Self; 4]);
+
+    /// Makes a pass over tets. Here and not where it is called, so that it is compiled once for each precision, not
+    /// in every crate that steps a solver.
+    #[doc(hidden)]
+    fn solve_tets(level: Level, damped: bool, form: Form, pass: &Pass<'_, Self>);
 
     /// Rounds a vector of doubles to this precision.
     #[inline]
@@ -85,10 +108,12 @@ pub trait Real:
 }
 
 macro_rules! real {
-    ($scalar:ty, $vector:ty, $atomic:ty, $from_f64:expr) => {
+    ($scalar:ty, $vector:ty, $atomic:ty, $lanes:ident, $from_f64:expr, $cells:literal, $pack:expr, $unpack:expr) => {
         impl Real for $scalar {
             type Vector = $vector;
             type Atomic = $atomic;
+            type Particle = [AtomicU64; $cells];
+            type Lanes<S: Simd> = S::$lanes;
 
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
@@ -137,6 +162,25 @@ macro_rules! real {
             fn store(self, cell: &$atomic) {
                 cell.store(self.to_bits(), Ordering::Relaxed);
             }
+            #[inline(never)]
+            fn solve_tets(level: Level, damped: bool, form: Form, pass: &Pass<'_, Self>) {
+                gauss_seidel::run(level, damped, form, pass);
+            }
+            #[inline(always)]
+            fn particle(values: [Self; 4]) -> Self::Particle {
+                $pack(values).map(AtomicU64::new)
+            }
+            #[inline(always)]
+            fn read(particle: &Self::Particle) -> [Self; 4] {
+                $unpack(std::array::from_fn(|i| particle[i].load(Ordering::Relaxed)))
+            }
+            #[inline(always)]
+            fn write(particle: &Self::Particle, values: [Self; 4]) {
+                let packed: [u64; $cells] = $pack(values);
+                for (cell, bits) in particle.iter().zip(packed) {
+                    cell.store(bits, Ordering::Relaxed);
+                }
+            }
         }
     };
 }
@@ -150,8 +194,53 @@ fn round_to_f32(value: f64) -> f32 {
     value as f32
 }
 
-real!(f32, Vec3, AtomicU32, round_to_f32);
-real!(f64, DVec3, AtomicU64, std::convert::identity);
+/// Two single-precision numbers in one cell, the first in the lower half.
+#[inline(always)]
+fn pack_f32(v: [f32; 4]) -> [u64; 2] {
+    let pair = |a: f32, b: f32| u64::from(a.to_bits()) | (u64::from(b.to_bits()) << 32);
+    [pair(v[0], v[1]), pair(v[2], v[3])]
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "the lower half is what is wanted"
+)]
+#[inline(always)]
+fn unpack_f32(cells: [u64; 2]) -> [f32; 4] {
+    let [low, high] = cells.map(|c| [f32::from_bits(c as u32), f32::from_bits((c >> 32) as u32)]);
+    [low[0], low[1], high[0], high[1]]
+}
+
+#[inline(always)]
+fn pack_f64(v: [f64; 4]) -> [u64; 4] {
+    v.map(f64::to_bits)
+}
+
+#[inline(always)]
+fn unpack_f64(cells: [u64; 4]) -> [f64; 4] {
+    cells.map(f64::from_bits)
+}
+
+real!(
+    f32,
+    Vec3,
+    AtomicU32,
+    f32s,
+    round_to_f32,
+    2,
+    pack_f32,
+    unpack_f32
+);
+real!(
+    f64,
+    DVec3,
+    AtomicU64,
+    f64s,
+    std::convert::identity,
+    4,
+    pack_f64,
+    unpack_f64
+);
 
 /// Whether all components are finite.
 pub(crate) fn finite<R: Real>(v: R::Vector) -> bool {
@@ -160,25 +249,20 @@ pub(crate) fn finite<R: Real>(v: R::Vector) -> bool {
 
 /// The position of a particle.
 #[inline]
-pub(crate) fn load<R: Real>(particle: &[R::Atomic; 4]) -> R::Vector {
-    R::vector(
-        R::load(&particle[0]),
-        R::load(&particle[1]),
-        R::load(&particle[2]),
-    )
+pub(crate) fn load<R: Real>(particle: &R::Particle) -> R::Vector {
+    let [x, y, z, _] = R::read(particle);
+    R::vector(x, y, z)
 }
 
 /// The inverse mass of a particle in 1/kg; 0 if it does not move.
 #[inline]
-pub(crate) fn weight<R: Real>(particle: &[R::Atomic; 4]) -> R {
-    R::load(&particle[3])
+pub(crate) fn weight<R: Real>(particle: &R::Particle) -> R {
+    R::read(particle)[3]
 }
 
 /// Moves a particle.
 #[inline]
-pub(crate) fn store<R: Real>(particle: &[R::Atomic; 4], x: R::Vector) {
+pub(crate) fn store<R: Real>(particle: &R::Particle, x: R::Vector) {
     let [a, b, c] = R::components(x);
-    a.store(&particle[0]);
-    b.store(&particle[1]);
-    c.store(&particle[2]);
+    R::write(particle, [a, b, c, weight::<R>(particle)]);
 }

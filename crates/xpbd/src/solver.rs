@@ -4,8 +4,11 @@
 //! outside with every step. Topology changes arrive as single edits (a new particle between two others, a copy, a tet
 //! replaced), each in constant time, so that a cut costs what it touches.
 
+use fearless_simd::Level;
 use glam::DVec3;
 
+use crate::jacobi::Jacobi;
+use crate::layout::Layout;
 use crate::neo_hookean::TetConstraint;
 use crate::real::{finite, load, store};
 use crate::{Material, Real, XpbdError};
@@ -36,7 +39,7 @@ use crate::{Material, Real, XpbdError};
 #[derive(Debug)]
 pub struct Solver<R: Real> {
     /// Position and inverse mass of each particle, together in one cache line part.
-    pub(crate) particles: Vec<[R::Atomic; 4]>,
+    pub(crate) particles: Vec<R::Particle>,
     pub(crate) previous: Vec<R::Vector>,
     pub(crate) velocities: Vec<R::Vector>,
     pub(crate) masses: Vec<f64>,
@@ -47,8 +50,13 @@ pub struct Solver<R: Real> {
     pub(crate) material_of: Vec<u16>,
     pub(crate) materials: Vec<Material>,
     kappa_limit: Option<KappaLimit>,
-    /// Kept only while a step has more than one iteration or is asked for its residuals.
-    pub(crate) multipliers: Vec<[R::Atomic; 2]>,
+    /// The tets in solving order.
+    pub(crate) layout: Layout<R>,
+    /// The instructions that this processor has.
+    pub(crate) level: Level,
+    /// By place in the layout; kept only while a step has more than one iteration or is asked for its residuals.
+    pub(crate) multipliers: Vec<R::Atomic>,
+    pub(crate) jacobi: Option<Jacobi<R>>,
     /// Positions before the constraints are solved, kept only for residuals.
     pub(crate) predicted: Vec<R::Vector>,
 }
@@ -80,7 +88,10 @@ impl<R: Real> Solver<R> {
             kappa_limit: None,
             material_of: Vec::new(),
             materials: Vec::new(),
+            layout: Layout::default(),
+            level: Level::new(),
             multipliers: Vec::new(),
+            jacobi: None,
             predicted: Vec::new(),
         };
         for &x in positions {
@@ -111,6 +122,7 @@ impl<R: Real> Solver<R> {
     pub fn add_material(&mut self, material: Material) -> Result<u16, XpbdError> {
         material.check()?;
         self.materials.push(material);
+        self.layout.stale = true;
         Ok(u16::try_from(self.materials.len() - 1).expect("at most 65,536 materials"))
     }
 
@@ -122,6 +134,7 @@ impl<R: Real> Solver<R> {
         let constraint = self.constraint(particles, rest, material);
         self.tets.push(constraint);
         self.volumes.push(signed_volume(rest));
+        self.layout.stale = true;
         self.material_of.push(material);
     }
 
@@ -132,6 +145,7 @@ impl<R: Real> Solver<R> {
     pub fn replace_tet(&mut self, tet: usize, particles: [u32; 4], rest: [DVec3; 4]) {
         self.tets[tet] = self.constraint(particles, rest, self.material_of[tet]);
         self.volumes[tet] = signed_volume(rest);
+        self.layout.stale = true;
     }
 
     /// Hangs a tet on other particles that are copies of its own.
@@ -141,6 +155,7 @@ impl<R: Real> Solver<R> {
     pub fn relink_tet(&mut self, tet: usize, particles: [u32; 4]) {
         self.check_particles(particles);
         self.tets[tet].particles = particles;
+        self.layout.stale = true;
     }
 
     fn constraint(&self, particles: [u32; 4], rest: [DVec3; 4], material: u16) -> TetConstraint<R> {
@@ -224,8 +239,7 @@ impl<R: Real> Solver<R> {
     fn push_particle(&mut self, x: R::Vector, velocity: R::Vector, fixed: bool) {
         assert!(finite::<R>(x), "positions are finite");
         let [a, b, c] = R::components(x);
-        self.particles
-            .push([a.cell(), b.cell(), c.cell(), R::ZERO.cell()]);
+        self.particles.push(R::particle([a, b, c, R::ZERO]));
         self.previous.push(x);
         self.velocities.push(velocity);
         self.masses.push(0.0);
@@ -257,11 +271,14 @@ impl<R: Real> Solver<R> {
         self.set_weight(particle);
     }
 
-    fn set_weight(&self, particle: usize) {
+    fn set_weight(&mut self, particle: usize) {
         let inverse = R::from_f64(1.0 / self.masses[particle]);
         // A mass so small that its inverse overflows belongs to a speck that could only do harm if it moved.
         let free = !self.fixed[particle] && inverse.is_finite();
-        (if free { inverse } else { R::ZERO }).store(&self.particles[particle][3]);
+        let [x, y, z, _] = R::read(&self.particles[particle]);
+        let weight = if free { inverse } else { R::ZERO };
+        R::write(&self.particles[particle], [x, y, z, weight]);
+        self.layout.stale = true;
     }
 
     /// Whether a particle is fixed.

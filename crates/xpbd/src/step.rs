@@ -11,9 +11,12 @@
 use incise_graph::Schedule;
 use rayon::prelude::*;
 
-use crate::gauss_seidel::Pass;
+use crate::gauss_seidel;
+use crate::jacobi::Jacobi;
+use crate::lanes::Pass;
+use crate::layout::Ingredients;
 use crate::real::{finite, load, store, weight};
-use crate::{Ground, Real, Solver, StepSettings, XpbdError};
+use crate::{Ground, Method, Real, Solver, StepSettings, XpbdError};
 
 /// Particles a thread takes at a time.
 const PARALLEL_PARTICLES: usize = 4096;
@@ -68,51 +71,110 @@ impl<R: Real> Solver<R> {
     ) -> Result<StepReport, XpbdError> {
         let _span = tracing::debug_span!("xpbd::step").entered();
         settings.check()?;
+        self.lay_out(schedule);
+        let mut report = StepReport::default();
+        self.predicted.clear();
+        for substep in 0..settings.substeps {
+            let keep = keep && substep + 1 == settings.substeps;
+            report.repaired += self.substep(settings, keep);
+        }
+        Ok(report)
+    }
+
+    fn substep(&mut self, settings: &StepSettings, keep: bool) -> usize {
+        let time = settings.substep_time();
+        self.predict(settings, R::from_f64(time));
+        let per_time = R::from_f64(1.0 / time);
+        let jacobi = settings.method != Method::GaussSeidel;
+        self.multipliers.clear();
+        if keep || settings.iterations > 1 {
+            let count = 2 * self.layout.lanes * self.layout.block_count();
+            self.multipliers.resize_with(count, || R::ZERO.cell());
+        }
+        if keep {
+            self.predicted = (0..self.particles.len()).map(|p| self.vector(p)).collect();
+        }
+        let mut state = match jacobi {
+            true => Some(self.jacobi.take().unwrap_or_default()),
+            false => None,
+        };
+        if let Some(state) = &mut state {
+            state.restart();
+        }
+        for _ in 0..settings.iterations {
+            self.iterate(settings, state.as_mut());
+            if let Some(ground) = settings.ground {
+                self.project_to_ground(ground);
+            }
+        }
+        self.jacobi = state;
+        self.update_velocities(R::from_f64(time), per_time)
+    }
+
+    /// One iteration over the tets.
+    fn iterate(&self, settings: &StepSettings, mut jacobi: Option<&mut Jacobi<R>>) {
+        let time = settings.substep_time();
+        if let Some(jacobi) = &mut jacobi {
+            let extrapolating = settings.method != Method::Jacobi;
+            jacobi.begin(&self.particles, &self.multipliers, extrapolating);
+        }
+        let pass = Pass {
+            layout: &self.layout,
+            particles: &self.particles,
+            previous: &self.previous,
+            multipliers: &self.multipliers,
+            corrections: jacobi.as_ref().map_or(&[], |jacobi| &jacobi.corrections),
+            time_squared: R::from_f64(time * time),
+            per_time: R::from_f64(1.0 / time),
+            relaxation: R::from_f64(settings.relaxation),
+        };
+        let damped = self.materials.iter().any(|m| m.damping > 0.0);
+        R::solve_tets(self.level, damped, settings.form, &pass);
+        let Some(jacobi) = jacobi else { return };
+        jacobi.apply(&self.particles);
+        if let Method::Chebyshev {
+            spectral_radius,
+            delay,
+        } = settings.method
+        {
+            jacobi.extrapolate(&self.particles, &self.multipliers, spectral_radius, delay);
+        }
+    }
+
+    /// Puts the tets into the order of the schedule, unless they are.
+    fn lay_out(&mut self, schedule: &Schedule) {
+        if self.layout.fits(schedule) {
+            return;
+        }
         if let Some(&tet) = schedule.order().iter().max() {
             assert!(
                 (tet as usize) < self.tets.len(),
                 "the schedule belongs to these tets"
             );
         }
-        let mut report = StepReport::default();
-        self.predicted.clear();
-        for substep in 0..settings.substeps {
-            let keep = keep && substep + 1 == settings.substeps;
-            report.repaired += self.substep(schedule, settings, keep);
-        }
-        Ok(report)
+        let mut layout = std::mem::take(&mut self.layout);
+        let lanes = gauss_seidel::lanes::<R>(self.level);
+        layout.rebuild(schedule, lanes, self.materials.len() < 2, |t| {
+            let tet = self.tets[t as usize];
+            let material = &self.materials[usize::from(self.material_of[t as usize])];
+            Ingredients {
+                tet,
+                weights: tet
+                    .particles
+                    .map(|p| weight::<R>(&self.particles[p as usize])),
+                constants: [tet.ratio, tet.gamma, R::from_f64(material.damping)],
+            }
+        });
+        self.layout = layout;
     }
 
-    fn substep(&mut self, schedule: &Schedule, settings: &StepSettings, keep: bool) -> usize {
-        let time = settings.substep_time();
-        self.predict(settings, R::from_f64(time));
-        let with_multipliers = keep || settings.iterations > 1;
-        if with_multipliers {
-            self.multipliers.clear();
-            self.multipliers
-                .resize_with(self.tets.len(), || [R::ZERO.cell(), R::ZERO.cell()]);
-        }
-        if keep {
-            self.predicted = (0..self.particles.len()).map(|p| self.vector(p)).collect();
-        }
-        let pass = Pass {
-            time_squared: R::from_f64(time * time),
-            per_time: R::from_f64(1.0 / time),
-            relaxation: R::from_f64(settings.relaxation),
+    /// The multipliers of a tet after the last substep; zero if the schedule does not solve it.
+    pub(crate) fn multipliers_of(&self, tet: usize) -> [R; 2] {
+        let Some((block, lane)) = self.layout.place(tet) else {
+            return [R::ZERO; 2];
         };
-        let damped = self.materials.iter().any(|m| m.damping > 0.0);
-        for _ in 0..settings.iterations {
-            match (damped, with_multipliers) {
-                (false, false) => self.pass::<false, false>(schedule, &pass),
-                (false, true) => self.pass::<false, true>(schedule, &pass),
-                (true, false) => self.pass::<true, false>(schedule, &pass),
-                (true, true) => self.pass::<true, true>(schedule, &pass),
-            }
-            if let Some(ground) = settings.ground {
-                self.project_to_ground(ground);
-            }
-        }
-        self.update_velocities(R::from_f64(time), pass.per_time)
+        let lanes = self.layout.lanes;
+        [0, 1].map(|k| R::load(&self.multipliers[(2 * block + k) * lanes + lane]))
     }
 
     /// Moves every free particle by its velocity.

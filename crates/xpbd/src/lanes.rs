@@ -1,0 +1,512 @@
+//! [`solve_block`]: the Stable Neo-Hookean constraints of several tets at once, one in each lane of a processor.
+//!
+//! With deformation gradient F the deviatoric constraint is `C_D = |F|` and the hydrostatic one `C_H = det F - γ`; half
+//! their squares over the compliances `1/(μV)` and `1/(lV)` are the energy exactly. At rest both gradients are parallel,
+//! so solving one after the other lets them fight; solved as one 2×2 system, a tet at rest stays at rest whatever the
+//! stiffness. (A body of many stays so up to a kappa of 2: rounding in one tet disturbs the next.)
+//!
+//! The matrix needs no gradients at the corners. With `G = Σ w q qᵀ` over the corners (see `Layout`), `Σ w |∇C|²` is
+//! `G : AᵀA` for `A = dC/dF`; the mixed term is `det F tr G / |F|`, since `Fᵀ cof F = det F`. Both corrections then are
+//! one matrix times the gradients of the barycentric coordinates.
+//!
+//! Products and sums are rounded one by one, not fused, so that every instruction set gives the same bits.
+//!
+//! Source: Macklin and Müller 2021 (constraints), Ton-That et al. 2023 (block solve), paper equations 5 and 6. The paper
+//! prints a minus in its equation 6; its equation 3 gives the plus used here.
+//! Cost: 305 operations, one square root and two divisions a tet (block form, undamped), and 144 bytes of which 64 are
+//! the corners.
+
+use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdFrom};
+
+use crate::Real;
+use crate::layout::{CONSTANTS, Layout, REST};
+
+/// Most lanes of any instruction set.
+pub(crate) const MOST_LANES: usize = 16;
+
+/// What a pass over the tets is given. Public only because [`Real`] names it.
+#[expect(unnameable_types, reason = "nobody else makes passes")]
+#[derive(Debug)]
+pub struct Pass<'a, R: Real> {
+    pub(crate) layout: &'a Layout<R>,
+    pub(crate) particles: &'a [R::Particle],
+    /// Positions at the start of the substep; used with damping only.
+    pub(crate) previous: &'a [R::Vector],
+    /// Block, number, lane: the multipliers; empty if not kept.
+    pub(crate) multipliers: &'a [R::Atomic],
+    /// Where corrections are gathered by a Jacobi pass, which leaves the particles as they are; else empty.
+    pub(crate) corrections: &'a [R::Particle],
+    /// Square of the time of a substep in s².
+    pub(crate) time_squared: R,
+    /// One over the time of a substep in 1/s.
+    pub(crate) per_time: R,
+    /// Factor on each correction.
+    pub(crate) relaxation: R,
+}
+
+/// What is solved; each choice is compiled on its own. Whether multipliers are kept and where corrections go is asked
+/// once a block, which costs nothing that can be measured; compiled on their own they would make four times the code.
+pub(crate) trait Kind {
+    /// Whether constraints resist the rate of their change.
+    const DAMPED: bool;
+    /// Whether the two constraints of a tet are solved one after the other; compiled with damping only, which may be 0.
+    const SEQUENTIAL: bool;
+}
+
+type Matrix<V> = [[V; 3]; 3];
+
+/// The tets of one block, with what is needed of them.
+struct Tets<'a, R: Real, S: Simd> {
+    simd: S,
+    rest: &'a [R],
+    /// `l/μ`.
+    ratio: R::Lanes<S>,
+    gamma: R::Lanes<S>,
+    /// Damping time over the time of a substep.
+    damping: R::Lanes<S>,
+    time_squared: R::Lanes<S>,
+    relaxation: R::Lanes<S>,
+}
+
+/// Solves the tets of a block, which share no particle.
+#[inline(always)]
+pub(crate) fn solve_block<R: Real, S: Simd, K: Kind>(simd: S, pass: &Pass<'_, R>, block: usize) {
+    let lanes = R::Lanes::<S>::LEN;
+    let layout = pass.layout;
+    let active = usize::from(layout.active[block]);
+    let corners = &layout.particles[block * lanes..(block + 1) * lanes];
+    let read = |p: u32| R::read(&pass.particles[p as usize]);
+    let mut x = gather::<R, S>(simd, corners, read);
+    let tets = Tets::<R, S>::new(simd, pass, block);
+    let q = tets.gradients();
+    let f = deformation::<R, S>(&x, &q);
+    let old = if K::DAMPED {
+        let before = |p: u32| {
+            let [x, y, z] = R::components(pass.previous[p as usize]);
+            [x, y, z, R::ZERO]
+        };
+        deformation::<R, S>(&gather::<R, S>(simd, corners, before), &q)
+    } else {
+        f
+    };
+    let keeps = !pass.multipliers.is_empty();
+    let mut multipliers = if keeps {
+        load_multipliers::<R, S>(simd, pass, block)
+    } else {
+        [splat::<R, S>(simd, R::ZERO); 2]
+    };
+    let jacobi = !pass.corrections.is_empty();
+    let before = x;
+    if K::SEQUENTIAL {
+        let change = tets.deviatoric::<K>(&f, &old, &mut multipliers[0]);
+        move_corners::<R, S>(&mut x, &change, &q);
+        let f = if jacobi {
+            f
+        } else {
+            deformation::<R, S>(&x, &q)
+        };
+        let change = tets.hydrostatic::<K>(&f, &old, &mut multipliers[1]);
+        move_corners::<R, S>(&mut x, &change, &q);
+    } else {
+        let change = tets.both::<K>(&f, &old, &mut multipliers);
+        move_corners::<R, S>(&mut x, &change, &q);
+    }
+    if keeps {
+        store_multipliers::<R, S>(pass, block, multipliers);
+    }
+    if jacobi {
+        for k in 0..4 {
+            for axis in 0..3 {
+                x[k][axis] -= before[k][axis];
+            }
+        }
+        let add = |p: u32, [x, y, z, _]: [R; 4]| {
+            let sum = &pass.corrections[p as usize];
+            let [a, b, c, d] = R::read(sum);
+            R::write(sum, [a + x, b + y, c + z, d]);
+        };
+        scatter::<R, S>(&x, &corners[..active], add);
+    } else {
+        let write = |p: u32, values| R::write(&pass.particles[p as usize], values);
+        scatter::<R, S>(&x, &corners[..active], write);
+    }
+}
+
+impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
+    #[inline(always)]
+    fn new(simd: S, pass: &Pass<'a, R>, block: usize) -> Self {
+        let lanes = R::Lanes::<S>::LEN;
+        let layout = pass.layout;
+        let rest = &layout.rest[block * REST * lanes..(block + 1) * REST * lanes];
+        let mut constants = [splat::<R, S>(simd, R::ZERO); CONSTANTS];
+        for (k, constant) in constants.iter_mut().enumerate() {
+            *constant = if layout.constants.is_empty() {
+                splat::<R, S>(simd, layout.constant[k])
+            } else {
+                let start = (block * CONSTANTS + k) * lanes;
+                R::Lanes::<S>::from_slice(simd, &layout.constants[start..start + lanes])
+            };
+        }
+        let [ratio, gamma, damping] = constants;
+        Self {
+            simd,
+            rest,
+            ratio,
+            gamma,
+            damping: damping * splat::<R, S>(simd, pass.per_time),
+            time_squared: splat::<R, S>(simd, pass.time_squared),
+            relaxation: splat::<R, S>(simd, pass.relaxation),
+        }
+    }
+
+    #[inline(always)]
+    fn splat(&self, value: R) -> R::Lanes<S> {
+        splat::<R, S>(self.simd, value)
+    }
+
+    #[inline(always)]
+    fn rest(&self, k: usize) -> R::Lanes<S> {
+        let lanes = R::Lanes::<S>::LEN;
+        R::Lanes::<S>::from_slice(self.simd, &self.rest[k * lanes..(k + 1) * lanes])
+    }
+
+    /// The rows of the inverse rest matrix: the gradients of the barycentric coordinates of corners 1 to 3.
+    #[inline(always)]
+    fn gradients(&self) -> Matrix<R::Lanes<S>> {
+        [
+            [self.rest(0), self.rest(1), self.rest(2)],
+            [self.rest(3), self.rest(4), self.rest(5)],
+            [self.rest(6), self.rest(7), self.rest(8)],
+        ]
+    }
+
+    /// `G : AᵀA` in units of the stiffness times time squared.
+    #[inline(always)]
+    fn weighted(&self, a: &Matrix<R::Lanes<S>>) -> R::Lanes<S> {
+        let [a, b, c] = a;
+        let same = self.rest(9) * dot::<R, S>(a, a)
+            + self.rest(10) * dot::<R, S>(b, b)
+            + self.rest(11) * dot::<R, S>(c, c);
+        let mixed = self.rest(12) * dot::<R, S>(a, b)
+            + self.rest(13) * dot::<R, S>(a, c)
+            + self.rest(14) * dot::<R, S>(b, c);
+        (same + mixed) * self.time_squared
+    }
+
+    /// `μV` times the square of the time.
+    #[inline(always)]
+    fn stiffness(&self) -> R::Lanes<S> {
+        self.rest(15) * self.time_squared
+    }
+
+    /// The norm of F and one over it; at F = 0 the gradient has no direction, and the tet waits for its neighbors.
+    #[inline(always)]
+    fn norm(&self, f: &Matrix<R::Lanes<S>>) -> (R::Lanes<S>, R::Lanes<S>) {
+        let square =
+            dot::<R, S>(&f[0], &f[0]) + dot::<R, S>(&f[1], &f[1]) + dot::<R, S>(&f[2], &f[2]);
+        let norm = square.sqrt();
+        let zero = self.splat(R::ZERO);
+        let inverse = self.splat(R::ONE) / norm;
+        (norm, norm.simd_gt(zero).select(inverse, zero))
+    }
+
+    /// The change of F's corners per weight that satisfies both constraints to first order, and of the multipliers.
+    ///
+    /// The equations are multiplied by stiffness and time squared, which makes the matrix one plus numbers of the order
+    /// of kappa: as they are usually written, with compliances, they leave the range of single precision for a body of
+    /// micrometers.
+    #[inline(always)]
+    fn both<K: Kind>(
+        &self,
+        f: &Matrix<R::Lanes<S>>,
+        old: &Matrix<R::Lanes<S>>,
+        multipliers: &mut [R::Lanes<S>; 2],
+    ) -> Matrix<R::Lanes<S>> {
+        let (one, zero) = (self.splat(R::ONE), self.splat(R::ZERO));
+        let (norm, scale) = self.norm(f);
+        let cofactor = cofactor::<R, S>(f);
+        let volume = dot::<R, S>(&f[0], &cofactor[0]);
+        let trace = (self.rest(9) + self.rest(10) + self.rest(11)) * self.time_squared;
+        let mut m11 = self.weighted(f) * scale * scale;
+        let mut m22 = self.weighted(&cofactor);
+        let mut m12 = trace * volume * scale;
+        let (mut deviatoric, mut hydrostatic) = (norm, volume - self.gamma);
+        if K::DAMPED {
+            let motion = difference::<R, S>(f, old);
+            deviatoric += self.damping * scale * product::<R, S>(f, &motion);
+            hydrostatic += self.damping * product::<R, S>(&cofactor, &motion);
+            let damped = one + self.damping;
+            (m11, m22, m12) = (m11 * damped, m22 * damped, m12 * damped);
+        }
+        // At rest the gradients are parallel and only the one keeps the system regular. The difference is not negative
+        // (Cauchy-Schwarz); where rounding says otherwise, it is noise. Overflow makes it NaN and stays so.
+        let parallel = m11 * m22 - m12 * m12;
+        let parallel = parallel.simd_lt(zero).select(zero, parallel);
+        let inverse = one / (self.ratio * (parallel + m22) + m11 + one);
+        let stiffness = self.stiffness();
+        let b1 = -(stiffness * deviatoric + multipliers[0]);
+        let b2 = -(stiffness * self.ratio * hydrostatic + multipliers[1]);
+        let d1 = ((self.ratio * m22 + one) * b1 - m12 * b2) * inverse * self.relaxation;
+        let d2 = ((m11 + one) * b2 - self.ratio * m12 * b1) * inverse * self.relaxation;
+        let sound = (d1 + d2).is_finite();
+        let (d1, d2) = (sound.select(d1, zero), sound.select(d2, zero));
+        multipliers[0] += d1;
+        multipliers[1] += d2;
+        let along = d1 * scale;
+        let mut change = [[zero; 3]; 3];
+        for j in 0..3 {
+            for axis in 0..3 {
+                let entry = f[j][axis] * along + cofactor[j][axis] * d2;
+                change[j][axis] = sound.select(entry, zero);
+            }
+        }
+        change
+    }
+
+    /// The same for the deviatoric constraint alone.
+    #[inline(always)]
+    fn deviatoric<K: Kind>(
+        &self,
+        f: &Matrix<R::Lanes<S>>,
+        old: &Matrix<R::Lanes<S>>,
+        multiplier: &mut R::Lanes<S>,
+    ) -> Matrix<R::Lanes<S>> {
+        let (norm, scale) = self.norm(f);
+        let mut constraint = norm;
+        let mut m = self.weighted(f) * scale * scale;
+        if K::DAMPED {
+            let rate = product::<R, S>(f, &difference::<R, S>(f, old));
+            constraint += self.damping * scale * rate;
+            m *= self.splat(R::ONE) + self.damping;
+        }
+        self.alone(f, scale, self.stiffness(), constraint, m, multiplier)
+    }
+
+    /// The same for the hydrostatic constraint alone.
+    #[inline(always)]
+    fn hydrostatic<K: Kind>(
+        &self,
+        f: &Matrix<R::Lanes<S>>,
+        old: &Matrix<R::Lanes<S>>,
+        multiplier: &mut R::Lanes<S>,
+    ) -> Matrix<R::Lanes<S>> {
+        let cofactor = cofactor::<R, S>(f);
+        let mut constraint = dot::<R, S>(&f[0], &cofactor[0]) - self.gamma;
+        let mut m = self.weighted(&cofactor) * self.ratio;
+        if K::DAMPED {
+            let rate = product::<R, S>(&cofactor, &difference::<R, S>(f, old));
+            constraint += self.damping * rate;
+            m *= self.splat(R::ONE) + self.damping;
+        }
+        let stiffness = self.stiffness() * self.ratio;
+        let one = self.splat(R::ONE);
+        self.alone(&cofactor, one, stiffness, constraint, m, multiplier)
+    }
+
+    /// The change of a multiplier that satisfies its constraint, whose derivative is `scale` times a matrix, times that.
+    #[inline(always)]
+    fn alone(
+        &self,
+        derivative: &Matrix<R::Lanes<S>>,
+        scale: R::Lanes<S>,
+        stiffness: R::Lanes<S>,
+        constraint: R::Lanes<S>,
+        m: R::Lanes<S>,
+        multiplier: &mut R::Lanes<S>,
+    ) -> Matrix<R::Lanes<S>> {
+        let zero = self.splat(R::ZERO);
+        let b = -(stiffness * constraint + *multiplier);
+        let d = b / (m + self.splat(R::ONE)) * self.relaxation;
+        let sound = d.is_finite();
+        let d = sound.select(d, zero);
+        *multiplier += d;
+        let along = d * scale;
+        let mut change = [[zero; 3]; 3];
+        for j in 0..3 {
+            for axis in 0..3 {
+                change[j][axis] = sound.select(derivative[j][axis] * along, zero);
+            }
+        }
+        change
+    }
+}
+
+/// The columns of F.
+#[inline(always)]
+fn deformation<R: Real, S: Simd>(
+    x: &[[R::Lanes<S>; 4]; 4],
+    q: &Matrix<R::Lanes<S>>,
+) -> Matrix<R::Lanes<S>> {
+    let mut f = *q;
+    for axis in 0..3 {
+        let [a, b, c] = [
+            x[1][axis] - x[0][axis],
+            x[2][axis] - x[0][axis],
+            x[3][axis] - x[0][axis],
+        ];
+        for j in 0..3 {
+            f[j][axis] = a * q[0][j] + b * q[1][j] + c * q[2][j];
+        }
+    }
+    f
+}
+
+/// Moves the corners by the weight of each times a matrix times the gradient of its barycentric coordinate.
+#[inline(always)]
+fn move_corners<R: Real, S: Simd>(
+    x: &mut [[R::Lanes<S>; 4]; 4],
+    change: &Matrix<R::Lanes<S>>,
+    q: &Matrix<R::Lanes<S>>,
+) {
+    for axis in 0..3 {
+        let row = [change[0][axis], change[1][axis], change[2][axis]];
+        let a = dot::<R, S>(&row, &q[0]);
+        let b = dot::<R, S>(&row, &q[1]);
+        let c = dot::<R, S>(&row, &q[2]);
+        x[0][axis] -= x[0][3] * (a + b + c);
+        x[1][axis] += x[1][3] * a;
+        x[2][axis] += x[2][3] * b;
+        x[3][axis] += x[3][3] * c;
+    }
+}
+
+#[inline(always)]
+fn dot<R: Real, S: Simd>(a: &[R::Lanes<S>; 3], b: &[R::Lanes<S>; 3]) -> R::Lanes<S> {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[inline(always)]
+fn cross<R: Real, S: Simd>(a: &[R::Lanes<S>; 3], b: &[R::Lanes<S>; 3]) -> [R::Lanes<S>; 3] {
+    [
+        a[1] * b[2] - b[1] * a[2],
+        a[2] * b[0] - b[2] * a[0],
+        a[0] * b[1] - b[0] * a[1],
+    ]
+}
+
+/// The derivative of the determinant.
+#[inline(always)]
+fn cofactor<R: Real, S: Simd>([a, b, c]: &Matrix<R::Lanes<S>>) -> Matrix<R::Lanes<S>> {
+    [
+        cross::<R, S>(b, c),
+        cross::<R, S>(c, a),
+        cross::<R, S>(a, b),
+    ]
+}
+
+#[inline(always)]
+fn difference<R: Real, S: Simd>(
+    a: &Matrix<R::Lanes<S>>,
+    b: &Matrix<R::Lanes<S>>,
+) -> Matrix<R::Lanes<S>> {
+    let mut difference = *a;
+    for j in 0..3 {
+        for axis in 0..3 {
+            difference[j][axis] = a[j][axis] - b[j][axis];
+        }
+    }
+    difference
+}
+
+/// The sum of the products of all entries.
+#[inline(always)]
+fn product<R: Real, S: Simd>(a: &Matrix<R::Lanes<S>>, b: &Matrix<R::Lanes<S>>) -> R::Lanes<S> {
+    dot::<R, S>(&a[0], &b[0]) + dot::<R, S>(&a[1], &b[1]) + dot::<R, S>(&a[2], &b[2])
+}
+
+#[inline(always)]
+fn splat<R: Real, S: Simd>(simd: S, value: R) -> R::Lanes<S> {
+    R::Lanes::<S>::simd_from(simd, value)
+}
+
+/// The corners of the tets in all lanes: x, y, z and the inverse mass of each.
+#[inline(always)]
+fn gather<R: Real, S: Simd>(
+    simd: S,
+    corners: &[[u32; 4]],
+    read: impl Fn(u32) -> [R; 4],
+) -> [[R::Lanes<S>; 4]; 4] {
+    let lanes = R::Lanes::<S>::LEN;
+    let mut gathered = [[splat::<R, S>(simd, R::ZERO); 4]; 4];
+    for (k, values) in gathered.iter_mut().enumerate() {
+        let mut buffer = [R::ZERO; 4 * MOST_LANES];
+        for (lane, corner) in corners.iter().enumerate().take(lanes) {
+            let values = read(corner[k]);
+            buffer[4 * lane] = values[0];
+            buffer[4 * lane + 1] = values[1];
+            buffer[4 * lane + 2] = values[2];
+            buffer[4 * lane + 3] = values[3];
+        }
+        let a = R::Lanes::<S>::from_slice(simd, &buffer[..lanes]);
+        let b = R::Lanes::<S>::from_slice(simd, &buffer[lanes..2 * lanes]);
+        let c = R::Lanes::<S>::from_slice(simd, &buffer[2 * lanes..3 * lanes]);
+        let d = R::Lanes::<S>::from_slice(simd, &buffer[3 * lanes..4 * lanes]);
+        // Two rounds of taking the even and the odd ones apart.
+        let (even, odd) = a.deinterleave(b);
+        let (more_even, more_odd) = c.deinterleave(d);
+        let (x, z) = even.deinterleave(more_even);
+        let (y, w) = odd.deinterleave(more_odd);
+        *values = [x, y, z, w];
+    }
+    gathered
+}
+
+/// Hands each corner of each tet to `write`.
+#[inline(always)]
+fn scatter<R: Real, S: Simd>(
+    x: &[[R::Lanes<S>; 4]; 4],
+    corners: &[[u32; 4]],
+    write: impl Fn(u32, [R; 4]),
+) {
+    let lanes = R::Lanes::<S>::LEN;
+    for (k, &[x, y, z, w]) in x.iter().enumerate() {
+        let (even, more_even) = x.interleave(z);
+        let (odd, more_odd) = y.interleave(w);
+        let (a, b) = even.interleave(odd);
+        let (c, d) = more_even.interleave(more_odd);
+        let mut buffer = [R::ZERO; 4 * MOST_LANES];
+        a.store_slice(&mut buffer[..lanes]);
+        b.store_slice(&mut buffer[lanes..2 * lanes]);
+        c.store_slice(&mut buffer[2 * lanes..3 * lanes]);
+        d.store_slice(&mut buffer[3 * lanes..4 * lanes]);
+        for (values, corner) in buffer.chunks_exact(4).zip(corners) {
+            write(corner[k], [values[0], values[1], values[2], values[3]]);
+        }
+    }
+}
+
+#[inline(always)]
+fn load_multipliers<R: Real, S: Simd>(
+    simd: S,
+    pass: &Pass<'_, R>,
+    block: usize,
+) -> [R::Lanes<S>; 2] {
+    let lanes = R::Lanes::<S>::LEN;
+    let mut multipliers = [splat::<R, S>(simd, R::ZERO); 2];
+    for (k, values) in multipliers.iter_mut().enumerate() {
+        let start = (2 * block + k) * lanes;
+        let mut buffer = [R::ZERO; MOST_LANES];
+        for (lane, cell) in pass.multipliers[start..start + lanes].iter().enumerate() {
+            buffer[lane] = R::load(cell);
+        }
+        *values = R::Lanes::<S>::from_slice(simd, &buffer[..lanes]);
+    }
+    multipliers
+}
+
+#[inline(always)]
+fn store_multipliers<R: Real, S: Simd>(
+    pass: &Pass<'_, R>,
+    block: usize,
+    multipliers: [R::Lanes<S>; 2],
+) {
+    let lanes = R::Lanes::<S>::LEN;
+    for (k, values) in multipliers.into_iter().enumerate() {
+        let start = (2 * block + k) * lanes;
+        let mut buffer = [R::ZERO; MOST_LANES];
+        values.store_slice(&mut buffer[..lanes]);
+        for (lane, cell) in pass.multipliers[start..start + lanes].iter().enumerate() {
+            buffer[lane].store(cell);
+        }
+    }
+}
