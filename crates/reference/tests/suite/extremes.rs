@@ -58,8 +58,8 @@ fn statics_finds_an_equilibrium() {
     }
 }
 
-/// Half a second in steps of 10 ms: no energy is gained, the damping of implicit Euler ends nearly all of it, and only
-/// the scramble at Poisson's ratio 0.49 may stay entangled.
+/// Half a second in steps of 10 ms: no energy is gained, implicit Euler damps nearly all of it (5 % are left of the
+/// worst, a point at Poisson's ratio 0.45), and all tets are upright again.
 #[test]
 fn motion_recovers() {
     for nu in [0.3, 0.45, 0.49] {
@@ -74,31 +74,25 @@ fn motion_recovers() {
                 within("energy", now, last * (1.0 + 1e-9));
                 last = now;
             }
-            let entangled = nu == 0.49 && state == "scrambled";
-            assert!(body.inverted() == 0 || entangled, "{nu} {state}");
-            if body.inverted() == 0 {
-                within("energy left", last, 0.01 * start);
-            }
+            assert_eq!(body.inverted(), 0, "{nu} {state}");
+            within("energy left", last, 0.1 * start);
         }
     }
 }
 
-/// Stiffness, step and size over twenty orders of magnitude: a finite, balanced state or an error, and after an error
-/// the state from before.
+/// Stiffness, step and size over twenty orders of magnitude: a balanced state, or an error and the state from before. Of
+/// the 27 two fail: steps of a day in which a body comes to hang that weighs ten thousand times what it can bear.
 #[test]
-fn whatever_the_numbers_a_result_is_finite_or_refused() {
-    let mut solved = 0;
+fn whatever_the_numbers_a_result_is_balanced_or_refused() {
     for young_modulus in [1e-3, 1e6, 1e17] {
         for time_step in [1e-9, 1e-2, 1e5] {
             for size in [1e-6, 1.0, 1e6] {
                 let mesh = kuhn_box([2, 1, 1], DVec3::splat(size));
-                let mut body = body(
-                    &mesh,
-                    Material {
-                        young_modulus,
-                        ..RUBBER
-                    },
-                );
+                let material = Material {
+                    young_modulus,
+                    ..RUBBER
+                };
+                let mut body = body(&mesh, material);
                 let mut noise = Noise(8);
                 for (p, x) in mesh.positions.iter().enumerate() {
                     body.fixed[p] = x.x == mesh.positions[0].x;
@@ -109,19 +103,19 @@ fn whatever_the_numbers_a_result_is_finite_or_refused() {
                 let (positions, velocities) = (body.positions.clone(), body.velocities.clone());
                 match body.step(time_step, DVec3::NEG_Z * 9.81) {
                     Ok(report) => {
-                        solved += 1;
                         assert!(report.residual() <= report.rounding.max(1e-10 * report.scale));
                         let all = body.positions.iter().chain(&body.velocities);
                         assert!(all.into_iter().all(|v| v.is_finite()));
                     }
-                    Err(ReferenceError::NotConverged { .. } | ReferenceError::Range) => {
+                    Err(error) => {
+                        let overloaded = 1e3 * 9.81 * size > 1e3 * young_modulus;
+                        assert!(overloaded && time_step > 1.0, "{error}");
+                        assert!(matches!(error, ReferenceError::NotConverged { .. }));
                         assert_eq!(body.positions, positions);
                         assert_eq!(body.velocities, velocities);
                     }
-                    Err(other) => panic!("{other}"),
                 }
             }
         }
     }
-    println!("{solved} of 27");
 }
