@@ -44,6 +44,7 @@ fn statics_finds_an_equilibrium() {
             let (mut body, rest) = cube(3, nu, state);
             let report = body.settle(DVec3::ZERO).unwrap();
             assert!(report.residual() <= report.rounding.max(1e-10 * report.scale));
+            assert!(report.clamped > 0, "{nu} {state}: no such state is convex");
             let forces = body.elastic_forces();
             let free = (0..forces.len()).filter(|&p| !body.fixed[p]);
             let left = free.map(|p| forces[p].length_squared()).sum::<f64>().sqrt();
