@@ -86,7 +86,8 @@ struct Evaluation {
 
 impl Evaluation {
     fn is_finite(&self) -> bool {
-        (self.energy + self.residual + self.scale).is_finite()
+        let rounding = self.rounding + self.energy_rounding;
+        (self.energy + self.residual + self.scale + rounding).is_finite()
     }
 
     fn converged(&self) -> bool {
