@@ -17,6 +17,7 @@ mod finite_elements;
 mod ground;
 mod kappa;
 mod recovery;
+mod reference;
 mod refusals;
 mod residuals;
 mod rest;
