@@ -45,14 +45,16 @@ mod material;
 mod measure;
 mod neo_hookean;
 mod real;
+mod residuals;
 mod settings;
 mod solver;
 mod step;
 
 pub use error::XpbdError;
 pub use material::Material;
-pub use measure::{Energy, Residuals, Softened, Volume};
+pub use measure::{Energy, Softened, Volume};
 pub use real::Real;
+pub use residuals::Residuals;
 pub use settings::{Ground, StepSettings};
 pub use solver::{KappaLimit, Solver};
 pub use step::StepReport;
