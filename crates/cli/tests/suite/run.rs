@@ -104,7 +104,7 @@ fn reports_appear_when_asked_for() {
     }
     assert_eq!(
         keys(&frames[0]["residual"]),
-        names("primal, dual, dual_rms, force, potential")
+        names("primal, primal_relative, dual, dual_rms, force, force_relative, potential")
     );
     assert_eq!(
         keys(&frames[0]["energy"]),
