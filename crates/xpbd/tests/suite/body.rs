@@ -59,6 +59,15 @@ pub(crate) fn substep<R: Real>(solver: &Solver<R>, kappa: f64) -> StepSettings {
     StepSettings::new((kappa / solver.kappa(1.0)).sqrt())
 }
 
+/// The number of frames that fill `time`.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "tests take some thousand frames"
+)]
+pub(crate) fn frames(time: f64, settings: &StepSettings) -> usize {
+    (time / settings.time_step).ceil() as usize
+}
+
 /// Takes `count` frames; none may need a repair.
 pub(crate) fn advance<R: Real>(
     solver: &mut Solver<R>,
@@ -68,6 +77,28 @@ pub(crate) fn advance<R: Real>(
 ) {
     for _ in 0..count {
         assert_eq!(solver.step(schedule, settings).unwrap().repaired, 0);
+    }
+}
+
+/// Sets all velocities to zero whenever the kinetic energy has passed a peak, so that a body comes to rest; where does
+/// not depend on it.
+#[derive(Default)]
+pub(crate) struct KineticDamping {
+    last: f64,
+}
+
+impl KineticDamping {
+    /// Looks at the state after a step; says whether that was past a peak.
+    pub(crate) fn apply<R: Real>(&mut self, solver: &mut Solver<R>) -> bool {
+        let now = solver.energy(None).kinetic;
+        let past = now < self.last;
+        self.last = if past { 0.0 } else { now };
+        if past {
+            for p in 0..solver.particle_count() {
+                solver.set_velocity(p, DVec3::ZERO);
+            }
+        }
+        past
     }
 }
 

@@ -7,7 +7,9 @@
 
 mod beam;
 mod body;
+mod closed_forms;
 mod conservation;
+mod convergence;
 mod damping;
 mod determinism;
 mod edits;
@@ -16,7 +18,9 @@ mod extremes;
 mod finite_elements;
 mod ground;
 mod kappa;
+mod large_deformations;
 mod recovery;
 mod refusals;
 mod residuals;
 mod rest;
+mod vibration;
