@@ -49,6 +49,7 @@ mod residuals;
 mod settings;
 mod solver;
 mod step;
+mod unfold;
 
 pub use error::XpbdError;
 pub use material::Material;

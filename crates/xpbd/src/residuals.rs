@@ -133,7 +133,8 @@ impl<R: Real> Solver<R> {
         tet.evaluate(tet.particles.map(|p| self.position(p as usize)))
     }
 
-    fn moves(&self, particle: usize) -> bool {
+    /// Whether a particle is neither held nor without mass.
+    pub(crate) fn moves(&self, particle: usize) -> bool {
         weight::<R>(&self.particles[particle]) > R::ZERO
     }
 }

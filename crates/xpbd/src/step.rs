@@ -24,6 +24,9 @@ pub struct StepReport {
     /// Particles that would have become infinite or NaN and were put back where they were instead, counted once for
     /// each substep. Anything but 0 means the step is not to be trusted: use more substeps.
     pub repaired: usize,
+    /// Particles that were moved by a millionth of a tet's size because all tets lay on one line to the last digit, from
+    /// where no constraint could have brought them back.
+    pub unfolded: usize,
 }
 
 impl<R: Real> Solver<R> {
@@ -74,7 +77,10 @@ impl<R: Real> Solver<R> {
                 "the schedule belongs to these tets"
             );
         }
-        let mut report = StepReport::default();
+        let mut report = StepReport {
+            repaired: 0,
+            unfolded: self.unfold(),
+        };
         self.predicted.clear();
         for substep in 0..settings.substeps {
             let keep = keep && substep + 1 == settings.substeps;

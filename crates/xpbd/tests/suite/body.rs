@@ -5,7 +5,7 @@ use incise_clustering::cluster;
 use incise_coloring::color;
 use incise_graph::{Incidence, Schedule};
 use incise_mesh::{TetId, TetMesh};
-use incise_xpbd::{Material, Real, Solver, StepSettings};
+use incise_xpbd::{Material, Real, Solver, StepReport, StepSettings};
 
 /// Rubber of a density that keeps numbers plain.
 pub(crate) const RUBBER: Material = Material {
@@ -66,6 +66,30 @@ pub(crate) fn substep<R: Real>(solver: &Solver<R>, kappa: f64) -> StepSettings {
 )]
 pub(crate) fn frames(time: f64, settings: &StepSettings) -> usize {
     (time / settings.time_step).ceil() as usize
+}
+
+/// The ways of solving that must survive every extreme and recover from every collapse.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Method {
+    /// Colored Gauss-Seidel, both constraints of a tet at once.
+    GaussSeidel,
+}
+
+impl Method {
+    /// All of them.
+    pub(crate) const ALL: [Self; 1] = [Self::GaussSeidel];
+
+    /// Takes a frame, keeping residuals where the method has them.
+    pub(crate) fn step<R: Real>(
+        self,
+        solver: &mut Solver<R>,
+        schedule: &Schedule,
+        settings: &StepSettings,
+    ) -> StepReport {
+        match self {
+            Self::GaussSeidel => solver.step_keeping_residuals(schedule, settings).unwrap(),
+        }
+    }
 }
 
 /// Takes `count` frames; none may need a repair.
