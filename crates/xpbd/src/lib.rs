@@ -39,6 +39,8 @@
 //! What it cannot do: iterating a large step does not converge to the implicit solution of that step, because XPBD
 //! leaves out the primal residual; use substeps, and watch [`Solver::kappa`].
 
+#[cfg(feature = "direct")]
+mod direct;
 mod error;
 mod gauss_seidel;
 mod material;

@@ -12,6 +12,8 @@ mod conservation;
 mod convergence;
 mod damping;
 mod determinism;
+#[cfg(feature = "direct")]
+mod direct;
 mod edits;
 mod energy;
 mod extremes;
