@@ -253,9 +253,10 @@ impl Simulation {
         each!(&self.solver, solver => for quantity in &self.quantities {
             match quantity {
                 Quantity::Residual => {
+                    let load = self.settings.gravity.map(|g| solver.load(g));
                     report.residual = solver
                         .residuals(substep_time)
-                        .map(|r| ResidualReport { primal: r.primal, dual: r.dual });
+                        .map(|r| ResidualReport::new(&r, load, substep_time));
                 }
                 Quantity::Energy => {
                     let energy = solver.energy(self.settings.gravity);

@@ -24,4 +24,8 @@ pub enum XpbdError {
         /// The range it must lie in.
         range: &'static str,
     },
+    /// A direct solve left double precision.
+    #[cfg(feature = "direct")]
+    #[error("the constraints are too stiff for a direct solve: use a smaller substep")]
+    Factorization,
 }

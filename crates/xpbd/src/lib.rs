@@ -40,6 +40,8 @@
 //! leaves out the primal residual; use substeps, and watch [`Solver::kappa`].
 
 mod crew;
+#[cfg(feature = "direct")]
+mod direct;
 mod error;
 mod gauss_seidel;
 mod jacobi;
@@ -49,14 +51,17 @@ mod material;
 mod measure;
 mod neo_hookean;
 mod real;
+mod residuals;
 mod settings;
 mod solver;
 mod step;
+mod unfold;
 
 pub use error::XpbdError;
 pub use material::Material;
-pub use measure::{Energy, Residuals, Softened, Volume};
+pub use measure::{Energy, Softened, Volume};
 pub use real::Real;
+pub use residuals::Residuals;
 pub use settings::{Form, Ground, Method, StepSettings};
 pub use solver::{KappaLimit, Solver};
 pub use step::StepReport;

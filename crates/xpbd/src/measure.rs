@@ -1,4 +1,4 @@
-//! What a state is worth: energies, volume, kappa, residuals. Computed on request, in double precision.
+//! What a state is worth: energies, volume, kappa. Computed on request, in double precision.
 //!
 //! Everything is summed one after the other in the order of particles and tets, so the numbers do not depend on the
 //! number of threads. Cost: a pass over particles or tets.
@@ -42,15 +42,6 @@ pub struct Softened {
     pub strongest: f64,
 }
 
-/// How far the last substep is from a solution of its equations.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Residuals {
-    /// `‖M (x - x̃) - ∇Cᵀ λ‖` over all free particles in kg·m: the part of the equations of motion that XPBD drops.
-    pub primal: f64,
-    /// `‖C + α̃ λ‖` over all constraints, without unit: the part it iterates on.
-    pub dual: f64,
-}
-
 impl<R: Real> Solver<R> {
     /// The energies of the present state.
     #[must_use]
@@ -60,16 +51,9 @@ impl<R: Real> Solver<R> {
             energy.kinetic += 0.5 * self.masses[p] * self.velocity(p).length_squared();
             energy.gravity -= gravity.map_or(0.0, |g| self.masses[p] * g.dot(self.position(p)));
         }
-        for t in 0..self.tet_count() {
-            let material = &self.materials[usize::from(self.material_of[t])];
-            let (mu, l, gamma) = (material.mu(), material.volume_stiffness(), material.gamma());
-            let f = self.gradient(t);
-            let squared =
-                f.x_axis.length_squared() + f.y_axis.length_squared() + f.z_axis.length_squared();
-            let (bulge, at_rest) = (f.determinant() - gamma, 1.0 - gamma);
-            let density =
-                0.5 * mu * (squared - 3.0) + 0.5 * l * (bulge * bulge - at_rest * at_rest);
-            energy.elastic += self.volumes[t] * density / self.softening(t);
+        for tet in &self.tets {
+            let tet = tet.to_f64();
+            energy.elastic += tet.energy(&self.evaluate(&tet));
         }
         energy
     }
@@ -141,43 +125,6 @@ impl<R: Real> Solver<R> {
         }
         softened.volume_fraction /= self.volumes.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         softened
-    }
-
-    /// The residuals of the last substep; `None` unless it was made by [`Solver::step_keeping_residuals`] with
-    /// `substep_time` and nothing was changed since.
-    #[must_use]
-    pub fn residuals(&self, substep_time: f64) -> Option<Residuals> {
-        if self.predicted.len() != self.particle_count() || self.layout.stale {
-            return None;
-        }
-        let mut primal: Vec<DVec3> = (0..self.particle_count())
-            .map(|p| (self.position(p) - R::to_dvec3(self.predicted[p])) * self.masses[p])
-            .collect();
-        let mut dual = 0.0;
-        for (t, tet) in self.tets.iter().enumerate() {
-            let tet = tet.to_f64();
-            let k1 = tet.stiffness * substep_time * substep_time;
-            let k2 = tet.ratio * k1;
-            // A tet that takes no part, or so little that its compliance overflows, has nothing to satisfy.
-            if !((1.0 / k1).is_finite() && (1.0 / k2).is_finite()) {
-                continue;
-            }
-            let evaluation = tet.evaluate(tet.particles.map(|p| self.position(p as usize)));
-            let [deviatoric, hydrostatic] = self.multipliers_of(t).map(R::to_f64);
-            dual += (evaluation.deviatoric + deviatoric / k1).powi(2);
-            dual += (evaluation.hydrostatic + hydrostatic / k2).powi(2);
-            for (k, &p) in tet.particles.iter().enumerate() {
-                let pull = evaluation.deviatoric_gradients[k] * deviatoric
-                    + evaluation.hydrostatic_gradients[k] * hydrostatic;
-                primal[p as usize] -= pull;
-            }
-        }
-        let free = (0..self.particle_count()).filter(|&p| !self.fixed[p]);
-        let primal: f64 = free.map(|p| primal[p].length_squared()).sum();
-        Some(Residuals {
-            primal: primal.sqrt(),
-            dual: dual.sqrt(),
-        })
     }
 
     fn inverse_rest(&self, tet: usize) -> DMat3 {

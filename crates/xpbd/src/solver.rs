@@ -54,8 +54,10 @@ pub struct Solver<R: Real> {
     pub(crate) layout: Layout<R>,
     /// The instructions that this processor has.
     pub(crate) level: Level,
-    /// By place in the layout; kept only while a step has more than one iteration or is asked for its residuals.
+    /// By place in the layout; only while a step has more than one iteration or is asked for its residuals.
     pub(crate) multipliers: Vec<R::Atomic>,
+    /// The multipliers of each tet after the last substep, for residuals.
+    pub(crate) kept: Vec<[R; 2]>,
     pub(crate) jacobi: Option<Jacobi<R>>,
     /// Positions before the constraints are solved, kept only for residuals.
     pub(crate) predicted: Vec<R::Vector>,
@@ -91,6 +93,7 @@ impl<R: Real> Solver<R> {
             layout: Layout::default(),
             level: Level::new(),
             multipliers: Vec::new(),
+            kept: Vec::new(),
             jacobi: None,
             predicted: Vec::new(),
         };

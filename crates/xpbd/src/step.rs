@@ -27,6 +27,9 @@ pub struct StepReport {
     /// Particles that would have become infinite or NaN and were put back where they were instead, counted once for
     /// each substep. Anything but 0 means the step is not to be trusted: use more substeps.
     pub repaired: usize,
+    /// Particles that were moved by a millionth of a tet's size because all tets lay on one line to the last digit, from
+    /// where no constraint could have brought them back.
+    pub unfolded: usize,
 }
 
 impl<R: Real> Solver<R> {
@@ -72,8 +75,12 @@ impl<R: Real> Solver<R> {
         let _span = tracing::debug_span!("xpbd::step").entered();
         settings.check()?;
         self.lay_out(schedule);
-        let mut report = StepReport::default();
+        let mut report = StepReport {
+            repaired: 0,
+            unfolded: self.unfold(),
+        };
         self.predicted.clear();
+        self.kept.clear();
         for substep in 0..settings.substeps {
             let keep = keep && substep + 1 == settings.substeps;
             report.repaired += self.substep(settings, keep);
@@ -108,6 +115,11 @@ impl<R: Real> Solver<R> {
             }
         }
         self.jacobi = state;
+        if keep {
+            self.kept = (0..self.tets.len())
+                .map(|t| self.multipliers_of(t))
+                .collect();
+        }
         self.update_velocities(R::from_f64(time), per_time)
     }
 
@@ -169,7 +181,7 @@ impl<R: Real> Solver<R> {
     }
 
     /// The multipliers of a tet after the last substep; zero if the schedule does not solve it.
-    pub(crate) fn multipliers_of(&self, tet: usize) -> [R; 2] {
+    fn multipliers_of(&self, tet: usize) -> [R; 2] {
         let Some((block, lane)) = self.layout.place(tet) else {
             return [R::ZERO; 2];
         };
@@ -178,7 +190,7 @@ impl<R: Real> Solver<R> {
     }
 
     /// Moves every free particle by its velocity.
-    fn predict(&mut self, settings: &StepSettings, time: R) {
+    pub(crate) fn predict(&mut self, settings: &StepSettings, time: R) {
         let change = settings
             .gravity
             .map(|g| R::from_dvec3(g * settings.substep_time()));
@@ -199,7 +211,7 @@ impl<R: Real> Solver<R> {
     }
 
     /// Lifts particles out of the ground; friction holds them back by at most its share of the depth.
-    fn project_to_ground(&self, ground: Ground) {
+    pub(crate) fn project_to_ground(&self, ground: Ground) {
         let (height, friction) = (R::from_f64(ground.height), R::from_f64(ground.friction));
         let particles = self.particles.par_iter().with_min_len(PARALLEL_PARTICLES);
         particles
@@ -225,7 +237,7 @@ impl<R: Real> Solver<R> {
     /// them would be wrong by their last digit over the time: in single precision a body in free fall would lose a
     /// hundredth of its speed, and far from the origin it would hang in the air. The prediction, computed again to the
     /// same bits, tells what part of the motion is correction; without correction the velocity stays as it is.
-    fn update_velocities(&mut self, time: R, per_time: R) -> usize {
+    pub(crate) fn update_velocities(&mut self, time: R, per_time: R) -> usize {
         let particles = self.particles.par_iter().with_min_len(PARALLEL_PARTICLES);
         particles
             .zip(&self.previous)

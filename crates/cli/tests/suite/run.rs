@@ -102,7 +102,10 @@ fn reports_appear_when_asked_for() {
     for (frame, expected) in frames.iter().zip([all.as_str(), ALWAYS, &all]) {
         assert_eq!(keys(frame), names(expected));
     }
-    assert_eq!(keys(&frames[0]["residual"]), names("primal, dual"));
+    assert_eq!(
+        keys(&frames[0]["residual"]),
+        names("primal, primal_relative, dual, dual_rms, force, force_relative, potential")
+    );
     assert_eq!(
         keys(&frames[0]["energy"]),
         names("kinetic, elastic, gravity")

@@ -111,7 +111,18 @@ fn inner_objects_have_the_promised_keys() {
     );
     simulation.step().unwrap();
     let report = json(simulation.step().unwrap());
-    assert_eq!(keys(&report["residual"]), set(&["primal", "dual"]));
+    assert_eq!(
+        keys(&report["residual"]),
+        set(&[
+            "primal",
+            "primal_relative",
+            "dual",
+            "dual_rms",
+            "force",
+            "force_relative",
+            "potential"
+        ])
+    );
     assert_eq!(
         keys(&report["energy"]),
         set(&["kinetic", "elastic", "gravity"])

@@ -8,9 +8,9 @@
 use glam::{DVec3, dvec3};
 use incise_graph::Schedule;
 use incise_mesh::{TetMesh, generate::kuhn_box};
-use incise_xpbd::{Material, Real, Solver, StepSettings};
+use incise_xpbd::{Material, Real, StepSettings};
 
-use crate::body::{body, plain, schedule, substep, within};
+use crate::body::{KineticDamping, body, plain, schedule, substep, within};
 use crate::finite_elements;
 
 /// Gravity in m/s²: the tip sinks by a hundredth of the length.
@@ -41,12 +41,6 @@ fn tip(mesh: &TetMesh, heights: impl Fn(usize) -> f64) -> f64 {
     sum / count
 }
 
-fn kinetic<R: Real>(solver: &Solver<R>) -> f64 {
-    let each =
-        (0..solver.particle_count()).map(|p| solver.mass(p) * solver.velocity(p).length_squared());
-    each.sum()
-}
-
 /// The tip of the settled beam.
 fn settled<R: Real>(mesh: &TetMesh, schedule: &Schedule, kappa: f64) -> f64 {
     let mut solver = body::<R>(mesh, STUFF);
@@ -57,19 +51,13 @@ fn settled<R: Real>(mesh: &TetMesh, schedule: &Schedule, kappa: f64) -> f64 {
         gravity: Some(DVec3::NEG_Z * LIGHT),
         ..substep(&solver, kappa)
     };
-    let (mut last, mut tips) = (0.0, vec![0.0]);
+    let (mut damping, mut tips) = (KineticDamping::default(), vec![0.0]);
     let mut first = usize::MAX;
     for n in 0..20_000 {
         solver.step(schedule, &settings).unwrap();
-        let now = kinetic(&solver);
-        if now >= last {
-            last = now;
+        if !damping.apply(&mut solver) {
             continue;
         }
-        for p in 0..solver.particle_count() {
-            solver.set_velocity(p, DVec3::ZERO);
-        }
-        last = 0.0;
         tips.push(tip(mesh, |p| solver.position(p).z));
         // Short cycles of high modes and rounding noise never end; the tip does not follow them.
         let steady = |pair: &[f64]| (pair[1] - pair[0]).abs() < 1e-4 * pair[1].abs();
@@ -78,7 +66,6 @@ fn settled<R: Real>(mesh: &TetMesh, schedule: &Schedule, kappa: f64) -> f64 {
             && tips.len() > QUIET_CYCLES
             && tips[tips.len() - QUIET_CYCLES..].windows(2).all(steady)
         {
-            //eprintln!("SETTLED {} {:?}", n, tips.last());
             return tips[tips.len() - 1];
         }
     }

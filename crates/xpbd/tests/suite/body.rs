@@ -5,7 +5,7 @@ use incise_clustering::cluster;
 use incise_coloring::color;
 use incise_graph::{Incidence, Schedule};
 use incise_mesh::{TetId, TetMesh};
-use incise_xpbd::{Material, Real, Solver, StepSettings};
+use incise_xpbd::{Material, Real, Solver, StepReport, StepSettings};
 
 /// Rubber of a density that keeps numbers plain.
 pub(crate) const RUBBER: Material = Material {
@@ -59,6 +59,39 @@ pub(crate) fn substep<R: Real>(solver: &Solver<R>, kappa: f64) -> StepSettings {
     StepSettings::new((kappa / solver.kappa(1.0)).sqrt())
 }
 
+/// The number of frames that fill `time`.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "tests take some thousand frames"
+)]
+pub(crate) fn frames(time: f64, settings: &StepSettings) -> usize {
+    (time / settings.time_step).ceil() as usize
+}
+
+/// The ways of solving that must survive every extreme and recover from every collapse.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Method {
+    /// Colored Gauss-Seidel, both constraints of a tet at once.
+    GaussSeidel,
+}
+
+impl Method {
+    /// All of them.
+    pub(crate) const ALL: [Self; 1] = [Self::GaussSeidel];
+
+    /// Takes a frame, keeping residuals where the method has them.
+    pub(crate) fn step<R: Real>(
+        self,
+        solver: &mut Solver<R>,
+        schedule: &Schedule,
+        settings: &StepSettings,
+    ) -> StepReport {
+        match self {
+            Self::GaussSeidel => solver.step_keeping_residuals(schedule, settings).unwrap(),
+        }
+    }
+}
+
 /// Takes `count` frames; none may need a repair.
 pub(crate) fn advance<R: Real>(
     solver: &mut Solver<R>,
@@ -68,6 +101,28 @@ pub(crate) fn advance<R: Real>(
 ) {
     for _ in 0..count {
         assert_eq!(solver.step(schedule, settings).unwrap().repaired, 0);
+    }
+}
+
+/// Sets all velocities to zero whenever the kinetic energy has passed a peak, so that a body comes to rest; where does
+/// not depend on it.
+#[derive(Default)]
+pub(crate) struct KineticDamping {
+    last: f64,
+}
+
+impl KineticDamping {
+    /// Looks at the state after a step; says whether that was past a peak.
+    pub(crate) fn apply<R: Real>(&mut self, solver: &mut Solver<R>) -> bool {
+        let now = solver.energy(None).kinetic;
+        let past = now < self.last;
+        self.last = if past { 0.0 } else { now };
+        if past {
+            for p in 0..solver.particle_count() {
+                solver.set_velocity(p, DVec3::ZERO);
+            }
+        }
+        past
     }
 }
 

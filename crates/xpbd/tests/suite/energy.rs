@@ -79,6 +79,39 @@ fn elastic_energy_is_zero_at_rest_and_under_rotation() {
     }
 }
 
+/// The largest force on a particle of a rotated body in units of μ times the smallest face, as residual and as what a
+/// very short substep makes of it.
+fn force_of_rotation<R: Real>(turn: DQuat) -> [f64; 2] {
+    let mesh = kuhn_box([3, 2, 2], dvec3(0.3, 0.2, 0.2));
+    let mut solver = body::<R>(&mesh, RUBBER);
+    deform(&mut solver, &mesh, DMat3::from_quat(turn));
+    let settings = substep(&solver, 1e-6);
+    solver
+        .step_keeping_residuals(&plain(&mesh), &settings)
+        .unwrap();
+    let residual = solver.residuals(settings.time_step).unwrap().force;
+    let applied = (0..solver.particle_count())
+        .map(|p| solver.velocity(p).length() * solver.mass(p) / settings.time_step)
+        .fold(0.0, f64::max);
+    [residual, applied].map(|force| force / (RUBBER.mu() * 0.1 * 0.1))
+}
+
+/// Measured at most 2e-15 and 4e-7 applied; the residual sums over 36 particles and divides the last digit of their
+/// positions by Δt².
+#[test]
+fn a_rotated_body_feels_no_force() {
+    let mut noise = Noise(22);
+    for _ in 0..10 {
+        let turn = DQuat::from_scaled_axis(noise.vector() * 3.0);
+        let [residual, applied] = force_of_rotation::<f64>(turn);
+        within("f64 residual", residual, 1e-13);
+        within("f64", applied, 1e-14);
+        let [residual, applied] = force_of_rotation::<f32>(turn);
+        within("f32 residual", residual, 2e-5);
+        within("f32", applied, 1e-6);
+    }
+}
+
 #[test]
 fn elastic_energy_does_not_change_under_rotation_of_a_strained_body() {
     let mesh = kuhn_box([2, 2, 2], DVec3::ONE);

@@ -7,17 +7,23 @@
 
 mod beam;
 mod body;
+mod closed_forms;
 mod conservation;
+mod convergence;
 mod damping;
 mod determinism;
+#[cfg(feature = "direct")]
+mod direct;
 mod edits;
 mod energy;
 mod extremes;
 mod finite_elements;
 mod ground;
 mod kappa;
+mod large_deformations;
 mod recovery;
 mod reference;
 mod refusals;
 mod residuals;
 mod rest;
+mod vibration;

@@ -101,10 +101,12 @@ fn the_kappa_limit_keeps_a_stiff_body_at_rest() {
 }
 
 /// One tet is solved exactly whatever the stiffness: both multipliers are the ones at rest and their pushes cancel.
-/// The pushes themselves grow with kappa, so the rounding left is kappa times the last digit, here at most 4 times.
+/// The pushes themselves grow with kappa, so the rounding left is kappa times the last digit, here at most 4 times:
+/// below 1e-6 of the tet up to kappa 2 in single precision, below 1e-13 up to kappa 100 in double precision. It is not
+/// the solve that is lacking then, but the positions: two opposite pushes of kappa times the tet's size are added.
 #[test]
 fn one_tet_at_rest_is_solved_exactly_at_any_kappa() {
-    for kappa in [1e-3, 1.0, 1e3, 1e6] {
+    for kappa in [1e-3, 1.0, 1e2, 1e3, 1e6] {
         within(
             "f64",
             tet_displacement::<f64>(kappa),

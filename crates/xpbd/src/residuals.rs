@@ -1,0 +1,166 @@
+//! [`Residuals`]: how far the last substep is from a solution of its equations, in stated norms and units.
+//!
+//! Backward Euler asks for `M (x - x̃) = ∇Cᵀ λ` and `C + α̃ λ = 0` at once; XPBD iterates on the second alone, so a small
+//! dual residual proves nothing. Without multipliers both are one equation, `M (x - x̃) / Δt² + ∇U(x) = 0`, the slope of
+//! the incremental potential `‖x - x̃‖²_M / (2 Δt²) + U(x)`: the force residual is taken from positions alone, and no
+//! state that fails to move as it should, collapsed or stalled, can make it small.
+//!
+//! Sources: Macklin, Müller, Chentanez 2016 (primal and dual); Gast et al. 2015 (incremental potential). Everything is
+//! in double precision and summed in the order of particles and tets. Cost: one pass over the tets, on request only.
+
+use glam::DVec3;
+
+use crate::neo_hookean::{Evaluation, TetConstraint};
+use crate::real::weight;
+use crate::{Real, Solver};
+
+/// How far the last substep is from a solution of its equations.
+///
+/// Sums go over the particles that move and the tets that take part. Forces other than elastic ones and gravity are no
+/// part of the equations, so where a body touches the ground or is damped, `primal`, `force` and `potential` show that.
+/// In single precision the last digit of a position over Δt² is the floor of `force`. A value too large for a double is
+/// [`f64::MAX`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Residuals {
+    /// `‖M (x - x̃) - ∇Cᵀ λ‖` in kg·m: the part of the equations of motion that XPBD drops. To be compared with
+    /// `Δt²` times [`Solver::load`].
+    pub primal: f64,
+    /// `‖C + α̃ λ‖` without unit: the part it iterates on.
+    pub dual: f64,
+    /// The root of the mean square of `C + α̃ λ`, which does not grow with the number of constraints.
+    pub dual_rms: f64,
+    /// `‖M (x - x̃) / Δt² + ∇U(x)‖` in N, from positions alone: what backward Euler makes zero. To be compared with
+    /// [`Solver::load`].
+    pub force: f64,
+    /// The incremental potential `‖x - x̃‖²_M / (2 Δt²) + U(x)` in J, which backward Euler makes least. `U` is 0 at rest.
+    pub potential: f64,
+}
+
+impl<R: Real> Solver<R> {
+    /// The residuals of the last substep; `None` unless it was made by [`Solver::step_keeping_residuals`] with
+    /// `substep_time` and no particle or tet has come since. They are those of the positions as they are now.
+    ///
+    /// # Example
+    /// A single tet at rest falls freely, which it does without residual.
+    /// ```
+    /// # use glam::DVec3;
+    /// # use incise_graph::{Clustering, ColorId, Coloring, Schedule};
+    /// # use incise_xpbd::{Material, Solver, StepSettings};
+    /// # let rest = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+    /// # let material = Material { young_modulus: 1e4, poisson_ratio: 0.4, density: 1e3, damping: 0.0 };
+    /// # let mut solver = Solver::<f64>::new(&rest);
+    /// # solver.add_material(material)?;
+    /// # solver.push_tet([0, 1, 2, 3], rest, 0);
+    /// # (0..4).for_each(|p| solver.set_mass(p, 1000.0 / 6.0 / 4.0));
+    /// # let schedule = Schedule::new(&Clustering::none(1), &Coloring::new(vec![ColorId(0)]));
+    /// let settings = StepSettings { gravity: Some(DVec3::NEG_Z), ..StepSettings::new(0.01) };
+    /// solver.step_keeping_residuals(&schedule, &settings)?;
+    /// let residuals = solver.residuals(settings.substep_time()).expect("they were kept");
+    /// assert!(residuals.force < 1e-9 * solver.load(DVec3::NEG_Z));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn residuals(&self, substep_time: f64) -> Option<Residuals> {
+        if self.predicted.len() != self.particle_count() || self.kept.len() != self.tet_count() {
+            return None;
+        }
+        let time_squared = substep_time * substep_time;
+        let inertia: Vec<DVec3> = (0..self.particle_count())
+            .map(|p| (self.position(p) - R::to_dvec3(self.predicted[p])) * self.masses[p])
+            .collect();
+        let mut potential: f64 = (0..self.particle_count())
+            .filter(|&p| self.moves(p))
+            .map(|p| inertia[p].length_squared() / (2.0 * self.masses[p] * time_squared))
+            .sum();
+        let mut force: Vec<DVec3> = inertia.iter().map(|&i| i / time_squared).collect();
+        let mut primal = inertia;
+        let mut dual = Vec::new();
+        for (t, tet) in self.tets.iter().enumerate() {
+            let tet = tet.to_f64();
+            let stiffness = [tet.stiffness, tet.ratio * tet.stiffness];
+            let evaluation = self.evaluate(&tet);
+            let values = [evaluation.deviatoric, evaluation.hydrostatic];
+            potential += tet.energy(&evaluation);
+            let multipliers = self.kept[t].map(R::to_f64);
+            for (k, &p) in tet.particles.iter().enumerate() {
+                let gradients = [
+                    evaluation.deviatoric_gradients[k],
+                    evaluation.hydrostatic_gradients[k],
+                ];
+                for c in 0..2 {
+                    force[p as usize] += gradients[c] * (stiffness[c] * values[c]);
+                    primal[p as usize] -= gradients[c] * multipliers[c];
+                }
+            }
+            let compliances = stiffness.map(|s| 1.0 / (s * time_squared));
+            // A tet that takes no part, or so little that its compliance overflows, has nothing to satisfy.
+            if compliances.into_iter().all(f64::is_finite) {
+                dual.extend([0, 1].map(|c| values[c] + compliances[c] * multipliers[c]));
+            }
+        }
+        let moving = |vectors: Vec<DVec3>| {
+            let entries = vectors.into_iter().enumerate();
+            norm(
+                entries
+                    .filter(|&(p, _)| self.moves(p))
+                    .flat_map(|(_, v)| v.to_array()),
+            )
+        };
+        let constraints = dual.len().max(1) as f64;
+        let dual = norm(dual.into_iter());
+        Some(Residuals {
+            primal: moving(primal),
+            dual,
+            dual_rms: dual / constraints.sqrt(),
+            force: moving(force),
+            potential: representable(potential),
+        })
+    }
+
+    /// `‖M g‖` over the particles that move, in N: the size of the forces in play, by which residuals are judged.
+    ///
+    /// The sum of squares shrinks with the size of the particles as that of [`Residuals::force`] does.
+    #[must_use]
+    pub fn load(&self, gravity: DVec3) -> f64 {
+        let particles = (0..self.particle_count()).filter(|&p| self.moves(p));
+        norm(particles.flat_map(|p| (gravity * self.masses[p]).to_array()))
+    }
+
+    /// Both constraints of a tet at the present positions.
+    pub(crate) fn evaluate(&self, tet: &TetConstraint<f64>) -> Evaluation<f64> {
+        tet.evaluate(tet.particles.map(|p| self.position(p as usize)))
+    }
+
+    /// Whether a particle is neither held nor without mass.
+    pub(crate) fn moves(&self, particle: usize) -> bool {
+        weight::<R>(&self.particles[particle]) > R::ZERO
+    }
+}
+
+impl TetConstraint<f64> {
+    /// The elastic energy in J of the tet as the solver has it, softened or left out; 0 at rest.
+    pub(crate) fn energy(&self, e: &Evaluation<f64>) -> f64 {
+        let at_rest = 1.0 - self.gamma;
+        let shape = e.deviatoric * e.deviatoric - 3.0;
+        let bulge = e.hydrostatic * e.hydrostatic - at_rest * at_rest;
+        0.5 * self.stiffness * (shape + self.ratio * bulge)
+    }
+}
+
+/// The Euclidean norm, without overflow of the squares.
+fn norm(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    if values.clone().any(|v| !v.is_finite()) {
+        return f64::MAX;
+    }
+    let largest = values.clone().fold(0.0, |a: f64, v| a.max(v.abs()));
+    if largest == 0.0 {
+        return 0.0;
+    }
+    let sum: f64 = values.map(|v| (v / largest) * (v / largest)).sum();
+    representable(largest * sum.sqrt())
+}
+
+/// The value, or the largest double where it is more than that.
+fn representable(value: f64) -> f64 {
+    if value.is_finite() { value } else { f64::MAX }
+}
