@@ -39,6 +39,7 @@
 //! What it cannot do: iterating a large step does not converge to the implicit solution of that step, because XPBD
 //! leaves out the primal residual; use substeps, and watch [`Solver::kappa`].
 
+mod descent;
 mod error;
 mod gauss_seidel;
 mod material;
@@ -49,6 +50,7 @@ mod settings;
 mod solver;
 mod step;
 
+pub use descent::{DescentReport, DescentSettings, Guess, ImplicitStep, Stars};
 pub use error::XpbdError;
 pub use material::Material;
 pub use measure::{Energy, Residuals, Softened, Volume};

@@ -116,7 +116,7 @@ impl<R: Real> Solver<R> {
     }
 
     /// Moves every free particle by its velocity.
-    fn predict(&mut self, settings: &StepSettings, time: R) {
+    pub(crate) fn predict(&mut self, settings: &StepSettings, time: R) {
         let change = settings
             .gravity
             .map(|g| R::from_dvec3(g * settings.substep_time()));
@@ -137,7 +137,7 @@ impl<R: Real> Solver<R> {
     }
 
     /// Lifts particles out of the ground; friction holds them back by at most its share of the depth.
-    fn project_to_ground(&self, ground: Ground) {
+    pub(crate) fn project_to_ground(&self, ground: Ground) {
         let (height, friction) = (R::from_f64(ground.height), R::from_f64(ground.friction));
         let particles = self.particles.par_iter().with_min_len(PARALLEL_PARTICLES);
         particles
@@ -163,7 +163,7 @@ impl<R: Real> Solver<R> {
     /// them would be wrong by their last digit over the time: in single precision a body in free fall would lose a
     /// hundredth of its speed, and far from the origin it would hang in the air. The prediction, computed again to the
     /// same bits, tells what part of the motion is correction; without correction the velocity stays as it is.
-    fn update_velocities(&mut self, time: R, per_time: R) -> usize {
+    pub(crate) fn update_velocities(&mut self, time: R, per_time: R) -> usize {
         let particles = self.particles.par_iter().with_min_len(PARALLEL_PARTICLES);
         particles
             .zip(&self.previous)

@@ -9,6 +9,8 @@ mod beam;
 mod body;
 mod conservation;
 mod damping;
+mod descent;
+mod descent_extremes;
 mod determinism;
 mod edits;
 mod energy;
