@@ -205,8 +205,8 @@ fn free_fall_is_the_closed_form() {
     }
 }
 
-/// A beam that has come to rest by large steps of descent goes on by small ones of XPBD, and back. The sag of XPBD at
-/// kappa 0.3 differs by some percent on so coarse a beam, so the tip swings by twice that: measured 10 %.
+/// A beam that has come to rest by large steps of descent goes on by small ones of XPBD, and back. The sag of XPBD is
+/// too large by a share of kappa, so the tip swings by twice that: 20 % at kappa 0.3, below 3 % at the 0.02 used here.
 #[test]
 fn methods_may_change_between_frames() {
     let mesh = kuhn_box([6, 2, 2], dvec3(0.6, 0.2, 0.2));
@@ -223,14 +223,14 @@ fn methods_may_change_between_frames() {
     assert!(settled < 0.2 - 1e-3, "it sags: {settled}");
     let xpbd = incise_xpbd::StepSettings {
         gravity: Some(GRAVITY),
-        ..substep(&solver, 0.3)
+        ..substep(&solver, 0.02)
     };
-    for _ in 0..300 {
+    for _ in 0..1200 {
         assert_eq!(solver.step(&schedule, &xpbd).unwrap().repaired, 0);
         within(
             "tip",
             ((tip(&solver) - settled) / (0.2 - settled)).abs(),
-            0.2,
+            0.03,
         );
     }
     assert_eq!(solver.descend(&mut stars, &settings).unwrap().repaired, 0);
@@ -379,9 +379,9 @@ fn stars_follow_a_cut() {
     solver.descend(&mut stars, &settings).unwrap();
     // Copies of the particles in the middle plane, for the tets on its right.
     let mut copy_of = vec![None; mesh.positions.len()];
-    for p in 0..mesh.positions.len() {
+    for (p, copy) in copy_of.iter_mut().enumerate() {
         if (mesh.positions[p].x - 0.2).abs() < 1e-9 {
-            copy_of[p] = u32::try_from(solver.particle_count()).ok();
+            *copy = u32::try_from(solver.particle_count()).ok();
             solver.push_copy(p);
             let half = solver.mass(p) / 2.0;
             solver.set_mass(p, half);
