@@ -1,6 +1,6 @@
 //! How descent converges within one large step: residual and milliseconds, iteration by iteration.
 //!
-//! `cargo run --release -p incise-xpbd --example convergence -- [MESH] [gravity|stretch] [ROUNDS] [ω]`
+//! `cargo run --release -p incise-xpbd --example convergence -- [MESH] [gravity|stretch] [ROUNDS] [ω] [AGGREGATE] [CG] [REDUCTION] [SWEEPS]`
 //!
 //! A body 0.2 m long of Young's modulus 1e7 Pa and Poisson's ratio 0.49, held where x is smallest, falls under gravity
 //! or starts at twice its size. A step is 16 ms, kappa tens of thousands. Without a mesh file it is a box.
@@ -13,7 +13,9 @@ use std::time::Instant;
 use glam::{DVec3, dvec3};
 use incise_graph::{Clustering, Schedule};
 use incise_mesh::{TetId, TetMesh, generate::kuhn_box, io};
-use incise_xpbd::{DescentSettings, ImplicitStep, Material, Real, Solver, Stars};
+use incise_xpbd::{
+    Correction, CorrectionSettings, DescentSettings, ImplicitStep, Material, Real, Solver, Stars,
+};
 
 const STUFF: Material = Material {
     young_modulus: 1e7,
@@ -44,7 +46,14 @@ fn body<R: Real>(mesh: &TetMesh) -> Solver<R> {
     solver
 }
 
-fn run<R: Real>(mesh: &TetMesh, case: &str, rounds: usize, relaxation: f64) {
+fn run<R: Real>(
+    mesh: &TetMesh,
+    case: &str,
+    rounds: usize,
+    relaxation: f64,
+    corrections: CorrectionSettings,
+    sweeps: usize,
+) {
     let mut solver = body::<R>(mesh);
     let mut settings = DescentSettings::new(0.016, 1);
     settings.step.relaxation = relaxation;
@@ -78,6 +87,16 @@ fn run<R: Real>(mesh: &TetMesh, case: &str, rounds: usize, relaxation: f64) {
         clock.elapsed().as_secs_f64() * 1e3,
         solver.kappa(0.016)
     );
+    let clock = Instant::now();
+    let mut correction =
+        (corrections.aggregate > 0).then(|| Correction::new(&stars, corrections).unwrap());
+    if let Some(correction) = &correction {
+        println!(
+            "{} aggregates, correction in {:.2} ms",
+            correction.aggregate_count(),
+            clock.elapsed().as_secs_f64() * 1e3
+        );
+    }
     let mut step = ImplicitStep::new(&mut solver, &mut stars, &settings).unwrap();
     let start = step.residual();
     let load = load.unwrap_or(start);
@@ -86,19 +105,26 @@ fn run<R: Real>(mesh: &TetMesh, case: &str, rounds: usize, relaxation: f64) {
     let (mut seen2, mut seen4) = (false, false);
     for round in 1..=rounds {
         let clock = Instant::now();
-        step.sweep();
+        for _ in 0..sweeps {
+            step.sweep();
+        }
+        let report = correction.as_mut().map(|c| step.correct(c));
         time += clock.elapsed().as_secs_f64() * 1e3;
         let show = round as f64 >= next;
-        if show || round % 20 == 0 {
+        if show || round % 20 == 0 || report.is_some() {
             let r = step.residual() / load;
             let hit = (!seen2 && r < 1e-2) || (!seen4 && r < 1e-4);
             seen2 |= r < 1e-2;
             seen4 |= r < 1e-4;
-            if show || hit {
+            if show || hit || report.is_some() {
                 println!(
-                    "{round:6} {time:10.3} ms   residual {:.3e}  potential {:.6e}",
+                    "{round:6} {time:10.3} ms   residual {:.3e}  potential {:.6e}  {}",
                     r,
-                    step.potential()
+                    step.potential(),
+                    report.map_or(String::new(), |r| format!(
+                        "{} cg, part {}",
+                        r.iterations, r.taken
+                    ))
                 );
                 next *= 1.5;
             }
@@ -133,7 +159,13 @@ fn main() {
     mesh.positions.iter_mut().for_each(|x| *x *= scale);
     let rounds = argument(2, "200").parse().unwrap();
     let relaxation = argument(3, "1").parse().unwrap();
-    for (threads, single) in [(1, true), (2, true), (1, false)] {
+    let corrections = CorrectionSettings {
+        aggregate: argument(4, "0").parse().unwrap(),
+        iterations: argument(5, "50").parse().unwrap(),
+        reduction: argument(6, "0.1").parse().unwrap(),
+    };
+    let sweeps = argument(7, "1").parse().unwrap();
+    for (threads, single) in [(1, false), (2, false), (1, true)] {
         println!("threads {threads}, {}", if single { "f32" } else { "f64" });
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
@@ -142,9 +174,9 @@ fn main() {
         let case = argument(1, "gravity");
         pool.install(|| {
             if single {
-                run::<f32>(&mesh, &case, rounds, relaxation)
+                run::<f32>(&mesh, &case, rounds, relaxation, corrections, sweeps)
             } else {
-                run::<f64>(&mesh, &case, rounds, relaxation)
+                run::<f64>(&mesh, &case, rounds, relaxation, corrections, sweeps)
             }
         });
     }

@@ -50,7 +50,10 @@ mod settings;
 mod solver;
 mod step;
 
-pub use descent::{DescentReport, DescentSettings, Guess, ImplicitStep, Stars};
+pub use descent::{
+    Correction, CorrectionReport, CorrectionSettings, DescentReport, DescentSettings, Guess,
+    ImplicitStep, Stars,
+};
 pub use error::XpbdError;
 pub use material::Material;
 pub use measure::{Energy, Residuals, Softened, Volume};

@@ -13,10 +13,17 @@
 //! quadratic falls by `ω (2 - ω)` of the most it can.
 //!
 //! Sweeps damp what varies from tet to tet and hardly touch what varies over the body, the more so the stiffer
-//! it is.
+//! it is. [`Correction`] adds a truncated Newton step for the whole body, preconditioned by aggregates of particles.
 //!
 //! Source: Chen, Liu, Yang, Yuksel 2024 (vertex block descent). Cost: see [`Stars`] and [`ImplicitStep::sweep`].
 
+mod aggregates;
+mod cholesky;
+mod coarse;
+mod conjugate;
+mod correction;
+mod hessian;
+mod matrix;
 mod settings;
 mod spoke;
 mod stars;
@@ -24,6 +31,7 @@ mod state;
 mod step;
 mod sweep;
 
+pub use correction::{Correction, CorrectionReport, CorrectionSettings};
 pub use settings::{DescentSettings, Guess};
 pub use stars::Stars;
 pub use step::{DescentReport, ImplicitStep};

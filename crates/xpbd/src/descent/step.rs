@@ -104,7 +104,7 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
         Ok(Self::predicted(solver, stars, settings))
     }
 
-    fn predicted(
+    pub(super) fn predicted(
         solver: &'a mut Solver<R>,
         stars: &'a mut Stars<R>,
         settings: &DescentSettings,

@@ -106,7 +106,7 @@ impl<R: Real> Sweep<R> {
 /// Gaussian elimination without square roots. No pivot of such a matrix is smaller than its isotropic part; where
 /// rounding says otherwise, it is noise.
 #[inline]
-fn solve<R: Real>(isotropic: R, h: [R; 6], force: R::Vector) -> R::Vector {
+pub(super) fn solve<R: Real>(isotropic: R, h: [R; 6], force: R::Vector) -> R::Vector {
     let [f0, f1, f2] = R::components(force);
     let at_least = |pivot: R| if pivot > isotropic { pivot } else { isotropic };
     let d0 = R::ONE / (h[0] + isotropic);

@@ -10,6 +10,7 @@ mod body;
 mod conservation;
 mod damping;
 mod descent;
+mod descent_correction;
 mod descent_extremes;
 mod determinism;
 mod edits;
