@@ -6,8 +6,10 @@
 //! with the affine motions of aggregates in between (`coarse`): a two-level cycle. Nothing of the mesh is
 //! factored, only the aggregates, so after a cut a new pattern is all that has to be made.
 //!
+//! From a violent start, with many solutions at hand, it may settle in a worse one than sweeps would: sweep first.
+//!
 //! Source: truncated Newton after Nash 2000; aggregates after Vaněk, Mandel, Brezina 1996, without smoothing.
-//! Cost: filling the matrix is three sweeps, an iteration of conjugate gradients about one.
+//! Cost: filling and factoring is 20 to 30 sweeps, an iteration of conjugate gradients about two.
 
 use super::aggregates::aggregates;
 use super::coarse::Coarse;
@@ -32,7 +34,7 @@ impl Default for CorrectionSettings {
     fn default() -> Self {
         Self {
             iterations: 50,
-            reduction: 0.03,
+            reduction: 0.01,
             aggregate: 120,
         }
     }
@@ -116,6 +118,37 @@ impl<R: Real> Solver<R> {
     ///
     /// # Determinism
     /// Bit-identical for any number of threads.
+    ///
+    /// # Example
+    /// A wedge of steel hangs from a corner and reaches 1e-9 of its first residual in a few rounds.
+    /// ```
+    /// use glam::DVec3;
+    /// use incise_graph::{Clustering, ColorId, Coloring, Schedule};
+    /// use incise_xpbd::{Correction, CorrectionSettings, DescentSettings, Material, Solver, Stars};
+    ///
+    /// let rest = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE];
+    /// let steel = Material { young_modulus: 2e11, poisson_ratio: 0.3, density: 7800.0, damping: 0.0 };
+    /// let mut solver = Solver::<f64>::new(&rest);
+    /// solver.add_material(steel)?;
+    /// for tet in [[0u32, 1, 2, 3], [1, 4, 2, 3]] {
+    ///     solver.push_tet(tet, tet.map(|p| rest[p as usize]), 0);
+    /// }
+    /// for p in 0..5 {
+    ///     solver.set_mass(p, 1000.0);
+    /// }
+    /// solver.set_fixed(0, true);
+    ///
+    /// // Particles 0 and 4 share no tet, so they share a color.
+    /// let colors = Coloring::new([0, 1, 2, 3, 0].map(ColorId).to_vec());
+    /// let mut stars = Stars::new(&solver, &Schedule::new(&Clustering::none(5), &colors))?;
+    /// let mut correction = Correction::new(&stars, CorrectionSettings::default())?;
+    /// let mut settings = DescentSettings::new(1.0 / 60.0, 20);
+    /// settings.step.gravity = Some(DVec3::new(0.0, 0.0, -9.81));
+    /// settings.tolerance = Some(1e-9);
+    /// let report = solver.descend_corrected(&mut stars, &mut correction, &settings)?;
+    /// assert!(report.iterations < 10);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn descend_corrected(
         &mut self,
         stars: &mut Stars<R>,

@@ -123,16 +123,17 @@ mod tests {
         h
     }
 
-    /// The smallest pivot of a matrix plus a small multiple of the identity.
+    /// The smallest pivot of a matrix plus a multiple of the identity.
     fn smallest_pivot(mut h: Matrix, shift: f64) -> f64 {
         let mut smallest = f64::INFINITY;
         for k in 0..9 {
-            let pivot = h[k][k] + shift;
+            let upper = h[k];
+            let pivot = upper[k] + shift;
             smallest = smallest.min(pivot);
-            for i in k + 1..9 {
-                let factor = h[i][k] / pivot;
-                for j in k + 1..9 {
-                    h[i][j] -= factor * h[k][j];
+            for row in &mut h[k + 1..] {
+                let factor = row[k] / pivot;
+                for (entry, above) in row[k + 1..].iter_mut().zip(&upper[k + 1..]) {
+                    *entry -= factor * above;
                 }
             }
         }
