@@ -112,7 +112,7 @@ impl<R: Real> Solver<R> {
             // The multipliers, each over the scale of its row.
             let mut multipliers = vec![0.0; 2 * self.tet_count()];
             for _ in 0..settings.iterations {
-                self.iterate(&pattern, settings, &mut multipliers)
+                self.solve_all(&pattern, settings, &mut multipliers)
                     .ok_or(XpbdError::Factorization)?;
                 if let Some(ground) = settings.ground {
                     self.project_to_ground(ground);
@@ -130,7 +130,7 @@ impl<R: Real> Solver<R> {
     }
 
     /// One direct solve; `None` if it left double precision.
-    fn iterate(
+    fn solve_all(
         &self,
         pattern: &Pattern,
         settings: &StepSettings,

@@ -40,6 +40,7 @@
 //! leaves out the primal residual; use substeps, and watch [`Solver::kappa`].
 
 mod crew;
+mod descent;
 #[cfg(feature = "direct")]
 mod direct;
 mod error;
@@ -57,6 +58,10 @@ mod solver;
 mod step;
 mod unfold;
 
+pub use descent::{
+    Correction, CorrectionReport, CorrectionSettings, DescentReport, DescentSettings, Guess,
+    ImplicitStep, Stars,
+};
 pub use error::XpbdError;
 pub use material::Material;
 pub use measure::{Energy, Softened, Volume};

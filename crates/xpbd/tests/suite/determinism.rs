@@ -7,7 +7,7 @@ use incise_xpbd::{Ground, Material, Real, StepSettings};
 use crate::body::{GRAVITY, RUBBER, body, disturb, plain, schedule};
 
 /// FNV-1a over the bits of positions and velocities. Single precision widens without loss.
-fn hash<'a>(vectors: impl IntoIterator<Item = &'a DVec3>) -> u64 {
+pub(crate) fn hash<'a>(vectors: impl IntoIterator<Item = &'a DVec3>) -> u64 {
     let mut hash = 0xcbf2_9ce4_8422_2325_u64;
     for value in vectors.into_iter().flat_map(|v| v.to_array()) {
         for byte in value.to_bits().to_le_bytes() {

@@ -11,7 +11,7 @@ use crate::body::{
 
 /// Fails unless every number that the solver shows is finite.
 #[track_caller]
-fn assert_finite<R: Real>(solver: &Solver<R>, what: &str) {
+pub(crate) fn assert_finite<R: Real>(solver: &Solver<R>, what: &str) {
     for p in 0..solver.particle_count() {
         let state = (solver.position(p), solver.velocity(p));
         assert!(
@@ -68,9 +68,9 @@ fn small() -> TetMesh {
     kuhn_box([2, 2, 2], DVec3::splat(0.125))
 }
 
-type Prepare<R> = Box<dyn Fn(&mut Solver<R>)>;
+pub(crate) type Prepare<R> = Box<dyn Fn(&mut Solver<R>)>;
 /// A body, a material, a time step, and what is done to the body.
-type Case<R> = (TetMesh, Material, f64, Prepare<R>);
+pub(crate) type Case<R> = (TetMesh, Material, f64, Prepare<R>);
 
 fn place<R: Real>(map: impl Fn(usize, DVec3) -> DVec3 + 'static) -> Case<R> {
     let prepare = move |solver: &mut Solver<R>| {
@@ -81,7 +81,7 @@ fn place<R: Real>(map: impl Fn(usize, DVec3) -> DVec3 + 'static) -> Case<R> {
     (small(), RUBBER, 1.0 / 60.0, Box::new(prepare))
 }
 
-fn cases<R: Real>() -> Vec<(String, Case<R>)> {
+pub(crate) fn cases<R: Real>() -> Vec<(String, Case<R>)> {
     let mut cases: Vec<(String, Case<R>)> = vec![
         ("on a point".into(), place(|_, _| DVec3::splat(0.05))),
         ("on the origin".into(), place(|_, _| DVec3::ZERO)),

@@ -11,6 +11,9 @@ mod closed_forms;
 mod conservation;
 mod convergence;
 mod damping;
+mod descent;
+mod descent_correction;
+mod descent_extremes;
 mod determinism;
 #[cfg(feature = "direct")]
 mod direct;

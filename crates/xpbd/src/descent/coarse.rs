@@ -1,0 +1,130 @@
+//! [`Coarse`]: the affine motions of aggregates, their Galerkin matrix `Pᵀ A P` and its factor.
+//!
+//! An aggregate has twelve motions: `δx = u₀ + (r₁ u₁ + r₂ u₂ + r₃ u₃)` with r the place of the particle relative to the
+//! aggregate's center over its radius. They contain its turns, stretches and shears, of which bending and bulging of
+//! the body are made. A block of A between two particles contributes itself times the products of their r: no more
+//! than 16 scaled copies. The matrix is dense, because aggregates are few. Cost: 144 operations a block, then a
+//! factorization of 12 unknowns an aggregate.
+
+use super::cholesky::Cholesky;
+use super::matrix::Blocks;
+use crate::Real;
+
+/// Motions of an aggregate: four vectors.
+const VECTORS: usize = 4;
+
+/// What corrects a body aggregate by aggregate.
+#[derive(Clone, Debug)]
+pub(super) struct Coarse {
+    /// The aggregate of each row.
+    of: Vec<u32>,
+    count: usize,
+    /// 1, r₁, r₂, r₃ of each row; all zero if the row is held.
+    weights: Vec<[f64; VECTORS]>,
+    cholesky: Cholesky,
+    values: Vec<f64>,
+}
+
+impl Coarse {
+    pub(super) fn new(of: Vec<u32>, count: usize) -> Self {
+        let weights = vec![[0.0; VECTORS]; of.len()];
+        Self {
+            of,
+            count,
+            weights,
+            cholesky: Cholesky::default(),
+            values: Vec::new(),
+        }
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Takes the motions at the positions `x` of the rows.
+    pub(super) fn place(&mut self, x: impl Fn(usize) -> glam::DVec3, held: &[bool]) {
+        let mut centers = vec![(glam::DVec3::ZERO, 0.0); self.count];
+        for (row, &a) in self.of.iter().enumerate() {
+            let center = &mut centers[a as usize];
+            *center = (center.0 + x(row), center.1 + 1.0);
+        }
+        let mut radii = vec![0.0f64; self.count];
+        for (row, &a) in self.of.iter().enumerate() {
+            let center = centers[a as usize];
+            let radius = &mut radii[a as usize];
+            *radius = radius.max((x(row) - center.0 / center.1).length());
+        }
+        for (row, &a) in self.of.iter().enumerate() {
+            let (center, radius) = (centers[a as usize], radii[a as usize]);
+            let r = (x(row) - center.0 / center.1) / radius;
+            let r = if r.is_finite() { r } else { glam::DVec3::ZERO };
+            self.weights[row] = if held[row] {
+                [0.0; VECTORS]
+            } else {
+                [1.0, r.x, r.y, r.z]
+            };
+        }
+    }
+
+    /// Assembles and factors the matrix.
+    pub(super) fn assemble<R: Real>(&mut self, matrix: &Blocks<R>) {
+        const WIDTH: usize = 3 * VECTORS;
+        self.cholesky.reset(WIDTH * self.count);
+        for (row, &a) in self.of.iter().enumerate() {
+            let left = self.weights[row];
+            if left[0] == 0.0 {
+                continue;
+            }
+            for (column, block) in matrix.row(row) {
+                let b = self.of[column];
+                let right = self.weights[column];
+                // The lower triangle is enough.
+                if b > a || right[0] == 0.0 {
+                    continue;
+                }
+                // By rows.
+                let [x, y, z] = block.map(|v| R::components(v).map(R::to_f64));
+                let block: [[f64; 3]; 3] = std::array::from_fn(|k| [x[k], y[k], z[k]]);
+                for (i, left) in left.into_iter().enumerate() {
+                    for (k, entries) in block.iter().enumerate() {
+                        let at = WIDTH * a as usize + 3 * i + k;
+                        let target = self.cholesky.row_mut(at, WIDTH * b as usize);
+                        for (target, right) in target.chunks_exact_mut(3).zip(right) {
+                            for (target, entry) in target.iter_mut().zip(entries) {
+                                *target += left * right * entry;
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        self.cholesky.factor();
+    }
+
+    /// Adds the coarse correction for the forces `r` to `z`.
+    pub(super) fn correct<R: Real>(&mut self, r: &[R::Vector], z: &mut [R::Vector]) {
+        self.values.clear();
+        self.values.resize(3 * VECTORS * self.count, 0.0);
+        for (row, &a) in self.of.iter().enumerate() {
+            let target = &mut self.values[3 * VECTORS * a as usize..][..3 * VECTORS];
+            let force = R::components(r[row]).map(R::to_f64);
+            for (j, weight) in self.weights[row].into_iter().enumerate() {
+                for k in 0..3 {
+                    target[3 * j + k] += weight * force[k];
+                }
+            }
+        }
+        self.cholesky.solve(&mut self.values);
+        for (row, &a) in self.of.iter().enumerate() {
+            let source = &self.values[3 * VECTORS * a as usize..][..3 * VECTORS];
+            let mut motion = [0.0; 3];
+            for (j, weight) in self.weights[row].into_iter().enumerate() {
+                for k in 0..3 {
+                    motion[k] += weight * source[3 * j + k];
+                }
+            }
+            let [a, b, c] = motion.map(R::from_f64);
+            z[row] += R::vector(a, b, c);
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! [`Conjugate`]: preconditioned conjugate gradients for the matrix of a correction.
+//!
+//! The preconditioner is one symmetric cycle: a Gauss-Seidel sweep over the rows in the colors of the stars, the
+//! coarse correction, and a sweep backwards. Dot products are summed in double precision, row after row.
+//! Cost of an iteration: three products, and a coarse solution.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::coarse::Coarse;
+use super::matrix::{Block, Blocks, PARALLEL_ROWS, apply};
+use super::sweep::solve;
+use crate::Real;
+use crate::real::finite;
+
+/// When to stop.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    pub(super) iterations: u32,
+    pub(super) reduction: f64,
+}
+
+/// The vectors of the iteration.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Conjugate<R: Real> {
+    inverses: Vec<Block<R>>,
+    solution: Vec<R::Vector>,
+    residual: Vec<R::Vector>,
+    direction: Vec<R::Vector>,
+    product: Vec<R::Vector>,
+    preconditioned: Vec<R::Vector>,
+}
+
+impl<R: Real> Conjugate<R> {
+    /// The result of [`Conjugate::solve`].
+    pub(super) fn solution(&self) -> &[R::Vector] {
+        &self.solution
+    }
+
+    /// Solves `A x = b` approximately; returns the iterations made. Rows that are held stay zero.
+    pub(super) fn solve(
+        &mut self,
+        matrix: &Blocks<R>,
+        coarse: &mut Coarse,
+        colors: &[usize],
+        b: &[R::Vector],
+        held: &[bool],
+        limits: Limits,
+    ) -> u32 {
+        let rows = b.len();
+        for v in [
+            &mut self.solution,
+            &mut self.direction,
+            &mut self.product,
+            &mut self.preconditioned,
+        ] {
+            v.clear();
+            v.resize(rows, R::Vector::default());
+        }
+        self.residual.clear();
+        self.residual.extend(b);
+        (0..rows)
+            .into_par_iter()
+            .with_min_len(PARALLEL_ROWS)
+            .map(|row| inverse::<R>(&matrix.blocks[matrix.offsets[row]], held[row]))
+            .collect_into_vec(&mut self.inverses);
+        let mut last = 0.0;
+        let mut first = 0.0;
+        for iteration in 0..limits.iterations {
+            self.precondition(matrix, coarse, colors);
+            let now = dot::<R>(&self.residual, &self.preconditioned);
+            if iteration == 0 {
+                first = now;
+            }
+            if !(now.is_finite() && now > limits.reduction * limits.reduction * first) {
+                return iteration;
+            }
+            let share = R::from_f64(if iteration == 0 { 0.0 } else { now / last });
+            last = now;
+            for (d, z) in self.direction.iter_mut().zip(&self.preconditioned) {
+                *d = *z + *d * share;
+            }
+            matrix.multiply(&self.direction, &mut self.product);
+            let curvature = dot::<R>(&self.direction, &self.product);
+            let length = now / curvature;
+            if !(length.is_finite() && length > 0.0) {
+                return iteration;
+            }
+            let length = R::from_f64(length);
+            for (x, d) in self.solution.iter_mut().zip(&self.direction) {
+                *x += *d * length;
+            }
+            for (r, q) in self.residual.iter_mut().zip(&self.product) {
+                *r += *q * -length;
+            }
+        }
+        limits.iterations
+    }
+
+    /// One cycle for the residual.
+    fn precondition(&mut self, matrix: &Blocks<R>, coarse: &mut Coarse, colors: &[usize]) {
+        let Self {
+            inverses,
+            residual,
+            preconditioned: z,
+            product,
+            ..
+        } = self;
+        // From zero, nothing right of the diagonal matters yet, and nothing but that is left over afterwards.
+        for color in colors.windows(2) {
+            relax(matrix, inverses, residual, z, color[0]..color[1], |row| {
+                matrix.lower(row)
+            });
+        }
+        matrix.multiply_upper(z, product);
+        coarse.correct::<R>(product, z);
+        for color in colors.windows(2).rev() {
+            relax(matrix, inverses, residual, z, color[0]..color[1], |row| {
+                matrix.beside(row)
+            });
+        }
+    }
+}
+
+/// Solves each row of a color for its own unknown, seeing some of its blocks; no two rows of a color are coupled.
+fn relax<R: Real>(
+    matrix: &Blocks<R>,
+    inverses: &[Block<R>],
+    b: &[R::Vector],
+    z: &mut [R::Vector],
+    rows: Range<usize>,
+    seen: impl Fn(usize) -> Range<usize> + Sync,
+) {
+    let start = rows.start;
+    let (before, rest) = z.split_at_mut(start);
+    let (own, after) = rest.split_at_mut(rows.len());
+    let (before, after) = (&*before, &*after);
+    own.par_iter_mut()
+        .with_min_len(PARALLEL_ROWS)
+        .enumerate()
+        .for_each(|(k, z)| {
+            let row = start + k;
+            let mut force = b[row];
+            let seen = seen(row);
+            for (&column, block) in matrix.columns[seen.clone()]
+                .iter()
+                .zip(&matrix.blocks[seen])
+            {
+                let column = column as usize;
+                let x = if column < start {
+                    before[column]
+                } else {
+                    after[column - rows.end]
+                };
+                force = force - apply::<R>(block, x);
+            }
+            *z = apply::<R>(&inverses[row], force);
+        });
+}
+
+/// The inverse of a symmetric block; zero if it has none or the row is held.
+fn inverse<R: Real>(block: &Block<R>, held: bool) -> Block<R> {
+    let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = block.map(R::components);
+    let axes = [
+        (R::ONE, R::ZERO, R::ZERO),
+        (R::ZERO, R::ONE, R::ZERO),
+        (R::ZERO, R::ZERO, R::ONE),
+    ];
+    let columns =
+        axes.map(|(x, y, z)| solve(R::ZERO, [xx, xy, xz, yy, yz, zz], R::vector(x, y, z)));
+    if held || !columns.into_iter().all(finite::<R>) {
+        return [R::Vector::default(); 3];
+    }
+    columns
+}
+
+fn dot<R: Real>(a: &[R::Vector], b: &[R::Vector]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| R::dot(*a, *b).to_f64()).sum()
+}

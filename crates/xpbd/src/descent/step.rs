@@ -1,0 +1,192 @@
+//! [`Solver::descend`] and [`ImplicitStep`]: a frame, and one substep of it opened up.
+
+use super::{DescentSettings, Guess, Stars};
+use crate::real::{finite, load, store, weight};
+use crate::{Real, Solver, StepReport, StepSettings, XpbdError};
+
+/// What a frame of descent has to say about itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DescentReport {
+    /// As in [`StepReport::repaired`].
+    pub repaired: usize,
+    /// Iterations made, over all substeps.
+    pub iterations: u32,
+    /// With a tolerance: the force residual at the end of the last substep, as a fraction of that at the free motion.
+    pub residual: Option<f64>,
+}
+
+impl<R: Real> Solver<R> {
+    /// Advances by one frame of `settings.step.time_step` by sweeps of block descent. May take turns with
+    /// [`Solver::step`].
+    ///
+    /// # Errors
+    /// If the settings do not pass [`DescentSettings::check`]; nothing has moved then.
+    ///
+    /// # Panics
+    /// If the stars are those of another number of particles or tets.
+    ///
+    /// # Determinism
+    /// Bit-identical for any number of threads.
+    ///
+    /// # Example
+    /// A tet of steel hangs from a corner; kappa is 1e4, far beyond what XPBD can do in one substep.
+    /// ```
+    /// use glam::DVec3;
+    /// use incise_graph::{Clustering, ColorId, Coloring, Schedule};
+    /// use incise_xpbd::{DescentSettings, Material, Solver, Stars};
+    ///
+    /// let rest = [DVec3::ZERO, DVec3::Y, DVec3::X, DVec3::NEG_Z];
+    /// let steel = Material { young_modulus: 2e11, poisson_ratio: 0.3, density: 7800.0, damping: 0.0 };
+    /// let mut solver = Solver::<f64>::new(&rest);
+    /// solver.add_material(steel)?;
+    /// solver.push_tet([0, 1, 2, 3], rest, 0);
+    /// for p in 0..4 {
+    ///     solver.set_mass(p, 7800.0 / 24.0);
+    /// }
+    /// solver.set_fixed(0, true);
+    ///
+    /// // Four particles of one tet need four colors.
+    /// let colors = Coloring::new([0, 1, 2, 3].map(ColorId).to_vec());
+    /// let mut stars = Stars::new(&solver, &Schedule::new(&Clustering::none(4), &colors))?;
+    /// let mut settings = DescentSettings::new(1.0 / 60.0, 20);
+    /// settings.step.gravity = Some(DVec3::new(0.0, 0.0, -9.81));
+    /// for _ in 0..60 {
+    ///     assert_eq!(solver.descend(&mut stars, &settings)?.repaired, 0);
+    /// }
+    /// assert!((solver.volume().min_ratio - 1.0).abs() < 1e-3);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn descend(
+        &mut self,
+        stars: &mut Stars<R>,
+        settings: &DescentSettings,
+    ) -> Result<DescentReport, XpbdError> {
+        let _span = tracing::debug_span!("xpbd::descend").entered();
+        settings.check()?;
+        let mut report = DescentReport::default();
+        for _ in 0..settings.step.substeps {
+            let mut step = ImplicitStep::predicted(self, stars, settings);
+            step.run(settings, &mut report, |step| step.sweep());
+            report.repaired += step.finish().repaired;
+        }
+        Ok(report)
+    }
+}
+
+/// One substep of descent between its prediction and its end, for those who choose themselves what to do in it, or
+/// want to look at it while it converges.
+///
+/// The positions of the solver are the iterate. Velocities follow only in [`ImplicitStep::finish`]: a step dropped
+/// before that leaves the solver with velocities that do not belong to its positions.
+#[derive(Debug)]
+#[must_use = "velocities follow in `finish`"]
+pub struct ImplicitStep<'a, R: Real> {
+    pub(super) solver: &'a mut Solver<R>,
+    pub(super) stars: &'a mut Stars<R>,
+    pub(super) settings: StepSettings,
+    pub(super) time: R,
+}
+
+impl<'a, R: Real> ImplicitStep<'a, R> {
+    /// Begins a substep of `settings.step.substep_time()`: moves the particles to the initial guess.
+    ///
+    /// # Errors
+    /// If the settings do not pass [`DescentSettings::check`]; nothing has moved then.
+    ///
+    /// # Panics
+    /// If the stars are those of another number of particles or tets.
+    pub fn new(
+        solver: &'a mut Solver<R>,
+        stars: &'a mut Stars<R>,
+        settings: &DescentSettings,
+    ) -> Result<Self, XpbdError> {
+        settings.check()?;
+        Ok(Self::predicted(solver, stars, settings))
+    }
+
+    pub(super) fn predicted(
+        solver: &'a mut Solver<R>,
+        stars: &'a mut Stars<R>,
+        settings: &DescentSettings,
+    ) -> Self {
+        assert!(
+            stars.fits(solver),
+            "the stars belong to these particles and tets"
+        );
+        let time = R::from_f64(settings.step.substep_time());
+        solver.predict(&settings.step, time);
+        let mut step = Self {
+            solver,
+            stars,
+            settings: settings.step,
+            time,
+        };
+        if let (Guess::Adaptive, Some(gravity)) = (settings.guess, settings.step.gravity) {
+            step.start_where_gravity_led(R::from_dvec3(gravity));
+        }
+        step
+    }
+
+    /// Iterates until the settings or the tolerance say that it is enough.
+    pub(super) fn run(
+        &mut self,
+        settings: &DescentSettings,
+        report: &mut DescentReport,
+        mut iterate: impl FnMut(&mut Self),
+    ) {
+        let start = settings.tolerance.map(|_| self.free_residual());
+        for _ in 0..settings.step.iterations {
+            iterate(self);
+            report.iterations += 1;
+            if let (Some(tolerance), Some(start)) = (settings.tolerance, start) {
+                let residual = self.residual();
+                report.residual = Some(if start > 0.0 {
+                    residual / start
+                } else {
+                    residual
+                });
+                if residual <= tolerance * start {
+                    return;
+                }
+            }
+        }
+    }
+
+    /// Takes back the part of gravity that the last substep did not show.
+    fn start_where_gravity_led(&mut self, gravity: R::Vector) {
+        let change = gravity * self.time;
+        let squared = R::dot(change, change);
+        let first = self.stars.earlier.len() != self.solver.particle_count();
+        if first {
+            self.stars.earlier.clear();
+            self.stars
+                .earlier
+                .resize(self.solver.particle_count(), R::Vector::default());
+        }
+        for p in 0..self.solver.particle_count() {
+            let velocity = self.solver.velocities[p] - change;
+            let followed = R::dot(velocity - self.stars.earlier[p], change) / squared;
+            self.stars.earlier[p] = velocity;
+            let particle = &self.solver.particles[p];
+            let partly = followed < R::ONE && weight::<R>(particle) > R::ZERO;
+            if first || !partly {
+                continue;
+            }
+            let share = if followed > R::ZERO {
+                followed
+            } else {
+                R::ZERO
+            };
+            let x = load::<R>(particle) + change * ((share - R::ONE) * self.time);
+            if finite::<R>(x) {
+                store::<R>(particle, x);
+            }
+        }
+    }
+
+    /// Ends the substep: velocities from the motion.
+    pub fn finish(self) -> StepReport {
+        let repaired = self.solver.update_velocities(self.time, R::ONE / self.time);
+        StepReport { repaired }
+    }
+}
