@@ -39,23 +39,33 @@
 //! What it cannot do: iterating a large step does not converge to the implicit solution of that step, because XPBD
 //! leaves out the primal residual; use substeps, and watch [`Solver::kappa`].
 
+mod attachment;
+mod collider;
+mod direction;
+mod distance;
 mod error;
 mod gauss_seidel;
 mod material;
 mod measure;
 mod neo_hookean;
 mod real;
+mod scalar;
 mod settings;
 mod solver;
 mod step;
+mod volume;
 
+pub use attachment::Pose;
+pub use collider::{Collider, ColliderShape};
+pub use distance::DistanceConstraint;
 pub use error::XpbdError;
 pub use material::Material;
 pub use measure::{Energy, Residuals, Softened, Volume};
 pub use real::Real;
-pub use settings::{Ground, StepSettings};
+pub use settings::StepSettings;
 pub use solver::{KappaLimit, Solver};
 pub use step::StepReport;
+pub use volume::VolumeConstraint;
 
 /// The example of the README, run as a test.
 #[cfg(doctest)]

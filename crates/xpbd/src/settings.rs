@@ -2,14 +2,14 @@
 
 use glam::DVec3;
 
-use crate::XpbdError;
+use crate::{Collider, XpbdError};
 
 /// How one frame is computed.
 ///
 /// Accuracy is bought by `substeps`: more of them approach the true motion, while more `iterations` of a large step
 /// approach something else (the projection leaves out part of the equations of motion). The number that decides is
 /// [`crate::Solver::kappa`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct StepSettings {
     /// Time of a frame in s, positive.
     pub time_step: f64,
@@ -21,17 +21,8 @@ pub struct StepSettings {
     pub relaxation: f64,
     /// Acceleration in m/s².
     pub gravity: Option<DVec3>,
-    /// A floor.
-    pub ground: Option<Ground>,
-}
-
-/// A horizontal floor that particles do not pass; up is z.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ground {
-    /// Its height in m.
-    pub height: f64,
-    /// Coulomb's coefficient of friction, at least 0.
-    pub friction: f64,
+    /// Obstacles.
+    pub colliders: Vec<Collider>,
 }
 
 impl StepSettings {
@@ -44,7 +35,7 @@ impl StepSettings {
             iterations: 1,
             relaxation: 1.0,
             gravity: None,
-            ground: None,
+            colliders: Vec::new(),
         }
     }
 
@@ -78,14 +69,6 @@ impl StepSettings {
         {
             return refuse("gravity", value, "finite");
         }
-        if let Some(ground) = self.ground {
-            if !ground.height.is_finite() {
-                return refuse("ground height", ground.height, "finite");
-            }
-            if !(ground.friction.is_finite() && ground.friction >= 0.0) {
-                return refuse("ground friction", ground.friction, "at least 0 and finite");
-            }
-        }
-        Ok(())
+        self.colliders.iter().try_for_each(Collider::check)
     }
 }

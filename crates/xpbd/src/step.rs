@@ -11,12 +11,13 @@
 use incise_graph::Schedule;
 use rayon::prelude::*;
 
+use crate::collider::Obstacle;
 use crate::gauss_seidel::Pass;
 use crate::real::{finite, load, store, weight};
-use crate::{Ground, Real, Solver, StepSettings, XpbdError};
+use crate::{Real, Solver, StepSettings, XpbdError};
 
 /// Particles a thread takes at a time.
-const PARALLEL_PARTICLES: usize = 4096;
+pub(crate) const PARALLEL_PARTICLES: usize = 4096;
 
 /// What a step has to say about itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -78,19 +79,35 @@ impl<R: Real> Solver<R> {
         self.predicted.clear();
         for substep in 0..settings.substeps {
             let keep = keep && substep + 1 == settings.substeps;
-            report.repaired += self.substep(schedule, settings, keep);
+            report.repaired += self.substep(schedule, settings, substep, keep);
         }
+        self.arrive();
         Ok(report)
     }
 
-    fn substep(&mut self, schedule: &Schedule, settings: &StepSettings, keep: bool) -> usize {
+    fn substep(
+        &mut self,
+        schedule: &Schedule,
+        settings: &StepSettings,
+        number: u32,
+        keep: bool,
+    ) -> usize {
         let time = settings.substep_time();
+        let ended = f64::from(number + 1);
         self.predict(settings, R::from_f64(time));
+        let lost = self.move_held(ended / f64::from(settings.substeps));
+        let obstacles = Obstacle::place(settings, ended * time);
         let with_multipliers = keep || settings.iterations > 1;
         if with_multipliers {
             self.multipliers.clear();
             self.multipliers
                 .resize_with(self.tets.len(), || [R::ZERO.cell(), R::ZERO.cell()]);
+        }
+        if let Some(distances) = &mut self.distances {
+            distances.begin(with_multipliers);
+        }
+        if let Some(volumes) = &mut self.volume_constraints {
+            volumes.begin(with_multipliers);
         }
         if keep {
             self.predicted = (0..self.particles.len()).map(|p| self.vector(p)).collect();
@@ -108,11 +125,20 @@ impl<R: Real> Solver<R> {
                 (true, false) => self.pass::<true, false>(schedule, &pass),
                 (true, true) => self.pass::<true, true>(schedule, &pass),
             }
-            if let Some(ground) = settings.ground {
-                self.project_to_ground(ground);
+            self.solve_attachments(&pass);
+            if let Some(distances) = &self.distances {
+                distances.pass(self, &pass);
+            }
+            if let Some(volumes) = &self.volume_constraints {
+                volumes.pass(self, &pass);
+            }
+            if !obstacles.is_empty() {
+                self.project_to_colliders(&obstacles);
             }
         }
-        self.update_velocities(R::from_f64(time), pass.per_time)
+        let repaired = self.update_velocities(R::from_f64(time), pass.per_time);
+        self.update_held(pass.per_time);
+        lost + repaired
     }
 
     /// Moves every free particle by its velocity.
@@ -133,27 +159,6 @@ impl<R: Real> Solver<R> {
                     }
                     store::<R>(particle, x + *velocity * time);
                 }
-            });
-    }
-
-    /// Lifts particles out of the ground; friction holds them back by at most its share of the depth.
-    fn project_to_ground(&self, ground: Ground) {
-        let (height, friction) = (R::from_f64(ground.height), R::from_f64(ground.friction));
-        let particles = self.particles.par_iter().with_min_len(PARALLEL_PARTICLES);
-        particles
-            .zip(&self.previous)
-            .for_each(|(particle, previous)| {
-                let x = load::<R>(particle);
-                let [a, b, c] = R::components(x);
-                let depth = height - c;
-                if !(depth > R::ZERO && weight::<R>(particle) > R::ZERO) {
-                    return;
-                }
-                let [dx, dy, _] = R::components(x - *previous);
-                let slide = (dx * dx + dy * dy).sqrt();
-                let hold = friction * depth;
-                let share = if slide > hold { hold / slide } else { R::ONE };
-                store::<R>(particle, R::vector(a - dx * share, b - dy * share, height));
             });
     }
 

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, dvec3};
 use incise_mesh::{TetMesh, generate::kuhn_box};
-use incise_xpbd::{Ground, Material, Real, Solver, StepSettings};
+use incise_xpbd::{Collider, Material, Real, Solver, StepSettings};
 use proptest::prelude::*;
 
 use crate::body::{GRAVITY, Noise, RUBBER, body, disturb, plain, positions};
@@ -43,10 +43,7 @@ fn survive<R: Real>(
             substeps,
             iterations,
             gravity: Some(GRAVITY),
-            ground: Some(Ground {
-                height: -1.0,
-                friction: 0.5,
-            }),
+            colliders: vec![Collider::ground(-1.0, 0.5)],
             ..StepSettings::new(time_step)
         };
         for _ in 0..20 {
