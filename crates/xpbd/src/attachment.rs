@@ -345,7 +345,7 @@ impl<R: Real> Solver<R> {
             .for_each(|attachment| {
                 let p = attachment.particle as usize;
                 let inverse_mass = weight::<R>(&particles[p]);
-                if !(inverse_mass > R::ZERO) {
+                if inverse_mass <= R::ZERO {
                     return;
                 }
                 let x = load::<R>(&particles[p]);

@@ -396,7 +396,7 @@ impl<R: Real> Obstacle<R> {
             normal,
             point,
         } = self.solid.nearest(x);
-        if !(distance < R::ZERO) {
+        if distance >= R::ZERO {
             return None;
         }
         let way = x - previous - self.motion;
@@ -416,7 +416,7 @@ impl<R: Real> Solver<R> {
         particles
             .zip(&self.previous)
             .for_each(|(particle, &previous)| {
-                if !(weight::<R>(particle) > R::ZERO) {
+                if weight::<R>(particle) <= R::ZERO {
                     return;
                 }
                 let mut x = load::<R>(particle);

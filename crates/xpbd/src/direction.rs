@@ -12,12 +12,9 @@ pub(crate) fn direction<R: Real>(v: R::Vector) -> Option<(R, R::Vector)> {
     let [a, b, c] = [x, y, z].map(absolute);
     let largest = if a > b { a } else { b };
     let largest = if c > largest { c } else { largest };
-    if !(largest > R::ZERO) {
-        return None;
-    }
     let scaled = R::vector(x / largest, y / largest, z / largest);
     let length = R::dot(scaled, scaled).sqrt();
-    Some((largest * length, scaled * (R::ONE / length)))
+    (length > R::ZERO).then(|| (largest * length, scaled * (R::ONE / length)))
 }
 
 /// The absolute value.

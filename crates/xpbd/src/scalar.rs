@@ -152,8 +152,14 @@ impl<R: Real, C> Constraints<R, C> {
         let residual = value + compliance * before + damping * rate;
         let mut change =
             -(residual / ((R::ONE + damping) * steepness + compliance)) * pass.relaxation;
-        if constraint.one_sided() && before + change > R::ZERO {
-            change = -before;
+        if constraint.one_sided() {
+            // Slack it does not pull, not even to damp; and in all it never pushes.
+            if value <= R::ZERO && change < R::ZERO {
+                return;
+            }
+            if before + change > R::ZERO {
+                change = -before;
+            }
         }
         // Nothing that could move it, or out of range.
         if !change.is_finite() {

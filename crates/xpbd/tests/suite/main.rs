@@ -5,11 +5,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 
+mod attachments;
 mod beam;
 mod body;
+mod colliders;
 mod conservation;
 mod damping;
 mod determinism;
+mod distances;
 mod edits;
 mod energy;
 mod extremes;
@@ -20,3 +23,4 @@ mod recovery;
 mod refusals;
 mod residuals;
 mod rest;
+mod volumes;
