@@ -157,8 +157,9 @@ impl Handle {
             let axis = (axis / axis.abs().max_element()).normalize();
             DQuat::from_axis_angle(axis, (elapsed * turn.angle_degrees).to_radians())
         });
+        let way = along(&self.spec.path, elapsed) - DVec3::from_array(self.spec.path[0]);
         Pose {
-            position: self.center + along(&self.spec.path, elapsed),
+            position: self.center + way,
             rotation,
         }
     }
