@@ -190,7 +190,14 @@ mod tests {
     /// The scenes in `fixtures/` run, pass every check and end with the pieces they promise.
     #[test]
     fn fixtures_run() {
-        for (name, frames, pieces) in [("beam", 3, 1), ("crossing", 62, 4), ("two_bodies", 5, 4)] {
+        for (name, frames, pieces) in [
+            ("beam", 3, 1),
+            ("colliders", 60, 1),
+            ("crossing", 62, 4),
+            ("handles", 82, 2),
+            ("links", 20, 2),
+            ("two_bodies", 5, 4),
+        ] {
             let path =
                 Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../fixtures/{name}.toml"));
             let mut simulation = Simulation::new(&Scene::load(&path).unwrap()).unwrap();

@@ -7,8 +7,9 @@ use incise_mesh::generate::{Shape, generate};
 use incise_mesh::{ParticleId, TetMesh, io};
 use incise_xpbd::Material;
 
-use crate::limits::{LARGEST_COORDINATE, coordinates, direction, value, within};
-use crate::scene::{BodySpec, Region};
+use crate::limits::{LARGEST_COORDINATE, coordinates, value, within};
+use crate::region::particles;
+use crate::scene::BodySpec;
 use crate::{Error, Scene};
 
 /// All bodies of a scene as one mesh.
@@ -18,6 +19,8 @@ pub(crate) struct Bodies {
     /// For each tet the number of its body, which is that of its material.
     pub(crate) body_of: Vec<u16>,
     pub(crate) fixed: Vec<bool>,
+    /// The first particle of each body, and the end.
+    starts: Vec<usize>,
 }
 
 impl Bodies {
@@ -30,6 +33,7 @@ impl Bodies {
             materials: Vec::new(),
             body_of: Vec::new(),
             fixed: Vec::new(),
+            starts: vec![0],
         };
         for (i, spec) in scene.body.iter().enumerate() {
             bodies.add(&format!("body[{i}]"), spec)?;
@@ -82,54 +86,19 @@ impl Bodies {
         self.materials.push(material);
         self.fixed.resize(self.mesh.positions.len(), false);
         for (i, region) in spec.fixed.iter().enumerate() {
-            self.fix(&format!("{field}.fixed[{i}]"), region, first)?;
+            let field = format!("{field}.fixed[{i}]");
+            for p in particles(&field, region, &self.mesh.positions[first..])? {
+                self.fixed[first + p] = true;
+            }
         }
+        self.starts.push(self.mesh.positions.len());
         Ok(())
     }
 
-    /// Fixes the particles from `first` on that lie in a region.
-    fn fix(&mut self, field: &str, region: &Region, first: usize) -> Result<(), Error> {
-        let positions = &self.mesh.positions[first..];
-        let mut fix = |inside: &dyn Fn(DVec3) -> bool| {
-            for (fixed, x) in self.fixed[first..].iter_mut().zip(positions) {
-                *fixed |= inside(*x);
-            }
-        };
-        match region {
-            Region::HalfSpace { point, normal } => {
-                let point = coordinates(&format!("{field}.half_space.point"), *point)?;
-                let normal = direction(&format!("{field}.half_space.normal"), *normal)?;
-                fix(&|x| normal.dot(x - point) >= 0.0);
-            }
-            Region::Box { low, high } => {
-                let low = coordinates(&format!("{field}.box.low"), *low)?;
-                let high = coordinates(&format!("{field}.box.high"), *high)?;
-                if !low.cmple(high).all() {
-                    let range = "such that low is at most high in all coordinates";
-                    return Err(value(format!("{field}.box"), "inside out", range));
-                }
-                fix(&|x| x.cmpge(low).all() && x.cmple(high).all());
-            }
-            Region::Sphere { center, radius } => {
-                let center = coordinates(&format!("{field}.sphere.center"), *center)?;
-                if !(radius.is_finite() && *radius >= 0.0) {
-                    let field = format!("{field}.sphere.radius");
-                    return Err(value(field, radius, "at least 0 and finite"));
-                }
-                fix(&|x| x.distance(center) <= *radius);
-            }
-            Region::Particles(particles) => {
-                for &p in particles {
-                    let count = self.fixed.len() - first;
-                    let fixed = self.fixed[first..].get_mut(p as usize);
-                    *fixed.ok_or_else(|| {
-                        let range = format!("below {count}, the body's number of particles");
-                        value(format!("{field}.particles"), p, range)
-                    })? = true;
-                }
-            }
-        }
-        Ok(())
+    /// The positions at rest of a body's particles and the number of the first of them.
+    pub(crate) fn particles_of(&self, body: usize) -> Option<(&[DVec3], usize)> {
+        let (start, end) = (*self.starts.get(body)?, *self.starts.get(body + 1)?);
+        Some((&self.mesh.positions[start..end], start))
     }
 }
 

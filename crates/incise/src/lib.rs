@@ -22,13 +22,18 @@
 
 mod backend;
 mod body;
+mod collider;
 mod error;
+mod handle;
 mod limits;
+mod link;
 mod plan;
+mod region;
 pub mod report;
 pub mod scene;
 mod simulation;
 mod strokes;
+mod volume;
 
 pub use error::Error;
 pub use incise_clustering as clustering;

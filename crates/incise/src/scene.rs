@@ -8,6 +8,9 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
+pub use crate::collider::{ColliderSpec, RotationSpec};
+pub use crate::handle::{HandleSpec, TurnSpec};
+pub use crate::link::{EndSpec, LinkSpec};
 
 /// A scene.
 ///
@@ -41,6 +44,15 @@ pub struct Scene {
     /// The bodies.
     #[serde(default)]
     pub body: Vec<BodySpec>,
+    /// Obstacles.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub collider: Vec<ColliderSpec>,
+    /// What holds parts of bodies and moves them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub handle: Vec<HandleSpec>,
+    /// Sutures and springs.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub link: Vec<LinkSpec>,
     /// The cuts.
     #[serde(default)]
     pub stroke: Vec<StrokeSpec>,
@@ -211,6 +223,10 @@ pub struct BodySpec {
     /// Damping time in s: see `incise_xpbd::Material::damping`.
     #[serde(default)]
     pub damping: f64,
+    /// Keeps the volume of each tet beyond what the material does: one over a bulk modulus, in 1/Pa; 0 is
+    /// incompressible. Absent: not at all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub volume_compliance: Option<f64>,
     /// Particles that do not move, in m in the world.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fixed: Vec<Region>,
@@ -351,12 +367,14 @@ impl Scene {
         })
     }
 
-    /// The first frame after all strokes.
+    /// The first frame after all strokes and handles.
     #[must_use]
     pub fn frames_needed(&self) -> u64 {
-        self.stroke
-            .iter()
-            .map(|stroke| stroke.last_frame().saturating_add(1))
+        let strokes = self.stroke.iter().map(StrokeSpec::last_frame);
+        let handles = self.handle.iter().map(|handle| handle.frames[1]);
+        strokes
+            .chain(handles)
+            .map(|last| last.saturating_add(1))
             .max()
             .unwrap_or(0)
     }

@@ -9,20 +9,22 @@ use glam::DVec3;
 use incise_cutting::CuttableMesh;
 use incise_graph::{Clustering, Coloring, Schedule};
 use incise_mesh::{Surface, TetMesh};
-use incise_xpbd::{Ground, KappaLimit, StepSettings};
+use incise_xpbd::{KappaLimit, StepSettings};
 use rayon::ThreadPool;
 
 use crate::backend::{AnySolver, each};
 use crate::body::Bodies;
-use crate::limits::{LARGEST_COORDINATE, coordinates, value, within};
+use crate::handle::Handle;
+use crate::limits::{coordinates, value, within};
 use crate::plan::Plan;
 use crate::report::{
     CutReport, EnergyReport, FrameReport, Milliseconds, ResidualReport, SoftenedReport,
     milliseconds,
 };
-use crate::scene::{GroundSpec, Precision, Quantity, StrokeSpec};
+use crate::scene::{Precision, Quantity, StrokeSpec};
 use crate::strokes::Timeline;
-use crate::{Error, Scene};
+use crate::volume::BodyVolumes;
+use crate::{Error, Scene, collider, link};
 
 /// A scene in motion.
 ///
@@ -61,6 +63,8 @@ pub struct Simulation {
     solver: AnySolver,
     plan: Plan,
     timeline: Timeline,
+    handles: Vec<Handle>,
+    volumes: Option<BodyVolumes>,
     positions: Vec<DVec3>,
     /// Whether a particle lies on a cut; empty before the first.
     on_cut: Vec<bool>,
@@ -115,12 +119,18 @@ impl Simulation {
             source,
         })?;
         let kappa_limit = kappa_limit(scene, &settings)?;
-        let solver = AnySolver::new(precision, kappa_limit, &bodies, &cuttable)?;
+        let mut solver = AnySolver::new(precision, kappa_limit, &bodies, &cuttable)?;
+        let handles = hold(scene, &bodies, &mut solver)?;
+        connect(scene, &bodies, &mut solver)?;
         let make_plan = || Plan::new(scene, cuttable.mesh());
         let plan = match &pool {
             Some(pool) => pool.install(make_plan),
             None => make_plan(),
         }?;
+        let volumes = BodyVolumes::new(scene)?;
+        if let Some(volumes) = &volumes {
+            volumes.constrain(&mut solver, &cuttable, &plan.schedule)?;
+        }
         let mut simulation = Self {
             settings,
             quantities: scene.report.quantities.clone(),
@@ -134,6 +144,8 @@ impl Simulation {
             solver,
             plan,
             timeline,
+            handles,
+            volumes,
             next_frame: 0,
             report: FrameReport::default(),
             pool,
@@ -175,6 +187,9 @@ impl Simulation {
         let cut = self.carry_out_strokes(&mut ms)?;
 
         let before_solve = Instant::now();
+        for handle in &self.handles {
+            handle.advance(self.next_frame, &mut self.solver);
+        }
         let wants = |quantity| {
             self.next_frame.is_multiple_of(self.every) && self.quantities.contains(&quantity)
         };
@@ -189,6 +204,7 @@ impl Simulation {
             field: "solver".into(),
             source,
         })?;
+        collider::advance(&mut self.settings);
         ms.solve = milliseconds(before_solve.elapsed());
 
         self.report = FrameReport {
@@ -217,6 +233,7 @@ impl Simulation {
             positions,
             solver,
             plan,
+            volumes,
             pieces,
             on_cut,
             ..
@@ -226,6 +243,9 @@ impl Simulation {
         timeline.advance(self.next_frame, cuttable, positions, |cuttable, delta| {
             solver.follow(delta, cuttable);
             plan.follow(delta, ms)?;
+            if let Some(volumes) = volumes {
+                volumes.follow(solver, delta, cuttable, &plan.schedule)?;
+            }
             report.get_or_insert_default().add(delta);
             on_cut.resize(delta.particles_before, false);
             on_cut.resize(delta.particles_after(), true);
@@ -409,7 +429,7 @@ fn settings(scene: &Scene) -> Result<StepSettings, Error> {
             .gravity
             .map(|g| coordinates("world.gravity", g))
             .transpose()?,
-        ground: scene.world.ground.map(ground).transpose()?,
+        colliders: collider::colliders(scene)?,
     };
     settings.check().map_err(|source| Error::Xpbd {
         field: "solver".into(),
@@ -419,11 +439,25 @@ fn settings(scene: &Scene) -> Result<StepSettings, Error> {
     Ok(settings)
 }
 
-fn ground(ground: GroundSpec) -> Result<Ground, Error> {
-    let GroundSpec { height, friction } = ground;
-    let far = LARGEST_COORDINATE;
-    Ok(Ground {
-        height: within("world.ground.height", height, -far, far)?,
-        friction: within("world.ground.friction", friction, 0.0, 1e3)?,
-    })
+/// Checks the handles of a scene and takes hold.
+fn hold(scene: &Scene, bodies: &Bodies, solver: &mut AnySolver) -> Result<Vec<Handle>, Error> {
+    let mut handles = Vec::with_capacity(scene.handle.len());
+    for (i, spec) in scene.handle.iter().enumerate() {
+        let field = format!("handle[{i}]");
+        let particles = |body| bodies.particles_of(body);
+        let mut handle = Handle::new(&field, spec, |body| Some(particles(body)?.0))?;
+        let first = particles(handle.body()).map_or(0, |(_, first)| first);
+        handle.attach(&field, solver, first)?;
+        handles.push(handle);
+    }
+    Ok(handles)
+}
+
+/// Checks the links of a scene and ties them.
+fn connect(scene: &Scene, bodies: &Bodies, solver: &mut AnySolver) -> Result<(), Error> {
+    let links = scene.link.iter().enumerate();
+    let links: Result<Vec<_>, Error> = links
+        .map(|(i, spec)| link::link(&format!("link[{i}]"), spec, |b| bodies.particles_of(b)))
+        .collect();
+    link::connect(solver, &links?)
 }

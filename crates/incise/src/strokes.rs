@@ -194,7 +194,7 @@ impl Stroke {
 }
 
 /// The point at a fraction of a path whose points are passed at equal times.
-fn along(path: &[[f64; 3]], fraction: f64) -> DVec3 {
+pub(crate) fn along(path: &[[f64; 3]], fraction: f64) -> DVec3 {
     let (mut from, mut to, mut rest) = (path[0], path[0], fraction * (path.len() - 1) as f64);
     for &next in &path[1..] {
         (from, to) = (to, next);

@@ -20,6 +20,7 @@ use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
 use faer::sparse::{Argsort, Pair, SparseColMat, SymbolicSparseColMat};
 use glam::DVec3;
 
+use crate::collider::Obstacle;
 use crate::neo_hookean::Evaluation;
 use crate::real::{store, weight};
 use crate::{Real, Solver, StepReport, StepSettings, XpbdError};
@@ -85,6 +86,7 @@ impl<R: Real> Solver<R> {
     pub fn step_direct(&mut self, settings: &StepSettings) -> Result<StepReport, XpbdError> {
         let _span = tracing::debug_span!("xpbd::step_direct").entered();
         settings.check()?;
+        self.refuse_soft_constraints()?;
         let before: Vec<_> = (0..self.particle_count())
             .map(|p| (self.vector(p), self.velocities[p]))
             .collect();
@@ -106,17 +108,18 @@ impl<R: Real> Solver<R> {
             unfolded: self.unfold(),
         };
         let time = settings.substep_time();
-        for _ in 0..settings.substeps {
+        for number in 1..=settings.substeps {
             self.predict(settings, R::from_f64(time));
+            let ended = f64::from(number) / f64::from(settings.substeps);
+            report.repaired += self.move_held(ended);
+            let obstacles = Obstacle::place(settings, ended * settings.time_step);
             self.predicted = (0..self.particle_count()).map(|p| self.vector(p)).collect();
             // The multipliers, each over the scale of its row.
             let mut multipliers = vec![0.0; 2 * self.tet_count()];
             for _ in 0..settings.iterations {
                 self.solve_all(&pattern, settings, &mut multipliers)
                     .ok_or(XpbdError::Factorization)?;
-                if let Some(ground) = settings.ground {
-                    self.project_to_ground(ground);
-                }
+                self.project_to_colliders(&obstacles);
             }
             self.kept.clear();
             for t in 0..self.tet_count() {
@@ -124,8 +127,11 @@ impl<R: Real> Solver<R> {
                 let multiplier = |c| R::from_f64(scales[c] * multipliers[2 * t + c]);
                 self.kept.push([multiplier(0), multiplier(1)]);
             }
-            report.repaired += self.update_velocities(R::from_f64(time), R::from_f64(1.0 / time));
+            let per_time = R::from_f64(1.0 / time);
+            report.repaired += self.update_velocities(R::from_f64(time), per_time);
+            self.update_held(per_time);
         }
+        self.arrive();
         Ok(report)
     }
 

@@ -1,4 +1,6 @@
-//! [`XpbdError`]: what can be wrong with a material, a setting or a tet.
+//! [`XpbdError`]: what can be wrong with a material, a setting or a constraint.
+
+use incise_graph::GraphError;
 
 /// Why a solver refused its input.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -28,4 +30,30 @@ pub enum XpbdError {
     #[cfg(feature = "direct")]
     #[error("the constraints are too stiff for a direct solve: use a smaller substep")]
     Factorization,
+    /// Constraints of a kind that the method does not know.
+    #[error("this method knows no {kind}: use XPBD")]
+    Unknown {
+        /// The kind.
+        kind: &'static str,
+    },
+    /// A value of a distance or volume constraint outside its range.
+    #[error("{what} of constraint {index} is {value}: it must be {range}")]
+    Constraint {
+        /// The number of the constraint.
+        index: usize,
+        /// The value's name.
+        what: &'static str,
+        /// The value.
+        value: f64,
+        /// The range it must lie in.
+        range: &'static str,
+    },
+    /// Constraints on particles that do not exist, or a schedule that is not theirs.
+    #[error("{what} constraints: {source}")]
+    Schedule {
+        /// The kind of constraint.
+        what: &'static str,
+        /// What is wrong.
+        source: GraphError,
+    },
 }

@@ -20,6 +20,7 @@ use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdFrom};
 
 use crate::Real;
 use crate::layout::{CONSTANTS, Layout, REST};
+use crate::step::Factors;
 
 /// Most lanes of any instruction set.
 pub(crate) const MOST_LANES: usize = 16;
@@ -36,12 +37,7 @@ pub struct Pass<'a, R: Real> {
     pub(crate) multipliers: &'a [R::Atomic],
     /// Where corrections are gathered by a Jacobi pass, which leaves the particles as they are; else empty.
     pub(crate) corrections: &'a [R::Particle],
-    /// Square of the time of a substep in s².
-    pub(crate) time_squared: R,
-    /// One over the time of a substep in 1/s.
-    pub(crate) per_time: R,
-    /// Factor on each correction.
-    pub(crate) relaxation: R,
+    pub(crate) factors: Factors<R>,
 }
 
 /// What is solved; each choice is compiled on its own. Whether multipliers are kept and where corrections go is asked
@@ -153,9 +149,9 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
             rest,
             ratio,
             gamma,
-            damping: damping * splat::<R, S>(simd, pass.per_time),
-            time_squared: splat::<R, S>(simd, pass.time_squared),
-            relaxation: splat::<R, S>(simd, pass.relaxation),
+            damping: damping * splat::<R, S>(simd, pass.factors.per_time),
+            time_squared: splat::<R, S>(simd, pass.factors.time_squared),
+            relaxation: splat::<R, S>(simd, pass.factors.relaxation),
         }
     }
 

@@ -39,10 +39,14 @@
 //! What it cannot do: iterating a large step does not converge to the implicit solution of that step, because XPBD
 //! leaves out the primal residual; use substeps, and watch [`Solver::kappa`].
 
+mod attachment;
+mod collider;
 mod crew;
 mod descent;
 #[cfg(feature = "direct")]
 mod direct;
+mod direction;
+mod distance;
 mod error;
 mod gauss_seidel;
 mod jacobi;
@@ -53,23 +57,29 @@ mod measure;
 mod neo_hookean;
 mod real;
 mod residuals;
+mod scalar;
 mod settings;
 mod solver;
 mod step;
 mod unfold;
+mod volume;
 
+pub use attachment::Pose;
+pub use collider::{Collider, ColliderShape};
 pub use descent::{
     Correction, CorrectionReport, CorrectionSettings, DescentReport, DescentSettings, Guess,
     ImplicitStep, Stars,
 };
+pub use distance::DistanceConstraint;
 pub use error::XpbdError;
 pub use material::Material;
 pub use measure::{Energy, Softened, Volume};
 pub use real::Real;
 pub use residuals::Residuals;
-pub use settings::{Form, Ground, Method, StepSettings};
+pub use settings::{Form, Method, StepSettings};
 pub use solver::{KappaLimit, Solver};
 pub use step::StepReport;
+pub use volume::VolumeConstraint;
 
 /// The example of the README, run as a test.
 #[cfg(doctest)]

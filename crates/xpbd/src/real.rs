@@ -55,6 +55,8 @@ pub trait Real:
     const ZERO: Self;
     /// One.
     const ONE: Self;
+    /// The distance from one to the next larger number.
+    const EPSILON: Self;
 
     /// Rounds a double to this precision.
     fn from_f64(value: f64) -> Self;
@@ -117,6 +119,7 @@ macro_rules! real {
 
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
+            const EPSILON: Self = <$scalar>::EPSILON;
 
             #[inline]
             fn from_f64(value: f64) -> Self {

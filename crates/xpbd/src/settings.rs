@@ -2,14 +2,14 @@
 
 use glam::DVec3;
 
-use crate::XpbdError;
+use crate::{Collider, XpbdError};
 
 /// How one frame is computed.
 ///
 /// Accuracy is bought by `substeps`: more of them approach the true motion, while more `iterations` of a large step
 /// approach something else (the projection leaves out part of the equations of motion). The number that decides is
 /// [`crate::Solver::kappa`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct StepSettings {
     /// Time of a frame in s, positive.
     pub time_step: f64,
@@ -25,8 +25,8 @@ pub struct StepSettings {
     pub relaxation: f64,
     /// Acceleration in m/s².
     pub gravity: Option<DVec3>,
-    /// A floor.
-    pub ground: Option<Ground>,
+    /// Obstacles.
+    pub colliders: Vec<Collider>,
 }
 
 /// How an iteration over the constraints is made.
@@ -58,15 +58,6 @@ pub enum Form {
     Sequential,
 }
 
-/// A horizontal floor that particles do not pass; up is z.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ground {
-    /// Its height in m.
-    pub height: f64,
-    /// Coulomb's coefficient of friction, at least 0.
-    pub friction: f64,
-}
-
 impl StepSettings {
     /// One substep of one iteration, no forces.
     #[must_use]
@@ -79,7 +70,7 @@ impl StepSettings {
             form: Form::Block,
             relaxation: 1.0,
             gravity: None,
-            ground: None,
+            colliders: Vec::new(),
         }
     }
 
@@ -126,14 +117,6 @@ impl StepSettings {
         {
             return refuse("gravity", value, "finite");
         }
-        if let Some(ground) = self.ground {
-            if !ground.height.is_finite() {
-                return refuse("ground height", ground.height, "finite");
-            }
-            if !(ground.friction.is_finite() && ground.friction >= 0.0) {
-                return refuse("ground friction", ground.friction, "at least 0 and finite");
-            }
-        }
-        Ok(())
+        self.colliders.iter().try_for_each(Collider::check)
     }
 }

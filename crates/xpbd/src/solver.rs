@@ -7,10 +7,14 @@
 use fearless_simd::Level;
 use glam::DVec3;
 
+use crate::attachment::Attachments;
+use crate::distance::Distance;
 use crate::jacobi::Jacobi;
 use crate::layout::Layout;
 use crate::neo_hookean::TetConstraint;
 use crate::real::{finite, load, store};
+use crate::scalar::Constraints;
+use crate::volume::TetVolume;
 use crate::{Material, Real, XpbdError};
 
 /// The state of a simulation in one precision.
@@ -61,6 +65,9 @@ pub struct Solver<R: Real> {
     pub(crate) jacobi: Option<Jacobi<R>>,
     /// Positions before the constraints are solved, kept only for residuals.
     pub(crate) predicted: Vec<R::Vector>,
+    pub(crate) attachments: Attachments<R>,
+    pub(crate) distances: Option<Constraints<R, Distance<R>>>,
+    pub(crate) volume_constraints: Option<Constraints<R, TetVolume<R>>>,
 }
 
 /// See [`Solver::limit_kappa`].
@@ -96,6 +103,9 @@ impl<R: Real> Solver<R> {
             kept: Vec::new(),
             jacobi: None,
             predicted: Vec::new(),
+            attachments: Attachments::default(),
+            distances: None,
+            volume_constraints: None,
         };
         for &x in positions {
             solver.push_particle(R::from_dvec3(x), R::Vector::default(), false);
@@ -183,7 +193,7 @@ impl<R: Real> Solver<R> {
         self.kappa_limit = limit;
     }
 
-    fn check_particles(&self, particles: [u32; 4]) {
+    pub(crate) fn check_particles(&self, particles: [u32; 4]) {
         let exists = |&p: &u32| (p as usize) < self.particles.len();
         assert!(particles.iter().all(exists), "the particles of a tet exist");
     }
@@ -216,7 +226,7 @@ impl<R: Real> Solver<R> {
     }
 
     /// Appends a particle on the edge from `a` to `b`: position and velocity are interpolated, and it is fixed if both
-    /// ends are. It has no mass yet.
+    /// ends are, attached if both are attached to the same handle. It has no mass yet.
     ///
     /// # Panics
     /// If an end does not exist or the parameter puts the particle nowhere finite.
@@ -229,14 +239,18 @@ impl<R: Real> Solver<R> {
             u + (v - u) * t,
             self.fixed[a] && self.fixed[b],
         );
+        let last = self.particles.len() - 1;
+        self.attachments.between([a, b], parameter, last);
     }
 
-    /// Appends a particle in the state of another one. It has no mass yet.
+    /// Appends a particle in the state of another one, attached to what that is attached to. It has no mass yet.
     ///
     /// # Panics
     /// If the particle does not exist.
     pub fn push_copy(&mut self, of: usize) {
         self.push_particle(self.vector(of), self.velocities[of], self.fixed[of]);
+        let last = self.particles.len() - 1;
+        self.attachments.copy(of, last);
     }
 
     fn push_particle(&mut self, x: R::Vector, velocity: R::Vector, fixed: bool) {
@@ -274,14 +288,30 @@ impl<R: Real> Solver<R> {
         self.set_weight(particle);
     }
 
-    fn set_weight(&mut self, particle: usize) {
+    pub(crate) fn set_weight(&mut self, particle: usize) {
         let inverse = R::from_f64(1.0 / self.masses[particle]);
         // A mass so small that its inverse overflows belongs to a speck that could only do harm if it moved.
-        let free = !self.fixed[particle] && inverse.is_finite();
+        let held = self.fixed[particle] || self.attachments.holds(particle);
+        let free = !held && inverse.is_finite();
         let [x, y, z, _] = R::read(&self.particles[particle]);
         let weight = if free { inverse } else { R::ZERO };
         R::write(&self.particles[particle], [x, y, z, weight]);
         self.layout.stale = true;
+    }
+
+    /// For methods that solve nothing but tets and what is held rigidly.
+    pub(crate) fn refuse_soft_constraints(&self) -> Result<(), XpbdError> {
+        let unknown = |kind| Err(XpbdError::Unknown { kind });
+        if self.distances.is_some() {
+            return unknown("distance constraints");
+        }
+        if self.volume_constraints.is_some() {
+            return unknown("volume constraints");
+        }
+        if self.attachments.is_soft() {
+            return unknown("attachments with compliance");
+        }
+        Ok(())
     }
 
     /// Whether a particle is fixed.

@@ -11,15 +11,16 @@
 use incise_graph::Schedule;
 use rayon::prelude::*;
 
+use crate::collider::Obstacle;
 use crate::gauss_seidel;
 use crate::jacobi::Jacobi;
 use crate::lanes::Pass;
 use crate::layout::Ingredients;
 use crate::real::{finite, load, store, weight};
-use crate::{Ground, Method, Real, Solver, StepSettings, XpbdError};
+use crate::{Method, Real, Solver, StepSettings, XpbdError};
 
 /// Particles a thread takes at a time.
-const PARALLEL_PARTICLES: usize = 4096;
+pub(crate) const PARALLEL_PARTICLES: usize = 4096;
 
 /// What a step has to say about itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -30,6 +31,28 @@ pub struct StepReport {
     /// Particles that were moved by a millionth of a tet's size because all tets lay on one line to the last digit, from
     /// where no constraint could have brought them back.
     pub unfolded: usize,
+}
+
+/// What the time of a substep and the settings are to a constraint.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Factors<R> {
+    /// Square of the time of a substep in s².
+    pub(crate) time_squared: R,
+    /// One over the time of a substep in 1/s.
+    pub(crate) per_time: R,
+    /// Factor on each correction.
+    pub(crate) relaxation: R,
+}
+
+impl<R: Real> Factors<R> {
+    pub(crate) fn new(settings: &StepSettings) -> Self {
+        let time = settings.substep_time();
+        Self {
+            time_squared: R::from_f64(time * time),
+            per_time: R::from_f64(1.0 / time),
+            relaxation: R::from_f64(settings.relaxation),
+        }
+    }
 }
 
 impl<R: Real> Solver<R> {
@@ -83,20 +106,30 @@ impl<R: Real> Solver<R> {
         self.kept.clear();
         for substep in 0..settings.substeps {
             let keep = keep && substep + 1 == settings.substeps;
-            report.repaired += self.substep(settings, keep);
+            report.repaired += self.substep(settings, substep, keep);
         }
+        self.arrive();
         Ok(report)
     }
 
-    fn substep(&mut self, settings: &StepSettings, keep: bool) -> usize {
+    fn substep(&mut self, settings: &StepSettings, number: u32, keep: bool) -> usize {
         let time = settings.substep_time();
+        let ended = f64::from(number + 1);
         self.predict(settings, R::from_f64(time));
-        let per_time = R::from_f64(1.0 / time);
+        let lost = self.move_held(ended / f64::from(settings.substeps));
+        let obstacles = Obstacle::place(settings, ended * time);
         let jacobi = settings.method != Method::GaussSeidel;
+        let with_multipliers = keep || settings.iterations > 1;
         self.multipliers.clear();
-        if keep || settings.iterations > 1 {
+        if with_multipliers {
             let count = 2 * self.layout.lanes * self.layout.block_count();
             self.multipliers.resize_with(count, || R::ZERO.cell());
+        }
+        if let Some(distances) = &mut self.distances {
+            distances.begin(with_multipliers);
+        }
+        if let Some(volumes) = &mut self.volume_constraints {
+            volumes.begin(with_multipliers);
         }
         if keep {
             self.predicted = (0..self.particles.len()).map(|p| self.vector(p)).collect();
@@ -108,10 +141,18 @@ impl<R: Real> Solver<R> {
         if let Some(state) = &mut state {
             state.restart();
         }
+        let factors = Factors::new(settings);
         for _ in 0..settings.iterations {
-            self.iterate(settings, state.as_mut());
-            if let Some(ground) = settings.ground {
-                self.project_to_ground(ground);
+            self.iterate(settings, &factors, state.as_mut());
+            self.solve_attachments(&factors);
+            if let Some(distances) = &self.distances {
+                distances.pass(self, &factors);
+            }
+            if let Some(volumes) = &self.volume_constraints {
+                volumes.pass(self, &factors);
+            }
+            if !obstacles.is_empty() {
+                self.project_to_colliders(&obstacles);
             }
         }
         self.jacobi = state;
@@ -120,12 +161,18 @@ impl<R: Real> Solver<R> {
                 .map(|t| self.multipliers_of(t))
                 .collect();
         }
-        self.update_velocities(R::from_f64(time), per_time)
+        let repaired = self.update_velocities(R::from_f64(time), factors.per_time);
+        self.update_held(factors.per_time);
+        lost + repaired
     }
 
     /// One iteration over the tets.
-    fn iterate(&self, settings: &StepSettings, mut jacobi: Option<&mut Jacobi<R>>) {
-        let time = settings.substep_time();
+    fn iterate(
+        &self,
+        settings: &StepSettings,
+        factors: &Factors<R>,
+        mut jacobi: Option<&mut Jacobi<R>>,
+    ) {
         if let Some(jacobi) = &mut jacobi {
             let extrapolating = settings.method != Method::Jacobi;
             jacobi.begin(&self.particles, &self.multipliers, extrapolating);
@@ -136,9 +183,7 @@ impl<R: Real> Solver<R> {
             previous: &self.previous,
             multipliers: &self.multipliers,
             corrections: jacobi.as_ref().map_or(&[], |jacobi| &jacobi.corrections),
-            time_squared: R::from_f64(time * time),
-            per_time: R::from_f64(1.0 / time),
-            relaxation: R::from_f64(settings.relaxation),
+            factors: *factors,
         };
         let damped = self.materials.iter().any(|m| m.damping > 0.0);
         R::solve_tets(self.level, damped, settings.form, &pass);
@@ -207,27 +252,6 @@ impl<R: Real> Solver<R> {
                     }
                     store::<R>(particle, x + *velocity * time);
                 }
-            });
-    }
-
-    /// Lifts particles out of the ground; friction holds them back by at most its share of the depth.
-    pub(crate) fn project_to_ground(&self, ground: Ground) {
-        let (height, friction) = (R::from_f64(ground.height), R::from_f64(ground.friction));
-        let particles = self.particles.par_iter().with_min_len(PARALLEL_PARTICLES);
-        particles
-            .zip(&self.previous)
-            .for_each(|(particle, previous)| {
-                let x = load::<R>(particle);
-                let [a, b, c] = R::components(x);
-                let depth = height - c;
-                if !(depth > R::ZERO && weight::<R>(particle) > R::ZERO) {
-                    return;
-                }
-                let [dx, dy, _] = R::components(x - *previous);
-                let slide = (dx * dx + dy * dy).sqrt();
-                let hold = friction * depth;
-                let share = if slide > hold { hold / slide } else { R::ONE };
-                store::<R>(particle, R::vector(a - dx * share, b - dy * share, height));
             });
     }
 

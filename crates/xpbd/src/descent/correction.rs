@@ -111,7 +111,7 @@ impl<R: Real> Solver<R> {
     /// As [`Solver::descend`], with a correction after each sweep.
     ///
     /// # Errors
-    /// If the settings do not pass [`DescentSettings::check`]; nothing has moved then.
+    /// As [`Solver::descend`].
     ///
     /// # Panics
     /// If stars or correction are those of another number of particles or tets.
@@ -157,9 +157,10 @@ impl<R: Real> Solver<R> {
     ) -> Result<DescentReport, XpbdError> {
         let _span = tracing::debug_span!("xpbd::descend_corrected").entered();
         settings.check()?;
+        self.refuse_soft_constraints()?;
         let mut report = DescentReport::default();
-        for _ in 0..settings.step.substeps {
-            let mut step = ImplicitStep::predicted(self, stars, settings);
+        for number in 1..=settings.step.substeps {
+            let mut step = ImplicitStep::predicted(self, stars, settings, number);
             step.run(settings, &mut report, |step| {
                 step.sweep();
                 step.correct(correction);
@@ -173,7 +174,7 @@ impl<R: Real> Solver<R> {
 impl<R: Real> ImplicitStep<'_, R> {
     /// Moves the whole body along a Newton direction, as far as the potential falls.
     ///
-    /// Particles on the ground are held meanwhile; sweeps lift them off.
+    /// Particles that touch a collider are held meanwhile; sweeps lift them off.
     ///
     /// # Panics
     /// If the correction is that of other stars.
@@ -192,17 +193,13 @@ impl<R: Real> ImplicitStep<'_, R> {
             matrix.belongs_to(self.stars),
             "the correction belongs to these stars"
         );
-        let height = self
-            .settings
-            .ground
-            .map(|ground| R::from_f64(ground.height));
         held.clear();
         base.clear();
         for &p in &self.stars.order {
             let particle = &self.solver.particles[p as usize];
             let x = load::<R>(particle);
-            let grounded = height.is_some_and(|height| R::components(x)[2] <= height);
-            held.push(weight::<R>(particle) <= R::ZERO || grounded);
+            let touching = self.obstacles.iter().any(|o| o.touched_at(x).is_some());
+            held.push(weight::<R>(particle) <= R::ZERO || touching);
             base.push(x);
         }
         force.clear();
@@ -222,9 +219,7 @@ impl<R: Real> ImplicitStep<'_, R> {
             .map(|(f, d)| R::to_dvec3(*f).dot(R::to_dvec3(*d)))
             .sum();
         let taken = self.search(base, direction, slope);
-        if let Some(ground) = self.settings.ground {
-            self.solver.project_to_ground(ground);
-        }
+        self.solver.project_to_colliders(&self.obstacles);
         CorrectionReport { iterations, taken }
     }
 

@@ -19,7 +19,7 @@ pub enum Guess {
 ///
 /// Unlike XPBD, descent converges with `step.iterations` to the backward Euler solution of the substep, at any
 /// stiffness; `step.substeps` then buy accuracy in time. `step.relaxation` above 1 is over-relaxation.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct DescentSettings {
     /// Time, substeps, iterations (sweeps, or rounds of a sweep and a correction), relaxation, forces.
     pub step: StepSettings,

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::ImplicitStep;
 use crate::Real;
+use crate::collider::Obstacle;
 use crate::neo_hookean::TetConstraint;
 use crate::real::weight;
 
@@ -40,7 +41,7 @@ impl<R: Real> ImplicitStep<'_, R> {
     }
 
     /// The forces in N that are left over: `M (x̃ - x) / Δt² - ∇U(x)`, zero in the solution. Those on particles that do
-    /// not move, and those that press a particle on the ground into it, are zero as well.
+    /// not move, and those that press a particle into a collider that it touches, are zero as well.
     pub fn forces(&self, out: &mut Vec<DVec3>) {
         self.forces_at(&|p| self.solver.position(p), out);
     }
@@ -80,13 +81,15 @@ impl<R: Real> ImplicitStep<'_, R> {
             }
         }
         let per_time_squared = self.time.to_f64().powi(-2);
-        let height = self.settings.ground.map(|ground| ground.height);
         for (p, force) in out.iter_mut().enumerate() {
             let x = position(p);
             *force += (self.free_position(p) - x) * (per_time_squared * solver.mass(p));
             let fixed = weight::<R>(&solver.particles[p]) <= R::ZERO;
-            let rounded = R::from_f64(x.z);
-            let pressed = height.is_some_and(|h| rounded <= R::from_f64(h) && force.z <= 0.0);
+            let into = |o: &Obstacle<R>| {
+                let normal = o.touched_at(R::from_dvec3(x))?;
+                (R::to_dvec3(normal).dot(*force) <= 0.0).then_some(())
+            };
+            let pressed = self.obstacles.iter().any(|o| into(o).is_some());
             if fixed || pressed {
                 *force = DVec3::ZERO;
             }

@@ -1,6 +1,7 @@
 //! [`Solver::descend`] and [`ImplicitStep`]: a frame, and one substep of it opened up.
 
 use super::{DescentSettings, Guess, Stars};
+use crate::collider::Obstacle;
 use crate::real::{finite, load, store, weight};
 use crate::{Real, Solver, StepReport, StepSettings, XpbdError};
 
@@ -20,7 +21,8 @@ impl<R: Real> Solver<R> {
     /// [`Solver::step`].
     ///
     /// # Errors
-    /// If the settings do not pass [`DescentSettings::check`]; nothing has moved then.
+    /// If the settings do not pass [`DescentSettings::check`], or there are constraints that descent does not know:
+    /// distances, volumes, soft attachments. Nothing has moved then.
     ///
     /// # Panics
     /// If the stars are those of another number of particles or tets.
@@ -63,9 +65,10 @@ impl<R: Real> Solver<R> {
     ) -> Result<DescentReport, XpbdError> {
         let _span = tracing::debug_span!("xpbd::descend").entered();
         settings.check()?;
+        self.refuse_soft_constraints()?;
         let mut report = DescentReport::default();
-        for _ in 0..settings.step.substeps {
-            let mut step = ImplicitStep::predicted(self, stars, settings);
+        for number in 1..=settings.step.substeps {
+            let mut step = ImplicitStep::predicted(self, stars, settings, number);
             step.run(settings, &mut report, |step| step.sweep());
             report.repaired += step.finish().repaired;
         }
@@ -84,14 +87,20 @@ pub struct ImplicitStep<'a, R: Real> {
     pub(super) solver: &'a mut Solver<R>,
     pub(super) stars: &'a mut Stars<R>,
     pub(super) settings: StepSettings,
+    pub(super) obstacles: Vec<Obstacle<R>>,
+    /// Whether the frame ends with it.
+    last: bool,
     pub(super) time: R,
+    /// Held particles that could not follow their handle.
+    lost: usize,
 }
 
 impl<'a, R: Real> ImplicitStep<'a, R> {
-    /// Begins a substep of `settings.step.substep_time()`: moves the particles to the initial guess.
+    /// Begins the last substep of a frame: moves the particles to the initial guess, and handles to where they go.
     ///
     /// # Errors
-    /// If the settings do not pass [`DescentSettings::check`]; nothing has moved then.
+    /// If the settings do not pass [`DescentSettings::check`], or there are constraints that descent does not know;
+    /// nothing has moved then.
     ///
     /// # Panics
     /// If the stars are those of another number of particles or tets.
@@ -101,13 +110,20 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
         settings: &DescentSettings,
     ) -> Result<Self, XpbdError> {
         settings.check()?;
-        Ok(Self::predicted(solver, stars, settings))
+        solver.refuse_soft_constraints()?;
+        Ok(Self::predicted(
+            solver,
+            stars,
+            settings,
+            settings.step.substeps,
+        ))
     }
 
     pub(super) fn predicted(
         solver: &'a mut Solver<R>,
         stars: &'a mut Stars<R>,
         settings: &DescentSettings,
+        number: u32,
     ) -> Self {
         assert!(
             stars.fits(solver),
@@ -115,11 +131,16 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
         );
         let time = R::from_f64(settings.step.substep_time());
         solver.predict(&settings.step, time);
+        let ended = f64::from(number) / f64::from(settings.step.substeps);
+        let lost = solver.move_held(ended);
         let mut step = Self {
             solver,
             stars,
-            settings: settings.step,
+            obstacles: Obstacle::place(&settings.step, ended * settings.step.time_step),
+            last: number == settings.step.substeps,
+            settings: settings.step.clone(),
             time,
+            lost,
         };
         if let (Guess::Adaptive, Some(gravity)) = (settings.guess, settings.step.gravity) {
             step.start_where_gravity_led(R::from_dvec3(gravity));
@@ -186,7 +207,15 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
 
     /// Ends the substep: velocities from the motion.
     pub fn finish(self) -> StepReport {
-        let repaired = self.solver.update_velocities(self.time, R::ONE / self.time);
-        StepReport { repaired }
+        let per_time = R::ONE / self.time;
+        let repaired = self.solver.update_velocities(self.time, per_time);
+        self.solver.update_held(per_time);
+        if self.last {
+            self.solver.arrive();
+        }
+        StepReport {
+            repaired: repaired + self.lost,
+            unfolded: 0,
+        }
     }
 }

@@ -22,9 +22,9 @@ struct Sweep<R> {
 }
 
 impl<R: Real> ImplicitStep<'_, R> {
-    /// Moves every free particle once, color after color; then lifts particles out of the ground.
+    /// Moves every free particle once, color after color; then puts particles out of colliders.
     ///
-    /// Without ground the potential does not rise, up to rounding. Cost: about 60 operations a pair of particle and
+    /// Without colliders the potential does not rise, up to rounding. Cost: about 60 operations a pair of particle and
     /// tet, and three divisions a particle; [`Stars::pair_count`].
     pub fn sweep(&mut self) {
         let sweep = Sweep {
@@ -49,8 +49,8 @@ impl<R: Real> ImplicitStep<'_, R> {
                 });
             }
         }
-        if let Some(ground) = self.settings.ground {
-            self.solver.project_to_ground(ground);
+        if !self.obstacles.is_empty() {
+            self.solver.project_to_colliders(&self.obstacles);
         }
     }
 }

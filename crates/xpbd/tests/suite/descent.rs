@@ -4,7 +4,7 @@ use glam::{DVec3, dvec3};
 use incise_graph::{Clustering, ColorId, Coloring, GraphError, Schedule};
 use incise_mesh::{TetMesh, generate::kuhn_box};
 use incise_xpbd::{
-    DescentSettings, Ground, Guess, ImplicitStep, Material, Real, Solver, Stars, XpbdError,
+    Collider, DescentSettings, Guess, ImplicitStep, Material, Real, Solver, Stars, XpbdError,
 };
 
 use crate::body::{
@@ -241,10 +241,7 @@ pub(crate) fn everything() -> DescentSettings {
     let mut settings = falling(4);
     settings.step.substeps = 2;
     settings.step.relaxation = 1.3;
-    settings.step.ground = Some(Ground {
-        height: -0.01,
-        friction: 0.4,
-    });
+    settings.step.colliders = vec![Collider::ground(-0.01, 0.4)];
     settings.guess = Guess::Adaptive;
     settings
 }
@@ -351,10 +348,7 @@ fn held_particles_stay_and_the_ground_holds() {
     let mut stars = stars(&solver);
     let height = -0.1234;
     let mut settings = everything();
-    settings.step.ground = Some(Ground {
-        height,
-        friction: 0.3,
-    });
+    settings.step.colliders = vec![Collider::ground(height, 0.3)];
     for _ in 0..60 {
         solver.descend(&mut stars, &settings).unwrap();
         assert_eq!(

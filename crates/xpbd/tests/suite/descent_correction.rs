@@ -3,7 +3,7 @@
 use glam::{DVec3, dvec3};
 use incise_mesh::generate::kuhn_box;
 use incise_xpbd::{
-    Correction, CorrectionReport, CorrectionSettings, DescentSettings, Ground, ImplicitStep,
+    Collider, Correction, CorrectionReport, CorrectionSettings, DescentSettings, ImplicitStep,
     Material, Real, Solver, Stars, XpbdError,
 };
 
@@ -151,10 +151,7 @@ fn all_survive<R: Real>() {
         let mut correction = Correction::new(&stars, SMALL).unwrap();
         let mut settings = DescentSettings::new(time_step, 2);
         settings.step.gravity = Some(GRAVITY);
-        settings.step.ground = Some(Ground {
-            height: -1.0,
-            friction: 0.5,
-        });
+        settings.step.colliders = vec![Collider::ground(-1.0, 0.5)];
         for _ in 0..5 {
             solver
                 .descend_corrected(&mut stars, &mut correction, &settings)
@@ -182,10 +179,7 @@ fn the_ground_holds_under_corrections() {
     let mut stars = stars(&solver);
     let mut correction = Correction::new(&stars, SMALL).unwrap();
     let mut settings = falling(6);
-    settings.step.ground = Some(Ground {
-        height: -0.02,
-        friction: 0.5,
-    });
+    settings.step.colliders = vec![Collider::ground(-0.02, 0.5)];
     for _ in 0..120 {
         solver
             .descend_corrected(&mut stars, &mut correction, &settings)

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, dvec3};
 use incise_mesh::generate::kuhn_box;
-use incise_xpbd::{DescentSettings, Ground, Material, Real};
+use incise_xpbd::{Collider, DescentSettings, Material, Real};
 
 use crate::body::{GRAVITY, Noise, RUBBER, body, within};
 use crate::descent::{falling, stars};
@@ -17,10 +17,7 @@ fn all_survive<R: Real>() {
             let mut settings = DescentSettings::new(time_step, iterations);
             settings.step.substeps = substeps;
             settings.step.gravity = Some(GRAVITY);
-            settings.step.ground = Some(Ground {
-                height: -1.0,
-                friction: 0.5,
-            });
+            settings.step.colliders = vec![Collider::ground(-1.0, 0.5)];
             for _ in 0..10 {
                 solver.descend(&mut stars, &settings).unwrap();
             }

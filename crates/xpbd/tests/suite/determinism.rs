@@ -2,7 +2,7 @@
 
 use glam::{DVec3, dvec3};
 use incise_mesh::generate::kuhn_box;
-use incise_xpbd::{Ground, Material, Real, StepSettings};
+use incise_xpbd::{Collider, Material, Real, StepSettings};
 
 use crate::body::{GRAVITY, RUBBER, body, disturb, plain, schedule};
 
@@ -24,10 +24,7 @@ fn everything(time_step: f64) -> StepSettings {
         iterations: 3,
         relaxation: 0.9,
         gravity: Some(GRAVITY),
-        ground: Some(Ground {
-            height: -0.01,
-            friction: 0.4,
-        }),
+        colliders: vec![Collider::ground(-0.01, 0.4)],
         ..StepSettings::new(time_step)
     }
 }

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3, dvec3};
 use incise_graph::{Clustering, ColorId, Coloring, Schedule};
 use incise_mesh::{TetMesh, generate::kuhn_box};
-use incise_xpbd::{Ground, Material, Real, Solver, StepSettings, XpbdError};
+use incise_xpbd::{Collider, Material, Real, Solver, StepSettings, XpbdError};
 
 use crate::body::{
     GRAVITY, RUBBER, body, disturb, largest_distance, plain, positions, substep, within,
@@ -32,10 +32,7 @@ fn one_tet_moves_as_with_the_block_solve() {
             substeps: 3,
             relaxation: 0.9,
             gravity: Some(GRAVITY),
-            ground: Some(Ground {
-                height: -0.1,
-                friction: 0.3,
-            }),
+            colliders: vec![Collider::ground(-0.1, 0.3)],
             ..substep(solver, kappa)
         };
         let [block, direct] = [false, true].map(|direct| {

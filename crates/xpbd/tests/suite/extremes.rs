@@ -2,7 +2,7 @@
 
 use glam::{DVec3, dvec3};
 use incise_mesh::{TetId, TetMesh, generate::kuhn_box};
-use incise_xpbd::{Ground, KappaLimit, Material, Real, Solver, StepSettings};
+use incise_xpbd::{Collider, KappaLimit, Material, Real, Solver, StepSettings};
 use proptest::prelude::*;
 
 use crate::body::{
@@ -46,10 +46,7 @@ fn survive<R: Real>(
             substeps,
             iterations,
             gravity: Some(GRAVITY),
-            ground: Some(Ground {
-                height: -1.0,
-                friction: 0.5,
-            }),
+            colliders: vec![Collider::ground(-1.0, 0.5)],
             ..StepSettings::new(time_step)
         };
         for _ in 0..20 {
@@ -189,7 +186,7 @@ fn every_extreme(method: Method) {
 
 #[test]
 fn every_extreme_stays_finite() {
-    Method::ALL.map(every_extreme);
+    Method::ALL.into_iter().for_each(every_extreme);
 }
 
 /// Inverted tets and error of volume of a bar of two materials, one end held, the other of that density and stiffness,

@@ -3,14 +3,14 @@
 use glam::{DVec3, dvec3};
 use incise_graph::{Clustering, Coloring, Schedule};
 use incise_mesh::generate::kuhn_box;
-use incise_xpbd::{Ground, Material, Real, Solver, StepSettings};
+use incise_xpbd::{Collider, Material, Real, Solver, StepSettings};
 
 use crate::body::{GRAVITY, Noise, RUBBER, body, disturb, plain, substep, within};
 
 fn on_ground<R: Real>(solver: &Solver<R>, height: f64, friction: f64) -> StepSettings {
     StepSettings {
         gravity: Some(GRAVITY),
-        ground: Some(Ground { height, friction }),
+        colliders: vec![Collider::ground(height, friction)],
         ..substep(solver, 0.3)
     }
 }
@@ -92,10 +92,7 @@ fn particles_end_on_the_ground_to_the_bit() {
     (0..depths.len()).for_each(|p| solver.set_mass(p, 1.0));
     let schedule = Schedule::new(&Clustering::none(0), &Coloring::new(Vec::new()));
     let settings = StepSettings {
-        ground: Some(Ground {
-            height: 0.1,
-            friction: 0.0,
-        }),
+        colliders: vec![Collider::ground(0.1, 0.0)],
         ..StepSettings::new(0.01)
     };
     solver.step(&schedule, &settings).unwrap();

@@ -5,9 +5,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 
+mod attachments;
 mod beam;
 mod body;
 mod closed_forms;
+mod colliders;
 mod conservation;
 mod convergence;
 mod damping;
@@ -17,6 +19,7 @@ mod descent_extremes;
 mod determinism;
 #[cfg(feature = "direct")]
 mod direct;
+mod distances;
 mod edits;
 mod energy;
 mod extremes;
@@ -30,3 +33,4 @@ mod refusals;
 mod residuals;
 mod rest;
 mod vibration;
+mod volumes;

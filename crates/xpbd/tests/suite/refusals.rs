@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use incise_mesh::generate::kuhn_box;
-use incise_xpbd::{Ground, Material, Solver, StepSettings, XpbdError};
+use incise_xpbd::{Collider, Material, Solver, StepSettings, XpbdError};
 
 use crate::body::{RUBBER, body, plain, positions};
 
@@ -64,49 +64,61 @@ fn bad_settings_are_refused_by_name_and_nothing_moves() {
         ..StepSettings::new(0.01)
     };
     let ground = |height, friction| StepSettings {
-        ground: Some(Ground { height, friction }),
-        ..good
+        colliders: vec![Collider::ground(height, friction)],
+        ..good.clone()
     };
     let mut table = vec![
         (
             "substeps",
             StepSettings {
                 substeps: 0,
-                ..good
+                ..good.clone()
             },
         ),
         (
             "iterations",
             StepSettings {
                 iterations: 0,
-                ..good
+                ..good.clone()
             },
         ),
         (
             "gravity",
             StepSettings {
                 gravity: Some(DVec3::new(0.0, NAN, 0.0)),
-                ..good
+                ..good.clone()
             },
         ),
         (
             "gravity",
             StepSettings {
                 gravity: Some(DVec3::INFINITY),
-                ..good
+                ..good.clone()
             },
         ),
-        ("ground height", ground(NAN, 0.0)),
-        ("ground height", ground(-INFINITY, 0.0)),
-        ("ground friction", ground(0.0, NAN)),
-        ("ground friction", ground(0.0, INFINITY)),
-        ("ground friction", ground(0.0, -0.1)),
+        ("collider point", ground(NAN, 0.0)),
+        ("collider point", ground(-INFINITY, 0.0)),
+        ("collider friction", ground(0.0, NAN)),
+        ("collider friction", ground(0.0, INFINITY)),
+        ("collider friction", ground(0.0, -0.1)),
     ];
     for time_step in [0.0, -0.01, NAN, INFINITY] {
-        table.push(("time_step", StepSettings { time_step, ..good }));
+        table.push((
+            "time_step",
+            StepSettings {
+                time_step,
+                ..good.clone()
+            },
+        ));
     }
     for relaxation in [0.0, -0.5, 2.1, NAN, INFINITY] {
-        table.push(("relaxation", StepSettings { relaxation, ..good }));
+        table.push((
+            "relaxation",
+            StepSettings {
+                relaxation,
+                ..good.clone()
+            },
+        ));
     }
     let mesh = kuhn_box([2, 2, 2], DVec3::ONE);
     let mut solver = body::<f64>(&mesh, RUBBER);

@@ -234,7 +234,7 @@ fn a_collapsed_body_cannot_hide_from_the_force_residual() {
     for iterations in [100, 100, 100, 3000] {
         let settings = StepSettings {
             iterations,
-            ..settings
+            ..settings.clone()
         };
         solver
             .step_keeping_residuals(&plain(&mesh), &settings)

@@ -1,0 +1,166 @@
+//! [`HandleSpec`]: what holds parts of bodies and moves them, such as an instrument or a bone.
+//!
+//! A handle's frame has its origin in the center of its turn, so that particles go around it on circles between two
+//! frames as well.
+
+use glam::{DQuat, DVec3};
+use incise_xpbd::Pose;
+use serde::{Deserialize, Serialize};
+
+use crate::Error;
+use crate::backend::{AnySolver, each};
+use crate::collider::rotation;
+use crate::limits::{coordinates, value, within};
+use crate::region::particles;
+use crate::scene::Region;
+use crate::strokes::along;
+
+/// Holds some particles of a body and moves them. Cuts through what it holds leave both sides held.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HandleSpec {
+    /// The number of the body.
+    #[serde(default)]
+    pub body: usize,
+    /// What is held: the particles that lie at rest in any of these regions. Fixed ones stay where they are.
+    pub holds: Vec<Region>,
+    /// The frames at whose start the handle is at the path's start and end.
+    pub frames: [u64; 2],
+    /// Offsets of the handle in m, passed through at equal times. What is held is at rest at the first one.
+    pub path: Vec<[f64; 3]>,
+    /// How it turns meanwhile; absent: not at all.
+    pub turn: Option<TurnSpec>,
+    /// One over the stiffness by which each particle is held, in m/N; 0 holds rigidly.
+    #[serde(default)]
+    pub compliance: f64,
+}
+
+/// A turn about an axis through a point, at an even rate.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TurnSpec {
+    /// The axis.
+    pub axis: [f64; 3],
+    /// The angle from start to end in degrees, against the clock as seen against the axis; below 180 a frame.
+    pub angle_degrees: f64,
+    /// A point on the axis in m, which moves along the path.
+    #[serde(default)]
+    pub center: [f64; 3],
+}
+
+/// A handle, checked.
+#[derive(Debug)]
+pub(crate) struct Handle {
+    spec: HandleSpec,
+    center: DVec3,
+    /// The particles it holds, as numbered in their body.
+    particles: Vec<usize>,
+    /// Its number in the solver.
+    number: u32,
+}
+
+impl Handle {
+    /// Checks a handle; `positions` are those of its body's particles at rest, by the number of the body.
+    pub(crate) fn new<'a>(
+        field: &str,
+        spec: &HandleSpec,
+        positions: impl Fn(usize) -> Option<&'a [DVec3]>,
+    ) -> Result<Self, Error> {
+        let Some(positions) = positions(spec.body) else {
+            let range = "the number of a body, counted from 0";
+            return Err(value(format!("{field}.body"), spec.body, range));
+        };
+        let [first, last] = spec.frames;
+        if first >= last {
+            let range = "two frames, the second after the first";
+            let frames = format!("{:?}", spec.frames);
+            return Err(value(format!("{field}.frames"), frames, range));
+        }
+        if spec.path.len() < 2 {
+            let count = format!("{} point(s)", spec.path.len());
+            return Err(value(format!("{field}.path"), count, "at least two"));
+        }
+        for &offset in &spec.path {
+            coordinates(&format!("{field}.path"), offset)?;
+        }
+        let mut center = DVec3::ZERO;
+        if let Some(turn) = spec.turn {
+            let field = format!("{field}.turn");
+            rotation(&field, turn.axis, turn.angle_degrees)?;
+            center = coordinates(&format!("{field}.center"), turn.center)?;
+            if turn.angle_degrees.abs() / (last - first) as f64 >= 180.0 {
+                let range = "below 180 a frame";
+                let field = format!("{field}.angle_degrees");
+                return Err(value(field, turn.angle_degrees, range));
+            }
+        }
+        within(&format!("{field}.compliance"), spec.compliance, 0.0, 1e9)?;
+        let mut held = Vec::new();
+        for (i, region) in spec.holds.iter().enumerate() {
+            held.extend(particles(
+                &format!("{field}.holds[{i}]"),
+                region,
+                positions,
+            )?);
+        }
+        held.sort_unstable();
+        held.dedup();
+        Ok(Self {
+            spec: spec.clone(),
+            center,
+            particles: held,
+            number: 0,
+        })
+    }
+
+    /// The body it holds.
+    pub(crate) fn body(&self) -> usize {
+        self.spec.body
+    }
+
+    /// Takes hold; the body's particles are numbered from `first` on in the solver.
+    pub(crate) fn attach(
+        &mut self,
+        field: &str,
+        solver: &mut AnySolver,
+        first: usize,
+    ) -> Result<(), Error> {
+        let (pose, compliance) = (self.pose(0), self.spec.compliance);
+        each!(solver, solver => {
+            self.number = solver.add_handle(pose);
+            for &p in &self.particles {
+                if solver.handle_of(first + p).is_some() {
+                    let what = format!("a region with particle {p}");
+                    let range = "what no other handle holds";
+                    return Err(value(format!("{field}.holds"), what, range));
+                }
+                solver
+                    .attach(first + p, self.number, compliance, 0.0)
+                    .map_err(|source| Error::Xpbd { field: field.to_owned(), source })?;
+            }
+        });
+        Ok(())
+    }
+
+    /// Tells the solver where the handle is at the end of a frame.
+    pub(crate) fn advance(&self, frame: u64, solver: &mut AnySolver) {
+        let pose = self.pose(frame.saturating_add(1));
+        each!(solver, solver => solver.move_handle(self.number, pose));
+    }
+
+    /// Where the handle is at the start of a frame.
+    fn pose(&self, frame: u64) -> Pose {
+        let [first, last] = self.spec.frames;
+        let elapsed = (frame.clamp(first, last) - first) as f64 / (last - first) as f64;
+        let rotation = self.spec.turn.map_or(DQuat::IDENTITY, |turn| {
+            let axis = DVec3::from_array(turn.axis);
+            let axis = (axis / axis.abs().max_element()).normalize();
+            DQuat::from_axis_angle(axis, (elapsed * turn.angle_degrees).to_radians())
+        });
+        let way = along(&self.spec.path, elapsed) - DVec3::from_array(self.spec.path[0]);
+        Pose {
+            position: self.center + way,
+            rotation,
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! [`LinkSpec`]: sutures and springs between two points of bodies.
+
+use glam::DVec3;
+use incise_coloring::{Order, greedy};
+use incise_graph::{Clustering, Incidence, Schedule};
+use incise_xpbd::DistanceConstraint;
+use serde::{Deserialize, Serialize};
+
+use crate::Error;
+use crate::backend::{AnySolver, each};
+use crate::limits::{LARGEST_COORDINATE, coordinates, value, within};
+
+/// Keeps two particles at a distance. A cut leaves it on its particles.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LinkSpec {
+    /// One end.
+    pub from: EndSpec,
+    /// The other end.
+    pub to: EndSpec,
+    /// The length at rest in m; absent: the distance of both particles at rest.
+    pub length: Option<f64>,
+    /// One over the stiffness in m/N; 0 is a rod, or a thread that does not stretch.
+    #[serde(default)]
+    pub compliance: f64,
+    /// Whether it acts only while it is longer than at rest, as a thread does.
+    #[serde(default)]
+    pub only_when_longer: bool,
+}
+
+/// The particle of a body that is nearest to a point at rest.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EndSpec {
+    /// The number of the body.
+    pub body: usize,
+    /// The point in m in the world.
+    pub point: [f64; 3],
+}
+
+/// Checks a link. `positions` gives those of a body's particles at rest, and the number of its first particle in the
+/// solver, by the number of the body.
+pub(crate) fn link<'a>(
+    field: &str,
+    spec: &LinkSpec,
+    positions: impl Fn(usize) -> Option<(&'a [DVec3], usize)>,
+) -> Result<DistanceConstraint, Error> {
+    let end = |key: &str, end: &EndSpec| {
+        let Some((positions, first)) = positions(end.body) else {
+            let range = "the number of a body, counted from 0";
+            return Err(value(format!("{field}.{key}.body"), end.body, range));
+        };
+        let point = coordinates(&format!("{field}.{key}.point"), end.point)?;
+        let nearest = (0..positions.len())
+            .map(|p| (positions[p].distance_squared(point), p))
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        let (_, nearest) =
+            nearest.ok_or_else(|| value(field, "on an empty body", "on a particle"))?;
+        Ok((positions[nearest], first + nearest))
+    };
+    let (a, from) = end("from", &spec.from)?;
+    let (b, to) = end("to", &spec.to)?;
+    if from == to {
+        let range = "such that another particle is nearest than from the other end";
+        return Err(value(
+            format!("{field}.to.point"),
+            format!("{:?}", spec.to.point),
+            range,
+        ));
+    }
+    let number =
+        |p: usize| u32::try_from(p).map_err(|_| Error::Inconsistent("too many particles".into()));
+    let length = spec.length.unwrap_or(a.distance(b));
+    Ok(DistanceConstraint {
+        particles: [number(from)?, number(to)?],
+        length: within(
+            &format!("{field}.length"),
+            length,
+            0.0,
+            2.0 * LARGEST_COORDINATE,
+        )?,
+        compliance: within(&format!("{field}.compliance"), spec.compliance, 0.0, 1e9)?,
+        damping: 0.0,
+        only_when_longer: spec.only_when_longer,
+    })
+}
+
+/// Hands links to the solver, in an order by colors.
+pub(crate) fn connect(solver: &mut AnySolver, links: &[DistanceConstraint]) -> Result<(), Error> {
+    if links.is_empty() {
+        return Ok(());
+    }
+    each!(solver, solver => {
+        let particles = links.iter().map(|link| link.particles);
+        let incidence = Incidence::from_constraints(solver.particle_count(), particles)?;
+        let coloring = greedy(&incidence, Order::LargestFirst);
+        let schedule = Schedule::new(&Clustering::none(links.len()), &coloring);
+        let set = solver.set_distances(links, schedule);
+        set.map_err(|source| Error::Xpbd { field: "link".into(), source })
+    })
+}

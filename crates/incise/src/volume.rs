@@ -1,0 +1,96 @@
+//! [`BodyVolumes`]: the volume constraints of bodies that ask for them, one for each tet, and how they follow a cut.
+//!
+//! Constraint `i` is that of tet `i`, so the schedule of the tets is theirs as well. Tets of other bodies take no part.
+
+use glam::DVec3;
+use incise_cutting::{CutDelta, CuttableMesh};
+use incise_graph::Schedule;
+use incise_mesh::{ParticleId, TetId};
+use incise_xpbd::{VolumeConstraint, XpbdError};
+
+use crate::backend::{AnySolver, each};
+use crate::limits::within;
+use crate::{Error, Scene};
+
+/// What each body asks for.
+#[derive(Debug)]
+pub(crate) struct BodyVolumes {
+    compliance: Vec<Option<f64>>,
+}
+
+impl BodyVolumes {
+    /// `None` if no body of the scene asks.
+    pub(crate) fn new(scene: &Scene) -> Result<Option<Self>, Error> {
+        let mut compliance = Vec::new();
+        for (i, body) in scene.body.iter().enumerate() {
+            let field = format!("body[{i}].volume_compliance");
+            let checked = body.volume_compliance.map(|c| within(&field, c, 0.0, 1e9));
+            compliance.push(checked.transpose()?);
+        }
+        let any = compliance.iter().any(Option::is_some);
+        Ok(any.then_some(Self { compliance }))
+    }
+
+    /// Constrains all tets.
+    pub(crate) fn constrain(
+        &self,
+        solver: &mut AnySolver,
+        cuttable: &CuttableMesh,
+        schedule: &Schedule,
+    ) -> Result<(), Error> {
+        let mesh = cuttable.mesh();
+        each!(solver, solver => {
+            let list: Vec<VolumeConstraint> = (0..mesh.tets.len())
+                .map(|t| {
+                    let rest = mesh.corners(TetId::new(t));
+                    self.constraint(solver.material_of(t), mesh.tets[t], rest)
+                })
+                .collect();
+            solver.set_volumes(&list, schedule.clone()).map_err(refused)
+        })
+    }
+
+    /// Follows a cut, after the solver and the schedule have.
+    pub(crate) fn follow(
+        &self,
+        solver: &mut AnySolver,
+        delta: &CutDelta,
+        cuttable: &CuttableMesh,
+        schedule: &Schedule,
+    ) -> Result<(), Error> {
+        let mesh = cuttable.mesh();
+        let mut added: Vec<_> = delta.added.iter().collect();
+        added.sort_unstable_by_key(|tet| tet.tet);
+        each!(solver, solver => {
+            for tet in added {
+                let body = solver.material_of(tet.tet.index());
+                let constraint = self.constraint(body, tet.corners, mesh.corners(tet.tet));
+                solver.put_volume(tet.tet.index(), constraint).map_err(refused)?;
+            }
+            for tet in &delta.relinked {
+                solver.relink_volume(tet.tet.index(), tet.after.map(|p| p.0));
+            }
+            solver.reschedule_volumes(schedule);
+        });
+        Ok(())
+    }
+
+    fn constraint(
+        &self,
+        body: u16,
+        corners: [ParticleId; 4],
+        rest: [DVec3; 4],
+    ) -> VolumeConstraint {
+        let compliance = self.compliance[usize::from(body)];
+        let particles = corners.map(|p| p.0);
+        let mut constraint = VolumeConstraint::of_tet(particles, rest, compliance.unwrap_or(0.0));
+        if compliance.is_none() {
+            constraint.rest_volume = 0.0;
+        }
+        constraint
+    }
+}
+
+fn refused(error: XpbdError) -> Error {
+    Error::Inconsistent(error.to_string())
+}

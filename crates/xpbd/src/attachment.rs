@@ -1,0 +1,370 @@
+//! [`Pose`] and attachments: particles that hang on moving handles, such as an instrument's jaws or a bone.
+//!
+//! A handle goes from pose to pose, one a frame; in between, its position is interpolated linearly and its rotation
+//! along the shortest arc. An attached particle has a place in the handle's frame. With a compliance of 0 it is there at
+//! the end of every substep, to the bit, whatever pulls on it: it moves as a fixed particle does, by itself only. With a
+//! compliance it is pulled there by a spring of rest length 0, `C = x - target` in all three directions at once.
+//!
+//! Source: Macklin, Müller, Chentanez 2016 (compliance, damping). Cost: 40 operations an attachment.
+
+use glam::{DQuat, DVec3};
+use rayon::prelude::*;
+
+use crate::real::{finite, load, store, weight};
+use crate::step::Factors;
+use crate::step::PARALLEL_PARTICLES;
+use crate::{Real, Solver, XpbdError};
+
+/// Where a handle is and how it is turned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// Position in m.
+    pub position: DVec3,
+    /// Rotation, of length 1.
+    pub rotation: DQuat,
+}
+
+impl Pose {
+    /// At a position, not turned.
+    #[must_use]
+    pub fn at(position: DVec3) -> Self {
+        Self {
+            position,
+            rotation: DQuat::IDENTITY,
+        }
+    }
+
+    /// Where a point of the handle's frame is in the world.
+    #[must_use]
+    pub fn apply(&self, point: DVec3) -> DVec3 {
+        self.position + self.rotation * point
+    }
+
+    /// The pose at a fraction of the way to another one; that one itself at 1.
+    #[must_use]
+    pub fn toward(&self, to: &Self, fraction: f64) -> Self {
+        if fraction >= 1.0 || self == to {
+            return *to;
+        }
+        Self {
+            position: self.position.lerp(to.position, fraction),
+            rotation: self.rotation.slerp(to.rotation, fraction),
+        }
+    }
+
+    fn check(&self) {
+        let sound = self.position.is_finite() && self.rotation.is_finite();
+        assert!(
+            sound && (self.rotation.length() - 1.0).abs() < 1e-6,
+            "poses are finite and their rotations of length 1"
+        );
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Handle {
+    /// At the start and at the end of the frame.
+    from: Pose,
+    to: Pose,
+    /// At the end of the substep.
+    now: Pose,
+}
+
+/// A particle's place on a handle.
+#[derive(Clone, Copy, Debug)]
+struct Attachment<R: Real> {
+    particle: u32,
+    handle: u32,
+    /// The place in the handle's frame.
+    place: DVec3,
+    /// In m/N; 0 is rigid.
+    compliance: f64,
+    damping: f64,
+    /// Where the place is in the world at the end of the substep, and at its start.
+    target: R::Vector,
+    before: R::Vector,
+    /// 0 at the start of every substep.
+    multiplier: R::Vector,
+}
+
+/// All handles and what hangs on them.
+#[derive(Debug)]
+pub(crate) struct Attachments<R: Real> {
+    handles: Vec<Handle>,
+    /// Ascending by particle, at most one each.
+    list: Vec<Attachment<R>>,
+}
+
+impl<R: Real> Default for Attachments<R> {
+    fn default() -> Self {
+        Self {
+            handles: Vec::new(),
+            list: Vec::new(),
+        }
+    }
+}
+
+impl<R: Real> Attachments<R> {
+    fn find(&self, particle: usize) -> Result<usize, usize> {
+        self.list
+            .binary_search_by_key(&particle, |a| a.particle as usize)
+    }
+
+    fn get(&self, particle: usize) -> Option<&Attachment<R>> {
+        self.find(particle).ok().map(|i| &self.list[i])
+    }
+
+    /// Whether some attachment is not rigid.
+    pub(crate) fn is_soft(&self) -> bool {
+        self.list.iter().any(|a| a.compliance > 0.0)
+    }
+
+    /// Whether a particle is where its handle says, whatever pulls on it.
+    pub(crate) fn holds(&self, particle: usize) -> bool {
+        self.get(particle).is_some_and(|a| a.compliance == 0.0)
+    }
+
+    /// Attaches the last particle as `of` is, if it is.
+    pub(crate) fn copy(&mut self, of: usize, copy: usize) {
+        if let Some(&attachment) = self.get(of) {
+            self.append(attachment, copy);
+        }
+    }
+
+    /// Attaches the last particle if both ends are attached to the same handle.
+    pub(crate) fn between(&mut self, [a, b]: [usize; 2], parameter: f64, particle: usize) {
+        let (Some(&a), Some(b)) = (self.get(a), self.get(b)) else {
+            return;
+        };
+        if a.handle == b.handle {
+            let attachment = Attachment {
+                place: a.place.lerp(b.place, parameter),
+                compliance: a.compliance.max(b.compliance),
+                damping: a.damping.max(b.damping),
+                ..a
+            };
+            self.append(attachment, particle);
+        }
+    }
+
+    fn append(&mut self, attachment: Attachment<R>, particle: usize) {
+        let particle = number(particle);
+        self.list.push(Attachment {
+            particle,
+            ..attachment
+        });
+    }
+}
+
+fn number(particle: usize) -> u32 {
+    u32::try_from(particle).expect("particles are numbered by 32 bits")
+}
+
+impl<R: Real> Solver<R> {
+    /// Adds a handle and returns its number.
+    ///
+    /// # Panics
+    /// If the pose is not finite or its rotation not of length 1.
+    pub fn add_handle(&mut self, pose: Pose) -> u32 {
+        pose.check();
+        let handles = &mut self.attachments.handles;
+        handles.push(Handle {
+            from: pose,
+            to: pose,
+            now: pose,
+        });
+        number(handles.len() - 1)
+    }
+
+    /// Says where a handle is at the end of the next frame; until told again, it stays there.
+    ///
+    /// # Panics
+    /// If the handle does not exist, the pose is not finite or its rotation not of length 1.
+    pub fn move_handle(&mut self, handle: u32, pose: Pose) {
+        pose.check();
+        self.attachments.handles[handle as usize].to = pose;
+    }
+
+    /// The present pose of a handle.
+    ///
+    /// # Panics
+    /// If the handle does not exist.
+    #[must_use]
+    pub fn handle(&self, handle: u32) -> Pose {
+        self.attachments.handles[handle as usize].from
+    }
+
+    /// Attaches a particle, from where it is now, to a handle as that is now. A particle hangs on one handle: another
+    /// attachment replaces the first.
+    ///
+    /// `compliance` is one over the stiffness in m/N, 0 is rigid; `damping` is a time in s, by which the motion relative
+    /// to the handle is resisted times the stiffness (nothing with a compliance of 0). A fixed particle stays fixed. A
+    /// cut attaches copies like their originals, and a particle between two others if both hang on the same handle; with
+    /// a compliance, each has a spring of its own.
+    ///
+    /// O(log n + attachments of higher particles).
+    ///
+    /// # Errors
+    /// A negative or infinite compliance or damping.
+    ///
+    /// # Panics
+    /// If the particle or the handle does not exist.
+    ///
+    /// # Example
+    /// ```
+    /// use glam::{DQuat, DVec3};
+    /// use incise_graph::Schedule;
+    /// use incise_xpbd::{Pose, Solver, StepSettings};
+    ///
+    /// let mut solver = Solver::<f64>::new(&[DVec3::X]);
+    /// solver.set_mass(0, 1.0);
+    /// let handle = solver.add_handle(Pose::at(DVec3::ZERO));
+    /// solver.attach(0, handle, 0.0, 0.0)?;
+    /// let turned = Pose { position: DVec3::Z, rotation: DQuat::from_rotation_z(1.0) };
+    /// solver.move_handle(handle, turned);
+    /// solver.step(&Schedule::default(), &StepSettings { substeps: 3, ..StepSettings::new(0.016) })?;
+    /// assert_eq!(solver.position(0), turned.apply(DVec3::X));
+    /// # Ok::<(), incise_xpbd::XpbdError>(())
+    /// ```
+    pub fn attach(
+        &mut self,
+        particle: usize,
+        handle: u32,
+        compliance: f64,
+        damping: f64,
+    ) -> Result<(), XpbdError> {
+        for (what, value) in [
+            ("attachment compliance", compliance),
+            ("attachment damping", damping),
+        ] {
+            if !(value.is_finite() && value >= 0.0) {
+                return Err(XpbdError::Setting {
+                    what,
+                    value,
+                    range: "at least 0 and finite",
+                });
+            }
+        }
+        let pose = self.attachments.handles[handle as usize].from;
+        let x = self.vector(particle);
+        let attachment = Attachment {
+            particle: number(particle),
+            handle,
+            place: pose.rotation.conjugate() * (R::to_dvec3(x) - pose.position),
+            compliance,
+            damping,
+            target: x,
+            before: x,
+            multiplier: R::Vector::default(),
+        };
+        let list = &mut self.attachments.list;
+        match list.binary_search_by_key(&attachment.particle, |a| a.particle) {
+            Ok(place) => list[place] = attachment,
+            Err(place) => list.insert(place, attachment),
+        }
+        self.set_weight(particle);
+        Ok(())
+    }
+
+    /// Lets a particle go; it keeps its velocity. O(log n + attachments of higher particles).
+    ///
+    /// # Panics
+    /// If the particle does not exist.
+    pub fn detach(&mut self, particle: usize) {
+        if let Ok(place) = self.attachments.find(particle) {
+            self.attachments.list.remove(place);
+        }
+        self.set_weight(particle);
+    }
+
+    /// The handle that a particle hangs on.
+    #[must_use]
+    pub fn handle_of(&self, particle: usize) -> Option<u32> {
+        self.attachments.get(particle).map(|a| a.handle)
+    }
+
+    /// Brings handles and what they hold rigidly to where they are at a fraction of the frame; returns how many
+    /// particles could not follow out of the range of numbers.
+    pub(crate) fn move_held(&mut self, fraction: f64) -> usize {
+        let Self {
+            attachments: Attachments { handles, list },
+            particles,
+            fixed,
+            ..
+        } = self;
+        for handle in handles.iter_mut() {
+            handle.now = handle.from.toward(&handle.to, fraction);
+        }
+        let mut lost = 0;
+        for attachment in list {
+            attachment.before = attachment.target;
+            attachment.multiplier = R::Vector::default();
+            let pose = &handles[attachment.handle as usize].now;
+            let target = R::from_dvec3(pose.apply(attachment.place));
+            if !finite::<R>(target) {
+                lost += 1;
+                continue;
+            }
+            attachment.target = target;
+            let p = attachment.particle as usize;
+            if attachment.compliance == 0.0 && !fixed[p] {
+                store::<R>(&particles[p], target);
+            }
+        }
+        lost
+    }
+
+    /// Gives particles that are held rigidly the velocity of their motion in a substep.
+    pub(crate) fn update_held(&mut self, per_time: R) {
+        for attachment in &self.attachments.list {
+            let p = attachment.particle as usize;
+            if attachment.compliance == 0.0 && !self.fixed[p] {
+                let velocity = (self.vector(p) - self.previous[p]) * per_time;
+                if finite::<R>(velocity) {
+                    self.velocities[p] = velocity;
+                }
+            }
+        }
+    }
+
+    /// Ends a frame: the handles have arrived.
+    pub(crate) fn arrive(&mut self) {
+        for handle in &mut self.attachments.handles {
+            handle.from = handle.to;
+        }
+    }
+
+    /// Pulls particles to their handles that hang on them by a compliance. Each moves only its own particle.
+    pub(crate) fn solve_attachments(&mut self, factors: &Factors<R>) {
+        let Self {
+            attachments: Attachments { list, .. },
+            particles,
+            previous,
+            ..
+        } = self;
+        if list.is_empty() {
+            return;
+        }
+        list.par_iter_mut()
+            .with_min_len(PARALLEL_PARTICLES)
+            .for_each(|attachment| {
+                let p = attachment.particle as usize;
+                let inverse_mass = weight::<R>(&particles[p]);
+                if inverse_mass <= R::ZERO {
+                    return;
+                }
+                let x = load::<R>(&particles[p]);
+                let compliance = R::from_f64(attachment.compliance) / factors.time_squared;
+                let damping = R::from_f64(attachment.damping) * factors.per_time;
+                let away = x - attachment.target;
+                let motion = away - (previous[p] - attachment.before);
+                let residual = away + attachment.multiplier * compliance + motion * damping;
+                let share = factors.relaxation / ((R::ONE + damping) * inverse_mass + compliance);
+                let change = -(residual * share);
+                if finite::<R>(change) {
+                    store::<R>(&particles[p], x + change * inverse_mass);
+                    attachment.multiplier += change;
+                }
+            });
+    }
+}

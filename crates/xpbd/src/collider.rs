@@ -1,0 +1,447 @@
+//! [`Collider`]: solid obstacles that particles do not enter, with Coulomb friction.
+//!
+//! A collider is a shape with a closed form of its signed distance: plane, sphere, capsule or box. After the
+//! constraints, a particle inside is put on the nearest point of the surface, and what it moved along the surface in
+//! this substep is taken back by at most the coefficient of friction times the depth. The depth is what the normal
+//! force pushed the particle out by, so this is Coulomb's law.
+//!
+//! Contacts are found where a particle is, not along its way: what crosses a collider within one substep passes, and
+//! what got past the middle of a thin box leaves on the other side. A substep must be short against thickness over
+//! speed.
+//!
+//! Source: Macklin, Müller, Chentanez, Kim 2014 (friction, section 6.1). Cost: 20 to 50 operations for each particle
+//! and collider, more for those inside.
+
+use glam::{DMat3, DQuat, DVec3};
+use rayon::prelude::*;
+
+use crate::direction::{absolute, direction};
+use crate::real::{load, store, weight};
+use crate::step::PARALLEL_PARTICLES;
+use crate::{Real, Solver, StepSettings, XpbdError};
+
+/// How often a particle inside several colliders is handed around among them.
+const ROUNDS: usize = 32;
+
+/// A solid obstacle.
+///
+/// # Example
+/// A particle falls on a ball and lies on its top.
+/// ```
+/// use glam::DVec3;
+/// use incise_graph::Schedule;
+/// use incise_xpbd::{Collider, ColliderShape, Solver, StepSettings};
+///
+/// let ball = Collider::new(ColliderShape::Sphere { center: DVec3::ZERO, radius: 0.5 });
+/// let mut solver = Solver::<f64>::new(&[DVec3::Z]);
+/// solver.set_mass(0, 1.0);
+/// let settings = StepSettings {
+///     substeps: 10,
+///     gravity: Some(DVec3::new(0.0, 0.0, -9.81)),
+///     colliders: vec![ball],
+///     ..StepSettings::new(0.016)
+/// };
+/// for _ in 0..60 {
+///     solver.step(&Schedule::default(), &settings)?;
+/// }
+/// assert!((solver.position(0).z - 0.5).abs() < 1e-12);
+/// # Ok::<(), incise_xpbd::XpbdError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Collider {
+    /// Its shape and place at the start of the frame.
+    pub shape: ColliderShape,
+    /// Coulomb's coefficient of friction, at least 0.
+    pub friction: f64,
+    /// Its velocity in m/s during the frame. The next frame starts where its caller says: see [`Collider::moved`].
+    pub velocity: DVec3,
+}
+
+/// The shape of a collider.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ColliderShape {
+    /// A half space, free on the side that the normal points to.
+    Plane {
+        /// A point on its surface in m.
+        point: DVec3,
+        /// Its normal, of any length but 0.
+        normal: DVec3,
+    },
+    /// A ball.
+    Sphere {
+        /// Its center in m.
+        center: DVec3,
+        /// Its radius in m, positive.
+        radius: f64,
+    },
+    /// All points within the radius of a segment.
+    Capsule {
+        /// The ends of the segment in m; they may coincide.
+        ends: [DVec3; 2],
+        /// Its radius in m, positive.
+        radius: f64,
+    },
+    /// A turned box.
+    Box {
+        /// Its center in m.
+        center: DVec3,
+        /// Half its edges in m, positive.
+        half_extents: DVec3,
+        /// How it is turned, of any length but 0.
+        rotation: DQuat,
+    },
+}
+
+impl Collider {
+    /// A collider at rest, without friction.
+    #[must_use]
+    pub fn new(shape: ColliderShape) -> Self {
+        Self {
+            shape,
+            friction: 0.0,
+            velocity: DVec3::ZERO,
+        }
+    }
+
+    /// A horizontal floor at a height in m; up is z.
+    #[must_use]
+    pub fn ground(height: f64, friction: f64) -> Self {
+        let shape = ColliderShape::Plane {
+            point: DVec3::Z * height,
+            normal: DVec3::Z,
+        };
+        Self {
+            friction,
+            ..Self::new(shape)
+        }
+    }
+
+    /// The collider where its velocity takes it in `time` s.
+    #[must_use]
+    pub fn moved(&self, time: f64) -> Self {
+        let by = self.velocity * time;
+        let mut moved = *self;
+        match &mut moved.shape {
+            ColliderShape::Plane { point, .. } => *point += by,
+            ColliderShape::Sphere { center, .. } | ColliderShape::Box { center, .. } => {
+                *center += by;
+            }
+            ColliderShape::Capsule { ends, .. } => ends.iter_mut().for_each(|end| *end += by),
+        }
+        moved
+    }
+
+    /// The distance of a point from the surface in m, negative inside, and the direction in which it grows fastest.
+    ///
+    /// Where there are several such directions (the center of a sphere, the axis of a capsule, the middle of a box),
+    /// it is always the same one of them.
+    ///
+    /// # Example
+    /// ```
+    /// use glam::DVec3;
+    /// use incise_xpbd::Collider;
+    ///
+    /// let (distance, normal) = Collider::ground(1.0, 0.0).distance(DVec3::ZERO);
+    /// assert_eq!((distance, normal), (-1.0, DVec3::Z));
+    /// ```
+    #[must_use]
+    pub fn distance(&self, point: DVec3) -> (f64, DVec3) {
+        let nearest = Solid::<f64>::new(&self.shape).nearest(point);
+        (nearest.distance, nearest.normal)
+    }
+
+    /// Checks that each value lies in its range.
+    ///
+    /// # Errors
+    /// [`XpbdError::Setting`] names the first value that does not.
+    pub fn check(&self) -> Result<(), XpbdError> {
+        let refuse = |what, value, range| Err(XpbdError::Setting { what, value, range });
+        let vectors = match self.shape {
+            ColliderShape::Plane { point, normal } => {
+                [("collider point", point), ("collider normal", normal)]
+            }
+            ColliderShape::Sphere { center, .. } => [("collider center", center); 2],
+            ColliderShape::Capsule { ends, .. } => ends.map(|end| ("collider end", end)),
+            ColliderShape::Box {
+                center,
+                half_extents,
+                ..
+            } => [
+                ("collider center", center),
+                ("collider half_extents", half_extents),
+            ],
+        };
+        let velocity = [("collider velocity", self.velocity)];
+        for (what, vector) in vectors.into_iter().chain(velocity) {
+            if let Some(value) = vector.to_array().into_iter().find(|c| !c.is_finite()) {
+                return refuse(what, value, "finite");
+            }
+        }
+        if !(self.friction.is_finite() && self.friction >= 0.0) {
+            return refuse("collider friction", self.friction, "at least 0 and finite");
+        }
+        match self.shape {
+            ColliderShape::Plane { normal, .. } if normal == DVec3::ZERO => {
+                refuse("collider normal", 0.0, "a direction")
+            }
+            ColliderShape::Sphere { radius, .. } | ColliderShape::Capsule { radius, .. }
+                if !(radius.is_finite() && radius > 0.0) =>
+            {
+                refuse("collider radius", radius, "positive and finite")
+            }
+            ColliderShape::Box {
+                half_extents,
+                rotation,
+                ..
+            } => {
+                let smallest = half_extents.min_element();
+                if smallest <= 0.0 {
+                    return refuse("collider half_extents", smallest, "positive");
+                }
+                let length = rotation.length();
+                if !(length.is_finite() && length > 0.0) {
+                    return refuse("collider rotation", length, "a rotation");
+                }
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// A shape in the solver's precision, prepared for many questions.
+#[derive(Clone, Copy, Debug)]
+enum Solid<R: Real> {
+    Plane {
+        normal: R::Vector,
+        /// Of the surface from the origin, along the normal.
+        offset: R,
+    },
+    /// A capsule; a sphere is one without length.
+    Round {
+        start: R::Vector,
+        axis: R::Vector,
+        /// One over the squared length of the axis; 0 for a sphere.
+        per_squared: R,
+        radius: R,
+        /// The normal for points on the axis.
+        aside: R::Vector,
+    },
+    Box {
+        center: R::Vector,
+        axes: [R::Vector; 3],
+        half: [R; 3],
+    },
+}
+
+/// What is nearest to a point on a surface.
+struct Nearest<R: Real> {
+    distance: R,
+    normal: R::Vector,
+    point: R::Vector,
+}
+
+impl<R: Real> Solid<R> {
+    fn new(shape: &ColliderShape) -> Self {
+        match *shape {
+            ColliderShape::Plane { point, normal } => {
+                let normal = unit(normal);
+                Self::Plane {
+                    normal: R::from_dvec3(normal),
+                    offset: R::from_f64(normal.dot(point)),
+                }
+            }
+            ColliderShape::Sphere { center, radius } => Self::round([center; 2], radius),
+            ColliderShape::Capsule { ends, radius } => Self::round(ends, radius),
+            ColliderShape::Box {
+                center,
+                half_extents,
+                rotation,
+            } => {
+                let axes = DMat3::from_quat(rotation.normalize());
+                Self::Box {
+                    center: R::from_dvec3(center),
+                    axes: [axes.x_axis, axes.y_axis, axes.z_axis].map(R::from_dvec3),
+                    half: half_extents.to_array().map(R::from_f64),
+                }
+            }
+        }
+    }
+
+    fn round([start, end]: [DVec3; 2], radius: f64) -> Self {
+        let axis = R::from_dvec3(end - start);
+        let per_squared = R::ONE / R::dot(axis, axis);
+        // Too short to be told from a sphere.
+        let short = !per_squared.is_finite();
+        let aside = if short {
+            DVec3::Z
+        } else {
+            unit(end - start).any_orthonormal_vector()
+        };
+        Self::Round {
+            start: R::from_dvec3(start),
+            axis,
+            per_squared: if short { R::ZERO } else { per_squared },
+            radius: R::from_f64(radius),
+            aside: R::from_dvec3(aside),
+        }
+    }
+
+    #[inline]
+    fn nearest(&self, x: R::Vector) -> Nearest<R> {
+        match *self {
+            Self::Plane { normal, offset } => {
+                let along = R::dot(normal, x);
+                Nearest {
+                    distance: along - offset,
+                    normal,
+                    // Not `x` plus the depth: like this it lies on a level surface to the bit.
+                    point: x - normal * along + normal * offset,
+                }
+            }
+            Self::Round {
+                start,
+                axis,
+                per_squared,
+                radius,
+                aside,
+            } => {
+                let part = clamp(R::dot(x - start, axis) * per_squared, R::ZERO, R::ONE);
+                let center = start + axis * part;
+                let (length, normal) = direction::<R>(x - center).unwrap_or((R::ZERO, aside));
+                Nearest {
+                    distance: length - radius,
+                    normal,
+                    point: center + normal * radius,
+                }
+            }
+            Self::Box { center, axes, half } => {
+                let local = axes.map(|axis| R::dot(axis, x - center));
+                let (distance, normal, point) = nearest_on_box::<R>(local, half);
+                let back = |v: [R; 3]| axes[0] * v[0] + axes[1] * v[1] + axes[2] * v[2];
+                Nearest {
+                    distance,
+                    normal: back(normal),
+                    point: center + back(point),
+                }
+            }
+        }
+    }
+}
+
+/// Signed distance, normal and nearest point of an axis-aligned box around the origin.
+#[inline]
+fn nearest_on_box<R: Real>(x: [R; 3], half: [R; 3]) -> (R, [R; 3], [R; 3]) {
+    let beyond: [R; 3] = std::array::from_fn(|i| absolute(x[i]) - half[i]);
+    let clamped: [R; 3] = std::array::from_fn(|i| clamp(x[i], -half[i], half[i]));
+    let outside = R::vector(x[0] - clamped[0], x[1] - clamped[1], x[2] - clamped[2]);
+    if let Some((distance, normal)) = direction::<R>(outside) {
+        return (distance, R::components(normal), clamped);
+    }
+    let mut face = 0;
+    for i in 1..3 {
+        if beyond[i] > beyond[face] {
+            face = i;
+        }
+    }
+    let (mut normal, mut point) = ([R::ZERO; 3], x);
+    let side = if x[face] < R::ZERO { -R::ONE } else { R::ONE };
+    normal[face] = side;
+    point[face] = side * half[face];
+    (beyond[face], normal, point)
+}
+
+#[inline]
+fn clamp<R: Real>(value: R, low: R, high: R) -> R {
+    if value < low {
+        low
+    } else if value > high {
+        high
+    } else {
+        value
+    }
+}
+
+/// The vector of length 1 along another one that is not zero.
+fn unit(v: DVec3) -> DVec3 {
+    let scaled = v / v.abs().max_element();
+    scaled / scaled.length()
+}
+
+/// A collider at the end of a substep.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Obstacle<R: Real> {
+    solid: Solid<R>,
+    friction: R,
+    /// What it moved in the substep.
+    motion: R::Vector,
+}
+
+impl<R: Real> Obstacle<R> {
+    /// The colliders `elapsed` s after the start of the frame, at the end of a substep.
+    pub(crate) fn place(settings: &StepSettings, elapsed: f64) -> Vec<Self> {
+        let place = |collider: &Collider| Self {
+            solid: Solid::new(&collider.moved(elapsed).shape),
+            friction: R::from_f64(collider.friction),
+            motion: R::from_dvec3(collider.velocity * settings.substep_time()),
+        };
+        settings.colliders.iter().map(place).collect()
+    }
+
+    /// The outward normal, if a particle is inside or, but for rounding, on the surface.
+    pub(crate) fn touched_at(&self, x: R::Vector) -> Option<R::Vector> {
+        let nearest = self.solid.nearest(x);
+        let [a, b, c] = R::components(x);
+        let size = (a * a + b * b + c * c).sqrt();
+        (nearest.distance <= size * R::EPSILON * R::from_f64(4.0)).then_some(nearest.normal)
+    }
+
+    /// Where a particle inside is put that was at `previous` before the substep.
+    #[inline]
+    fn push_out(&self, x: R::Vector, previous: R::Vector) -> Option<R::Vector> {
+        let Nearest {
+            distance,
+            normal,
+            point,
+        } = self.solid.nearest(x);
+        if distance >= R::ZERO {
+            return None;
+        }
+        let way = x - previous - self.motion;
+        let slide = way - normal * R::dot(normal, way);
+        let length = R::dot(slide, slide).sqrt();
+        let hold = -(self.friction * distance);
+        let share = if length > hold { hold / length } else { R::ONE };
+        Some(point - slide * share)
+    }
+}
+
+impl<R: Real> Solver<R> {
+    /// Puts the particles inside of colliders on their surface. Where colliders overlap, one may push a particle into
+    /// another; then they take turns, which ends at a point outside of all if there is one nearby.
+    pub(crate) fn project_to_colliders(&self, obstacles: &[Obstacle<R>]) {
+        let particles = self.particles.par_iter().with_min_len(PARALLEL_PARTICLES);
+        particles
+            .zip(&self.previous)
+            .for_each(|(particle, &previous)| {
+                if weight::<R>(particle) <= R::ZERO {
+                    return;
+                }
+                let mut x = load::<R>(particle);
+                // Obstacles in a row that the particle is not inside of.
+                let (mut clear, mut moved) = (0, false);
+                for obstacle in obstacles.iter().cycle().take(ROUNDS * obstacles.len()) {
+                    clear += 1;
+                    if let Some(outside) = obstacle.push_out(x, previous) {
+                        (x, clear, moved) = (outside, 1, true);
+                    }
+                    if clear == obstacles.len() {
+                        break;
+                    }
+                }
+                if moved {
+                    store::<R>(particle, x);
+                }
+            });
+    }
+}
