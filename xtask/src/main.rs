@@ -4,6 +4,7 @@
 
 mod coloring;
 mod models;
+mod solver;
 mod sweep;
 
 use clap::{Parser, Subcommand};
@@ -22,6 +23,8 @@ struct Arguments {
 enum Command {
     /// Cluster and color meshes in every way there is, and write tables.
     Coloring(coloring::ColoringArguments),
+    /// Compare the methods of the solver: what they cost and what they are worth.
+    Solver(solver::SolverArguments),
     /// Cut meshes, check everything and write a table.
     Sweep(sweep::SweepArguments),
 }
@@ -29,6 +32,7 @@ enum Command {
 fn main() -> anyhow::Result<()> {
     match Arguments::parse().command {
         Command::Coloring(arguments) => coloring::coloring(&arguments),
+        Command::Solver(arguments) => solver::solver(&arguments),
         Command::Sweep(arguments) => sweep::sweep(&arguments),
     }
 }

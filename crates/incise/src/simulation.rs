@@ -423,6 +423,8 @@ fn settings(scene: &Scene) -> Result<StepSettings, Error> {
         time_step: scene.solver.time_step,
         substeps: scene.solver.substeps,
         iterations: scene.solver.iterations,
+        method: incise_xpbd::Method::GaussSeidel,
+        form: incise_xpbd::Form::Block,
         relaxation: scene.solver.relaxation,
         gravity: scene
             .world

@@ -1,0 +1,82 @@
+//! Bodies that the tables are about.
+
+use std::path::Path;
+
+use anyhow::Context;
+use incise::clustering::{Method as ClusteringMethod, cluster};
+use incise::coloring::{Algorithm, color};
+use incise::graph::{Clustering, Incidence, Schedule};
+use incise::mesh::generate::{Shape, generate};
+use incise::mesh::glam::DVec3;
+use incise::mesh::{TetId, TetMesh, io};
+use incise::xpbd::{Material, Real, Solver, Stars};
+
+/// The liver of a folder of models, or a generated one of the same number of tets.
+pub(crate) fn liver(models: Option<&Path>, quick: bool) -> anyhow::Result<TetMesh> {
+    match models {
+        Some(folder) => {
+            let path = folder.join("liver_11k.vtk");
+            io::read(&path).with_context(|| path.display().to_string())
+        }
+        None => Ok(generate(Shape::Liver, if quick { 1500 } else { 11_000 })?),
+    }
+}
+
+/// The mesh with a longest side of `size` m and its lowest corner at the origin.
+pub(crate) fn scaled(mesh: &TetMesh, size: f64) -> TetMesh {
+    let ends = (DVec3::MAX, DVec3::MIN);
+    let (low, high) = mesh
+        .positions
+        .iter()
+        .fold(ends, |(low, high), &x| (low.min(x), high.max(x)));
+    let scale = size / (high - low).max_element();
+    let mut mesh = mesh.clone();
+    for x in &mut mesh.positions {
+        *x = (*x - low) * scale;
+    }
+    mesh
+}
+
+/// A body of one material; `held` says which particles do not move.
+pub(crate) fn body<R: Real>(
+    mesh: &TetMesh,
+    material: Material,
+    held: impl Fn(DVec3) -> bool,
+) -> anyhow::Result<Solver<R>> {
+    let mut solver = Solver::new(&mesh.positions);
+    let number = solver.add_material(material)?;
+    let mut masses = vec![0.0; mesh.positions.len()];
+    for (t, tet) in mesh.tets.iter().enumerate() {
+        let id = TetId::new(t);
+        solver.push_tet(tet.map(|p| p.0), mesh.corners(id), number);
+        for p in tet {
+            masses[p.index()] += 0.25 * material.density * mesh.volume(id);
+        }
+    }
+    for (p, mass) in masses.into_iter().enumerate() {
+        solver.set_mass(p, mass);
+        solver.set_fixed(p, held(mesh.positions[p]));
+    }
+    Ok(solver)
+}
+
+/// The order of solving the tets in clusters by the method of that name.
+pub(crate) fn schedule(mesh: &TetMesh, clustering: &str) -> anyhow::Result<Schedule> {
+    let tets = mesh.tets.iter().copied();
+    let incidence = Incidence::from_constraints(mesh.positions.len(), tets)?;
+    let clusters = cluster(clustering.parse::<ClusteringMethod>()?, &incidence);
+    let coloring = color(auto()?, &incidence.quotient(&clusters), 0)?.coloring;
+    Ok(Schedule::new(&clusters, &coloring))
+}
+
+/// The particles in the order in which descent visits them.
+pub(crate) fn stars<R: Real>(solver: &Solver<R>) -> anyhow::Result<Stars<R>> {
+    let incidence = solver.star_incidence();
+    let coloring = color(auto()?, &incidence, 0)?.coloring;
+    let clusters = Clustering::none(incidence.constraint_count());
+    Ok(Stars::new(solver, &Schedule::new(&clusters, &coloring))?)
+}
+
+fn auto() -> anyhow::Result<Algorithm> {
+    Ok("auto".parse()?)
+}
