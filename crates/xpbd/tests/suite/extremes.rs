@@ -189,7 +189,7 @@ fn every_extreme(method: Method) {
 
 #[test]
 fn every_extreme_stays_finite() {
-    Method::ALL.map(every_extreme);
+    Method::ALL.into_iter().for_each(every_extreme);
 }
 
 /// Inverted tets and error of volume of a bar of two materials, one end held, the other of that density and stiffness,
