@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec3};
 use incise_graph::{Clustering, ColorId, Coloring, Schedule};
-use incise_xpbd::{Material, Real, Solver, StepSettings};
+use incise_xpbd::{KappaLimit, Material, Real, Solver, StepSettings};
 
 use crate::body::{Noise, RUBBER, largest_distance, positions, within};
 
@@ -71,6 +71,52 @@ fn a_tet_too_small_to_represent_takes_no_part() {
     assert_eq!(solver.kappa(1.0), 0.0);
     let residuals = solver.residuals(0.01).unwrap();
     assert_eq!((residuals.force, residuals.dual), (0.0, 0.0));
+    assert_eq!(residuals.dual_rms, 0.0);
+    assert_eq!(solver.softened().tets, 0);
+}
+
+/// Rounding of a stiffness is no softening, and nothing softened of nothing is nothing.
+#[test]
+fn only_what_was_softened_counts_as_softened() {
+    for k in 0..100 {
+        let young_modulus = 1e6 / (3.0 + f64::from(k));
+        let (solver, _) = tet::<f32>(
+            CORNER,
+            Material {
+                young_modulus,
+                ..RUBBER
+            },
+        );
+        assert_eq!(solver.softened().tets, 0);
+    }
+    assert_eq!(Solver::<f64>::new(&[]).softened().volume_fraction, 0.0);
+}
+
+/// A limit above a tet's kappa leaves it as it is; it does not stiffen it up to the limit.
+#[test]
+fn a_kappa_limit_stiffens_nothing() {
+    let (mut solver, _) = tet::<f64>(CORNER, RUBBER);
+    solver.set_position(3, DVec3::Z * 1.5);
+    let energy = solver.energy(None);
+    let kappa = 2.0 * solver.kappa(0.01);
+    solver.limit_kappa(Some(KappaLimit {
+        kappa,
+        substep_time: 0.01,
+    }));
+    solver.replace_tet(0, [0, 1, 2, 3], CORNER);
+    assert_eq!(solver.energy(None), energy);
+}
+
+/// A line at the largest coordinates there are: a particle that cannot be moved aside without leaving them stays.
+#[test]
+fn a_line_at_the_end_of_the_range_stays_in_it() {
+    let (mut solver, schedule) = tet::<f32>(CORNER, RUBBER);
+    let far = f64::from(f32::MAX);
+    for p in 0..4 {
+        solver.set_position(p, DVec3::new(p as f64, far, far));
+    }
+    solver.step(&schedule, &StepSettings::new(1e-9)).unwrap();
+    assert!(positions(&solver).iter().all(|x| x.is_finite()));
 }
 
 /// At rest, turned any way, the gradients are parallel and the determinant is the difference of two equal products of
