@@ -3,8 +3,8 @@
 //! Each iteration solves `(J M⁻¹ Jᵀ + α̃) Δλ = -(C + α̃ λ)` and moves the particles by `M⁻¹ Jᵀ Δλ`: Newton's method on the
 //! constraints, of which a Gauss-Seidel pass is an approximation. It has no order of solving, and its dual residual
 //! falls quadratically. It still drops the primal residual (the change of J with the positions is left out), so it ends
-//! where XPBD would with infinitely many passes, not at the step of backward Euler: see [`crate::Residuals::force`], and
-//! use substeps for accuracy.
+//! near where XPBD would with infinitely many passes (the gap vanishes with kappa), not at the step of backward Euler:
+//! see [`crate::Residuals::force`], and use substeps for accuracy.
 //!
 //! With the rows and columns scaled by the root of stiffness times Δt² the matrix is a positive semidefinite one plus
 //! the identity, so it is regular whatever the state: at rest both gradients of a tet are parallel, and only the

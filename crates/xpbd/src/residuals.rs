@@ -164,3 +164,22 @@ fn norm(values: impl Iterator<Item = f64> + Clone) -> f64 {
 fn representable(value: f64) -> f64 {
     if value.is_finite() { value } else { f64::MAX }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn norms_at_the_edges_of_double_precision() {
+        let norm = |values: &[f64]| norm(values.iter().copied());
+        assert_eq!(norm(&[]), 0.0);
+        assert_eq!(norm(&[0.0, -0.0]), 0.0);
+        assert_eq!(norm(&[3.0, -4.0]), 5.0);
+        assert_eq!(norm(&[3e300, -4e300]), 5e300);
+        assert_eq!(norm(&[3e-300, -4e-300]), 5e-300);
+        assert_eq!(norm(&[f64::MAX, f64::MAX]), f64::MAX);
+        // What is no number must not count as nothing.
+        assert_eq!(norm(&[0.0, f64::NAN]), f64::MAX);
+        assert_eq!(norm(&[1.0, f64::NEG_INFINITY]), f64::MAX);
+    }
+}

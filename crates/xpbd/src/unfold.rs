@@ -29,10 +29,10 @@ impl<R: Real> Solver<R> {
         moving.filter(|&p| self.touch(p, TOUCH * size)).count()
     }
 
-    /// Whether no tet that takes part has two dimensions, to the last digit, while one has one.
+    /// Whether no tet has two dimensions, to the last digit, while one has one.
     fn is_on_a_line(&self) -> bool {
         let mut line = false;
-        for tet in self.tets.iter().filter(|tet| tet.stiffness > R::ZERO) {
+        for tet in &self.tets {
             let [a, b, c, d] = tet.particles.map(|p| self.position(p as usize));
             let [u, v, w] = [b - a, c - a, d - a];
             if [u.cross(v), v.cross(w), w.cross(u)] != [DVec3::ZERO; 3] {
@@ -62,7 +62,7 @@ impl<R: Real> Solver<R> {
     }
 }
 
-/// A vector of coordinates between 1/2 and 1, each of either sign, that depends on `number` alone (SplitMix64: Steele,
+/// A vector of coordinates between 1/2 and 1, each of either sign, that depends on `number` alone (`SplitMix64`: Steele,
 /// Lea, Flood 2014).
 fn direction(number: u64) -> DVec3 {
     let coordinate = |axis: u64| {

@@ -95,8 +95,7 @@ fn the_direct_solve_approaches_the_limit_of_many_passes() {
         let dual = solver.residuals(settings.substep_time()).unwrap().dual;
         within("passes", dual / first, 1e-9);
         // In parts of what the step moved.
-        let gap = largest_distance(&positions(&solver), &exact) / largest_distance(&start, &exact);
-        gap
+        largest_distance(&positions(&solver), &exact) / largest_distance(&start, &exact)
     });
     within("at kappa 0.1", gaps[0], 0.2);
     for pair in gaps.windows(2) {

@@ -25,6 +25,7 @@ mod energy;
 mod extremes;
 mod finite_elements;
 mod ground;
+mod guards;
 mod kappa;
 mod large_deformations;
 mod recovery;
