@@ -106,3 +106,56 @@ impl<R: Real> Jacobi<R> {
         std::mem::swap(&mut self.last, &mut self.before);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The Chebyshev polynomial of degree k.
+    fn chebyshev(k: u32, x: f64) -> f64 {
+        let (mut before, mut last) = (1.0, x);
+        for _ in 0..k {
+            (before, last) = (last, 2.0 * x * last - before);
+        }
+        before
+    }
+
+    /// On the iteration `x̂ = r x`, for which this is made, k steps leave `T_k(r / ρ) / T_k(1 / ρ)` of the start.
+    #[test]
+    fn extrapolation_makes_chebyshev_polynomials() {
+        let radius = 0.9;
+        for r in [0.9, 0.5, 0.1, 0.0, -0.3, -0.9] {
+            let particles = [f64::particle([1.0, 2.0, 0.0, 1.0])];
+            let multipliers = [3.0.cell()];
+            let mut jacobi = Jacobi::<f64>::default();
+            jacobi.restart();
+            for k in 1..=30 {
+                jacobi.begin(&particles, &multipliers, true);
+                let [x, y, z, w] = f64::read(&particles[0]);
+                f64::write(&particles[0], [r * x, r * y, r * z, w]);
+                (r * f64::load(&multipliers[0])).store(&multipliers[0]);
+                jacobi.extrapolate(&particles, &multipliers, radius, 1);
+                let left = chebyshev(k, r / radius) / chebyshev(k, 1.0 / radius);
+                let [x, y, _, w] = f64::read(&particles[0]);
+                let multiplier = f64::load(&multipliers[0]);
+                for (value, start) in [(x, 1.0), (y, 2.0), (multiplier, 3.0)] {
+                    assert!((value - start * left).abs() < 1e-12, "{r}, {k}: {value}");
+                }
+                assert_eq!(w, 1.0);
+            }
+        }
+    }
+
+    #[test]
+    fn a_delay_leaves_the_first_iterations_alone() {
+        let particles = [f64::particle([1.0, 0.0, 0.0, 1.0])];
+        let mut jacobi = Jacobi::<f64>::default();
+        for _ in 0..5 {
+            jacobi.begin(&particles, &[], true);
+            let [x, ..] = f64::read(&particles[0]);
+            f64::write(&particles[0], [0.5 * x, 0.0, 0.0, 1.0]);
+            jacobi.extrapolate(&particles, &[], 0.9, 5);
+        }
+        assert_eq!(f64::read(&particles[0])[0], 1.0 / 32.0);
+    }
+}

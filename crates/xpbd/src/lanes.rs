@@ -506,3 +506,6 @@ fn store_multipliers<R: Real, S: Simd>(
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -5,7 +5,7 @@ use incise_clustering::cluster;
 use incise_coloring::color;
 use incise_graph::{Incidence, Schedule};
 use incise_mesh::{TetId, TetMesh};
-use incise_xpbd::{Material, Real, Solver, StepReport, StepSettings};
+use incise_xpbd::{Form, Material, Real, Solver, StepReport, StepSettings};
 
 /// Rubber of a density that keeps numbers plain.
 pub(crate) const RUBBER: Material = Material {
@@ -68,16 +68,30 @@ pub(crate) fn frames(time: f64, settings: &StepSettings) -> usize {
     (time / settings.time_step).ceil() as usize
 }
 
-/// The ways of solving that must survive every extreme and recover from every collapse.
+/// The ways of solving by XPBD. Descent has its own suite of extremes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Method {
     /// Colored Gauss-Seidel, both constraints of a tet at once.
     GaussSeidel,
+    /// The same, one after the other.
+    Sequential,
+    /// Corrections added up, the paper's relaxation.
+    Jacobi,
+    /// The same, extrapolated.
+    Chebyshev,
 }
 
 impl Method {
-    /// All of them.
-    pub(crate) const ALL: [Self; 1] = [Self::GaussSeidel];
+    /// All of them: none may leave the finite numbers.
+    pub(crate) const ALL: [Self; 4] = [
+        Self::GaussSeidel,
+        Self::Sequential,
+        Self::Jacobi,
+        Self::Chebyshev,
+    ];
+
+    /// Those that are accurate with one iteration a substep: they must recover from every collapse.
+    pub(crate) const ACCURATE: [Self; 2] = [Self::GaussSeidel, Self::Sequential];
 
     /// Takes a frame, keeping residuals where the method has them.
     pub(crate) fn step<R: Real>(
@@ -86,9 +100,23 @@ impl Method {
         schedule: &Schedule,
         settings: &StepSettings,
     ) -> StepReport {
+        let mut settings = settings.clone();
         match self {
-            Self::GaussSeidel => solver.step_keeping_residuals(schedule, settings).unwrap(),
+            Self::GaussSeidel => {}
+            Self::Sequential => settings.form = Form::Sequential,
+            Self::Jacobi => {
+                settings.method = incise_xpbd::Method::Jacobi;
+                settings.relaxation = 0.1;
+            }
+            Self::Chebyshev => {
+                settings.method = incise_xpbd::Method::Chebyshev {
+                    spectral_radius: 0.99,
+                    delay: 3,
+                };
+                settings.relaxation = 0.1;
+            }
         }
+        solver.step_keeping_residuals(schedule, &settings).unwrap()
     }
 }
 

@@ -245,7 +245,7 @@ fn shaken<R: Real>(method: Method, young_modulus: f64, density: f64) -> (usize, 
 /// Measured: volume within 2.6e-3, which is what still rings.
 #[test]
 fn stiffness_and_mass_ratio_do_no_harm_at_a_substep_chosen_from_kappa() {
-    for method in Method::ALL {
+    for method in Method::ACCURATE {
         for young_modulus in [1e1, 1e3, 1e6, 1e9, 1e12] {
             for density in [1e-3, 1.0, 1e3, 1e6] {
                 let what = format!("{method:?}, E {young_modulus:e}, density {density:e}");
@@ -297,7 +297,7 @@ fn limited<R: Real>(method: Method, young_modulus: f64) -> usize {
 
 #[test]
 fn the_kappa_limit_saves_a_body_of_any_stiffness() {
-    for method in Method::ALL {
+    for method in Method::ACCURATE {
         for young_modulus in [1e8, 1e10, 1e12] {
             assert_eq!(limited::<f32>(method, young_modulus), 0);
             assert_eq!(limited::<f64>(method, young_modulus), 0);
