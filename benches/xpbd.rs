@@ -1,11 +1,13 @@
-//! One substep of one iteration: both precisions, with and without damping, with and without clusters of ten tets, on
-//! one and two threads.
+//! Ten substeps of one iteration: both precisions, with and without damping, with and without clusters of ten tets, on
+//! one and two threads; and the plain kernel that all of it is compared with.
 //!
 //! The body hangs from one end and swings on from iteration to iteration, so that no step is the trivial one of a body
 //! at rest.
 
 // The same reason as in the library.
 #![expect(clippy::unwrap_used, reason = "benches stop at the first surprise")]
+
+mod plain;
 
 use std::num::NonZeroUsize;
 
@@ -16,6 +18,7 @@ use incise::mesh::TetId;
 use incise::mesh::glam::DVec3;
 use incise::xpbd::{Material, Real, Solver, StepSettings};
 use incise_benches::{Bench, Case};
+use plain::Plain;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 fn main() {
@@ -30,18 +33,19 @@ fn main() {
         for (name, clustering) in [("none", none), ("serial10", serial)] {
             let coloring = scgc(&graph.quotient(&clustering)).coloring;
             let schedule = Schedule::new(&clustering, &coloring);
+            plain_substeps(bench, &format!("plain-{name}"), &schedule);
             for (damping_name, damping) in [("undamped", 0.0), ("damped", 0.002)] {
                 for (threads, pool) in &pools {
                     let rest = format!("{name}-{damping_name}-{threads}");
-                    substep::<f32>(bench, &format!("f32-{rest}"), damping, &schedule, pool);
-                    substep::<f64>(bench, &format!("f64-{rest}"), damping, &schedule, pool);
+                    substeps::<f32>(bench, &format!("f32-{rest}"), damping, &schedule, pool);
+                    substeps::<f64>(bench, &format!("f64-{rest}"), damping, &schedule, pool);
                 }
             }
         }
     });
 }
 
-fn substep<R: Real>(
+fn substeps<R: Real>(
     bench: &mut Bench<'_, '_>,
     name: &str,
     damping: f64,
@@ -50,8 +54,9 @@ fn substep<R: Real>(
 ) {
     let mut solver = solver::<R>(bench.case, damping);
     let settings = StepSettings {
-        gravity: Some(DVec3::new(0.0, 0.0, -9.81)),
-        ..StepSettings::new(5e-4)
+        substeps: SUBSTEPS,
+        gravity: Some(GRAVITY),
+        ..StepSettings::new(TIME * f64::from(SUBSTEPS))
     };
     bench.measure(name, |b| {
         b.iter(|| {
@@ -60,6 +65,50 @@ fn substep<R: Real>(
         });
     });
 }
+
+/// The same substeps by the plain kernel, in single precision without damping, after a look that it is the same.
+fn plain_substeps(bench: &mut Bench<'_, '_>, name: &str, schedule: &Schedule) {
+    let mut solver = solver::<f32>(bench.case, 0.0);
+    let count = solver.particle_count();
+    let positions: Vec<DVec3> = (0..count).map(|p| solver.position(p)).collect();
+    let weight = |p| {
+        if solver.is_fixed(p) {
+            0.0
+        } else {
+            1.0 / solver.mass(p)
+        }
+    };
+    let weights: Vec<f64> = (0..count).map(weight).collect();
+    let tets: Vec<_> = (0..solver.tet_count())
+        .map(|t| solver.tet_particles(t).map(|p| p as usize))
+        .collect();
+    let stiffness = [RUBBER.mu(), RUBBER.volume_stiffness()];
+    let mut plain = Plain::new(&positions, &weights, &tets, schedule, stiffness, TIME);
+    let settings = StepSettings {
+        substeps: SUBSTEPS,
+        gravity: Some(GRAVITY),
+        ..StepSettings::new(TIME * f64::from(SUBSTEPS))
+    };
+    solver.step(schedule, &settings).unwrap();
+    (0..SUBSTEPS).for_each(|_| plain.substep(GRAVITY));
+    let apart = (0..count).map(|p| plain.position(p).distance(solver.position(p)));
+    assert!(apart.fold(0.0, f64::max) < 1e-5, "the same motion");
+    bench.measure(name, |b| {
+        b.iter(|| (0..SUBSTEPS).for_each(|_| plain.substep(GRAVITY)));
+    });
+}
+
+const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, -9.81);
+/// Time of a substep in s.
+const TIME: f64 = 5e-4;
+/// Substeps of a frame.
+const SUBSTEPS: u32 = 10;
+const RUBBER: Material = Material {
+    young_modulus: 1e5,
+    poisson_ratio: 0.45,
+    density: 1000.0,
+    damping: 0.0,
+};
 
 /// The case in rubber, held at its low end in x. Scaled to one meter, so that the time of the substep suits any mesh.
 fn solver<R: Real>(case: &Case, damping: f64) -> Solver<R> {
@@ -72,12 +121,7 @@ fn solver<R: Real>(case: &Case, damping: f64) -> Solver<R> {
         .map(|&x| (x - low) * scale)
         .collect();
     let mut solver = Solver::new(&positions);
-    let material = Material {
-        young_modulus: 1e5,
-        poisson_ratio: 0.45,
-        density: 1000.0,
-        damping,
-    };
+    let material = Material { damping, ..RUBBER };
     let rubber = solver.add_material(material).unwrap();
     let mut masses = vec![0.0; positions.len()];
     for (t, tet) in case.mesh.tets.iter().enumerate() {

@@ -102,8 +102,8 @@ impl<R: Real> Case<R> {
                 damping = R::from_f64(RUBBER.damping) * self.factors.per_time;
                 for k in 0..4 {
                     let motion = x[k] - self.previous[corners[k]];
-                    rates[0] = rates[0] + damping * R::dot(e.deviatoric_gradients[k], motion);
-                    rates[1] = rates[1] + damping * R::dot(e.hydrostatic_gradients[k], motion);
+                    rates[0] += damping * R::dot(e.deviatoric_gradients[k], motion);
+                    rates[1] += damping * R::dot(e.hydrostatic_gradients[k], motion);
                 }
             }
             let none = [R::ZERO; 2];
