@@ -18,7 +18,7 @@ struct Tet {
 
 /// Particles and tets of a body of rubber.
 #[derive(Debug)]
-pub struct Plain {
+pub(crate) struct Plain {
     positions: Vec<Vec3>,
     velocities: Vec<Vec3>,
     previous: Vec<Vec3>,
@@ -34,8 +34,7 @@ pub struct Plain {
 )]
 impl Plain {
     /// A body with the tets in the order of a schedule. `mu` and `l` are its stiffnesses in Pa.
-    #[must_use]
-    pub fn new(
+    pub(crate) fn new(
         positions: &[DVec3],
         weights: &[f64],
         tets: &[[usize; 4]],
@@ -69,7 +68,7 @@ impl Plain {
     }
 
     /// A substep of one iteration under gravity.
-    pub fn substep(&mut self, gravity: DVec3) {
+    pub(crate) fn substep(&mut self, gravity: DVec3) {
         let (time, gravity) = (self.time, gravity.as_vec3());
         for p in 0..self.positions.len() {
             self.previous[p] = self.positions[p];
@@ -87,8 +86,7 @@ impl Plain {
     }
 
     /// Where a particle is.
-    #[must_use]
-    pub fn position(&self, particle: usize) -> DVec3 {
+    pub(crate) fn position(&self, particle: usize) -> DVec3 {
         self.positions[particle].as_dvec3()
     }
 }
@@ -119,7 +117,8 @@ fn solve(tet: &Tet, positions: &mut [Vec3], weights: &[f32], gamma: f32) {
     let a22 = product(&hydrostatic, &hydrostatic) + tet.compliances[1];
     let a12 = product(&deviatoric, &hydrostatic);
     let determinant = a11 * a22 - a12 * a12;
-    if !(determinant > 0.0) {
+    // Rounding can make it 0, and huge numbers NaN.
+    if determinant.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
         return;
     }
     let (b1, b2) = (-norm, gamma - f1.dot(cofactor));
