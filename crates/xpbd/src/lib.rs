@@ -44,6 +44,7 @@ mod gauss_seidel;
 mod material;
 mod measure;
 mod neo_hookean;
+mod origin;
 mod real;
 mod settings;
 mod solver;

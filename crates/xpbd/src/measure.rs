@@ -14,7 +14,7 @@ pub struct Energy {
     pub kinetic: f64,
     /// Of deformation; 0 at rest.
     pub elastic: f64,
-    /// Of height, relative to the origin; 0 without gravity.
+    /// Of height, relative to the origin of the world; 0 without gravity.
     pub gravity: f64,
 }
 
@@ -153,7 +153,7 @@ impl<R: Real> Solver<R> {
             return None;
         }
         let mut primal: Vec<DVec3> = (0..self.particle_count())
-            .map(|p| (self.position(p) - R::to_dvec3(self.predicted[p])) * self.masses[p])
+            .map(|p| (self.local(p) - R::to_dvec3(self.predicted[p])) * self.masses[p])
             .collect();
         let mut dual = 0.0;
         for (t, tet) in self.tets.iter().enumerate() {
@@ -164,7 +164,7 @@ impl<R: Real> Solver<R> {
             if !((1.0 / k1).is_finite() && (1.0 / k2).is_finite()) {
                 continue;
             }
-            let evaluation = tet.evaluate(tet.particles.map(|p| self.position(p as usize)));
+            let evaluation = tet.evaluate(tet.particles.map(|p| self.local(p as usize)));
             let [deviatoric, hydrostatic] = self.multipliers_of(t).map(R::to_f64);
             dual += (evaluation.deviatoric + deviatoric / k1).powi(2);
             dual += (evaluation.hydrostatic + hydrostatic / k2).powi(2);
@@ -188,7 +188,7 @@ impl<R: Real> Solver<R> {
     }
 
     fn gradient(&self, tet: usize) -> DMat3 {
-        let [a, b, c, d] = self.tets[tet].particles.map(|p| self.position(p as usize));
+        let [a, b, c, d] = self.tets[tet].particles.map(|p| self.local(p as usize));
         DMat3::from_cols(b - a, c - a, d - a) * self.inverse_rest(tet)
     }
 

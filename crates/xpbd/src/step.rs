@@ -75,6 +75,7 @@ impl<R: Real> Solver<R> {
             );
         }
         let mut report = StepReport::default();
+        self.follow_body();
         self.predicted.clear();
         for substep in 0..settings.substeps {
             let keep = keep && substep + 1 == settings.substeps;
@@ -138,7 +139,8 @@ impl<R: Real> Solver<R> {
 
     /// Lifts particles out of the ground; friction holds them back by at most its share of the depth.
     fn project_to_ground(&self, ground: Ground) {
-        let (height, friction) = (R::from_f64(ground.height), R::from_f64(ground.friction));
+        let height = R::from_f64(ground.height - self.origin.z);
+        let friction = R::from_f64(ground.friction);
         let particles = self.particles.par_iter().with_min_len(PARALLEL_PARTICLES);
         particles
             .zip(&self.previous)

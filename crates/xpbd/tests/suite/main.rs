@@ -16,6 +16,7 @@ mod extremes;
 mod finite_elements;
 mod ground;
 mod kappa;
+mod origin;
 mod recovery;
 mod refusals;
 mod residuals;
