@@ -23,12 +23,16 @@
 mod backend;
 mod body;
 mod error;
+mod group;
+mod islands;
 mod limits;
+mod measure;
 mod plan;
 pub mod report;
 pub mod scene;
 mod simulation;
 mod strokes;
+mod whole;
 
 pub use error::Error;
 pub use incise_clustering as clustering;

@@ -1,0 +1,93 @@
+//! What all groups of bodies together are worth: the quantities of a report.
+//!
+//! Sums, and the largest or smallest value where that is what is asked. For a single group they are its own numbers to
+//! the bit. Cost: a pass over the particles or tets each.
+
+use glam::DVec3;
+use incise_xpbd::Volume;
+
+use crate::backend::each;
+use crate::group::Group;
+use crate::report::{EnergyReport, ResidualReport, SoftenedReport};
+
+/// Residuals of the last substep of each group, as one vector's length; `None` unless all groups have kept theirs.
+pub(crate) fn residual(groups: &[Group]) -> Option<ResidualReport> {
+    let mut sum = ResidualReport {
+        primal: 0.0,
+        dual: 0.0,
+    };
+    for group in groups {
+        let time = group.settings.substep_time();
+        let residuals = each!(&group.solver, solver => solver.residuals(time))?;
+        sum.primal = sum.primal.hypot(residuals.primal);
+        sum.dual = sum.dual.hypot(residuals.dual);
+    }
+    Some(sum)
+}
+
+pub(crate) fn energy(groups: &[Group], gravity: Option<DVec3>) -> EnergyReport {
+    let mut sum = EnergyReport {
+        kinetic: 0.0,
+        elastic: 0.0,
+        gravity: 0.0,
+    };
+    for group in groups {
+        let energy = each!(&group.solver, solver => solver.energy(gravity));
+        sum.kinetic += energy.kinetic;
+        sum.elastic += energy.elastic;
+        sum.gravity += energy.gravity;
+    }
+    sum
+}
+
+pub(crate) fn volume(groups: &[Group]) -> Volume {
+    let mut sum = Volume {
+        total: 0.0,
+        rest: 0.0,
+        min_ratio: 1.0,
+        inverted: 0,
+    };
+    for group in groups {
+        let volume = each!(&group.solver, solver => solver.volume());
+        sum.total += volume.total;
+        sum.rest += volume.rest;
+        sum.min_ratio = sum.min_ratio.min(volume.min_ratio);
+        sum.inverted += volume.inverted;
+    }
+    sum
+}
+
+/// The largest speed of a particle in m/s.
+pub(crate) fn max_speed(groups: &[Group]) -> f64 {
+    let speeds = groups
+        .iter()
+        .map(|group| each!(&group.solver, solver => solver.max_speed()));
+    speeds.fold(0.0, f64::max)
+}
+
+/// The largest kappa of a tet, each at the substep of its group.
+pub(crate) fn kappa(groups: &[Group]) -> f64 {
+    groups.iter().map(Group::kappa).fold(0.0, f64::max)
+}
+
+pub(crate) fn softened(groups: &[Group]) -> SoftenedReport {
+    let of = |group: &Group| each!(&group.solver, solver => solver.softened());
+    if let [group] = groups {
+        return of(group).into();
+    }
+    let mut sum = SoftenedReport {
+        tets: 0,
+        volume_fraction: 0.0,
+        strongest: 1.0,
+    };
+    let mut volume = 0.0;
+    for group in groups {
+        let softened = of(group);
+        sum.tets += softened.tets;
+        sum.volume_fraction += softened.volume_fraction * group.initial_volume;
+        sum.strongest = sum.strongest.max(softened.strongest);
+        volume += group.initial_volume;
+    }
+    sum.volume_fraction /= volume;
+    sum
+}
