@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use incise_cutting::{CutDelta, CuttableMesh};
-use incise_mesh::{ParticleId, TetId};
+use incise_mesh::{ParticleId, TetId, TetMesh};
 use incise_xpbd::{KappaLimit, Solver};
 
 use crate::Error;
@@ -30,7 +30,6 @@ pub(crate) use each;
 impl AnySolver {
     pub(crate) fn new(
         precision: Precision,
-        kappa_limit: Option<KappaLimit>,
         joined: &Joined,
         cuttable: &CuttableMesh,
     ) -> Result<Self, Error> {
@@ -41,7 +40,6 @@ impl AnySolver {
         };
         let mesh = cuttable.mesh();
         each!(&mut any, solver => {
-            solver.limit_kappa(kappa_limit);
             for material in &joined.materials {
                 let field = "body".to_owned();
                 solver.add_material(*material).map_err(|source| Error::Xpbd { field, source })?;
@@ -57,6 +55,18 @@ impl AnySolver {
             }
         });
         Ok(any)
+    }
+
+    /// Softens every tet, present and to come, that exceeds the limit. O(tets).
+    pub(crate) fn limit_kappa(&mut self, limit: KappaLimit, mesh: &TetMesh) {
+        each!(self, solver => {
+            solver.limit_kappa(Some(limit));
+            for t in 0..solver.tet_count() {
+                if solver.kappa_of(t, limit.substep_time) > limit.kappa {
+                    solver.replace_tet(t, solver.tet_particles(t), mesh.corners(TetId::new(t)));
+                }
+            }
+        });
     }
 
     /// Follows a cut. Costs what the cut touched.

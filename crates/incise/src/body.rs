@@ -6,7 +6,7 @@ use incise_mesh::{TetMesh, io};
 use incise_xpbd::Material;
 
 use crate::limits::{LARGEST_COORDINATE, coordinates, direction, value, within};
-use crate::scene::{BodySpec, Region};
+use crate::scene::{BodySpec, Region, Substeps};
 use crate::{Error, Scene};
 
 /// A body in the world.
@@ -16,6 +16,7 @@ pub(crate) struct Body {
     pub(crate) material: Material,
     /// For each particle whether it is fixed.
     pub(crate) fixed: Vec<bool>,
+    pub(crate) substeps: Substeps,
 }
 
 impl Body {
@@ -26,11 +27,12 @@ impl Body {
         }
         let bodies = scene.body.iter().enumerate();
         bodies
-            .map(|(i, spec)| Self::new(&format!("body[{i}]"), spec))
+            .map(|(i, spec)| Self::new(&format!("body[{i}]"), spec, scene.solver.substeps))
             .collect()
     }
 
-    fn new(field: &str, spec: &BodySpec) -> Result<Self, Error> {
+    /// The body of a spec; `substeps` are those of a body that does not name its own.
+    fn new(field: &str, spec: &BodySpec, substeps: Substeps) -> Result<Self, Error> {
         let material = Material {
             young_modulus: spec.young_modulus,
             poisson_ratio: spec.poisson_ratio,
@@ -50,6 +52,9 @@ impl Body {
         within(&format!("{field}.density"), spec.density, 1e-6, 1e9)?;
         within(&format!("{field}.damping"), spec.damping, 0.0, 1e6)?;
         within(&format!("{field}.scale"), spec.scale, 1e-9, 1e9)?;
+        if spec.substeps == Some(Substeps::Fixed(0)) {
+            return Err(value(format!("{field}.substeps"), 0, "at least 1"));
+        }
         let position = coordinates(&format!("{field}.position"), spec.position)?;
         let mut mesh = load(field, spec)?;
         for x in &mut mesh.positions {
@@ -71,6 +76,7 @@ impl Body {
             mesh,
             material,
             fixed,
+            substeps: spec.substeps.unwrap_or(substeps),
         })
     }
 }

@@ -32,6 +32,7 @@ pub mod report;
 pub mod scene;
 mod simulation;
 mod strokes;
+mod substeps;
 mod whole;
 
 pub use error::Error;

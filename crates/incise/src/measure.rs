@@ -8,7 +8,7 @@ use incise_xpbd::Volume;
 
 use crate::backend::each;
 use crate::group::Group;
-use crate::report::{EnergyReport, ResidualReport, SoftenedReport};
+use crate::report::{BodyReport, EnergyReport, ResidualReport, SoftenedReport};
 
 /// Residuals of the last substep of each group, as one vector's length; `None` unless all groups have kept theirs.
 pub(crate) fn residual(groups: &[Group]) -> Option<ResidualReport> {
@@ -71,9 +71,8 @@ pub(crate) fn kappa(groups: &[Group]) -> f64 {
 }
 
 pub(crate) fn softened(groups: &[Group]) -> SoftenedReport {
-    let of = |group: &Group| each!(&group.solver, solver => solver.softened());
     if let [group] = groups {
-        return of(group).into();
+        return softened_of(group);
     }
     let mut sum = SoftenedReport {
         tets: 0,
@@ -82,7 +81,7 @@ pub(crate) fn softened(groups: &[Group]) -> SoftenedReport {
     };
     let mut volume = 0.0;
     for group in groups {
-        let softened = of(group);
+        let softened = softened_of(group);
         sum.tets += softened.tets;
         sum.volume_fraction += softened.volume_fraction * group.initial_volume;
         sum.strongest = sum.strongest.max(softened.strongest);
@@ -90,4 +89,25 @@ pub(crate) fn softened(groups: &[Group]) -> SoftenedReport {
     }
     sum.volume_fraction /= volume;
     sum
+}
+
+fn softened_of(group: &Group) -> SoftenedReport {
+    each!(&group.solver, solver => solver.softened()).into()
+}
+
+/// Substeps and what cuts did to kappa by group; `with_kappa` also those that take a pass over the tets.
+pub(crate) fn by_body(groups: &mut [Group], with_kappa: bool) -> Vec<BodyReport> {
+    let report = |group: &mut Group| {
+        let cut = group.cut_kappa.take();
+        BodyReport {
+            bodies: group.bodies.clone(),
+            substeps: group.settings.substeps,
+            choice: group.choice,
+            kappa: with_kappa.then(|| group.kappa()),
+            kappa_before_cut: cut.and_then(|cut| cut.before),
+            kappa_of_new_tets: cut.map(|cut| cut.new_tets),
+            softened: with_kappa.then(|| softened_of(group)),
+        }
+    };
+    groups.iter_mut().map(report).collect()
 }

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
+pub use crate::substeps::Substeps;
 
 /// A scene.
 ///
@@ -23,7 +24,7 @@ use crate::Error;
 ///     "#,
 /// )?;
 /// assert_eq!(scene.body.len(), 1);
-/// assert_eq!(scene.solver.substeps, 5);
+/// assert_eq!(scene.solver.substeps, 5.into());
 /// # Ok::<(), incise::Error>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -85,7 +86,8 @@ pub enum Quantity {
     Volume,
     /// The largest speed.
     Speed,
-    /// The control number of the substep (see `incise_xpbd::Solver::kappa`) and what was softened to keep its limit.
+    /// The control number of the substep (see `incise_xpbd::Solver::kappa`) and what was softened to keep its limit, for
+    /// all and by body, and in a frame with a cut also as it was before.
     Kappa,
 }
 
@@ -116,8 +118,10 @@ pub struct GroundSpec {
 pub struct SolverSpec {
     /// Time of a frame in s.
     pub time_step: f64,
-    /// Equal parts of a frame.
-    pub substeps: u32,
+    /// Equal parts of a frame: a number, or `auto`, which chooses for each body.
+    pub substeps: Substeps,
+    /// The most substeps that `auto` takes.
+    pub max_substeps: u32,
     /// Passes over the constraints in a substep; 1 is what converges.
     pub iterations: u32,
     /// How a pass is made.
@@ -139,7 +143,8 @@ impl Default for SolverSpec {
     fn default() -> Self {
         Self {
             time_step: 0.016,
-            substeps: 5,
+            substeps: Substeps::Fixed(5),
+            max_substeps: 200,
             iterations: 1,
             method: Method::GaussSeidel,
             relaxation: 1.0,
@@ -211,6 +216,9 @@ pub struct BodySpec {
     /// Damping time in s: see `incise_xpbd::Material::damping`.
     #[serde(default)]
     pub damping: f64,
+    /// Substeps of this body in place of the solver's. Bodies that are solved together take the largest number.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub substeps: Option<Substeps>,
     /// Particles that do not move, in m in the world.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fixed: Vec<Region>,

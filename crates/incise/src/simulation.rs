@@ -18,9 +18,9 @@ use crate::body::Body;
 use crate::group::{Group, Joined};
 use crate::islands::islands;
 use crate::limits::{LARGEST_COORDINATE, coordinates, value, within};
-use crate::measure::{energy, kappa, max_speed, residual, softened, volume};
+use crate::measure::{by_body, energy, kappa, max_speed, residual, softened, volume};
 use crate::report::{CutReport, FrameReport, Milliseconds, SoftenedReport, milliseconds};
-use crate::scene::{GroundSpec, Precision, Quantity, StrokeSpec};
+use crate::scene::{GroundSpec, Precision, Quantity, StrokeSpec, Substeps};
 use crate::strokes::Timeline;
 use crate::whole::Whole;
 use crate::{Error, Scene};
@@ -108,14 +108,14 @@ impl Simulation {
         for stroke in &scene.stroke {
             timeline.add(stroke.clone())?;
         }
-        kappa_limit(scene)?;
+        check_limits(scene)?;
         let bodies = Body::all(scene)?;
         let islands = islands(bodies.len(), &[]);
         let count = islands.iter().max().map_or(0, |last| last + 1);
         let whole = (count > 1).then(|| Whole::new(&bodies, &islands));
         let mut joined: Vec<Joined> = (0..count).map(|_| Joined::default()).collect();
-        for (body, island) in bodies.into_iter().zip(islands) {
-            joined[island].add(body)?;
+        for (number, (body, island)) in bodies.into_iter().zip(islands).enumerate() {
+            joined[island].add(number, body)?;
         }
         let make_groups = || {
             let groups = joined.into_par_iter();
@@ -142,6 +142,9 @@ impl Simulation {
         };
         simulation.collect_positions();
         simulation.count();
+        if simulation.chooses() {
+            simulation.report.bodies = by_body(&mut simulation.groups, false);
+        }
         Ok(simulation)
     }
 
@@ -177,10 +180,7 @@ impl Simulation {
         let cut = self.carry_out_strokes(&mut ms)?;
 
         let before_solve = Instant::now();
-        let wants = |quantity| {
-            self.next_frame.is_multiple_of(self.every) && self.quantities.contains(&quantity)
-        };
-        let residual = wants(Quantity::Residual);
+        let residual = self.wants(Quantity::Residual);
         let groups = self.groups.par_iter_mut();
         let repaired = groups
             .map(|group| group.step(residual).map(|step| step.repaired))
@@ -204,9 +204,21 @@ impl Simulation {
         Ok(())
     }
 
+    /// Whether the frame to come is to report a quantity.
+    fn wants(&self, quantity: Quantity) -> bool {
+        self.next_frame.is_multiple_of(self.every) && self.quantities.contains(&quantity)
+    }
+
+    /// Whether substeps are chosen for a body.
+    fn chooses(&self) -> bool {
+        self.groups.iter().any(|group| group.choice.is_some())
+    }
+
     /// Cuts what is due and lets everybody follow.
     fn carry_out_strokes(&mut self, ms: &mut Milliseconds) -> Result<Option<CutReport>, Error> {
         let start = Instant::now();
+        let wants_kappa = self.wants(Quantity::Kappa);
+        let notes_kappa = wants_kappa || self.chooses();
         let Self {
             timeline,
             groups,
@@ -217,7 +229,15 @@ impl Simulation {
         let mut report: Option<CutReport> = None;
         let mut counting = 0.0;
         timeline.advance(self.next_frame, groups, |number, group, delta| {
+            if wants_kappa {
+                let start = Instant::now();
+                group.note_kappa_before();
+                counting += milliseconds(start.elapsed());
+            }
             group.follow(delta, ms)?;
+            if notes_kappa {
+                group.note_kappa_of(delta);
+            }
             if !delta.copies.is_empty() {
                 let start = Instant::now();
                 group.count_pieces();
@@ -239,6 +259,10 @@ impl Simulation {
 
     /// Computes the quantities that this frame reports.
     fn measure(&mut self) {
+        let kappa_too = self.wants(Quantity::Kappa);
+        if kappa_too || self.chooses() {
+            self.report.bodies = by_body(&mut self.groups, kappa_too);
+        }
         if !self.report.frame.is_multiple_of(self.every) {
             return;
         }
@@ -293,7 +317,7 @@ impl Simulation {
         report.precision = self.precision.name();
     }
 
-    /// The report on the last frame; before the first, only its counts mean something.
+    /// The report on the last frame; before the first, only its counts and the chosen substeps mean something.
     #[must_use]
     pub fn report(&self) -> &FrameReport {
         &self.report
@@ -392,11 +416,14 @@ impl Simulation {
     }
 }
 
-/// Refuses a limit of kappa that is none.
-fn kappa_limit(scene: &Scene) -> Result<(), Error> {
+/// Refuses limits that are none.
+fn check_limits(scene: &Scene) -> Result<(), Error> {
     let kappa = scene.solver.kappa_limit;
     if kappa.is_nan() || kappa <= 0.0 {
         return Err(value("solver.kappa_limit", kappa, "positive"));
+    }
+    if scene.solver.max_substeps == 0 {
+        return Err(value("solver.max_substeps", 0, "at least 1"));
     }
     Ok(())
 }
@@ -404,7 +431,11 @@ fn kappa_limit(scene: &Scene) -> Result<(), Error> {
 fn settings(scene: &Scene) -> Result<StepSettings, Error> {
     let settings = StepSettings {
         time_step: scene.solver.time_step,
-        substeps: scene.solver.substeps,
+        // Each group has its own.
+        substeps: match scene.solver.substeps {
+            Substeps::Fixed(substeps) => substeps,
+            Substeps::Auto => 1,
+        },
         iterations: scene.solver.iterations,
         relaxation: scene.solver.relaxation,
         gravity: scene

@@ -12,5 +12,6 @@ mod parsing;
 mod physics;
 mod regions;
 mod reports;
+mod substeps;
 mod support;
 mod values;

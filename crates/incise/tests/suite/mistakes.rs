@@ -8,8 +8,10 @@ use crate::values::{plane, refused, region, sound, sweep};
 /// A mistake in a sound scene, and the field an error names.
 type Mistake = (&'static str, fn(&mut Scene));
 
-const MISTAKES: [Mistake; 24] = [
-    ("solver.substeps", |s| s.solver.substeps = 0),
+const MISTAKES: [Mistake; 26] = [
+    ("solver.substeps", |s| s.solver.substeps = 0.into()),
+    ("solver.max_substeps", |s| s.solver.max_substeps = 0),
+    ("body[0].substeps", |s| s.body[0].substeps = Some(0.into())),
     ("solver.iterations", |s| s.solver.iterations = 0),
     ("solver.clustering", |s| {
         s.solver.clustering = "serial:0".into();
