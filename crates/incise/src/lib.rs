@@ -28,6 +28,7 @@ mod islands;
 mod limits;
 mod measure;
 mod plan;
+mod preset;
 pub mod report;
 pub mod scene;
 mod simulation;

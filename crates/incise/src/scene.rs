@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
+pub use crate::preset::Preset;
 pub use crate::substeps::Substeps;
 
 /// A scene.
@@ -116,6 +117,9 @@ pub struct GroundSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SolverSpec {
+    /// Other defaults for the keys below, applied when a scene is read: `paper`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub preset: Option<Preset>,
     /// Time of a frame in s.
     pub time_step: f64,
     /// Equal parts of a frame: a number, or `auto`, which chooses for each body.
@@ -142,6 +146,7 @@ pub struct SolverSpec {
 impl Default for SolverSpec {
     fn default() -> Self {
         Self {
+            preset: None,
             time_step: 0.016,
             substeps: Substeps::Fixed(5),
             max_substeps: 200,
@@ -337,7 +342,7 @@ impl Scene {
     /// If it is not valid TOML, or a key is unknown or of the wrong type: the message names the line and, for an
     /// unknown key, the nearest known one.
     pub fn from_toml(text: &str) -> Result<Self, Error> {
-        toml::from_str(text).map_err(|error| {
+        let mut scene: Self = toml::from_str(text).map_err(|error| {
             let line = error
                 .span()
                 .map(|span| text[..span.start.min(text.len())].matches('\n').count() + 1);
@@ -345,7 +350,9 @@ impl Scene {
                 line,
                 message: with_suggestion(error.message()),
             }
-        })
+        })?;
+        scene.solver = scene.solver.over_preset(text)?;
+        Ok(scene)
     }
 
     /// The scene as TOML.

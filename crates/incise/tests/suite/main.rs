@@ -10,6 +10,7 @@ mod locality;
 mod mistakes;
 mod parsing;
 mod physics;
+mod preset;
 mod regions;
 mod reports;
 mod substeps;
