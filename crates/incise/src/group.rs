@@ -15,6 +15,7 @@ use crate::limits::value;
 use crate::plan::Plan;
 use crate::report::Milliseconds;
 use crate::scene::Substeps;
+use crate::sleep::Rest;
 use crate::substeps::{Choice, choose};
 use crate::{Error, Scene};
 
@@ -38,6 +39,8 @@ pub(crate) struct Group {
     pub(crate) choice: Option<Choice>,
     /// What the last cut did to kappa, if that is to be reported.
     pub(crate) cut_kappa: Option<CutKappa>,
+    /// Whether it sleeps, in a scene where bodies may.
+    pub(crate) rest: Option<Rest>,
 }
 
 /// What cuts did to kappa.
@@ -144,28 +147,47 @@ impl Group {
             bodies: joined.bodies,
             choice,
             cut_kappa: None,
+            rest: scene.solver.sleep.map(Rest::new),
         };
         group.solver.positions(&mut group.positions);
         Ok(group)
     }
 
-    /// Advances by one frame.
+    /// Whether it is not solved until it is woken.
+    pub(crate) fn asleep(&self) -> bool {
+        self.rest.is_some_and(|rest| rest.asleep())
+    }
+
+    /// Advances by one frame, unless it sleeps.
     pub(crate) fn step(&mut self, keeping_residuals: bool) -> Result<StepReport, Error> {
+        if self.asleep() {
+            return Ok(StepReport::default());
+        }
         let (schedule, settings) = (&self.plan.schedule, &self.settings);
         let step = each!(&mut self.solver, solver => if keeping_residuals {
             solver.step_keeping_residuals(schedule, settings)
         } else {
             solver.step(schedule, settings)
         });
+        if let Some(rest) = &mut self.rest {
+            each!(&mut self.solver, solver => if rest.count(solver.max_speed(), settings.time_step) {
+                for p in 0..solver.particle_count() {
+                    solver.set_velocity(p, DVec3::ZERO);
+                }
+            });
+        }
         step.map_err(|source| Error::Xpbd {
             field: "solver".into(),
             source,
         })
     }
 
-    /// Lets solver, clusters, colors and schedule follow a cut of the mesh. The pieces are counted by
+    /// Lets solver, clusters, colors and schedule follow a cut of the mesh, and wakes it. The pieces are counted by
     /// [`Group::count_pieces`].
     pub(crate) fn follow(&mut self, delta: &CutDelta, ms: &mut Milliseconds) -> Result<(), Error> {
+        if let Some(rest) = &mut self.rest {
+            rest.wake();
+        }
         self.solver.follow(delta, &self.cuttable);
         self.plan.follow(delta, ms)
     }

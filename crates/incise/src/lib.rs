@@ -32,6 +32,7 @@ mod preset;
 pub mod report;
 pub mod scene;
 mod simulation;
+mod sleep;
 mod strokes;
 mod substeps;
 mod whole;

@@ -10,13 +10,13 @@ use crate::backend::each;
 use crate::group::Group;
 use crate::report::{BodyReport, EnergyReport, ResidualReport, SoftenedReport};
 
-/// Residuals of the last substep of each group, as one vector's length; `None` unless all groups have kept theirs.
+/// Residuals of the last substep of each group awake, as one vector's length; `None` unless these have kept theirs.
 pub(crate) fn residual(groups: &[Group]) -> Option<ResidualReport> {
     let mut sum = ResidualReport {
         primal: 0.0,
         dual: 0.0,
     };
-    for group in groups {
+    for group in groups.iter().filter(|group| !group.asleep()) {
         let time = group.settings.substep_time();
         let residuals = each!(&group.solver, solver => solver.residuals(time))?;
         sum.primal = sum.primal.hypot(residuals.primal);
@@ -102,6 +102,7 @@ pub(crate) fn by_body(groups: &mut [Group], with_kappa: bool) -> Vec<BodyReport>
         BodyReport {
             bodies: group.bodies.clone(),
             substeps: group.settings.substeps,
+            asleep: group.rest.map(|rest| rest.asleep()),
             choice: group.choice,
             kappa: with_kappa.then(|| group.kappa()),
             kappa_before_cut: cut.and_then(|cut| cut.before),

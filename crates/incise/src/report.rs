@@ -60,7 +60,7 @@ pub struct FrameReport {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub softened: Option<SoftenedReport>,
     /// By body what its substeps and its kappa are, in the order of the scene; in all frames if `substeps` is `auto` for
-    /// a body, else where kappa is reported, else absent.
+    /// a body or bodies may sleep, else where kappa is reported, else absent.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub bodies: Vec<BodyReport>,
     /// Particles that had to be put back because they would have become infinite; absent if none.
@@ -84,6 +84,9 @@ pub struct BodyReport {
     pub bodies: Vec<usize>,
     /// Substeps of a frame.
     pub substeps: u32,
+    /// Whether it is at rest and not solved, in a scene where bodies may sleep.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub asleep: Option<bool>,
     /// How they were chosen, if `auto` was to: its keys are among those of the body.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub choice: Option<Choice>,

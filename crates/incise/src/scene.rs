@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 pub use crate::preset::Preset;
+pub use crate::sleep::SleepSpec;
 pub use crate::substeps::Substeps;
 
 /// A scene.
@@ -141,6 +142,9 @@ pub struct SolverSpec {
     pub precision: Precision,
     /// Largest kappa of a tet, positive: stiffer ones, as cuts leave them, are softened to it. `inf` softens none.
     pub kappa_limit: f64,
+    /// Bodies at rest are not solved until they are cut; absent: all are always solved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sleep: Option<SleepSpec>,
 }
 
 impl Default for SolverSpec {
@@ -157,6 +161,7 @@ impl Default for SolverSpec {
             coloring: "auto".to_owned(),
             precision: Precision::F32,
             kappa_limit: 1.0,
+            sleep: None,
         }
     }
 }

@@ -214,6 +214,11 @@ impl Simulation {
         self.groups.iter().any(|group| group.choice.is_some())
     }
 
+    /// Whether bodies may sleep.
+    fn sleeps(&self) -> bool {
+        self.groups.iter().any(|group| group.rest.is_some())
+    }
+
     /// Cuts what is due and lets everybody follow.
     fn carry_out_strokes(&mut self, ms: &mut Milliseconds) -> Result<Option<CutReport>, Error> {
         let start = Instant::now();
@@ -260,7 +265,7 @@ impl Simulation {
     /// Computes the quantities that this frame reports.
     fn measure(&mut self) {
         let kappa_too = self.wants(Quantity::Kappa);
-        if kappa_too || self.chooses() {
+        if kappa_too || self.chooses() || self.sleeps() {
             self.report.bodies = by_body(&mut self.groups, kappa_too);
         }
         if !self.report.frame.is_multiple_of(self.every) {
@@ -424,6 +429,17 @@ fn check_limits(scene: &Scene) -> Result<(), Error> {
     }
     if scene.solver.max_substeps == 0 {
         return Err(value("solver.max_substeps", 0, "at least 1"));
+    }
+    if let Some(sleep) = scene.solver.sleep {
+        for (key, number) in [("speed", sleep.speed), ("time", sleep.time)] {
+            if !(number.is_finite() && number > 0.0) {
+                return Err(value(
+                    format!("solver.sleep.{key}"),
+                    number,
+                    "positive and finite",
+                ));
+            }
+        }
     }
     Ok(())
 }

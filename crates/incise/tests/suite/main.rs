@@ -13,6 +13,7 @@ mod physics;
 mod preset;
 mod regions;
 mod reports;
+mod sleep;
 mod substeps;
 mod support;
 mod values;

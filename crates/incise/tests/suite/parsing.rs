@@ -76,6 +76,7 @@ clustering = "serial:5"
 coloring = "greedy"
 precision = "f64"
 kappa_limit = inf
+sleep = { speed = 0.01, time = 0.2 }
 [[body]]
 mesh = "liver.vtk"
 scale = 0.1
@@ -150,6 +151,7 @@ fn an_unknown_key_at_any_level_names_the_nearest() {
         ("precision", "precison"),
         ("f64", "f46"),
         ("kappa_limit", "kapa_limit"),
+        ("sleep", "sleeep"),
         ("young_modulus", "youngs_modulus"),
         ("poisson_ratio", "poison_ratio"),
         ("density", "densty"),
