@@ -2,11 +2,11 @@
 
 use glam::DVec3;
 use incise_cutting::{CutDelta, CuttableMesh};
-use incise_mesh::{ParticleId, TetId};
+use incise_mesh::{ParticleId, TetId, TetMesh};
 use incise_xpbd::{KappaLimit, Solver};
 
 use crate::Error;
-use crate::body::Bodies;
+use crate::group::Joined;
 use crate::scene::Precision;
 
 /// A solver in one of both precisions.
@@ -30,26 +30,24 @@ pub(crate) use each;
 impl AnySolver {
     pub(crate) fn new(
         precision: Precision,
-        kappa_limit: Option<KappaLimit>,
-        bodies: &Bodies,
+        joined: &Joined,
         cuttable: &CuttableMesh,
     ) -> Result<Self, Error> {
-        let positions = &bodies.mesh.positions;
+        let positions = &cuttable.mesh().positions;
         let mut any = match precision {
             Precision::F32 => Self::Single(Solver::new(positions)),
             Precision::F64 => Self::Double(Solver::new(positions)),
         };
         let mesh = cuttable.mesh();
         each!(&mut any, solver => {
-            solver.limit_kappa(kappa_limit);
-            for (i, material) in bodies.materials.iter().enumerate() {
-                let field = format!("body[{i}]");
+            for material in &joined.materials {
+                let field = "body".to_owned();
                 solver.add_material(*material).map_err(|source| Error::Xpbd { field, source })?;
             }
             for (t, tet) in mesh.tets.iter().enumerate() {
-                solver.push_tet(tet.map(|p| p.0), mesh.corners(TetId::new(t)), bodies.body_of[t]);
+                solver.push_tet(tet.map(|p| p.0), mesh.corners(TetId::new(t)), joined.material_of[t]);
             }
-            for (p, &fixed) in bodies.fixed.iter().enumerate() {
+            for (p, &fixed) in joined.fixed.iter().enumerate() {
                 solver.set_mass(p, mass(solver, cuttable, ParticleId::new(p)));
                 if fixed {
                     solver.set_fixed(p, true);
@@ -57,6 +55,18 @@ impl AnySolver {
             }
         });
         Ok(any)
+    }
+
+    /// Softens every tet, present and to come, that exceeds the limit. O(tets).
+    pub(crate) fn limit_kappa(&mut self, limit: KappaLimit, mesh: &TetMesh) {
+        each!(self, solver => {
+            solver.limit_kappa(Some(limit));
+            for t in 0..solver.tet_count() {
+                if solver.kappa_of(t, limit.substep_time) > limit.kappa {
+                    solver.replace_tet(t, solver.tet_particles(t), mesh.corners(TetId::new(t)));
+                }
+            }
+        });
     }
 
     /// Follows a cut. Costs what the cut touched.

@@ -9,6 +9,8 @@ use incise_xpbd::Residuals;
 use incise_xpbd::Softened;
 use serde::Serialize;
 
+pub use crate::substeps::{Choice, Missed};
+
 /// What a frame did.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
@@ -58,6 +60,10 @@ pub struct FrameReport {
     /// The tets softened to keep the limit of kappa.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub softened: Option<SoftenedReport>,
+    /// By body what its substeps and its kappa are, in the order of the scene; in all frames if `substeps` is `auto` for
+    /// a body or bodies may sleep, else where kappa is reported, else absent.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub bodies: Vec<BodyReport>,
     /// Particles that had to be put back because they would have become infinite; absent if none.
     #[serde(skip_serializing_if = "is_zero")]
     pub repaired: usize,
@@ -69,6 +75,34 @@ pub struct FrameReport {
 
 fn is_zero(count: &usize) -> bool {
     *count == 0
+}
+
+/// A body's substeps and kappa, or those of bodies that are joined and therefore solved together.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct BodyReport {
+    /// The numbers of the bodies in the scene; mostly one.
+    pub bodies: Vec<usize>,
+    /// Substeps of a frame.
+    pub substeps: u32,
+    /// Whether it is at rest and not solved, in a scene where bodies may sleep.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub asleep: Option<bool>,
+    /// How they were chosen, if `auto` was to: its keys are among those of the body.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub choice: Option<Choice>,
+    /// The largest `E Δt² / (ρ h²)` of a tet, had none been softened; where kappa is reported.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kappa: Option<f64>,
+    /// The same before the cut of this frame; where kappa is reported.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kappa_before_cut: Option<f64>,
+    /// The largest kappa of the tets that the cut of this frame has made, had none been softened.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kappa_of_new_tets: Option<f64>,
+    /// The tets softened to keep the limit of kappa; where kappa is reported.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub softened: Option<SoftenedReport>,
 }
 
 /// What a frame's strokes cut.

@@ -11,6 +11,9 @@ use crate::Error;
 pub use crate::collider::{ColliderSpec, RotationSpec};
 pub use crate::handle::{HandleSpec, TurnSpec};
 pub use crate::link::{EndSpec, LinkSpec};
+pub use crate::preset::Preset;
+pub use crate::sleep::SleepSpec;
+pub use crate::substeps::Substeps;
 
 /// A scene.
 ///
@@ -26,7 +29,7 @@ pub use crate::link::{EndSpec, LinkSpec};
 ///     "#,
 /// )?;
 /// assert_eq!(scene.body.len(), 1);
-/// assert_eq!(scene.solver.substeps, 5);
+/// assert_eq!(scene.solver.substeps, 5.into());
 /// # Ok::<(), incise::Error>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -97,7 +100,8 @@ pub enum Quantity {
     Volume,
     /// The largest speed.
     Speed,
-    /// The control number of the substep (see `incise_xpbd::Solver::kappa`) and what was softened to keep its limit.
+    /// The control number of the substep (see `incise_xpbd::Solver::kappa`) and what was softened to keep its limit, for
+    /// all and by body, and in a frame with a cut also as it was before.
     Kappa,
 }
 
@@ -126,10 +130,15 @@ pub struct GroundSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SolverSpec {
+    /// Other defaults for the keys below, applied when a scene is read: `paper`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub preset: Option<Preset>,
     /// Time of a frame in s.
     pub time_step: f64,
-    /// Equal parts of a frame.
-    pub substeps: u32,
+    /// Equal parts of a frame: a number, or `auto`, which chooses for each body.
+    pub substeps: Substeps,
+    /// The most substeps that `auto` takes.
+    pub max_substeps: u32,
     /// Passes over the constraints in a substep; 1 is what converges.
     pub iterations: u32,
     /// How a pass is made.
@@ -145,13 +154,18 @@ pub struct SolverSpec {
     pub precision: Precision,
     /// Largest kappa of a tet, positive: stiffer ones, as cuts leave them, are softened to it. `inf` softens none.
     pub kappa_limit: f64,
+    /// Bodies at rest are not solved until they are cut; absent: all are always solved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sleep: Option<SleepSpec>,
 }
 
 impl Default for SolverSpec {
     fn default() -> Self {
         Self {
+            preset: None,
             time_step: 0.016,
-            substeps: 5,
+            substeps: Substeps::Fixed(5),
+            max_substeps: 200,
             iterations: 1,
             method: Method::GaussSeidel,
             relaxation: 1.0,
@@ -159,6 +173,7 @@ impl Default for SolverSpec {
             coloring: "auto".to_owned(),
             precision: Precision::F32,
             kappa_limit: 1.0,
+            sleep: None,
         }
     }
 }
@@ -227,6 +242,9 @@ pub struct BodySpec {
     /// incompressible. Absent: not at all.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub volume_compliance: Option<f64>,
+    /// Substeps of this body in place of the solver's. Bodies that are solved together take the largest number.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub substeps: Option<Substeps>,
     /// Particles that do not move, in m in the world.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fixed: Vec<Region>,
@@ -345,7 +363,7 @@ impl Scene {
     /// If it is not valid TOML, or a key is unknown or of the wrong type: the message names the line and, for an
     /// unknown key, the nearest known one.
     pub fn from_toml(text: &str) -> Result<Self, Error> {
-        toml::from_str(text).map_err(|error| {
+        let mut scene: Self = toml::from_str(text).map_err(|error| {
             let line = error
                 .span()
                 .map(|span| text[..span.start.min(text.len())].matches('\n').count() + 1);
@@ -353,7 +371,9 @@ impl Scene {
                 line,
                 message: with_suggestion(error.message()),
             }
-        })
+        })?;
+        scene.solver = scene.solver.over_preset(text)?;
+        Ok(scene)
     }
 
     /// The scene as TOML.

@@ -66,7 +66,7 @@ impl<R: Real> Solver<R> {
         }
         let time_squared = substep_time * substep_time;
         let inertia: Vec<DVec3> = (0..self.particle_count())
-            .map(|p| (self.position(p) - R::to_dvec3(self.predicted[p])) * self.masses[p])
+            .map(|p| (self.local(p) - R::to_dvec3(self.predicted[p])) * self.masses[p])
             .collect();
         let mut potential: f64 = (0..self.particle_count())
             .filter(|&p| self.moves(p))
@@ -128,7 +128,7 @@ impl<R: Real> Solver<R> {
 
     /// Both constraints of a tet at the present positions.
     pub(crate) fn evaluate(&self, tet: &TetConstraint<f64>) -> Evaluation<f64> {
-        tet.evaluate(tet.particles.map(|p| self.position(p as usize)))
+        tet.evaluate(tet.particles.map(|p| self.local(p as usize)))
     }
 
     /// Whether a particle is neither held nor without mass.

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 
+mod bodies;
 mod constraints;
 mod cutting;
 mod determinism;
@@ -10,7 +11,10 @@ mod locality;
 mod mistakes;
 mod parsing;
 mod physics;
+mod preset;
 mod regions;
 mod reports;
+mod sleep;
+mod substeps;
 mod support;
 mod values;

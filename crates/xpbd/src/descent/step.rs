@@ -66,6 +66,7 @@ impl<R: Real> Solver<R> {
         let _span = tracing::debug_span!("xpbd::descend").entered();
         settings.check()?;
         self.refuse_soft_constraints()?;
+        self.follow_body();
         let mut report = DescentReport::default();
         for number in 1..=settings.step.substeps {
             let mut step = ImplicitStep::predicted(self, stars, settings, number);
@@ -133,10 +134,12 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
         solver.predict(&settings.step, time);
         let ended = f64::from(number) / f64::from(settings.step.substeps);
         let lost = solver.move_held(ended);
+        let elapsed = ended * settings.step.time_step;
+        let obstacles = Obstacle::place(&settings.step, elapsed, solver.origin);
         let mut step = Self {
             solver,
             stars,
-            obstacles: Obstacle::place(&settings.step, ended * settings.step.time_step),
+            obstacles,
             last: number == settings.step.substeps,
             settings: settings.step.clone(),
             time,

@@ -27,6 +27,7 @@ mod finite_elements;
 mod ground;
 mod kappa;
 mod large_deformations;
+mod origin;
 mod recovery;
 mod reference;
 mod refusals;
