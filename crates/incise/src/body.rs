@@ -1,12 +1,12 @@
 //! [`Body`]: a body of a scene with its mesh, material and fixed particles, all values checked.
 
-use glam::DVec3;
 use incise_mesh::generate::{Shape, generate};
 use incise_mesh::{TetMesh, io};
 use incise_xpbd::Material;
 
-use crate::limits::{LARGEST_COORDINATE, coordinates, direction, value, within};
-use crate::scene::{BodySpec, Region, Substeps};
+use crate::limits::{LARGEST_COORDINATE, coordinates, value, within};
+use crate::region::particles;
+use crate::scene::{BodySpec, Substeps};
 use crate::{Error, Scene};
 
 /// A body in the world.
@@ -16,6 +16,8 @@ pub(crate) struct Body {
     pub(crate) material: Material,
     /// For each particle whether it is fixed.
     pub(crate) fixed: Vec<bool>,
+    /// Of the volume constraints that it asks for.
+    pub(crate) volume_compliance: Option<f64>,
     pub(crate) substeps: Substeps,
 }
 
@@ -55,6 +57,10 @@ impl Body {
         if spec.substeps == Some(Substeps::Fixed(0)) {
             return Err(value(format!("{field}.substeps"), 0, "at least 1"));
         }
+        let volume_compliance = spec
+            .volume_compliance
+            .map(|c| within(&format!("{field}.volume_compliance"), c, 0.0, 1e9))
+            .transpose()?;
         let position = coordinates(&format!("{field}.position"), spec.position)?;
         let mut mesh = load(field, spec)?;
         for x in &mut mesh.positions {
@@ -70,58 +76,18 @@ impl Body {
         let mut fixed = vec![false; mesh.positions.len()];
         for (i, region) in spec.fixed.iter().enumerate() {
             let field = format!("{field}.fixed[{i}]");
-            fix(&field, region, &mesh.positions, &mut fixed)?;
+            for p in particles(&field, region, &mesh.positions)? {
+                fixed[p] = true;
+            }
         }
         Ok(Self {
             mesh,
             material,
             fixed,
+            volume_compliance,
             substeps: spec.substeps.unwrap_or(substeps),
         })
     }
-}
-
-/// Fixes the particles that lie in a region.
-fn fix(field: &str, region: &Region, positions: &[DVec3], fixed: &mut [bool]) -> Result<(), Error> {
-    let mut fix = |inside: &dyn Fn(DVec3) -> bool| {
-        for (fixed, x) in fixed.iter_mut().zip(positions) {
-            *fixed |= inside(*x);
-        }
-    };
-    match region {
-        Region::HalfSpace { point, normal } => {
-            let point = coordinates(&format!("{field}.half_space.point"), *point)?;
-            let normal = direction(&format!("{field}.half_space.normal"), *normal)?;
-            fix(&|x| normal.dot(x - point) >= 0.0);
-        }
-        Region::Box { low, high } => {
-            let low = coordinates(&format!("{field}.box.low"), *low)?;
-            let high = coordinates(&format!("{field}.box.high"), *high)?;
-            if !low.cmple(high).all() {
-                let range = "such that low is at most high in all coordinates";
-                return Err(value(format!("{field}.box"), "inside out", range));
-            }
-            fix(&|x| x.cmpge(low).all() && x.cmple(high).all());
-        }
-        Region::Sphere { center, radius } => {
-            let center = coordinates(&format!("{field}.sphere.center"), *center)?;
-            if !(radius.is_finite() && *radius >= 0.0) {
-                let field = format!("{field}.sphere.radius");
-                return Err(value(field, radius, "at least 0 and finite"));
-            }
-            fix(&|x| x.distance(center) <= *radius);
-        }
-        Region::Particles(particles) => {
-            let count = fixed.len();
-            for &p in particles {
-                *fixed.get_mut(p as usize).ok_or_else(|| {
-                    let range = format!("below {count}, the body's number of particles");
-                    value(format!("{field}.particles"), p, range)
-                })? = true;
-            }
-        }
-    }
-    Ok(())
 }
 
 /// The body's mesh, sound.

@@ -6,18 +6,17 @@
 
 use glam::DVec3;
 use incise_cutting::{CutDelta, CuttableMesh};
-use incise_mesh::{ParticleId, TetId, TetMesh};
-use incise_xpbd::{KappaLimit, Material, StepReport, StepSettings};
+use incise_xpbd::{KappaLimit, StepReport, StepSettings};
 
 use crate::backend::{AnySolver, each};
-use crate::body::Body;
-use crate::limits::value;
+use crate::handle::Handle;
+use crate::joined::Joined;
 use crate::plan::Plan;
 use crate::report::Milliseconds;
-use crate::scene::Substeps;
 use crate::sleep::Rest;
-use crate::substeps::{Choice, choose};
-use crate::{Error, Scene};
+use crate::substeps::Choice;
+use crate::volume::Volumes;
+use crate::{Error, Scene, collider, link};
 
 /// Bodies that are solved together.
 #[derive(Debug)]
@@ -28,7 +27,10 @@ pub(crate) struct Group {
     pub(crate) cuttable: CuttableMesh,
     pub(crate) solver: AnySolver,
     pub(crate) plan: Plan,
+    /// Its colliders are where they are at the start of the next frame.
     pub(crate) settings: StepSettings,
+    handles: Vec<Handle>,
+    volumes: Option<Volumes>,
     /// The present positions.
     pub(crate) positions: Vec<DVec3>,
     /// Number of pieces.
@@ -50,66 +52,6 @@ pub(crate) struct CutKappa {
     pub(crate) before: Option<f64>,
     /// The largest of a tet that was made.
     pub(crate) new_tets: f64,
-}
-
-/// The bodies of a group as one mesh.
-#[derive(Debug, Default)]
-pub(crate) struct Joined {
-    bodies: Vec<usize>,
-    pub(crate) mesh: TetMesh,
-    pub(crate) materials: Vec<Material>,
-    /// For each tet the number of its material, which is that of its body within the group.
-    pub(crate) material_of: Vec<u16>,
-    pub(crate) fixed: Vec<bool>,
-    /// Those that each body asks for.
-    substeps: Vec<Substeps>,
-}
-
-impl Joined {
-    /// Appends a body of the scene.
-    pub(crate) fn add(&mut self, number: usize, body: Body) -> Result<(), Error> {
-        let material = u16::try_from(self.materials.len())
-            .map_err(|_| value("body", "too many", "at most 65,536"))?;
-        let first = self.mesh.positions.len();
-        let shifted = |p: ParticleId| ParticleId::new(first + p.index());
-        self.mesh.positions.extend(body.mesh.positions);
-        let tets = body.mesh.tets.iter().map(|tet| tet.map(shifted));
-        self.mesh.tets.extend(tets);
-        self.bodies.push(number);
-        self.material_of.resize(self.mesh.tets.len(), material);
-        self.materials.push(body.material);
-        self.fixed.extend(body.fixed);
-        self.substeps.push(body.substeps);
-        Ok(())
-    }
-
-    /// The substeps of the group: the most that a body asks for. Where it is left open, also how they were chosen.
-    fn substeps(
-        &self,
-        scene: &Scene,
-        solver: &AnySolver,
-        cuttable: &CuttableMesh,
-    ) -> (u32, Option<Choice>) {
-        let fixed = |substeps: &Substeps| match substeps {
-            Substeps::Fixed(substeps) => *substeps,
-            Substeps::Auto => 1,
-        };
-        let most = self.substeps.iter().map(fixed).max().unwrap_or(1);
-        if !self.substeps.contains(&Substeps::Auto) {
-            return (most, None);
-        }
-        let mesh = cuttable.mesh();
-        let time = scene.solver.time_step;
-        let auto = |t: &usize| self.substeps[usize::from(self.material_of[*t])] == Substeps::Auto;
-        let of_tet = |t: usize| {
-            let kappa = each!(solver, solver => solver.kappa_of(t, time));
-            (kappa, mesh.volume(TetId::new(t)))
-        };
-        let tets = (0..mesh.tets.len()).filter(auto).map(of_tet).collect();
-        let softens = scene.solver.kappa_limit.is_finite();
-        let choice = choose(tets, scene.solver.max_substeps, softens);
-        (most.max(choice.substeps), Some(choice))
-    }
 }
 
 impl Group {
@@ -135,11 +77,22 @@ impl Group {
             };
             solver.limit_kappa(limit, cuttable.mesh());
         }
+        for handle in &mut joined.handles {
+            handle.attach(&mut solver)?;
+        }
+        link::connect(&mut solver, &joined.links)?;
         let plan = Plan::new(scene, cuttable.mesh())?;
+        let volumes = joined.volumes();
+        if let Some(volumes) = &volumes {
+            volumes.constrain(&mut solver, &cuttable, &plan.schedule)?;
+        }
+        solver.prepare(&scene.solver)?;
         let mut group = Self {
             solver,
             plan,
             settings,
+            handles: joined.handles,
+            volumes,
             positions: Vec::new(),
             pieces: cuttable.mesh().pieces().count,
             initial_volume: cuttable.mesh().total_volume(),
@@ -158,38 +111,55 @@ impl Group {
         self.rest.is_some_and(|rest| rest.asleep())
     }
 
-    /// Advances by one frame, unless it sleeps.
-    pub(crate) fn step(&mut self, keeping_residuals: bool) -> Result<StepReport, Error> {
+    /// Advances by the frame of a number, unless it sleeps. What moves a handle or a collider wakes it.
+    pub(crate) fn step(
+        &mut self,
+        frame: u64,
+        keeping_residuals: bool,
+    ) -> Result<StepReport, Error> {
+        let moved = self.rest.is_some() && self.is_moved(frame);
+        if let Some(rest) = self.rest.as_mut().filter(|_| moved) {
+            rest.wake();
+        }
         if self.asleep() {
             return Ok(StepReport::default());
         }
+        for handle in &self.handles {
+            handle.advance(frame, &mut self.solver);
+        }
         let (schedule, settings) = (&self.plan.schedule, &self.settings);
-        let step = each!(&mut self.solver, solver => if keeping_residuals {
-            solver.step_keeping_residuals(schedule, settings)
-        } else {
-            solver.step(schedule, settings)
-        });
-        if let Some(rest) = &mut self.rest {
-            each!(&mut self.solver, solver => if rest.count(solver.max_speed(), settings.time_step) {
+        let step = self.solver.step(schedule, settings, keeping_residuals)?;
+        collider::advance(&mut self.settings);
+        let time = self.settings.time_step;
+        if let Some(rest) = self.rest.as_mut().filter(|_| !moved) {
+            each!(&mut self.solver, solver => if rest.count(solver.max_speed(), time) {
                 for p in 0..solver.particle_count() {
                     solver.set_velocity(p, DVec3::ZERO);
                 }
             });
         }
-        step.map_err(|source| Error::Xpbd {
-            field: "solver".into(),
-            source,
-        })
+        Ok(step)
     }
 
-    /// Lets solver, clusters, colors and schedule follow a cut of the mesh, and wakes it. The pieces are counted by
+    /// Whether a handle or a collider moves in a frame.
+    fn is_moved(&self, frame: u64) -> bool {
+        let mut colliders = self.settings.colliders.iter();
+        colliders.any(|collider| collider.velocity != DVec3::ZERO)
+            || self.handles.iter().any(|handle| handle.moves(frame))
+    }
+
+    /// Lets solver, clusters, colors, schedule and volume constraints follow a cut of the mesh, and wakes it. The pieces are counted by
     /// [`Group::count_pieces`].
     pub(crate) fn follow(&mut self, delta: &CutDelta, ms: &mut Milliseconds) -> Result<(), Error> {
         if let Some(rest) = &mut self.rest {
             rest.wake();
         }
-        self.solver.follow(delta, &self.cuttable);
-        self.plan.follow(delta, ms)
+        self.solver.follow(delta, &self.cuttable, ms)?;
+        self.plan.follow(delta, ms)?;
+        let Some(volumes) = &self.volumes else {
+            return Ok(());
+        };
+        volumes.follow(&mut self.solver, delta, &self.cuttable, &self.plan.schedule)
     }
 
     /// Notes the largest kappa before the first cut of a frame. O(tets).

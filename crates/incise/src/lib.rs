@@ -23,13 +23,16 @@
 mod backend;
 mod body;
 mod collider;
+mod descent;
 mod error;
 mod group;
 mod handle;
 mod islands;
+mod joined;
 mod limits;
 mod link;
 mod measure;
+mod method;
 mod plan;
 mod preset;
 mod region;

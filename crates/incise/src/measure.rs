@@ -6,23 +6,55 @@
 use glam::DVec3;
 use incise_xpbd::Volume;
 
-use crate::backend::each;
+use crate::backend::{LastSubstep, each};
 use crate::group::Group;
 use crate::report::{BodyReport, EnergyReport, ResidualReport, SoftenedReport};
 
-/// Residuals of the last substep of each group awake, as one vector's length; `None` unless these have kept theirs.
-pub(crate) fn residual(groups: &[Group]) -> Option<ResidualReport> {
-    let mut sum = ResidualReport {
-        primal: 0.0,
-        dual: 0.0,
-    };
-    for group in groups.iter().filter(|group| !group.asleep()) {
+/// Residuals of the last substep of each group awake, as one vector's length, and their potentials' sum; `None` if all
+/// sleep or one has not kept its own. What is too large for a double is the largest one.
+pub(crate) fn residual(groups: &[Group], gravity: Option<DVec3>) -> Option<ResidualReport> {
+    let awake = || groups.iter().filter(|group| !group.asleep());
+    // The weight's norm in N, and the same times the square of each group's substep.
+    let (mut weight, mut moved) = (0.0_f64, 0.0_f64);
+    let (mut primal, mut dual, mut force) = (0.0_f64, 0.0_f64, 0.0_f64);
+    let (mut potential, mut constraints, mut descends) = (0.0, 0, false);
+    for group in awake() {
         let time = group.settings.substep_time();
-        let residuals = each!(&group.solver, solver => solver.residuals(time))?;
-        sum.primal = sum.primal.hypot(residuals.primal);
-        sum.dual = sum.dual.hypot(residuals.dual);
+        if let Some(gravity) = gravity {
+            let load = each!(&group.solver, solver => solver.load(gravity));
+            weight = weight.hypot(load);
+            moved = moved.hypot(load * time * time);
+        }
+        match group.solver.last_substep(time)? {
+            LastSubstep::Constraints(residuals) => {
+                primal = primal.hypot(residuals.primal);
+                dual = dual.hypot(residuals.dual);
+                force = force.hypot(residuals.force);
+                potential += residuals.potential;
+                constraints += residuals.constraints;
+            }
+            LastSubstep::Descent {
+                force: left,
+                potential: of_group,
+            } => {
+                force = force.hypot(left);
+                potential += of_group;
+                descends = true;
+            }
+        }
     }
-    Some(sum)
+    awake().next()?;
+    let of_constraints = |value: f64| (!descends).then_some(value.min(f64::MAX));
+    let relative = |value: f64, unit: f64| (unit > 0.0).then(|| (value / unit).min(f64::MAX));
+    Some(ResidualReport {
+        primal: of_constraints(primal),
+        primal_relative: relative(primal, moved).and_then(of_constraints),
+        dual: of_constraints(dual),
+        dual_rms: of_constraints(dual / (constraints.max(1) as f64).sqrt()),
+        force: force.min(f64::MAX),
+        force_relative: relative(force, weight),
+        potential: potential.min(f64::MAX),
+    })
 }
 
 pub(crate) fn energy(groups: &[Group], gravity: Option<DVec3>) -> EnergyReport {

@@ -5,7 +5,6 @@
 use std::time::Duration;
 
 use incise_cutting::CutDelta;
-use incise_xpbd::Residuals;
 use incise_xpbd::Softened;
 use serde::Serialize;
 
@@ -166,43 +165,30 @@ pub struct Milliseconds {
     pub total: f64,
 }
 
-/// Residuals of the last substep.
+/// Residuals of the last substep. Descent has no multipliers, and therefore no primal and dual ones.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct ResidualReport {
     /// What XPBD drops, in kg·m.
-    pub primal: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub primal: Option<f64>,
     /// The same as a part of the weight's norm times the square of the substep; absent without gravity.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub primal_relative: Option<f64>,
     /// What it iterates on, without unit.
-    pub dual: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dual: Option<f64>,
     /// Its root mean square over all constraints.
-    pub dual_rms: f64,
-    /// The unbalanced force of the implicit step in N, from positions alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dual_rms: Option<f64>,
+    /// The unbalanced force of the implicit step in N, from positions alone. Descent leaves out what presses particles
+    /// into colliders.
     pub force: f64,
     /// The same as a part of the weight's norm; absent without gravity.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub force_relative: Option<f64>,
     /// The energy in J that the implicit step would make least.
     pub potential: f64,
-}
-
-impl ResidualReport {
-    /// The residuals of a substep, beside a load of that norm in N.
-    pub(crate) fn new(residuals: &Residuals, load: Option<f64>, substep_time: f64) -> Self {
-        let load = load.filter(|&load| load > 0.0);
-        let relative = |value: f64, unit: f64| (value / unit).min(f64::MAX);
-        Self {
-            primal: residuals.primal,
-            primal_relative: load
-                .map(|load| relative(residuals.primal, load * substep_time * substep_time)),
-            dual: residuals.dual,
-            dual_rms: residuals.dual_rms,
-            force: residuals.force,
-            force_relative: load.map(|load| relative(residuals.force, load)),
-            potential: residuals.potential,
-        }
-    }
 }
 
 /// Energies in J.

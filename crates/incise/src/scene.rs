@@ -11,6 +11,7 @@ use crate::Error;
 pub use crate::collider::{ColliderSpec, RotationSpec};
 pub use crate::handle::{HandleSpec, TurnSpec};
 pub use crate::link::{EndSpec, LinkSpec};
+pub use crate::method::{Form, Method};
 pub use crate::preset::Preset;
 pub use crate::sleep::SleepSpec;
 pub use crate::substeps::Substeps;
@@ -127,10 +128,12 @@ pub struct GroundSpec {
 }
 
 /// How it is computed.
+///
+/// Some defaults depend on the method: see [`SolverSpec::of`]. Those and a preset's are applied when a scene is read.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SolverSpec {
-    /// Other defaults for the keys below, applied when a scene is read: `paper`.
+    /// Other defaults for the keys below: `paper`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub preset: Option<Preset>,
     /// Time of a frame in s.
@@ -139,12 +142,23 @@ pub struct SolverSpec {
     pub substeps: Substeps,
     /// The most substeps that `auto` takes.
     pub max_substeps: u32,
-    /// Passes over the constraints in a substep; 1 is what converges.
+    /// Passes over the constraints in a substep, or sweeps of descent. With Gauss-Seidel 1 is what converges.
     pub iterations: u32,
     /// How a pass is made.
     pub method: Method,
+    /// How the two constraints of a tet are solved. Descent has no constraints.
+    pub form: Form,
     /// Factor on each correction.
     pub relaxation: f64,
+    /// For Chebyshev: the spectral radius of the Jacobi iteration, from 0 to below 1: the larger, the bolder. At 0.99
+    /// the weights tend to 1.75, which they reach in some ten iterations; more pays only with hundreds of them.
+    pub spectral_radius: f64,
+    /// For Chebyshev: plain iterations before the first extrapolation, at least 1. They damp what extrapolation would
+    /// blow up.
+    pub delay: u32,
+    /// For descent: whether each sweep is followed by a correction of the whole body, which costs some 100 sweeps.
+    #[serde(skip_serializing_if = "is_false")]
+    pub coarse: bool,
     /// How constraints are put together: `none` or `serial:K`.
     pub clustering: String,
     /// How clusters are colored, by the name of an [`Algorithm`](incise_coloring::Algorithm). Clusters that cuts make are
@@ -154,7 +168,7 @@ pub struct SolverSpec {
     pub precision: Precision,
     /// Largest kappa of a tet, positive: stiffer ones, as cuts leave them, are softened to it. `inf` softens none.
     pub kappa_limit: f64,
-    /// Bodies at rest are not solved until they are cut; absent: all are always solved.
+    /// Bodies at rest are not solved until they are cut or something moves them; absent: all are always solved.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sleep: Option<SleepSpec>,
 }
@@ -168,7 +182,11 @@ impl Default for SolverSpec {
             max_substeps: 200,
             iterations: 1,
             method: Method::GaussSeidel,
+            form: Form::Block,
             relaxation: 1.0,
+            spectral_radius: 0.99,
+            delay: 10,
+            coarse: false,
             clustering: "serial:10".to_owned(),
             coloring: "auto".to_owned(),
             precision: Precision::F32,
@@ -176,16 +194,6 @@ impl Default for SolverSpec {
             sleep: None,
         }
     }
-}
-
-/// How a pass over the constraints is made.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
-pub enum Method {
-    /// Color after color, each constraint seeing the corrections before it.
-    #[default]
-    GaussSeidel,
 }
 
 /// Width of the numbers the solver computes with.
@@ -372,7 +380,7 @@ impl Scene {
                 message: with_suggestion(error.message()),
             }
         })?;
-        scene.solver = scene.solver.over_preset(text)?;
+        scene.solver = scene.solver.with_defaults(text)?;
         Ok(scene)
     }
 
@@ -436,6 +444,9 @@ pub fn nearest<'a>(unknown: &str, known: impl IntoIterator<Item = &'a str>) -> O
         .max_by(|a, b| likeness(a).total_cmp(&likeness(b)))
 }
 
+fn is_false(flag: &bool) -> bool {
+    !flag
+}
 fn one() -> u64 {
     1
 }

@@ -10,20 +10,21 @@ use std::time::Instant;
 use glam::DVec3;
 use incise_graph::{Clustering, Coloring, Schedule};
 use incise_mesh::{Surface, TetMesh};
-use incise_xpbd::{Ground, StepSettings};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use crate::body::Body;
-use crate::group::{Group, Joined};
+use crate::group::Group;
 use crate::islands::islands;
-use crate::limits::{LARGEST_COORDINATE, coordinates, value, within};
+use crate::joined::Joined;
+use crate::limits::value;
 use crate::measure::{by_body, energy, kappa, max_speed, residual, softened, volume};
+use crate::method::settings;
 use crate::report::{CutReport, FrameReport, Milliseconds, SoftenedReport, milliseconds};
-use crate::scene::{GroundSpec, Precision, Quantity, StrokeSpec, Substeps};
+use crate::scene::{Precision, Quantity, StrokeSpec};
 use crate::strokes::Timeline;
 use crate::whole::Whole;
-use crate::{Error, Scene};
+use crate::{Error, Scene, link};
 
 /// A scene in motion.
 ///
@@ -54,7 +55,9 @@ use crate::{Error, Scene};
 /// ```
 #[derive(Debug)]
 pub struct Simulation {
-    settings: StepSettings,
+    /// In s.
+    time_step: f64,
+    gravity: Option<DVec3>,
     quantities: Vec<Quantity>,
     every: u64,
     precision: Precision,
@@ -110,29 +113,23 @@ impl Simulation {
         }
         check_limits(scene)?;
         let bodies = Body::all(scene)?;
-        let islands = islands(bodies.len(), &[]);
-        let count = islands.iter().max().map_or(0, |last| last + 1);
-        let whole = (count > 1).then(|| Whole::new(&bodies, &islands));
-        let mut joined: Vec<Joined> = (0..count).map(|_| Joined::default()).collect();
-        for (number, (body, island)) in bodies.into_iter().zip(islands).enumerate() {
-            joined[island].add(number, body)?;
-        }
+        let islands = islands(bodies.len(), &link::pairs(scene, bodies.len())?);
+        let several = islands.iter().any(|&island| island > 0);
+        let whole = several.then(|| Whole::new(&bodies, &islands));
+        let joined = Joined::all(scene, bodies, &islands)?;
         let make_groups = || {
             let groups = joined.into_par_iter();
             groups
-                .map(|joined| Group::new(scene, settings, joined))
+                .map(|joined| Group::new(scene, settings.clone(), joined))
                 .collect::<Result<Vec<_>, _>>()
         };
         let groups = match &pool {
             Some(pool) => pool.install(make_groups),
             None => make_groups(),
         }?;
-        let volumes = BodyVolumes::new(scene)?;
-        if let Some(volumes) = &volumes {
-            volumes.constrain(&mut solver, &cuttable, &plan.schedule)?;
-        }
         let mut simulation = Self {
-            settings,
+            time_step: settings.time_step,
+            gravity: settings.gravity,
             quantities: scene.report.quantities.clone(),
             every: scene.report.every,
             precision,
@@ -140,8 +137,6 @@ impl Simulation {
             groups,
             whole,
             timeline,
-            handles,
-            volumes,
             next_frame: 0,
             report: FrameReport::default(),
             pool,
@@ -186,16 +181,16 @@ impl Simulation {
         let cut = self.carry_out_strokes(&mut ms)?;
 
         let before_solve = Instant::now();
-        let residual = self.wants(Quantity::Residual);
+        let (frame, residual) = (self.next_frame, self.wants(Quantity::Residual));
         let groups = self.groups.par_iter_mut();
         let repaired = groups
-            .map(|group| group.step(residual).map(|step| step.repaired))
+            .map(|group| group.step(frame, residual).map(|step| step.repaired))
             .try_reduce(|| 0, |a, b| Ok(a + b))?;
         ms.solve = milliseconds(before_solve.elapsed());
 
         self.report = FrameReport {
             frame: self.next_frame,
-            time_s: (self.next_frame + 1) as f64 * self.settings.time_step,
+            time_s: (self.next_frame + 1) as f64 * self.time_step,
             cut,
             repaired,
             ..FrameReport::default()
@@ -280,9 +275,9 @@ impl Simulation {
         for quantity in &self.quantities {
             let report = &mut self.report;
             match quantity {
-                Quantity::Residual => report.residual = residual(&self.groups),
+                Quantity::Residual => report.residual = residual(&self.groups, self.gravity),
                 Quantity::Energy => {
-                    report.energy = Some(energy(&self.groups, self.settings.gravity));
+                    report.energy = Some(energy(&self.groups, self.gravity));
                 }
                 Quantity::Volume => {
                     let volume = volume(&self.groups);
@@ -448,52 +443,4 @@ fn check_limits(scene: &Scene) -> Result<(), Error> {
         }
     }
     Ok(())
-}
-
-fn settings(scene: &Scene) -> Result<StepSettings, Error> {
-    let settings = StepSettings {
-        time_step: scene.solver.time_step,
-        // Each group has its own.
-        substeps: match scene.solver.substeps {
-            Substeps::Fixed(substeps) => substeps,
-            Substeps::Auto => 1,
-        },
-        iterations: scene.solver.iterations,
-        relaxation: scene.solver.relaxation,
-        gravity: scene
-            .world
-            .gravity
-            .map(|g| coordinates("world.gravity", g))
-            .transpose()?,
-        colliders: collider::colliders(scene)?,
-    };
-    settings.check().map_err(|source| Error::Xpbd {
-        field: "solver".into(),
-        source,
-    })?;
-    within("solver.time_step", settings.time_step, 1e-9, 1e3)?;
-    Ok(settings)
-}
-
-/// Checks the handles of a scene and takes hold.
-fn hold(scene: &Scene, bodies: &Bodies, solver: &mut AnySolver) -> Result<Vec<Handle>, Error> {
-    let mut handles = Vec::with_capacity(scene.handle.len());
-    for (i, spec) in scene.handle.iter().enumerate() {
-        let field = format!("handle[{i}]");
-        let particles = |body| bodies.particles_of(body);
-        let mut handle = Handle::new(&field, spec, |body| Some(particles(body)?.0))?;
-        let first = particles(handle.body()).map_or(0, |(_, first)| first);
-        handle.attach(&field, solver, first)?;
-        handles.push(handle);
-    }
-    Ok(handles)
-}
-
-/// Checks the links of a scene and ties them.
-fn connect(scene: &Scene, bodies: &Bodies, solver: &mut AnySolver) -> Result<(), Error> {
-    let links = scene.link.iter().enumerate();
-    let links: Result<Vec<_>, Error> = links
-        .map(|(i, spec)| link::link(&format!("link[{i}]"), spec, |b| bodies.particles_of(b)))
-        .collect();
-    link::connect(solver, &links?)
 }

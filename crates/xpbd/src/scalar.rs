@@ -140,11 +140,11 @@ impl<R: Real, C> Constraints<R, C> {
             damping = constraint.damping() * factors.per_time;
             for k in 0..K {
                 let motion = x[k] - solver.previous[numbers[k] as usize];
-                rate = rate + R::dot(gradients[k], motion);
+                rate += R::dot(gradients[k], motion);
             }
         }
         for k in 0..K {
-            steepness = steepness + weights[k] * R::dot(gradients[k], gradients[k]);
+            steepness += weights[k] * R::dot(gradients[k], gradients[k]);
         }
         let compliance = constraint.compliance() / factors.time_squared;
         let multiplier = self.multipliers.get(index);

@@ -62,7 +62,7 @@ impl<R: Real> Solver<R> {
     }
 }
 
-/// A vector of coordinates between 1/2 and 1, each of either sign, that depends on `number` alone (SplitMix64: Steele,
+/// A vector of coordinates between 1/2 and 1, each of either sign, that depends on `number` alone (`SplitMix64`: Steele,
 /// Lea, Flood 2014).
 fn direction(number: u64) -> DVec3 {
     let coordinate = |axis: u64| {

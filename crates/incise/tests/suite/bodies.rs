@@ -213,11 +213,11 @@ fn quantities_are_those_of_all_bodies() {
     assert_eq!(together.kappa.unwrap(), max(&|r| r.kappa.unwrap()));
     let residual = together.residual.unwrap();
     let square = |x: f64| x * x;
-    let primal = sum(&|r| square(r.residual.unwrap().primal));
-    near(square(residual.primal), primal);
+    let primal = sum(&|r| square(r.residual.unwrap().primal.unwrap()));
+    near(square(residual.primal.unwrap()), primal);
     near(
-        square(residual.dual),
-        sum(&|r| square(r.residual.unwrap().dual)),
+        square(residual.dual.unwrap()),
+        sum(&|r| square(r.residual.unwrap().dual.unwrap())),
     );
     let softened = together.softened.unwrap();
     let tets: usize = alone.iter().map(|r| r.softened.unwrap().tets).sum();
@@ -239,6 +239,78 @@ fn the_fixture_of_two_bodies_is_cut_in_one_stroke() {
     assert_eq!(cuts.count(), 1);
     assert_eq!(simulation.report().pieces, 4);
     simulation.check().unwrap();
+}
+
+/// The third body of three is tied to the first: they are solved together, the second on its own and as alone.
+#[test]
+fn linked_bodies_share_a_group_and_others_do_not() {
+    let bodies = three();
+    let link = "[[link]]\nfrom = { body = 2, point = [0, 0.8, 0] }\nto = { body = 0, point = [0, -0.8, 0] }\ncompliance = 1e-5\n";
+    let report = "[report]\nquantities = [\"kappa\"]\n[solver]\nsubsteps = 2\n";
+    let second = bodies[1].clone() + "substeps = 7\n";
+    let with = |bodies: &str| simulation(&scene(&format!("{report}{WORLD}{bodies}{}", strokes())));
+    let mut tied = with(&format!("{}{second}{}{link}", bodies[0], bodies[2]));
+    let mut loose = with(&format!("{}{second}{}", bodies[0], bodies[2]));
+    let mut alone = with(&second);
+    let sizes = ranges(&bodies);
+    for frame in 0..7 {
+        for simulation in [&mut tied, &mut loose, &mut alone] {
+            simulation.step().unwrap();
+            simulation.check().unwrap();
+        }
+        let groups = |simulation: &Simulation| {
+            let groups = simulation.report().bodies.iter();
+            groups
+                .map(|group| (group.bodies.clone(), group.substeps))
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(groups(&tied), [(vec![0, 2], 2), (vec![1], 7)]);
+        assert_eq!(groups(&loose), [(vec![0], 2), (vec![1], 7), (vec![2], 2)]);
+        let owner = body_of_tets(&tied, &sizes);
+        let own = (0..owner.len()).filter(|t| owner[*t] == 1);
+        let all = 0..alone.mesh().tets.len();
+        assert!(
+            shape(&tied, own) == shape(&alone, all),
+            "the second body differs in frame {frame}"
+        );
+    }
+    // The thread pulls: the first particles of the first body are elsewhere than without.
+    assert!(tied.positions()[..50] != loose.positions()[..50]);
+}
+
+/// The second of two bodies is held and pulled away; the first falls as alone.
+#[test]
+fn a_handle_on_one_of_two_bodies_moves_that_one() {
+    let bodies = [
+        body("box", 200, [0.0; 3]),
+        body("box", 200, [2.0, 0.0, 0.0]),
+    ];
+    let handle = "[[handle]]\nbody = 1\nholds = [{ half_space = { point = [2, 0, 0.3], normal = [0, 0, 1] } }]\n\
+        frames = [1, 5]\npath = [[0, 0, 0], [0, 0, 0.1]]\n";
+    let with = |text: &str| {
+        let mut scene = scene(&format!("{WORLD}{text}"));
+        scene.solver.precision = Precision::F64;
+        simulation(&scene)
+    };
+    let mut held = with(&format!("{}{handle}", bodies.concat()));
+    let mut alone = with(&bodies[0]);
+    for _ in 0..8 {
+        held.step().unwrap();
+        alone.step().unwrap();
+        held.check().unwrap();
+    }
+    let first = alone.positions().len();
+    assert!(held.positions()[..first] == *alone.positions());
+    let second = held.mesh().positions.iter().zip(held.positions());
+    let top: Vec<_> = second
+        .skip(first)
+        .filter(|(rest, _)| rest.z >= 0.3)
+        .collect();
+    assert!(top.len() > 10);
+    for (rest, x) in top {
+        // Rounding of a sum.
+        assert!(x.distance(*rest + DVec3::Z * 0.1) < 1e-12);
+    }
 }
 
 /// A body a thousand kilometers away moves as here, is cut as here, and the one here does not feel it.

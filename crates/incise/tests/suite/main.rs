@@ -8,6 +8,7 @@ mod cutting;
 mod determinism;
 mod kappa;
 mod locality;
+mod methods;
 mod mistakes;
 mod parsing;
 mod physics;

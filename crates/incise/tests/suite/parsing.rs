@@ -5,7 +5,7 @@ use std::path::Path;
 
 use incise::mesh::generate::{Shape, generate};
 use incise::mesh::io;
-use incise::scene::{Method, Precision, StrokeSpec};
+use incise::scene::{Form, Method, Precision, StrokeSpec};
 use incise::{Error, Scene, Simulation};
 
 use crate::support::{body, scene};
@@ -24,6 +24,10 @@ fn defaults_are_the_documented_ones() {
     assert_eq!(
         (solver.method, solver.relaxation),
         (Method::GaussSeidel, 1.0)
+    );
+    assert_eq!(
+        (solver.form, solver.spectral_radius, solver.delay),
+        (Form::Block, 0.99, 10)
     );
     assert_eq!(
         (solver.clustering.as_str(), solver.coloring.as_str()),
@@ -70,8 +74,11 @@ time_step = 0.01
 substeps = "auto"
 max_substeps = 70
 iterations = 2
-method = "gauss-seidel"
+method = "chebyshev"
+form = "sequential"
 relaxation = 0.9
+spectral_radius = 0.9
+delay = 3
 clustering = "serial:5"
 coloring = "greedy"
 precision = "f64"
@@ -145,7 +152,11 @@ fn an_unknown_key_at_any_level_names_the_nearest() {
         ("auto", "atuo"),
         ("max_substeps", "max_substep"),
         ("iterations", "iteration"),
-        ("gauss-seidel", "gauss_seidel"),
+        ("chebyshev", "chebychev"),
+        ("form", "from"),
+        ("sequential", "seqential"),
+        ("spectral_radius", "spectral_radios"),
+        ("delay", "dealy"),
         ("relaxation", "relaxtion"),
         ("clustering", "clusterng"),
         ("precision", "precison"),

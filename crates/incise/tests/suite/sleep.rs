@@ -63,6 +63,55 @@ fn a_stroke_wakes_what_it_cuts_and_nothing_else() {
     until_asleep(&mut simulation);
 }
 
+/// Weightless boxes at rest sleep; a handle wakes the one it holds for as long as it moves.
+#[test]
+fn a_handle_wakes_what_it_holds_while_it_moves() {
+    let solver = "[solver]\nsleep = { speed = 0.05, time = 0.05 }\n";
+    let bodies = body("box", 200, [0.0; 3]) + &body("box", 200, [3.0, 0.0, 0.0]);
+    let all = "[[handle]]\nbody = 1\nholds = [{ half_space = { point = [0, 0, -9], normal = [0, 0, 1] } }]\n\
+        frames = [10, 20]\npath = [[0, 0, 0], [0, 0, 1]]\n";
+    let mut simulation = simulation(&scene(&format!("{solver}{bodies}{all}")));
+    for frame in 0..30_u32 {
+        let bodies = simulation.step().unwrap().bodies.clone();
+        // 0.05 s are four frames.
+        assert_eq!(bodies[0].asleep, Some(frame >= 3), "frame {frame}");
+        // The handle moves in ten frames; what it holds is still from the frame after that.
+        let awake = frame < 3 || (10..23).contains(&frame);
+        assert_eq!(bodies[1].asleep, Some(!awake), "frame {frame}");
+    }
+    let rest = simulation.mesh().positions.last().unwrap();
+    let x = simulation.positions().last().unwrap();
+    // Single precision.
+    assert!((x.z - rest.z - 1.0).abs() < 1e-6);
+}
+
+/// A wall comes from far; nothing may sleep before it, or it would pass through.
+#[test]
+fn a_moving_collider_keeps_bodies_awake() {
+    let solver = "[solver]\nsleep = { time = 0.05 }\n";
+    let sphere = body("sphere", 200, [0.0; 3]);
+    let wall = |velocity: f64| {
+        format!(
+            "[[collider]]\nkind = \"plane\"\npoint = [-0.8, 0, 0]\nnormal = [1, 0, 0]\nvelocity = [{velocity}, 0, 0]\n"
+        )
+    };
+    let run = |velocity: f64| {
+        let text = format!("{solver}{sphere}{}", wall(velocity));
+        let mut simulation = simulation(&scene(&text));
+        for _ in 0..40 {
+            simulation.step().unwrap();
+        }
+        let low = simulation.positions().iter().map(|x| x.x);
+        let asleep = simulation.report().bodies[0].asleep;
+        (asleep, low.fold(f64::INFINITY, f64::min))
+    };
+    assert_eq!(run(0.0).0, Some(true));
+    let (asleep, low) = run(1.0);
+    // The wall is at -0.8 + 40 · 0.016 m; single precision.
+    assert_eq!(asleep, Some(false));
+    assert!(low > -0.16 - 1e-6, "{low}");
+}
+
 #[test]
 fn sleeping_is_the_same_for_any_number_of_threads() {
     let scene = lying_and_falling(&plane(12, [0.003, 0.0, 0.0], [1.0, 0.2, 0.1]));

@@ -150,7 +150,7 @@ impl<R: Real> Blocks<R> {
                     let slope = R::cross(b - a, c - a) * spoke.slope;
                     let lack = R::dot(slope, a) - spoke.target;
                     *force += slope * lack - (a * wa + b * wb + c * wc);
-                    isotropic = isotropic - (wa + wb + wc);
+                    isotropic -= wa + wb + wc;
                     // Gradients of √(lV) det F at this particle (minus slope) and at the others.
                     let held = spoke.slope * excess[stars.tets[pair] as usize];
                     add_outer::<R>(&mut blocks[0], slope, slope);

@@ -14,6 +14,10 @@ pub struct DescentReport {
     pub iterations: u32,
     /// With a tolerance: the force residual at the end of the last substep, as a fraction of that at the free motion.
     pub residual: Option<f64>,
+    /// If measured: [`ImplicitStep::residual`] in N at the end of the frame.
+    pub force: Option<f64>,
+    /// If measured: [`ImplicitStep::potential`] in J at the end of the frame.
+    pub potential: Option<f64>,
 }
 
 impl<R: Real> Solver<R> {
@@ -151,7 +155,7 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
         step
     }
 
-    /// Iterates until the settings or the tolerance say that it is enough.
+    /// Iterates until the settings or the tolerance say that it is enough, then measures if asked to.
     pub(super) fn run(
         &mut self,
         settings: &DescentSettings,
@@ -170,9 +174,13 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
                     residual
                 });
                 if residual <= tolerance * start {
-                    return;
+                    break;
                 }
             }
+        }
+        if settings.measure && self.last {
+            report.force = Some(self.residual());
+            report.potential = Some(self.potential());
         }
     }
 

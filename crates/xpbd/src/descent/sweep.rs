@@ -80,14 +80,14 @@ impl<R: Real> Sweep<R> {
             let slope = R::cross(b - a, c - a) * spoke.slope;
             let excess = R::dot(slope, a) - spoke.target;
             force += slope * excess - (a * wa + b * wb + c * wc);
-            isotropic = isotropic - (wa + wb + wc);
+            isotropic -= wa + wb + wc;
             let [u, v, w] = R::components(slope);
-            h[0] = h[0] + u * u;
-            h[1] = h[1] + u * v;
-            h[2] = h[2] + u * w;
-            h[3] = h[3] + v * v;
-            h[4] = h[4] + v * w;
-            h[5] = h[5] + w * w;
+            h[0] += u * u;
+            h[1] += u * v;
+            h[2] += u * w;
+            h[3] += v * v;
+            h[4] += v * w;
+            h[5] += w * w;
         }
         let mut step = solve(isotropic, h, force) * self.relaxation;
         // All its tets lie on lines: a tiny push out of them, if that is unstable, grows from sweep to sweep.
