@@ -181,8 +181,9 @@ pub struct ResidualReport {
     /// Its root mean square over all constraints.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dual_rms: Option<f64>,
-    /// The unbalanced force of the implicit step in N, from positions alone. Descent leaves out what presses particles
-    /// into colliders.
+    /// The unbalanced force of the implicit step in N, from positions alone. XPBD counts that of colliders as
+    /// unbalanced; descent leaves out what presses particles into them, but as its sweeps and the colliders take turns,
+    /// it does not vanish where bodies touch them.
     pub force: f64,
     /// The same as a part of the weight's norm; absent without gravity.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -170,7 +170,7 @@ fn an_unknown_key_at_any_level_names_the_nearest() {
         ("fixed", "fixd"),
         ("half_space", "half-space"),
         ("low", "lo"),
-        ("radius", "radus"),
+        ("center", "centr"),
         ("particles", "particle"),
         ("tets", "tet"),
         ("frame ", "frme "),
