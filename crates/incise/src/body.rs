@@ -1,4 +1,4 @@
-//! [`Body`]: a body of a scene with its mesh, material and fixed particles, all values checked.
+//! [`Body`]: a body of a scene with its mesh, what it is made of and its fixed particles, all values checked.
 
 use incise_mesh::generate::{Shape, generate};
 use incise_mesh::{TetMesh, io};

@@ -148,8 +148,8 @@ impl Group {
             || self.handles.iter().any(|handle| handle.moves(frame))
     }
 
-    /// Lets solver, clusters, colors, schedule and volume constraints follow a cut of the mesh, and wakes it. The pieces are counted by
-    /// [`Group::count_pieces`].
+    /// Lets solver, clusters, colors, schedule and volume constraints follow a cut of the mesh, and wakes it. The pieces
+    /// are counted by [`Group::count_pieces`].
     pub(crate) fn follow(&mut self, delta: &CutDelta, ms: &mut Milliseconds) -> Result<(), Error> {
         if let Some(rest) = &mut self.rest {
             rest.wake();

@@ -62,17 +62,14 @@ pub(crate) struct Handle {
 }
 
 impl Handle {
-    /// Checks a handle. `positions` gives those of a body's particles at rest, and the number of its first particle in
-    /// its group, by the number of the body.
-    pub(crate) fn new<'a>(
+    /// Checks a handle. `positions` are those of its body's particles at rest, which are numbered from `first_particle` on
+    /// in their group.
+    pub(crate) fn new(
         field: String,
         spec: &HandleSpec,
-        positions: impl Fn(usize) -> Option<(&'a [DVec3], usize)>,
+        positions: &[DVec3],
+        first_particle: usize,
     ) -> Result<Self, Error> {
-        let Some((positions, first_particle)) = positions(spec.body) else {
-            let range = "the number of a body, counted from 0";
-            return Err(value(format!("{field}.body"), spec.body, range));
-        };
         let [first, last] = spec.frames;
         if first >= last {
             let range = "two frames, the second after the first";

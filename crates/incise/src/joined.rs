@@ -3,6 +3,8 @@
 //! Particles and tets are numbered body by body in the order of the scene; handles and links, which a scene gives by
 //! bodies and points, are translated here. Cost: O(particles + tets).
 
+use std::ops::Range;
+
 use incise_cutting::CuttableMesh;
 use incise_mesh::{ParticleId, TetId, TetMesh};
 use incise_xpbd::{DistanceConstraint, Material};
@@ -10,7 +12,7 @@ use incise_xpbd::{DistanceConstraint, Material};
 use crate::backend::{AnySolver, each};
 use crate::body::Body;
 use crate::handle::Handle;
-use crate::limits::value;
+use crate::limits::{existing, value};
 use crate::scene::Substeps;
 use crate::substeps::{Choice, choose};
 use crate::volume::Volumes;
@@ -34,7 +36,8 @@ pub(crate) struct Joined {
 }
 
 impl Joined {
-    /// The groups of a scene, in the order of their first bodies; `islands` says which body goes to which.
+    /// The groups of a scene, in the order of their first bodies; `islands` says which body goes to which. The bodies of
+    /// links exist.
     pub(crate) fn all(
         scene: &Scene,
         bodies: Vec<Body>,
@@ -49,26 +52,26 @@ impl Joined {
             all[island].add(number, body)?;
             ranges.push(first..all[island].mesh.positions.len());
         }
-        for (i, spec) in scene.handle.iter().enumerate() {
-            let particles = |body: usize| {
-                let range = ranges.get(body)?.clone();
-                Some((
-                    &all[islands[body]].mesh.positions[range.clone()],
-                    range.start,
-                ))
-            };
-            let handle = Handle::new(format!("handle[{i}]"), spec, particles)?;
+        let particles = |body: usize| {
+            let range: Range<usize> = ranges[body].clone();
+            let first = range.start;
+            (&all[islands[body]].mesh.positions[range], first)
+        };
+        let handles = scene.handle.iter().enumerate().map(|(i, spec)| {
+            let field = format!("handle[{i}]");
+            existing(&format!("{field}.body"), spec.body, islands.len())?;
+            let (positions, first) = particles(spec.body);
+            Handle::new(field, spec, positions, first)
+        });
+        let handles = handles.collect::<Result<Vec<_>, Error>>()?;
+        let links = scene.link.iter().enumerate();
+        let links = links
+            .map(|(i, spec)| link::link(&format!("link[{i}]"), spec, particles))
+            .collect::<Result<Vec<_>, _>>()?;
+        for (handle, spec) in handles.into_iter().zip(&scene.handle) {
             all[islands[spec.body]].handles.push(handle);
         }
-        for (i, spec) in scene.link.iter().enumerate() {
-            let particles = |body: usize| {
-                let range = ranges[body].clone();
-                (
-                    &all[islands[body]].mesh.positions[range.clone()],
-                    range.start,
-                )
-            };
-            let link = link::link(&format!("link[{i}]"), spec, particles)?;
+        for (link, spec) in links.into_iter().zip(&scene.link) {
             all[islands[spec.from.body]].links.push(link);
         }
         Ok(all)

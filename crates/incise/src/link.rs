@@ -7,7 +7,7 @@ use incise_xpbd::DistanceConstraint;
 use serde::{Deserialize, Serialize};
 
 use crate::backend::{AnySolver, each};
-use crate::limits::{LARGEST_COORDINATE, coordinates, value, within};
+use crate::limits::{LARGEST_COORDINATE, coordinates, existing, value, within};
 use crate::{Error, Scene};
 
 /// Keeps two particles at a distance. A cut leaves it on its particles.
@@ -42,12 +42,8 @@ pub struct EndSpec {
 pub(crate) fn pairs(scene: &Scene, bodies: usize) -> Result<Vec<[usize; 2]>, Error> {
     let links = scene.link.iter().enumerate();
     let pair = |(i, spec): (usize, &LinkSpec)| {
-        for (key, end) in [("from", spec.from), ("to", spec.to)] {
-            if end.body >= bodies {
-                let range = "the number of a body, counted from 0";
-                return Err(value(format!("link[{i}].{key}.body"), end.body, range));
-            }
-        }
+        existing(&format!("link[{i}].from.body"), spec.from.body, bodies)?;
+        existing(&format!("link[{i}].to.body"), spec.to.body, bodies)?;
         Ok([spec.from.body, spec.to.body])
     };
     links.map(pair).collect()

@@ -1,9 +1,12 @@
 //! [`Rest`]: how long a group of bodies has been at rest, and whether it sleeps.
 //!
 //! A body whose fastest particle has stayed below a speed for a time is no longer solved: it keeps its positions to the
-//! bit, its velocities become zero, and it costs nothing until it is cut. The trade: what is left of its motion, at most
-//! that speed, and slow creep are lost. Shear is damped only by the substeps, so that a large soft body rings for
-//! seconds before it rests. The time keeps a body awake that only turns around, as at the top of its flight.
+//! bit, its velocities become zero, and it costs nothing until it is cut or one of its handles moves. A collider with a
+//! velocity keeps everybody awake, wherever it is: nobody foresees whom it will meet.
+//!
+//! The trade: what is left of its motion, at most that speed, and slow creep are lost. Shear is damped only by the
+//! substeps, so that a large soft body rings for seconds before it rests. The time keeps a body awake that only turns
+//! around, as at the top of its flight.
 //!
 //! Source: sleeping islands as in rigid body engines. Cost: a pass over the particles a frame while awake, none asleep.
 
