@@ -175,9 +175,10 @@ impl Output {
                 .map(|t| f64::from(of(t)))
                 .collect::<Vec<_>>()
         };
-        let cluster = |t: usize| simulation.clustering().labels()[t];
+        let (clustering, coloring) = (simulation.clustering(), simulation.coloring());
+        let cluster = |t: usize| clustering.labels()[t];
         let clusters = numbers(&|t| cluster(t).0);
-        let colors = numbers(&|t| simulation.coloring().color(cluster(t).index()).0);
+        let colors = numbers(&|t| coloring.color(cluster(t).index()).0);
         let labels = mesh.pieces().labels;
         let pieces = numbers(&|t| labels[t]);
         let particles = [Field {

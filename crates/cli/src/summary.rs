@@ -3,7 +3,7 @@
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table};
 use incise::FrameReport;
-use incise::report::{Milliseconds, SoftenedReport};
+use incise::report::{BodyReport, Milliseconds, Missed, SoftenedReport};
 
 /// Name and time of each stage that has one.
 type Stage = (&'static str, fn(&Milliseconds) -> f64);
@@ -97,6 +97,9 @@ impl Summary {
             "worst volume ratio of a cut".to_owned(),
             format!("{:.2e}", self.worst_volume_ratio),
         ]);
+        for body in &self.last.bodies {
+            counts.add_row([substeps_of(&body.bodies), substeps(body)]);
+        }
         counts.add_row([
             "kappa before, after".to_owned(),
             format!("{:.2}, {:.2}", kappa[0], kappa[1]),
@@ -122,6 +125,30 @@ impl Summary {
             }
         }
         format!("{stages}\n{counts}")
+    }
+}
+
+/// The name of the row for some bodies.
+fn substeps_of(bodies: &[usize]) -> String {
+    let numbers: Vec<String> = bodies.iter().map(ToString::to_string).collect();
+    format!("substeps of body {}", numbers.join(", "))
+}
+
+/// Substeps, and why there are not more if more are wanted.
+fn substeps(body: &BodyReport) -> String {
+    let substeps = body.substeps;
+    match body.choice {
+        Some(choice) => match choice.missed {
+            Some(Missed::Cap) => {
+                format!("{substeps} (the cap; {} wanted)", choice.substeps_wanted)
+            }
+            Some(Missed::Sliver) => format!(
+                "{substeps} ({} wanted by slivers, {} tets)",
+                choice.substeps_wanted, choice.sliver_tets
+            ),
+            _ => substeps.to_string(),
+        },
+        None => substeps.to_string(),
     }
 }
 

@@ -1,27 +1,51 @@
-//! [`AnySolver`]: the solver in the precision that the scene asks for, and how it follows a cut.
+//! [`AnySolver`]: the solver in the precision and with the method that the scene asks for, and how it follows a cut.
 
 use glam::DVec3;
 use incise_cutting::{CutDelta, CuttableMesh};
-use incise_mesh::{ParticleId, TetId};
-use incise_xpbd::{KappaLimit, Solver};
+use incise_graph::Schedule;
+use incise_mesh::{ParticleId, TetId, TetMesh};
+use incise_xpbd::{KappaLimit, Real, Residuals, Solver, StepReport, StepSettings, XpbdError};
 
 use crate::Error;
-use crate::body::Bodies;
-use crate::scene::Precision;
+use crate::descent::Descent;
+use crate::joined::Joined;
+use crate::report::Milliseconds;
+use crate::scene::{Method, Precision, SolverSpec};
 
 /// A solver in one of both precisions.
 #[derive(Debug)]
 pub(crate) enum AnySolver {
-    Single(Solver<f32>),
-    Double(Solver<f64>),
+    Single(Backend<f32>),
+    Double(Backend<f64>),
+}
+
+/// A solver and what its method needs beside it.
+#[derive(Debug)]
+pub(crate) struct Backend<R: Real> {
+    pub(crate) solver: Solver<R>,
+    /// In a scene that is solved by descent.
+    descent: Option<Descent<R>>,
+}
+
+/// How far the last substep is from a solution of its equations; XPBD knows more than that.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum LastSubstep {
+    Constraints(Residuals),
+    Descent { force: f64, potential: f64 },
 }
 
 /// Does the same with whichever solver it is.
 macro_rules! each {
     ($any:expr, $solver:ident => $body:expr) => {
         match $any {
-            $crate::backend::AnySolver::Single($solver) => $body,
-            $crate::backend::AnySolver::Double($solver) => $body,
+            $crate::backend::AnySolver::Single($crate::backend::Backend {
+                solver: $solver,
+                ..
+            }) => $body,
+            $crate::backend::AnySolver::Double($crate::backend::Backend {
+                solver: $solver,
+                ..
+            }) => $body,
         }
     };
 }
@@ -30,26 +54,24 @@ pub(crate) use each;
 impl AnySolver {
     pub(crate) fn new(
         precision: Precision,
-        kappa_limit: Option<KappaLimit>,
-        bodies: &Bodies,
+        joined: &Joined,
         cuttable: &CuttableMesh,
     ) -> Result<Self, Error> {
-        let positions = &bodies.mesh.positions;
+        let positions = &cuttable.mesh().positions;
         let mut any = match precision {
-            Precision::F32 => Self::Single(Solver::new(positions)),
-            Precision::F64 => Self::Double(Solver::new(positions)),
+            Precision::F32 => Self::Single(Backend::new(positions)),
+            Precision::F64 => Self::Double(Backend::new(positions)),
         };
         let mesh = cuttable.mesh();
         each!(&mut any, solver => {
-            solver.limit_kappa(kappa_limit);
-            for (i, material) in bodies.materials.iter().enumerate() {
-                let field = format!("body[{i}]");
+            for material in &joined.materials {
+                let field = "body".to_owned();
                 solver.add_material(*material).map_err(|source| Error::Xpbd { field, source })?;
             }
             for (t, tet) in mesh.tets.iter().enumerate() {
-                solver.push_tet(tet.map(|p| p.0), mesh.corners(TetId::new(t)), bodies.body_of[t]);
+                solver.push_tet(tet.map(|p| p.0), mesh.corners(TetId::new(t)), joined.material_of[t]);
             }
-            for (p, &fixed) in bodies.fixed.iter().enumerate() {
+            for (p, &fixed) in joined.fixed.iter().enumerate() {
                 solver.set_mass(p, mass(solver, cuttable, ParticleId::new(p)));
                 if fixed {
                     solver.set_fixed(p, true);
@@ -59,8 +81,58 @@ impl AnySolver {
         Ok(any)
     }
 
-    /// Follows a cut. Costs what the cut touched.
-    pub(crate) fn follow(&mut self, delta: &CutDelta, cuttable: &CuttableMesh) {
+    /// Prepares for the method of the scene, once the tets are what they are.
+    pub(crate) fn prepare(&mut self, spec: &SolverSpec) -> Result<(), Error> {
+        match self {
+            Self::Single(backend) => backend.prepare(spec),
+            Self::Double(backend) => backend.prepare(spec),
+        }
+    }
+
+    /// Advances by one frame, keeping what [`AnySolver::last_substep`] needs if told to.
+    pub(crate) fn step(
+        &mut self,
+        schedule: &Schedule,
+        settings: &StepSettings,
+        keep: bool,
+    ) -> Result<StepReport, Error> {
+        let step = match self {
+            Self::Single(backend) => backend.step(schedule, settings, keep),
+            Self::Double(backend) => backend.step(schedule, settings, keep),
+        };
+        step.map_err(|source| Error::Xpbd {
+            field: "solver".into(),
+            source,
+        })
+    }
+
+    /// The residuals of the last substep, if they were kept.
+    pub(crate) fn last_substep(&self, substep_time: f64) -> Option<LastSubstep> {
+        match self {
+            Self::Single(backend) => backend.last_substep(substep_time),
+            Self::Double(backend) => backend.last_substep(substep_time),
+        }
+    }
+
+    /// Softens every tet, present and to come, that exceeds the limit. O(tets).
+    pub(crate) fn limit_kappa(&mut self, limit: KappaLimit, mesh: &TetMesh) {
+        each!(self, solver => {
+            solver.limit_kappa(Some(limit));
+            for t in 0..solver.tet_count() {
+                if solver.kappa_of(t, limit.substep_time) > limit.kappa {
+                    solver.replace_tet(t, solver.tet_particles(t), mesh.corners(TetId::new(t)));
+                }
+            }
+        });
+    }
+
+    /// Follows a cut. Costs what the cut touched; descent sorts its stars anew, O(tets).
+    pub(crate) fn follow(
+        &mut self,
+        delta: &CutDelta,
+        cuttable: &CuttableMesh,
+        ms: &mut Milliseconds,
+    ) -> Result<(), Error> {
         let mesh = cuttable.mesh();
         each!(self, solver => {
             for point in &delta.points {
@@ -87,6 +159,10 @@ impl AnySolver {
                 solver.set_mass(p.index(), mass(solver, cuttable, p));
             }
         });
+        match self {
+            Self::Single(backend) => backend.follow(ms),
+            Self::Double(backend) => backend.follow(ms),
+        }
     }
 
     /// Recomputes masses and corners and compares; for tests and on request.
@@ -116,12 +192,58 @@ impl AnySolver {
     }
 }
 
+impl<R: Real> Backend<R> {
+    fn new(positions: &[DVec3]) -> Self {
+        Self {
+            solver: Solver::new(positions),
+            descent: None,
+        }
+    }
+
+    fn prepare(&mut self, spec: &SolverSpec) -> Result<(), Error> {
+        if spec.method == Method::Descent {
+            self.descent = Some(Descent::new(&self.solver, spec.coarse)?);
+        }
+        Ok(())
+    }
+
+    fn step(
+        &mut self,
+        schedule: &Schedule,
+        settings: &StepSettings,
+        keep: bool,
+    ) -> Result<StepReport, XpbdError> {
+        let Self { solver, descent } = self;
+        match descent {
+            Some(descent) => descent.step(solver, settings, keep),
+            None if keep => solver.step_keeping_residuals(schedule, settings),
+            None => solver.step(schedule, settings),
+        }
+    }
+
+    fn last_substep(&self, substep_time: f64) -> Option<LastSubstep> {
+        match &self.descent {
+            Some(descent) => Some(LastSubstep::Descent {
+                force: descent.last.force?,
+                potential: descent.last.potential?,
+            }),
+            None => self
+                .solver
+                .residuals(substep_time)
+                .map(LastSubstep::Constraints),
+        }
+    }
+
+    fn follow(&mut self, ms: &mut Milliseconds) -> Result<(), Error> {
+        let Self { solver, descent } = self;
+        descent
+            .as_mut()
+            .map_or(Ok(()), |descent| descent.follow(solver, ms))
+    }
+}
+
 /// A quarter of the mass of each tet around a particle, summed in the order of the tets.
-fn mass<R: incise_xpbd::Real>(
-    solver: &Solver<R>,
-    cuttable: &CuttableMesh,
-    particle: ParticleId,
-) -> f64 {
+fn mass<R: Real>(solver: &Solver<R>, cuttable: &CuttableMesh, particle: ParticleId) -> f64 {
     let mut tets: Vec<TetId> = cuttable.around(particle).collect();
     tets.sort_unstable();
     let quarter = |t: &TetId| 0.25 * solver.density_of(t.index()) * cuttable.mesh().volume(*t);

@@ -1,47 +1,40 @@
-//! From the bodies of a scene to one mesh with materials and fixed particles.
-//!
-//! All bodies share one mesh, so that a stroke cuts whatever it meets and one schedule covers everything.
+//! [`Body`]: a body of a scene with its mesh, what it is made of and its fixed particles, all values checked.
 
-use glam::DVec3;
 use incise_mesh::generate::{Shape, generate};
-use incise_mesh::{ParticleId, TetMesh, io};
+use incise_mesh::{TetMesh, io};
 use incise_xpbd::Material;
 
 use crate::limits::{LARGEST_COORDINATE, coordinates, value, within};
 use crate::region::particles;
-use crate::scene::BodySpec;
+use crate::scene::{BodySpec, Substeps};
 use crate::{Error, Scene};
 
-/// All bodies of a scene as one mesh.
-pub(crate) struct Bodies {
+/// A body in the world.
+#[derive(Debug)]
+pub(crate) struct Body {
     pub(crate) mesh: TetMesh,
-    pub(crate) materials: Vec<Material>,
-    /// For each tet the number of its body, which is that of its material.
-    pub(crate) body_of: Vec<u16>,
+    pub(crate) material: Material,
+    /// For each particle whether it is fixed.
     pub(crate) fixed: Vec<bool>,
-    /// The first particle of each body, and the end.
-    starts: Vec<usize>,
+    /// Of the volume constraints that it asks for.
+    pub(crate) volume_compliance: Option<f64>,
+    pub(crate) substeps: Substeps,
 }
 
-impl Bodies {
-    pub(crate) fn new(scene: &Scene) -> Result<Self, Error> {
+impl Body {
+    /// The bodies of a scene.
+    pub(crate) fn all(scene: &Scene) -> Result<Vec<Self>, Error> {
         if scene.body.is_empty() {
             return Err(value("body", "missing", "at least one [[body]]"));
         }
-        let mut bodies = Self {
-            mesh: TetMesh::default(),
-            materials: Vec::new(),
-            body_of: Vec::new(),
-            fixed: Vec::new(),
-            starts: vec![0],
-        };
-        for (i, spec) in scene.body.iter().enumerate() {
-            bodies.add(&format!("body[{i}]"), spec)?;
-        }
-        Ok(bodies)
+        let bodies = scene.body.iter().enumerate();
+        bodies
+            .map(|(i, spec)| Self::new(&format!("body[{i}]"), spec, scene.solver.substeps))
+            .collect()
     }
 
-    fn add(&mut self, field: &str, spec: &BodySpec) -> Result<(), Error> {
+    /// The body of a spec; `substeps` are those of a body that does not name its own.
+    fn new(field: &str, spec: &BodySpec, substeps: Substeps) -> Result<Self, Error> {
         let material = Material {
             young_modulus: spec.young_modulus,
             poisson_ratio: spec.poisson_ratio,
@@ -61,14 +54,17 @@ impl Bodies {
         within(&format!("{field}.density"), spec.density, 1e-6, 1e9)?;
         within(&format!("{field}.damping"), spec.damping, 0.0, 1e6)?;
         within(&format!("{field}.scale"), spec.scale, 1e-9, 1e9)?;
+        if spec.substeps == Some(Substeps::Fixed(0)) {
+            return Err(value(format!("{field}.substeps"), 0, "at least 1"));
+        }
+        let volume_compliance = spec
+            .volume_compliance
+            .map(|c| within(&format!("{field}.volume_compliance"), c, 0.0, 1e9))
+            .transpose()?;
         let position = coordinates(&format!("{field}.position"), spec.position)?;
-        let mesh = load(field, spec)?;
-
-        let body = u16::try_from(self.materials.len())
-            .map_err(|_| value("body", "too many", "at most 65,536"))?;
-        let first = self.mesh.positions.len();
-        for x in mesh.positions {
-            let x = x * spec.scale + position;
+        let mut mesh = load(field, spec)?;
+        for x in &mut mesh.positions {
+            *x = *x * spec.scale + position;
             if x.abs().max_element() > LARGEST_COORDINATE {
                 return Err(value(
                     format!("{field}.scale"),
@@ -76,29 +72,21 @@ impl Bodies {
                     "such that the body stays within 1e9 m",
                 ));
             }
-            self.mesh.positions.push(x);
         }
-        let shifted = |p: ParticleId| ParticleId::new(first + p.index());
-        self.mesh
-            .tets
-            .extend(mesh.tets.iter().map(|tet| tet.map(shifted)));
-        self.body_of.resize(self.mesh.tets.len(), body);
-        self.materials.push(material);
-        self.fixed.resize(self.mesh.positions.len(), false);
+        let mut fixed = vec![false; mesh.positions.len()];
         for (i, region) in spec.fixed.iter().enumerate() {
             let field = format!("{field}.fixed[{i}]");
-            for p in particles(&field, region, &self.mesh.positions[first..])? {
-                self.fixed[first + p] = true;
+            for p in particles(&field, region, &mesh.positions)? {
+                fixed[p] = true;
             }
         }
-        self.starts.push(self.mesh.positions.len());
-        Ok(())
-    }
-
-    /// The positions at rest of a body's particles and the number of the first of them.
-    pub(crate) fn particles_of(&self, body: usize) -> Option<(&[DVec3], usize)> {
-        let (start, end) = (*self.starts.get(body)?, *self.starts.get(body + 1)?);
-        Some((&self.mesh.positions[start..end], start))
+        Ok(Self {
+            mesh,
+            material,
+            fixed,
+            volume_compliance,
+            substeps: spec.substeps.unwrap_or(substeps),
+        })
     }
 }
 

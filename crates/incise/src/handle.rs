@@ -51,25 +51,25 @@ pub struct TurnSpec {
 /// A handle, checked.
 #[derive(Debug)]
 pub(crate) struct Handle {
+    /// Its key in the scene.
+    field: String,
     spec: HandleSpec,
     center: DVec3,
-    /// The particles it holds, as numbered in their body.
+    /// The particles it holds, as numbered in their group of bodies.
     particles: Vec<usize>,
     /// Its number in the solver.
     number: u32,
 }
 
 impl Handle {
-    /// Checks a handle; `positions` are those of its body's particles at rest, by the number of the body.
-    pub(crate) fn new<'a>(
-        field: &str,
+    /// Checks a handle. `positions` are those of its body's particles at rest, which are numbered from `first_particle` on
+    /// in their group.
+    pub(crate) fn new(
+        field: String,
         spec: &HandleSpec,
-        positions: impl Fn(usize) -> Option<&'a [DVec3]>,
+        positions: &[DVec3],
+        first_particle: usize,
     ) -> Result<Self, Error> {
-        let Some(positions) = positions(spec.body) else {
-            let range = "the number of a body, counted from 0";
-            return Err(value(format!("{field}.body"), spec.body, range));
-        };
         let [first, last] = spec.frames;
         if first >= last {
             let range = "two frames, the second after the first";
@@ -97,15 +97,13 @@ impl Handle {
         within(&format!("{field}.compliance"), spec.compliance, 0.0, 1e9)?;
         let mut held = Vec::new();
         for (i, region) in spec.holds.iter().enumerate() {
-            held.extend(particles(
-                &format!("{field}.holds[{i}]"),
-                region,
-                positions,
-            )?);
+            let inside = particles(&format!("{field}.holds[{i}]"), region, positions)?;
+            held.extend(inside.iter().map(|p| first_particle + p));
         }
         held.sort_unstable();
         held.dedup();
         Ok(Self {
+            field,
             spec: spec.clone(),
             center,
             particles: held,
@@ -113,33 +111,29 @@ impl Handle {
         })
     }
 
-    /// The body it holds.
-    pub(crate) fn body(&self) -> usize {
-        self.spec.body
-    }
-
-    /// Takes hold; the body's particles are numbered from `first` on in the solver.
-    pub(crate) fn attach(
-        &mut self,
-        field: &str,
-        solver: &mut AnySolver,
-        first: usize,
-    ) -> Result<(), Error> {
+    /// Takes hold.
+    pub(crate) fn attach(&mut self, solver: &mut AnySolver) -> Result<(), Error> {
+        let field = &self.field;
         let (pose, compliance) = (self.pose(0), self.spec.compliance);
         each!(solver, solver => {
             self.number = solver.add_handle(pose);
             for &p in &self.particles {
-                if solver.handle_of(first + p).is_some() {
-                    let what = format!("a region with particle {p}");
+                if solver.handle_of(p).is_some() {
+                    let what = "a region with a particle of another handle";
                     let range = "what no other handle holds";
                     return Err(value(format!("{field}.holds"), what, range));
                 }
                 solver
-                    .attach(first + p, self.number, compliance, 0.0)
-                    .map_err(|source| Error::Xpbd { field: field.to_owned(), source })?;
+                    .attach(p, self.number, compliance, 0.0)
+                    .map_err(|source| Error::Xpbd { field: field.clone(), source })?;
             }
         });
         Ok(())
+    }
+
+    /// Whether it moves in a frame.
+    pub(crate) fn moves(&self, frame: u64) -> bool {
+        self.pose(frame) != self.pose(frame.saturating_add(1))
     }
 
     /// Tells the solver where the handle is at the end of a frame.

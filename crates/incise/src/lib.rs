@@ -23,17 +23,27 @@
 mod backend;
 mod body;
 mod collider;
+mod descent;
 mod error;
+mod group;
 mod handle;
+mod islands;
+mod joined;
 mod limits;
 mod link;
+mod measure;
+mod method;
 mod plan;
+mod preset;
 mod region;
 pub mod report;
 pub mod scene;
 mod simulation;
+mod sleep;
 mod strokes;
+mod substeps;
 mod volume;
+mod whole;
 
 pub use error::Error;
 pub use incise_clustering as clustering;

@@ -40,6 +40,14 @@ pub(crate) fn direction(field: &str, v: [f64; 3]) -> Result<DVec3, Error> {
     }
 }
 
+/// Refuses the number of a body if there are not as many.
+pub(crate) fn existing(field: &str, body: usize, bodies: usize) -> Result<(), Error> {
+    if body < bodies {
+        return Ok(());
+    }
+    Err(value(field, body, "the number of a body, counted from 0"))
+}
+
 /// The number, if it lies in a range.
 pub(crate) fn within(field: &str, number: f64, low: f64, high: f64) -> Result<f64, Error> {
     if (low..=high).contains(&number) {

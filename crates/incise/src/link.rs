@@ -6,9 +6,9 @@ use incise_graph::{Clustering, Incidence, Schedule};
 use incise_xpbd::DistanceConstraint;
 use serde::{Deserialize, Serialize};
 
-use crate::Error;
 use crate::backend::{AnySolver, each};
-use crate::limits::{LARGEST_COORDINATE, coordinates, value, within};
+use crate::limits::{LARGEST_COORDINATE, coordinates, existing, value, within};
+use crate::{Error, Scene};
 
 /// Keeps two particles at a distance. A cut leaves it on its particles.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -38,18 +38,26 @@ pub struct EndSpec {
     pub point: [f64; 3],
 }
 
-/// Checks a link. `positions` gives those of a body's particles at rest, and the number of its first particle in the
-/// solver, by the number of the body.
+/// The bodies that links join, if they all exist.
+pub(crate) fn pairs(scene: &Scene, bodies: usize) -> Result<Vec<[usize; 2]>, Error> {
+    let links = scene.link.iter().enumerate();
+    let pair = |(i, spec): (usize, &LinkSpec)| {
+        existing(&format!("link[{i}].from.body"), spec.from.body, bodies)?;
+        existing(&format!("link[{i}].to.body"), spec.to.body, bodies)?;
+        Ok([spec.from.body, spec.to.body])
+    };
+    links.map(pair).collect()
+}
+
+/// Checks a link between bodies that exist. `positions` gives those of a body's particles at rest, and the number of its
+/// first particle in its group, by the number of the body.
 pub(crate) fn link<'a>(
     field: &str,
     spec: &LinkSpec,
-    positions: impl Fn(usize) -> Option<(&'a [DVec3], usize)>,
+    positions: impl Fn(usize) -> (&'a [DVec3], usize),
 ) -> Result<DistanceConstraint, Error> {
-    let end = |key: &str, end: &EndSpec| {
-        let Some((positions, first)) = positions(end.body) else {
-            let range = "the number of a body, counted from 0";
-            return Err(value(format!("{field}.{key}.body"), end.body, range));
-        };
+    let end = |key: &str, end: &EndSpec| -> Result<_, Error> {
+        let (positions, first) = positions(end.body);
         let point = coordinates(&format!("{field}.{key}.point"), end.point)?;
         let nearest = (0..positions.len())
             .map(|p| (positions[p].distance_squared(point), p))

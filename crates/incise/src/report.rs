@@ -5,9 +5,10 @@
 use std::time::Duration;
 
 use incise_cutting::CutDelta;
-use incise_xpbd::Residuals;
 use incise_xpbd::Softened;
 use serde::Serialize;
+
+pub use crate::substeps::{Choice, Missed};
 
 /// What a frame did.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -58,6 +59,10 @@ pub struct FrameReport {
     /// The tets softened to keep the limit of kappa.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub softened: Option<SoftenedReport>,
+    /// By body what its substeps and its kappa are, in the order of the scene; in all frames if `substeps` is `auto` for
+    /// a body or bodies may sleep, else where kappa is reported, else absent.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub bodies: Vec<BodyReport>,
     /// Particles that had to be put back because they would have become infinite; absent if none.
     #[serde(skip_serializing_if = "is_zero")]
     pub repaired: usize,
@@ -69,6 +74,34 @@ pub struct FrameReport {
 
 fn is_zero(count: &usize) -> bool {
     *count == 0
+}
+
+/// A body's substeps and kappa, or those of bodies that are joined and therefore solved together.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct BodyReport {
+    /// The numbers of the bodies in the scene; mostly one.
+    pub bodies: Vec<usize>,
+    /// Substeps of a frame.
+    pub substeps: u32,
+    /// Whether it is at rest and not solved, in a scene where bodies may sleep.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub asleep: Option<bool>,
+    /// How they were chosen, if `auto` was to: its keys are among those of the body.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub choice: Option<Choice>,
+    /// The largest `E Δt² / (ρ h²)` of a tet, had none been softened; where kappa is reported.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kappa: Option<f64>,
+    /// The same before the cut of this frame; where kappa is reported.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kappa_before_cut: Option<f64>,
+    /// The largest kappa of the tets that the cut of this frame has made, had none been softened.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kappa_of_new_tets: Option<f64>,
+    /// The tets softened to keep the limit of kappa; where kappa is reported.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub softened: Option<SoftenedReport>,
 }
 
 /// What a frame's strokes cut.
@@ -132,43 +165,31 @@ pub struct Milliseconds {
     pub total: f64,
 }
 
-/// Residuals of the last substep.
+/// Residuals of the last substep. Descent has no multipliers, and therefore no primal and dual ones.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct ResidualReport {
     /// What XPBD drops, in kg·m.
-    pub primal: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub primal: Option<f64>,
     /// The same as a part of the weight's norm times the square of the substep; absent without gravity.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub primal_relative: Option<f64>,
     /// What it iterates on, without unit.
-    pub dual: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dual: Option<f64>,
     /// Its root mean square over all constraints.
-    pub dual_rms: f64,
-    /// The unbalanced force of the implicit step in N, from positions alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dual_rms: Option<f64>,
+    /// The unbalanced force of the implicit step in N, from positions alone. XPBD counts that of colliders as
+    /// unbalanced; descent leaves out what presses particles into them, but as its sweeps and the colliders take turns,
+    /// it does not vanish where bodies touch them.
     pub force: f64,
     /// The same as a part of the weight's norm; absent without gravity.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub force_relative: Option<f64>,
     /// The energy in J that the implicit step would make least.
     pub potential: f64,
-}
-
-impl ResidualReport {
-    /// The residuals of a substep, beside a load of that norm in N.
-    pub(crate) fn new(residuals: &Residuals, load: Option<f64>, substep_time: f64) -> Self {
-        let load = load.filter(|&load| load > 0.0);
-        let relative = |value: f64, unit: f64| (value / unit).min(f64::MAX);
-        Self {
-            primal: residuals.primal,
-            primal_relative: load
-                .map(|load| relative(residuals.primal, load * substep_time * substep_time)),
-            dual: residuals.dual,
-            dual_rms: residuals.dual_rms,
-            force: residuals.force,
-            force_relative: load.map(|load| relative(residuals.force, load)),
-            potential: residuals.potential,
-        }
-    }
 }
 
 /// Energies in J.

@@ -11,6 +11,10 @@ use crate::Error;
 pub use crate::collider::{ColliderSpec, RotationSpec};
 pub use crate::handle::{HandleSpec, TurnSpec};
 pub use crate::link::{EndSpec, LinkSpec};
+pub use crate::method::{Form, Method};
+pub use crate::preset::Preset;
+pub use crate::sleep::SleepSpec;
+pub use crate::substeps::Substeps;
 
 /// A scene.
 ///
@@ -26,7 +30,7 @@ pub use crate::link::{EndSpec, LinkSpec};
 ///     "#,
 /// )?;
 /// assert_eq!(scene.body.len(), 1);
-/// assert_eq!(scene.solver.substeps, 5);
+/// assert_eq!(scene.solver.substeps, 5.into());
 /// # Ok::<(), incise::Error>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -97,7 +101,8 @@ pub enum Quantity {
     Volume,
     /// The largest speed.
     Speed,
-    /// The control number of the substep (see `incise_xpbd::Solver::kappa`) and what was softened to keep its limit.
+    /// The control number of the substep (see `incise_xpbd::Solver::kappa`) and what was softened to keep its limit, for
+    /// all and by body, and in a frame with a cut also as it was before.
     Kappa,
 }
 
@@ -123,19 +128,37 @@ pub struct GroundSpec {
 }
 
 /// How it is computed.
+///
+/// Some defaults depend on the method: see [`SolverSpec::of`]. Those and a preset's are applied when a scene is read.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SolverSpec {
+    /// Other defaults for the keys below: `paper`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub preset: Option<Preset>,
     /// Time of a frame in s.
     pub time_step: f64,
-    /// Equal parts of a frame.
-    pub substeps: u32,
-    /// Passes over the constraints in a substep; 1 is what converges.
+    /// Equal parts of a frame: a number, or `auto`, which chooses for each body.
+    pub substeps: Substeps,
+    /// The most substeps that `auto` takes.
+    pub max_substeps: u32,
+    /// Passes over the constraints in a substep, or sweeps of descent. With Gauss-Seidel 1 is what converges.
     pub iterations: u32,
     /// How a pass is made.
     pub method: Method,
+    /// How the two constraints of a tet are solved. Descent has no constraints.
+    pub form: Form,
     /// Factor on each correction.
     pub relaxation: f64,
+    /// For Chebyshev: the spectral radius of the Jacobi iteration, from 0 to below 1: the larger, the bolder. At 0.99
+    /// the weights tend to 1.75, which they reach in some ten iterations; more pays only with hundreds of them.
+    pub spectral_radius: f64,
+    /// For Chebyshev: plain iterations before the first extrapolation, at least 1. They damp what extrapolation would
+    /// blow up.
+    pub delay: u32,
+    /// For descent: whether each sweep is followed by a correction of the whole body, which costs some 100 sweeps.
+    #[serde(skip_serializing_if = "is_false")]
+    pub coarse: bool,
     /// How constraints are put together: `none` or `serial:K`.
     pub clustering: String,
     /// How clusters are colored, by the name of an [`Algorithm`](incise_coloring::Algorithm). Clusters that cuts make are
@@ -145,32 +168,32 @@ pub struct SolverSpec {
     pub precision: Precision,
     /// Largest kappa of a tet, positive: stiffer ones, as cuts leave them, are softened to it. `inf` softens none.
     pub kappa_limit: f64,
+    /// Bodies at rest are not solved until they are cut or something moves them; absent: all are always solved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sleep: Option<SleepSpec>,
 }
 
 impl Default for SolverSpec {
     fn default() -> Self {
         Self {
+            preset: None,
             time_step: 0.016,
-            substeps: 5,
+            substeps: Substeps::Fixed(5),
+            max_substeps: 200,
             iterations: 1,
             method: Method::GaussSeidel,
+            form: Form::Block,
             relaxation: 1.0,
+            spectral_radius: 0.99,
+            delay: 10,
+            coarse: false,
             clustering: "serial:10".to_owned(),
             coloring: "auto".to_owned(),
             precision: Precision::F32,
             kappa_limit: 1.0,
+            sleep: None,
         }
     }
-}
-
-/// How a pass over the constraints is made.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
-pub enum Method {
-    /// Color after color, each constraint seeing the corrections before it.
-    #[default]
-    GaussSeidel,
 }
 
 /// Width of the numbers the solver computes with.
@@ -227,6 +250,9 @@ pub struct BodySpec {
     /// incompressible. Absent: not at all.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub volume_compliance: Option<f64>,
+    /// Substeps of this body in place of the solver's. Bodies that are solved together take the largest number.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub substeps: Option<Substeps>,
     /// Particles that do not move, in m in the world.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fixed: Vec<Region>,
@@ -345,7 +371,7 @@ impl Scene {
     /// If it is not valid TOML, or a key is unknown or of the wrong type: the message names the line and, for an
     /// unknown key, the nearest known one.
     pub fn from_toml(text: &str) -> Result<Self, Error> {
-        toml::from_str(text).map_err(|error| {
+        let mut scene: Self = toml::from_str(text).map_err(|error| {
             let line = error
                 .span()
                 .map(|span| text[..span.start.min(text.len())].matches('\n').count() + 1);
@@ -353,7 +379,9 @@ impl Scene {
                 line,
                 message: with_suggestion(error.message()),
             }
-        })
+        })?;
+        scene.solver = scene.solver.with_defaults(text)?;
+        Ok(scene)
     }
 
     /// The scene as TOML.
@@ -416,6 +444,9 @@ pub fn nearest<'a>(unknown: &str, known: impl IntoIterator<Item = &'a str>) -> O
         .max_by(|a, b| likeness(a).total_cmp(&likeness(b)))
 }
 
+fn is_false(flag: &bool) -> bool {
+    !flag
+}
 fn one() -> u64 {
     1
 }

@@ -1,30 +1,30 @@
 //! [`Simulation`]: a scene in motion.
 //!
-//! One frame: strokes that are due cut the mesh; their deltas go to solver, clusters, colors and schedule; the solver
-//! advances; the report is made. A frame without a cut touches only the solver.
+//! One frame: strokes that are due cut the meshes; their deltas go to solver, clusters, colors and schedule; the solvers
+//! advance, those of different groups of bodies in parallel; the report is made. A frame without a cut touches only the
+//! solvers.
 
+use std::borrow::Cow;
 use std::time::Instant;
 
 use glam::DVec3;
-use incise_cutting::CuttableMesh;
 use incise_graph::{Clustering, Coloring, Schedule};
 use incise_mesh::{Surface, TetMesh};
-use incise_xpbd::{KappaLimit, StepSettings};
 use rayon::ThreadPool;
+use rayon::prelude::*;
 
-use crate::backend::{AnySolver, each};
-use crate::body::Bodies;
-use crate::handle::Handle;
-use crate::limits::{coordinates, value, within};
-use crate::plan::Plan;
-use crate::report::{
-    CutReport, EnergyReport, FrameReport, Milliseconds, ResidualReport, SoftenedReport,
-    milliseconds,
-};
+use crate::body::Body;
+use crate::group::Group;
+use crate::islands::islands;
+use crate::joined::Joined;
+use crate::limits::value;
+use crate::measure::{by_body, energy, kappa, max_speed, residual, softened, volume};
+use crate::method::settings;
+use crate::report::{CutReport, FrameReport, Milliseconds, SoftenedReport, milliseconds};
 use crate::scene::{Precision, Quantity, StrokeSpec};
 use crate::strokes::Timeline;
-use crate::volume::BodyVolumes;
-use crate::{Error, Scene, collider, link};
+use crate::whole::Whole;
+use crate::{Error, Scene, link};
 
 /// A scene in motion.
 ///
@@ -55,21 +55,19 @@ use crate::{Error, Scene, collider, link};
 /// ```
 #[derive(Debug)]
 pub struct Simulation {
-    settings: StepSettings,
+    /// In s.
+    time_step: f64,
+    gravity: Option<DVec3>,
     quantities: Vec<Quantity>,
     every: u64,
     precision: Precision,
-    cuttable: CuttableMesh,
-    solver: AnySolver,
-    plan: Plan,
+    /// In the order of their first bodies.
+    groups: Vec<Group>,
+    /// All groups together, if there are several.
+    whole: Option<Whole>,
     timeline: Timeline,
-    handles: Vec<Handle>,
-    volumes: Option<BodyVolumes>,
-    positions: Vec<DVec3>,
     /// Whether a particle lies on a cut; empty before the first.
     on_cut: Vec<bool>,
-    initial_volume: f64,
-    pieces: usize,
     next_frame: u64,
     report: FrameReport,
     pool: Option<ThreadPool>,
@@ -113,45 +111,41 @@ impl Simulation {
         for stroke in &scene.stroke {
             timeline.add(stroke.clone())?;
         }
-        let bodies = Bodies::new(scene)?;
-        let cuttable = CuttableMesh::new(bodies.mesh.clone()).map_err(|source| Error::Cut {
-            field: "body".into(),
-            source,
-        })?;
-        let kappa_limit = kappa_limit(scene, &settings)?;
-        let mut solver = AnySolver::new(precision, kappa_limit, &bodies, &cuttable)?;
-        let handles = hold(scene, &bodies, &mut solver)?;
-        connect(scene, &bodies, &mut solver)?;
-        let make_plan = || Plan::new(scene, cuttable.mesh());
-        let plan = match &pool {
-            Some(pool) => pool.install(make_plan),
-            None => make_plan(),
+        check_limits(scene)?;
+        let bodies = Body::all(scene)?;
+        let islands = islands(bodies.len(), &link::pairs(scene, bodies.len())?);
+        let several = islands.iter().any(|&island| island > 0);
+        let whole = several.then(|| Whole::new(&bodies, &islands));
+        let joined = Joined::all(scene, bodies, &islands)?;
+        let make_groups = || {
+            let groups = joined.into_par_iter();
+            groups
+                .map(|joined| Group::new(scene, settings.clone(), joined))
+                .collect::<Result<Vec<_>, _>>()
+        };
+        let groups = match &pool {
+            Some(pool) => pool.install(make_groups),
+            None => make_groups(),
         }?;
-        let volumes = BodyVolumes::new(scene)?;
-        if let Some(volumes) = &volumes {
-            volumes.constrain(&mut solver, &cuttable, &plan.schedule)?;
-        }
         let mut simulation = Self {
-            settings,
+            time_step: settings.time_step,
+            gravity: settings.gravity,
             quantities: scene.report.quantities.clone(),
             every: scene.report.every,
             precision,
-            initial_volume: cuttable.mesh().total_volume(),
-            pieces: cuttable.mesh().pieces().count,
-            positions: Vec::new(),
             on_cut: Vec::new(),
-            cuttable,
-            solver,
-            plan,
+            groups,
+            whole,
             timeline,
-            handles,
-            volumes,
             next_frame: 0,
             report: FrameReport::default(),
             pool,
         };
-        simulation.solver.positions(&mut simulation.positions);
+        simulation.collect_positions();
         simulation.count();
+        if simulation.chooses() {
+            simulation.report.bodies = by_body(&mut simulation.groups, false);
+        }
         Ok(simulation)
     }
 
@@ -166,7 +160,7 @@ impl Simulation {
     /// Advances by one frame and reports on it.
     ///
     /// # Errors
-    /// If a stroke cannot be carried out; the body is then as it was before that stroke.
+    /// If a stroke cannot be carried out; the bodies it has not cut yet are then as they were before that stroke.
     pub fn step(&mut self) -> Result<&FrameReport, Error> {
         // The pool is taken out so that the closure may borrow the rest.
         match self.pool.take() {
@@ -187,35 +181,22 @@ impl Simulation {
         let cut = self.carry_out_strokes(&mut ms)?;
 
         let before_solve = Instant::now();
-        for handle in &self.handles {
-            handle.advance(self.next_frame, &mut self.solver);
-        }
-        let wants = |quantity| {
-            self.next_frame.is_multiple_of(self.every) && self.quantities.contains(&quantity)
-        };
-        let residual = wants(Quantity::Residual);
-        let (schedule, settings) = (&self.plan.schedule, &self.settings);
-        let step = each!(&mut self.solver, solver => if residual {
-            solver.step_keeping_residuals(schedule, settings)
-        } else {
-            solver.step(schedule, settings)
-        });
-        let step = step.map_err(|source| Error::Xpbd {
-            field: "solver".into(),
-            source,
-        })?;
-        collider::advance(&mut self.settings);
+        let (frame, residual) = (self.next_frame, self.wants(Quantity::Residual));
+        let groups = self.groups.par_iter_mut();
+        let repaired = groups
+            .map(|group| group.step(frame, residual).map(|step| step.repaired))
+            .try_reduce(|| 0, |a, b| Ok(a + b))?;
         ms.solve = milliseconds(before_solve.elapsed());
 
         self.report = FrameReport {
             frame: self.next_frame,
-            time_s: (self.next_frame + 1) as f64 * self.settings.time_step,
+            time_s: (self.next_frame + 1) as f64 * self.time_step,
             cut,
-            repaired: step.repaired,
+            repaired,
             ..FrameReport::default()
         };
         self.measure();
-        self.solver.positions(&mut self.positions);
+        self.collect_positions();
         self.count();
         ms.total = milliseconds(start.elapsed());
         ms.other = ms.total - ms.cut - ms.cluster - ms.color - ms.schedule - ms.solve;
@@ -224,38 +205,57 @@ impl Simulation {
         Ok(())
     }
 
+    /// Whether the frame to come is to report a quantity.
+    fn wants(&self, quantity: Quantity) -> bool {
+        self.next_frame.is_multiple_of(self.every) && self.quantities.contains(&quantity)
+    }
+
+    /// Whether substeps are chosen for a body.
+    fn chooses(&self) -> bool {
+        self.groups.iter().any(|group| group.choice.is_some())
+    }
+
+    /// Whether bodies may sleep.
+    fn sleeps(&self) -> bool {
+        self.groups.iter().any(|group| group.rest.is_some())
+    }
+
     /// Cuts what is due and lets everybody follow.
     fn carry_out_strokes(&mut self, ms: &mut Milliseconds) -> Result<Option<CutReport>, Error> {
         let start = Instant::now();
+        let wants_kappa = self.wants(Quantity::Kappa);
+        let notes_kappa = wants_kappa || self.chooses();
         let Self {
             timeline,
-            cuttable,
-            positions,
-            solver,
-            plan,
-            volumes,
-            pieces,
+            groups,
+            whole,
             on_cut,
             ..
         } = self;
         let mut report: Option<CutReport> = None;
         let mut counting = 0.0;
-        timeline.advance(self.next_frame, cuttable, positions, |cuttable, delta| {
-            solver.follow(delta, cuttable);
-            plan.follow(delta, ms)?;
-            if let Some(volumes) = volumes {
-                volumes.follow(solver, delta, cuttable, &plan.schedule)?;
+        timeline.advance(self.next_frame, groups, |number, group, delta| {
+            if wants_kappa {
+                let start = Instant::now();
+                group.note_kappa_before();
+                counting += milliseconds(start.elapsed());
+            }
+            group.follow(delta, ms)?;
+            if notes_kappa {
+                group.note_kappa_of(delta);
+            }
+            if !delta.copies.is_empty() {
+                let start = Instant::now();
+                group.count_pieces();
+                counting += milliseconds(start.elapsed());
             }
             report.get_or_insert_default().add(delta);
+            let of_whole = whole.as_mut().map(|whole| whole.follow(number, delta));
+            let delta = of_whole.as_ref().unwrap_or(delta);
             on_cut.resize(delta.particles_before, false);
             on_cut.resize(delta.particles_after(), true);
             for source in &delta.copies {
                 on_cut[source.index()] = true;
-            }
-            if !delta.copies.is_empty() {
-                let start = Instant::now();
-                *pieces = cuttable.mesh().pieces().count;
-                counting += milliseconds(start.elapsed());
             }
             Ok(())
         })?;
@@ -265,56 +265,65 @@ impl Simulation {
 
     /// Computes the quantities that this frame reports.
     fn measure(&mut self) {
+        let kappa_too = self.wants(Quantity::Kappa);
+        if kappa_too || self.chooses() || self.sleeps() {
+            self.report.bodies = by_body(&mut self.groups, kappa_too);
+        }
         if !self.report.frame.is_multiple_of(self.every) {
             return;
         }
-        let substep_time = self.settings.substep_time();
-        let report = &mut self.report;
-        each!(&self.solver, solver => for quantity in &self.quantities {
+        for quantity in &self.quantities {
+            let report = &mut self.report;
             match quantity {
-                Quantity::Residual => {
-                    let load = self.settings.gravity.map(|g| solver.load(g));
-                    report.residual = solver
-                        .residuals(substep_time)
-                        .map(|r| ResidualReport::new(&r, load, substep_time));
-                }
+                Quantity::Residual => report.residual = residual(&self.groups, self.gravity),
                 Quantity::Energy => {
-                    let energy = solver.energy(self.settings.gravity);
-                    report.energy = Some(EnergyReport {
-                        kinetic: energy.kinetic,
-                        elastic: energy.elastic,
-                        gravity: energy.gravity,
-                    });
+                    report.energy = Some(energy(&self.groups, self.gravity));
                 }
                 Quantity::Volume => {
-                    let volume = solver.volume();
+                    let volume = volume(&self.groups);
                     report.volume = Some(volume.total);
                     report.volume_error = Some(volume.total / volume.rest - 1.0);
                     report.min_volume_ratio = Some(volume.min_ratio);
                     report.inverted_tets = Some(volume.inverted);
                 }
-                Quantity::Speed => report.max_speed = Some(solver.max_speed()),
+                Quantity::Speed => report.max_speed = Some(max_speed(&self.groups)),
                 Quantity::Kappa => {
-                    report.kappa = Some(solver.kappa(substep_time));
-                    report.softened = Some(solver.softened().into());
+                    report.kappa = Some(kappa(&self.groups));
+                    report.softened = Some(softened(&self.groups));
                 }
             }
-        });
+        }
+    }
+
+    /// Takes over the positions of the solvers.
+    fn collect_positions(&mut self) {
+        for group in &mut self.groups {
+            group.solver.positions(&mut group.positions);
+        }
+        if let Some(whole) = &mut self.whole {
+            whole.collect_positions(&self.groups);
+        }
     }
 
     /// Fills in the counts.
     fn count(&mut self) {
+        let mesh = self.mesh();
+        let (particles, tets) = (mesh.positions.len(), mesh.tets.len());
+        let plans = || self.groups.iter().map(|group| &group.plan);
+        let clusters = plans().map(|plan| plan.clustering.occupied()).sum();
+        let colors = plans().map(|plan| plan.schedule.color_count());
+        let colors = colors.max().unwrap_or(0);
         let report = &mut self.report;
-        report.particles = self.cuttable.mesh().positions.len();
-        report.tets = self.cuttable.mesh().tets.len();
-        report.clusters = self.plan.clustering.occupied();
-        report.colors = self.plan.schedule.color_count();
-        report.pieces = self.pieces;
+        report.particles = particles;
+        report.tets = tets;
+        report.clusters = clusters;
+        report.colors = colors;
+        report.pieces = self.groups.iter().map(|group| group.pieces).sum();
         report.backend = "cpu";
         report.precision = self.precision.name();
     }
 
-    /// The report on the last frame; before the first, only its counts mean something.
+    /// The report on the last frame; before the first, only its counts and the chosen substeps mean something.
     #[must_use]
     pub fn report(&self) -> &FrameReport {
         &self.report
@@ -323,19 +332,29 @@ impl Simulation {
     /// The present positions of all particles in m.
     #[must_use]
     pub fn positions(&self) -> &[DVec3] {
-        &self.positions
+        match &self.whole {
+            Some(whole) => &whole.positions,
+            None => &self.groups[0].positions,
+        }
     }
 
-    /// The mesh at rest, with all cuts made so far.
+    /// The mesh at rest of all bodies, with all cuts made so far.
+    ///
+    /// At the start particles and tets are numbered body by body in the order of the scene. Cuts change no number: the
+    /// first child of a cut tet takes over its number, other new tets and new particles get the next ones, stroke by
+    /// stroke and within a stroke body by body.
     #[must_use]
     pub fn mesh(&self) -> &TetMesh {
-        self.cuttable.mesh()
+        match &self.whole {
+            Some(whole) => &whole.mesh,
+            None => self.groups[0].cuttable.mesh(),
+        }
     }
 
     /// The boundary triangles, outer and cut, as the mesh is now. O(n log n).
     #[must_use]
     pub fn surface(&self) -> Surface {
-        self.cuttable.mesh().surface()
+        self.mesh().surface()
     }
 
     /// Whether each particle lies where a stroke cut; empty before the first cut. A boundary triangle with all three
@@ -345,34 +364,49 @@ impl Simulation {
         &self.on_cut
     }
 
-    /// The clusters of tets.
+    /// The clusters of tets. With several bodies they are put together: O(tets), and the clusters of a body are
+    /// numbered after those of the bodies before it, so that a cut can change their numbers.
     #[must_use]
-    pub fn clustering(&self) -> &Clustering {
-        &self.plan.clustering
+    pub fn clustering(&self) -> Cow<'_, Clustering> {
+        match &self.whole {
+            Some(whole) => Cow::Owned(whole.plan(&self.groups).0),
+            None => Cow::Borrowed(&self.groups[0].plan.clustering),
+        }
     }
 
-    /// The colors of the clusters.
+    /// The colors of the clusters. With several bodies they are put together: O(tets).
     #[must_use]
-    pub fn coloring(&self) -> &Coloring {
-        self.plan.coloring()
+    pub fn coloring(&self) -> Cow<'_, Coloring> {
+        match &self.whole {
+            Some(whole) => Cow::Owned(whole.plan(&self.groups).1),
+            None => Cow::Borrowed(self.groups[0].plan.coloring()),
+        }
     }
 
-    /// The order of solving.
+    /// The order of solving. With several bodies it is put together, O(tets): each body is solved in this order, but
+    /// none waits for another.
     #[must_use]
-    pub fn schedule(&self) -> &Schedule {
-        &self.plan.schedule
+    pub fn schedule(&self) -> Cow<'_, Schedule> {
+        match &self.whole {
+            Some(whole) => {
+                let (clustering, coloring) = whole.plan(&self.groups);
+                Cow::Owned(Schedule::new(&clustering, &coloring))
+            }
+            None => Cow::Borrowed(&self.groups[0].plan.schedule),
+        }
     }
 
-    /// The largest `E Δt² / (ρ h²)` of a tet, had none been softened: up to about 0.5 the motion is accurate.
+    /// The largest `E Δt² / (ρ h²)` of a tet, had none been softened: up to about 0.5 the motion is accurate. Δt is the
+    /// substep of the tet's body.
     #[must_use]
     pub fn kappa(&self) -> f64 {
-        each!(&self.solver, solver => solver.kappa(self.settings.substep_time()))
+        kappa(&self.groups)
     }
 
     /// The tets that are softer than their material to keep the scene's limit of kappa.
     #[must_use]
     pub fn softened(&self) -> SoftenedReport {
-        each!(&self.solver, solver => solver.softened()).into()
+        softened(&self.groups)
     }
 
     /// Recomputes everything derived and compares: the mesh, the lists around its particles, volume, masses, clusters,
@@ -381,85 +415,32 @@ impl Simulation {
     /// # Errors
     /// [`Error::Inconsistent`] or [`Error::Cut`] name the first difference.
     pub fn check(&self) -> Result<(), Error> {
-        self.cuttable.check().map_err(|source| Error::Cut {
-            field: "mesh".into(),
-            source,
-        })?;
-        let mesh = self.cuttable.mesh();
-        let volume = mesh.total_volume();
-        if (volume - self.initial_volume).abs() > 1e-12 * self.initial_volume {
-            let initial = self.initial_volume;
-            return Err(Error::Inconsistent(format!(
-                "the volume at rest was {initial} and is {volume}"
-            )));
-        }
-        self.solver.check(&self.cuttable)?;
-        self.plan.check(mesh)?;
-        let pieces = mesh.pieces().count;
-        if pieces != self.pieces {
-            return Err(Error::Inconsistent(format!(
-                "{} pieces were counted, there are {pieces}",
-                self.pieces
-            )));
-        }
-        Ok(())
+        self.groups.iter().try_for_each(Group::check)?;
+        self.whole
+            .as_ref()
+            .map_or(Ok(()), |whole| whole.check(&self.groups))
     }
 }
 
-fn kappa_limit(scene: &Scene, settings: &StepSettings) -> Result<Option<KappaLimit>, Error> {
+/// Refuses limits that are none.
+fn check_limits(scene: &Scene) -> Result<(), Error> {
     let kappa = scene.solver.kappa_limit;
     if kappa.is_nan() || kappa <= 0.0 {
         return Err(value("solver.kappa_limit", kappa, "positive"));
     }
-    let substep_time = settings.substep_time();
-    Ok(kappa.is_finite().then_some(KappaLimit {
-        kappa,
-        substep_time,
-    }))
-}
-
-fn settings(scene: &Scene) -> Result<StepSettings, Error> {
-    let settings = StepSettings {
-        time_step: scene.solver.time_step,
-        substeps: scene.solver.substeps,
-        iterations: scene.solver.iterations,
-        method: incise_xpbd::Method::GaussSeidel,
-        form: incise_xpbd::Form::Block,
-        relaxation: scene.solver.relaxation,
-        gravity: scene
-            .world
-            .gravity
-            .map(|g| coordinates("world.gravity", g))
-            .transpose()?,
-        colliders: collider::colliders(scene)?,
-    };
-    settings.check().map_err(|source| Error::Xpbd {
-        field: "solver".into(),
-        source,
-    })?;
-    within("solver.time_step", settings.time_step, 1e-9, 1e3)?;
-    Ok(settings)
-}
-
-/// Checks the handles of a scene and takes hold.
-fn hold(scene: &Scene, bodies: &Bodies, solver: &mut AnySolver) -> Result<Vec<Handle>, Error> {
-    let mut handles = Vec::with_capacity(scene.handle.len());
-    for (i, spec) in scene.handle.iter().enumerate() {
-        let field = format!("handle[{i}]");
-        let particles = |body| bodies.particles_of(body);
-        let mut handle = Handle::new(&field, spec, |body| Some(particles(body)?.0))?;
-        let first = particles(handle.body()).map_or(0, |(_, first)| first);
-        handle.attach(&field, solver, first)?;
-        handles.push(handle);
+    if scene.solver.max_substeps == 0 {
+        return Err(value("solver.max_substeps", 0, "at least 1"));
     }
-    Ok(handles)
-}
-
-/// Checks the links of a scene and ties them.
-fn connect(scene: &Scene, bodies: &Bodies, solver: &mut AnySolver) -> Result<(), Error> {
-    let links = scene.link.iter().enumerate();
-    let links: Result<Vec<_>, Error> = links
-        .map(|(i, spec)| link::link(&format!("link[{i}]"), spec, |b| bodies.particles_of(b)))
-        .collect();
-    link::connect(solver, &links?)
+    if let Some(sleep) = scene.solver.sleep {
+        for (key, number) in [("speed", sleep.speed), ("time", sleep.time)] {
+            if !(number.is_finite() && number > 0.0) {
+                return Err(value(
+                    format!("solver.sleep.{key}"),
+                    number,
+                    "positive and finite",
+                ));
+            }
+        }
+    }
+    Ok(())
 }

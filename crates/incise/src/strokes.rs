@@ -1,9 +1,10 @@
 //! [`Timeline`]: the strokes of a scene, carried out frame by frame.
 
 use glam::DVec3;
-use incise_cutting::{CutDelta, CutError, CutOptions, CuttableMesh, Plane, Sweep, cut_plane};
+use incise_cutting::{CutDelta, CutError, CutOptions, Plane, Sweep, cut_plane};
 
 use crate::Error;
+use crate::group::Group;
 use crate::limits::{coordinates, direction, value};
 use crate::scene::StrokeSpec;
 
@@ -12,7 +13,8 @@ use crate::scene::StrokeSpec;
 struct Stroke {
     field: String,
     spec: StrokeSpec,
-    sweep: Option<Sweep>,
+    /// One for each group of bodies once the blade has its first pose.
+    sweeps: Vec<Sweep>,
 }
 
 /// The strokes that are not finished.
@@ -94,37 +96,36 @@ impl Timeline {
         self.strokes.push(Stroke {
             field,
             spec,
-            sweep: None,
+            sweeps: Vec::new(),
         });
         self.added += 1;
         Ok(())
     }
 
-    /// Carries out what is due in `frame`; hands each delta to `follow` before the next stroke moves. `positions` is
-    /// kept current.
+    /// Carries out what is due in `frame` on every group; hands each delta to `follow` before the next stroke moves. The
+    /// groups' positions are kept current.
     pub(crate) fn advance(
         &mut self,
         frame: u64,
-        cuttable: &mut CuttableMesh,
-        positions: &mut Vec<DVec3>,
-        mut follow: impl FnMut(&CuttableMesh, &CutDelta) -> Result<(), Error>,
+        groups: &mut [Group],
+        mut follow: impl FnMut(usize, &mut Group, &CutDelta) -> Result<(), Error>,
     ) -> Result<(), Error> {
         for i in 0..self.strokes.len() {
-            let tolerance = self.tolerance;
-            let Some(delta) = self.strokes[i].advance(frame, tolerance, cuttable, positions)?
-            else {
-                continue;
-            };
-            if delta.is_empty() {
-                continue;
-            }
-            delta.extend_particles(positions);
-            for other in self.strokes.iter_mut().enumerate().filter(|(j, _)| *j != i) {
-                if let Some(sweep) = &mut other.1.sweep {
-                    sweep.follow(cuttable, &delta);
+            for (g, group) in groups.iter_mut().enumerate() {
+                let Some(delta) = self.strokes[i].advance(frame, self.tolerance, g, group)? else {
+                    continue;
+                };
+                if delta.is_empty() {
+                    continue;
                 }
+                delta.extend_particles(&mut group.positions);
+                for other in self.strokes.iter_mut().enumerate().filter(|(j, _)| *j != i) {
+                    if let Some(sweep) = other.1.sweeps.get_mut(g) {
+                        sweep.follow(&group.cuttable, &delta);
+                    }
+                }
+                follow(g, group, &delta)?;
             }
-            follow(cuttable, &delta)?;
         }
         self.strokes
             .retain(|stroke| frame < stroke.spec.last_frame());
@@ -140,13 +141,15 @@ impl Timeline {
 }
 
 impl Stroke {
+    /// Moves in the group of the given number.
     fn advance(
         &mut self,
         frame: u64,
         tolerance: f64,
-        cuttable: &mut CuttableMesh,
-        positions: &[DVec3],
+        number: usize,
+        group: &mut Group,
     ) -> Result<Option<CutDelta>, Error> {
+        let (cuttable, positions) = (&mut group.cuttable, &group.positions);
         let cut = |source| Error::Cut {
             field: self.field.clone(),
             source,
@@ -175,7 +178,7 @@ impl Stroke {
                 let elapsed = (frame.min(*last) - first) as f64 / (last - first) as f64;
                 let offset = along(path, elapsed);
                 let pose: Vec<DVec3> = blade.iter().map(|x| vector(*x) + offset).collect();
-                if let Some(sweep) = &mut self.sweep {
+                if let Some(sweep) = self.sweeps.get_mut(number) {
                     return sweep
                         .advance(cuttable, positions, &pose)
                         .map(Some)
@@ -185,7 +188,8 @@ impl Stroke {
                     snap: *snap,
                     tolerance,
                 };
-                self.sweep = Some(Sweep::new(cuttable, positions, &pose, options).map_err(cut)?);
+                let sweep = Sweep::new(cuttable, positions, &pose, options);
+                self.sweeps.push(sweep.map_err(cut)?);
                 Ok(None)
             }
             _ => Ok(None),

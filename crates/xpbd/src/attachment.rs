@@ -114,6 +114,14 @@ impl<R: Real> Attachments<R> {
         self.find(particle).ok().map(|i| &self.list[i])
     }
 
+    /// Follows a new origin.
+    pub(crate) fn shift(&mut self, by: R::Vector) {
+        for attachment in &mut self.list {
+            attachment.target = attachment.target - by;
+            attachment.before = attachment.before - by;
+        }
+    }
+
     /// Whether some attachment is not rigid.
     pub(crate) fn is_soft(&self) -> bool {
         self.list.iter().any(|a| a.compliance > 0.0)
@@ -246,11 +254,11 @@ impl<R: Real> Solver<R> {
             }
         }
         let pose = self.attachments.handles[handle as usize].from;
-        let x = self.vector(particle);
+        let (x, world) = (self.vector(particle), self.position(particle));
         let attachment = Attachment {
             particle: number(particle),
             handle,
-            place: pose.rotation.conjugate() * (R::to_dvec3(x) - pose.position),
+            place: pose.rotation.conjugate() * (world - pose.position),
             compliance,
             damping,
             target: x,
@@ -290,6 +298,7 @@ impl<R: Real> Solver<R> {
             attachments: Attachments { handles, list },
             particles,
             fixed,
+            origin,
             ..
         } = self;
         for handle in handles.iter_mut() {
@@ -300,7 +309,7 @@ impl<R: Real> Solver<R> {
             attachment.before = attachment.target;
             attachment.multiplier = R::Vector::default();
             let pose = &handles[attachment.handle as usize].now;
-            let target = R::from_dvec3(pose.apply(attachment.place));
+            let target = R::from_dvec3(pose.apply(attachment.place) - *origin);
             if !finite::<R>(target) {
                 lost += 1;
                 continue;

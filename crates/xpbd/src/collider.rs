@@ -119,7 +119,10 @@ impl Collider {
     /// The collider where its velocity takes it in `time` s.
     #[must_use]
     pub fn moved(&self, time: f64) -> Self {
-        let by = self.velocity * time;
+        self.shifted(self.velocity * time)
+    }
+
+    fn shifted(&self, by: DVec3) -> Self {
         let mut moved = *self;
         match &mut moved.shape {
             ColliderShape::Plane { point, .. } => *point += by,
@@ -378,14 +381,18 @@ pub(crate) struct Obstacle<R: Real> {
 }
 
 impl<R: Real> Obstacle<R> {
-    /// The colliders `elapsed` s after the start of the frame, at the end of a substep.
-    pub(crate) fn place(settings: &StepSettings, elapsed: f64) -> Vec<Self> {
-        let place = |collider: &Collider| Self {
-            solid: Solid::new(&collider.moved(elapsed).shape),
+    /// The colliders `elapsed` s after the start of the frame, at the end of a substep, relative to an origin.
+    pub(crate) fn place(
+        settings: &StepSettings,
+        elapsed: f64,
+        origin: DVec3,
+    ) -> impl Iterator<Item = Self> {
+        let place = move |collider: &Collider| Self {
+            solid: Solid::new(&collider.moved(elapsed).shifted(-origin).shape),
             friction: R::from_f64(collider.friction),
             motion: R::from_dvec3(collider.velocity * settings.substep_time()),
         };
-        settings.colliders.iter().map(place).collect()
+        settings.colliders.iter().map(place)
     }
 
     /// The outward normal, if a particle is inside or, but for rounding, on the surface.

@@ -102,6 +102,7 @@ impl<R: Real> Solver<R> {
     }
 
     fn frame_direct(&mut self, settings: &StepSettings) -> Result<StepReport, XpbdError> {
+        self.follow_body();
         let pattern = self.pattern().ok_or(XpbdError::Factorization)?;
         let mut report = StepReport {
             repaired: 0,
@@ -112,7 +113,8 @@ impl<R: Real> Solver<R> {
             self.predict(settings, R::from_f64(time));
             let ended = f64::from(number) / f64::from(settings.substeps);
             report.repaired += self.move_held(ended);
-            let obstacles = Obstacle::place(settings, ended * settings.time_step);
+            let elapsed = ended * settings.time_step;
+            let obstacles: Vec<_> = Obstacle::place(settings, elapsed, self.origin).collect();
             self.predicted = (0..self.particle_count()).map(|p| self.vector(p)).collect();
             // The multipliers, each over the scale of its row.
             let mut multipliers = vec![0.0; 2 * self.tet_count()];
@@ -174,7 +176,7 @@ impl<R: Real> Solver<R> {
             });
             let push: DVec3 = pushes.sum();
             let weight = weight::<R>(&self.particles[p]).to_f64();
-            let moved = R::from_dvec3(self.position(p) + push * weight);
+            let moved = R::from_dvec3(self.local(p) + push * weight);
             store::<R>(&self.particles[p], moved);
         }
         Some(())
@@ -198,7 +200,7 @@ impl<R: Real> Solver<R> {
     fn rate(&self, row: usize, rows: &Rows) -> f64 {
         let particles = self.tets[row / 2].particles.into_iter().enumerate();
         let parts = particles.map(|(k, p)| {
-            let motion = self.position(p as usize) - R::to_dvec3(self.previous[p as usize]);
+            let motion = self.local(p as usize) - R::to_dvec3(self.previous[p as usize]);
             rows.gradient(row % 2, k).dot(motion)
         });
         parts.sum()

@@ -55,6 +55,7 @@ mod layout;
 mod material;
 mod measure;
 mod neo_hookean;
+mod origin;
 mod real;
 mod residuals;
 mod scalar;

@@ -14,7 +14,7 @@ pub struct Energy {
     pub kinetic: f64,
     /// Of deformation; 0 at rest.
     pub elastic: f64,
-    /// Of height, relative to the origin; 0 without gravity.
+    /// Of height, relative to the origin of the world; 0 without gravity.
     pub gravity: f64,
 }
 
@@ -133,7 +133,7 @@ impl<R: Real> Solver<R> {
     }
 
     fn gradient(&self, tet: usize) -> DMat3 {
-        let [a, b, c, d] = self.tets[tet].particles.map(|p| self.position(p as usize));
+        let [a, b, c, d] = self.tets[tet].particles.map(|p| self.local(p as usize));
         DMat3::from_cols(b - a, c - a, d - a) * self.inverse_rest(tet)
     }
 

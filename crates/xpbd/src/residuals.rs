@@ -29,6 +29,8 @@ pub struct Residuals {
     pub dual: f64,
     /// The root of the mean square of `C + α̃ λ`, which does not grow with the number of constraints.
     pub dual_rms: f64,
+    /// The number of constraints that it is the mean of: two for each tet that takes part.
+    pub constraints: usize,
     /// `‖M (x - x̃) / Δt² + ∇U(x)‖` in N, from positions alone: what backward Euler makes zero. To be compared with
     /// [`Solver::load`].
     pub force: f64,
@@ -66,7 +68,7 @@ impl<R: Real> Solver<R> {
         }
         let time_squared = substep_time * substep_time;
         let inertia: Vec<DVec3> = (0..self.particle_count())
-            .map(|p| (self.position(p) - R::to_dvec3(self.predicted[p])) * self.masses[p])
+            .map(|p| (self.local(p) - R::to_dvec3(self.predicted[p])) * self.masses[p])
             .collect();
         let mut potential: f64 = (0..self.particle_count())
             .filter(|&p| self.moves(p))
@@ -106,12 +108,13 @@ impl<R: Real> Solver<R> {
                     .flat_map(|(_, v)| v.to_array()),
             )
         };
-        let constraints = dual.len().max(1) as f64;
+        let constraints = dual.len();
         let dual = norm(dual.into_iter());
         Some(Residuals {
             primal: moving(primal),
             dual,
-            dual_rms: dual / constraints.sqrt(),
+            dual_rms: dual / (constraints.max(1) as f64).sqrt(),
+            constraints,
             force: moving(force),
             potential: representable(potential),
         })
@@ -128,7 +131,7 @@ impl<R: Real> Solver<R> {
 
     /// Both constraints of a tet at the present positions.
     pub(crate) fn evaluate(&self, tet: &TetConstraint<f64>) -> Evaluation<f64> {
-        tet.evaluate(tet.particles.map(|p| self.position(p as usize)))
+        tet.evaluate(tet.particles.map(|p| self.local(p as usize)))
     }
 
     /// Whether a particle is neither held nor without mass.

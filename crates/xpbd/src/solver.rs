@@ -8,10 +8,12 @@ use fearless_simd::Level;
 use glam::DVec3;
 
 use crate::attachment::Attachments;
+use crate::collider::Obstacle;
 use crate::distance::Distance;
 use crate::jacobi::Jacobi;
 use crate::layout::Layout;
 use crate::neo_hookean::TetConstraint;
+use crate::origin::frame_of;
 use crate::real::{finite, load, store};
 use crate::scalar::Constraints;
 use crate::volume::TetVolume;
@@ -42,6 +44,10 @@ use crate::{Material, Real, XpbdError};
 /// ```
 #[derive(Debug)]
 pub struct Solver<R: Real> {
+    /// What positions are relative to.
+    pub(crate) origin: DVec3,
+    /// The longest side of the bounding box at the start in m.
+    pub(crate) size: f64,
     /// Position and inverse mass of each particle, together in one cache line part.
     pub(crate) particles: Vec<R::Particle>,
     pub(crate) previous: Vec<R::Vector>,
@@ -63,6 +69,8 @@ pub struct Solver<R: Real> {
     /// The multipliers of each tet after the last substep, for residuals.
     pub(crate) kept: Vec<[R; 2]>,
     pub(crate) jacobi: Option<Jacobi<R>>,
+    /// The colliders of the present substep.
+    pub(crate) obstacles: Vec<Obstacle<R>>,
     /// Positions before the constraints are solved, kept only for residuals.
     pub(crate) predicted: Vec<R::Vector>,
     pub(crate) attachments: Attachments<R>,
@@ -82,11 +90,17 @@ pub struct KappaLimit {
 impl<R: Real> Solver<R> {
     /// Particles at rest at `positions`, without mass and without constraints.
     ///
+    /// Positions are kept relative to [`Solver::origin`], which is chosen from them: the precision is that of a body at
+    /// the origin of the world.
+    ///
     /// # Panics
     /// If a position is not finite in this precision.
     #[must_use]
     pub fn new(positions: &[DVec3]) -> Self {
+        let (origin, size) = frame_of(positions);
         let mut solver = Self {
+            origin,
+            size,
             particles: Vec::new(),
             previous: Vec::new(),
             velocities: Vec::new(),
@@ -102,13 +116,14 @@ impl<R: Real> Solver<R> {
             multipliers: Vec::new(),
             kept: Vec::new(),
             jacobi: None,
+            obstacles: Vec::new(),
             predicted: Vec::new(),
             attachments: Attachments::default(),
             distances: None,
             volume_constraints: None,
         };
         for &x in positions {
-            solver.push_particle(R::from_dvec3(x), R::Vector::default(), false);
+            solver.push_particle(R::from_dvec3(x - origin), R::Vector::default(), false);
         }
         solver
     }
@@ -332,21 +347,26 @@ impl<R: Real> Solver<R> {
         self.masses[particle]
     }
 
-    /// The position of a particle in m.
+    /// The position of a particle in the world in m.
     ///
     /// # Panics
     /// If the particle does not exist.
     #[must_use]
     pub fn position(&self, particle: usize) -> DVec3 {
+        self.origin + self.local(particle)
+    }
+
+    /// The position of a particle relative to the origin.
+    pub(crate) fn local(&self, particle: usize) -> DVec3 {
         R::to_dvec3(self.vector(particle))
     }
 
-    /// Moves a particle.
+    /// Moves a particle to a position in the world in m.
     ///
     /// # Panics
     /// If the particle does not exist or the position is not finite in this precision.
     pub fn set_position(&mut self, particle: usize, position: DVec3) {
-        let x = R::from_dvec3(position);
+        let x = R::from_dvec3(position - self.origin);
         assert!(finite::<R>(x), "positions are finite");
         store::<R>(&self.particles[particle], x);
     }
@@ -370,7 +390,7 @@ impl<R: Real> Solver<R> {
         self.velocities[particle] = v;
     }
 
-    /// Writes the positions of all particles to `out`.
+    /// Writes the positions of all particles in the world in m to `out`.
     pub fn positions(&self, out: &mut Vec<DVec3>) {
         out.clear();
         out.extend((0..self.particles.len()).map(|p| self.position(p)));

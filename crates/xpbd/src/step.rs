@@ -98,6 +98,7 @@ impl<R: Real> Solver<R> {
         let _span = tracing::debug_span!("xpbd::step").entered();
         settings.check()?;
         self.lay_out(schedule);
+        self.follow_body();
         let mut report = StepReport {
             repaired: 0,
             unfolded: self.unfold(),
@@ -117,7 +118,9 @@ impl<R: Real> Solver<R> {
         let ended = f64::from(number + 1);
         self.predict(settings, R::from_f64(time));
         let lost = self.move_held(ended / f64::from(settings.substeps));
-        let obstacles = Obstacle::place(settings, ended * time);
+        let mut obstacles = std::mem::take(&mut self.obstacles);
+        obstacles.clear();
+        obstacles.extend(Obstacle::place(settings, ended * time, self.origin));
         let jacobi = settings.method != Method::GaussSeidel;
         let with_multipliers = keep || settings.iterations > 1;
         self.multipliers.clear();
@@ -156,6 +159,7 @@ impl<R: Real> Solver<R> {
             }
         }
         self.jacobi = state;
+        self.obstacles = obstacles;
         if keep {
             self.kept = (0..self.tets.len())
                 .map(|t| self.multipliers_of(t))

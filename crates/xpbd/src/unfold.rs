@@ -33,7 +33,7 @@ impl<R: Real> Solver<R> {
     fn is_on_a_line(&self) -> bool {
         let mut line = false;
         for tet in &self.tets {
-            let [a, b, c, d] = tet.particles.map(|p| self.position(p as usize));
+            let [a, b, c, d] = tet.particles.map(|p| self.local(p as usize));
             let [u, v, w] = [b - a, c - a, d - a];
             if [u.cross(v), v.cross(w), w.cross(u)] != [DVec3::ZERO; 3] {
                 return false;
@@ -46,7 +46,7 @@ impl<R: Real> Solver<R> {
     /// Moves a particle by `amount` in every coordinate, or by as much more as it takes to change the last digit of each;
     /// says whether that was possible.
     fn touch(&self, particle: usize, mut amount: f64) -> bool {
-        let x = self.position(particle);
+        let x = self.local(particle);
         let direction = direction(particle as u64);
         loop {
             let moved = R::from_dvec3(x + direction * amount);

@@ -97,7 +97,7 @@ fn reports_appear_when_asked_for() {
     place.good(&["run", "scene.toml", "--frames", "3", "--quiet"]);
     let frames = frames(&place, "out/frames.jsonl");
     let all = format!(
-        "{ALWAYS}, residual, energy, volume, volume_error, min_volume_ratio, max_speed, inverted_tets, kappa, softened"
+        "{ALWAYS}, residual, energy, volume, volume_error, min_volume_ratio, max_speed, inverted_tets, kappa, softened, bodies"
     );
     for (frame, expected) in frames.iter().zip([all.as_str(), ALWAYS, &all]) {
         assert_eq!(keys(frame), names(expected));
@@ -110,6 +110,20 @@ fn reports_appear_when_asked_for() {
         keys(&frames[0]["energy"]),
         names("kinetic, elastic, gravity")
     );
+}
+
+#[test]
+fn chosen_substeps_are_in_the_table_and_in_every_line() {
+    let place = Place::new();
+    let solver = "[solver]\nsubsteps = \"auto\"\nmax_substeps = 2\n";
+    place.write("scene.toml", SCENE.replace("1e4", "1e6") + solver);
+    let table = place.good(&["run", "scene.toml", "--frames", "3"]);
+    assert!(table.contains("substeps of body 0"), "{table}");
+    assert!(table.contains("2 (the cap; "), "{table}");
+    for frame in frames(&place, "out/frames.jsonl") {
+        assert_eq!(frame["bodies"][0]["substeps"], 2);
+        assert_eq!(frame["bodies"][0]["missed"], "cap");
+    }
 }
 
 #[test]

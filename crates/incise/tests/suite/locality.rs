@@ -38,9 +38,9 @@ fn a_frame_without_a_cut_leaves_the_plan_alone() {
     for _ in 0..9 {
         let plan = |s: &Simulation| {
             (
-                s.clustering().clone(),
-                s.coloring().clone(),
-                s.schedule().clone(),
+                s.clustering().into_owned(),
+                s.coloring().into_owned(),
+                s.schedule().into_owned(),
             )
         };
         let (before, mesh) = (plan(&simulation), simulation.mesh().clone());

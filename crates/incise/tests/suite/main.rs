@@ -2,15 +2,20 @@
 
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 
+mod bodies;
 mod constraints;
 mod cutting;
 mod determinism;
 mod kappa;
 mod locality;
+mod methods;
 mod mistakes;
 mod parsing;
 mod physics;
+mod preset;
 mod regions;
 mod reports;
+mod sleep;
+mod substeps;
 mod support;
 mod values;

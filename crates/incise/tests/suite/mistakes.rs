@@ -1,6 +1,6 @@
 //! Mistakes that are no numbers, or lie between numbers, are refused by the name of their field as well.
 
-use incise::scene::{Region, StrokeSpec};
+use incise::scene::{Region, SleepSpec, StrokeSpec};
 use incise::{Scene, Simulation};
 
 use crate::values::{plane, refused, region, sound, sweep};
@@ -8,8 +8,22 @@ use crate::values::{plane, refused, region, sound, sweep};
 /// A mistake in a sound scene, and the field an error names.
 type Mistake = (&'static str, fn(&mut Scene));
 
-const MISTAKES: [Mistake; 24] = [
-    ("solver.substeps", |s| s.solver.substeps = 0),
+const MISTAKES: [Mistake; 28] = [
+    ("solver.substeps", |s| s.solver.substeps = 0.into()),
+    ("solver.sleep.speed", |s| {
+        s.solver.sleep = Some(SleepSpec {
+            speed: f64::NAN,
+            time: 1.0,
+        });
+    }),
+    ("solver.sleep.time", |s| {
+        s.solver.sleep = Some(SleepSpec {
+            speed: 1.0,
+            time: 0.0,
+        });
+    }),
+    ("solver.max_substeps", |s| s.solver.max_substeps = 0),
+    ("body[0].substeps", |s| s.body[0].substeps = Some(0.into())),
     ("solver.iterations", |s| s.solver.iterations = 0),
     ("solver.clustering", |s| {
         s.solver.clustering = "serial:0".into();

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use incise::mesh::generate::{Shape, generate};
 use incise::mesh::io;
-use incise::scene::{Method, Precision, StrokeSpec};
+use incise::scene::{Form, Method, Precision, StrokeSpec};
 use incise::{Error, Scene, Simulation};
 
 use crate::support::{body, scene};
@@ -19,11 +19,15 @@ fn defaults_are_the_documented_ones() {
     let solver = &parsed.solver;
     assert_eq!(
         (solver.time_step, solver.substeps, solver.iterations),
-        (0.016, 5, 1)
+        (0.016, 5.into(), 1)
     );
     assert_eq!(
         (solver.method, solver.relaxation),
         (Method::GaussSeidel, 1.0)
+    );
+    assert_eq!(
+        (solver.form, solver.spectral_radius, solver.delay),
+        (Form::Block, 0.99, 10)
     );
     assert_eq!(
         (solver.clustering.as_str(), solver.coloring.as_str()),
@@ -33,6 +37,7 @@ fn defaults_are_the_documented_ones() {
         (solver.precision, solver.kappa_limit),
         (Precision::F32, 1.0)
     );
+    assert_eq!(solver.max_substeps, 200);
     assert_eq!((parsed.world.gravity, parsed.world.ground), (None, None));
     assert_eq!(
         (parsed.report.every, parsed.report.quantities.len()),
@@ -48,7 +53,7 @@ fn defaults_are_the_documented_ones() {
         (body.young_modulus, body.poisson_ratio, body.density),
         (1e5, 0.45, 1000.0)
     );
-    assert!(body.fixed.is_empty() && body.mesh.is_none());
+    assert!(body.fixed.is_empty() && body.mesh.is_none() && body.substeps.is_none());
     let StrokeSpec::Plane { snap, .. } = parsed.stroke[0] else {
         panic!("not a plane")
     };
@@ -66,14 +71,19 @@ gravity = [0.0, 0.5, -9.81]
 ground = { height = -1.5, friction = 0.5 }
 [solver]
 time_step = 0.01
-substeps = 7
+substeps = "auto"
+max_substeps = 70
 iterations = 2
-method = "gauss-seidel"
+method = "chebyshev"
+form = "sequential"
 relaxation = 0.9
+spectral_radius = 0.9
+delay = 3
 clustering = "serial:5"
 coloring = "greedy"
 precision = "f64"
 kappa_limit = inf
+sleep = { speed = 0.01, time = 0.2 }
 [[body]]
 mesh = "liver.vtk"
 scale = 0.1
@@ -82,6 +92,7 @@ young_modulus = 2e4
 poisson_ratio = 0.3
 density = 1050.0
 damping = 0.001
+substeps = 7
 fixed = [
   { half_space = { point = [0, 0, -0.4], normal = [0, 0, -1] } },
   { box = { low = [0, 0, 0], high = [1, 1, 1] } },
@@ -138,13 +149,20 @@ fn an_unknown_key_at_any_level_names_the_nearest() {
         ("[solver]", "[slover]"),
         ("time_step", "timestep"),
         ("substeps", "sub_steps"),
+        ("auto", "atuo"),
+        ("max_substeps", "max_substep"),
         ("iterations", "iteration"),
-        ("gauss-seidel", "gauss_seidel"),
+        ("chebyshev", "chebychev"),
+        ("form", "from"),
+        ("sequential", "seqential"),
+        ("spectral_radius", "spectral_radios"),
+        ("delay", "dealy"),
         ("relaxation", "relaxtion"),
         ("clustering", "clusterng"),
         ("precision", "precison"),
         ("f64", "f46"),
         ("kappa_limit", "kapa_limit"),
+        ("sleep", "sleeep"),
         ("young_modulus", "youngs_modulus"),
         ("poisson_ratio", "poison_ratio"),
         ("density", "densty"),
@@ -152,7 +170,7 @@ fn an_unknown_key_at_any_level_names_the_nearest() {
         ("fixed", "fixd"),
         ("half_space", "half-space"),
         ("low", "lo"),
-        ("radius", "radus"),
+        ("center", "centr"),
         ("particles", "particle"),
         ("tets", "tet"),
         ("frame ", "frme "),
@@ -181,7 +199,9 @@ fn wrong_types_and_missing_keys_are_named_in_one_line() {
         ("[world]\ngravity = [0, 0]", "line 2"),
         ("[world]\nground = {}", "height"),
         ("[solver]\nsubsteps = -1", "line 2"),
-        ("[solver]\nsubsteps = 1.5", "line 2"),
+        ("[solver]\nsubsteps = 1.5", "\"auto\""),
+        ("[solver]\nsubsteps = 5000000000", "line 2"),
+        ("[solver]\nsubsteps = [1]", "\"auto\""),
         ("[report]\nevery = -1", "line 2"),
         ("[[body]]\nshape = { kind = \"box\" }", "tets"),
         ("[[body]]\nshape = \"box\"", "line 2"),

@@ -90,7 +90,7 @@ fn each_quantity_has_its_own_keys() {
             ],
         ),
         ("speed", &["max_speed"]),
-        ("kappa", &["kappa", "softened"]),
+        ("kappa", &["kappa", "softened", "bodies"]),
     ] {
         let mut simulation = cut_sphere(&format!("[report]\nquantities = [\"{quantity}\"]"));
         let expected = &set(&ALWAYS) | &names.iter().copied().collect();

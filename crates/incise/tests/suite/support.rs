@@ -56,10 +56,15 @@ pub(crate) fn hash(words: impl IntoIterator<Item = u64>) -> u64 {
 /// Everything a frame leaves behind, as words: positions to the bit, clusters, colors, the order of solving.
 pub(crate) fn state(simulation: &Simulation) -> Vec<u64> {
     let coordinates = simulation.positions().iter().flat_map(|x| x.to_array());
-    let clusters = simulation.clustering().labels();
+    let clustering = simulation.clustering();
     coordinates
         .map(f64::to_bits)
-        .chain(clusters.iter().map(|cluster| u64::from(cluster.0)))
+        .chain(
+            clustering
+                .labels()
+                .iter()
+                .map(|cluster| u64::from(cluster.0)),
+        )
         .chain(plan(simulation))
         .collect()
 }
@@ -67,9 +72,10 @@ pub(crate) fn state(simulation: &Simulation) -> Vec<u64> {
 /// Colors and schedule as words.
 fn plan(simulation: &Simulation) -> Vec<u64> {
     let schedule = simulation.schedule();
-    let colors = simulation.coloring().colors();
+    let coloring = simulation.coloring();
     let order = schedule.order().iter();
-    colors
+    coloring
+        .colors()
         .iter()
         .map(|color| u64::from(color.0))
         .chain(order.chain(schedule.color_offsets()).map(|&i| u64::from(i)))

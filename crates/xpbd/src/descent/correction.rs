@@ -158,6 +158,7 @@ impl<R: Real> Solver<R> {
         let _span = tracing::debug_span!("xpbd::descend_corrected").entered();
         settings.check()?;
         self.refuse_soft_constraints()?;
+        self.follow_body();
         let mut report = DescentReport::default();
         for number in 1..=settings.step.substeps {
             let mut step = ImplicitStep::predicted(self, stars, settings, number);

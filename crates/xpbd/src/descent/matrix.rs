@@ -280,7 +280,7 @@ mod tests {
         }
         for p in 0..5 {
             solver.set_mass(p, 10.0);
-            let x = solver.position(p);
+            let x = solver.local(p);
             solver.set_position(
                 p,
                 DVec3::new(1.05 * x.x + 0.02 * x.y, 1.04 * x.y, 1.06 * x.z),
@@ -306,7 +306,7 @@ mod tests {
                 let mut motion = vec![DVec3::ZERO; 5];
                 motion[column] = axis;
                 blocks.multiply(&motion, &mut product);
-                let x = step.solver.position(q as usize);
+                let x = step.solver.local(q as usize);
                 let [low, high] = [-1e-6, 1e-6].map(|h| {
                     step.solver.set_position(q as usize, x + axis * h);
                     step.forces(&mut exact);

@@ -28,6 +28,9 @@ pub struct DescentSettings {
     /// Ends a substep before its last iteration once the force residual has fallen to this fraction of its value at
     /// the free motion. Costs [`crate::ImplicitStep::residual`] each iteration.
     pub tolerance: Option<f64>,
+    /// Whether to report what the last iterate of the frame is worth. Costs [`crate::ImplicitStep::residual`] and
+    /// [`crate::ImplicitStep::potential`] once a frame.
+    pub measure: bool,
 }
 
 impl DescentSettings {
@@ -41,6 +44,7 @@ impl DescentSettings {
             },
             guess: Guess::Inertia,
             tolerance: None,
+            measure: false,
         }
     }
 

@@ -24,7 +24,7 @@ impl<R: Real> ImplicitStep<'_, R> {
         let elastic = |tets: &[TetConstraint<R>]| -> f64 {
             let each = tets.iter().map(|tet| {
                 let tet = tet.to_f64();
-                energy(&tet, tet.particles.map(|p| solver.position(p as usize)))
+                energy(&tet, tet.particles.map(|p| solver.local(p as usize)))
             });
             each.sum()
         };
@@ -32,7 +32,7 @@ impl<R: Real> ImplicitStep<'_, R> {
             if weight::<R>(&solver.particles[p]) <= R::ZERO {
                 return 0.0;
             }
-            let lag = solver.position(p) - self.free_position(p);
+            let lag = solver.local(p) - self.free_position(p);
             0.5 * per_time_squared * solver.mass(p) * lag.length_squared()
         };
         let mut parts: Vec<f64> = solver.tets.par_chunks(PARALLEL_TETS).map(elastic).collect();
@@ -43,7 +43,7 @@ impl<R: Real> ImplicitStep<'_, R> {
     /// The forces in N that are left over: `M (x̃ - x) / Δt² - ∇U(x)`, zero in the solution. Those on particles that do
     /// not move, and those that press a particle into a collider that it touches, are zero as well.
     pub fn forces(&self, out: &mut Vec<DVec3>) {
-        self.forces_at(&|p| self.solver.position(p), out);
+        self.forces_at(&|p| self.solver.local(p), out);
     }
 
     /// The norm of [`ImplicitStep::forces`] over all particles, in N.
@@ -140,7 +140,7 @@ mod tests {
         }
         for p in 0..5 {
             solver.set_mass(p, 10.0 + p as f64);
-            let x = solver.position(p);
+            let x = solver.local(p);
             solver.set_position(
                 p,
                 DVec3::new(1.3 * x.x + 0.2 * x.y, 0.7 * x.y, x.z - 0.4 * x.x),
@@ -157,7 +157,7 @@ mod tests {
         let mut forces = Vec::new();
         step.forces(&mut forces);
         for (p, force) in forces.iter().enumerate() {
-            let x = step.solver.position(p);
+            let x = step.solver.local(p);
             for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
                 let [low, high] = [-1e-6, 1e-6].map(|h| {
                     step.solver.set_position(p, x + axis * h);

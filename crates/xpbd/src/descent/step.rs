@@ -14,6 +14,10 @@ pub struct DescentReport {
     pub iterations: u32,
     /// With a tolerance: the force residual at the end of the last substep, as a fraction of that at the free motion.
     pub residual: Option<f64>,
+    /// If measured: [`ImplicitStep::residual`] in N at the end of the frame.
+    pub force: Option<f64>,
+    /// If measured: [`ImplicitStep::potential`] in J at the end of the frame.
+    pub potential: Option<f64>,
 }
 
 impl<R: Real> Solver<R> {
@@ -66,6 +70,7 @@ impl<R: Real> Solver<R> {
         let _span = tracing::debug_span!("xpbd::descend").entered();
         settings.check()?;
         self.refuse_soft_constraints()?;
+        self.follow_body();
         let mut report = DescentReport::default();
         for number in 1..=settings.step.substeps {
             let mut step = ImplicitStep::predicted(self, stars, settings, number);
@@ -133,10 +138,12 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
         solver.predict(&settings.step, time);
         let ended = f64::from(number) / f64::from(settings.step.substeps);
         let lost = solver.move_held(ended);
+        let elapsed = ended * settings.step.time_step;
+        let obstacles = Obstacle::place(&settings.step, elapsed, solver.origin).collect();
         let mut step = Self {
             solver,
             stars,
-            obstacles: Obstacle::place(&settings.step, ended * settings.step.time_step),
+            obstacles,
             last: number == settings.step.substeps,
             settings: settings.step.clone(),
             time,
@@ -148,7 +155,7 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
         step
     }
 
-    /// Iterates until the settings or the tolerance say that it is enough.
+    /// Iterates until the settings or the tolerance say that it is enough, then measures if asked to.
     pub(super) fn run(
         &mut self,
         settings: &DescentSettings,
@@ -167,9 +174,13 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
                     residual
                 });
                 if residual <= tolerance * start {
-                    return;
+                    break;
                 }
             }
+        }
+        if settings.measure && self.last {
+            report.force = Some(self.residual());
+            report.potential = Some(self.potential());
         }
     }
 

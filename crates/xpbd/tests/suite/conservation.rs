@@ -50,7 +50,7 @@ fn free_fall_is_the_closed_form() {
 }
 
 /// In single precision a tenth of a micrometer, which is what gravity moves in a substep, is lost on a coordinate of
-/// 10 km; the body must fall all the same. The last digit there is 1 mm.
+/// 10 km; the body must fall all the same. In 10,000 steps it falls 1e-4 farther than in continuous time.
 #[test]
 fn a_body_far_from_the_origin_falls_in_single_precision() {
     let rest = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].map(|x| x + DVec3::splat(1e4));
@@ -70,7 +70,7 @@ fn a_body_far_from_the_origin_falls_in_single_precision() {
         .map(|p| solver.position(p).z - rest[p].z)
         .sum::<f64>()
         / 4.0;
-    within("height", (mean / (GRAVITY.z / 2.0) - 1.0).abs(), 0.02);
+    within("height", (mean / (GRAVITY.z / 2.0) - 1.0).abs(), 3e-4);
 }
 
 fn momentum<R: Real>(solver: &Solver<R>) -> [DVec3; 2] {

@@ -5,6 +5,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 
+mod allocations;
 mod attachments;
 mod beam;
 mod body;
@@ -28,6 +29,7 @@ mod ground;
 mod guards;
 mod kappa;
 mod large_deformations;
+mod origin;
 mod recovery;
 mod reference;
 mod refusals;

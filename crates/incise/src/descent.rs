@@ -1,0 +1,96 @@
+//! [`Descent`]: what a group that is solved by descent keeps, and how it follows a cut.
+//!
+//! Descent visits particles, so these have colors of their own; tets, clusters and their colors stay as they are for
+//! everybody who asks for them. Cost: O(tets) after each cut, as the stars of all particles are sorted anew.
+
+use std::time::Instant;
+
+use incise_coloring::auto;
+use incise_graph::{Clustering, Schedule};
+use incise_xpbd::{
+    Correction, CorrectionSettings, DescentReport, Real, Solver, Stars, StepReport, StepSettings,
+};
+
+use crate::report::{Milliseconds, milliseconds};
+use crate::{Error, method};
+
+/// Aggregates of a large body: factoring more of them would cost more than they gain.
+const AGGREGATES: usize = 50;
+
+/// The state of descent beside that of the solver.
+#[derive(Debug)]
+pub(crate) struct Descent<R: Real> {
+    stars: Stars<R>,
+    /// Where corrections are asked for.
+    correction: Option<Correction<R>>,
+    /// What the last frame said of itself.
+    pub(crate) last: DescentReport,
+}
+
+impl<R: Real> Descent<R> {
+    /// Colors the particles of a solver; `coarse` asks for corrections.
+    pub(crate) fn new(solver: &Solver<R>, coarse: bool) -> Result<Self, Error> {
+        let stars = Stars::new(solver, &schedule(solver, &mut Milliseconds::default()))?;
+        let correction = coarse.then(|| correction(&stars, solver)).transpose()?;
+        Ok(Self {
+            stars,
+            correction,
+            last: DescentReport::default(),
+        })
+    }
+
+    /// Follows a cut, after the solver has.
+    pub(crate) fn follow(
+        &mut self,
+        solver: &Solver<R>,
+        ms: &mut Milliseconds,
+    ) -> Result<(), Error> {
+        let schedule = schedule(solver, ms);
+        let start = Instant::now();
+        self.stars.rebuild(solver, &schedule)?;
+        if let Some(old) = &mut self.correction {
+            *old = correction(&self.stars, solver)?;
+        }
+        ms.schedule += milliseconds(start.elapsed());
+        Ok(())
+    }
+
+    /// Advances a solver by one frame.
+    pub(crate) fn step(
+        &mut self,
+        solver: &mut Solver<R>,
+        settings: &StepSettings,
+        measure: bool,
+    ) -> Result<StepReport, incise_xpbd::XpbdError> {
+        let mut settings = method::descent(settings);
+        settings.measure = measure;
+        self.last = match &mut self.correction {
+            Some(correction) => solver.descend_corrected(&mut self.stars, correction, &settings),
+            None => solver.descend(&mut self.stars, &settings),
+        }?;
+        Ok(StepReport {
+            repaired: self.last.repaired,
+            unfolded: 0,
+        })
+    }
+}
+
+/// The particles in the order of their colors.
+fn schedule<R: Real>(solver: &Solver<R>, ms: &mut Milliseconds) -> Schedule {
+    let start = Instant::now();
+    let coloring = auto(&solver.star_incidence()).coloring;
+    ms.color += milliseconds(start.elapsed());
+    Schedule::new(&Clustering::none(solver.particle_count()), &coloring)
+}
+
+fn correction<R: Real>(stars: &Stars<R>, solver: &Solver<R>) -> Result<Correction<R>, Error> {
+    let small = CorrectionSettings::default();
+    let settings = CorrectionSettings {
+        aggregate: small.aggregate.max(solver.particle_count() / AGGREGATES),
+        ..small
+    };
+    Correction::new(stars, settings).map_err(|source| Error::Xpbd {
+        field: "solver".into(),
+        source,
+    })
+}

@@ -1,0 +1,227 @@
+//! [`Group`]: bodies that are solved together, with all that moves and cuts them.
+//!
+//! Mostly a single body. A group has its own mesh, solver, plan and substeps, so a stiff body makes no other one wait,
+//! each is precise around its own origin, and a body moves to the bit as it would alone in the scene. Cost: that of its
+//! parts.
+
+use glam::DVec3;
+use incise_cutting::{CutDelta, CuttableMesh};
+use incise_xpbd::{KappaLimit, StepReport, StepSettings};
+
+use crate::backend::{AnySolver, each};
+use crate::handle::Handle;
+use crate::joined::Joined;
+use crate::plan::Plan;
+use crate::report::Milliseconds;
+use crate::sleep::Rest;
+use crate::substeps::Choice;
+use crate::volume::Volumes;
+use crate::{Error, Scene, collider, link};
+
+/// Bodies that are solved together.
+#[derive(Debug)]
+pub(crate) struct Group {
+    /// The numbers of its bodies in the scene, ascending.
+    pub(crate) bodies: Vec<usize>,
+    /// Mesh at rest; its particles and tets are numbered within the group.
+    pub(crate) cuttable: CuttableMesh,
+    pub(crate) solver: AnySolver,
+    pub(crate) plan: Plan,
+    /// Its colliders are where they are at the start of the next frame.
+    pub(crate) settings: StepSettings,
+    handles: Vec<Handle>,
+    volumes: Option<Volumes>,
+    /// The present positions.
+    pub(crate) positions: Vec<DVec3>,
+    /// Number of pieces.
+    pub(crate) pieces: usize,
+    /// Volume at rest in m³ before all cuts.
+    pub(crate) initial_volume: f64,
+    /// What was chosen, if the scene left it open.
+    pub(crate) choice: Option<Choice>,
+    /// What the last cut did to kappa, if that is to be reported.
+    pub(crate) cut_kappa: Option<CutKappa>,
+    /// Whether it sleeps, in a scene where bodies may.
+    pub(crate) rest: Option<Rest>,
+}
+
+/// What cuts did to kappa.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CutKappa {
+    /// The largest of a tet before.
+    pub(crate) before: Option<f64>,
+    /// The largest of a tet that was made.
+    pub(crate) new_tets: f64,
+}
+
+impl Group {
+    pub(crate) fn new(
+        scene: &Scene,
+        mut settings: StepSettings,
+        mut joined: Joined,
+    ) -> Result<Self, Error> {
+        let mesh = std::mem::take(&mut joined.mesh);
+        let cuttable = CuttableMesh::new(mesh).map_err(|source| Error::Cut {
+            field: "body".into(),
+            source,
+        })?;
+        let mut solver = AnySolver::new(scene.solver.precision, &joined, &cuttable)?;
+        let (substeps, choice) = joined.substeps(scene, &solver, &cuttable);
+        settings.substeps = substeps;
+        let kappa = scene.solver.kappa_limit;
+        if kappa.is_finite() {
+            let substep_time = settings.substep_time();
+            let limit = KappaLimit {
+                kappa,
+                substep_time,
+            };
+            solver.limit_kappa(limit, cuttable.mesh());
+        }
+        for handle in &mut joined.handles {
+            handle.attach(&mut solver)?;
+        }
+        link::connect(&mut solver, &joined.links)?;
+        let plan = Plan::new(scene, cuttable.mesh())?;
+        let volumes = joined.volumes();
+        if let Some(volumes) = &volumes {
+            volumes.constrain(&mut solver, &cuttable, &plan.schedule)?;
+        }
+        solver.prepare(&scene.solver)?;
+        let mut group = Self {
+            solver,
+            plan,
+            settings,
+            handles: joined.handles,
+            volumes,
+            positions: Vec::new(),
+            pieces: cuttable.mesh().pieces().count,
+            initial_volume: cuttable.mesh().total_volume(),
+            cuttable,
+            bodies: joined.bodies,
+            choice,
+            cut_kappa: None,
+            rest: scene.solver.sleep.map(Rest::new),
+        };
+        group.solver.positions(&mut group.positions);
+        Ok(group)
+    }
+
+    /// Whether it is not solved until it is woken.
+    pub(crate) fn asleep(&self) -> bool {
+        self.rest.is_some_and(|rest| rest.asleep())
+    }
+
+    /// Advances by the frame of a number, unless it sleeps. What moves a handle or a collider wakes it.
+    pub(crate) fn step(
+        &mut self,
+        frame: u64,
+        keeping_residuals: bool,
+    ) -> Result<StepReport, Error> {
+        let moved = self.rest.is_some() && self.is_moved(frame);
+        if let Some(rest) = self.rest.as_mut().filter(|_| moved) {
+            rest.wake();
+        }
+        if self.asleep() {
+            return Ok(StepReport::default());
+        }
+        for handle in &self.handles {
+            handle.advance(frame, &mut self.solver);
+        }
+        let (schedule, settings) = (&self.plan.schedule, &self.settings);
+        let step = self.solver.step(schedule, settings, keeping_residuals)?;
+        collider::advance(&mut self.settings);
+        let time = self.settings.time_step;
+        if let Some(rest) = self.rest.as_mut().filter(|_| !moved) {
+            each!(&mut self.solver, solver => if rest.count(solver.max_speed(), time) {
+                for p in 0..solver.particle_count() {
+                    solver.set_velocity(p, DVec3::ZERO);
+                }
+            });
+        }
+        Ok(step)
+    }
+
+    /// Whether a handle or a collider moves in a frame.
+    fn is_moved(&self, frame: u64) -> bool {
+        let mut colliders = self.settings.colliders.iter();
+        colliders.any(|collider| collider.velocity != DVec3::ZERO)
+            || self.handles.iter().any(|handle| handle.moves(frame))
+    }
+
+    /// Lets solver, clusters, colors, schedule and volume constraints follow a cut of the mesh, and wakes it. The pieces
+    /// are counted by [`Group::count_pieces`].
+    pub(crate) fn follow(&mut self, delta: &CutDelta, ms: &mut Milliseconds) -> Result<(), Error> {
+        if let Some(rest) = &mut self.rest {
+            rest.wake();
+        }
+        self.solver.follow(delta, &self.cuttable, ms)?;
+        self.plan.follow(delta, ms)?;
+        let Some(volumes) = &self.volumes else {
+            return Ok(());
+        };
+        volumes.follow(&mut self.solver, delta, &self.cuttable, &self.plan.schedule)
+    }
+
+    /// Notes the largest kappa before the first cut of a frame. O(tets).
+    pub(crate) fn note_kappa_before(&mut self) {
+        if self.cut_kappa.is_none() {
+            self.cut_kappa = Some(CutKappa {
+                before: Some(self.kappa()),
+                new_tets: 0.0,
+            });
+        }
+    }
+
+    /// Notes the largest kappa of the tets that a cut has made. Costs what the cut touched.
+    pub(crate) fn note_kappa_of(&mut self, delta: &CutDelta) {
+        let time = self.settings.substep_time();
+        let kappas = delta
+            .added
+            .iter()
+            .map(|tet| each!(&self.solver, solver => solver.kappa_of(tet.tet.index(), time)));
+        let largest = kappas.fold(0.0, f64::max);
+        let noted = self.cut_kappa.get_or_insert(CutKappa {
+            before: None,
+            new_tets: 0.0,
+        });
+        noted.new_tets = noted.new_tets.max(largest);
+    }
+
+    /// Counts the pieces anew. O(tets).
+    pub(crate) fn count_pieces(&mut self) {
+        self.pieces = self.cuttable.mesh().pieces().count;
+    }
+
+    /// The largest kappa of a tet, had none been softened. O(tets).
+    pub(crate) fn kappa(&self) -> f64 {
+        each!(&self.solver, solver => solver.kappa(self.settings.substep_time()))
+    }
+
+    /// Recomputes everything derived and compares.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        self.cuttable.check().map_err(|source| Error::Cut {
+            field: "mesh".into(),
+            source,
+        })?;
+        let mesh = self.cuttable.mesh();
+        let (initial, volume) = (self.initial_volume, mesh.total_volume());
+        let farthest = |far: f64, x: &DVec3| far.max(x.abs().max_element());
+        let far = mesh.positions.iter().fold(0.0, farthest) / initial.cbrt();
+        // Far from the origin the positions of new particles are rounded by 1e-16 of the distance.
+        if (volume - initial).abs() > (1e-12 + 1e-15 * far) * initial {
+            return Err(Error::Inconsistent(format!(
+                "the volume at rest was {initial} and is {volume}"
+            )));
+        }
+        self.solver.check(&self.cuttable)?;
+        self.plan.check(mesh)?;
+        let pieces = mesh.pieces().count;
+        if pieces != self.pieces {
+            return Err(Error::Inconsistent(format!(
+                "{} pieces were counted, there are {pieces}",
+                self.pieces
+            )));
+        }
+        Ok(())
+    }
+}

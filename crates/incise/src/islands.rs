@@ -1,0 +1,50 @@
+//! [`islands`]: which bodies are solved together.
+//!
+//! Bodies that nothing joins do not see each other: each gets a solver, a schedule and substeps of its own. Bodies that
+//! are joined, directly or through others, must be solved as one. Source: the islands of rigid body engines, found as
+//! connected components by union-find. Cost: O((bodies + pairs) log bodies).
+
+/// For each of `bodies` bodies the number of its island; islands are numbered in the order of their first body. `joined`
+/// lists pairs of bodies that must be solved together.
+///
+/// # Panics
+/// If a pair names a body that does not exist.
+pub(crate) fn islands(bodies: usize, joined: &[[usize; 2]]) -> Vec<usize> {
+    let mut parent: Vec<usize> = (0..bodies).collect();
+    for pair in joined {
+        let [a, b] = pair.map(|body| root(&mut parent, body));
+        // The lower body becomes the root, so every body's root comes before it.
+        parent[a.max(b)] = a.min(b);
+    }
+    let mut islands: Vec<usize> = Vec::with_capacity(bodies);
+    let mut count = 0;
+    for body in 0..bodies {
+        let root = root(&mut parent, body);
+        let island = if root == body { count } else { islands[root] };
+        count += usize::from(root == body);
+        islands.push(island);
+    }
+    islands
+}
+
+fn root(parent: &mut [usize], mut body: usize) -> usize {
+    while parent[body] != body {
+        parent[body] = parent[parent[body]];
+        body = parent[body];
+    }
+    body
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn joined_bodies_share_an_island() {
+        assert_eq!(islands(0, &[]), []);
+        assert_eq!(islands(3, &[]), [0, 1, 2]);
+        assert_eq!(islands(3, &[[1, 1]]), [0, 1, 2]);
+        assert_eq!(islands(5, &[[4, 1], [3, 4]]), [0, 1, 2, 1, 1]);
+        assert_eq!(islands(4, &[[2, 3], [0, 1], [3, 0]]), [0; 4]);
+    }
+}

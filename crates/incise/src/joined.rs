@@ -1,0 +1,130 @@
+//! [`Joined`]: the bodies of a group as one mesh, with all that is tied to their particles.
+//!
+//! Particles and tets are numbered body by body in the order of the scene; handles and links, which a scene gives by
+//! bodies and points, are translated here. Cost: O(particles + tets).
+
+use std::ops::Range;
+
+use incise_cutting::CuttableMesh;
+use incise_mesh::{ParticleId, TetId, TetMesh};
+use incise_xpbd::{DistanceConstraint, Material};
+
+use crate::backend::{AnySolver, each};
+use crate::body::Body;
+use crate::handle::Handle;
+use crate::limits::{existing, value};
+use crate::scene::Substeps;
+use crate::substeps::{Choice, choose};
+use crate::volume::Volumes;
+use crate::{Error, Scene, link};
+
+/// The bodies of a group before it is set up.
+#[derive(Debug, Default)]
+pub(crate) struct Joined {
+    /// Their numbers in the scene, ascending.
+    pub(crate) bodies: Vec<usize>,
+    pub(crate) mesh: TetMesh,
+    pub(crate) materials: Vec<Material>,
+    /// For each tet the number of its material, which is that of its body within the group.
+    pub(crate) material_of: Vec<u16>,
+    pub(crate) fixed: Vec<bool>,
+    pub(crate) handles: Vec<Handle>,
+    pub(crate) links: Vec<DistanceConstraint>,
+    /// What each body asks for.
+    volume_compliances: Vec<Option<f64>>,
+    substeps: Vec<Substeps>,
+}
+
+impl Joined {
+    /// The groups of a scene, in the order of their first bodies; `islands` says which body goes to which. The bodies of
+    /// links exist.
+    pub(crate) fn all(
+        scene: &Scene,
+        bodies: Vec<Body>,
+        islands: &[usize],
+    ) -> Result<Vec<Self>, Error> {
+        let groups = islands.iter().max().map_or(0, |last| last + 1);
+        let mut all: Vec<Self> = (0..groups).map(|_| Self::default()).collect();
+        // The particles of each body in its group.
+        let mut ranges = Vec::with_capacity(bodies.len());
+        for (number, (body, &island)) in bodies.into_iter().zip(islands).enumerate() {
+            let first = all[island].mesh.positions.len();
+            all[island].add(number, body)?;
+            ranges.push(first..all[island].mesh.positions.len());
+        }
+        let particles = |body: usize| {
+            let range: Range<usize> = ranges[body].clone();
+            let first = range.start;
+            (&all[islands[body]].mesh.positions[range], first)
+        };
+        let handles = scene.handle.iter().enumerate().map(|(i, spec)| {
+            let field = format!("handle[{i}]");
+            existing(&format!("{field}.body"), spec.body, islands.len())?;
+            let (positions, first) = particles(spec.body);
+            Handle::new(field, spec, positions, first)
+        });
+        let handles = handles.collect::<Result<Vec<_>, Error>>()?;
+        let links = scene.link.iter().enumerate();
+        let links = links
+            .map(|(i, spec)| link::link(&format!("link[{i}]"), spec, particles))
+            .collect::<Result<Vec<_>, _>>()?;
+        for (handle, spec) in handles.into_iter().zip(&scene.handle) {
+            all[islands[spec.body]].handles.push(handle);
+        }
+        for (link, spec) in links.into_iter().zip(&scene.link) {
+            all[islands[spec.from.body]].links.push(link);
+        }
+        Ok(all)
+    }
+
+    /// Appends a body of the scene.
+    fn add(&mut self, number: usize, body: Body) -> Result<(), Error> {
+        let material = u16::try_from(self.materials.len())
+            .map_err(|_| value("body", "too many", "at most 65,536"))?;
+        let first = self.mesh.positions.len();
+        let shifted = |p: ParticleId| ParticleId::new(first + p.index());
+        self.mesh.positions.extend(body.mesh.positions);
+        let tets = body.mesh.tets.iter().map(|tet| tet.map(shifted));
+        self.mesh.tets.extend(tets);
+        self.bodies.push(number);
+        self.material_of.resize(self.mesh.tets.len(), material);
+        self.materials.push(body.material);
+        self.fixed.extend(body.fixed);
+        self.volume_compliances.push(body.volume_compliance);
+        self.substeps.push(body.substeps);
+        Ok(())
+    }
+
+    /// The volume constraints of the group, if a body asks for them.
+    pub(crate) fn volumes(&self) -> Option<Volumes> {
+        Volumes::new(self.volume_compliances.clone())
+    }
+
+    /// The substeps of the group: the most that a body asks for. Where it is left open, also how they were chosen.
+    pub(crate) fn substeps(
+        &self,
+        scene: &Scene,
+        solver: &AnySolver,
+        cuttable: &CuttableMesh,
+    ) -> (u32, Option<Choice>) {
+        let fixed = |substeps: &Substeps| match substeps {
+            Substeps::Fixed(substeps) => *substeps,
+            Substeps::Auto => 1,
+        };
+        let most = self.substeps.iter().map(fixed).max().unwrap_or(1);
+        if !self.substeps.contains(&Substeps::Auto) {
+            return (most, None);
+        }
+        let mesh = cuttable.mesh();
+        let time = scene.solver.time_step;
+        let auto = |t: &usize| self.substeps[usize::from(self.material_of[*t])] == Substeps::Auto;
+        let of_tet = |t: usize| {
+            let kappa = each!(solver, solver => solver.kappa_of(t, time));
+            (kappa, mesh.volume(TetId::new(t)))
+        };
+        let tets = (0..mesh.tets.len()).filter(auto).map(of_tet).collect();
+        let softens = scene.solver.kappa_limit.is_finite();
+        let choice = choose(tets, scene.solver.max_substeps, softens);
+        (most.max(choice.substeps), Some(choice))
+    }
+}

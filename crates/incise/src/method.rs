@@ -1,0 +1,157 @@
+//! [`Method`]: how a substep is solved, and which keys of a scene go with it.
+//!
+//! Gauss-Seidel, Jacobi and Chebyshev are ways through the same constraints of XPBD. Descent knows no constraints: it
+//! lowers the potential of the implicit step, so what XPBD adds as constraints (links, soft handles, volumes) or as
+//! damping does not exist for it, and scenes that ask for both are refused.
+
+use incise_xpbd::{DescentSettings, StepSettings};
+use serde::{Deserialize, Serialize};
+
+use crate::limits::{coordinates, value, within};
+use crate::scene::{SolverSpec, Substeps};
+use crate::{Error, Scene, collider};
+
+/// How a substep is solved.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Method {
+    /// Color after color, each constraint seeing the corrections before it.
+    #[default]
+    GaussSeidel,
+    /// All constraints at once, corrections added up: see `incise_xpbd::Method::Jacobi`.
+    Jacobi,
+    /// Jacobi, extrapolated: see `incise_xpbd::Method::Chebyshev`.
+    Chebyshev,
+    /// No XPBD: particle by particle into the minimum of the implicit step's potential, see
+    /// `incise_xpbd::Solver::descend`. Stable at any stiffness. Neither damping nor links, soft handles and volume
+    /// constraints go with it.
+    Descent,
+}
+
+/// How the two constraints of a tet are solved.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Form {
+    /// As one system of two unknowns.
+    #[default]
+    Block,
+    /// One after the other, as in the paper.
+    Sequential,
+}
+
+impl SolverSpec {
+    /// The defaults that go with a method: those of [`SolverSpec::default`], but
+    ///
+    /// * all methods but Gauss-Seidel take 20 `iterations`, as one of theirs does little;
+    /// * Jacobi and Chebyshev have a `relaxation` of 0.1: with 1 they overshoot where more than two tets meet;
+    /// * descent has no `kappa_limit`: it is stable without.
+    ///
+    /// ```
+    /// let scene = incise::Scene::from_toml("[solver]\nmethod = \"jacobi\"\niterations = 7")?;
+    /// assert_eq!((scene.solver.iterations, scene.solver.relaxation), (7, 0.1));
+    /// # Ok::<(), incise::Error>(())
+    /// ```
+    #[must_use]
+    pub fn of(method: Method) -> Self {
+        let mut spec = Self {
+            method,
+            ..Self::default()
+        };
+        match method {
+            Method::GaussSeidel => {}
+            Method::Jacobi | Method::Chebyshev => (spec.iterations, spec.relaxation) = (20, 0.1),
+            Method::Descent => (spec.iterations, spec.kappa_limit) = (20, f64::INFINITY),
+        }
+        spec
+    }
+}
+
+/// The settings of a scene, checked; each group of bodies puts in its own substeps.
+pub(crate) fn settings(scene: &Scene) -> Result<StepSettings, Error> {
+    let solver = &scene.solver;
+    let gravity = scene.world.gravity;
+    let settings = StepSettings {
+        time_step: solver.time_step,
+        substeps: match solver.substeps {
+            Substeps::Fixed(substeps) => substeps,
+            Substeps::Auto => 1,
+        },
+        iterations: solver.iterations,
+        method: match solver.method {
+            Method::Chebyshev => incise_xpbd::Method::Chebyshev {
+                spectral_radius: solver.spectral_radius,
+                delay: solver.delay,
+            },
+            Method::Jacobi => incise_xpbd::Method::Jacobi,
+            // Descent does not ask.
+            Method::GaussSeidel | Method::Descent => incise_xpbd::Method::GaussSeidel,
+        },
+        form: match solver.form {
+            Form::Block => incise_xpbd::Form::Block,
+            Form::Sequential => incise_xpbd::Form::Sequential,
+        },
+        relaxation: solver.relaxation,
+        gravity: gravity
+            .map(|g| coordinates("world.gravity", g))
+            .transpose()?,
+        colliders: collider::colliders(scene)?,
+    };
+    let checked = match solver.method {
+        Method::Descent => check_descent(scene).map(|()| descent(&settings).check()),
+        _ if solver.coarse => Err(refused("solver.coarse", true, "false unless")),
+        _ => Ok(settings.check()),
+    };
+    checked?.map_err(|source| Error::Xpbd {
+        field: "solver".into(),
+        source,
+    })?;
+    within("solver.time_step", settings.time_step, 1e-9, 1e3)?;
+    Ok(settings)
+}
+
+/// The same for descent.
+pub(crate) fn descent(settings: &StepSettings) -> DescentSettings {
+    DescentSettings {
+        // What lies or hangs starts where it is, so that few sweeps do.
+        guess: incise_xpbd::Guess::Adaptive,
+        step: settings.clone(),
+        ..DescentSettings::new(settings.time_step, settings.iterations)
+    }
+}
+
+/// Refuses what descent would silently leave out.
+fn check_descent(scene: &Scene) -> Result<(), Error> {
+    if scene.solver.form != Form::Block {
+        return Err(refused("solver.form", "sequential", "block where"));
+    }
+    if !scene.link.is_empty() {
+        return Err(refused("link", "given", "absent where"));
+    }
+    for (i, handle) in scene.handle.iter().enumerate() {
+        if handle.compliance != 0.0 {
+            let field = format!("handle[{i}].compliance");
+            return Err(refused(&field, handle.compliance, "0 where"));
+        }
+    }
+    for (i, body) in scene.body.iter().enumerate() {
+        if body.damping != 0.0 {
+            let field = format!("body[{i}].damping");
+            return Err(refused(&field, body.damping, "0 where"));
+        }
+        if let Some(compliance) = body.volume_compliance {
+            let field = format!("body[{i}].volume_compliance");
+            return Err(refused(&field, compliance, "absent where"));
+        }
+    }
+    Ok(())
+}
+
+fn refused(field: &str, given: impl ToString, range: &str) -> Error {
+    value(
+        field,
+        given,
+        format!("{range} solver.method is \"descent\""),
+    )
+}

@@ -1,0 +1,170 @@
+//! [`Whole`]: several groups of bodies seen as one mesh.
+//!
+//! At the start particles and tets are numbered body by body in the order of the scene. A cut keeps all numbers: new
+//! particles and tets get the next ones, stroke by stroke and within a stroke group by group, each group's in the order
+//! of its own delta. Each group numbers its own from 0; the lists here translate, and one delta of a group becomes one
+//! of the whole. Only scenes with more than one group have a whole; a single group is its own.
+//!
+//! Cost: following a cut costs what the cut touched; clusters and colors of the whole are put together on request.
+
+use glam::DVec3;
+use incise_cutting::{AddedTet, CutDelta, EdgePoint, RelinkedTet, RemovedTet};
+use incise_graph::{ClusterId, Clustering, Coloring};
+use incise_mesh::{ParticleId, TetId, TetMesh};
+
+use crate::Error;
+use crate::body::Body;
+use crate::group::Group;
+
+/// The numbers in the whole of a group's particles and tets.
+#[derive(Debug, Default)]
+struct Numbers {
+    particles: Vec<ParticleId>,
+    tets: Vec<TetId>,
+}
+
+/// All groups as one mesh.
+#[derive(Debug)]
+pub(crate) struct Whole {
+    pub(crate) mesh: TetMesh,
+    pub(crate) positions: Vec<DVec3>,
+    numbers: Vec<Numbers>,
+}
+
+impl Whole {
+    /// The bodies as one mesh, before they go to their `islands`.
+    pub(crate) fn new(bodies: &[Body], islands: &[usize]) -> Self {
+        let mut mesh = TetMesh::default();
+        let groups = islands.iter().max().map_or(0, |last| last + 1);
+        let mut numbers: Vec<Numbers> = (0..groups).map(|_| Numbers::default()).collect();
+        for (body, &island) in bodies.iter().zip(islands) {
+            let first = mesh.positions.len();
+            let shifted = |p: ParticleId| ParticleId::new(first + p.index());
+            let first_tet = mesh.tets.len();
+            mesh.positions.extend(&body.mesh.positions);
+            let tets = body.mesh.tets.iter().map(|tet| tet.map(shifted));
+            mesh.tets.extend(tets);
+            let numbers = &mut numbers[island];
+            let particles = (first..mesh.positions.len()).map(ParticleId::new);
+            numbers.particles.extend(particles);
+            let tets = (first_tet..mesh.tets.len()).map(TetId::new);
+            numbers.tets.extend(tets);
+        }
+        Self {
+            positions: mesh.positions.clone(),
+            mesh,
+            numbers,
+        }
+    }
+
+    /// Follows a cut in one group; returns what it changed in the numbers of the whole.
+    pub(crate) fn follow(&mut self, group: usize, delta: &CutDelta) -> CutDelta {
+        let numbers = &mut self.numbers[group];
+        let (particles_before, tets_before) = (self.mesh.positions.len(), self.mesh.tets.len());
+        let new = delta.particles_after() - delta.particles_before;
+        let particles = (particles_before..particles_before + new).map(ParticleId::new);
+        numbers.particles.extend(particles);
+        let new = delta.tets_after() - delta.tets_before;
+        numbers
+            .tets
+            .extend((tets_before..tets_before + new).map(TetId::new));
+
+        let particle = |p: ParticleId| numbers.particles[p.index()];
+        let tet = |t: TetId| numbers.tets[t.index()];
+        let point = |point: &EdgePoint| EdgePoint {
+            ends: point.ends.map(particle),
+            parameter: point.parameter,
+        };
+        let removed = |removed: &RemovedTet| RemovedTet {
+            tet: tet(removed.tet),
+            corners: removed.corners.map(particle),
+        };
+        let added = |added: &AddedTet| AddedTet {
+            tet: tet(added.tet),
+            parent: tet(added.parent),
+            corners: added.corners.map(particle),
+            positive: added.positive,
+        };
+        let relinked = |relinked: &RelinkedTet| RelinkedTet {
+            tet: tet(relinked.tet),
+            before: relinked.before.map(particle),
+            after: relinked.after.map(particle),
+        };
+        let whole = CutDelta {
+            particles_before,
+            tets_before,
+            points: delta.points.iter().map(point).collect(),
+            copies: delta.copies.iter().map(|&p| particle(p)).collect(),
+            removed: delta.removed.iter().map(removed).collect(),
+            added: delta.added.iter().map(added).collect(),
+            relinked: delta.relinked.iter().map(relinked).collect(),
+            snapped: delta.snapped,
+            worst_volume_ratio: delta.worst_volume_ratio,
+        };
+        whole.apply(&mut self.mesh);
+        whole.extend_particles(&mut self.positions);
+        whole
+    }
+
+    /// Takes over the groups' positions.
+    pub(crate) fn collect_positions(&mut self, groups: &[Group]) {
+        for (numbers, group) in self.numbers.iter().zip(groups) {
+            for (p, x) in numbers.particles.iter().zip(&group.positions) {
+                self.positions[p.index()] = *x;
+            }
+        }
+    }
+
+    /// The clusters of all groups and their colors: those of a group follow those of the groups before it. O(tets).
+    pub(crate) fn plan(&self, groups: &[Group]) -> (Clustering, Coloring) {
+        let mut labels = vec![ClusterId::NONE; self.mesh.tets.len()];
+        let mut colors = Vec::new();
+        for (numbers, group) in self.numbers.iter().zip(groups) {
+            for (t, tet) in numbers.tets.iter().enumerate() {
+                if let Some(cluster) = group.plan.clustering.cluster_of(t) {
+                    labels[tet.index()] = ClusterId::new(colors.len() + cluster.index());
+                }
+            }
+            colors.extend_from_slice(group.plan.coloring().colors());
+        }
+        let clustering = Clustering::from_labels(labels)
+            .expect("each group has at most as many cluster numbers as tets");
+        // Vacant numbers at the end are left out.
+        colors.truncate(clustering.cluster_count());
+        (clustering, Coloring::new(colors))
+    }
+
+    /// Compares with the groups.
+    pub(crate) fn check(&self, groups: &[Group]) -> Result<(), Error> {
+        let mut particles = vec![0_u32; self.mesh.positions.len()];
+        let mut tets = vec![0_u32; self.mesh.tets.len()];
+        let differs = |what: &str| Err(Error::Inconsistent(format!("{what} of the whole differs")));
+        for (numbers, group) in self.numbers.iter().zip(groups) {
+            let mesh = group.cuttable.mesh();
+            if (numbers.particles.len(), numbers.tets.len())
+                != (mesh.positions.len(), mesh.tets.len())
+            {
+                return differs("the size");
+            }
+            for (p, number) in numbers.particles.iter().enumerate() {
+                particles[number.index()] += 1;
+                if self.mesh.positions[number.index()] != mesh.positions[p]
+                    || self.positions[number.index()] != group.positions[p]
+                {
+                    return differs("a particle");
+                }
+            }
+            for (t, number) in numbers.tets.iter().enumerate() {
+                tets[number.index()] += 1;
+                let corners = mesh.tets[t].map(|p| numbers.particles[p.index()]);
+                if self.mesh.tets[number.index()] != corners {
+                    return differs("a tet");
+                }
+            }
+        }
+        if particles.iter().chain(&tets).any(|count| *count != 1) {
+            return differs("the numbering");
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,273 @@
+//! The methods a scene may name: what they default to, that each runs, and what does not go with it.
+
+use incise::mesh::glam::DVec3;
+use incise::scene::{Form, Method, Precision, SolverSpec};
+use incise::{Scene, Simulation};
+
+use crate::support::{body, plane, scene, simulation, state};
+use crate::values::refused;
+
+const NAMES: [(&str, Method); 4] = [
+    ("gauss-seidel", Method::GaussSeidel),
+    ("jacobi", Method::Jacobi),
+    ("chebyshev", Method::Chebyshev),
+    ("descent", Method::Descent),
+];
+
+/// A sphere that falls onto the ground and is cut, by the given keys of `[solver]`.
+fn falling(keys: &str) -> Scene {
+    scene(&format!(
+        "[report]\nquantities = [\"residual\"]\n\
+         [world]\ngravity = [0.0, 0.0, -9.81]\nground = {{ height = -0.55, friction = 0.4 }}\n\
+         [solver]\n{keys}\n{}{}",
+        body("sphere", 300, [0.0; 3]),
+        plane(3, [0.03, 0.0, 0.0], [1.0, 0.1, 0.0]),
+    ))
+}
+
+#[test]
+fn each_method_has_its_defaults_and_named_keys_override_them() {
+    for (name, method) in NAMES {
+        let spec = |keys: &str| scene(&format!("[solver]\nmethod = \"{name}\"\n{keys}")).solver;
+        assert_eq!(spec(""), SolverSpec::of(method));
+        let (iterations, relaxation, limit) = match method {
+            Method::GaussSeidel => (1, 1.0, 1.0),
+            Method::Descent => (20, 1.0, f64::INFINITY),
+            _ => (20, 0.1, 1.0),
+        };
+        let given = spec("");
+        assert_eq!(
+            (given.iterations, given.relaxation, given.kappa_limit),
+            (iterations, relaxation, limit)
+        );
+        assert_eq!(
+            (given.form, given.spectral_radius, given.delay, given.coarse),
+            (Form::Block, 0.99, 10, false)
+        );
+        // Also a key whose value is that of the plain defaults.
+        let given = spec("iterations = 1\nrelaxation = 1.0\nkappa_limit = 1.0");
+        assert_eq!(
+            given,
+            SolverSpec {
+                method,
+                ..SolverSpec::default()
+            }
+        );
+        let scene = falling(&format!("method = \"{name}\"\nrelaxation = 0.3"));
+        assert_eq!(Scene::from_toml(&scene.to_toml().unwrap()).unwrap(), scene);
+    }
+}
+
+#[test]
+fn each_method_runs_through_a_cut_and_does_not_depend_on_threads() {
+    let forms = ["block", "sequential"].map(|form| format!("form = \"{form}\""));
+    let mut settings: Vec<String> = Vec::new();
+    for (name, method) in NAMES {
+        let variants = match method {
+            Method::Descent => [String::new(), "coarse = true".to_owned()],
+            _ => forms.clone(),
+        };
+        settings.extend(variants.map(|keys| format!("method = \"{name}\"\n{keys}")));
+    }
+    let mut ends = Vec::new();
+    for keys in settings {
+        for precision in [Precision::F32, Precision::F64] {
+            let mut scene = falling(&keys);
+            scene.solver.precision = precision;
+            let [mut one, mut three] =
+                [1, 3].map(|threads| Simulation::with_threads(&scene, threads).unwrap());
+            for _ in 0..8 {
+                one.step().unwrap();
+                three.step().unwrap();
+                one.check().unwrap();
+                assert!(one.positions().iter().all(|x| x.is_finite()));
+                assert!(state(&one) == state(&three), "{keys}");
+                assert_eq!(one.report().repaired, 0, "{keys}");
+            }
+            assert_eq!(one.report().pieces, 2);
+            ends.push((keys.clone(), one.positions().to_vec()));
+        }
+    }
+    // Each key changes something, or it would not be a key.
+    for (i, (a, x)) in ends.iter().enumerate() {
+        for (b, y) in &ends[..i] {
+            assert!(x != y, "{a} gives the same as {b}");
+        }
+    }
+}
+
+/// Chebyshev's own keys arrive: a delay as long as the iterations, or a radius of 0, is Jacobi.
+#[test]
+fn chebyshev_without_extrapolation_is_jacobi() {
+    let run = |keys: &str| {
+        let mut simulation = simulation(&falling(keys));
+        // In free fall there is nothing to correct: up to the impact.
+        for _ in 0..9 {
+            simulation.step().unwrap();
+        }
+        simulation.positions().to_vec()
+    };
+    let jacobi = run("method = \"jacobi\"");
+    assert!(jacobi == run("method = \"chebyshev\"\ndelay = 20"));
+    assert!(jacobi == run("method = \"chebyshev\"\nspectral_radius = 0.0"));
+    assert!(jacobi != run("method = \"chebyshev\"\ndelay = 5"));
+    assert!(run("method = \"chebyshev\"\nspectral_radius = 0.5") != run("method = \"chebyshev\""));
+}
+
+/// Both follow the same equations, and at a small kappa one pass of Gauss-Seidel solves them nearly.
+#[test]
+fn descent_and_gauss_seidel_agree_at_a_small_kappa() {
+    let run = |keys: &str| {
+        let text = format!(
+            "[world]\ngravity = [0.0, 0.0, -9.81]\n[solver]\nprecision = \"f64\"\nsubsteps = 40\nkappa_limit = inf\n{keys}\n{}\
+             fixed = [{{ half_space = {{ point = [-0.4, 0, 0], normal = [-1, 0, 0] }} }}]\n",
+            body("beam", 300, [0.0; 3]),
+        );
+        let mut simulation = simulation(&scene(&text));
+        for _ in 0..15 {
+            simulation.step().unwrap();
+        }
+        assert!(simulation.kappa() < 0.1, "{}", simulation.kappa());
+        simulation
+    };
+    let (xpbd, descent) = (run(""), run("method = \"descent\""));
+    let corrected = run("method = \"descent\"\ncoarse = true");
+    let distance = |a: &Simulation, b: &Simulation| {
+        let pairs = a.positions().iter().zip(b.positions());
+        pairs.map(|(x, y)| x.distance(*y)).fold(0.0, f64::max)
+    };
+    let moved = xpbd.positions().iter().zip(&xpbd.mesh().positions);
+    let moved = moved.map(|(x, y)| x.distance(*y)).fold(0.0, f64::max);
+    // The end sags by a third of the beam. Both descents have converged; XPBD leaves out the primal residual.
+    assert!(moved > 0.2, "{moved}");
+    let [to_xpbd, to_corrected] = [&xpbd, &corrected].map(|other| distance(&descent, other));
+    assert!(to_xpbd < 0.02 * moved, "{to_xpbd} of {moved}");
+    assert!(to_corrected < 1e-3 * moved, "{to_corrected} of {moved}");
+}
+
+/// Force and potential exist for descent, primal and dual residuals do not; more sweeps leave less force.
+#[test]
+fn descent_reports_the_residuals_that_it_has() {
+    let run = |iterations: u32, coarse: bool| {
+        let mut scene = scene(&format!(
+            "[report]\nquantities = [\"residual\"]\n[world]\ngravity = [0.0, 0.0, -9.81]\n\
+             [solver]\nmethod = \"descent\"\nprecision = \"f64\"\n{}\
+             fixed = [{{ half_space = {{ point = [-0.4, 0, 0], normal = [-1, 0, 0] }} }}]\n",
+            body("beam", 300, [0.0; 3]),
+        ));
+        (scene.solver.iterations, scene.solver.coarse) = (iterations, coarse);
+        let mut simulation = simulation(&scene);
+        for _ in 0..3 {
+            simulation.step().unwrap();
+        }
+        simulation.report().residual.unwrap()
+    };
+    let few = run(2, false);
+    assert_eq!(
+        (few.primal, few.primal_relative, few.dual, few.dual_rms),
+        (None, None, None, None)
+    );
+    assert!(few.force > 0.0 && few.force_relative.unwrap() > 0.0 && few.potential.is_finite());
+    let many = run(200, false);
+    assert!(
+        many.force < 0.1 * few.force,
+        "{} after {}",
+        many.force,
+        few.force
+    );
+    let corrected = run(10, true);
+    assert!(
+        corrected.force < 1e-3 * few.force,
+        "{} after {}",
+        corrected.force,
+        few.force
+    );
+}
+
+/// A steel ball in one substep: kappa is beyond a million, and descent neither inverts nor loses a tet.
+#[test]
+fn descent_is_stable_at_any_stiffness() {
+    let mut scene = falling("method = \"descent\"\nsubsteps = 1");
+    scene.body[0].young_modulus = 2e11;
+    let mut simulation = simulation(&scene);
+    assert!(simulation.kappa() > 1e6);
+    for _ in 0..12 {
+        simulation.step().unwrap();
+    }
+    let largest = simulation.positions().iter().map(|x| x.length());
+    assert!(largest.fold(0.0, f64::max) < 1.0);
+    assert_eq!(simulation.softened().tets, 0);
+}
+
+/// A handle moves what descent solves as what XPBD solves.
+#[test]
+fn a_rigid_handle_goes_with_descent() {
+    let text = format!(
+        "[solver]\nmethod = \"descent\"\nprecision = \"f64\"\n{}\
+         [[handle]]\nholds = [{{ half_space = {{ point = [0, 0, 0.3], normal = [0, 0, 1] }} }}]\n\
+         frames = [0, 4]\npath = [[0, 0, 0], [0, 0, 0.2]]\n{}",
+        body("box", 300, [0.0; 3]),
+        plane(2, [0.03, 0.0, 0.0], [1.0, 0.1, 0.0])
+    );
+    let mut simulation = simulation(&scene(&text));
+    for _ in 0..6 {
+        simulation.step().unwrap();
+        simulation.check().unwrap();
+    }
+    let rest = simulation.mesh().positions.iter();
+    let held: Vec<_> = rest
+        .zip(simulation.positions())
+        .filter(|(rest, _)| rest.z >= 0.499)
+        .collect();
+    assert!(held.len() > 10);
+    for (rest, x) in held {
+        // Rounding of a turn and two sums.
+        assert!(x.distance(*rest + DVec3::Z * 0.2) < 1e-12);
+    }
+}
+
+/// A change of a sound scene of descent, and the field that an error names.
+type Mistake = (&'static str, fn(&mut Scene));
+
+const MISTAKES: [Mistake; 10] = [
+    ("link is given", |s| {
+        s.link = scene(
+            "[[link]]\nfrom = { body = 0, point = [0, 0, 0] }\nto = { body = 0, point = [0, 0, 1] }",
+        )
+        .link;
+    }),
+    ("handle[0].compliance is 0.5", |s| {
+        s.handle =
+            scene("[[handle]]\nholds = []\nframes = [0, 1]\npath = [[0, 0, 0], [0, 0, 1]]\ncompliance = 0.5")
+                .handle;
+    }),
+    ("body[0].damping is 0.001", |s| s.body[0].damping = 0.001),
+    ("body[0].volume_compliance is 0", |s| {
+        s.body[0].volume_compliance = Some(0.0);
+    }),
+    ("solver.form is sequential", |s| {
+        s.solver.form = Form::Sequential;
+    }),
+    ("solver.relaxation is 2", |s| s.solver.relaxation = 2.0),
+    ("solver.coarse is true", |s| {
+        (s.solver.method, s.solver.coarse) = (Method::GaussSeidel, true);
+    }),
+    ("solver.spectral_radius is 1", |s| {
+        (s.solver.method, s.solver.spectral_radius) = (Method::Chebyshev, 1.0);
+    }),
+    ("solver.delay is 0", |s| {
+        (s.solver.method, s.solver.delay) = (Method::Chebyshev, 0);
+    }),
+    ("solver.iterations is 0", |s| s.solver.iterations = 0),
+];
+
+#[test]
+fn what_a_method_does_not_know_is_refused_by_name() {
+    let sound = falling("method = \"descent\"");
+    simulation(&sound).step().unwrap();
+    for (field, mistake) in MISTAKES {
+        let mut scene = sound.clone();
+        mistake(&mut scene);
+        refused(&scene, field);
+    }
+}

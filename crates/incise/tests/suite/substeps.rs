@@ -1,0 +1,263 @@
+//! Substeps chosen for each body: enough and no more, capped, not ruled by slivers, and all of it reported.
+
+use incise::report::{BodyReport, Missed};
+use incise::scene::{Precision, Substeps};
+use incise::{Scene, Simulation};
+use serde_json::Value;
+
+use crate::support::{body, plane, scene, simulation, state};
+
+const AUTO: &str = "[solver]\nsubsteps = \"auto\"\n";
+
+fn with_modulus(body: &str, modulus: &str) -> String {
+    body.replace("young_modulus = 1e4", &format!("young_modulus = {modulus}"))
+}
+
+fn bodies(simulation: &Simulation) -> &[BodyReport] {
+    &simulation.report().bodies
+}
+
+/// A fine sphere and a stiff one next to it.
+fn soft_and_stiff() -> [String; 2] {
+    let stiff = body("sphere", 300, [0.0, 2.0, 0.0]);
+    [body("sphere", 300, [0.0; 3]), with_modulus(&stiff, "1.6e5")]
+}
+
+#[test]
+fn each_body_gets_the_fewest_sufficient_substeps() {
+    let scene = scene(&format!("{AUTO}{}", soft_and_stiff().concat()));
+    let simulation = simulation(&scene);
+    let [soft, stiff] = bodies(&simulation) else {
+        panic!("two bodies")
+    };
+    assert_eq!((&soft.bodies[..], &stiff.bodies[..]), (&[0][..], &[1][..]));
+    for (number, report) in [soft, stiff].into_iter().enumerate() {
+        let mut alone = scene.clone();
+        alone.body = vec![scene.body[number].clone()];
+        let choice = report.choice.unwrap();
+        assert_eq!((choice.missed, choice.sliver_tets), (None, 0));
+        assert_eq!(choice.substeps_wanted, report.substeps);
+        // With the number itself kappa is low enough, with one fewer it is not.
+        let kappa = |substeps: u32| {
+            alone.solver.substeps = substeps.into();
+            Simulation::with_threads(&alone, 1).unwrap().kappa()
+        };
+        let kappas = [report.substeps, report.substeps - 1].map(kappa);
+        assert!(kappas[0] <= 0.5 && kappas[1] > 0.5, "{kappas:?}");
+    }
+    // Sixteen times as stiff is four times as many, but for rounding up.
+    let quadruple = 4 * soft.substeps;
+    assert!((quadruple - 3..=quadruple).contains(&stiff.substeps));
+    assert!(simulation.kappa() <= 0.5);
+}
+
+#[test]
+fn bodies_of_different_stiffness_move_to_the_bit_as_alone() {
+    let world = "[world]\ngravity = [0.0, 0.0, -9.81]\nground = { height = -0.55 }\n";
+    let run = |bodies: &str| {
+        let mut simulation = simulation(&scene(&format!("{world}{AUTO}{bodies}")));
+        (0..8).for_each(|_| drop(simulation.step().unwrap().clone()));
+        simulation
+    };
+    let two = soft_and_stiff();
+    let together = run(&two.concat());
+    let alone = two.each_ref().map(|body| run(body));
+    let joined: Vec<_> = alone.iter().flat_map(|s| s.positions().to_vec()).collect();
+    assert!(together.positions() == joined);
+    assert_ne!(bodies(&together)[0].substeps, bodies(&together)[1].substeps);
+}
+
+#[test]
+fn a_body_may_name_its_own() {
+    let two = [
+        body("box", 200, [0.0; 3]) + "substeps = 3\n",
+        body("box", 200, [0.0, 2.0, 0.0]) + "substeps = \"auto\"\n",
+        body("box", 200, [0.0, 4.0, 0.0]),
+    ];
+    let of = |solver: &str| {
+        let simulation = simulation(&scene(&format!("{solver}{}", two.concat())));
+        let numbers = bodies(&simulation).iter();
+        numbers
+            .map(|body| (body.substeps, body.choice.is_some()))
+            .collect::<Vec<_>>()
+    };
+    let chosen = of(AUTO)[2].0;
+    assert_eq!(of(AUTO), [(3, false), (chosen, true), (chosen, true)]);
+    assert_eq!(
+        of("[solver]\nsubsteps = 9\n"),
+        [(3, false), (chosen, true), (9, false)]
+    );
+}
+
+#[test]
+fn the_cap_is_kept_and_reported_and_the_result_finite() {
+    for (modulus, precision) in [
+        ("1e7", Precision::F32),
+        ("1e12", Precision::F32),
+        ("1e12", Precision::F64),
+    ] {
+        let sphere = with_modulus(&body("sphere", 200, [0.0; 3]), modulus);
+        let mut scene = scene(&format!(
+            "[world]\ngravity = [0.0, 0.0, -9.81]\n{AUTO}max_substeps = 8\n{sphere}"
+        ));
+        scene.solver.precision = precision;
+        let mut simulation = simulation(&scene);
+        for _ in 0..4 {
+            let report = simulation.step().unwrap();
+            let body = &report.bodies[0];
+            let choice = body.choice.unwrap();
+            assert_eq!((body.substeps, choice.missed), (8, Some(Missed::Cap)));
+            assert!(choice.substeps_wanted > 8);
+            assert_eq!(report.repaired, 0);
+        }
+        assert!(simulation.positions().iter().all(|x| x.is_finite()));
+        // What the cap leaves is softened to the limit of 1, which is twice what would be accurate.
+        let wanted = f64::from(bodies(&simulation)[0].choice.unwrap().substeps_wanted);
+        let excess = 0.5 * (wanted / 8.0).powi(2);
+        let softened = simulation.softened().strongest / excess;
+        assert!(softened > 0.9 && softened < 1.01, "{softened}");
+    }
+}
+
+/// A box with one tet that was squeezed flat at the surface.
+fn with_sliver(folder: &std::path::Path) -> String {
+    use incise::mesh::glam::DVec3;
+    let mut mesh = incise::mesh::generate::kuhn_box([6, 6, 6], DVec3::ONE);
+    // A flat tet on a face of the box: three of its corners and a point just outside.
+    let surface = mesh.surface();
+    let triangle = surface.triangles[0];
+    let [a, b, c] = triangle.map(|p| mesh.positions[p.index()]);
+    let normal = (b - a).cross(c - a).normalize();
+    mesh.positions.push((a + b + c) / 3.0 + 1e-3 * normal);
+    let tip = incise::mesh::ParticleId::new(mesh.positions.len() - 1);
+    mesh.tets.push([triangle[0], triangle[1], triangle[2], tip]);
+    mesh.orient_positively();
+    incise::mesh::io::write(folder.join("sliver.vtk"), &mesh).unwrap();
+    format!(
+        "[[body]]\nmesh = {:?}\nyoung_modulus = 1e4\n",
+        folder.join("sliver.vtk")
+    )
+}
+
+#[test]
+fn a_sliver_does_not_decide_and_is_reported() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = format!("{AUTO}{}", with_sliver(folder.path()));
+    let mut simulation = simulation(&scene(&text));
+    let report = bodies(&simulation)[0].clone();
+    let choice = report.choice.unwrap();
+    assert_eq!(choice.missed, Some(Missed::Sliver));
+    assert_eq!(choice.sliver_tets, 1);
+    assert!(choice.sliver_volume_fraction > 0.0 && choice.sliver_volume_fraction < 1e-3);
+    assert!(choice.substeps_wanted > 20 * report.substeps);
+    // It is the only one softened, and the body rests.
+    assert_eq!(simulation.softened().tets, 1);
+    let start = simulation.positions().to_vec();
+    for _ in 0..5 {
+        assert_eq!(simulation.step().unwrap().repaired, 0);
+    }
+    for (x, from) in simulation.positions().iter().zip(&start) {
+        assert!(x.distance(*from) < 1e-5);
+    }
+    // Without a limit that softens it, it decides.
+    let unlimited = text.replace(
+        "\"auto\"\n",
+        "\"auto\"\nkappa_limit = inf\nmax_substeps = 100000\n",
+    );
+    let unlimited = crate::support::simulation(&scene(&unlimited));
+    let decided = &bodies(&unlimited)[0];
+    assert_eq!(decided.choice.unwrap().missed, None);
+    assert_eq!(decided.substeps, choice.substeps_wanted);
+}
+
+fn cut_scene(report: &str, solver: &str) -> Scene {
+    let cut = plane(1, [0.013, 0.0, 0.0], [1.0, 0.2, 0.0]);
+    let bodies = body("sphere", 400, [0.0; 3]) + &body("sphere", 300, [3.0, 0.0, 0.0]);
+    scene(&format!("{report}{solver}{bodies}{cut}"))
+}
+
+#[test]
+fn a_cut_keeps_the_substeps_and_shows_what_it_did_to_kappa() {
+    let report = "[report]\nquantities = [\"kappa\"]\n";
+    let mut simulation = simulation(&cut_scene(report, AUTO));
+    let before = simulation.step().unwrap().clone();
+    assert!(
+        before
+            .bodies
+            .iter()
+            .all(|body| { body.kappa_before_cut.is_none() && body.kappa_of_new_tets.is_none() })
+    );
+    let cut = simulation.step().unwrap().clone();
+    assert!(cut.cut.is_some());
+    let body = &cut.bodies[0];
+    assert_eq!(body.substeps, before.bodies[0].substeps);
+    assert_eq!(body.kappa_before_cut, before.bodies[0].kappa);
+    assert!(before.bodies[0].kappa.unwrap() <= 0.5);
+    // Children are smaller than their parent, so the stiffest is a new one.
+    assert_eq!(body.kappa_of_new_tets, body.kappa);
+    assert!(body.kappa > body.kappa_before_cut);
+    assert!(body.softened.unwrap().tets > 0);
+    assert_eq!(cut.kappa, body.kappa);
+    // The other body was not met.
+    assert_eq!(cut.bodies[1].kappa_before_cut, None);
+    assert_eq!(cut.bodies[1].kappa, before.bodies[1].kappa);
+    let after = simulation.step().unwrap();
+    assert_eq!(after.bodies[0].kappa_before_cut, None);
+    assert_eq!(after.bodies[0].substeps, body.substeps);
+    simulation.check().unwrap();
+}
+
+#[test]
+fn the_keys_of_a_body_are_the_promised_ones() {
+    let keys = |scene: &Scene| {
+        let mut simulation = simulation(scene);
+        simulation.step().unwrap();
+        let report = serde_json::to_value(simulation.step().unwrap()).unwrap();
+        let bodies = report.get("bodies").cloned().unwrap_or(Value::Null);
+        let Some(body) = bodies.get(0) else {
+            return Vec::new();
+        };
+        let keys = body.as_object().unwrap().keys().cloned();
+        keys.collect::<Vec<String>>()
+    };
+    let kappa = "[report]\nquantities = [\"kappa\"]\n";
+    let mut asked = vec![
+        "bodies",
+        "kappa",
+        "kappa_before_cut",
+        "kappa_of_new_tets",
+        "softened",
+        "substeps",
+    ];
+    let choice = [
+        "missed",
+        "sliver_tets",
+        "sliver_volume_fraction",
+        "substeps_wanted",
+    ];
+    assert_eq!(keys(&cut_scene("", "")), Vec::<String>::new());
+    assert_eq!(keys(&cut_scene(kappa, "")), asked);
+    asked.extend(choice);
+    asked.sort_unstable();
+    assert_eq!(keys(&cut_scene(kappa, AUTO)), asked);
+    let mut chosen = vec!["bodies", "kappa_of_new_tets", "substeps"];
+    chosen.extend(choice);
+    chosen.sort_unstable();
+    assert_eq!(keys(&cut_scene("", AUTO)), chosen);
+}
+
+/// A chosen number gives what the same number gives when it is named.
+#[test]
+fn auto_is_the_number_it_chooses() {
+    let mut named = cut_scene("", AUTO);
+    let mut auto = simulation(&named);
+    for (body, report) in named.body.iter_mut().zip(bodies(&auto)) {
+        body.substeps = Some(Substeps::Fixed(report.substeps));
+    }
+    let mut named = simulation(&named);
+    for _ in 0..4 {
+        auto.step().unwrap();
+        named.step().unwrap();
+    }
+    assert!(state(&auto) == state(&named));
+}
