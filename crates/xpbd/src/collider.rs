@@ -16,10 +16,12 @@ use glam::{DMat3, DQuat, DVec3};
 use rayon::prelude::*;
 
 use crate::direction::{absolute, direction};
-use crate::real::{load, store, weight};
+use crate::real::{finite, load, store, weight};
 use crate::step::PARALLEL_PARTICLES;
 use crate::{Real, Solver, StepSettings, XpbdError};
 
+/// How far a particle may be pushed, in depths.
+const LONGEST_PUSH: f64 = 10.0;
 /// How often a particle inside several colliders is handed around among them.
 const ROUNDS: usize = 32;
 
@@ -403,6 +405,24 @@ impl<R: Real> Obstacle<R> {
         (nearest.distance <= size * R::EPSILON * R::from_f64(4.0)).then_some(nearest.normal)
     }
 
+    /// What is left of a force in N on a particle that the collider bears: nothing of what presses the particle into it,
+    /// nor of what friction then holds.
+    pub(crate) fn left_of(&self, force: DVec3, x: R::Vector) -> DVec3 {
+        let Some(normal) = self.touched_at(x).map(R::to_dvec3) else {
+            return force;
+        };
+        let pressure = -normal.dot(force);
+        if pressure < 0.0 {
+            return force;
+        }
+        let along = force + normal * pressure;
+        let (size, held) = (along.length(), self.friction.to_f64() * pressure);
+        if size <= held {
+            return DVec3::ZERO;
+        }
+        along * (1.0 - held / size)
+    }
+
     /// Where a particle inside is put that was at `previous` before the substep.
     #[inline]
     fn push_out(&self, x: R::Vector, previous: R::Vector) -> Option<R::Vector> {
@@ -414,18 +434,50 @@ impl<R: Real> Obstacle<R> {
         if distance >= R::ZERO {
             return None;
         }
-        let way = x - previous - self.motion;
+        Some(self.rub(point, normal, -distance, x - previous))
+    }
+
+    /// Where a particle at `x` is put that wants to move to `moved` inside: onto the plane that touches the surface
+    /// nearest to `x`, along `along(normal)`. With the direction in which a force along the normal moves the particle,
+    /// what is left over in the end is such a force. `None` if that leads far away.
+    #[inline]
+    pub(crate) fn push_along(
+        &self,
+        x: R::Vector,
+        moved: R::Vector,
+        previous: R::Vector,
+        along: impl Fn(R::Vector) -> R::Vector,
+    ) -> Option<R::Vector> {
+        if self.solid.nearest(moved).distance >= R::ZERO {
+            return None;
+        }
+        let Nearest {
+            distance, normal, ..
+        } = self.solid.nearest(x);
+        let depth = -(distance + R::dot(normal, moved - x));
+        let along = along(normal);
+        let straight = R::dot(normal, along);
+        // A push that goes much further along the surface than out of it throws particles about in extreme states.
+        let limit = straight * R::from_f64(LONGEST_PUSH);
+        let sound = depth > R::ZERO && straight > R::ZERO && R::dot(along, along) <= limit * limit;
+        let out = moved + along * (depth / straight);
+        (sound && finite::<R>(out)).then(|| self.rub(out, normal, depth, out - previous))
+    }
+
+    /// Holds a particle on the surface back by at most the friction's share of the depth it was pushed out of.
+    #[inline]
+    fn rub(&self, x: R::Vector, normal: R::Vector, depth: R, way: R::Vector) -> R::Vector {
+        let way = way - self.motion;
         let slide = way - normal * R::dot(normal, way);
         let length = R::dot(slide, slide).sqrt();
-        let hold = -(self.friction * distance);
+        let hold = self.friction * depth;
         let share = if length > hold { hold / length } else { R::ONE };
-        Some(point - slide * share)
+        x - slide * share
     }
 }
 
 impl<R: Real> Solver<R> {
-    /// Puts the particles inside of colliders on their surface. Where colliders overlap, one may push a particle into
-    /// another; then they take turns, which ends at a point outside of all if there is one nearby.
+    /// Puts the particles inside of colliders on their surface.
     pub(crate) fn project_to_colliders(&self, obstacles: &[Obstacle<R>]) {
         let particles = self.particles.par_iter().with_min_len(PARALLEL_PARTICLES);
         particles
@@ -434,21 +486,31 @@ impl<R: Real> Solver<R> {
                 if weight::<R>(particle) <= R::ZERO {
                     return;
                 }
-                let mut x = load::<R>(particle);
-                // Obstacles in a row that the particle is not inside of.
-                let (mut clear, mut moved) = (0, false);
-                for obstacle in obstacles.iter().cycle().take(ROUNDS * obstacles.len()) {
-                    clear += 1;
-                    if let Some(outside) = obstacle.push_out(x, previous) {
-                        (x, clear, moved) = (outside, 1, true);
-                    }
-                    if clear == obstacles.len() {
-                        break;
-                    }
-                }
-                if moved {
+                if let Some(x) = outside(obstacles, load::<R>(particle), previous) {
                     store::<R>(particle, x);
                 }
             });
     }
+}
+
+/// Where a particle inside of a collider is put; `None` outside of all. Where colliders overlap, one may push a particle
+/// into another; then they take turns, which ends at a point outside of all if there is one nearby.
+#[inline]
+pub(crate) fn outside<R: Real>(
+    obstacles: &[Obstacle<R>],
+    mut x: R::Vector,
+    previous: R::Vector,
+) -> Option<R::Vector> {
+    // Obstacles in a row that the particle is not inside of.
+    let (mut clear, mut moved) = (0, false);
+    for obstacle in obstacles.iter().cycle().take(ROUNDS * obstacles.len()) {
+        clear += 1;
+        if let Some(out) = obstacle.push_out(x, previous) {
+            (x, clear, moved) = (out, 1, true);
+        }
+        if clear == obstacles.len() {
+            break;
+        }
+    }
+    moved.then_some(x)
 }

@@ -8,7 +8,6 @@ use rayon::prelude::*;
 
 use super::ImplicitStep;
 use crate::Real;
-use crate::collider::Obstacle;
 use crate::neo_hookean::TetConstraint;
 use crate::real::weight;
 
@@ -41,7 +40,7 @@ impl<R: Real> ImplicitStep<'_, R> {
     }
 
     /// The forces in N that are left over: `M (x̃ - x) / Δt² - ∇U(x)`, zero in the solution. Those on particles that do
-    /// not move, and those that press a particle into a collider that it touches, are zero as well.
+    /// not move, and what a collider bears that a particle touches, are zero as well.
     pub fn forces(&self, out: &mut Vec<DVec3>) {
         self.forces_at(&|p| self.solver.local(p), out);
     }
@@ -84,14 +83,11 @@ impl<R: Real> ImplicitStep<'_, R> {
         for (p, force) in out.iter_mut().enumerate() {
             let x = position(p);
             *force += (self.free_position(p) - x) * (per_time_squared * solver.mass(p));
-            let fixed = weight::<R>(&solver.particles[p]) <= R::ZERO;
-            let into = |o: &Obstacle<R>| {
-                let normal = o.touched_at(R::from_dvec3(x))?;
-                (R::to_dvec3(normal).dot(*force) <= 0.0).then_some(())
-            };
-            let pressed = self.obstacles.iter().any(|o| into(o).is_some());
-            if fixed || pressed {
+            if weight::<R>(&solver.particles[p]) <= R::ZERO {
                 *force = DVec3::ZERO;
+            }
+            for obstacle in &self.obstacles {
+                *force = obstacle.left_of(*force, R::from_dvec3(x));
             }
         }
     }

@@ -4,7 +4,8 @@ use glam::{DVec3, dvec3};
 use incise_graph::{Clustering, ColorId, Coloring, GraphError, Schedule};
 use incise_mesh::{TetMesh, generate::kuhn_box};
 use incise_xpbd::{
-    Collider, DescentSettings, Guess, ImplicitStep, Material, Real, Solver, Stars, XpbdError,
+    Collider, ColliderShape, DescentSettings, Guess, ImplicitStep, Material, Real, Solver, Stars,
+    XpbdError,
 };
 
 use crate::body::{
@@ -411,4 +412,34 @@ fn stars_follow_a_cut() {
     }
     assert!(solver.velocity(solver.particle_count() - 1).x > 0.05);
     assert_eq!(solver.volume().inverted, 0);
+}
+
+/// A block pressed onto a frictionless slope and into a ball: sweeps converge to where the only forces that are left are
+/// those of the colliders, along their normals. (`residual` leaves those out.)
+#[test]
+fn sweeps_converge_on_colliders() {
+    let mesh = kuhn_box([3, 3, 3], DVec3::splat(0.3));
+    let slope = Collider::new(ColliderShape::Plane {
+        point: dvec3(0.0, 0.0, -0.001),
+        normal: dvec3(0.1, 0.2, 1.0),
+    });
+    let ball = Collider::new(ColliderShape::Sphere {
+        center: dvec3(0.15, 0.1, -0.2),
+        radius: 0.21,
+    });
+    for collider in [slope, ball] {
+        let mut solver = body::<f64>(&mesh, RUBBER);
+        let mut stars = stars(&solver);
+        let mut settings = falling(1);
+        settings.step.colliders = vec![collider];
+        let weight = solver.load(GRAVITY);
+        let mut step = ImplicitStep::new(&mut solver, &mut stars, &settings).unwrap();
+        (0..2000).for_each(|_| step.sweep());
+        within("force left over", step.residual() / weight, 1e-6);
+        let _ = step.finish();
+        let pressed = positions(&solver)
+            .into_iter()
+            .filter(|&x| collider.distance(x).0 < 1e-9);
+        assert!(pressed.count() > 0, "it lies on the collider");
+    }
 }
