@@ -1,7 +1,12 @@
 //! `cargo xtask solver`: what the methods of the solver cost and what they are worth, as tables.
 
+mod beam;
 mod body;
 mod convergence;
+mod rest;
+mod runner;
+mod stability;
+mod trade;
 
 use std::path::PathBuf;
 
@@ -28,6 +33,10 @@ pub(crate) struct SolverArguments {
 enum Part {
     /// Iterations and milliseconds to a residual, by method.
     Convergence,
+    /// Errors of a falling beam beside milliseconds per frame, and its error at rest by kappa.
+    Trade,
+    /// What becomes of a beam in extreme states, materials and steps.
+    Stability,
 }
 
 #[expect(
@@ -35,15 +44,26 @@ enum Part {
     reason = "the tables are the result of the command"
 )]
 pub(crate) fn solver(arguments: &SolverArguments) -> anyhow::Result<()> {
-    let mut text = String::new();
-    let wanted = |part| arguments.only.is_none_or(|only| only == part);
-    if wanted(Part::Convergence) {
-        let mesh = body::liver(arguments.models.as_deref(), arguments.quick)?;
-        text += &convergence::convergence(&mesh, arguments.quick)?;
-    }
+    let text = tables(arguments)?;
     println!("{text}");
     if let Some(path) = &arguments.out {
         std::fs::write(path, text)?;
     }
     Ok(())
+}
+
+fn tables(arguments: &SolverArguments) -> anyhow::Result<String> {
+    let mut parts = Vec::new();
+    let wanted = |part| arguments.only.is_none_or(|only| only == part);
+    if wanted(Part::Convergence) {
+        let mesh = body::liver(arguments.models.as_deref(), arguments.quick)?;
+        parts.push(convergence::convergence(&mesh, arguments.quick)?);
+    }
+    if wanted(Part::Trade) {
+        parts.push(trade::trade(arguments.quick)?);
+    }
+    if wanted(Part::Stability) {
+        parts.push(stability::stability(arguments.quick)?);
+    }
+    Ok(parts.join("\n"))
 }
