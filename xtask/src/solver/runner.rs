@@ -40,18 +40,18 @@ pub(crate) struct Runner<R: Real> {
 /// What a recipe has to prepare.
 enum Tools<R: Real> {
     Schedule(Schedule),
-    Stars(Stars<R>, Option<Correction<R>>),
+    Stars(Box<Stars<R>>, Option<Box<Correction<R>>>),
 }
 
 impl<R: Real> Runner<R> {
     pub(crate) fn new(solver: Solver<R>, mesh: &TetMesh, recipe: &Recipe) -> anyhow::Result<Self> {
         let tools = match recipe {
             Recipe::Xpbd { clustering, .. } => Tools::Schedule(schedule(mesh, clustering)?),
-            Recipe::Descent(_) => Tools::Stars(stars(&solver)?, None),
+            Recipe::Descent(_) => Tools::Stars(Box::new(stars(&solver)?), None),
             Recipe::Corrected(_) => {
                 let stars = stars(&solver)?;
                 let correction = Correction::new(&stars, CorrectionSettings::default())?;
-                Tools::Stars(stars, Some(correction))
+                Tools::Stars(Box::new(stars), Some(Box::new(correction)))
             }
         };
         Ok(Self {

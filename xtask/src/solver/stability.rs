@@ -58,9 +58,9 @@ pub(crate) fn stability(quick: bool) -> anyhow::Result<String> {
         .par_iter()
         .map(|extreme| row(extreme, quick))
         .collect::<anyhow::Result<_>>()?;
-    let mut table = table(["extreme"]);
     let head = ["extreme", "kappa of a frame", "substeps"];
-    table.set_header(head.into_iter().chain(METHODS));
+    let mut table = table(head.into_iter().chain(METHODS));
+
     table.add_rows(rows);
     Ok(format!("## Stability\n\n{LEGEND}\n{table}\n"))
 }
@@ -286,16 +286,22 @@ fn outcome<R: Real>(extreme: &Extreme, recipe: &Recipe, frames: usize) -> anyhow
     }
     let volume = solver.volume();
     let ratio = volume.total / volume.rest;
+    let shown = match ratio.abs() {
+        ..0.005 => "0.00".to_owned(),
+        ..100.0 => format!("{ratio:.2}"),
+        _ => format!("{ratio:.0e}"),
+    };
     let mut text = match volume.inverted {
         _ if start == end && extreme.held => "frozen".to_owned(),
-        inverted if ratio < 0.5 => format!("collapsed {ratio:.2}, {inverted} inv"),
-        0 if (ratio - 1.0).abs() > 0.05 => format!("off {ratio:.2}"),
-        0 => format!("ok {ratio:.2}"),
-        inverted => format!("{inverted} inv {ratio:.2}"),
+        0 if ratio < 0.5 => format!("collapsed {shown}"),
+        inverted if ratio < 0.5 => format!("collapsed {shown}, {inverted} inv"),
+        0 if (ratio - 1.0).abs() > 0.05 => format!("off {shown}"),
+        0 => format!("ok {shown}"),
+        inverted => format!("{inverted} inv {shown}"),
     };
     let speed = solver.max_speed();
     if speed > 15.0 {
-        text += &format!(", {speed:.0} m/s");
+        text += &format!(", {} m/s", digits(speed.round()));
     }
     if repaired > 0 {
         text += &format!(", {repaired} repaired");

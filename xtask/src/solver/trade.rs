@@ -118,7 +118,7 @@ fn keep(best: &mut Option<Measured>, beam: &Beam, limit: &Motion, motion: &Motio
     }
 }
 
-/// Three digits, or as many as it has before the point.
+/// Two or three digits, up to five before the point.
 pub(crate) fn digits(value: f64) -> String {
     let places = match value.abs() {
         ..0.001 => return format!("{value:.1e}"),
@@ -127,7 +127,8 @@ pub(crate) fn digits(value: f64) -> String {
         ..1.0 => 3,
         ..10.0 => 2,
         ..100.0 => 1,
-        _ => 0,
+        ..1e5 => 0,
+        _ => return format!("{value:.1e}"),
     };
     format!("{value:.places$}")
 }
@@ -156,7 +157,8 @@ fn movers() -> Vec<(String, Mover)> {
     let substeps = [1, 2, 5, 10, 20, 40, 80, 160, 320].map(|n| [n, 1]);
     xpbd("XPBD", "none", &block, &substeps);
     xpbd("XPBD", "none", &block, &[[1, 5], [1, 20], [1, 100]]);
-    xpbd("XPBD", "none", &block, &[[20, 2], [20, 4]]);
+    let both = [[20, 2], [20, 4], [40, 2], [40, 4], [80, 2]];
+    xpbd("XPBD", "none", &block, &both);
     xpbd("XPBD, clusters of 10", "serial:10", &block, &[[20, 1]]);
     for (name, relaxation, counts) in [
         ("XPBD, relaxation 0.2", 0.2, [[1, 20], [20, 1]]),
