@@ -2,8 +2,7 @@
 //!
 //! With one iteration a substep XPBD is off even where nothing moves, in proportion to kappa and, as kappa knows Young's
 //! modulus only, nearly in proportion to `l/μ = 1 / (1 - 2 ν)`. The beam starts where Newton's method finds the
-//! equilibrium, and velocities are damped at about the critical rate until it stays: at rest the damping does nothing. A few iterations
-//! a substep spread the change of volume over the tets, which is what most of the error is near incompressibility.
+//! equilibrium, and velocities are damped at about the critical rate until it stays: at rest the damping does nothing.
 
 use comfy_table::Table;
 use incise::mesh::glam::DVec3;

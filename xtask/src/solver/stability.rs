@@ -29,12 +29,12 @@ const METHODS: [&str; 6] = [
 ];
 const LEGEND: &str = "\
 After a second: `ok` and the volume over that at rest; `12 inv`, tets that are inverted; `collapsed`, less than half the
-volume; `off`, a volume wrong by more than 5 %; `frozen`, nothing has moved at all; speeds above 15 m/s at the end, the
-larger part of which is an error; `repaired`, particles that would have become infinite or NaN and were put back. Single
-and double precision apart where they differ. *XPBD, substeps* is the block form with one iteration in each of the
-substeps of the third column, which bring kappa to 0.5 unless there would be more than 200. *paper* is the sequential form
-with relaxation 0.8 and clusters of 10; Jacobi and Chebyshev (spectral radius 0.9) are the block form with relaxation 0.1.
-`ok` speaks of the shape of tets, not of accuracy.
+volume; `off`, a volume that differs by more than 5 % (rightly so where a body is very soft or very heavy); `frozen`,
+nothing has moved at all; speeds above 20 m/s at the end; `repaired`, particles that would have become infinite or NaN
+and were put back. Single and double precision apart where they differ. *XPBD, substeps* is the block form with one
+iteration in each of the substeps of the third column, which bring kappa to 0.5 unless there would be more than 200.
+*paper* is the sequential form with relaxation 0.8 and clusters of 10; Jacobi and Chebyshev (spectral radius 0.9) are the
+block form with relaxation 0.1. `ok` speaks of the shape of tets, not of accuracy.
 ";
 
 /// Where a particle is put at the start.
@@ -293,15 +293,17 @@ fn outcome<R: Real>(extreme: &Extreme, recipe: &Recipe, frames: usize) -> anyhow
     };
     let mut text = match volume.inverted {
         _ if start == end && extreme.held => "frozen".to_owned(),
-        0 if ratio < 0.5 => format!("collapsed {shown}"),
-        inverted if ratio < 0.5 => format!("collapsed {shown}, {inverted} inv"),
+        _ if ratio < -0.5 => format!("collapsed {shown}"),
+        _ if ratio < 0.5 => format!("collapsed {:.1}", ratio.abs()),
         0 if (ratio - 1.0).abs() > 0.05 => format!("off {shown}"),
         0 => format!("ok {shown}"),
         inverted => format!("{inverted} inv {shown}"),
     };
     let speed = solver.max_speed();
-    if speed > 15.0 {
-        text += &format!(", {} m/s", digits(speed.round()));
+    match speed {
+        ..=20.0 => {}
+        ..1e5 => text += &format!(", {speed:.0} m/s"),
+        _ => text += &format!(", {speed:.0e} m/s"),
     }
     if repaired > 0 {
         text += &format!(", {repaired} repaired");
