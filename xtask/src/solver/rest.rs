@@ -2,8 +2,8 @@
 //!
 //! With one iteration a substep XPBD is off even where nothing moves, in proportion to kappa and, as kappa knows Young's
 //! modulus only, nearly in proportion to `l/μ = 1 / (1 - 2 ν)`. The beam starts where Newton's method finds the
-//! equilibrium, and velocities are damped at about the critical rate until it stays: at rest the damping does nothing. With some more
-//! iterations the error hardly depends on Poisson's ratio until close to 1/2, which the second table shows.
+//! equilibrium, and velocities are damped at about the critical rate until it stays: at rest the damping does nothing.
+//! With some more iterations the error hardly depends on Poisson's ratio until close to 1/2: the second table.
 
 use comfy_table::Table;
 use incise::mesh::glam::DVec3;
