@@ -8,8 +8,8 @@ mod solver;
 mod sweep;
 
 use clap::{Parser, Subcommand};
-use comfy_table::Table;
 use comfy_table::presets::ASCII_MARKDOWN;
+use comfy_table::{Row, Table};
 
 /// Sweeps over incise.
 #[derive(Debug, Parser)]
@@ -38,7 +38,7 @@ fn main() -> anyhow::Result<()> {
 }
 
 /// An empty table in Markdown.
-fn table<const N: usize>(header: [&str; N]) -> Table {
+fn table(header: impl Into<Row>) -> Table {
     let mut table = Table::new();
     table.load_style(ASCII_MARKDOWN);
     table.set_header(header);

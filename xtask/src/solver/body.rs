@@ -43,14 +43,28 @@ pub(crate) fn body<R: Real>(
     material: Material,
     held: impl Fn(DVec3) -> bool,
 ) -> anyhow::Result<Solver<R>> {
+    mixed_body(mesh, &[material], |_tet| 0, held)
+}
+
+/// A body of several materials; `material_of` gives the place of each tet's in the list.
+pub(crate) fn mixed_body<R: Real>(
+    mesh: &TetMesh,
+    materials: &[Material],
+    material_of: impl Fn(TetId) -> usize,
+    held: impl Fn(DVec3) -> bool,
+) -> anyhow::Result<Solver<R>> {
     let mut solver = Solver::new(&mesh.positions);
-    let number = solver.add_material(material)?;
+    let numbers: Vec<u16> = materials
+        .iter()
+        .map(|&m| solver.add_material(m))
+        .collect::<Result<_, _>>()?;
     let mut masses = vec![0.0; mesh.positions.len()];
     for (t, tet) in mesh.tets.iter().enumerate() {
         let id = TetId::new(t);
-        solver.push_tet(tet.map(|p| p.0), mesh.corners(id), number);
+        let material = material_of(id);
+        solver.push_tet(tet.map(|p| p.0), mesh.corners(id), numbers[material]);
         for p in tet {
-            masses[p.index()] += 0.25 * material.density * mesh.volume(id);
+            masses[p.index()] += 0.25 * materials[material].density * mesh.volume(id);
         }
     }
     for (p, mass) in masses.into_iter().enumerate() {

@@ -1,0 +1,86 @@
+//! A body and the method that moves it, frame by frame: what the tables of motion have in common.
+
+use incise::graph::Schedule;
+use incise::mesh::TetMesh;
+use incise::xpbd::{
+    Correction, CorrectionSettings, DescentSettings, Real, Solver, Stars, StepSettings,
+};
+
+use super::body::{schedule, stars};
+
+/// A method with its settings.
+#[derive(Clone, Debug)]
+pub(crate) enum Recipe {
+    Xpbd {
+        clustering: &'static str,
+        settings: StepSettings,
+    },
+    Descent(DescentSettings),
+    /// Descent with a coarse correction after each sweep.
+    Corrected(DescentSettings),
+}
+
+impl Recipe {
+    /// The time of a substep in s.
+    pub(crate) fn substep_time(&self) -> f64 {
+        match self {
+            Self::Xpbd { settings, .. } => settings.substep_time(),
+            Self::Descent(settings) | Self::Corrected(settings) => settings.step.substep_time(),
+        }
+    }
+}
+
+/// A body that moves by a recipe.
+pub(crate) struct Runner<R: Real> {
+    pub(crate) solver: Solver<R>,
+    recipe: Recipe,
+    tools: Tools<R>,
+}
+
+/// What a recipe has to prepare.
+enum Tools<R: Real> {
+    Schedule(Schedule),
+    Stars(Box<Stars<R>>, Option<Box<Correction<R>>>),
+}
+
+impl<R: Real> Runner<R> {
+    pub(crate) fn new(solver: Solver<R>, mesh: &TetMesh, recipe: &Recipe) -> anyhow::Result<Self> {
+        let tools = match recipe {
+            Recipe::Xpbd { clustering, .. } => Tools::Schedule(schedule(mesh, clustering)?),
+            Recipe::Descent(_) => Tools::Stars(Box::new(stars(&solver)?), None),
+            Recipe::Corrected(_) => {
+                let stars = stars(&solver)?;
+                let correction = Correction::new(&stars, CorrectionSettings::default())?;
+                Tools::Stars(Box::new(stars), Some(Box::new(correction)))
+            }
+        };
+        Ok(Self {
+            solver,
+            recipe: recipe.clone(),
+            tools,
+        })
+    }
+
+    /// Advances by a frame; returns the number of particles that would not have been finite.
+    pub(crate) fn frame(&mut self) -> anyhow::Result<usize> {
+        let (solver, recipe) = (&mut self.solver, &self.recipe);
+        let repaired = match (recipe, &mut self.tools) {
+            (Recipe::Xpbd { settings, .. }, Tools::Schedule(schedule)) => {
+                solver.step(schedule, settings)?.repaired
+            }
+            (
+                Recipe::Descent(settings) | Recipe::Corrected(settings),
+                Tools::Stars(stars, correction),
+            ) => match correction {
+                Some(correction) => {
+                    solver
+                        .descend_corrected(stars, correction, settings)?
+                        .repaired
+                }
+                None => solver.descend(stars, settings)?.repaired,
+            },
+            _ => unreachable!("the tools are made for the recipe"),
+        };
+        Ok(repaired)
+    }
+}
