@@ -182,8 +182,7 @@ pub struct ResidualReport {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dual_rms: Option<f64>,
     /// The unbalanced force of the implicit step in N, from positions alone. XPBD counts that of colliders as
-    /// unbalanced; descent leaves out what presses particles into them, but as its sweeps and the colliders take turns,
-    /// it does not vanish where bodies touch them.
+    /// unbalanced; descent leaves out what they bear.
     pub force: f64,
     /// The same as a part of the weight's norm; absent without gravity.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -424,15 +424,18 @@ fn gather<R: Real, S: Simd>(
 ) -> [[R::Lanes<S>; 4]; 4] {
     let lanes = R::Lanes::<S>::LEN;
     let mut gathered = [[splat::<R, S>(simd, R::ZERO); 4]; 4];
-    for (k, values) in gathered.iter_mut().enumerate() {
-        let mut buffer = [R::ZERO; 4 * MOST_LANES];
-        for (lane, corner) in corners.iter().enumerate().take(lanes) {
-            let values = read(corner[k]);
+    // First all that is written, then all that is read: a wide load cannot overtake the narrow stores it needs.
+    let mut buffers = [[R::ZERO; 4 * MOST_LANES]; 4];
+    for (lane, corner) in corners.iter().enumerate().take(lanes) {
+        for (buffer, &p) in buffers.iter_mut().zip(corner) {
+            let values = read(p);
             buffer[4 * lane] = values[0];
             buffer[4 * lane + 1] = values[1];
             buffer[4 * lane + 2] = values[2];
             buffer[4 * lane + 3] = values[3];
         }
+    }
+    for (values, buffer) in gathered.iter_mut().zip(&buffers) {
         let a = R::Lanes::<S>::from_slice(simd, &buffer[..lanes]);
         let b = R::Lanes::<S>::from_slice(simd, &buffer[lanes..2 * lanes]);
         let c = R::Lanes::<S>::from_slice(simd, &buffer[2 * lanes..3 * lanes]);

@@ -246,6 +246,7 @@ real!(
 );
 
 /// Whether all components are finite.
+#[inline]
 pub(crate) fn finite<R: Real>(v: R::Vector) -> bool {
     R::components(v).into_iter().all(R::is_finite)
 }

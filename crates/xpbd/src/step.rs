@@ -243,18 +243,22 @@ impl<R: Real> Solver<R> {
         let change = settings
             .gravity
             .map(|g| R::from_dvec3(g * settings.substep_time()));
-        let particles = self.particles.par_iter().with_min_len(PARALLEL_PARTICLES);
+        let particles = self.particles.par_chunks(PARALLEL_PARTICLES);
         particles
-            .zip(&mut self.previous)
-            .zip(&mut self.velocities)
-            .for_each(|((particle, previous), velocity)| {
-                let x = load::<R>(particle);
-                *previous = x;
-                if weight::<R>(particle) > R::ZERO {
-                    if let Some(change) = change {
-                        *velocity += change;
+            .zip(self.previous.par_chunks_mut(PARALLEL_PARTICLES))
+            .zip(self.velocities.par_chunks_mut(PARALLEL_PARTICLES))
+            .for_each(|((particles, previous), velocities)| {
+                for ((particle, previous), velocity) in
+                    particles.iter().zip(previous).zip(velocities)
+                {
+                    let x = load::<R>(particle);
+                    *previous = x;
+                    if weight::<R>(particle) > R::ZERO {
+                        if let Some(change) = change {
+                            *velocity += change;
+                        }
+                        store::<R>(particle, x + *velocity * time);
                     }
-                    store::<R>(particle, x + *velocity * time);
                 }
             });
     }
@@ -266,23 +270,29 @@ impl<R: Real> Solver<R> {
     /// hundredth of its speed, and far from the origin it would hang in the air. The prediction, computed again to the
     /// same bits, tells what part of the motion is correction; without correction the velocity stays as it is.
     pub(crate) fn update_velocities(&mut self, time: R, per_time: R) -> usize {
-        let particles = self.particles.par_iter().with_min_len(PARALLEL_PARTICLES);
+        let particles = self.particles.par_chunks(PARALLEL_PARTICLES);
         particles
-            .zip(&self.previous)
-            .zip(&mut self.velocities)
-            .map(|((particle, previous), velocity)| {
-                if weight::<R>(particle) <= R::ZERO {
-                    *velocity = R::Vector::default();
-                    return 0;
+            .zip(self.previous.par_chunks(PARALLEL_PARTICLES))
+            .zip(self.velocities.par_chunks_mut(PARALLEL_PARTICLES))
+            .map(|((particles, previous), velocities)| {
+                let mut repaired = 0;
+                for ((particle, previous), velocity) in
+                    particles.iter().zip(previous).zip(velocities)
+                {
+                    if weight::<R>(particle) <= R::ZERO {
+                        *velocity = R::Vector::default();
+                        continue;
+                    }
+                    let predicted = *previous + *velocity * time;
+                    let speed = *velocity + (load::<R>(particle) - predicted) * per_time;
+                    let finite = finite::<R>(speed);
+                    *velocity = if finite { speed } else { R::Vector::default() };
+                    if !finite {
+                        store::<R>(particle, *previous);
+                        repaired += 1;
+                    }
                 }
-                let predicted = *previous + *velocity * time;
-                let speed = *velocity + (load::<R>(particle) - predicted) * per_time;
-                let finite = finite::<R>(speed);
-                *velocity = if finite { speed } else { R::Vector::default() };
-                if !finite {
-                    store::<R>(particle, *previous);
-                }
-                usize::from(!finite)
+                repaired
             })
             .sum()
     }

@@ -5,6 +5,7 @@ mod body;
 mod convergence;
 mod rest;
 mod runner;
+mod speed;
 mod stability;
 mod trade;
 
@@ -35,6 +36,8 @@ enum Part {
     Convergence,
     /// Errors of a falling beam beside milliseconds per frame, and its error at rest by kappa.
     Trade,
+    /// Nanoseconds a tet, on one thread and on two.
+    Speed,
     /// What becomes of a beam in extreme states, materials and steps.
     Stability,
 }
@@ -61,6 +64,10 @@ fn tables(arguments: &SolverArguments) -> anyhow::Result<String> {
     }
     if wanted(Part::Trade) {
         parts.push(trade::trade(arguments.quick)?);
+    }
+    if wanted(Part::Speed) {
+        let mesh = body::liver(arguments.models.as_deref(), arguments.quick)?;
+        parts.push(speed::speed(&mesh, arguments.quick)?);
     }
     if wanted(Part::Stability) {
         parts.push(stability::stability(arguments.quick)?);
