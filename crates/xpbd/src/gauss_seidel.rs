@@ -14,7 +14,7 @@ use crate::lanes::{Kind, Pass, solve_block};
 use crate::{Form, Real};
 
 /// Blocks in a color from which a second thread pays: some microseconds of work.
-const PARALLEL_BLOCKS: usize = 32;
+const PARALLEL_BLOCKS: usize = 8;
 
 struct Plain;
 struct Damped;
