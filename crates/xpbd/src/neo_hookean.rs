@@ -172,7 +172,7 @@ impl<R: Real> TetConstraint<R> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use proptest::prelude::*;
 
     use super::*;
@@ -184,12 +184,12 @@ mod tests {
         damping: 0.0,
     };
 
-    fn point() -> impl Strategy<Value = DVec3> {
+    pub(crate) fn point() -> impl Strategy<Value = DVec3> {
         prop::array::uniform3(-1.0..1.0f64).prop_map(DVec3::from_array)
     }
 
     /// A tet at rest of volume above 1e-3 in a cube of edge 2.
-    fn rest() -> impl Strategy<Value = [DVec3; 4]> {
+    pub(crate) fn rest() -> impl Strategy<Value = [DVec3; 4]> {
         let volume = |[a, b, c, d]: [DVec3; 4]| (b - a).cross(c - a).dot(d - a) / 6.0;
         prop::array::uniform4(point()).prop_filter_map("flat", move |[a, b, c, d]| {
             let rest = if volume([a, b, c, d]) > 0.0 {

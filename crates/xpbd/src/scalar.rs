@@ -14,7 +14,7 @@ use crate::real::{load, store, weight};
 use crate::step::Factors;
 use crate::{Real, Solver, XpbdError};
 
-/// Constraints in a color from which a second thread pays for its wake-up; as for tets.
+/// Constraints in a color from which a second thread pays for its wake-up.
 const PARALLEL_CONSTRAINTS: usize = 256;
 
 /// One constraint on `K` particles.

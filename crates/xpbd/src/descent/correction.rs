@@ -64,6 +64,9 @@ pub struct Correction<R: Real> {
 /// Halvings of a direction that does not lower the potential.
 const HALVINGS: usize = 8;
 
+/// Rounds in a row without a correction after which a substep ends: what is left is rounding.
+const IDLE_ROUNDS: u32 = 2;
+
 /// A gain below this part of the potential is lost in its rounding.
 const ROUNDING: f64 = 1e-11;
 
@@ -108,7 +111,8 @@ impl<R: Real> Correction<R> {
 }
 
 impl<R: Real> Solver<R> {
-    /// As [`Solver::descend`], with a correction after each sweep.
+    /// As [`Solver::descend`], with a correction after each sweep. A substep also ends when two corrections in a row find
+    /// nothing to gain: in single precision that is soon so in a stiff body.
     ///
     /// # Errors
     /// As [`Solver::descend`].
@@ -156,19 +160,13 @@ impl<R: Real> Solver<R> {
         settings: &DescentSettings,
     ) -> Result<DescentReport, XpbdError> {
         let _span = tracing::debug_span!("xpbd::descend_corrected").entered();
-        settings.check()?;
-        self.refuse_soft_constraints()?;
-        self.follow_body();
-        let mut report = DescentReport::default();
-        for number in 1..=settings.step.substeps {
-            let mut step = ImplicitStep::predicted(self, stars, settings, number);
-            step.run(settings, &mut report, |step| {
-                step.sweep();
-                step.correct(correction);
-            });
-            report.repaired += step.finish().repaired;
-        }
-        Ok(report)
+        let mut idle = 0;
+        self.frame_of_descent(stars, settings, |step| {
+            step.sweep();
+            let taken = step.correct(correction).taken;
+            idle = if taken > 0.0 { 0 } else { idle + 1 };
+            idle < IDLE_ROUNDS
+        })
     }
 }
 

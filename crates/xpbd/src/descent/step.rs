@@ -68,13 +68,26 @@ impl<R: Real> Solver<R> {
         settings: &DescentSettings,
     ) -> Result<DescentReport, XpbdError> {
         let _span = tracing::debug_span!("xpbd::descend").entered();
+        self.frame_of_descent(stars, settings, |step| {
+            step.sweep();
+            true
+        })
+    }
+
+    /// A frame in which a substep ends early when `iterate` says that it has no more to give.
+    pub(super) fn frame_of_descent(
+        &mut self,
+        stars: &mut Stars<R>,
+        settings: &DescentSettings,
+        mut iterate: impl FnMut(&mut ImplicitStep<'_, R>) -> bool,
+    ) -> Result<DescentReport, XpbdError> {
         settings.check()?;
         self.refuse_soft_constraints()?;
         self.follow_body();
         let mut report = DescentReport::default();
         for number in 1..=settings.step.substeps {
             let mut step = ImplicitStep::predicted(self, stars, settings, number);
-            step.run(settings, &mut report, |step| step.sweep());
+            step.run(settings, &mut report, &mut iterate);
             report.repaired += step.finish().repaired;
         }
         Ok(report)
@@ -160,11 +173,11 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
         &mut self,
         settings: &DescentSettings,
         report: &mut DescentReport,
-        mut iterate: impl FnMut(&mut Self),
+        mut iterate: impl FnMut(&mut Self) -> bool,
     ) {
         let start = settings.tolerance.map(|_| self.free_residual());
         for _ in 0..settings.step.iterations {
-            iterate(self);
+            let more = iterate(self);
             report.iterations += 1;
             if let (Some(tolerance), Some(start)) = (settings.tolerance, start) {
                 let residual = self.residual();
@@ -176,6 +189,9 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
                 if residual <= tolerance * start {
                     break;
                 }
+            }
+            if !more {
+                break;
             }
         }
         if settings.measure && self.last {

@@ -7,6 +7,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::layout::Ingredients;
 use crate::neo_hookean::TetConstraint;
+use crate::neo_hookean::tests::{point, rest};
 use crate::real::load;
 use crate::{Form, Material, gauss_seidel};
 use incise_graph::{Clustering, ColorId, Coloring, Schedule};
@@ -134,23 +135,6 @@ fn levels() -> Vec<Level> {
     {
         vec![Level::new(), Level::baseline()]
     }
-}
-
-fn point() -> impl Strategy<Value = DVec3> {
-    prop::array::uniform3(-1.0..1.0f64).prop_map(DVec3::from_array)
-}
-
-/// A tet at rest of volume above 1e-3 in a cube of edge 2.
-fn rest() -> impl Strategy<Value = [DVec3; 4]> {
-    let volume = |[a, b, c, d]: [DVec3; 4]| (b - a).cross(c - a).dot(d - a) / 6.0;
-    prop::array::uniform4(point()).prop_filter_map("flat", move |[a, b, c, d]| {
-        let rest = if volume([a, b, c, d]) > 0.0 {
-            [a, b, c, d]
-        } else {
-            [a, c, b, d]
-        };
-        (volume(rest) > 1e-3).then_some(rest)
-    })
 }
 
 /// Any number of tets from none to several blocks, each at rest and moved anywhere, some of them collapsed.
