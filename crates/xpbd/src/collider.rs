@@ -12,13 +12,15 @@
 //! Source: Macklin, Müller, Chentanez, Kim 2014 (friction, section 6.1). Cost: 20 to 50 operations for each particle
 //! and collider, more for those inside.
 
-use glam::{DMat3, DQuat, DVec3};
+mod solid;
+
+use glam::{DQuat, DVec3};
 use rayon::prelude::*;
 
-use crate::direction::{absolute, direction};
 use crate::real::{finite, load, store, weight};
 use crate::step::PARALLEL_PARTICLES;
 use crate::{Real, Solver, StepSettings, XpbdError};
+use solid::{Nearest, Solid};
 
 /// How far a particle may be pushed, in depths.
 const LONGEST_PUSH: f64 = 10.0;
@@ -212,165 +214,6 @@ impl Collider {
             _ => Ok(()),
         }
     }
-}
-
-/// A shape in the solver's precision, prepared for many questions.
-#[derive(Clone, Copy, Debug)]
-enum Solid<R: Real> {
-    Plane {
-        normal: R::Vector,
-        /// Of the surface from the origin, along the normal.
-        offset: R,
-    },
-    /// A capsule; a sphere is one without length.
-    Round {
-        start: R::Vector,
-        axis: R::Vector,
-        /// One over the squared length of the axis; 0 for a sphere.
-        per_squared: R,
-        radius: R,
-        /// The normal for points on the axis.
-        aside: R::Vector,
-    },
-    Box {
-        center: R::Vector,
-        axes: [R::Vector; 3],
-        half: [R; 3],
-    },
-}
-
-/// What is nearest to a point on a surface.
-struct Nearest<R: Real> {
-    distance: R,
-    normal: R::Vector,
-    point: R::Vector,
-}
-
-impl<R: Real> Solid<R> {
-    fn new(shape: &ColliderShape) -> Self {
-        match *shape {
-            ColliderShape::Plane { point, normal } => {
-                let normal = unit(normal);
-                Self::Plane {
-                    normal: R::from_dvec3(normal),
-                    offset: R::from_f64(normal.dot(point)),
-                }
-            }
-            ColliderShape::Sphere { center, radius } => Self::round([center; 2], radius),
-            ColliderShape::Capsule { ends, radius } => Self::round(ends, radius),
-            ColliderShape::Box {
-                center,
-                half_extents,
-                rotation,
-            } => {
-                let axes = DMat3::from_quat(rotation.normalize());
-                Self::Box {
-                    center: R::from_dvec3(center),
-                    axes: [axes.x_axis, axes.y_axis, axes.z_axis].map(R::from_dvec3),
-                    half: half_extents.to_array().map(R::from_f64),
-                }
-            }
-        }
-    }
-
-    fn round([start, end]: [DVec3; 2], radius: f64) -> Self {
-        let axis = R::from_dvec3(end - start);
-        let per_squared = R::ONE / R::dot(axis, axis);
-        // Too short to be told from a sphere.
-        let short = !per_squared.is_finite();
-        let aside = if short {
-            DVec3::Z
-        } else {
-            unit(end - start).any_orthonormal_vector()
-        };
-        Self::Round {
-            start: R::from_dvec3(start),
-            axis,
-            per_squared: if short { R::ZERO } else { per_squared },
-            radius: R::from_f64(radius),
-            aside: R::from_dvec3(aside),
-        }
-    }
-
-    #[inline]
-    fn nearest(&self, x: R::Vector) -> Nearest<R> {
-        match *self {
-            Self::Plane { normal, offset } => {
-                let along = R::dot(normal, x);
-                Nearest {
-                    distance: along - offset,
-                    normal,
-                    // Not `x` plus the depth: like this it lies on a level surface to the bit.
-                    point: x - normal * along + normal * offset,
-                }
-            }
-            Self::Round {
-                start,
-                axis,
-                per_squared,
-                radius,
-                aside,
-            } => {
-                let part = clamp(R::dot(x - start, axis) * per_squared, R::ZERO, R::ONE);
-                let center = start + axis * part;
-                let (length, normal) = direction::<R>(x - center).unwrap_or((R::ZERO, aside));
-                Nearest {
-                    distance: length - radius,
-                    normal,
-                    point: center + normal * radius,
-                }
-            }
-            Self::Box { center, axes, half } => {
-                let local = axes.map(|axis| R::dot(axis, x - center));
-                let (distance, normal, point) = nearest_on_box::<R>(local, half);
-                let back = |v: [R; 3]| axes[0] * v[0] + axes[1] * v[1] + axes[2] * v[2];
-                Nearest {
-                    distance,
-                    normal: back(normal),
-                    point: center + back(point),
-                }
-            }
-        }
-    }
-}
-
-/// Signed distance, normal and nearest point of an axis-aligned box around the origin.
-#[inline]
-fn nearest_on_box<R: Real>(x: [R; 3], half: [R; 3]) -> (R, [R; 3], [R; 3]) {
-    let beyond: [R; 3] = std::array::from_fn(|i| absolute(x[i]) - half[i]);
-    let clamped: [R; 3] = std::array::from_fn(|i| clamp(x[i], -half[i], half[i]));
-    let outside = R::vector(x[0] - clamped[0], x[1] - clamped[1], x[2] - clamped[2]);
-    if let Some((distance, normal)) = direction::<R>(outside) {
-        return (distance, R::components(normal), clamped);
-    }
-    let mut face = 0;
-    for i in 1..3 {
-        if beyond[i] > beyond[face] {
-            face = i;
-        }
-    }
-    let (mut normal, mut point) = ([R::ZERO; 3], x);
-    let side = if x[face] < R::ZERO { -R::ONE } else { R::ONE };
-    normal[face] = side;
-    point[face] = side * half[face];
-    (beyond[face], normal, point)
-}
-
-#[inline]
-fn clamp<R: Real>(value: R, low: R, high: R) -> R {
-    if value < low {
-        low
-    } else if value > high {
-        high
-    } else {
-        value
-    }
-}
-
-/// The vector of length 1 along another one that is not zero.
-fn unit(v: DVec3) -> DVec3 {
-    let scaled = v / v.abs().max_element();
-    scaled / scaled.length()
 }
 
 /// A collider at the end of a substep.

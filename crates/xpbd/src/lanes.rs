@@ -17,14 +17,14 @@
 //! bytes of the layout and four corners of 16 bytes, read and written. Taking corners from where they are and putting
 //! them back is more than half of the instructions, since there is no safe instruction for it.
 
-use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdFrom};
+mod memory;
+
+use fearless_simd::{Select, Simd, SimdBase, SimdFloat};
 
 use crate::Real;
 use crate::layout::{CONSTANTS, Layout, REST};
 use crate::step::Factors;
-
-/// Most lanes of any instruction set.
-pub(crate) const MOST_LANES: usize = 16;
+use memory::{gather, load_multipliers, scatter, splat, store_multipliers};
 
 /// What a pass over the tets is given. Public only because [`Real`] names it.
 #[expect(unnameable_types, reason = "nobody else makes passes")]
@@ -409,106 +409,6 @@ fn difference<R: Real, S: Simd>(
 #[inline(always)]
 fn product<R: Real, S: Simd>(a: &Matrix<R::Lanes<S>>, b: &Matrix<R::Lanes<S>>) -> R::Lanes<S> {
     dot::<R, S>(&a[0], &b[0]) + dot::<R, S>(&a[1], &b[1]) + dot::<R, S>(&a[2], &b[2])
-}
-
-#[inline(always)]
-fn splat<R: Real, S: Simd>(simd: S, value: R) -> R::Lanes<S> {
-    R::Lanes::<S>::simd_from(simd, value)
-}
-
-/// The corners of the tets in all lanes: x, y, z and the inverse mass of each.
-#[inline(always)]
-fn gather<R: Real, S: Simd>(
-    simd: S,
-    corners: &[[u32; 4]],
-    read: impl Fn(u32) -> [R; 4],
-) -> [[R::Lanes<S>; 4]; 4] {
-    let lanes = R::Lanes::<S>::LEN;
-    let mut gathered = [[splat::<R, S>(simd, R::ZERO); 4]; 4];
-    // First all that is written, then all that is read: a wide load cannot overtake the narrow stores it needs.
-    let mut buffers = [[R::ZERO; 4 * MOST_LANES]; 4];
-    for (lane, corner) in corners.iter().enumerate().take(lanes) {
-        for (buffer, &p) in buffers.iter_mut().zip(corner) {
-            let values = read(p);
-            buffer[4 * lane] = values[0];
-            buffer[4 * lane + 1] = values[1];
-            buffer[4 * lane + 2] = values[2];
-            buffer[4 * lane + 3] = values[3];
-        }
-    }
-    for (values, buffer) in gathered.iter_mut().zip(&buffers) {
-        let a = R::Lanes::<S>::from_slice(simd, &buffer[..lanes]);
-        let b = R::Lanes::<S>::from_slice(simd, &buffer[lanes..2 * lanes]);
-        let c = R::Lanes::<S>::from_slice(simd, &buffer[2 * lanes..3 * lanes]);
-        let d = R::Lanes::<S>::from_slice(simd, &buffer[3 * lanes..4 * lanes]);
-        // Two rounds of taking the even and the odd ones apart.
-        let (even, odd) = a.deinterleave(b);
-        let (more_even, more_odd) = c.deinterleave(d);
-        let (x, z) = even.deinterleave(more_even);
-        let (y, w) = odd.deinterleave(more_odd);
-        *values = [x, y, z, w];
-    }
-    gathered
-}
-
-/// Hands each corner of each tet to `write`.
-#[inline(always)]
-fn scatter<R: Real, S: Simd>(
-    x: &[[R::Lanes<S>; 4]; 4],
-    corners: &[[u32; 4]],
-    write: impl Fn(u32, [R; 4]),
-) {
-    let lanes = R::Lanes::<S>::LEN;
-    for (k, &[x, y, z, w]) in x.iter().enumerate() {
-        let (even, more_even) = x.interleave(z);
-        let (odd, more_odd) = y.interleave(w);
-        let (a, b) = even.interleave(odd);
-        let (c, d) = more_even.interleave(more_odd);
-        let mut buffer = [R::ZERO; 4 * MOST_LANES];
-        a.store_slice(&mut buffer[..lanes]);
-        b.store_slice(&mut buffer[lanes..2 * lanes]);
-        c.store_slice(&mut buffer[2 * lanes..3 * lanes]);
-        d.store_slice(&mut buffer[3 * lanes..4 * lanes]);
-        for (values, corner) in buffer.chunks_exact(4).zip(corners) {
-            write(corner[k], [values[0], values[1], values[2], values[3]]);
-        }
-    }
-}
-
-#[inline(always)]
-fn load_multipliers<R: Real, S: Simd>(
-    simd: S,
-    pass: &Pass<'_, R>,
-    block: usize,
-) -> [R::Lanes<S>; 2] {
-    let lanes = R::Lanes::<S>::LEN;
-    let mut multipliers = [splat::<R, S>(simd, R::ZERO); 2];
-    for (k, values) in multipliers.iter_mut().enumerate() {
-        let start = (2 * block + k) * lanes;
-        let mut buffer = [R::ZERO; MOST_LANES];
-        for (lane, cell) in pass.multipliers[start..start + lanes].iter().enumerate() {
-            buffer[lane] = R::load(cell);
-        }
-        *values = R::Lanes::<S>::from_slice(simd, &buffer[..lanes]);
-    }
-    multipliers
-}
-
-#[inline(always)]
-fn store_multipliers<R: Real, S: Simd>(
-    pass: &Pass<'_, R>,
-    block: usize,
-    multipliers: [R::Lanes<S>; 2],
-) {
-    let lanes = R::Lanes::<S>::LEN;
-    for (k, values) in multipliers.into_iter().enumerate() {
-        let start = (2 * block + k) * lanes;
-        let mut buffer = [R::ZERO; MOST_LANES];
-        values.store_slice(&mut buffer[..lanes]);
-        for (lane, cell) in pass.multipliers[start..start + lanes].iter().enumerate() {
-            buffer[lane].store(cell);
-        }
-    }
 }
 
 #[cfg(test)]

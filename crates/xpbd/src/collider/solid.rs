@@ -1,0 +1,169 @@
+//! [`Solid`]: the nearest point of a plane, a sphere, a capsule or a box, with its distance and normal.
+//!
+//! A sphere is a capsule without length, a box is asked in its own axes. Where several points are nearest, it is always
+//! the same one that is answered. Cost: 10 to 60 operations.
+
+use glam::{DMat3, DVec3};
+
+use super::ColliderShape;
+use crate::Real;
+use crate::direction::{absolute, direction};
+
+/// A shape in the solver's precision, prepared for many questions.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Solid<R: Real> {
+    Plane {
+        normal: R::Vector,
+        /// Of the surface from the origin, along the normal.
+        offset: R,
+    },
+    /// A capsule; a sphere is one without length.
+    Round {
+        start: R::Vector,
+        axis: R::Vector,
+        /// One over the squared length of the axis; 0 for a sphere.
+        per_squared: R,
+        radius: R,
+        /// The normal for points on the axis.
+        aside: R::Vector,
+    },
+    Box {
+        center: R::Vector,
+        axes: [R::Vector; 3],
+        half: [R; 3],
+    },
+}
+
+/// What is nearest to a point on a surface.
+pub(super) struct Nearest<R: Real> {
+    pub(super) distance: R,
+    pub(super) normal: R::Vector,
+    pub(super) point: R::Vector,
+}
+
+impl<R: Real> Solid<R> {
+    pub(super) fn new(shape: &ColliderShape) -> Self {
+        match *shape {
+            ColliderShape::Plane { point, normal } => {
+                let normal = unit(normal);
+                Self::Plane {
+                    normal: R::from_dvec3(normal),
+                    offset: R::from_f64(normal.dot(point)),
+                }
+            }
+            ColliderShape::Sphere { center, radius } => Self::round([center; 2], radius),
+            ColliderShape::Capsule { ends, radius } => Self::round(ends, radius),
+            ColliderShape::Box {
+                center,
+                half_extents,
+                rotation,
+            } => {
+                let axes = DMat3::from_quat(rotation.normalize());
+                Self::Box {
+                    center: R::from_dvec3(center),
+                    axes: [axes.x_axis, axes.y_axis, axes.z_axis].map(R::from_dvec3),
+                    half: half_extents.to_array().map(R::from_f64),
+                }
+            }
+        }
+    }
+
+    fn round([start, end]: [DVec3; 2], radius: f64) -> Self {
+        let axis = R::from_dvec3(end - start);
+        let per_squared = R::ONE / R::dot(axis, axis);
+        // Too short to be told from a sphere.
+        let short = !per_squared.is_finite();
+        let aside = if short {
+            DVec3::Z
+        } else {
+            unit(end - start).any_orthonormal_vector()
+        };
+        Self::Round {
+            start: R::from_dvec3(start),
+            axis,
+            per_squared: if short { R::ZERO } else { per_squared },
+            radius: R::from_f64(radius),
+            aside: R::from_dvec3(aside),
+        }
+    }
+
+    #[inline]
+    pub(super) fn nearest(&self, x: R::Vector) -> Nearest<R> {
+        match *self {
+            Self::Plane { normal, offset } => {
+                let along = R::dot(normal, x);
+                Nearest {
+                    distance: along - offset,
+                    normal,
+                    // Not `x` plus the depth: like this it lies on a level surface to the bit.
+                    point: x - normal * along + normal * offset,
+                }
+            }
+            Self::Round {
+                start,
+                axis,
+                per_squared,
+                radius,
+                aside,
+            } => {
+                let part = clamp(R::dot(x - start, axis) * per_squared, R::ZERO, R::ONE);
+                let center = start + axis * part;
+                let (length, normal) = direction::<R>(x - center).unwrap_or((R::ZERO, aside));
+                Nearest {
+                    distance: length - radius,
+                    normal,
+                    point: center + normal * radius,
+                }
+            }
+            Self::Box { center, axes, half } => {
+                let local = axes.map(|axis| R::dot(axis, x - center));
+                let (distance, normal, point) = nearest_on_box::<R>(local, half);
+                let back = |v: [R; 3]| axes[0] * v[0] + axes[1] * v[1] + axes[2] * v[2];
+                Nearest {
+                    distance,
+                    normal: back(normal),
+                    point: center + back(point),
+                }
+            }
+        }
+    }
+}
+
+/// Signed distance, normal and nearest point of an axis-aligned box around the origin.
+#[inline]
+fn nearest_on_box<R: Real>(x: [R; 3], half: [R; 3]) -> (R, [R; 3], [R; 3]) {
+    let beyond: [R; 3] = std::array::from_fn(|i| absolute(x[i]) - half[i]);
+    let clamped: [R; 3] = std::array::from_fn(|i| clamp(x[i], -half[i], half[i]));
+    let outside = R::vector(x[0] - clamped[0], x[1] - clamped[1], x[2] - clamped[2]);
+    if let Some((distance, normal)) = direction::<R>(outside) {
+        return (distance, R::components(normal), clamped);
+    }
+    let mut face = 0;
+    for i in 1..3 {
+        if beyond[i] > beyond[face] {
+            face = i;
+        }
+    }
+    let (mut normal, mut point) = ([R::ZERO; 3], x);
+    let side = if x[face] < R::ZERO { -R::ONE } else { R::ONE };
+    normal[face] = side;
+    point[face] = side * half[face];
+    (beyond[face], normal, point)
+}
+
+#[inline]
+fn clamp<R: Real>(value: R, low: R, high: R) -> R {
+    if value < low {
+        low
+    } else if value > high {
+        high
+    } else {
+        value
+    }
+}
+
+/// The vector of length 1 along another one that is not zero.
+fn unit(v: DVec3) -> DVec3 {
+    let scaled = v / v.abs().max_element();
+    scaled / scaled.length()
+}
