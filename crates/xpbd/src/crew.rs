@@ -29,7 +29,9 @@ pub(crate) fn in_rounds(
         lock: Mutex::new(()),
         bell: Condvar::new(),
     };
-    let helpers = rayon::current_num_threads() - 1;
+    // No more than the largest round can use.
+    let most = (0..rounds).map(&chunks).max().unwrap_or(0);
+    let helpers = rayon::current_num_threads().min(most).saturating_sub(1);
     rayon::scope(|scope| {
         for _ in 0..helpers {
             scope.spawn(|_| crew.work());

@@ -13,8 +13,8 @@ use crate::crew::in_rounds;
 use crate::lanes::{Kind, Pass, solve_block};
 use crate::{Form, Real};
 
-/// Blocks in a color from which a second thread pays: some microseconds of work.
-const PARALLEL_BLOCKS: usize = 8;
+/// Fewest blocks that a thread is given of a color: about a microsecond of work.
+const BLOCKS_A_THREAD: usize = 4;
 
 struct Plain;
 struct Damped;
@@ -79,8 +79,7 @@ fn colors<R: Real, S: Simd, K: Kind>(simd: S, pass: &Pass<'_, R>) {
         let groups = layout.groups(color);
         match layout.blocks(groups.clone()).len() {
             0 => 0,
-            few if few < PARALLEL_BLOCKS => 1,
-            _ => threads.min(groups.len()),
+            blocks => (blocks / BLOCKS_A_THREAD).clamp(1, threads.min(groups.len())),
         }
     };
     let solve = |color: usize, chunk: usize| {
