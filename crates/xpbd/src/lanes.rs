@@ -196,15 +196,14 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
         self.rest(15) * self.time_squared
     }
 
-    /// The norm of F and one over it; at F = 0 the gradient has no direction, and the tet waits for its neighbors.
+    /// The norm of F and one over it; at F = 0 the gradient has no direction, no correction is finite, and the tet waits
+    /// for its neighbors.
     #[inline(always)]
     fn norm(&self, f: &Matrix<R::Lanes<S>>) -> (R::Lanes<S>, R::Lanes<S>) {
         let square =
             dot::<R, S>(&f[0], &f[0]) + dot::<R, S>(&f[1], &f[1]) + dot::<R, S>(&f[2], &f[2]);
         let norm = square.sqrt();
-        let zero = self.splat(R::ZERO);
-        let inverse = self.splat(R::ONE) / norm;
-        (norm, norm.simd_gt(zero).select(inverse, zero))
+        (norm, self.splat(R::ONE) / norm)
     }
 
     /// The change of F's corners per weight that satisfies both constraints to first order, and of the multipliers.

@@ -59,6 +59,17 @@ impl<R: Real> Case<R> {
 
     /// The positions after a pass by the kernel.
     fn by_lanes(&self, level: Level, damped: bool, form: Form) -> Vec<R::Vector> {
+        self.by_lanes_keeping(level, damped, form, &[])
+    }
+
+    /// The same with multipliers, two for each lane of a single block.
+    fn by_lanes_keeping(
+        &self,
+        level: Level,
+        damped: bool,
+        form: Form,
+        multipliers: &[R::Atomic],
+    ) -> Vec<R::Vector> {
         let count = self.tets.len();
         let coloring = Coloring::new(vec![ColorId(0); count]);
         let schedule = Schedule::new(&Clustering::none(count), &coloring);
@@ -78,7 +89,7 @@ impl<R: Real> Case<R> {
             layout: &layout,
             particles: &particles,
             previous: &self.previous,
-            multipliers: &[],
+            multipliers,
             corrections: &[],
             factors: self.factors,
         };
@@ -187,6 +198,25 @@ proptest! {
         for level in levels() {
             let moved = (single.by_lanes(level, damped, form), double.by_lanes(level, damped, form));
             prop_assert_eq!(&moved, &expected, "{:?}", level);
+        }
+    }
+}
+
+/// A tet too large to be squared is left alone, its multipliers with it, and so is one without size.
+#[test]
+fn tets_out_of_range_stay_as_they_are() {
+    let rest = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+    for size in [1e30, 0.0] {
+        for form in [Form::Block, Form::Sequential] {
+            let case = Case::<f32>::new(&[rest], &[rest.map(|x| x * size)], 1e-3);
+            let multipliers: Vec<_> = (0..2 * 16).map(|_| 0.0f32.cell()).collect();
+            for level in levels() {
+                let moved = case.by_lanes_keeping(level, true, form, &multipliers);
+                for (x, before) in moved.iter().zip(&case.particles) {
+                    assert_eq!(x.to_array(), before[..3], "{size:e}, {form:?}");
+                }
+                assert!(multipliers.iter().all(|m| f32::load(m).is_finite()));
+            }
         }
     }
 }
