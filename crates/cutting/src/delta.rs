@@ -59,7 +59,42 @@ pub struct RelinkedTet {
     pub after: [ParticleId; 4],
 }
 
+/// A tet that took over the slot of one that was deleted, so that slots stay dense.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MovedTet {
+    /// Its slot before.
+    pub from: TetId,
+    /// Its slot now.
+    pub to: TetId,
+    /// Its corners, which do not change.
+    pub corners: [ParticleId; 4],
+}
+
+/// What a triangle of the boundary is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum FaceTag {
+    /// Part of the surface the body had when it was made.
+    Outer,
+    /// Laid bare by the stroke of this number.
+    Cut(u32),
+}
+
+/// A triangle of the boundary.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BoundaryTriangle {
+    /// The tet it is a face of.
+    pub tet: TetId,
+    /// The corner of that tet, 0 to 3, which it lies opposite to.
+    pub opposite: u8,
+    /// Its particles, counterclockwise seen from outside.
+    pub particles: [ParticleId; 3],
+    /// What it is.
+    pub tag: FaceTag,
+}
+
 /// Everything one cut changed.
+///
+/// A cut splits tets and separates them; taking tets away deletes and moves tets. One delta does one or the other.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CutDelta {
     /// Number of particles before the cut; new ones follow: first the points, then the copies.
@@ -77,6 +112,15 @@ pub struct CutDelta {
     pub added: Vec<AddedTet>,
     /// Tets that were not cut but have other corners now, ascending.
     pub relinked: Vec<RelinkedTet>,
+    /// Tets taken away without children, ascending by the slot they had before.
+    pub deleted: Vec<RemovedTet>,
+    /// The last tets, moved into the slots of deleted ones, ascending by `to`. No `to` lies at or past
+    /// [`CutDelta::tets_after`], every `from` does.
+    pub moved: Vec<MovedTet>,
+    /// Triangles of the boundary that are gone, with the slots that their tets had before.
+    pub surface_removed: Vec<BoundaryTriangle>,
+    /// Triangles of the boundary that are new, with the slots that their tets have now.
+    pub surface_added: Vec<BoundaryTriangle>,
     /// Particles that the surface was bent to by snapping.
     pub snapped: usize,
     /// The smallest volume of a child as a fraction of its parent's (1 if none was cut).
@@ -87,7 +131,10 @@ impl CutDelta {
     /// Whether the cut changed nothing.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.points.is_empty() && self.copies.is_empty() && self.added.is_empty()
+        self.points.is_empty()
+            && self.copies.is_empty()
+            && self.added.is_empty()
+            && self.deleted.is_empty()
     }
 
     /// Number of particles after the cut.
@@ -99,7 +146,7 @@ impl CutDelta {
     /// Number of tets after the cut.
     #[must_use]
     pub fn tets_after(&self) -> usize {
-        self.tets_before + self.added.len() - self.removed.len()
+        self.tets_before + self.added.len() - self.removed.len() - self.deleted.len()
     }
 
     /// Extends a quantity carried by particles to the new ones: interpolated on edges, repeated for copies.
@@ -126,12 +173,17 @@ impl CutDelta {
     /// If the mesh is not the one the delta was made from.
     pub fn apply(&self, mesh: &mut TetMesh) {
         self.extend_particles(&mut mesh.positions);
-        mesh.tets.resize(self.tets_after(), [ParticleId(0); 4]);
+        mesh.tets
+            .resize(self.tets_before.max(self.tets_after()), [ParticleId(0); 4]);
         for added in &self.added {
             mesh.tets[added.tet.index()] = added.corners;
         }
         for relinked in &self.relinked {
             mesh.tets[relinked.tet.index()] = relinked.after;
         }
+        for moved in &self.moved {
+            mesh.tets[moved.to.index()] = moved.corners;
+        }
+        mesh.tets.truncate(self.tets_after());
     }
 }

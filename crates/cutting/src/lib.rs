@@ -42,7 +42,9 @@ mod sweep;
 
 pub use bisect::{SplitEdge, split_tet};
 pub use cuttable::CuttableMesh;
-pub use delta::{AddedTet, CutDelta, EdgePoint, RelinkedTet, RemovedTet};
+pub use delta::{
+    AddedTet, BoundaryTriangle, CutDelta, EdgePoint, FaceTag, MovedTet, RelinkedTet, RemovedTet,
+};
 pub use error::CutError;
 pub use options::CutOptions;
 pub use plane::{Plane, cut_plane};

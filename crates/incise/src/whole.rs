@@ -100,6 +100,7 @@ impl Whole {
             relinked: delta.relinked.iter().map(relinked).collect(),
             snapped: delta.snapped,
             worst_volume_ratio: delta.worst_volume_ratio,
+            ..CutDelta::default()
         };
         whole.apply(&mut self.mesh);
         whole.extend_particles(&mut self.positions);
