@@ -10,6 +10,8 @@
 
 use incise_mesh::ParticleId;
 
+use crate::faces::INNER;
+
 /// An edge that is to be split.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SplitEdge {
@@ -39,16 +41,31 @@ pub fn split_tet(
     edges: &[SplitEdge],
     children: &mut Vec<[ParticleId; 4]>,
 ) {
+    let mut family = Vec::new();
+    split_linked((corners, [INNER; 4]), edges, &mut family);
     children.clear();
-    children.push(corners);
+    children.extend(family.into_iter().map(|(corners, _)| corners));
+}
+
+/// The same for a tet with a link for each of its faces, by opposite corner. A part of a face gets the link of the
+/// whole, faces between children get [`INNER`].
+pub(crate) fn split_linked(
+    tet: ([ParticleId; 4], [u32; 4]),
+    edges: &[SplitEdge],
+    children: &mut Vec<([ParticleId; 4], [u32; 4])>,
+) {
+    children.clear();
+    children.push(tet);
     for edge in edges {
         for i in 0..children.len() {
-            let child = children[i];
+            let (child, links) = children[i];
             let at = |end| child.iter().position(|&corner| corner == end);
             if let (Some(a), Some(b)) = (at(edge.ends[0]), at(edge.ends[1])) {
-                let mut other = child;
-                children[i][b] = edge.point;
-                other[a] = edge.point;
+                // The half that keeps `a` has the new face where `a` looks, the other one where `b` looks.
+                let (mut one, mut other) = ((child, links), (child, links));
+                (one.0[b], one.1[a]) = (edge.point, INNER);
+                (other.0[a], other.1[b]) = (edge.point, INNER);
+                children[i] = one;
                 children.push(other);
             }
         }

@@ -125,6 +125,8 @@ pub struct CutDelta {
     pub snapped: usize,
     /// The smallest volume of a child as a fraction of its parent's (1 if none was cut).
     pub worst_volume_ratio: f64,
+    /// The smallest and the largest dihedral angle of a child at rest in degrees, if any tet was cut.
+    pub dihedral: Option<[f64; 2]>,
 }
 
 impl CutDelta {
@@ -154,16 +156,46 @@ impl CutDelta {
     /// # Panics
     /// If `values` does not have an entry for each particle before the cut.
     pub fn extend_particles(&self, values: &mut Vec<DVec3>) {
+        self.extend_with(values, |a, b, t| *a + (*b - *a) * t);
+    }
+
+    /// The same for a quantity of any kind, such as texture coordinates or temperatures; `interpolate` gets the values
+    /// at both ends of an edge and the parameter.
+    ///
+    /// # Panics
+    /// If `values` does not have an entry for each particle before the cut.
+    ///
+    /// # Example
+    /// ```
+    /// use glam::DVec3;
+    /// use incise_cutting::{CutOptions, CuttableMesh, Plane, cut_plane};
+    /// use incise_mesh::generate::kuhn_box;
+    ///
+    /// let mut body = CuttableMesh::new(kuhn_box([2; 3], DVec3::ONE))?;
+    /// let rest = body.mesh().positions.clone();
+    /// let mut heights: Vec<f64> = rest.iter().map(|x| x.z).collect();
+    /// let plane = Plane { point: DVec3::splat(0.4), normal: DVec3::ONE };
+    /// let delta = cut_plane(&mut body, &rest, &plane, &CutOptions::default())?;
+    /// delta.extend_with(&mut heights, |a, b, t| a + (b - a) * t);
+    /// assert!(heights.iter().zip(&body.mesh().positions).all(|(h, x)| (h - x.z).abs() < 1e-12));
+    /// # Ok::<(), incise_cutting::CutError>(())
+    /// ```
+    pub fn extend_with<T: Clone>(
+        &self,
+        values: &mut Vec<T>,
+        interpolate: impl Fn(&T, &T, f64) -> T,
+    ) {
         assert_eq!(
             values.len(),
             self.particles_before,
             "one value for each particle before the cut"
         );
         for point in &self.points {
-            values.push(point.interpolate(values));
+            let [a, b] = point.ends.map(|p| &values[p.index()]);
+            values.push(interpolate(a, b, point.parameter));
         }
         for source in &self.copies {
-            values.push(values[source.index()]);
+            values.push(values[source.index()].clone());
         }
     }
 

@@ -30,15 +30,20 @@ mod bisect;
 mod cuttable;
 mod delta;
 mod error;
+mod faces;
 mod meet;
 mod near;
 mod operation;
 mod options;
 mod plane;
+mod quality;
+mod remove;
+mod separate;
 mod sides;
 mod stars;
 mod surface;
 mod sweep;
+mod undo;
 
 pub use bisect::{SplitEdge, split_tet};
 pub use cuttable::CuttableMesh;
@@ -46,8 +51,9 @@ pub use delta::{
     AddedTet, BoundaryTriangle, CutDelta, EdgePoint, FaceTag, MovedTet, RelinkedTet, RemovedTet,
 };
 pub use error::CutError;
-pub use options::CutOptions;
+pub use options::{CutOptions, Separation};
 pub use plane::{Plane, cut_plane};
+pub use remove::{carve, remove_tets};
 pub use sweep::Sweep;
 
 /// The example of the README, run as a test.

@@ -8,7 +8,7 @@ use glam::DVec3;
 use incise_mesh::ParticleId;
 
 use crate::operation::{Crossing, Operation};
-use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
+use crate::{CutDelta, CutError, CutOptions, CuttableMesh, Separation};
 
 /// A plane through a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,9 +100,9 @@ pub fn cut_plane(
     let free = |c: &&Crossing| c.ends.iter().all(|p| !on_surface[p.index()]);
     let flagged: Vec<Crossing> = crossings.iter().filter(free).copied().collect();
 
-    let mut operation = Operation::begin(cuttable);
+    let mut operation = Operation::begin(cuttable, options);
     operation.delta.snapped = snapped;
-    operation.split(&flagged);
+    operation.split(&flagged)?;
     distance.resize(distance.len() + flagged.len(), 0.0);
     on_surface.resize(on_surface.len() + flagged.len(), true);
 
@@ -119,10 +119,17 @@ pub fn cut_plane(
         .filter(|&p| on_surface[p])
         .map(ParticleId::new)
         .collect();
-    operation.separate(&seeds, |face| {
-        let [one, other] = face.corners.map(side);
-        one != other && face.particles.iter().all(|p| on_surface[p.index()])
-    });
+    let (particles, on) = (positions.len(), |p: ParticleId| on_surface[p.index()]);
+    match options.separation {
+        Separation::CutFaces => operation.separate(&seeds, |face| {
+            let [one, other] = face.corners.map(side);
+            one != other && face.particles.into_iter().all(on)
+        }),
+        Separation::SharedOriginal => {
+            operation.separate_by_particles(&seeds, |p| p.index() < particles);
+        }
+        Separation::SharedOffSurface => operation.separate_by_particles(&seeds, |p| !on(p)),
+    }
     Ok(operation.finish(|_, corners| side(corners)))
 }
 

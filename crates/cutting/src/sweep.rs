@@ -151,7 +151,7 @@ impl Sweep {
         let mut now = positions.to_vec();
         let mut fresh: Vec<ParticleId> = Vec::new();
         let mut near = near_tets(cuttable.mesh(), &self.before, &now, &segments);
-        let mut operation = Operation::begin(cuttable);
+        let mut operation = Operation::begin(cuttable, &self.options);
         // A segment meets an edge three times at most, so after as many rounds nothing can be left to split.
         for _ in 0..=3 * segments.len() {
             let edges = edges_of(&operation.cuttable.mesh, &near);
@@ -172,7 +172,14 @@ impl Sweep {
             for hit in &mut flagged {
                 hit.crossing.parameter = hit.crossing.parameter.clamp(reach, 1.0 - reach);
             }
-            near = operation.split(&flagged.iter().map(|hit| hit.crossing).collect::<Vec<_>>());
+            let crossings: Vec<Crossing> = flagged.iter().map(|hit| hit.crossing).collect();
+            near = match operation.split(&crossings) {
+                Ok(touched) => touched,
+                Err(error) => {
+                    operation.roll_back();
+                    return Err(error);
+                }
+            };
             self.given.forget(near.iter().copied());
             fresh.extend(&snapped);
             for hit in flagged {
