@@ -3,5 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 
 mod bodies;
+mod deltas;
 mod planes;
+mod removal;
+mod separation;
 mod sweeps;
