@@ -40,6 +40,7 @@ mod quality;
 mod remove;
 mod separate;
 mod sides;
+mod skin;
 mod stars;
 mod surface;
 mod sweep;
@@ -54,6 +55,7 @@ pub use error::CutError;
 pub use options::{CutOptions, Separation};
 pub use plane::{Plane, cut_plane};
 pub use remove::{carve, remove_tets};
+pub use skin::{Skin, SkinChange, SkinVertex};
 pub use sweep::Sweep;
 
 /// The example of the README, run as a test.

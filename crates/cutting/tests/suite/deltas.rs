@@ -1,9 +1,15 @@
 //! Deltas carry everything: they can be written, read and replayed; a cut that would be too large or too fine is refused
 //! or kept in bounds.
 
+use std::collections::BTreeSet;
+
 use glam::DVec3;
-use incise_cutting::{CutError, CutOptions, CuttableMesh, FaceTag, Plane, cut_plane};
+use incise_cutting::{
+    CutError, CutOptions, CuttableMesh, FaceTag, Plane, Skin, SkinChange, SkinVertex, carve,
+    cut_plane,
+};
 use incise_mesh::generate::kuhn_box;
+use incise_mesh::{ParticleId, TetId};
 use proptest::prelude::*;
 
 use crate::bodies::{body, check_cut, noise};
@@ -121,8 +127,75 @@ fn growth_is_capped() {
     assert!(cut(needed).0.is_ok());
 }
 
+/// The triangles of a skin as tets, particles and tags, each once.
+fn listed(skin: &Skin) -> BTreeSet<(TetId, [ParticleId; 3], FaceTag)> {
+    let vertex = |v: u32| skin.vertices()[v as usize];
+    let triangles = skin.triangles().iter().enumerate();
+    let all: Vec<_> = triangles
+        .map(|(i, corners)| {
+            assert!(corners.iter().all(|&v| vertex(v).tag == skin.tag(i)));
+            (
+                skin.tet(i),
+                corners.map(|v| vertex(v).particle),
+                skin.tag(i),
+            )
+        })
+        .collect();
+    let set: BTreeSet<_> = all.iter().copied().collect();
+    assert_eq!(set.len(), all.len());
+    set
+}
+
+/// A copy that gets only the parts a skin reports as changed stays equal to it.
+fn upload(copy: &mut (Vec<[u32; 3]>, Vec<SkinVertex>), skin: &Skin, change: &SkinChange) {
+    copy.0.resize(skin.triangles().len(), [u32::MAX; 3]);
+    copy.1.resize(
+        skin.vertices().len(),
+        SkinVertex {
+            particle: ParticleId(0),
+            tag: FaceTag::Outer,
+        },
+    );
+    for &i in &change.triangles {
+        copy.0[i] = skin.triangles()[i];
+    }
+    for &i in &change.vertices {
+        copy.1[i] = skin.vertices()[i];
+    }
+    assert_eq!(copy.0, skin.triangles());
+    assert_eq!(copy.1, skin.vertices());
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(30))]
+
+    /// A skin that follows cuts and removals is the skin made anew, whatever was uploaded of it in parts.
+    #[test]
+    fn a_skin_follows(kind in 0_usize..6, seed in any::<u32>()) {
+        let mut cuttable = CuttableMesh::new(body(kind, seed.into())).unwrap();
+        let mut skin = Skin::new(cuttable.boundary());
+        let mut copy = (skin.triangles().to_vec(), skin.vertices().to_vec());
+        for round in 0..6_u32 {
+            let rest = cuttable.mesh().positions.clone();
+            let random = |k| noise(u64::from(seed) + u64::from(round), k);
+            let delta = if round % 3 == 2 {
+                let point = DVec3::from_array([0, 1, 2].map(random));
+                carve(&mut cuttable, &rest, |x| x.distance(point) < 0.4, round).unwrap()
+            } else {
+                let plane = Plane {
+                    point: rest[seed as usize % rest.len()] * 0.9,
+                    normal: DVec3::from_array([3, 4, 5].map(random)) + DVec3::splat(1e-6),
+                };
+                let options = CutOptions { tag: round, ..CutOptions::default() };
+                cut_plane(&mut cuttable, &rest, &plane, &options).unwrap()
+            };
+            let change = skin.follow(&delta);
+            upload(&mut copy, &skin, &change);
+            prop_assert_eq!(listed(&skin), listed(&Skin::new(cuttable.boundary())));
+            let normals = skin.normals(&cuttable.mesh().positions);
+            prop_assert!(normals.iter().all(|n| *n == DVec3::ZERO || (n.length() - 1.0).abs() < 1e-9));
+        }
+    }
 
     /// Many cuts taken back one by one, then made again: the same bits both times.
     #[test]
