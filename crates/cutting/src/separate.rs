@@ -95,15 +95,27 @@ impl Operation<'_> {
             tets,
             parts,
         };
-        for &seed in seeds {
-            star.particle = seed;
-            star.tets.clear();
-            star.tets.extend(self.cuttable.stars.around(seed));
-            star.tets.sort_unstable();
-            star.parts.clear();
-            star.parts.extend(0..star.tets.len());
-            join(self, &mut star);
-            self.take_apart(&mut star);
+        let mut due = seeds.to_vec();
+        let mut done: Vec<ParticleId> = Vec::new();
+        while !due.is_empty() {
+            let mut parted = Vec::new();
+            for &seed in &due {
+                star.particle = seed;
+                star.tets.clear();
+                star.tets.extend(self.cuttable.stars.around(seed));
+                star.tets.sort_unstable();
+                star.parts.clear();
+                star.parts.extend(0..star.tets.len());
+                join(self, &mut star);
+                self.take_apart(&mut star, &mut parted);
+            }
+            // A stroke that crosses itself can open a face beside a particle it does not name.
+            done.append(&mut due);
+            done.sort_unstable();
+            parted.retain(|p| done.binary_search(p).is_err());
+            parted.sort_unstable();
+            parted.dedup();
+            due = parted;
         }
     }
 
@@ -124,7 +136,7 @@ impl Operation<'_> {
     }
 
     /// Gives every part of a star but the first its own copy of the particle.
-    fn take_apart(&mut self, star: &mut Star) {
+    fn take_apart(&mut self, star: &mut Star, parted: &mut Vec<ParticleId>) {
         let part_of: Vec<usize> = (0..star.tets.len())
             .map(|i| root(&mut star.parts, i))
             .collect();
@@ -134,6 +146,8 @@ impl Operation<'_> {
         for i in 0..star.tets.len() {
             for (face, other) in self.inner_faces(star, i) {
                 if part_of[i] != part_of[other] {
+                    let particles = face.particles(&self.cuttable.mesh);
+                    parted.extend(particles.map(|p| self.source(p)));
                     self.part(face);
                 }
             }

@@ -5,6 +5,7 @@
 mod bodies;
 mod deltas;
 mod planes;
+mod programs;
 mod removal;
 mod separation;
 mod sweeps;
