@@ -34,6 +34,8 @@ mod meet;
 mod near;
 mod operation;
 mod options;
+mod parts;
+mod pieces;
 mod plane;
 mod sides;
 mod stars;
@@ -47,6 +49,7 @@ pub use delta::{
 };
 pub use error::CutError;
 pub use options::CutOptions;
+pub use pieces::{Piece, PieceEvent, PieceTracker};
 pub use plane::{Plane, cut_plane};
 pub use sweep::Sweep;
 
