@@ -12,6 +12,7 @@ mod methods;
 mod mistakes;
 mod parsing;
 mod physics;
+mod pieces;
 mod preset;
 mod regions;
 mod reports;
