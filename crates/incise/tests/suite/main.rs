@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 
 mod bodies;
+mod conservation;
 mod constraints;
 mod cutting;
 mod determinism;
