@@ -5,4 +5,5 @@
 mod bodies;
 mod pieces;
 mod planes;
+mod scenarios;
 mod sweeps;
