@@ -97,4 +97,7 @@ pub enum CutError {
         /// Positions given.
         given: usize,
     },
+    /// The pieces that are tracked are not those of the mesh, which would be a defect of this crate.
+    #[error("the pieces are not current: {0}")]
+    Pieces(String),
 }

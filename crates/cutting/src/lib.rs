@@ -35,6 +35,8 @@ mod meet;
 mod near;
 mod operation;
 mod options;
+mod parts;
+mod pieces;
 mod plane;
 mod quality;
 mod remove;
@@ -53,6 +55,7 @@ pub use delta::{
 };
 pub use error::CutError;
 pub use options::{CutOptions, Separation};
+pub use pieces::{Piece, PieceEvent, PieceTracker};
 pub use plane::{Plane, cut_plane};
 pub use remove::{carve, remove_tets};
 pub use skin::{Skin, SkinChange, SkinVertex};

@@ -4,8 +4,10 @@
 
 mod bodies;
 mod deltas;
+mod pieces;
 mod planes;
 mod programs;
 mod removal;
+mod scenarios;
 mod separation;
 mod sweeps;

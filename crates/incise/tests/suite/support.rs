@@ -82,3 +82,12 @@ fn plan(simulation: &Simulation) -> Vec<u64> {
         .chain(schedule.slot_offsets().iter().map(|&i| u64::from(i)))
         .collect()
 }
+
+/// A hash of a seed and a number, in -1..1.
+pub(crate) fn noise(seed: u64, number: usize) -> f64 {
+    let mut x = seed ^ (number as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    for _ in 0..2 {
+        x = (x ^ (x >> 31)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    }
+    (x >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+}
