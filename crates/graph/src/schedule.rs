@@ -379,7 +379,11 @@ impl Schedule {
         // Each was found at a place of its own, so nothing else is there.
         let labels = clustering.labels().iter();
         let labels = labels.copied().chain(std::iter::repeat(ClusterId::NONE));
-        let labeled = self.labels.iter().copied().eq(labels.take(self.labels.len()));
+        let labeled = self
+            .labels
+            .iter()
+            .copied()
+            .eq(labels.take(self.labels.len()));
         if self.cluster_count() == occupied && labeled {
             Ok(())
         } else {

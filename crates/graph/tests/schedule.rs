@@ -190,7 +190,11 @@ fn a_forgotten_edit_is_found() {
     let mut schedule = Schedule::new(&clustering, &coloring);
     coloring.set(1, ColorId(0));
     schedule.update(&clustering, &coloring, &[], &[]);
-    let misplaced = |k| Err(GraphError::Misplaced { cluster: ClusterId(k) });
+    let misplaced = |k| {
+        Err(GraphError::Misplaced {
+            cluster: ClusterId(k),
+        })
+    };
     assert_eq!(schedule.check_plan(&clustering, &coloring), misplaced(1));
     schedule.update(&clustering, &coloring, &[], &[ClusterId(1)]);
     schedule.check_plan(&clustering, &coloring).unwrap();
@@ -210,7 +214,10 @@ fn revisions_tell_schedules_apart() {
     coloring.set(1, ColorId(0));
     for copy in [&mut second, &mut third] {
         copy.update(&clustering, &coloring, &[], &[ClusterId(1)]);
-        assert_eq!(copy.changes_since(first.revision()), Some(&[ClusterId(1)][..]));
+        assert_eq!(
+            copy.changes_since(first.revision()),
+            Some(&[ClusterId(1)][..])
+        );
     }
     assert_eq!(second, third);
     assert_eq!(second.changes_since(third.revision()), None);

@@ -75,13 +75,11 @@ pub(crate) fn lanes<R: Real>(level: Level) -> usize {
 fn colors<R: Real, S: Simd, K: Kind>(simd: S, pass: &Pass<'_, R>) {
     let layout = pass.layout;
     let threads = rayon::current_num_threads();
-    let chunks = |color: usize| {
-        match layout.blocks_of(color) {
-            0 => 0,
-            blocks => {
-                let groups = layout.groups(color).len();
-                (blocks / BLOCKS_A_THREAD).clamp(1, threads.min(groups))
-            }
+    let chunks = |color: usize| match layout.blocks_of(color) {
+        0 => 0,
+        blocks => {
+            let groups = layout.groups(color).len();
+            (blocks / BLOCKS_A_THREAD).clamp(1, threads.min(groups))
         }
     };
     let solve = |color: usize, chunk: usize| {

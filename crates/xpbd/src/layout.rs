@@ -254,3 +254,6 @@ fn metric<R: Real>(tet: &TetConstraint<R>, weights: [R; 4]) -> [R; 6] {
 fn index(value: usize) -> u32 {
     u32::try_from(value).expect("fewer than 2³² tets, lanes included")
 }
+
+#[cfg(test)]
+mod tests;

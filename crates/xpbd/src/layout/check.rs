@@ -63,20 +63,17 @@ impl<R: Real> Layout<R> {
             return wrong("number of active lanes", active as usize);
         }
         let occupied = self.groups.iter().map(|group| group.occupied);
-        match occupied.zip(taken).position(|(known, found)| known != found) {
+        match occupied
+            .zip(taken)
+            .position(|(known, found)| known != found)
+        {
             Some(group) => wrong("group", group),
             None => Ok(()),
         }
     }
 
     /// Whether a cluster has a lane for itself in its color, with blocks enough.
-    fn has_seat(
-        &self,
-        cluster: ClusterId,
-        color: usize,
-        length: usize,
-        taken: &mut [u16],
-    ) -> bool {
+    fn has_seat(&self, cluster: ClusterId, color: usize, length: usize, taken: &mut [u16]) -> bool {
         let Some((group, lane)) = self.seat(cluster) else {
             return false;
         };
