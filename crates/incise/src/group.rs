@@ -213,7 +213,7 @@ impl Group {
                 "the volume at rest was {initial} and is {volume}"
             )));
         }
-        self.solver.check(&self.cuttable)?;
+        self.solver.check(&self.cuttable, &self.plan.schedule)?;
         self.plan.check(mesh)?;
         self.pieces
             .check(&self.cuttable)

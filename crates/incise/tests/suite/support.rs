@@ -69,17 +69,28 @@ pub(crate) fn state(simulation: &Simulation) -> Vec<u64> {
         .collect()
 }
 
-/// Colors and schedule as words.
+/// Colors and schedule as words: the order of solving with the clusters of each color sorted, which run at the same
+/// time, and where each color and each cluster ends.
 fn plan(simulation: &Simulation) -> Vec<u64> {
     let schedule = simulation.schedule();
     let coloring = simulation.coloring();
-    let order = schedule.order().iter();
+    let (mut order, mut colors, mut ends) = (Vec::new(), vec![0], vec![0]);
+    for color in 0..schedule.color_count() {
+        let mut clusters = schedule.clusters(color).to_vec();
+        clusters.sort_unstable();
+        for cluster in clusters {
+            order.extend(schedule.constraints(cluster).iter().map(|&t| u64::from(t)));
+            ends.push(order.len() as u64);
+        }
+        colors.push(ends.len() as u64 - 1);
+    }
     coloring
         .colors()
         .iter()
         .map(|color| u64::from(color.0))
-        .chain(order.chain(schedule.color_offsets()).map(|&i| u64::from(i)))
-        .chain(schedule.slot_offsets().iter().map(|&i| u64::from(i)))
+        .chain(order)
+        .chain(colors)
+        .chain(ends)
         .collect()
 }
 
