@@ -1,5 +1,6 @@
 //! Ten substeps of one iteration: both precisions, with and without damping, with and without clusters of ten tets, on
-//! one and two threads; and the plain kernel that all of it is compared with.
+//! one and two threads; and the plain kernel that all of it is compared with. Then what a cut of twenty tets costs the
+//! schedule and the solver's layout.
 //!
 //! The body hangs from one end and swings on from iteration to iteration, so that no step is the trivial one of a body
 //! at rest.
@@ -7,10 +8,12 @@
 // The same reason as in the library.
 #![expect(clippy::unwrap_used, reason = "benches stop at the first surprise")]
 
+mod follow;
 mod plain;
 
 use std::num::NonZeroUsize;
 
+use follow::{Following, Stage};
 use incise::clustering::serial_neighbor;
 use incise::coloring::scgc;
 use incise::graph::{Clustering, Schedule};
@@ -27,6 +30,17 @@ fn main() {
         (threads, pool.unwrap())
     });
     incise_benches::run("xpbd", |bench| {
+        for (name, stage, anew) in [
+            ("cut-schedule", Stage::Schedule, false),
+            ("cut-schedule-anew", Stage::Schedule, true),
+            ("cut-layout", Stage::Layout, false),
+            ("cut-layout-anew", Stage::Layout, true),
+        ] {
+            let mut following = Following::new(bench.case, solver::<f32>(bench.case, 0.0), anew);
+            bench.measure(name, |b| {
+                b.iter_custom(|count| (0..count).map(|_| following.time(stage)).sum());
+            });
+        }
         let graph = bench.case.graph();
         let none = Clustering::none(graph.vertex_count());
         let serial = serial_neighbor(&graph, NonZeroUsize::MIN.saturating_add(9));

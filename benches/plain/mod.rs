@@ -42,7 +42,7 @@ impl Plain {
         [mu, l]: [f64; 2],
         time: f64,
     ) -> Self {
-        let tet = |&t: &u32| {
+        let tet = |t: u32| {
             let corners = tets[t as usize];
             let [a, b, c, d] = corners.map(|p| positions[p]);
             let edges = DMat3::from_cols(b - a, c - a, d - a);
