@@ -30,12 +30,14 @@ mod bisect;
 mod cuttable;
 mod delta;
 mod error;
+mod level_set;
 mod meet;
 mod near;
 mod operation;
 mod options;
 mod plane;
 mod sides;
+mod signs;
 mod stars;
 mod surface;
 mod sweep;
@@ -46,6 +48,7 @@ pub use delta::{
     AddedTet, BoundaryTriangle, CutDelta, EdgePoint, FaceTag, MovedTet, RelinkedTet, RemovedTet,
 };
 pub use error::CutError;
+pub use level_set::cut_level_set;
 pub use options::CutOptions;
 pub use plane::{Plane, cut_plane};
 pub use sweep::Sweep;

@@ -1,9 +1,9 @@
 //! Bodies to cut, and the oracle for the number of pieces.
 
 use glam::DVec3;
-use incise_cutting::{CutDelta, CuttableMesh};
-use incise_mesh::TetMesh;
+use incise_cutting::{CutDelta, CutOptions, CuttableMesh};
 use incise_mesh::generate::{Shape, generate, kuhn_box};
+use incise_mesh::{ParticleId, TetMesh};
 
 /// A hash of a seed and a number, in -1..1.
 pub(crate) fn noise(seed: u64, number: usize) -> f64 {
@@ -28,7 +28,7 @@ pub(crate) fn jittered_box(n: usize, amount: f64, seed: u64) -> TetMesh {
 
 /// A single tet, a grid, a jittered grid, a thin plate, a sphere or a torus.
 pub(crate) fn body(kind: usize, seed: u64) -> TetMesh {
-    let id = incise_mesh::ParticleId;
+    let id = ParticleId;
     match kind % 6 {
         0 => TetMesh {
             positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z],
@@ -117,4 +117,38 @@ pub(crate) fn check_cut(before: &TetMesh, after: &CuttableMesh, delta: &CutDelta
     let orphan =
         (0..used.len()).find(|&p| !used[p] && (before_used[p] || p >= before.positions.len()));
     assert_eq!(orphan, None, "no particle loses all its tets");
+}
+
+/// The default options with another snap distance.
+pub(crate) fn options(snap: f64) -> CutOptions {
+    CutOptions {
+        snap,
+        ..CutOptions::default()
+    }
+}
+
+/// The volumes of the pieces, ascending.
+pub(crate) fn volumes(body: &CuttableMesh) -> Vec<f64> {
+    let mut volumes = body.mesh().pieces().volumes(body.mesh());
+    volumes.sort_by(f64::total_cmp);
+    volumes
+}
+
+/// The same mesh with its particles renamed at random, and the new name of each particle.
+pub(crate) fn relabelled(mesh: &TetMesh, seed: u64) -> (TetMesh, Vec<usize>) {
+    let mut order: Vec<usize> = (0..mesh.positions.len()).collect();
+    order.sort_by(|&a, &b| noise(seed, a).total_cmp(&noise(seed, b)));
+    let mut name = vec![0; order.len()];
+    for (new, &old) in order.iter().enumerate() {
+        name[old] = new;
+    }
+    let renamed = TetMesh {
+        positions: order.iter().map(|&old| mesh.positions[old]).collect(),
+        tets: mesh
+            .tets
+            .iter()
+            .map(|tet| tet.map(|p| ParticleId::new(name[p.index()])))
+            .collect(),
+    };
+    (renamed, name)
 }
