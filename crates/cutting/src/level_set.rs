@@ -8,6 +8,7 @@
 use glam::DVec3;
 use incise_mesh::ParticleId;
 
+use crate::parallel;
 use crate::signs::{cut_by_signs, linear};
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
@@ -64,7 +65,7 @@ pub fn cut_level_set(
             given: positions.len(),
         });
     }
-    let values: Vec<f64> = positions.iter().map(|&x| field(x)).collect();
+    let values = parallel::map(positions, |&x| field(x));
     cut_by_signs(
         cuttable,
         values,

@@ -32,15 +32,20 @@ mod delta;
 mod error;
 mod level_set;
 mod meet;
+mod memory;
 mod near;
 mod operation;
 mod options;
+mod parallel;
 mod plane;
 mod sides;
 mod signs;
 mod stars;
+mod stroke;
 mod surface;
 mod sweep;
+mod tree;
+mod triangles;
 
 pub use bisect::{SplitEdge, split_tet};
 pub use cuttable::CuttableMesh;
@@ -49,9 +54,11 @@ pub use delta::{
 };
 pub use error::CutError;
 pub use level_set::cut_level_set;
+pub use memory::CutMemory;
 pub use options::CutOptions;
 pub use plane::{Plane, cut_plane};
 pub use sweep::Sweep;
+pub use triangles::{TriangleSurface, cut_surface, cut_surface_joining};
 
 /// The example of the README, run as a test.
 #[cfg(doctest)]

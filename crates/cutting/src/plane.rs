@@ -6,6 +6,7 @@
 
 use glam::DVec3;
 
+use crate::parallel;
 use crate::signs::cut_by_signs;
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
@@ -82,10 +83,7 @@ pub fn cut_plane(
         });
     }
 
-    let distance: Vec<f64> = positions
-        .iter()
-        .map(|x| normal.dot(*x - plane.point))
-        .collect();
+    let distance = parallel::map(positions, |x| normal.dot(*x - plane.point));
     let what = "the distance of a particle from the plane";
     cut_by_signs(cuttable, distance, what, options, |_, [a, b]| a / (a - b))
 }

@@ -8,6 +8,7 @@
 use incise_mesh::ParticleId;
 
 use crate::operation::{Crossing, Operation};
+use crate::parallel;
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
 /// Cuts where `values`, one a particle, change their sign. `what` they are is named if one is not finite.
@@ -25,13 +26,10 @@ pub(crate) fn cut_by_signs(
         return Err(CutError::NonFinite { what, value });
     }
     let mut on_surface: Vec<bool> = values.iter().map(|&d| d == 0.0).collect();
-    let crossings: Vec<Crossing> = crossed(cuttable, &values)
-        .into_iter()
-        .map(|ends| Crossing {
-            ends,
-            parameter: parameter(ends, ends.map(|p| values[p.index()])),
-        })
-        .collect();
+    let crossings = parallel::map(&crossed(cuttable, &values), |&ends| Crossing {
+        ends,
+        parameter: parameter(ends, ends.map(|p| values[p.index()])),
+    });
     if let Some(broken) = crossings.iter().find(|c| c.parameter.is_nan()) {
         return Err(CutError::NonFinite {
             what: "the field on an edge",

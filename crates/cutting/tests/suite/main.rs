@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 
 mod bodies;
+mod joins;
 mod level_sets;
 mod planes;
+mod surfaces;
 mod sweeps;
