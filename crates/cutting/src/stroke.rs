@@ -23,6 +23,7 @@ use crate::memory::CutMemory;
 use crate::operation::{Crossing, Operation};
 use crate::parallel;
 use crate::sides::{GivenSides, Sides};
+use crate::signs::linear;
 use crate::surface::{CutSurface, Tangent};
 use crate::{CutDelta, CutOptions, CuttableMesh};
 
@@ -137,27 +138,20 @@ impl Stroke {
             }
             round += 1;
             let snapped = self.snap(operation.cuttable, &hits, B::COMES_BY);
-            operation.delta.snapped += snapped.len();
-            let free = |hit: &Hit| {
-                hit.crossing
-                    .ends
-                    .iter()
-                    .all(|p| snapped.binary_search(p).is_err())
-            };
-            let mut flagged: Vec<Hit> = hits.into_iter().filter(free).collect();
-            let reach = self.options.reach();
-            for hit in &mut flagged {
-                hit.crossing.parameter = hit.crossing.parameter.clamp(reach, 1.0 - reach);
+            near = self.open(&mut operation, motion, hits, &snapped, &mut fresh);
+        }
+
+        while let (Some(memory), Some(number)) = (&memory, self.number) {
+            let gaps = self.gaps(operation.cuttable, &fresh);
+            if gaps.is_empty() {
+                break;
             }
-            near = operation.split(&flagged.iter().map(|hit| hit.crossing).collect::<Vec<_>>());
-            self.given.forget(near.iter().copied());
-            fresh.extend(&snapped);
-            for hit in flagged {
-                let point = ParticleId::new(motion.now.len());
-                fresh.push(point);
-                motion.push(&hit.crossing);
-                self.surface.put(point, hit.tangent);
+            let cuttable = &*operation.cuttable;
+            if memory.join(number, cuttable, &gaps, &mut self.surface, &mut fresh) {
+                continue;
             }
+            let snapped = self.snap(cuttable, &gaps, false);
+            self.open(&mut operation, motion, gaps, &snapped, &mut fresh);
         }
 
         let seeds = self.seeds(operation.cuttable, &fresh);
@@ -177,6 +171,83 @@ impl Stroke {
             memory.learn(number, &mut self.surface);
         }
         delta
+    }
+
+    /// Splits the edges that were hit and have no end on the surface. Returns the tets touched.
+    fn open(
+        &mut self,
+        operation: &mut Operation<'_>,
+        motion: &mut Motion,
+        mut hits: Vec<Hit>,
+        snapped: &[ParticleId],
+        fresh: &mut Vec<ParticleId>,
+    ) -> Vec<TetId> {
+        operation.delta.snapped += snapped.len();
+        hits.retain(|hit| {
+            let ends = hit.crossing.ends;
+            ends.iter().all(|p| snapped.binary_search(p).is_err())
+        });
+        let reach = self.options.reach();
+        for hit in &mut hits {
+            hit.crossing.parameter = hit.crossing.parameter.clamp(reach, 1.0 - reach);
+        }
+        let near = operation.split(&hits.iter().map(|hit| hit.crossing).collect::<Vec<_>>());
+        self.given.forget(near.iter().copied());
+        fresh.extend(snapped);
+        for hit in hits {
+            let point = ParticleId::new(motion.now.len());
+            fresh.push(point);
+            motion.push(&hit.crossing);
+            self.surface.put(point, hit.tangent);
+        }
+        near
+    }
+
+    /// The edges between this stroke's surface and the one it joins.
+    ///
+    /// Where the two run beside each other, an edge may slip through between the end of one and the start of the other.
+    /// So in tets that have particles of both, an edge that no blade met is taken to cross the mean of their tangent
+    /// planes, if its ends lie on different sides.
+    fn gaps(&self, cuttable: &CuttableMesh, fresh: &[ParticleId]) -> Vec<Hit> {
+        let rest = &cuttable.mesh.positions;
+        let mut gaps: Vec<Hit> = Vec::new();
+        for tet in tets_around(cuttable, fresh) {
+            let corners = cuttable.mesh.tets[tet.index()];
+            let on = || corners.into_iter().filter(|&p| self.surface.contains(p));
+            let joins = on().any(|p| self.surface.is_adopted(p))
+                && on().any(|p| !self.surface.is_adopted(p));
+            let mut off = corners.into_iter().filter(|&p| !self.surface.contains(p));
+            let (true, Some(a), Some(b)) = (joins, off.next(), off.next()) else {
+                continue;
+            };
+            let ends = [a.min(b), a.max(b)];
+            let tangents = on().filter_map(|p| self.surface.tangent(p));
+            let distances = ends.map(|p| {
+                let each = tangents.clone().map(|t| t.distance(rest[p.index()]));
+                each.sum::<f64>()
+            });
+            if distances[0] * distances[1] >= 0.0 {
+                continue;
+            }
+            let parameter = linear(distances);
+            let crossing = Crossing { ends, parameter };
+            let upwards = distances[0] < 0.0;
+            gaps.push(Hit {
+                crossing,
+                tangent: Tangent {
+                    point: rest[ends[0].index()].lerp(rest[ends[1].index()], parameter),
+                    normal: tangents
+                        .map(|t| t.normal)
+                        .sum::<DVec3>()
+                        .normalize_or_zero(),
+                },
+                sides: [Some(!upwards), Some(upwards)],
+                meetings: 1,
+            });
+        }
+        gaps.sort_by_key(|hit| hit.crossing.ends);
+        gaps.dedup_by_key(|hit| hit.crossing.ends);
+        gaps
     }
 
     /// Follows a cut that another stroke made.
