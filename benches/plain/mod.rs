@@ -61,7 +61,7 @@ impl Plain {
             velocities: still.clone(),
             previous: still,
             weights: weights.iter().map(|&w| w as f32).collect(),
-            tets: schedule.order().iter().map(tet).collect(),
+            tets: schedule.order().map(tet).collect(),
             gamma: (1.0 + mu / l) as f32,
             time: time as f32,
         }

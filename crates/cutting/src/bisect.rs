@@ -10,6 +10,8 @@
 
 use incise_mesh::ParticleId;
 
+use crate::faces::INNER;
+
 /// An edge that is to be split.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SplitEdge {
@@ -39,16 +41,31 @@ pub fn split_tet(
     edges: &[SplitEdge],
     children: &mut Vec<[ParticleId; 4]>,
 ) {
+    let mut family = Vec::new();
+    split_linked((corners, [INNER; 4]), edges, &mut family);
     children.clear();
-    children.push(corners);
+    children.extend(family.into_iter().map(|(corners, _)| corners));
+}
+
+/// The same for a tet with a link for each of its faces, by opposite corner. A part of a face gets the link of the
+/// whole, faces between children get [`INNER`].
+pub(crate) fn split_linked(
+    tet: ([ParticleId; 4], [u32; 4]),
+    edges: &[SplitEdge],
+    children: &mut Vec<([ParticleId; 4], [u32; 4])>,
+) {
+    children.clear();
+    children.push(tet);
     for edge in edges {
         for i in 0..children.len() {
-            let child = children[i];
+            let (child, links) = children[i];
             let at = |end| child.iter().position(|&corner| corner == end);
             if let (Some(a), Some(b)) = (at(edge.ends[0]), at(edge.ends[1])) {
-                let mut other = child;
-                children[i][b] = edge.point;
-                other[a] = edge.point;
+                // The half that keeps `a` has the new face where `a` looks, the other one where `b` looks.
+                let (mut one, mut other) = ((child, links), (child, links));
+                (one.0[b], one.1[a]) = (edge.point, INNER);
+                (other.0[a], other.1[b]) = (edge.point, INNER);
+                children[i] = one;
                 children.push(other);
             }
         }
@@ -57,6 +74,8 @@ pub fn split_tet(
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
     use super::*;
     use glam::DVec3;
     use incise_mesh::signed_volume;
@@ -148,5 +167,60 @@ mod tests {
             );
             assert_eq!(children.len(), 6);
         }
+    }
+
+    /// All 81 ways in which a surface can pass the corners, generated and counted by class: corners on the positive
+    /// side, on the negative side, on the surface -> patterns, crossed edges, children. Every child lies on one side.
+    #[test]
+    fn table_of_signs() {
+        let mut table = BTreeMap::new();
+        for pattern in 0..81_u32 {
+            let sign = [1, 3, 9, 27].map(|place| i32::try_from(pattern / place % 3).unwrap() - 1);
+            let count = |s: i32| sign.iter().filter(|t| **t == s).count();
+            let crossed: Vec<SplitEdge> = (0..6)
+                .filter(|&e| {
+                    let [a, b] = EDGES[e].map(|p| sign[p as usize]);
+                    a * b < 0
+                })
+                .map(|e| SplitEdge {
+                    ends: EDGES[e].map(ParticleId),
+                    point: ParticleId::new(4 + e),
+                })
+                .collect();
+            let mut children = Vec::new();
+            split_tet([0, 1, 2, 3].map(ParticleId), &crossed, &mut children);
+            for child in &children {
+                let sides = child.map(|p| sign.get(p.index()).copied().unwrap_or(0));
+                assert!(
+                    !(sides.contains(&1) && sides.contains(&-1)),
+                    "pattern {sign:?}: child {child:?} is on both sides"
+                );
+            }
+            let class = (count(1), count(-1), count(0));
+            let entry = table
+                .entry(class)
+                .or_insert((0, crossed.len(), children.len()));
+            assert_eq!((entry.1, entry.2), (crossed.len(), children.len()));
+            entry.0 += 1;
+        }
+        let mut expected = BTreeMap::new();
+        for (class, patterns, crossed, children) in [
+            ([4, 0, 0], 1, 0, 1),
+            ([3, 0, 1], 4, 0, 1),
+            ([2, 0, 2], 6, 0, 1),
+            ([1, 0, 3], 4, 0, 1),
+            ([0, 0, 4], 1, 0, 1),
+            ([1, 1, 2], 12, 1, 2),
+            ([2, 1, 1], 12, 2, 3),
+            ([3, 1, 0], 4, 3, 4),
+            ([2, 2, 0], 6, 4, 6),
+        ] {
+            let [p, m, z] = class;
+            expected.insert((p, m, z), (patterns, crossed, children));
+            expected.insert((m, p, z), (patterns, crossed, children));
+        }
+        assert_eq!(table, expected);
+        assert_eq!(table.values().map(|entry| entry.0).sum::<u32>(), 81);
+        assert_eq!(table.len(), 15);
     }
 }

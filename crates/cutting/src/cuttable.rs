@@ -2,17 +2,20 @@
 
 use incise_mesh::{ParticleId, TetId, TetMesh};
 
-use crate::CutError;
+use crate::faces::{Behind, Face, Faces};
 use crate::stars::Stars;
+use crate::{BoundaryTriangle, CutError};
 
 /// A tetrahedral mesh at rest that can be cut.
 ///
-/// Owns the mesh and, for each particle, the tets around it. Strokes change both in place and return what they changed
+/// Owns the mesh and what makes cutting it local: for each particle the tets around it, for each face what lies behind
+/// it, and a list of the boundary triangles. Strokes change both in place and return what they changed
 /// as a [`crate::CutDelta`].
 #[derive(Clone, Debug)]
 pub struct CuttableMesh {
     pub(crate) mesh: TetMesh,
     pub(crate) stars: Stars,
+    pub(crate) faces: Faces,
 }
 
 impl CuttableMesh {
@@ -23,7 +26,8 @@ impl CuttableMesh {
     pub fn new(mesh: TetMesh) -> Result<Self, CutError> {
         mesh.check()?;
         let stars = Stars::new(&mesh);
-        Ok(Self { mesh, stars })
+        let faces = Faces::new(&mesh);
+        Ok(Self { mesh, stars, faces })
     }
 
     /// The mesh at rest, with all cuts made so far.
@@ -40,19 +44,54 @@ impl CuttableMesh {
         self.stars.around(particle)
     }
 
+    /// The tet behind each face of a tet, by the corner that the face lies opposite to; `None` on the boundary. O(1).
+    ///
+    /// # Panics
+    /// If the tet does not exist.
+    #[must_use]
+    pub fn neighbors(&self, tet: TetId) -> [Option<TetId>; 4] {
+        Face::of(tet).map(|face| match self.faces.behind(face) {
+            Behind::Twin(twin) => Some(twin.tet()),
+            Behind::Nothing(_) => None,
+        })
+    }
+
+    /// Number of boundary triangles. O(1).
+    #[must_use]
+    pub fn boundary_count(&self) -> usize {
+        self.faces.boundary().len()
+    }
+
+    /// The boundary triangles, outer ones and cut ones, without a pass over the mesh.
+    ///
+    /// The order is the same for the same history of cuts: a triangle that is cut keeps its place for one of its parts,
+    /// new ones are appended.
+    pub fn boundary(&self) -> impl Iterator<Item = BoundaryTriangle> + '_ {
+        let faces = self.faces.boundary().iter();
+        faces.filter_map(|&(face, _)| self.faces.triangle(&self.mesh, face))
+    }
+
     /// Checks the mesh and recomputes the lists to compare. O(n log n); for tests and on request.
     ///
     /// # Errors
     /// [`CutError::Mesh`] if the mesh is broken.
     ///
     /// # Panics
-    /// If the lists around the particles do not belong to the mesh, which would be a defect of this crate.
+    /// If the lists around the particles or the links across faces do not belong to the mesh, which would be a defect of this crate.
     pub fn check(&self) -> Result<(), CutError> {
-        self.mesh.check()?;
+        // A body may have been removed as a whole.
+        if !self.mesh.tets.is_empty() {
+            self.mesh.check()?;
+        }
         assert_eq!(
             self.stars.first_difference(&self.mesh),
             None,
             "the lists of tets around particles are current"
+        );
+        assert_eq!(
+            self.faces.first_difference(&self.mesh),
+            None,
+            "the links across faces and the boundary triangles are current"
         );
         Ok(())
     }

@@ -1,5 +1,7 @@
 //! [`CutDelta`]: everything a cut changed, the only way a cut leaves this crate.
 //!
+//! With the feature `serde` deltas can be written and read, so that a session can be recorded and replayed; take a
+//! format that keeps all digits (JSON through `serde_json` does so with its feature `float_roundtrip`).
 //! Mesh, solver, clusters and colors consume the same delta instead of comparing before and after. Particles are only
 //! ever appended. A cut tet's slot is taken over by its first child and the other children are appended, so tets stay
 //! dense and no other tet changes its number.
@@ -9,6 +11,7 @@ use incise_mesh::{ParticleId, TetId, TetMesh};
 
 /// A new particle on an edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct EdgePoint {
     /// The ends of the edge; both have smaller ids than the new particle.
     pub ends: [ParticleId; 2],
@@ -28,6 +31,7 @@ impl EdgePoint {
 
 /// A tet as it was before it was cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RemovedTet {
     /// Its slot, which its first child has taken over.
     pub tet: TetId,
@@ -37,6 +41,7 @@ pub struct RemovedTet {
 
 /// A child of a cut tet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AddedTet {
     /// Its slot.
     pub tet: TetId,
@@ -50,6 +55,7 @@ pub struct AddedTet {
 
 /// A whole tet that now hangs on copies of some of its corners.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RelinkedTet {
     /// Its slot.
     pub tet: TetId,
@@ -61,6 +67,7 @@ pub struct RelinkedTet {
 
 /// A tet that took over the slot of one that was deleted, so that slots stay dense.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MovedTet {
     /// Its slot before.
     pub from: TetId,
@@ -72,6 +79,7 @@ pub struct MovedTet {
 
 /// What a triangle of the boundary is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum FaceTag {
     /// Part of the surface the body had when it was made.
     Outer,
@@ -81,6 +89,7 @@ pub enum FaceTag {
 
 /// A triangle of the boundary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BoundaryTriangle {
     /// The tet it is a face of.
     pub tet: TetId,
@@ -96,6 +105,7 @@ pub struct BoundaryTriangle {
 ///
 /// A cut splits tets and separates them; taking tets away deletes and moves tets. One delta does one or the other.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CutDelta {
     /// Number of particles before the cut; new ones follow: first the points, then the copies.
     pub particles_before: usize,
@@ -125,6 +135,8 @@ pub struct CutDelta {
     pub snapped: usize,
     /// The smallest volume of a child as a fraction of its parent's (1 if none was cut).
     pub worst_volume_ratio: f64,
+    /// The smallest and the largest dihedral angle of a child at rest in degrees, if any tet was cut.
+    pub dihedral: Option<[f64; 2]>,
 }
 
 impl CutDelta {
@@ -154,16 +166,46 @@ impl CutDelta {
     /// # Panics
     /// If `values` does not have an entry for each particle before the cut.
     pub fn extend_particles(&self, values: &mut Vec<DVec3>) {
+        self.extend_with(values, |a, b, t| *a + (*b - *a) * t);
+    }
+
+    /// The same for a quantity of any kind, such as texture coordinates or temperatures; `interpolate` gets the values
+    /// at both ends of an edge and the parameter.
+    ///
+    /// # Panics
+    /// If `values` does not have an entry for each particle before the cut.
+    ///
+    /// # Example
+    /// ```
+    /// use glam::DVec3;
+    /// use incise_cutting::{CutOptions, CuttableMesh, Plane, cut_plane};
+    /// use incise_mesh::generate::kuhn_box;
+    ///
+    /// let mut body = CuttableMesh::new(kuhn_box([2; 3], DVec3::ONE))?;
+    /// let rest = body.mesh().positions.clone();
+    /// let mut heights: Vec<f64> = rest.iter().map(|x| x.z).collect();
+    /// let plane = Plane { point: DVec3::splat(0.4), normal: DVec3::ONE };
+    /// let delta = cut_plane(&mut body, &rest, &plane, &CutOptions::default())?;
+    /// delta.extend_with(&mut heights, |a, b, t| a + (b - a) * t);
+    /// assert!(heights.iter().zip(&body.mesh().positions).all(|(h, x)| (h - x.z).abs() < 1e-12));
+    /// # Ok::<(), incise_cutting::CutError>(())
+    /// ```
+    pub fn extend_with<T: Clone>(
+        &self,
+        values: &mut Vec<T>,
+        interpolate: impl Fn(&T, &T, f64) -> T,
+    ) {
         assert_eq!(
             values.len(),
             self.particles_before,
             "one value for each particle before the cut"
         );
         for point in &self.points {
-            values.push(point.interpolate(values));
+            let [a, b] = point.ends.map(|p| &values[p.index()]);
+            values.push(interpolate(a, b, point.parameter));
         }
         for source in &self.copies {
-            values.push(values[source.index()]);
+            values.push(values[source.index()].clone());
         }
     }
 

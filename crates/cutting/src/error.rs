@@ -55,6 +55,40 @@ pub enum CutError {
         /// The value given.
         value: f64,
     },
+    /// Guard on the volume of children outside its range.
+    #[error("min_volume_ratio is {value}: it must lie between 0 and 0.015")]
+    Guard {
+        /// The value given.
+        value: f64,
+    },
+    /// A cut would make too many tets.
+    #[error(
+        "the cut would leave {tets} tets and {limit} are allowed: cut less at once, use a coarser mesh or raise the limit"
+    )]
+    TooManyTets {
+        /// Tets after the cut.
+        tets: usize,
+        /// [`crate::CutOptions::max_tets`].
+        limit: usize,
+    },
+    /// A tet to be removed does not exist.
+    #[error("tet {tet} was to be removed but the mesh has {tets}")]
+    NoSuchTet {
+        /// The tet given.
+        tet: incise_mesh::TetId,
+        /// Tets of the mesh.
+        tets: usize,
+    },
+    /// A delta is not the last one made of this mesh.
+    #[error(
+        "only the last cut can be undone: this delta left {tets} tets and {particles} particles, the mesh has others"
+    )]
+    NotLast {
+        /// Tets after the delta.
+        tets: usize,
+        /// Particles after the delta.
+        particles: usize,
+    },
     /// Positions do not belong to the mesh.
     #[error("{given} positions were given for a mesh of {expected} particles")]
     PositionCount {
@@ -94,4 +128,7 @@ pub enum CutError {
         /// Points of the second.
         second: usize,
     },
+    /// The pieces that are tracked are not those of the mesh, which would be a defect of this crate.
+    #[error("the pieces are not current: {0}")]
+    Pieces(String),
 }

@@ -1,18 +1,22 @@
 //! [`Operation`]: one cut in progress: splits, separates and writes the delta.
 //!
 //! The order of work: all crossed edges get their particle, the tets around them are split by ordered bisection, then
-//! each on-surface particle's star comes apart into its components. Every part looks only at the tets around the
-//! particles concerned, so the cost follows the cut. The mesh is changed in place; the slots' first state is kept
-//! until the delta is written.
+//! each on-surface particle's star comes apart into its components (module `separate`). Every part looks only at the
+//! tets around the particles concerned, so the cost follows the cut. The mesh is changed in place; the first state of
+//! what changed is kept until the delta is written.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use glam::DVec3;
 use incise_mesh::{ParticleId, TetId, signed_volume};
 
-use crate::delta::{AddedTet, CutDelta, EdgePoint, RelinkedTet, RemovedTet};
-use crate::sides::root;
-use crate::{CuttableMesh, SplitEdge, split_tet};
+use crate::bisect::split_linked;
+use crate::delta::{
+    AddedTet, BoundaryTriangle, CutDelta, EdgePoint, FaceTag, RelinkedTet, RemovedTet,
+};
+use crate::faces::{Behind, Face, face_of};
+use crate::quality::Dihedrals;
+use crate::{CutError, CutOptions, CuttableMesh, SplitEdge};
 
 /// An edge and where it is crossed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,26 +27,28 @@ pub(crate) struct Crossing {
     pub(crate) parameter: f64,
 }
 
-/// A face with the tets on both sides.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct SharedFace {
-    pub(crate) particles: [ParticleId; 3],
-    pub(crate) tets: [TetId; 2],
-    pub(crate) corners: [[ParticleId; 4]; 2],
+/// A tet as it was before the operation.
+struct First {
+    corners: [ParticleId; 4],
+    /// What was on the boundary.
+    tags: [Option<FaceTag>; 4],
+    /// Whether it was split; otherwise it hangs on other particles now.
+    split: bool,
 }
 
 /// A cut in progress.
 pub(crate) struct Operation<'a> {
     pub(crate) cuttable: &'a mut CuttableMesh,
     pub(crate) delta: CutDelta,
-    first_state: BTreeMap<TetId, [ParticleId; 4]>,
-    split: BTreeSet<TetId>,
+    tag: FaceTag,
+    max_tets: usize,
+    first: BTreeMap<TetId, First>,
     /// For each new slot the slot of the tet it was a part of before the operation.
     ancestors: Vec<TetId>,
 }
 
 impl<'a> Operation<'a> {
-    pub(crate) fn begin(cuttable: &'a mut CuttableMesh) -> Self {
+    pub(crate) fn begin(cuttable: &'a mut CuttableMesh, options: &CutOptions) -> Self {
         let delta = CutDelta {
             particles_before: cuttable.mesh.positions.len(),
             tets_before: cuttable.mesh.tets.len(),
@@ -52,8 +58,9 @@ impl<'a> Operation<'a> {
         Self {
             cuttable,
             delta,
-            first_state: BTreeMap::new(),
-            split: BTreeSet::new(),
+            tag: FaceTag::Cut(options.tag),
+            max_tets: options.max_tets,
+            first: BTreeMap::new(),
             ancestors: Vec::new(),
         }
     }
@@ -61,26 +68,19 @@ impl<'a> Operation<'a> {
     /// Puts a particle on each crossed edge and splits the tets around. `crossings` ascend by their ends.
     ///
     /// Must not be called after [`Operation::separate`]. Returns the tets touched, ascending.
-    pub(crate) fn split(&mut self, crossings: &[Crossing]) -> Vec<TetId> {
+    ///
+    /// # Errors
+    /// If there would be too many tets; this call has changed nothing then.
+    pub(crate) fn split(&mut self, crossings: &[Crossing]) -> Result<Vec<TetId>, CutError> {
         let mesh = &mut self.cuttable.mesh;
         let mut edges: Vec<(f64, SplitEdge)> = Vec::with_capacity(crossings.len());
-        for crossing in crossings {
-            let point = ParticleId::new(mesh.positions.len());
-            let on_edge = EdgePoint {
-                ends: crossing.ends,
-                parameter: crossing.parameter,
-            };
+        for (i, crossing) in crossings.iter().enumerate() {
             let [a, b] = crossing.ends.map(|p| mesh.positions[p.index()]);
-            edges.push((
-                a.distance_squared(b),
-                SplitEdge {
-                    ends: crossing.ends,
-                    point,
-                },
-            ));
-            mesh.positions.push(on_edge.interpolate(&mesh.positions));
-            self.cuttable.stars.push_particle();
-            self.delta.points.push(on_edge);
+            let edge = SplitEdge {
+                ends: crossing.ends,
+                point: ParticleId::new(mesh.positions.len() + i),
+            };
+            edges.push((a.distance_squared(b), edge));
         }
         // The one global order: longest edge first, then by ends. Particle ids follow the ends, so they break ties.
         edges.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.point.cmp(&b.1.point)));
@@ -89,43 +89,92 @@ impl<'a> Operation<'a> {
         for (rank, (_, edge)) in edges.iter().enumerate() {
             let [a, b] = edge.ends;
             let holds_b = |t: &TetId| mesh.tets[t.index()].contains(&b);
-            work.extend(
-                self.cuttable
-                    .stars
-                    .around(a)
-                    .filter(holds_b)
-                    .map(|t| (t, rank)),
-            );
+            let around = self.cuttable.stars.around(a).filter(holds_b);
+            work.extend(around.map(|t| (t, rank)));
         }
         work.sort_unstable();
 
-        let mut touched = Vec::new();
+        let mut families: Vec<(TetId, usize)> = Vec::new();
         let mut children = Vec::new();
+        let (mut of_tet, mut family) = (Vec::new(), Vec::new());
         for group in work.chunk_by(|a, b| a.0 == b.0) {
             let tet = group[0].0;
-            let of_tet: Vec<SplitEdge> = group.iter().map(|&(_, rank)| edges[rank].1).collect();
-            split_tet(self.cuttable.mesh.tets[tet.index()], &of_tet, &mut children);
-            self.replace(tet, &children, &mut touched);
+            of_tet.clear();
+            of_tet.extend(group.iter().map(|&(_, rank)| edges[rank].1));
+            let whole = (mesh.tets[tet.index()], self.cuttable.faces.links_of(tet));
+            split_linked(whole, &of_tet, &mut family);
+            families.push((tet, family.len()));
+            children.append(&mut family);
+        }
+        let tets = mesh.tets.len() + children.len() - families.len();
+        if tets > self.max_tets {
+            let limit = self.max_tets;
+            return Err(CutError::TooManyTets { tets, limit });
+        }
+
+        for crossing in crossings {
+            let on_edge = EdgePoint {
+                ends: crossing.ends,
+                parameter: crossing.parameter,
+            };
+            mesh.positions.push(on_edge.interpolate(&mesh.positions));
+            self.cuttable.stars.push_particle();
+            self.delta.points.push(on_edge);
+        }
+        let mut touched = Vec::with_capacity(children.len());
+        let mut children = children.into_iter();
+        for (tet, size) in families {
+            self.replace(tet, children.by_ref().take(size), &mut touched);
         }
         touched.sort_unstable();
-        touched
+        Ok(touched)
     }
 
-    fn replace(&mut self, tet: TetId, children: &[[ParticleId; 4]], touched: &mut Vec<TetId>) {
+    /// Gives a tet's slot to the first child and appends the others.
+    fn replace(
+        &mut self,
+        tet: TetId,
+        children: impl Iterator<Item = ([ParticleId; 4], [u32; 4])>,
+        touched: &mut Vec<TetId>,
+    ) {
         let ancestor = match tet.index().checked_sub(self.delta.tets_before) {
             Some(new) => self.ancestors[new],
             None => tet,
         };
-        self.split.insert(ancestor);
-        self.set_corners(tet, children[0]);
-        touched.push(tet);
-        for &child in &children[1..] {
-            let slot = TetId::new(self.cuttable.mesh.tets.len());
-            self.cuttable.mesh.tets.push(child);
-            self.cuttable.stars.push_tet(slot, child);
-            self.ancestors.push(ancestor);
+        for (i, (corners, links)) in children.enumerate() {
+            let slot = if i == 0 {
+                self.note(tet, true);
+                self.set_corners(tet, corners);
+                tet
+            } else {
+                let slot = TetId::new(self.cuttable.mesh.tets.len());
+                self.cuttable.mesh.tets.push(corners);
+                self.cuttable.stars.push_tet(slot, corners);
+                self.ancestors.push(ancestor);
+                slot
+            };
+            self.cuttable.faces.set_links(slot, links);
             touched.push(slot);
         }
+    }
+
+    /// Notes the state of a tet before its first change.
+    pub(crate) fn note(&mut self, tet: TetId, split: bool) {
+        if tet.index() >= self.delta.tets_before {
+            return;
+        }
+        let faces = &self.cuttable.faces;
+        self.first.entry(tet).or_insert_with(|| First {
+            corners: self.cuttable.mesh.tets[tet.index()],
+            tags: faces.links_of(tet).map(|link| faces.tag_of(link)),
+            split,
+        });
+    }
+
+    /// Hangs a whole tet on other particles.
+    pub(crate) fn relink(&mut self, tet: TetId, corners: [ParticleId; 4]) {
+        self.note(tet, false);
+        self.set_corners(tet, corners);
     }
 
     fn set_corners(&mut self, tet: TetId, corners: [ParticleId; 4]) {
@@ -133,95 +182,26 @@ impl<'a> Operation<'a> {
         for (k, (from, to)) in (0..).zip(before.into_iter().zip(corners)) {
             self.cuttable.stars.relink(tet, k, from, to);
         }
-        if tet.index() < self.delta.tets_before {
-            self.first_state.entry(tet).or_insert(before);
+    }
+
+    /// Makes a face and its twin boundary triangles of this cut.
+    pub(crate) fn part(&mut self, face: Face) {
+        if let Behind::Twin(twin) = self.cuttable.faces.behind(face) {
+            // Their tags are noted as they were.
+            self.note(face.tet(), false);
+            self.note(twin.tet(), false);
+            self.cuttable.faces.open(face, self.tag);
+            self.cuttable.faces.open(twin, self.tag);
         }
     }
 
-    /// Takes the star of each of `seeds` (ascending, all on the surface) apart where it was cut through.
-    ///
-    /// The parts of a star that hang together through faces that are not cut keep one particle each: the part with the
-    /// lowest tet the old one, the others a copy. Particles at the front of an unfinished stroke need no special case:
-    /// their star still hangs together around the front. This is the paper's shared-vertex criterion (section 4.3) put
-    /// so that it also holds for snapped particles, partial cuts and meshes cut before.
-    ///
-    /// `is_cut` is asked about faces as they were before separation. Cost: the sum of the sizes of the stars.
-    pub(crate) fn separate(&mut self, seeds: &[ParticleId], is_cut: impl Fn(&SharedFace) -> bool) {
-        let first_copy = self.delta.particles_before + self.delta.points.len();
-        let mut star: Vec<TetId> = Vec::new();
-        let mut faces: Vec<([ParticleId; 2], usize)> = Vec::new();
-        let mut parent: Vec<usize> = Vec::new();
-        for &seed in seeds {
-            star.clear();
-            star.extend(self.cuttable.stars.around(seed));
-            star.sort_unstable();
-
-            let copies = &self.delta.copies;
-            let source = |p: ParticleId| {
-                p.index()
-                    .checked_sub(first_copy)
-                    .map_or(p, |copy| copies[copy])
-            };
-            let tets = &self.cuttable.mesh.tets;
-            faces.clear();
-            for (i, tet) in star.iter().enumerate() {
-                let corners = tets[tet.index()];
-                let others: [ParticleId; 3] = others_than(corners, seed);
-                for pair in [
-                    [others[0], others[1]],
-                    [others[0], others[2]],
-                    [others[1], others[2]],
-                ] {
-                    faces.push(([pair[0].min(pair[1]), pair[0].max(pair[1])], i));
-                }
-            }
-            faces.sort_unstable();
-
-            parent.clear();
-            parent.extend(0..star.len());
-            for shared in faces.chunk_by(|a, b| a.0 == b.0) {
-                let [(pair, first), (_, second)] = *shared else {
-                    continue;
-                };
-                let tets = [star[first], star[second]];
-                let face = SharedFace {
-                    particles: [seed, pair[0], pair[1]].map(source),
-                    tets,
-                    corners: tets.map(|t| self.cuttable.mesh.tets[t.index()].map(source)),
-                };
-                if !is_cut(&face) {
-                    let (a, b) = (root(&mut parent, first), root(&mut parent, second));
-                    // The lower index becomes the root, so each part is named by its lowest tet.
-                    parent[a.max(b)] = a.min(b);
-                }
-            }
-            self.part(seed, &star, &mut parent);
-        }
+    /// Makes a face whose neighbor is taken away a boundary triangle of this cut.
+    pub(crate) fn lay_bare(&mut self, face: Face) {
+        self.note(face.tet(), false);
+        self.cuttable.faces.open(face, self.tag);
     }
 
-    /// Gives every part of a star but the first its own copy of the particle.
-    fn part(&mut self, particle: ParticleId, star: &[TetId], parent: &mut [usize]) {
-        let mut copy_of_part: Vec<(usize, ParticleId)> = Vec::new();
-        for (i, &tet) in star.iter().enumerate() {
-            let part = root(parent, i);
-            if part == 0 {
-                continue;
-            }
-            let known = copy_of_part
-                .iter()
-                .find(|(p, _)| *p == part)
-                .map(|(_, copy)| *copy);
-            let copy = known.unwrap_or_else(|| {
-                let copy = self.push_copy(particle);
-                copy_of_part.push((part, copy));
-                copy
-            });
-            let corners = self.cuttable.mesh.tets[tet.index()];
-            self.set_corners(tet, corners.map(|p| if p == particle { copy } else { p }));
-        }
-    }
-
-    fn push_copy(&mut self, source: ParticleId) -> ParticleId {
+    pub(crate) fn push_copy(&mut self, source: ParticleId) -> ParticleId {
         let mesh = &mut self.cuttable.mesh;
         let copy = ParticleId::new(mesh.positions.len());
         mesh.positions.push(mesh.positions[source.index()]);
@@ -230,79 +210,120 @@ impl<'a> Operation<'a> {
         copy
     }
 
+    /// The particle that a copy made by this operation was made of, or the particle itself.
+    pub(crate) fn source(&self, particle: ParticleId) -> ParticleId {
+        let first_copy = self.delta.particles_before + self.delta.points.len();
+        let copy = particle.index().checked_sub(first_copy);
+        copy.map_or(particle, |copy| self.delta.copies[copy])
+    }
+
+    /// Lets the split tets find their neighbors.
+    pub(crate) fn settle(&mut self) {
+        let split = self.first.iter().filter(|(_, first)| first.split);
+        let mut split: Vec<TetId> = split.map(|(&tet, _)| tet).collect();
+        split.extend((self.delta.tets_before..self.cuttable.mesh.tets.len()).map(TetId::new));
+        self.cuttable.faces.settle(&self.cuttable.mesh, &split);
+    }
+
+    /// Takes everything back.
+    pub(crate) fn roll_back(mut self) {
+        self.settle();
+        let (cuttable, delta) = self.write(|_, _| true);
+        delta.take_back(cuttable);
+    }
+
     /// Writes the delta. `side` is asked about particles as they were before separation.
     pub(crate) fn finish(self, side: impl Fn(&[DVec3], [ParticleId; 4]) -> bool) -> CutDelta {
-        let Self {
-            cuttable,
-            mut delta,
-            first_state,
-            split,
-            ancestors,
-        } = self;
-        let mesh = &cuttable.mesh;
-        let first_copy = delta.particles_before + delta.points.len();
-        let source = |p: ParticleId| {
-            p.index()
-                .checked_sub(first_copy)
-                .map_or(p, |copy| delta.copies[copy])
-        };
+        self.write(side).1
+    }
 
-        let mut families: Vec<(TetId, TetId)> = split.iter().map(|&t| (t, t)).collect();
+    pub(crate) fn write(
+        self,
+        side: impl Fn(&[DVec3], [ParticleId; 4]) -> bool,
+    ) -> (&'a mut CuttableMesh, CutDelta) {
+        let mesh = &self.cuttable.mesh;
+        let mut families: Vec<(TetId, TetId)> = Vec::new();
         families.extend(
-            ancestors
+            self.first
                 .iter()
-                .enumerate()
-                .map(|(i, &a)| (a, TetId::new(delta.tets_before + i))),
+                .filter(|(_, first)| first.split)
+                .map(|(&t, _)| (t, t)),
         );
+        let new = self.ancestors.iter().enumerate();
+        families.extend(new.map(|(i, &a)| (a, TetId::new(self.delta.tets_before + i))));
         families.sort_unstable();
-        let added: Vec<AddedTet> = families
-            .iter()
-            .map(|&(parent, tet)| {
-                let corners = mesh.tets[tet.index()];
-                AddedTet {
-                    tet,
-                    parent,
-                    corners,
-                    positive: side(&mesh.positions, corners.map(source)),
-                }
-            })
-            .collect();
-        for (&tet, &before) in &first_state {
-            if split.contains(&tet) {
-                delta.removed.push(RemovedTet {
-                    tet,
-                    corners: before,
-                });
-            } else {
-                delta.relinked.push(RelinkedTet {
-                    tet,
-                    before,
-                    after: mesh.tets[tet.index()],
-                });
+        let added = families.iter().map(|&(parent, tet)| {
+            let corners = mesh.tets[tet.index()];
+            AddedTet {
+                tet,
+                parent,
+                corners,
+                positive: side(&mesh.positions, corners.map(|p| self.source(p))),
             }
-        }
-        let rest_volume =
-            |corners: [ParticleId; 4]| signed_volume(corners.map(|p| mesh.positions[p.index()]));
-        for family in added.chunk_by(|a, b| a.parent == b.parent) {
-            let parent_volume = rest_volume(first_state[&family[0].parent]);
-            for child in family {
-                let ratio = rest_volume(child.corners) / parent_volume;
-                delta.worst_volume_ratio = delta.worst_volume_ratio.min(ratio);
-            }
-        }
-        delta.added = added;
-        delta
-    }
-}
+        });
+        let added: Vec<AddedTet> = added.collect();
+        let (surface_removed, surface_added) = self.boundary(&added);
 
-/// The three corners of a tet other than `particle`.
-fn others_than(corners: [ParticleId; 4], particle: ParticleId) -> [ParticleId; 3] {
-    let mut others = [particle; 3];
-    for (slot, corner) in others
-        .iter_mut()
-        .zip(corners.into_iter().filter(|&c| c != particle))
-    {
-        *slot = corner;
+        let mut delta = self.delta;
+        for (&tet, first) in &self.first {
+            let (before, after) = (first.corners, mesh.tets[tet.index()]);
+            if first.split {
+                let corners = before;
+                delta.removed.push(RemovedTet { tet, corners });
+            } else if before != after {
+                delta.relinked.push(RelinkedTet { tet, before, after });
+            }
+        }
+        let at_rest = |corners: [ParticleId; 4]| corners.map(|p| mesh.positions[p.index()]);
+        let mut dihedrals = Dihedrals::default();
+        for family in added.chunk_by(|a, b| a.parent == b.parent) {
+            let parent_volume = signed_volume(at_rest(self.first[&family[0].parent].corners));
+            for child in family {
+                let corners = at_rest(child.corners);
+                let ratio = signed_volume(corners) / parent_volume;
+                delta.worst_volume_ratio = delta.worst_volume_ratio.min(ratio);
+                dihedrals.add(corners);
+            }
+        }
+        delta.dihedral = dihedrals.range();
+        delta.added = added;
+        delta.surface_removed = surface_removed;
+        delta.surface_added = surface_added;
+        (self.cuttable, delta)
     }
-    others
+
+    /// What the boundary lost and gained, each ascending by tet and face.
+    fn boundary(&self, added: &[AddedTet]) -> (Vec<BoundaryTriangle>, Vec<BoundaryTriangle>) {
+        let (mesh, faces) = (&self.cuttable.mesh, &self.cuttable.faces);
+        let (mut removed, mut new) = (Vec::new(), Vec::new());
+        for (&tet, first) in &self.first {
+            let after = mesh.tets[tet.index()];
+            for (face, tag) in Face::of(tet).into_iter().zip(first.tags) {
+                let before = face_of(first.corners, face.opposite());
+                let kept = !first.split && before == face_of(after, face.opposite());
+                if let Some(tag) = tag.filter(|_| !kept) {
+                    removed.push(BoundaryTriangle {
+                        tet,
+                        opposite: [0, 1, 2, 3][face.opposite()],
+                        particles: before,
+                        tag,
+                    });
+                }
+                let old = first.split || (kept && tag.is_some());
+                if !old {
+                    new.extend(faces.triangle(mesh, face));
+                }
+            }
+        }
+        for child in added {
+            let of_child = Face::of(child.tet);
+            new.extend(
+                of_child
+                    .into_iter()
+                    .filter_map(|face| faces.triangle(mesh, face)),
+            );
+        }
+        new.sort_unstable_by_key(|triangle| (triangle.tet, triangle.opposite));
+        (removed, new)
+    }
 }

@@ -2,6 +2,24 @@
 
 use crate::CutError;
 
+/// How a body comes apart at the particles on a cut.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Separation {
+    /// Faces on the surface with tets on both sides are cut; the parts of a particle's star that no uncut face joins
+    /// get a particle each. Right for snapped particles, partial cuts, repeated cuts and edges where more than two
+    /// parts of the boundary meet.
+    #[default]
+    CutFaces,
+    /// The paper's criterion (section 4.3): two tets at a particle on the cut stay joined if they share a particle that
+    /// was there before the cut. For an unsnapped cut of a sound mesh the same as [`Separation::CutFaces`]. Where a
+    /// particle was snapped it is wrong: that particle was there before, so both sides stay tied to it.
+    SharedOriginal,
+    /// The same with particles off the surface in place of particles that were there before: right also with snapped
+    /// particles. Wrong where tets lie on the surface with all four particles, which then share nothing and come off,
+    /// and where a surface grazes particles without crossing an edge, which it then tears.
+    SharedOffSurface,
+}
+
 /// How crossings close to a particle are treated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CutOptions {
@@ -12,23 +30,37 @@ pub struct CutOptions {
     /// The same, never off: it keeps rounding from making zero-volume tets when a surface runs through particles.
     /// Use about 1e-9 for positions in double and 1e-5 for positions in single precision.
     pub tolerance: f64,
+    /// A guard on the volume of children as a fraction of their parent's, from 0 (off) to 0.015. Where snapping alone
+    /// does not promise it, crossings are snapped from as far as it takes. A tet whose edges were met in several steps of one frame
+    /// counts as many parents.
+    pub min_volume_ratio: f64,
+    /// How the body comes apart.
+    pub separation: Separation,
+    /// The number that the faces laid bare are tagged with ([`crate::FaceTag::Cut`]).
+    pub tag: u32,
+    /// The most tets that a cut may leave the mesh with; one that would leave more is refused, with nothing changed.
+    pub max_tets: usize,
 }
 
 impl Default for CutOptions {
-    /// Snap 0.1, tolerance 1e-9.
+    /// Snap 0.1, tolerance 1e-9, no further guard, separation by cut faces, tag 0, at most 2²⁶ tets.
     fn default() -> Self {
         Self {
             snap: 0.1,
             tolerance: 1e-9,
+            min_volume_ratio: 0.0,
+            separation: Separation::CutFaces,
+            tag: 0,
+            max_tets: 1 << 26,
         }
     }
 }
 
 impl CutOptions {
-    /// Checks the ranges of both values.
+    /// Checks the ranges of the values.
     ///
     /// # Errors
-    /// [`CutError::Snap`] or [`CutError::Tolerance`] if one lies outside its range.
+    /// [`CutError::Snap`], [`CutError::Tolerance`] or [`CutError::Guard`] if one lies outside its range.
     pub fn check(&self) -> Result<(), CutError> {
         if !(0.0..=0.25).contains(&self.snap) {
             return Err(CutError::Snap { value: self.snap });
@@ -38,11 +70,21 @@ impl CutOptions {
                 value: self.tolerance,
             });
         }
+        if !(0.0..=0.015).contains(&self.min_volume_ratio) {
+            return Err(CutError::Guard {
+                value: self.min_volume_ratio,
+            });
+        }
         Ok(())
     }
 
     /// The effective snap distance as a fraction of an edge.
+    ///
+    /// A child is made by at most three bisections, since each takes away one of its parent's corners and needs two of
+    /// them; each keeps at least this fraction of the volume. So its cube bounds the volume of children.
     pub(crate) fn reach(&self) -> f64 {
-        self.snap.max(self.tolerance)
+        self.snap
+            .max(self.tolerance)
+            .max(self.min_volume_ratio.cbrt())
     }
 }

@@ -9,7 +9,7 @@ use incise_mesh::ParticleId;
 
 use crate::operation::{Crossing, Operation};
 use crate::parallel;
-use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
+use crate::{CutDelta, CutError, CutOptions, CuttableMesh, Separation};
 
 /// Cuts where `values`, one a particle, change their sign. `what` they are is named if one is not finite.
 ///
@@ -40,9 +40,10 @@ pub(crate) fn cut_by_signs(
     let free = |c: &&Crossing| c.ends.iter().all(|p| !on_surface[p.index()]);
     let flagged: Vec<Crossing> = crossings.iter().filter(free).copied().collect();
 
-    let mut operation = Operation::begin(cuttable);
+    let particles = values.len();
+    let mut operation = Operation::begin(cuttable, options);
     operation.delta.snapped = snapped;
-    operation.split(&flagged);
+    operation.split(&flagged)?;
     values.resize(values.len() + flagged.len(), 0.0);
     on_surface.resize(on_surface.len() + flagged.len(), true);
 
@@ -59,10 +60,17 @@ pub(crate) fn cut_by_signs(
         .filter(|&p| on_surface[p])
         .map(ParticleId::new)
         .collect();
-    operation.separate(&seeds, |face| {
-        let [one, other] = face.corners.map(side);
-        one != other && face.particles.iter().all(|p| on_surface[p.index()])
-    });
+    let on = |p: ParticleId| on_surface[p.index()];
+    match options.separation {
+        Separation::CutFaces => operation.separate(&seeds, |face| {
+            let [one, other] = face.corners.map(side);
+            one != other && face.particles.into_iter().all(on)
+        }),
+        Separation::SharedOriginal => {
+            operation.separate_by_particles(&seeds, |p| p.index() < particles);
+        }
+        Separation::SharedOffSurface => operation.separate_by_particles(&seeds, |p| !on(p)),
+    }
     Ok(operation.finish(|_, corners| side(corners)))
 }
 

@@ -38,26 +38,48 @@ impl Stars {
         debug_assert_eq!(self.next.len(), 4 * tet.index());
         self.next.resize(self.next.len() + 4, NONE);
         self.previous.resize(self.previous.len() + 4, NONE);
+        self.insert(tet, corners);
+    }
+
+    /// Moves corner `k` of `tet` from one particle's star to another's.
+    pub(crate) fn relink(&mut self, tet: TetId, k: u32, from: ParticleId, to: ParticleId) {
+        if from != to {
+            self.unlink(tet, k, from);
+            self.link(tet, k, to);
+        }
+    }
+
+    /// Takes all corners of a tet out of their stars.
+    pub(crate) fn remove(&mut self, tet: TetId, corners: [ParticleId; 4]) {
+        for (k, particle) in (0..).zip(corners) {
+            self.unlink(tet, k, particle);
+        }
+    }
+
+    /// Puts all corners of a tet, which are in no star, into those of its particles.
+    pub(crate) fn insert(&mut self, tet: TetId, corners: [ParticleId; 4]) {
         for (k, particle) in (0..).zip(corners) {
             self.link(tet, k, particle);
         }
     }
 
-    /// Moves corner `k` of `tet` from one particle's star to another's.
-    pub(crate) fn relink(&mut self, tet: TetId, k: u32, from: ParticleId, to: ParticleId) {
-        if from == to {
-            return;
-        }
+    /// Forgets or makes room for tets and particles at the end; those forgotten are in no star and have no star.
+    pub(crate) fn resize(&mut self, particles: usize, tets: usize) {
+        self.head.resize(particles, NONE);
+        self.next.resize(4 * tets, NONE);
+        self.previous.resize(4 * tets, NONE);
+    }
+
+    fn unlink(&mut self, tet: TetId, k: u32, particle: ParticleId) {
         let slot = (4 * tet.0 + k) as usize;
         let (next, previous) = (self.next[slot], self.previous[slot]);
         match previous {
-            NONE => self.head[from.index()] = next,
+            NONE => self.head[particle.index()] = next,
             p => self.next[p as usize] = next,
         }
         if next != NONE {
             self.previous[next as usize] = previous;
         }
-        self.link(tet, k, to);
     }
 
     fn link(&mut self, tet: TetId, k: u32, particle: ParticleId) {

@@ -25,7 +25,7 @@ use crate::parallel;
 use crate::sides::{GivenSides, Sides};
 use crate::signs::linear;
 use crate::surface::{CutSurface, Tangent};
-use crate::{CutDelta, CutOptions, CuttableMesh};
+use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
 /// A meeting within this fraction of the edge's length from the tangent plane of an end is that same surface again,
 /// bent to its particles; one further away is another sheet of a stroke that came back.
@@ -112,9 +112,10 @@ impl Stroke {
         mut near: Vec<TetId>,
         blade: &B,
         mut memory: Option<&mut CutMemory>,
-    ) -> CutDelta {
+    ) -> Result<CutDelta, CutError> {
+        let particles = motion.now.len();
         let mut fresh: Vec<ParticleId> = Vec::new();
-        let mut operation = Operation::begin(cuttable);
+        let mut operation = Operation::begin(cuttable, &self.options);
         // A round a meeting of an edge: then nothing is left, but what would be cut off by more is smaller than a tet. Near
         // the tip of a surface there may be no end to it: every new edge crosses it again, nearer to the tip.
         let mut rounds = 1 + blade.most_meetings();
@@ -138,7 +139,10 @@ impl Stroke {
             }
             round += 1;
             let snapped = self.snap(operation.cuttable, &hits, B::COMES_BY);
-            near = self.open(&mut operation, motion, hits, &snapped, &mut fresh);
+            near = match self.open(&mut operation, motion, hits, &snapped, &mut fresh) {
+                Ok(touched) => touched,
+                Err(error) => return Err(self.give_up(operation, motion, particles, error)),
+            };
         }
 
         while let (Some(memory), Some(number)) = (&memory, self.number) {
@@ -151,7 +155,9 @@ impl Stroke {
                 continue;
             }
             let snapped = self.snap(cuttable, &gaps, false);
-            self.open(&mut operation, motion, gaps, &snapped, &mut fresh);
+            if let Err(error) = self.open(&mut operation, motion, gaps, &snapped, &mut fresh) {
+                return Err(self.give_up(operation, motion, particles, error));
+            }
         }
 
         let seeds = self.seeds(operation.cuttable, &fresh);
@@ -170,7 +176,22 @@ impl Stroke {
             memory.follow_all_but(number, cuttable, &delta, self.options.reach());
             memory.learn(number, &mut self.surface);
         }
-        delta
+        Ok(delta)
+    }
+
+    /// Takes the cut back, and what the stroke knows of the particles that are gone by it.
+    fn give_up(
+        &mut self,
+        operation: Operation<'_>,
+        motion: &mut Motion,
+        particles: usize,
+        error: CutError,
+    ) -> CutError {
+        operation.roll_back();
+        motion.before.truncate(particles);
+        motion.now.truncate(particles);
+        self.surface.truncate(particles);
+        error
     }
 
     /// Splits the edges that were hit and have no end on the surface. Returns the tets touched.
@@ -181,7 +202,7 @@ impl Stroke {
         mut hits: Vec<Hit>,
         snapped: &[ParticleId],
         fresh: &mut Vec<ParticleId>,
-    ) -> Vec<TetId> {
+    ) -> Result<Vec<TetId>, CutError> {
         operation.delta.snapped += snapped.len();
         hits.retain(|hit| {
             let ends = hit.crossing.ends;
@@ -191,7 +212,7 @@ impl Stroke {
         for hit in &mut hits {
             hit.crossing.parameter = hit.crossing.parameter.clamp(reach, 1.0 - reach);
         }
-        let near = operation.split(&hits.iter().map(|hit| hit.crossing).collect::<Vec<_>>());
+        let near = operation.split(&hits.iter().map(|hit| hit.crossing).collect::<Vec<_>>())?;
         self.given.forget(near.iter().copied());
         fresh.extend(snapped);
         for hit in hits {
@@ -200,7 +221,7 @@ impl Stroke {
             motion.push(&hit.crossing);
             self.surface.put(point, hit.tangent);
         }
-        near
+        Ok(near)
     }
 
     /// The edges between this stroke's surface and the one it joins.

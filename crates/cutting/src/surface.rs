@@ -105,6 +105,14 @@ impl CutSurface {
         self.news.get_or_insert_default();
     }
 
+    /// Forgets all particles from the given number on.
+    pub(crate) fn truncate(&mut self, particles: usize) {
+        self.marks.retain(|p, _| p.index() < particles);
+        if let Some(news) = &mut self.news {
+            news.retain(|p| p.index() < particles);
+        }
+    }
+
     /// What changed since the last call, by particle.
     pub(crate) fn take_news(&mut self) -> Vec<(ParticleId, Mark)> {
         let mut news = self.news.as_mut().map(std::mem::take).unwrap_or_default();

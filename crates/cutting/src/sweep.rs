@@ -174,12 +174,20 @@ impl Sweep {
             now: positions.to_vec(),
         };
         let blade_between = MovingBlade(segments);
-        let delta = self
+        let result = self
             .stroke
             .cut(cuttable, &mut motion, near, &blade_between, memory);
-        self.before = motion.now;
-        self.blade.copy_from_slice(blade);
-        Ok(delta)
+        match result {
+            Ok(delta) => {
+                self.before = motion.now;
+                self.blade.copy_from_slice(blade);
+                Ok(delta)
+            }
+            Err(error) => {
+                self.before = motion.before;
+                Err(error)
+            }
+        }
     }
 
     /// Follows a cut that another stroke made since the last call of [`Sweep::advance`].

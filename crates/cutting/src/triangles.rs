@@ -322,7 +322,7 @@ fn cut(
         now: positions.to_vec(),
     };
     let blade = StandingBlade { surface, tolerance };
-    Ok(Stroke::new(*options).cut(cuttable, &mut motion, near, &blade, memory))
+    Stroke::new(*options).cut(cuttable, &mut motion, near, &blade, memory)
 }
 
 /// The box and twice the tolerance around it.

@@ -69,18 +69,23 @@ impl BlockSchedule {
         );
         let blocks = Schedule::new(clustering, outer);
         let mut schedule = Self {
-            color_offsets: blocks.color_offsets().to_vec(),
-            clusters: (0..blocks.cluster_count())
-                .map(|b| blocks.cluster(b))
-                .collect(),
+            color_offsets: vec![0],
+            clusters: Vec::with_capacity(blocks.cluster_count()),
             block_offsets: vec![0],
             step_offsets: vec![0],
-            order: Vec::with_capacity(blocks.order().len()),
+            order: Vec::with_capacity(blocks.constraint_count()),
         };
+        for color in 0..blocks.color_count() {
+            schedule.clusters.extend_from_slice(blocks.clusters(color));
+            let end = offset(schedule.clusters.len());
+            schedule.color_offsets.push(end);
+        }
         let color = |c: u32| inner.color(c as usize);
-        for block in 0..blocks.cluster_count() {
+        for &cluster in &schedule.clusters {
             let start = schedule.order.len();
-            schedule.order.extend_from_slice(blocks.constraints(block));
+            schedule
+                .order
+                .extend_from_slice(blocks.constraints(cluster));
             let members = &mut schedule.order[start..];
             members.sort_unstable_by_key(|&c| (color(c), c));
             let mut end = start;
@@ -184,7 +189,7 @@ impl BlockSchedule {
     /// particle; two constraints of one step on one particle, named with the place of the step in
     /// its block as the color.
     pub fn check(&self, incidence: &Incidence) -> Result<(), GraphError> {
-        each_once("block schedule", &self.order, incidence)?;
+        each_once("block schedule", self.order.iter().copied(), incidence)?;
         // Who was at each particle last.
         let mut last: Vec<Option<Visit>> = vec![None; incidence.particle_count()];
         for color in 0..self.color_count() {

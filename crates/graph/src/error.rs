@@ -182,6 +182,12 @@ pub enum GraphError {
         /// The constraint.
         constraint: u32,
     },
+    /// A cluster that a schedule has not followed.
+    #[error("the schedule has other members or another color for cluster {cluster}")]
+    Misplaced {
+        /// The cluster.
+        cluster: ClusterId,
+    },
     /// Two clusters that a schedule would solve at the same time although they share a particle.
     #[error(
         "clusters {first} and {second} run together in color {color} but share particle {particle}"

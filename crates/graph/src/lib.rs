@@ -10,7 +10,7 @@
 //!
 //! Constraints, particles and graph vertices are plain `u32` numbers from 0, so any constraint of
 //! any arity fits: a spring, a bending angle, a tetrahedron. Ragged arrays are stored as `offsets`
-//! and `values` (CSR).
+//! and `values` (CSR), or, where they change, as [`Rows`].
 //!
 //! ```
 //! use incise_graph::{Clustering, ColorId, Coloring, ConstraintGraph, Incidence, Schedule};
@@ -28,14 +28,14 @@
 //! let schedule = Schedule::new(&Clustering::none(5), &coloring);
 //! schedule.check(&incidence)?;
 //! for color in 0..schedule.color_count() {
-//!     for slot in schedule.clusters(color) {
+//!     for &cluster in schedule.clusters(color) {
 //!         // These blocks share no particle: run them in parallel, each from front to back.
-//!         for &spring in schedule.constraints(slot) {
+//!         for &spring in schedule.constraints(cluster) {
 //!             let _ends = incidence.particles_of(spring as usize);
 //!         }
 //!     }
 //! }
-//! assert_eq!(schedule.order(), [0, 2, 4, 1, 3]);
+//! assert!(schedule.order().eq([0, 2, 4, 1, 3]));
 //! # Ok::<(), incise_graph::GraphError>(())
 //! ```
 
@@ -51,6 +51,7 @@ mod incidence;
 mod interop;
 mod metrics;
 mod read;
+mod rows;
 mod schedule;
 
 pub use block_schedule::BlockSchedule;
@@ -63,6 +64,7 @@ pub use id::{ClusterId, ColorId};
 pub use incidence::Incidence;
 pub use metrics::ColoringMetrics;
 pub use read::{read_dimacs, read_matrix_market};
+pub use rows::Rows;
 pub use schedule::Schedule;
 
 /// The example of the README, run as a test.

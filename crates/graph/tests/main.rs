@@ -5,4 +5,5 @@
 mod block_schedule;
 mod graph;
 mod read;
+mod rows;
 mod schedule;

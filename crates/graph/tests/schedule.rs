@@ -1,7 +1,7 @@
 //! A schedule holds every constraint once, in the order of the definition, and its check agrees
-//! with the coloring's.
+//! with the coloring's; edits give what a new schedule would be, at a cost that follows the edit.
 
-use incise_graph::{ClusterId, Clustering, ColorId, Coloring, Incidence, Schedule};
+use incise_graph::{ClusterId, Clustering, ColorId, Coloring, GraphError, Incidence, Schedule};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -16,6 +16,91 @@ fn inputs() -> impl Strategy<Value = (Clustering, Coloring)> {
     })
 }
 
+/// One random change of a plan.
+#[derive(Clone, Debug)]
+enum Edit {
+    /// Takes constraint (number modulo their count) out of its cluster.
+    Remove(usize),
+    /// Puts a constraint that is in no cluster, maybe past the end, into a new one.
+    Start(usize),
+    /// Puts it into the cluster of another constraint.
+    Join(usize, usize),
+    /// Gives a cluster a color.
+    Recolor(usize, u32),
+}
+
+fn edits() -> impl Strategy<Value = Vec<Edit>> {
+    let edit = prop_oneof![
+        (0usize..100).prop_map(Edit::Remove),
+        (0usize..100).prop_map(Edit::Start),
+        (0usize..100, 0usize..100).prop_map(|(a, b)| Edit::Join(a, b)),
+        (0usize..100, 0u32..8).prop_map(|(k, color)| Edit::Recolor(k, color)),
+    ];
+    vec(edit, 1..12)
+}
+
+/// Clusters and colors, and what has changed since the schedule followed.
+struct Plan {
+    clustering: Clustering,
+    coloring: Coloring,
+    constraints: Vec<u32>,
+    clusters: Vec<ClusterId>,
+}
+
+impl Plan {
+    /// A constraint in no cluster: one of the present ones if there is such a one, else the next.
+    fn loose(&self, start: usize) -> usize {
+        let count = self.clustering.constraint_count();
+        let mut all = (0..count).map(|i| (start + i) % count);
+        all.find(|&c| self.clustering.cluster_of(c).is_none())
+            .unwrap_or(count)
+    }
+
+    fn apply(&mut self, edit: &Edit) {
+        let count = self.clustering.constraint_count();
+        match *edit {
+            Edit::Remove(c) => {
+                self.clustering.remove(c % count);
+                self.constraints.push(u32::try_from(c % count).unwrap());
+            }
+            Edit::Start(c) => {
+                let c = self.loose(c);
+                let cluster = self.clustering.new_cluster(c);
+                if cluster.index() == self.coloring.vertex_count() {
+                    self.coloring.push(ColorId(2));
+                    self.clusters.push(cluster);
+                }
+                self.constraints.push(u32::try_from(c).unwrap());
+            }
+            Edit::Join(c, other) => {
+                let c = self.loose(c);
+                if let Some(cluster) = self.clustering.cluster_of(other % count) {
+                    self.clustering.assign(c, cluster);
+                    self.constraints.push(u32::try_from(c).unwrap());
+                }
+            }
+            Edit::Recolor(k, color) => {
+                let k = k % self.coloring.vertex_count();
+                self.coloring.set(k, ColorId(color));
+                self.clusters.push(ClusterId::new(k));
+            }
+        }
+    }
+}
+
+/// Color -> clusters, sorted, -> members.
+fn contents(schedule: &Schedule) -> Vec<Vec<(ClusterId, Vec<u32>)>> {
+    let color = |color| {
+        let clusters = schedule.clusters(color).iter();
+        let mut clusters: Vec<_> = clusters
+            .map(|&k| (k, schedule.constraints(k).to_vec()))
+            .collect();
+        clusters.sort_unstable();
+        clusters
+    };
+    (0..schedule.color_count()).map(color).collect()
+}
+
 proptest! {
     #[test]
     fn order_is_color_then_cluster_then_number((clustering, coloring) in inputs()) {
@@ -26,13 +111,15 @@ proptest! {
             .collect();
         expected.sort_unstable();
         let order: Vec<u32> = expected.iter().map(|&(_, _, c)| c).collect();
-        prop_assert_eq!(schedule.order(), &order[..]);
-        let slots: Vec<u32> = (0..schedule.cluster_count())
-            .flat_map(|s| schedule.constraints(s).to_vec())
+        prop_assert_eq!(schedule.order().collect::<Vec<_>>(), &order[..]);
+        prop_assert_eq!(schedule.constraint_count(), order.len());
+        let by_cluster: Vec<u32> = (0..schedule.color_count())
+            .flat_map(|c| schedule.clusters(c))
+            .flat_map(|&k| schedule.constraints(k).to_vec())
             .collect();
-        prop_assert_eq!(slots, &order[..]);
+        prop_assert_eq!(by_cluster, &order[..]);
         let colors: Vec<u32> = (0..schedule.color_count())
-            .flat_map(|c| schedule.color_constraints(c).to_vec())
+            .flat_map(|c| schedule.color_constraints(c))
             .collect();
         prop_assert_eq!(colors, order);
     }
@@ -55,6 +142,171 @@ proptest! {
     fn a_schedule_can_be_used_again((first, colors) in inputs(), (second, others) in inputs()) {
         let mut schedule = Schedule::new(&first, &colors);
         schedule.rebuild(&second, &others);
-        prop_assert_eq!(schedule, Schedule::new(&second, &others));
+        prop_assert_eq!(&schedule, &Schedule::new(&second, &others));
+        schedule.check_plan(&second, &others).unwrap();
     }
+
+    /// After every batch of edits the schedule is the new one up to the order within a color, and
+    /// the journal names what differs from any earlier state.
+    #[test]
+    fn updates_give_what_a_new_schedule_is(
+        (clustering, coloring) in inputs(),
+        batches in vec(edits(), 1..12),
+    ) {
+        let mut schedule = Schedule::new(&clustering, &coloring);
+        let mut plan = Plan { clustering, coloring, constraints: Vec::new(), clusters: Vec::new() };
+        let mut past = vec![schedule.clone()];
+        for batch in batches {
+            plan.constraints.clear();
+            plan.clusters.clear();
+            batch.iter().for_each(|edit| plan.apply(edit));
+            plan.clustering.check().unwrap();
+            schedule.update(&plan.clustering, &plan.coloring, &plan.constraints, &plan.clusters);
+            schedule.check_plan(&plan.clustering, &plan.coloring).unwrap();
+            let new = Schedule::new(&plan.clustering, &plan.coloring);
+            prop_assert_eq!(contents(&schedule), contents(&new));
+            prop_assert_eq!(schedule.cluster_count(), plan.clustering.occupied());
+            for earlier in &past {
+                let Some(changes) = schedule.changes_since(earlier.revision()) else {
+                    continue;
+                };
+                for k in (0..plan.clustering.cluster_count()).map(ClusterId::new) {
+                    let same = earlier.constraints(k) == schedule.constraints(k)
+                        && earlier.color(k) == schedule.color(k);
+                    prop_assert!(same || changes.contains(&k), "cluster {} was kept quiet", k);
+                }
+            }
+            past.push(schedule.clone());
+        }
+    }
+}
+
+/// What is not told is found.
+#[test]
+fn a_forgotten_edit_is_found() {
+    let labels = [0, 0, 1, 1].map(ClusterId).to_vec();
+    let mut clustering = Clustering::from_labels(labels).unwrap();
+    let mut coloring = Coloring::new([0, 1].map(ColorId).to_vec());
+    let mut schedule = Schedule::new(&clustering, &coloring);
+    coloring.set(1, ColorId(0));
+    schedule.update(&clustering, &coloring, &[], &[]);
+    let misplaced = |k| {
+        Err(GraphError::Misplaced {
+            cluster: ClusterId(k),
+        })
+    };
+    assert_eq!(schedule.check_plan(&clustering, &coloring), misplaced(1));
+    schedule.update(&clustering, &coloring, &[], &[ClusterId(1)]);
+    schedule.check_plan(&clustering, &coloring).unwrap();
+    clustering.remove(0);
+    assert_eq!(schedule.check_plan(&clustering, &coloring), misplaced(0));
+}
+
+/// Copies that part have nothing to tell of each other.
+#[test]
+fn revisions_tell_schedules_apart() {
+    let clustering = Clustering::none(2);
+    let mut coloring = Coloring::new([0, 1].map(ColorId).to_vec());
+    let first = Schedule::new(&clustering, &coloring);
+    let mut second = first.clone();
+    let mut third = first.clone();
+    assert_eq!(second.changes_since(first.revision()), Some(&[][..]));
+    coloring.set(1, ColorId(0));
+    for copy in [&mut second, &mut third] {
+        copy.update(&clustering, &coloring, &[], &[ClusterId(1)]);
+        assert_eq!(
+            copy.changes_since(first.revision()),
+            Some(&[ClusterId(1)][..])
+        );
+    }
+    assert_eq!(second, third);
+    assert_eq!(second.changes_since(third.revision()), None);
+    second.rebuild(&clustering, &coloring);
+    assert_eq!(second.changes_since(first.revision()), None);
+    let quiet = third.revision();
+    third.update(&clustering, &coloring, &[0, 1], &[ClusterId(0)]);
+    assert_eq!(third.revision(), quiet, "nothing has changed");
+    assert_eq!(Schedule::default().revision(), 0);
+}
+
+/// The journal forgets, but never what happened after the last state that a follower has seen.
+#[test]
+fn a_follower_of_every_change_is_never_left_behind() {
+    let clustering = Clustering::none(5);
+    let mut coloring = Coloring::new(vec![ColorId(0); 5]);
+    let mut schedule = Schedule::new(&clustering, &coloring);
+    let first = schedule.revision();
+    for round in 1..20u32 {
+        let before = schedule.revision();
+        let k = ClusterId(round % 5);
+        coloring.set(k.index(), ColorId(round));
+        schedule.update(&clustering, &coloring, &[], &[k]);
+        assert_eq!(schedule.changes_since(before), Some(&[k][..]));
+    }
+    assert_eq!(schedule.changes_since(first), None);
+}
+
+/// Counted, not timed: a cut's worth of edits in a large plan costs about the same whatever the
+/// rest is, and far less than the rest. 20 constraints are each replaced by four in two clusters.
+#[test]
+fn the_cost_of_an_update_follows_the_edit() {
+    for clusters in [2_000u32, 40_000] {
+        let labels = (0..5 * clusters).map(|c| ClusterId(c / 5)).collect();
+        let mut clustering = Clustering::from_labels(labels).unwrap();
+        let colors = (0..clusters).map(|k| ColorId(k % 30)).collect();
+        let mut coloring = Coloring::new(colors);
+        let mut schedule = Schedule::new(&clustering, &coloring);
+        let (cuts, mut total) = (60, 0);
+        for cut in 0..cuts {
+            let (mut constraints, mut changed) = (Vec::new(), Vec::new());
+            for i in 0..20 {
+                let parent = (cut * 20 + i) * 7;
+                clustering.remove(parent as usize);
+                for side in 0..2u32 {
+                    let first = match side {
+                        0 => parent as usize,
+                        _ => clustering.constraint_count(),
+                    };
+                    let cluster = clustering.new_cluster(first);
+                    let second = clustering.constraint_count();
+                    clustering.assign(second, cluster);
+                    if cluster.index() == coloring.vertex_count() {
+                        coloring.push(ColorId(0));
+                    }
+                    coloring.set(cluster.index(), ColorId((3 * i + side) % 32));
+                    changed.push(cluster);
+                    constraints.extend([first, second].map(|c| u32::try_from(c).unwrap()));
+                }
+            }
+            total += schedule.update(&clustering, &coloring, &constraints, &changed);
+        }
+        schedule.check_plan(&clustering, &coloring).unwrap();
+        // 120 constraints and 60 clusters change in a cut; each moves a few others. Once in the run
+        // every color moves to get room, which is the only part that knows the size of the plan.
+        let once = u64::from(clusters);
+        let bound = u64::from(cuts) * 20 * 40 + once;
+        assert!(total < bound, "{total} of {bound} for {clusters} clusters");
+    }
+}
+
+/// Edits that go on forever do not let the arrays grow: what is vacated is used again.
+#[test]
+fn memory_stays_in_proportion() {
+    let mut clustering = Clustering::none(100);
+    let mut coloring = Coloring::new((0..100).map(|k| ColorId(k % 7)).collect());
+    let mut schedule = Schedule::new(&clustering, &coloring);
+    let mut visited = 0;
+    for round in 0..5_000u32 {
+        let (c, k) = ((round * 37) % 100, ClusterId((round * 11) % 100));
+        clustering.remove(c as usize);
+        let target = clustering
+            .cluster_of(((c + 1 + round % 5) % 100) as usize)
+            .unwrap();
+        clustering.assign(c as usize, target);
+        coloring.set(k.index(), ColorId(round % 9));
+        visited += schedule.update(&clustering, &coloring, &[c], &[k]);
+    }
+    schedule.check_plan(&clustering, &coloring).unwrap();
+    // A round changes two numbers; clusters here grow to some dozens of members.
+    assert!(visited < 5_000 * 120, "{visited}");
 }

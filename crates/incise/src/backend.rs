@@ -155,8 +155,13 @@ impl AnySolver {
             for tet in &delta.relinked {
                 solver.relink_tet(tet.tet.index(), tet.after.map(|p| p.0));
             }
+            for tet in &delta.moved {
+                solver.move_tet(tet.from.index(), tet.to.index());
+            }
+            solver.truncate_tets(delta.tets_after());
             for p in touched(delta) {
-                solver.set_mass(p.index(), mass(solver, cuttable, p));
+                let star = cuttable.around(p).map(TetId::index);
+                solver.set_mass_in_star(p.index(), mass(solver, cuttable, p), star);
             }
         });
         match self {
@@ -165,8 +170,8 @@ impl AnySolver {
         }
     }
 
-    /// Recomputes masses and corners and compares; for tests and on request.
-    pub(crate) fn check(&self, cuttable: &CuttableMesh) -> Result<(), Error> {
+    /// Recomputes masses, corners and what a step would solve, and compares; for tests and on request.
+    pub(crate) fn check(&self, cuttable: &CuttableMesh, schedule: &Schedule) -> Result<(), Error> {
         let mesh = cuttable.mesh();
         each!(self, solver => {
             if (solver.particle_count(), solver.tet_count()) != (mesh.positions.len(), mesh.tets.len()) {
@@ -183,6 +188,7 @@ impl AnySolver {
                     return Err(Error::Inconsistent(format!("particle {p} has mass {stored} instead of {fresh}")));
                 }
             }
+            solver.check_layout(schedule).map_err(|error| Error::Inconsistent(error.to_string()))?;
         });
         Ok(())
     }
@@ -258,7 +264,8 @@ fn touched(delta: &CutDelta) -> Vec<ParticleId> {
         .relinked
         .iter()
         .flat_map(|tet| tet.before.into_iter().chain(tet.after));
-    let removed = delta.removed.iter().flat_map(|tet| tet.corners);
+    let removed = delta.removed.iter().chain(&delta.deleted);
+    let removed = removed.flat_map(|tet| tet.corners);
     let mut touched: Vec<ParticleId> = added.chain(relinked).chain(removed).collect();
     touched.sort_unstable();
     touched.dedup();

@@ -5,7 +5,7 @@
 //! parts.
 
 use glam::DVec3;
-use incise_cutting::{CutDelta, CuttableMesh};
+use incise_cutting::{CutDelta, CuttableMesh, PieceEvent, PieceTracker};
 use incise_xpbd::{KappaLimit, StepReport, StepSettings};
 
 use crate::backend::{AnySolver, each};
@@ -33,8 +33,8 @@ pub(crate) struct Group {
     volumes: Option<Volumes>,
     /// The present positions.
     pub(crate) positions: Vec<DVec3>,
-    /// Number of pieces.
-    pub(crate) pieces: usize,
+    /// Its pieces, numbered within the group.
+    pub(crate) pieces: PieceTracker,
     /// Volume at rest in m³ before all cuts.
     pub(crate) initial_volume: f64,
     /// What was chosen, if the scene left it open.
@@ -94,7 +94,7 @@ impl Group {
             handles: joined.handles,
             volumes,
             positions: Vec::new(),
-            pieces: cuttable.mesh().pieces().count,
+            pieces: PieceTracker::new(&cuttable),
             initial_volume: cuttable.mesh().total_volume(),
             cuttable,
             bodies: joined.bodies,
@@ -148,18 +148,23 @@ impl Group {
             || self.handles.iter().any(|handle| handle.moves(frame))
     }
 
-    /// Lets solver, clusters, colors, schedule and volume constraints follow a cut of the mesh, and wakes it. The pieces
-    /// are counted by [`Group::count_pieces`].
-    pub(crate) fn follow(&mut self, delta: &CutDelta, ms: &mut Milliseconds) -> Result<(), Error> {
+    /// Lets solver, pieces, clusters, colors, schedule and volume constraints follow a cut of the mesh, and wakes it.
+    /// Returns what happened to its pieces.
+    pub(crate) fn follow(
+        &mut self,
+        delta: &CutDelta,
+        ms: &mut Milliseconds,
+    ) -> Result<Vec<PieceEvent>, Error> {
         if let Some(rest) = &mut self.rest {
             rest.wake();
         }
         self.solver.follow(delta, &self.cuttable, ms)?;
+        let events = self.pieces.follow(&self.cuttable, delta);
         self.plan.follow(delta, ms)?;
-        let Some(volumes) = &self.volumes else {
-            return Ok(());
-        };
-        volumes.follow(&mut self.solver, delta, &self.cuttable, &self.plan.schedule)
+        if let Some(volumes) = &self.volumes {
+            volumes.follow(&mut self.solver, delta, &self.cuttable, &self.plan.schedule)?;
+        }
+        Ok(events)
     }
 
     /// Notes the largest kappa before the first cut of a frame. O(tets).
@@ -187,11 +192,6 @@ impl Group {
         noted.new_tets = noted.new_tets.max(largest);
     }
 
-    /// Counts the pieces anew. O(tets).
-    pub(crate) fn count_pieces(&mut self) {
-        self.pieces = self.cuttable.mesh().pieces().count;
-    }
-
     /// The largest kappa of a tet, had none been softened. O(tets).
     pub(crate) fn kappa(&self) -> f64 {
         each!(&self.solver, solver => solver.kappa(self.settings.substep_time()))
@@ -213,15 +213,10 @@ impl Group {
                 "the volume at rest was {initial} and is {volume}"
             )));
         }
-        self.solver.check(&self.cuttable)?;
+        self.solver.check(&self.cuttable, &self.plan.schedule)?;
         self.plan.check(mesh)?;
-        let pieces = mesh.pieces().count;
-        if pieces != self.pieces {
-            return Err(Error::Inconsistent(format!(
-                "{} pieces were counted, there are {pieces}",
-                self.pieces
-            )));
-        }
-        Ok(())
+        self.pieces
+            .check(&self.cuttable)
+            .map_err(|error| Error::Inconsistent(error.to_string()))
     }
 }

@@ -33,6 +33,7 @@ mod limits;
 mod link;
 mod measure;
 mod method;
+mod pieces;
 mod plan;
 mod preset;
 mod region;

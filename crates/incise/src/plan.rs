@@ -6,7 +6,7 @@ use std::time::Instant;
 use incise_clustering::{Method, cluster, update_local};
 use incise_coloring::{Algorithm, Recoloring, color};
 use incise_cutting::CutDelta;
-use incise_graph::{Clustering, Coloring, Incidence, Schedule};
+use incise_graph::{ClusterId, Clustering, Coloring, Incidence, Schedule};
 use incise_mesh::{ParticleId, TetId, TetMesh};
 
 use crate::report::{Milliseconds, milliseconds};
@@ -52,7 +52,7 @@ impl Plan {
     }
 
     /// Follows a cut: the cut tets leave their clusters, the children on each side of each become new clusters, and
-    /// these get colors; everything else stays. Only the schedule is sorted anew as a whole.
+    /// these get colors; everything else stays.
     pub(crate) fn follow(&mut self, delta: &CutDelta, ms: &mut Milliseconds) -> Result<(), Error> {
         let start = Instant::now();
         let mut removed = Vec::with_capacity(4 * delta.removed.len());
@@ -61,10 +61,9 @@ impl Plan {
         }
         self.update_clusters(delta)?;
         let clustered = Instant::now();
-        self.recolor(delta, removed)?;
+        let all = self.recolor(delta, removed)?;
         let colored = Instant::now();
-        self.schedule
-            .rebuild(&self.clustering, self.recoloring.coloring());
+        self.reschedule(delta, all);
         ms.cluster += milliseconds(clustered - start);
         ms.color += milliseconds(colored - clustered);
         ms.schedule += milliseconds(colored.elapsed());
@@ -106,8 +105,9 @@ impl Plan {
         Ok(())
     }
 
-    /// Colors the new clusters, and old ones where the cut brought them new particles.
-    fn recolor(&mut self, delta: &CutDelta, mut removed: Vec<(u32, u32)>) -> Result<(), Error> {
+    /// Colors the new clusters, and old ones where the cut brought them new particles; returns whether all clusters have
+    /// been colored anew.
+    fn recolor(&mut self, delta: &CutDelta, mut removed: Vec<(u32, u32)>) -> Result<bool, Error> {
         let _span = tracing::debug_span!("incise::color").entered();
         let mut added = Vec::with_capacity(4 * delta.added.len());
         for tet in &delta.added {
@@ -117,8 +117,27 @@ impl Plan {
             self.pair_up(tet.tet, tet.before, &mut removed);
             self.pair_up(tet.tet, tet.after, &mut added);
         }
-        self.recoloring.apply(&removed, &added)?;
-        Ok(())
+        Ok(self.recoloring.apply(&removed, &added)?.full)
+    }
+
+    /// Lets the schedule follow clusters and colors.
+    fn reschedule(&mut self, delta: &CutDelta, all: bool) {
+        let coloring = self.recoloring.coloring();
+        if all {
+            self.schedule.rebuild(&self.clustering, coloring);
+            return;
+        }
+        let removed = delta.removed.iter().chain(&delta.deleted);
+        let tets: Vec<u32> = removed
+            .map(|tet| tet.tet)
+            .chain(delta.added.iter().map(|tet| tet.tet))
+            .chain(delta.moved.iter().flat_map(|tet| [tet.from, tet.to]))
+            .map(|tet| tet.0)
+            .collect();
+        let changed = self.recoloring.changed().iter();
+        let clusters: Vec<ClusterId> = changed.copied().map(ClusterId).collect();
+        self.schedule
+            .update(&self.clustering, coloring, &tets, &clusters);
     }
 
     /// Proves clusters, colors and schedule against the mesh, from scratch.
@@ -135,6 +154,8 @@ impl Plan {
         self.coloring()
             .verify_incidence(&incidence.quotient(&self.clustering))?;
         self.schedule.check(&incidence)?;
+        self.schedule
+            .check_plan(&self.clustering, self.coloring())?;
         Ok(())
     }
 }

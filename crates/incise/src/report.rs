@@ -30,6 +30,9 @@ pub struct FrameReport {
     pub pieces: usize,
     /// What was cut, if anything.
     pub cut: Option<CutReport>,
+    /// What came off in this frame, in the order in which it did; absent if nothing.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub detached: Vec<DetachedReport>,
     /// Wall time by stage.
     pub ms: Milliseconds,
     /// Residuals of the last substep.
@@ -142,10 +145,45 @@ impl Default for CutReport {
     }
 }
 
+/// A part that came off a piece and is a piece of its own from now on.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct DetachedReport {
+    /// The number of the new piece.
+    pub piece: u32,
+    /// The piece that it came off, which goes on with the rest.
+    pub from: u32,
+    /// Its tets.
+    pub tets: usize,
+    /// Its volume at rest in m³.
+    pub volume: f64,
+    /// Its mass in kg.
+    pub mass: f64,
+}
+
+/// A piece: tets connected through shared particles.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct PieceReport {
+    /// Its number, which it keeps.
+    pub id: u32,
+    /// The piece that it came off; absent for those that were there before all cuts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub parent: Option<u32>,
+    /// The number of its body in the scene.
+    pub body: usize,
+    /// Its tets.
+    pub tets: usize,
+    /// Its volume at rest in m³.
+    pub volume: f64,
+    /// Its mass in kg.
+    pub mass: f64,
+}
+
 /// Wall time by stage in ms; stages that did not happen took none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Milliseconds {
-    /// Cutting the mesh and handing the cut to the solver.
+    /// Cutting the mesh, following its pieces and handing the cut to the solver.
     pub cut: f64,
     /// Updating clusters.
     pub cluster: f64,
@@ -159,7 +197,7 @@ pub struct Milliseconds {
     pub solve: f64,
     /// Fetching from a device.
     pub readback: f64,
-    /// Everything else: positions, pieces, reported quantities.
+    /// Everything else: positions and reported quantities.
     pub other: f64,
     /// The whole frame.
     pub total: f64,

@@ -20,7 +20,10 @@ use crate::joined::Joined;
 use crate::limits::value;
 use crate::measure::{by_body, energy, kappa, max_speed, residual, softened, volume};
 use crate::method::settings;
-use crate::report::{CutReport, FrameReport, Milliseconds, SoftenedReport, milliseconds};
+use crate::pieces::PieceNumbers;
+use crate::report::{
+    CutReport, DetachedReport, FrameReport, Milliseconds, PieceReport, SoftenedReport, milliseconds,
+};
 use crate::scene::{Precision, Quantity, StrokeSpec};
 use crate::strokes::Timeline;
 use crate::whole::Whole;
@@ -65,6 +68,7 @@ pub struct Simulation {
     groups: Vec<Group>,
     /// All groups together, if there are several.
     whole: Option<Whole>,
+    pieces: PieceNumbers,
     timeline: Timeline,
     /// Whether a particle lies on a cut; empty before the first.
     on_cut: Vec<bool>,
@@ -134,6 +138,7 @@ impl Simulation {
             every: scene.report.every,
             precision,
             on_cut: Vec::new(),
+            pieces: PieceNumbers::new(&groups),
             groups,
             whole,
             timeline,
@@ -178,7 +183,8 @@ impl Simulation {
         let _span = tracing::debug_span!("incise::frame", frame = self.next_frame).entered();
         let start = Instant::now();
         let mut ms = Milliseconds::default();
-        let cut = self.carry_out_strokes(&mut ms)?;
+        let mut detached = Vec::new();
+        let cut = self.carry_out_strokes(&mut detached, &mut ms)?;
 
         let before_solve = Instant::now();
         let (frame, residual) = (self.next_frame, self.wants(Quantity::Residual));
@@ -192,6 +198,7 @@ impl Simulation {
             frame: self.next_frame,
             time_s: (self.next_frame + 1) as f64 * self.time_step,
             cut,
+            detached,
             repaired,
             ..FrameReport::default()
         };
@@ -220,8 +227,12 @@ impl Simulation {
         self.groups.iter().any(|group| group.rest.is_some())
     }
 
-    /// Cuts what is due and lets everybody follow.
-    fn carry_out_strokes(&mut self, ms: &mut Milliseconds) -> Result<Option<CutReport>, Error> {
+    /// Cuts what is due and lets everybody follow; adds what comes off to `detached`.
+    fn carry_out_strokes(
+        &mut self,
+        detached: &mut Vec<DetachedReport>,
+        ms: &mut Milliseconds,
+    ) -> Result<Option<CutReport>, Error> {
         let start = Instant::now();
         let wants_kappa = self.wants(Quantity::Kappa);
         let notes_kappa = wants_kappa || self.chooses();
@@ -229,25 +240,22 @@ impl Simulation {
             timeline,
             groups,
             whole,
+            pieces,
             on_cut,
             ..
         } = self;
         let mut report: Option<CutReport> = None;
-        let mut counting = 0.0;
+        let mut measuring = 0.0;
         timeline.advance(self.next_frame, groups, |number, group, delta| {
             if wants_kappa {
                 let start = Instant::now();
                 group.note_kappa_before();
-                counting += milliseconds(start.elapsed());
+                measuring += milliseconds(start.elapsed());
             }
-            group.follow(delta, ms)?;
+            let events = group.follow(delta, ms)?;
+            pieces.follow(number, &events, detached);
             if notes_kappa {
                 group.note_kappa_of(delta);
-            }
-            if !delta.copies.is_empty() {
-                let start = Instant::now();
-                group.count_pieces();
-                counting += milliseconds(start.elapsed());
             }
             report.get_or_insert_default().add(delta);
             let of_whole = whole.as_mut().map(|whole| whole.follow(number, delta));
@@ -259,7 +267,7 @@ impl Simulation {
             }
             Ok(())
         })?;
-        ms.cut = milliseconds(start.elapsed()) - ms.cluster - ms.color - ms.schedule - counting;
+        ms.cut = milliseconds(start.elapsed()) - ms.cluster - ms.color - ms.schedule - measuring;
         Ok(report)
     }
 
@@ -318,7 +326,7 @@ impl Simulation {
         report.tets = tets;
         report.clusters = clusters;
         report.colors = colors;
-        report.pieces = self.groups.iter().map(|group| group.pieces).sum();
+        report.pieces = self.groups.iter().map(|group| group.pieces.count()).sum();
         report.backend = "cpu";
         report.precision = self.precision.name();
     }
@@ -362,6 +370,18 @@ impl Simulation {
     #[must_use]
     pub fn on_cut(&self) -> &[bool] {
         &self.on_cut
+    }
+
+    /// The pieces of all bodies with their numbers, ascending: what a cut took off whom, and how much each weighs.
+    ///
+    /// Before all cuts the pieces are numbered body by body (bodies that links join count where the first of them
+    /// stands), those of a body by their first tets; what comes off gets the next numbers, stroke by stroke and within a
+    /// stroke body by body. The larger part of a piece that comes apart mostly keeps its number, see
+    /// [`PieceTracker::follow`](incise_cutting::PieceTracker::follow). No number is used twice. O(pieces there ever
+    /// were).
+    #[must_use]
+    pub fn pieces(&self) -> Vec<PieceReport> {
+        self.pieces.report(&self.groups)
     }
 
     /// The clusters of tets. With several bodies they are put together: O(tets), and the clusters of a body are
@@ -416,6 +436,7 @@ impl Simulation {
     /// [`Error::Inconsistent`] or [`Error::Cut`] name the first difference.
     pub fn check(&self) -> Result<(), Error> {
         self.groups.iter().try_for_each(Group::check)?;
+        self.pieces.check(&self.groups)?;
         self.whole
             .as_ref()
             .map_or(Ok(()), |whole| whole.check(&self.groups))

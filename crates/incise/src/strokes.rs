@@ -136,6 +136,7 @@ impl Timeline {
         CutOptions {
             snap,
             tolerance: self.tolerance,
+            ..CutOptions::default()
         }
     }
 }
@@ -164,6 +165,7 @@ impl Stroke {
                 let options = CutOptions {
                     snap: *snap,
                     tolerance,
+                    ..CutOptions::default()
                 };
                 cut_plane(cuttable, positions, &plane(*point, *normal), &options)
                     .map(Some)
@@ -187,6 +189,7 @@ impl Stroke {
                 let options = CutOptions {
                     snap: *snap,
                     tolerance,
+                    ..CutOptions::default()
                 };
                 let sweep = Sweep::new(cuttable, positions, &pose, options);
                 self.sweeps.push(sweep.map_err(cut)?);

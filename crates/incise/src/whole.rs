@@ -8,7 +8,9 @@
 //! Cost: following a cut costs what the cut touched; clusters and colors of the whole are put together on request.
 
 use glam::DVec3;
-use incise_cutting::{AddedTet, CutDelta, EdgePoint, RelinkedTet, RemovedTet};
+use incise_cutting::{
+    AddedTet, BoundaryTriangle, CutDelta, EdgePoint, MovedTet, RelinkedTet, RemovedTet,
+};
 use incise_graph::{ClusterId, Clustering, Coloring};
 use incise_mesh::{ParticleId, TetId, TetMesh};
 
@@ -64,10 +66,9 @@ impl Whole {
         let new = delta.particles_after() - delta.particles_before;
         let particles = (particles_before..particles_before + new).map(ParticleId::new);
         numbers.particles.extend(particles);
-        let new = delta.tets_after() - delta.tets_before;
-        numbers
-            .tets
-            .extend((tets_before..tets_before + new).map(TetId::new));
+        let new = delta.added.len() - delta.removed.len();
+        let new = (tets_before..tets_before + new).map(TetId::new);
+        numbers.tets.extend(new);
 
         let particle = |p: ParticleId| numbers.particles[p.index()];
         let tet = |t: TetId| numbers.tets[t.index()];
@@ -90,7 +91,12 @@ impl Whole {
             before: relinked.before.map(particle),
             after: relinked.after.map(particle),
         };
-        let whole = CutDelta {
+        let triangle = |triangle: &BoundaryTriangle| BoundaryTriangle {
+            tet: tet(triangle.tet),
+            particles: triangle.particles.map(particle),
+            ..*triangle
+        };
+        let mut whole = CutDelta {
             particles_before,
             tets_before,
             points: delta.points.iter().map(point).collect(),
@@ -98,13 +104,61 @@ impl Whole {
             removed: delta.removed.iter().map(removed).collect(),
             added: delta.added.iter().map(added).collect(),
             relinked: delta.relinked.iter().map(relinked).collect(),
+            deleted: delta.deleted.iter().map(removed).collect(),
+            moved: Vec::new(),
+            surface_removed: delta.surface_removed.iter().map(triangle).collect(),
+            surface_added: Vec::new(),
             snapped: delta.snapped,
             worst_volume_ratio: delta.worst_volume_ratio,
-            ..CutDelta::default()
+            dihedral: delta.dihedral,
         };
+        whole.deleted.sort_unstable_by_key(|deleted| deleted.tet);
+
+        // A tet that moves within its group keeps its number in the whole.
+        for moved in &delta.moved {
+            numbers.tets[moved.to.index()] = numbers.tets[moved.from.index()];
+        }
+        numbers.tets.truncate(delta.tets_after());
+        self.fill_gaps(&mut whole);
+        let numbers = &self.numbers[group];
+        let triangles = delta.surface_added.iter();
+        whole.surface_added = triangles
+            .map(|triangle| BoundaryTriangle {
+                tet: numbers.tets[triangle.tet.index()],
+                particles: triangle.particles.map(|p| numbers.particles[p.index()]),
+                ..*triangle
+            })
+            .collect();
         whole.apply(&mut self.mesh);
         whole.extend_particles(&mut self.positions);
         whole
+    }
+
+    /// Gives the numbers of deleted tets to the last ones, whichever groups they belong to. O(tets) if there are any.
+    fn fill_gaps(&mut self, whole: &mut CutDelta) {
+        if whole.deleted.is_empty() {
+            return;
+        }
+        let after = whole.tets_after();
+        let deleted = |tet: TetId| whole.deleted.binary_search_by_key(&tet, |d| d.tet).is_ok();
+        let gaps = whole.deleted.iter().map(|deleted| deleted.tet);
+        let gaps = gaps.take_while(|tet| tet.index() < after);
+        let last = (after..whole.tets_before).map(TetId::new);
+        let movers = last.filter(|&tet| !deleted(tet));
+        let moves: Vec<(TetId, TetId)> = movers.zip(gaps).collect();
+        for numbers in &mut self.numbers {
+            for number in &mut numbers.tets {
+                if let Ok(i) = moves.binary_search_by_key(number, |(from, _)| *from) {
+                    let (from, to) = moves[i];
+                    *number = to;
+                    let corners = self.mesh.tets[from.index()];
+                    let relinked = whole.relinked.iter().find(|relinked| relinked.tet == from);
+                    let corners = relinked.map_or(corners, |relinked| relinked.after);
+                    whole.moved.push(MovedTet { from, to, corners });
+                }
+            }
+        }
+        whole.moved.sort_unstable_by_key(|moved| moved.to);
     }
 
     /// Takes over the groups' positions.

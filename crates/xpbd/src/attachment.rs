@@ -155,6 +155,12 @@ impl<R: Real> Attachments<R> {
         }
     }
 
+    /// Lets go of particles from number `count` on.
+    pub(crate) fn truncate(&mut self, count: usize) {
+        let kept = self.find(count).unwrap_or_else(|place| place);
+        self.list.truncate(kept);
+    }
+
     fn append(&mut self, attachment: Attachment<R>, particle: usize) {
         let particle = number(particle);
         self.list.push(Attachment {

@@ -48,6 +48,14 @@ pub enum XpbdError {
         /// The range it must lie in.
         range: &'static str,
     },
+    /// What a step would solve is not what schedule, tets and masses say.
+    #[error("the layout has another {what} {number} than schedule, tets and masses say")]
+    Layout {
+        /// What differs.
+        what: &'static str,
+        /// Its number.
+        number: usize,
+    },
     /// Constraints on particles that do not exist, or a schedule that is not theirs.
     #[error("{what} constraints: {source}")]
     Schedule {

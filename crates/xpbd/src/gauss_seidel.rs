@@ -75,22 +75,24 @@ pub(crate) fn lanes<R: Real>(level: Level) -> usize {
 fn colors<R: Real, S: Simd, K: Kind>(simd: S, pass: &Pass<'_, R>) {
     let layout = pass.layout;
     let threads = rayon::current_num_threads();
-    let chunks = |color: usize| {
-        let groups = layout.groups(color);
-        match layout.blocks(groups.clone()).len() {
-            0 => 0,
-            blocks => (blocks / BLOCKS_A_THREAD).clamp(1, threads.min(groups.len())),
+    let chunks = |color: usize| match layout.blocks_of(color) {
+        0 => 0,
+        blocks => {
+            let groups = layout.groups(color).len();
+            (blocks / BLOCKS_A_THREAD).clamp(1, threads.min(groups))
         }
     };
     let solve = |color: usize, chunk: usize| {
         let (groups, chunks) = (layout.groups(color), chunks(color));
-        let share = |part: usize| groups.start + groups.len() * part / chunks;
-        let blocks = layout.blocks(share(chunk)..share(chunk + 1));
+        let share = |part: usize| groups.len() * part / chunks;
+        let groups = &groups[share(chunk)..share(chunk + 1)];
         simd.vectorize(
             #[inline(always)]
             || {
-                for block in blocks {
-                    solve_block::<R, S, K>(simd, pass, block);
+                for &group in groups {
+                    for block in layout.blocks(group) {
+                        solve_block::<R, S, K>(simd, pass, block);
+                    }
                 }
             },
         );

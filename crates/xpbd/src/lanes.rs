@@ -70,7 +70,7 @@ struct Tets<'a, R: Real, S: Simd> {
 pub(crate) fn solve_block<R: Real, S: Simd, K: Kind>(simd: S, pass: &Pass<'_, R>, block: usize) {
     let lanes = R::Lanes::<S>::LEN;
     let layout = pass.layout;
-    let active = usize::from(layout.active[block]);
+    let active = layout.active[block];
     let corners = &layout.particles[block * lanes..(block + 1) * lanes];
     let read = |p: u32| R::read(&pass.particles[p as usize]);
     let mut x = gather::<R, S>(simd, corners, read);
@@ -122,10 +122,10 @@ pub(crate) fn solve_block<R: Real, S: Simd, K: Kind>(simd: S, pass: &Pass<'_, R>
             let [a, b, c, d] = R::read(sum);
             R::write(sum, [a + x, b + y, c + z, d]);
         };
-        scatter::<R, S>(&x, &corners[..active], add);
+        scatter::<R, S>(&x, corners, active, add);
     } else {
         let write = |p: u32, values| R::write(&pass.particles[p as usize], values);
-        scatter::<R, S>(&x, &corners[..active], write);
+        scatter::<R, S>(&x, corners, active, write);
     }
 }
 

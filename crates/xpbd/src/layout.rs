@@ -2,14 +2,22 @@
 //!
 //! Clusters of one color share no particle, so as many of them as a processor has lanes are solved side by side: lane
 //! by lane the first tet of each, then the second. A *group* is such a set of clusters, a *block* one tet of each.
-//! Within a color clusters are grouped by size, so that few lanes wait; which cluster is in which group changes who
-//! computes, never what, since each sees only its own particles.
+//! Which cluster is in which group changes who computes, never what, since each sees only its own particles.
 //!
-//! Cost: O(tets) to make, 80 bytes a tet in single precision; made anew as a whole when the schedule, a tet, a mass or
-//! what is fixed changes. A step compares the schedule with the last one, which costs a look at each of its numbers.
+//! A layout follows its schedule (`follow.rs`): groups keep their blocks, a changed cluster is taken from its lane and
+//! put into one that is free, and a tet whose corners, rest shape or masses changed is marked and filled in again. So a
+//! frame after a cut costs what the cut touched. Another schedule, another material or a changed mass of which nobody
+//! said what hangs on it makes all anew.
+//!
+//! Cost: O(tets) to make, 80 bytes a tet in single precision; to follow, O(changed clusters and marked tets), amortized.
+
+mod check;
+mod follow;
+
+use std::ops::Range;
 
 use glam::DVec3;
-use incise_graph::Schedule;
+use incise_graph::{ClusterId, Rows, Schedule};
 
 use crate::Real;
 use crate::neo_hookean::TetConstraint;
@@ -18,25 +26,30 @@ use crate::neo_hookean::TetConstraint;
 pub(crate) const REST: usize = 9 + 6 + 1;
 /// Numbers a lane has in [`Layout::constants`]: `l/μ`, `γ` and the damping time.
 pub(crate) const CONSTANTS: usize = 3;
+/// No place, no seat, no group.
+const NONE: u32 = u32::MAX;
 
 /// The tets of a schedule, block by block.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Layout<R> {
-    /// What this was made for.
-    schedule: Schedule,
-    /// Whether a tet or a mass has changed since.
-    pub(crate) stale: bool,
+    /// The revision of the schedule that this is the layout of; `None` if it is to be made anew.
+    revision: Option<u64>,
     /// Lanes of a block.
     pub(crate) lanes: usize,
+    /// Whether there is but one material.
+    uniform: bool,
     /// Color -> groups.
-    color_offsets: Vec<u32>,
-    /// Group -> blocks.
-    group_offsets: Vec<u32>,
-    /// Block -> lanes that have a tet; the others follow them.
-    pub(crate) active: Vec<u8>,
-    /// Block and lane -> corners. Lanes without a tet repeat the first one's.
+    colors: Rows<u32>,
+    usages: Vec<Usage>,
+    groups: Vec<Group>,
+    /// Blocks -> groups of so many blocks that have no cluster.
+    free: Rows<u32>,
+    free_blocks: usize,
+    /// Block -> a bit for each lane that has a tet.
+    pub(crate) active: Vec<u16>,
+    /// Block and lane -> corners; particle 0 in lanes without a tet.
     pub(crate) particles: Vec<[u32; 4]>,
-    /// Block and lane -> tet.
+    /// Block and lane -> tet, in lanes that have one.
     tets: Vec<u32>,
     /// Block, number, lane: what a tet is at rest.
     pub(crate) rest: Vec<R>,
@@ -46,6 +59,54 @@ pub(crate) struct Layout<R> {
     pub(crate) constant: [R; CONSTANTS],
     /// Tet -> block and lane.
     places: Vec<u32>,
+    /// Cluster -> group and lane.
+    seats: Vec<u32>,
+    /// Tets in the layout that have changed since, and for each tet whether it is listed.
+    dirty: Vec<u32>,
+    marked: Vec<bool>,
+    /// Work.
+    clusters: Vec<ClusterId>,
+}
+
+/// Clusters that are solved side by side.
+#[derive(Clone, Copy, Debug)]
+struct Group {
+    /// The first of its blocks, and their number.
+    first: u32,
+    depth: u32,
+    color: u32,
+    /// Where it is among the groups of its color.
+    place: u32,
+    /// A bit for each lane that has a cluster.
+    occupied: u16,
+}
+
+/// How well the blocks of a color are used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Usage {
+    tets: u32,
+    blocks: u32,
+    /// The most blocks of a group since the groups of the color were formed.
+    depth: u32,
+    /// The group that takes new clusters.
+    open: u32,
+}
+
+impl Usage {
+    const NONE: Self = Self {
+        tets: 0,
+        blocks: 0,
+        depth: 0,
+        open: NONE,
+    };
+
+    /// Whether forming the groups anew is worth it. Newly formed, a color has no more than `tets / lanes + depth`
+    /// blocks, so in between at least half as many have become idle.
+    fn is_wasteful(self, lanes: usize) -> bool {
+        let lanes = u64::try_from(lanes).unwrap_or(u64::MAX);
+        let [tets, blocks, depth] = [self.tets, self.blocks, self.depth].map(u64::from);
+        2 * lanes * blocks > 3 * (tets + lanes * depth)
+    }
 }
 
 /// What a tet of the layout is made of.
@@ -57,14 +118,27 @@ pub(crate) struct Ingredients<R> {
     pub(crate) constants: [R; CONSTANTS],
 }
 
+impl<R: Real> Ingredients<R> {
+    /// What is stored for the tet.
+    fn rest(&self) -> [R; REST] {
+        let mut rest = [self.tet.stiffness; REST];
+        rest[..9].copy_from_slice(&self.tet.inverse_rest);
+        rest[9..15].copy_from_slice(&metric(&self.tet, self.weights));
+        rest
+    }
+}
+
 impl<R: Real> Default for Layout<R> {
     fn default() -> Self {
         Self {
-            schedule: Schedule::default(),
-            stale: true,
+            revision: None,
             lanes: 1,
-            color_offsets: Vec::new(),
-            group_offsets: Vec::new(),
+            uniform: true,
+            colors: Rows::default(),
+            usages: Vec::new(),
+            groups: Vec::new(),
+            free: Rows::default(),
+            free_blocks: 0,
             active: Vec::new(),
             particles: Vec::new(),
             tets: Vec::new(),
@@ -72,116 +146,71 @@ impl<R: Real> Default for Layout<R> {
             constants: Vec::new(),
             constant: [R::ZERO; CONSTANTS],
             places: Vec::new(),
+            seats: Vec::new(),
+            dirty: Vec::new(),
+            marked: Vec::new(),
+            clusters: Vec::new(),
         }
     }
 }
 
 impl<R: Real> Layout<R> {
-    /// Whether this is the layout of the schedule, and nothing has changed since.
+    /// Whether this is the layout of the schedule, and no tet has changed since.
     pub(crate) fn fits(&self, schedule: &Schedule) -> bool {
-        !self.stale && self.schedule == *schedule
+        self.revision == Some(schedule.revision()) && self.dirty.is_empty()
     }
 
-    /// Makes the layout of a schedule. `uniform` says that there is but one material.
-    pub(crate) fn rebuild(
-        &mut self,
-        schedule: &Schedule,
-        lanes: usize,
-        uniform: bool,
-        ingredients: impl Fn(u32) -> Ingredients<R>,
-    ) {
-        let _span = tracing::debug_span!("xpbd::layout").entered();
-        self.schedule.clone_from(schedule);
-        self.stale = false;
-        self.lanes = lanes;
-        self.color_offsets.clear();
-        self.group_offsets.clear();
-        self.active.clear();
-        self.particles.clear();
-        self.tets.clear();
-        self.color_offsets.push(0);
-        self.group_offsets.push(0);
-        let mut slots: Vec<usize> = Vec::new();
-        for color in 0..schedule.color_count() {
-            slots.clear();
-            slots.extend(schedule.clusters(color));
-            slots.sort_by_key(|&slot| std::cmp::Reverse(schedule.constraints(slot).len()));
-            for group in slots.chunks(lanes) {
-                self.push_group(schedule, group);
-            }
-            self.color_offsets.push(index(self.group_offsets.len() - 1));
+    /// From now on nothing here is to be trusted.
+    pub(crate) fn forget(&mut self) {
+        self.revision = None;
+    }
+
+    /// Notes that the corners, the rest shape or the masses of a tet have changed. O(1).
+    pub(crate) fn touch(&mut self, tet: usize) {
+        if self.revision.is_some() && self.place(tet).is_some() && !self.marked[tet] {
+            self.marked[tet] = true;
+            self.dirty.push(index(tet));
         }
-        self.fill(uniform, ingredients);
     }
 
-    /// Appends the blocks of clusters that are solved side by side, the largest first.
-    fn push_group(&mut self, schedule: &Schedule, slots: &[usize]) {
-        for step in 0..schedule.constraints(slots[0]).len() {
-            let at = |&slot: &usize| schedule.constraints(slot).get(step).copied();
-            let tets = slots.iter().map_while(at);
-            let first = self.tets.len();
-            self.tets.extend(tets);
-            let active = self.tets.len() - first;
-            self.tets.resize(first + self.lanes, self.tets[first]);
-            self.active.push(u8::try_from(active).unwrap_or(u8::MAX));
-        }
-        self.group_offsets.push(index(self.active.len()));
-    }
-
-    /// Fills in what the tets are at rest.
-    fn fill(&mut self, uniform: bool, ingredients: impl Fn(u32) -> Ingredients<R>) {
+    /// Fills in what a tet is.
+    fn fill(&mut self, place: usize, tet: u32, ingredients: &Ingredients<R>) {
         let lanes = self.lanes;
-        self.rest.clear();
-        self.rest.resize(self.tets.len() * REST, R::ZERO);
-        self.constants.clear();
-        if !uniform {
-            self.constants.resize(self.tets.len() * CONSTANTS, R::ZERO);
+        let (block, lane) = (place / lanes, place % lanes);
+        self.particles[place] = ingredients.tet.particles;
+        if self.uniform {
+            self.constant = ingredients.constants;
+        } else {
+            let start = block * CONSTANTS * lanes + lane;
+            for (k, value) in ingredients.constants.into_iter().enumerate() {
+                self.constants[start + k * lanes] = value;
+            }
         }
-        self.places.clear();
-        for (place, &tet) in self.tets.iter().enumerate() {
-            let (block, lane) = (place / lanes, place % lanes);
-            let Ingredients {
-                tet: constraint,
-                weights,
-                constants,
-            } = ingredients(tet);
-            self.particles.push(constraint.particles);
-            if uniform {
-                self.constant = constants;
-            } else {
-                let start = block * CONSTANTS * lanes + lane;
-                for (k, value) in constants.into_iter().enumerate() {
-                    self.constants[start + k * lanes] = value;
-                }
-            }
-            if lane >= usize::from(self.active[block]) {
-                continue;
-            }
-            let start = block * REST * lanes + lane;
-            let metric = metric(&constraint, weights);
-            let values = constraint.inverse_rest.into_iter().chain(metric);
-            for (k, value) in values.chain([constraint.stiffness]).enumerate() {
-                self.rest[start + k * lanes] = value;
-            }
-            if self.places.len() <= tet as usize {
-                self.places.resize(tet as usize + 1, u32::MAX);
-            }
-            self.places[tet as usize] = index(place);
+        let start = block * REST * lanes + lane;
+        for (k, value) in ingredients.rest().into_iter().enumerate() {
+            self.rest[start + k * lanes] = value;
         }
+        self.marked[tet as usize] = false;
     }
 
     /// The groups of a color.
-    pub(crate) fn groups(&self, color: usize) -> std::ops::Range<usize> {
-        self.color_offsets[color] as usize..self.color_offsets[color + 1] as usize
+    pub(crate) fn groups(&self, color: usize) -> &[u32] {
+        self.colors.row(color)
     }
 
-    /// The blocks of some groups.
-    pub(crate) fn blocks(&self, groups: std::ops::Range<usize>) -> std::ops::Range<usize> {
-        self.group_offsets[groups.start] as usize..self.group_offsets[groups.end] as usize
+    /// The blocks of a group.
+    pub(crate) fn blocks(&self, group: u32) -> Range<usize> {
+        let group = self.groups[group as usize];
+        group.first as usize..(group.first + group.depth) as usize
+    }
+
+    /// The number of blocks of a color.
+    pub(crate) fn blocks_of(&self, color: usize) -> usize {
+        self.usages[color].blocks as usize
     }
 
     pub(crate) fn color_count(&self) -> usize {
-        self.color_offsets.len().saturating_sub(1)
+        self.colors.row_count()
     }
 
     pub(crate) fn block_count(&self) -> usize {
@@ -190,8 +219,9 @@ impl<R: Real> Layout<R> {
 
     /// The block and the lane of a tet; `None` if the schedule does not solve it.
     pub(crate) fn place(&self, tet: usize) -> Option<(usize, usize)> {
-        let place = *self.places.get(tet)? as usize;
-        (place < self.tets.len()).then_some((place / self.lanes, place % self.lanes))
+        let place = *self.places.get(tet)?;
+        let place = (place != NONE).then_some(place as usize)?;
+        Some((place / self.lanes, place % self.lanes))
     }
 }
 
@@ -224,3 +254,6 @@ fn metric<R: Real>(tet: &TetConstraint<R>, weights: [R; 4]) -> [R; 6] {
 fn index(value: usize) -> u32 {
     u32::try_from(value).expect("fewer than 2³² tets, lanes included")
 }
+
+#[cfg(test)]
+mod tests;

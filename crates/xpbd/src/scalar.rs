@@ -7,7 +7,7 @@
 //!
 //! Source: Macklin, Müller, Chentanez 2016, equations 18 and 26. Cost: 60 operations a distance, 150 a volume.
 
-use incise_graph::{Incidence, Schedule};
+use incise_graph::{ClusterId, Incidence, Schedule};
 use rayon::prelude::*;
 
 use crate::real::{load, store, weight};
@@ -101,19 +101,22 @@ impl<R: Real, C> Constraints<R, C> {
         let threads = rayon::current_num_threads();
         let schedule = &self.schedule;
         for color in 0..schedule.color_count() {
-            let constraints = schedule.color_constraints(color);
-            if threads == 1 || constraints.len() < PARALLEL_CONSTRAINTS {
-                constraints.iter().for_each(|&index| solve(index as usize));
-                continue;
-            }
             let clusters = schedule.clusters(color);
-            (0..threads).into_par_iter().for_each(|thread| {
-                let share = |part| clusters.start + clusters.len() * part / threads;
-                for cluster in share(thread)..share(thread + 1) {
+            let solve_all = |clusters: &[ClusterId]| {
+                for &cluster in clusters {
                     for &index in schedule.constraints(cluster) {
                         solve(index as usize);
                     }
                 }
+            };
+            let mut constraints = schedule.color_constraints(color);
+            if threads == 1 || constraints.nth(PARALLEL_CONSTRAINTS - 1).is_none() {
+                solve_all(clusters);
+                continue;
+            }
+            (0..threads).into_par_iter().for_each(|thread| {
+                let share = |part| clusters.len() * part / threads;
+                solve_all(&clusters[share(thread)..share(thread + 1)]);
             });
         }
     }

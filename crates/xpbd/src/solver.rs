@@ -2,7 +2,7 @@
 //!
 //! Constraints keep the numbers of the mesh's tets; the order of solving is a [`Schedule`]'s business and comes from
 //! outside with every step. Topology changes arrive as single edits (a new particle between two others, a copy, a tet
-//! replaced), each in constant time, so that a cut costs what it touches.
+//! replaced), each in constant time, and mark what the next step has to look at, so that a cut costs what it touches.
 
 use fearless_simd::Level;
 use glam::DVec3;
@@ -150,7 +150,7 @@ impl<R: Real> Solver<R> {
     pub fn add_material(&mut self, material: Material) -> Result<u16, XpbdError> {
         material.check()?;
         self.materials.push(material);
-        self.layout.stale = true;
+        self.layout.forget();
         Ok(u16::try_from(self.materials.len() - 1).expect("at most 65,536 materials"))
     }
 
@@ -162,7 +162,6 @@ impl<R: Real> Solver<R> {
         let constraint = self.constraint(particles, rest, material);
         self.tets.push(constraint);
         self.volumes.push(signed_volume(rest));
-        self.layout.stale = true;
         self.material_of.push(material);
     }
 
@@ -173,7 +172,7 @@ impl<R: Real> Solver<R> {
     pub fn replace_tet(&mut self, tet: usize, particles: [u32; 4], rest: [DVec3; 4]) {
         self.tets[tet] = self.constraint(particles, rest, self.material_of[tet]);
         self.volumes[tet] = signed_volume(rest);
-        self.layout.stale = true;
+        self.layout.touch(tet);
     }
 
     /// Hangs a tet on other particles that are copies of its own.
@@ -183,7 +182,59 @@ impl<R: Real> Solver<R> {
     pub fn relink_tet(&mut self, tet: usize, particles: [u32; 4]) {
         self.check_particles(particles);
         self.tets[tet].particles = particles;
-        self.layout.stale = true;
+        self.layout.touch(tet);
+    }
+
+    /// Gives a tet's place to another one, with its material; the other one stays where it is, to be taken away by
+    /// [`Solver::truncate_tets`] or replaced. O(1).
+    ///
+    /// # Panics
+    /// If one of them does not exist.
+    pub fn move_tet(&mut self, from: usize, to: usize) {
+        self.tets[to] = self.tets[from];
+        self.volumes[to] = self.volumes[from];
+        self.material_of[to] = self.material_of[from];
+        self.layout.touch(to);
+    }
+
+    /// Takes the last tets away until there are `count`; nothing happens if there are no more. Schedules must not name
+    /// them any more. O(tets taken away).
+    ///
+    /// # Example
+    /// Tets are kept dense: the last one takes the place of one that is deleted.
+    /// ```
+    /// # use glam::DVec3;
+    /// # use incise_xpbd::{Material, Solver};
+    /// # let rest = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+    /// # let mut solver = Solver::<f64>::new(&[DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE]);
+    /// # let rubber = Material { young_modulus: 1e4, poisson_ratio: 0.4, density: 1e3, damping: 0.0 };
+    /// # solver.add_material(rubber)?;
+    /// for tet in [[0, 1, 2, 3], [1, 4, 2, 3], [1, 4, 2, 3]] {
+    ///     solver.push_tet(tet, rest, 0);
+    /// }
+    /// solver.move_tet(2, 0);
+    /// solver.truncate_tets(2);
+    /// assert_eq!((solver.tet_count(), solver.tet_particles(0)), (2, [1, 4, 2, 3]));
+    /// # Ok::<(), incise_xpbd::XpbdError>(())
+    /// ```
+    pub fn truncate_tets(&mut self, count: usize) {
+        for tet in count..self.tets.len() {
+            self.layout.touch(tet);
+        }
+        self.tets.truncate(count);
+        self.volumes.truncate(count);
+        self.material_of.truncate(count);
+    }
+
+    /// Takes the last particles away until there are `count`, with what attaches them; nothing happens if there are no
+    /// more. No tet and no constraint may hang on them when the next step begins. O(particles taken away).
+    pub fn truncate_particles(&mut self, count: usize) {
+        self.particles.truncate(count);
+        self.previous.truncate(count);
+        self.velocities.truncate(count);
+        self.masses.truncate(count);
+        self.fixed.truncate(count);
+        self.attachments.truncate(count);
     }
 
     fn constraint(&self, particles: [u32; 4], rest: [DVec3; 4], material: u16) -> TetConstraint<R> {
@@ -278,17 +329,40 @@ impl<R: Real> Solver<R> {
         self.fixed.push(fixed);
     }
 
-    /// Sets the mass of a particle in kg. A particle without mass does not move.
+    /// Sets the mass of a particle in kg. A particle without mass does not move. As it is not known which tets have the
+    /// particle, the next step goes through all: see [`Solver::set_mass_in_star`].
     ///
     /// # Panics
     /// If the particle does not exist or the mass is negative or not finite.
     pub fn set_mass(&mut self, particle: usize, mass: f64) {
+        self.put_mass(particle, mass);
+        self.set_weight(particle);
+    }
+
+    /// The same where the star of the particle is known, the tets that it is a corner of, so that the next step has to
+    /// look at no others. Tets named without need do no harm; one that is left out is solved with the old mass, which
+    /// [`Solver::check_layout`] finds. O(tets of the star).
+    ///
+    /// # Panics
+    /// If the particle does not exist or the mass is negative or not finite.
+    pub fn set_mass_in_star(
+        &mut self,
+        particle: usize,
+        mass: f64,
+        star: impl IntoIterator<Item = usize>,
+    ) {
+        self.put_mass(particle, mass);
+        if self.update_weight(particle) {
+            star.into_iter().for_each(|tet| self.layout.touch(tet));
+        }
+    }
+
+    fn put_mass(&mut self, particle: usize, mass: f64) {
         assert!(
             mass.is_finite() && mass >= 0.0,
             "a mass is finite and not negative"
         );
         self.masses[particle] = mass;
-        self.set_weight(particle);
     }
 
     /// Fixes a particle where it is, or lets it go.
@@ -303,15 +377,23 @@ impl<R: Real> Solver<R> {
         self.set_weight(particle);
     }
 
+    /// Follows a change of mass or of what holds a particle.
     pub(crate) fn set_weight(&mut self, particle: usize) {
+        if self.update_weight(particle) {
+            self.layout.forget();
+        }
+    }
+
+    /// Computes the inverse mass of a particle anew; returns whether it is another one.
+    fn update_weight(&mut self, particle: usize) -> bool {
         let inverse = R::from_f64(1.0 / self.masses[particle]);
         // A mass so small that its inverse overflows belongs to a speck that could only do harm if it moved.
         let held = self.fixed[particle] || self.attachments.holds(particle);
         let free = !held && inverse.is_finite();
-        let [x, y, z, _] = R::read(&self.particles[particle]);
+        let [x, y, z, before] = R::read(&self.particles[particle]);
         let weight = if free { inverse } else { R::ZERO };
         R::write(&self.particles[particle], [x, y, z, weight]);
-        self.layout.stale = true;
+        weight != before
     }
 
     /// For methods that solve nothing but tets and what is held rigidly.

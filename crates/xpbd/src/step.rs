@@ -15,7 +15,7 @@ use crate::collider::Obstacle;
 use crate::gauss_seidel;
 use crate::jacobi::Jacobi;
 use crate::lanes::Pass;
-use crate::layout::Ingredients;
+use crate::layout::{Ingredients, Layout};
 use crate::real::{finite, load, store, weight};
 use crate::{Method, Real, Solver, StepSettings, XpbdError};
 
@@ -202,31 +202,49 @@ impl<R: Real> Solver<R> {
         }
     }
 
-    /// Puts the tets into the order of the schedule, unless they are.
+    /// Puts the tets into the order of the schedule, unless they are. Costs what has changed of both.
     fn lay_out(&mut self, schedule: &Schedule) {
         if self.layout.fits(schedule) {
             return;
         }
-        if let Some(&tet) = schedule.order().iter().max() {
-            assert!(
-                (tet as usize) < self.tets.len(),
-                "the schedule belongs to these tets"
-            );
-        }
         let mut layout = std::mem::take(&mut self.layout);
-        let lanes = gauss_seidel::lanes::<R>(self.level);
-        layout.rebuild(schedule, lanes, self.materials.len() < 2, |t| {
-            let tet = self.tets[t as usize];
-            let material = &self.materials[usize::from(self.material_of[t as usize])];
-            Ingredients {
-                tet,
-                weights: tet
-                    .particles
-                    .map(|p| weight::<R>(&self.particles[p as usize])),
-                constants: [tet.ratio, tet.gamma, R::from_f64(material.damping)],
-            }
-        });
+        self.bring_up(&mut layout, schedule);
         self.layout = layout;
+    }
+
+    fn bring_up(&self, layout: &mut Layout<R>, schedule: &Schedule) {
+        let lanes = gauss_seidel::lanes::<R>(self.level);
+        let uniform = self.materials.len() < 2;
+        layout.follow(schedule, lanes, uniform, |t| self.ingredients(t));
+    }
+
+    /// What the layout needs of a tet.
+    fn ingredients(&self, t: u32) -> Ingredients<R> {
+        let tet = self.tets.get(t as usize);
+        let tet = *tet.expect("the schedule belongs to these tets");
+        let material = &self.materials[usize::from(self.material_of[t as usize])];
+        Ingredients {
+            tet,
+            weights: tet
+                .particles
+                .map(|p| weight::<R>(&self.particles[p as usize])),
+            constants: [tet.ratio, tet.gamma, R::from_f64(material.damping)],
+        }
+    }
+
+    /// Proves that what the next step with this schedule would solve is what schedule, tets and masses say, to the bit.
+    /// A step carries over only what has changed since the last one; this finds what was forgotten, above all by
+    /// [`Solver::set_mass_in_star`]. O(tets); for tests and on request.
+    ///
+    /// # Errors
+    /// [`XpbdError::Layout`] with the first difference.
+    ///
+    /// # Panics
+    /// If the schedule names a tet that does not exist.
+    pub fn check_layout(&self, schedule: &Schedule) -> Result<(), XpbdError> {
+        let mut layout = self.layout.clone();
+        self.bring_up(&mut layout, schedule);
+        layout.check(schedule, |t| self.ingredients(t))
     }
 
     /// The multipliers of a tet after the last substep; zero if the schedule does not solve it.

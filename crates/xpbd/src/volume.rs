@@ -214,7 +214,7 @@ impl<R: Real> Solver<R> {
     /// If the schedule names a constraint that does not exist.
     pub fn reschedule_volumes(&mut self, schedule: &Schedule) {
         if let Some(volumes) = &mut self.volume_constraints {
-            let last = schedule.order().iter().max().copied();
+            let last = schedule.order().max();
             assert!(
                 last.is_none_or(|c| (c as usize) < volumes.list.len()),
                 "the schedule belongs to these volume constraints"

@@ -75,6 +75,8 @@ pub struct Recoloring {
     /// The number of colors after the last full coloring.
     reference: usize,
     slack: usize,
+    /// See [`Recoloring::changed`].
+    changed: Vec<u32>,
 }
 
 impl Recoloring {
@@ -142,6 +144,7 @@ impl Recoloring {
             sizes: Vec::new(),
             reference: 0,
             slack,
+            changed: Vec::new(),
         };
         recoloring.count();
         recoloring
@@ -151,6 +154,13 @@ impl Recoloring {
     #[must_use]
     pub fn coloring(&self) -> &Coloring {
         &self.coloring
+    }
+
+    /// The vertices that the last edit gave another color, new ones included, some of them several
+    /// times; complete unless it colored all anew ([`Recolored::full`]).
+    #[must_use]
+    pub fn changed(&self) -> &[u32] {
+        &self.changed
     }
 
     /// The number of colors: the largest label plus one. O(1).
@@ -193,6 +203,7 @@ impl Recoloring {
         added: &[(u32, u32)],
     ) -> Result<Recolored, ColoringError> {
         let mut report = Recolored::default();
+        self.changed.clear();
         self.unlink(removed)?;
         for &(v, particle) in added {
             self.links.add(v, particle);
@@ -368,6 +379,7 @@ impl Recoloring {
     /// Changes a color and the sizes with it.
     fn set(&mut self, v: u32, color: ColorId) {
         let old = self.coloring.color(v as usize);
+        self.changed.push(v);
         if old != UNCOLORED {
             self.sizes[old.index()] -= 1;
         }

@@ -1,9 +1,11 @@
 //! Bodies to cut, and the oracle for the number of pieces.
 
+use std::collections::BTreeSet;
+
 use glam::DVec3;
-use incise_cutting::{CutDelta, CutOptions, CuttableMesh};
+use incise_cutting::{BoundaryTriangle, CutDelta, CutOptions, CuttableMesh, FaceTag};
 use incise_mesh::generate::{Shape, generate, kuhn_box};
-use incise_mesh::{ParticleId, TetMesh};
+use incise_mesh::{ParticleId, TetId, TetMesh};
 
 /// A hash of a seed and a number, in -1..1.
 pub(crate) fn noise(seed: u64, number: usize) -> f64 {
@@ -88,15 +90,17 @@ pub(crate) fn check_cut(before: &TetMesh, after: &CuttableMesh, delta: &CutDelta
     let mut replayed = before.clone();
     delta.apply(&mut replayed);
     assert_eq!(&replayed, after.mesh(), "the delta says everything");
-    let (old, new) = (before.total_volume(), after.mesh().total_volume());
+    let gone: f64 = delta.deleted.iter().map(|t| before.volume(t.tet)).sum();
+    let (old, new) = (before.total_volume() - gone, after.mesh().total_volume());
     assert!(
-        (old - new).abs() <= 1e-12 * old,
+        (old - new).abs() <= 1e-12 * (old + gone),
         "volume {old} became {new}"
     );
-    assert_eq!(
-        after.mesh().pieces().count,
-        after.mesh().face_pieces().count
-    );
+    // What hangs together, hangs together by faces, unless parts touched in a particle or an edge before.
+    let by_faces = |mesh: &TetMesh| mesh.face_pieces().count == mesh.pieces().count;
+    assert!(by_faces(after.mesh()) || !by_faces(before));
+    check_boundary(before, after, delta);
+    check_undo(before, after, delta);
     assert_eq!(delta.tets_after(), after.mesh().tets.len());
     assert_eq!(delta.particles_after(), after.mesh().positions.len());
     let mut used = vec![false; after.mesh().positions.len()];
@@ -116,7 +120,103 @@ pub(crate) fn check_cut(before: &TetMesh, after: &CuttableMesh, delta: &CutDelta
         });
     let orphan =
         (0..used.len()).find(|&p| !used[p] && (before_used[p] || p >= before.positions.len()));
-    assert_eq!(orphan, None, "no particle loses all its tets");
+    if delta.deleted.is_empty() {
+        assert_eq!(orphan, None, "no particle loses all its tets");
+    }
+}
+
+/// The triangles that the delta names are those that the boundary lost and gained, and cut faces are those that were
+/// inside before.
+fn check_boundary(before: &TetMesh, after: &CuttableMesh, delta: &CutDelta) {
+    type Triangle = (TetId, [ParticleId; 3]);
+    let of = |mesh: &TetMesh| {
+        let surface = mesh.surface();
+        let pairs = surface.tets.into_iter().zip(surface.triangles);
+        pairs.map(turned).collect::<BTreeSet<Triangle>>()
+    };
+    fn turned((tet, mut face): Triangle) -> Triangle {
+        let least = (0..3).min_by_key(|&i| face[i]).unwrap();
+        face.rotate_left(least);
+        (tet, face)
+    }
+    let listed = |list: &[BoundaryTriangle]| {
+        let triangles = list.iter().map(|t| turned((t.tet, t.particles)));
+        let set: BTreeSet<Triangle> = triangles.collect();
+        assert_eq!(set.len(), list.len(), "no triangle is named twice");
+        set
+    };
+    let (removed, added) = (listed(&delta.surface_removed), listed(&delta.surface_added));
+    let mut boundary = of(before);
+    for triangle in &removed {
+        assert!(
+            boundary.remove(triangle),
+            "{triangle:?} was on the boundary"
+        );
+    }
+    let mut moved = BTreeSet::new();
+    for (tet, face) in boundary {
+        let found = delta.moved.iter().find(|m| m.from == tet);
+        moved.insert((found.map_or(tet, |m| m.to), face));
+    }
+    for triangle in &added {
+        assert!(
+            moved.insert(*triangle),
+            "{triangle:?} is new on the boundary"
+        );
+    }
+    assert_eq!(moved, of(after.mesh()));
+    let all: Vec<BoundaryTriangle> = after.boundary().collect();
+    assert_eq!(listed(&all), moved);
+    assert_eq!(all.len(), after.boundary_count());
+    // Outer faces keep their area, cut faces come in pairs of equal area, but for a removal.
+    let area = |mesh: &TetMesh, list: &[BoundaryTriangle], outer: bool| -> f64 {
+        let of_kind = list.iter().filter(|t| (t.tag == FaceTag::Outer) == outer);
+        of_kind
+            .map(|t| {
+                let [a, b, c] = t.particles.map(|p| mesh.positions[p.index()]);
+                (b - a).cross(c - a).length() / 2.0
+            })
+            .sum()
+    };
+    if delta.deleted.is_empty() {
+        let lost = area(before, &delta.surface_removed, true);
+        let gained = area(after.mesh(), &delta.surface_added, true);
+        assert!((lost - gained).abs() <= 1e-9 * (1.0 + lost));
+    }
+}
+
+/// Undone, the mesh is what it was to the byte, everything derived too; done again, it is what it became.
+fn check_undo(before: &TetMesh, after: &CuttableMesh, delta: &CutDelta) {
+    let mut undone = after.clone();
+    undone.undo(delta).unwrap();
+    undone.check().unwrap();
+    let bytes = |mesh: &TetMesh| {
+        let xyz = mesh.positions.iter().flat_map(|x| x.to_array());
+        let bits: Vec<u64> = xyz.map(f64::to_bits).collect();
+        (bits, mesh.tets.clone())
+    };
+    assert_eq!(bytes(undone.mesh()), bytes(before));
+    let tags = |body: &CuttableMesh| {
+        let list = body.boundary().map(|t| (t.tet, t.opposite, t.tag));
+        list.collect::<BTreeSet<_>>()
+    };
+    // Undone twice is refused, unless the delta changed nothing.
+    if !delta.is_empty() {
+        assert!(undone.undo(delta).is_err());
+    }
+    let mut expected = tags(after);
+    for triangle in &delta.surface_added {
+        assert!(expected.remove(&(triangle.tet, triangle.opposite, triangle.tag)));
+    }
+    let mut back = BTreeSet::new();
+    for (tet, opposite, tag) in expected {
+        let found = delta.moved.iter().find(|m| m.to == tet);
+        back.insert((found.map_or(tet, |m| m.from), opposite, tag));
+    }
+    for triangle in &delta.surface_removed {
+        back.insert((triangle.tet, triangle.opposite, triangle.tag));
+    }
+    assert_eq!(tags(&undone), back);
 }
 
 /// The default options with another snap distance.

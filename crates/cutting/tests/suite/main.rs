@@ -3,8 +3,14 @@
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 
 mod bodies;
+mod deltas;
 mod joins;
 mod level_sets;
+mod pieces;
 mod planes;
+mod programs;
+mod removal;
+mod scenarios;
+mod separation;
 mod surfaces;
 mod sweeps;

@@ -31,7 +31,7 @@ fn any_number_of_threads_gives_the_same_bits() {
         let mut one = Simulation::with_threads(&scene, 1).unwrap();
         let mut other = Simulation::with_threads(&scene, 2).unwrap();
         let schedule = one.schedule();
-        let sizes = (0..schedule.color_count()).map(|c| schedule.color_constraints(c).len());
+        let sizes = (0..schedule.color_count()).map(|c| schedule.color_constraints(c).count());
         assert!(
             sizes.max().unwrap() >= PARALLEL,
             "no color is large enough to be shared among threads: the test proves nothing"

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 
 mod bodies;
+mod conservation;
 mod constraints;
 mod cutting;
 mod determinism;
@@ -12,6 +13,7 @@ mod methods;
 mod mistakes;
 mod parsing;
 mod physics;
+mod pieces;
 mod preset;
 mod regions;
 mod reports;

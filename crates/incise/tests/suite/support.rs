@@ -69,16 +69,36 @@ pub(crate) fn state(simulation: &Simulation) -> Vec<u64> {
         .collect()
 }
 
-/// Colors and schedule as words.
+/// Colors and schedule as words: the order of solving with the clusters of each color sorted, which run at the same
+/// time, and where each color and each cluster ends.
 fn plan(simulation: &Simulation) -> Vec<u64> {
     let schedule = simulation.schedule();
     let coloring = simulation.coloring();
-    let order = schedule.order().iter();
+    let (mut order, mut colors, mut ends) = (Vec::new(), vec![0], vec![0]);
+    for color in 0..schedule.color_count() {
+        let mut clusters = schedule.clusters(color).to_vec();
+        clusters.sort_unstable();
+        for cluster in clusters {
+            order.extend(schedule.constraints(cluster).iter().map(|&t| u64::from(t)));
+            ends.push(order.len() as u64);
+        }
+        colors.push(ends.len() as u64 - 1);
+    }
     coloring
         .colors()
         .iter()
         .map(|color| u64::from(color.0))
-        .chain(order.chain(schedule.color_offsets()).map(|&i| u64::from(i)))
-        .chain(schedule.slot_offsets().iter().map(|&i| u64::from(i)))
+        .chain(order)
+        .chain(colors)
+        .chain(ends)
         .collect()
+}
+
+/// A hash of a seed and a number, in -1..1.
+pub(crate) fn noise(seed: u64, number: usize) -> f64 {
+    let mut x = seed ^ (number as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    for _ in 0..2 {
+        x = (x ^ (x >> 31)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    }
+    (x >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
 }

@@ -66,14 +66,14 @@ impl<R: Real> Stars<R> {
         self.colors.clear();
         self.colors.push(0);
         for color in 0..schedule.color_count() {
-            let end = self.colors[color] + schedule.color_constraints(color).len();
+            let end = self.colors[color] + schedule.color_constraints(color).count();
             self.colors.push(end);
         }
         self.offsets.clear();
         self.offsets.push(0);
         self.spokes.clear();
         self.tets.clear();
-        for &p in schedule.order() {
+        for p in schedule.order() {
             for &t in incidence.particles_of(p as usize) {
                 let tet = solver.tets[t as usize].to_f64();
                 let corner = tet.particles.iter().position(|&corner| corner == p);

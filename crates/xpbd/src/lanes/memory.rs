@@ -51,11 +51,12 @@ pub(super) fn gather<R: Real, S: Simd>(
     gathered
 }
 
-/// Hands each corner of each tet to `write`.
+/// Hands each corner of each tet in an active lane to `write`.
 #[inline(always)]
 pub(super) fn scatter<R: Real, S: Simd>(
     x: &[[R::Lanes<S>; 4]; 4],
     corners: &[[u32; 4]],
+    active: u16,
     write: impl Fn(u32, [R; 4]),
 ) {
     let lanes = R::Lanes::<S>::LEN;
@@ -69,8 +70,10 @@ pub(super) fn scatter<R: Real, S: Simd>(
         b.store_slice(&mut buffer[lanes..2 * lanes]);
         c.store_slice(&mut buffer[2 * lanes..3 * lanes]);
         d.store_slice(&mut buffer[3 * lanes..4 * lanes]);
-        for (values, corner) in buffer.chunks_exact(4).zip(corners) {
-            write(corner[k], [values[0], values[1], values[2], values[3]]);
+        for (lane, (values, corner)) in buffer.chunks_exact(4).zip(corners).enumerate() {
+            if active & (1 << lane) != 0 {
+                write(corner[k], [values[0], values[1], values[2], values[3]]);
+            }
         }
     }
 }

@@ -77,7 +77,7 @@ impl<R: Real> Case<R> {
         let mut layout = Layout::default();
         let lanes = gauss_seidel::lanes::<R>(level);
         let damping = if damped { RUBBER.damping } else { 0.0 };
-        layout.rebuild(&schedule, lanes, true, |t| {
+        layout.follow(&schedule, lanes, true, |t| {
             let tet = self.tets[t as usize];
             Ingredients {
                 weights: tet.particles.map(|p| self.particles[p as usize][3]),

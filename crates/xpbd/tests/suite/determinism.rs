@@ -39,7 +39,8 @@ fn state<R: Real>(threads: usize, clustering: &str, settings: &StepSettings) -> 
     let mesh = kuhn_box([20, 20, 20], DVec3::ONE);
     let schedule = schedule(&mesh, "scgc", clustering);
     // The solver shares a color out from 128 tets on, or fewer on narrower processors: most colors of this body are larger by far.
-    let large = (0..schedule.color_count()).filter(|&c| schedule.color_constraints(c).len() > 1024);
+    let large =
+        (0..schedule.color_count()).filter(|&c| schedule.color_constraints(c).count() > 1024);
     assert!(large.count() > 10);
     let mut solver = body::<R>(&mesh, DAMPED);
     disturb(&mut solver, 0.005, 6);

@@ -29,6 +29,7 @@ mod ground;
 mod guards;
 mod kappa;
 mod large_deformations;
+mod layout;
 mod origin;
 mod recovery;
 mod reference;

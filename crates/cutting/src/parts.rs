@@ -1,0 +1,239 @@
+//! [`Parts`]: which parts of a piece have come off, found by searches that stop as soon as they can.
+//!
+//! A search starts at each particle where the piece may have come apart. All advance in lockstep, one particle a round,
+//! from a particle to the particles of the tets around it. Searches that meet become one. A search with nothing left to
+//! find has found a complete part; once a single search is left the others are all parts that came off, and what that
+//! one would still find is the rest. So a slit costs the way around its front, and a part that comes off about twice
+//! its own size, however large the rest is.
+//!
+//! Source: parallel search from both ends of a deleted edge, as in Y. Shiloach and S. Even, "An On-Line Edge-Deletion
+//! Problem", 1981. Cost: O(seeds + parts × the largest part that came off); where two parts still hang together far
+//! away, as in a ring cut once, up to the whole piece.
+
+use incise_mesh::{ParticleId, TetId};
+
+use crate::CuttableMesh;
+
+const NONE: u32 = u32::MAX;
+
+/// Searches and what they have found. Kept from cut to cut so that a cut asks for no memory that another has freed.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Parts {
+    /// By particle: the search that found it first.
+    search_of: Vec<u32>,
+    /// All particles found, each in one list of one search.
+    found: Vec<Found>,
+    searches: Vec<Search>,
+    /// The tets that came off: those of a part together, ascending.
+    tets: Vec<TetId>,
+    /// Where in `tets` each part ends.
+    ends: Vec<usize>,
+    /// How often the tets around a particle were looked at, a tet at a time.
+    pub(crate) looks: usize,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    particle: ParticleId,
+    next: u32,
+}
+
+/// A first-in first-out list through [`Found::next`].
+#[derive(Clone, Copy, Debug)]
+struct List {
+    first: u32,
+    last: u32,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Search {
+    /// The search it has become one with, or itself.
+    parent: u32,
+    /// Particles whose tets have not been looked at.
+    open: List,
+    done: List,
+}
+
+impl Parts {
+    /// Finds what came off the piece that all of `seeds` were on. Each part of it holds a seed; seeds are different and
+    /// none is without tets. Afterwards [`Parts::iter`] lists the parts.
+    ///
+    /// What is left is not among them: it is the part whose search was still going on when all others had ended, or, if
+    /// none was, the one with the most tets, then the one with the lowest tet.
+    pub(crate) fn find(&mut self, cuttable: &CuttableMesh, seeds: &[ParticleId]) {
+        self.tets.clear();
+        self.ends.clear();
+        self.search_of.resize(cuttable.mesh().positions.len(), NONE);
+        let mut going: Vec<u32> = seeds.iter().map(|&seed| self.start(seed)).collect();
+        let mut ended: Vec<u32> = Vec::new();
+        while going.len() > 1 {
+            for &search in &going {
+                // Others may have become one with it in this round.
+                if self.searches[search as usize].parent == search {
+                    self.advance(cuttable, search);
+                }
+            }
+            going.retain(|&search| {
+                let Search { parent, open, .. } = self.searches[search as usize];
+                if parent == search && open.first == NONE {
+                    ended.push(search);
+                }
+                parent == search && open.first != NONE
+            });
+        }
+        for &search in &ended {
+            self.gather(cuttable, search);
+        }
+        if going.is_empty() {
+            self.keep_largest();
+        }
+        for found in self.found.drain(..) {
+            self.search_of[found.particle.index()] = NONE;
+        }
+        self.searches.clear();
+    }
+
+    /// The tets of each part that came off, ascending within a part.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &[TetId]> {
+        let starts = std::iter::once(0).chain(self.ends.iter().copied());
+        starts
+            .zip(&self.ends)
+            .map(|(start, &end)| &self.tets[start..end])
+    }
+
+    fn start(&mut self, seed: ParticleId) -> u32 {
+        let search = count(self.searches.len());
+        let empty = List {
+            first: NONE,
+            last: NONE,
+        };
+        self.searches.push(Search {
+            parent: search,
+            open: empty,
+            done: empty,
+        });
+        self.find_particle(search, seed);
+        search
+    }
+
+    /// Notes a particle that no search has found.
+    fn find_particle(&mut self, search: u32, particle: ParticleId) {
+        self.search_of[particle.index()] = search;
+        let one = count(self.found.len());
+        self.found.push(Found {
+            particle,
+            next: NONE,
+        });
+        let open = self.searches[search as usize].open;
+        self.searches[search as usize].open = self.joined(open, List::of(one));
+    }
+
+    /// Looks at the tets around the next particle of a search.
+    fn advance(&mut self, cuttable: &CuttableMesh, mut search: u32) {
+        let Search { open, done, .. } = self.searches[search as usize];
+        let next = open.first;
+        let Found {
+            particle,
+            next: then,
+        } = self.found[next as usize];
+        self.found[next as usize].next = NONE;
+        let last = if then == NONE { NONE } else { open.last };
+        self.searches[search as usize].open = List { first: then, last };
+        self.searches[search as usize].done = self.joined(done, List::of(next));
+        for tet in cuttable.around(particle) {
+            self.looks += 1;
+            for corner in cuttable.mesh().tets[tet.index()] {
+                match self.search_of[corner.index()] {
+                    NONE => self.find_particle(search, corner),
+                    other => search = self.unite(search, other),
+                }
+            }
+        }
+    }
+
+    /// Makes two searches one; the lower number becomes that of both.
+    fn unite(&mut self, a: u32, b: u32) -> u32 {
+        let (a, b) = (self.root(a), self.root(b));
+        if a == b {
+            return a;
+        }
+        let (low, high) = (a.min(b), a.max(b));
+        let [one, other] = [low, high].map(|search| self.searches[search as usize]);
+        self.searches[high as usize].parent = low;
+        self.searches[low as usize].open = self.joined(one.open, other.open);
+        self.searches[low as usize].done = self.joined(one.done, other.done);
+        low
+    }
+
+    fn root(&mut self, mut search: u32) -> u32 {
+        while self.searches[search as usize].parent != search {
+            let parent = self.searches[search as usize].parent;
+            let grandparent = self.searches[parent as usize].parent;
+            self.searches[search as usize].parent = grandparent;
+            search = grandparent;
+        }
+        search
+    }
+
+    fn joined(&mut self, a: List, b: List) -> List {
+        if a.first == NONE {
+            return b;
+        }
+        if b.first == NONE {
+            return a;
+        }
+        self.found[a.last as usize].next = b.first;
+        List {
+            first: a.first,
+            last: b.last,
+        }
+    }
+
+    /// Lists the tets of a search that has ended: each around the lowest of its corners.
+    fn gather(&mut self, cuttable: &CuttableMesh, search: u32) {
+        let start = self.tets.len();
+        let mut next = self.searches[search as usize].done.first;
+        while next != NONE {
+            let found = self.found[next as usize];
+            for tet in cuttable.around(found.particle) {
+                self.looks += 1;
+                let corners = cuttable.mesh().tets[tet.index()];
+                if corners.iter().all(|&corner| found.particle <= corner) {
+                    self.tets.push(tet);
+                }
+            }
+            next = found.next;
+        }
+        self.tets[start..].sort_unstable();
+        self.ends.push(self.tets.len());
+    }
+
+    /// Takes the largest part off the list of those that came off.
+    fn keep_largest(&mut self) {
+        let sizes = self.iter().enumerate();
+        let rank = |tets: &[TetId]| (tets.len(), std::cmp::Reverse(tets[0]));
+        let Some((largest, range)) = sizes.max_by_key(|(_, tets)| rank(tets)) else {
+            return;
+        };
+        let size = range.len();
+        let end = self.ends.remove(largest);
+        self.tets.drain(end - size..end);
+        for end in &mut self.ends[largest..] {
+            *end -= size;
+        }
+    }
+}
+
+impl List {
+    fn of(one: u32) -> Self {
+        Self {
+            first: one,
+            last: one,
+        }
+    }
+}
+
+/// A number of things that are particles, of which there are fewer than 2³².
+fn count(things: usize) -> u32 {
+    ParticleId::new(things).0
+}

@@ -1,0 +1,366 @@
+//! [`PieceTracker`]: the pieces of a body with names that last, kept current cut by cut.
+//!
+//! A piece is a set of tets connected through shared particles, as in [`incise_mesh::Pieces`]. The children of a cut
+//! tet belong to its piece, so something can come off only where particles were copied or tets taken away. From there
+//! the module `parts` searches in lockstep and stops when all parts but one are known; those come off as pieces of
+//! their own and the one left keeps its name.
+//!
+//! Cost: [`PieceTracker::new`] a pass over the tets. [`PieceTracker::follow`] what the cut touched, the way around the
+//! front of a slit, and about twice the parts that come off. Memory: 4 bytes a tet and a particle.
+//!
+//! The trade: where two sides of a cut hang together only far away (a ring cut once) the search goes all the way.
+//! Structures that answer in logarithmic time exist (Holm, de Lichtenberg and Thorup 2001); their constant costs every
+//! cut more than this costs the usual ones.
+
+use incise_mesh::{ParticleId, TetId, signed_volume};
+
+use crate::parts::Parts;
+use crate::{CutDelta, CutError, CuttableMesh};
+
+/// A piece of a body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Piece {
+    /// Its number. Pieces are numbered from 0 as they come to be; no number is used twice.
+    pub id: u32,
+    /// The piece it came off; none for the pieces a mesh had before all cuts.
+    pub parent: Option<u32>,
+    /// Number of its tets.
+    pub tets: usize,
+    /// Its volume at rest in m³.
+    pub volume: f64,
+}
+
+/// What happened to a piece.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum PieceEvent {
+    /// A part came off and is a piece of its own now.
+    Detached {
+        /// The new piece.
+        piece: u32,
+        /// The piece it came off, which goes on with the rest.
+        from: u32,
+        /// Number of tets of the new piece.
+        tets: usize,
+        /// Volume at rest of the new piece in m³.
+        volume: f64,
+    },
+    /// The last tets of a piece were taken away.
+    Vanished {
+        /// The piece, which no longer exists.
+        piece: u32,
+    },
+}
+
+/// The pieces of a [`CuttableMesh`], following its deltas.
+///
+/// # Example
+/// ```
+/// use glam::DVec3;
+/// use incise_cutting::{CutOptions, CuttableMesh, PieceEvent, PieceTracker, Plane, cut_plane};
+/// use incise_mesh::generate::kuhn_box;
+///
+/// let mut body = CuttableMesh::new(kuhn_box([8, 2, 2], DVec3::new(4.0, 1.0, 1.0)))?;
+/// let mut pieces = PieceTracker::new(&body);
+/// for x in [1.0, 3.0] {
+///     let positions = body.mesh().positions.clone();
+///     let plane = Plane { point: DVec3::splat(x), normal: DVec3::X };
+///     let delta = cut_plane(&mut body, &positions, &plane, &CutOptions::default())?;
+///     for event in pieces.follow(&body, &delta) {
+///         let PieceEvent::Detached { piece, from, volume, .. } = event else { continue };
+///         println!("piece {piece} of {volume} m³ came off piece {from}");
+///     }
+/// }
+/// // The middle, the smaller end parts came off.
+/// let volumes: Vec<f64> = pieces.iter().map(|piece| piece.volume).collect();
+/// assert!(volumes.iter().zip([2.0, 1.0, 1.0]).all(|(a, b)| (a - b).abs() < 1e-12));
+/// pieces.check(&body)?; // counts anew and compares
+/// # Ok::<(), incise_cutting::CutError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct PieceTracker {
+    piece_of: Vec<u32>,
+    /// By id, those without tets included.
+    pieces: Vec<Record>,
+    alive: usize,
+    parts: Parts,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Record {
+    parent: Option<u32>,
+    tets: usize,
+    volume: Sum,
+}
+
+/// A sum with the rounding error of its additions kept (A. Neumaier, 1974): what is left of a body that is taken away
+/// bit by bit would else be known only as precisely as the whole.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sum {
+    value: f64,
+    error: f64,
+}
+
+impl Sum {
+    fn add(&mut self, x: f64) {
+        let (old, sum) = (self.value, self.value + x);
+        let (large, small) = if old.abs() < x.abs() {
+            (x, old)
+        } else {
+            (old, x)
+        };
+        self.error += (large - sum) + small;
+        self.value = sum;
+    }
+
+    fn total(self) -> f64 {
+        self.value + self.error
+    }
+}
+
+impl PieceTracker {
+    /// The pieces of a mesh, numbered in the order of their first tets. O(tets).
+    ///
+    /// # Panics
+    /// If the mesh has 2³² pieces or more.
+    #[must_use]
+    pub fn new(cuttable: &CuttableMesh) -> Self {
+        let counted = cuttable.mesh().pieces();
+        let mut pieces = vec![Record::default(); counted.count];
+        for (tet, &piece) in counted.labels.iter().enumerate() {
+            let record = &mut pieces[piece as usize];
+            record.tets += 1;
+            record.volume.add(cuttable.mesh().volume(TetId::new(tet)));
+        }
+        Self {
+            piece_of: counted.labels,
+            pieces,
+            alive: counted.count,
+            parts: Parts::default(),
+        }
+    }
+
+    /// Follows a cut.
+    ///
+    /// A part that comes off gets the next number. Which part keeps the old one: the one whose search was still going
+    /// on when the searches of all others had ended, mostly the largest; if the last ended in the same round, the one
+    /// with the most tets, then the one with the lowest tet.
+    ///
+    /// # Returns
+    /// What happened, ascending by the piece it happened to, then by the lowest tet of the part that came off.
+    ///
+    /// # Determinism
+    /// The same history gives the same numbers and bits.
+    ///
+    /// # Panics
+    /// If the tracker does not follow the deltas of this mesh one by one, or from 2³² pieces on.
+    pub fn follow(&mut self, cuttable: &CuttableMesh, delta: &CutDelta) -> Vec<PieceEvent> {
+        assert_eq!(
+            self.piece_of.len(),
+            delta.tets_before,
+            "the mesh is as the tracker last saw it"
+        );
+        assert_eq!(
+            cuttable.mesh().tets.len(),
+            delta.tets_after(),
+            "the mesh is as the delta left it"
+        );
+        self.parts.looks = 0;
+        let reduced = self.renumber(cuttable, delta);
+        let mut events = Vec::new();
+        let places = self.places(cuttable, delta, &reduced);
+        for of_piece in places.chunk_by(|a, b| a.0 == b.0) {
+            let piece = of_piece[0].0;
+            if self.pieces[piece as usize].tets == 0 {
+                self.alive -= 1;
+                events.push(PieceEvent::Vanished { piece });
+                continue;
+            }
+            let seeds: Vec<ParticleId> = of_piece.iter().filter_map(|&(_, seed)| seed).collect();
+            self.parts.find(cuttable, &seeds);
+            self.detach(cuttable, piece, &mut events);
+        }
+        events
+    }
+
+    /// Lets the numbers and counts of tets follow; returns the pieces that lost tets.
+    fn renumber(&mut self, cuttable: &CuttableMesh, delta: &CutDelta) -> Vec<u32> {
+        let Self {
+            piece_of, pieces, ..
+        } = self;
+        let split = delta.tets_before + delta.added.len() - delta.removed.len();
+        piece_of.resize(split, 0);
+        for removed in &delta.removed {
+            pieces[piece_of[removed.tet.index()] as usize].tets -= 1;
+        }
+        for added in &delta.added {
+            let piece = piece_of[added.parent.index()];
+            piece_of[added.tet.index()] = piece;
+            pieces[piece as usize].tets += 1;
+        }
+        let positions = &cuttable.mesh().positions;
+        let mut reduced = Vec::new();
+        for deleted in &delta.deleted {
+            let piece = piece_of[deleted.tet.index()];
+            let volume = signed_volume(deleted.corners.map(|p| positions[p.index()]));
+            pieces[piece as usize].tets -= 1;
+            pieces[piece as usize].volume.add(-volume);
+            reduced.push(piece);
+        }
+        for moved in &delta.moved {
+            piece_of[moved.to.index()] = piece_of[moved.from.index()];
+        }
+        piece_of.truncate(delta.tets_after());
+        reduced
+    }
+
+    /// Where something can have come off: copied particles with their copies, and those of tets taken away, each with
+    /// the piece it is on. A piece that lost tets is there even if it has no such place left. Ascending.
+    fn places(
+        &self,
+        cuttable: &CuttableMesh,
+        delta: &CutDelta,
+        reduced: &[u32],
+    ) -> Vec<(u32, Option<ParticleId>)> {
+        let first_copy = delta.particles_before + delta.points.len();
+        let copies = (first_copy..delta.particles_after()).map(ParticleId::new);
+        let deleted = delta.deleted.iter().flat_map(|tet| tet.corners);
+        let particles = delta.copies.iter().copied().chain(copies).chain(deleted);
+        let with_piece = particles.filter_map(|p| {
+            let tet = cuttable.around(p).next()?;
+            Some((self.piece_of[tet.index()], Some(p)))
+        });
+        let without_place = reduced.iter().map(|&piece| (piece, None));
+        let mut places: Vec<_> = with_piece.chain(without_place).collect();
+        places.sort_unstable();
+        places.dedup();
+        places
+    }
+
+    /// Makes the parts that came off a piece pieces of their own.
+    fn detach(&mut self, cuttable: &CuttableMesh, from: u32, events: &mut Vec<PieceEvent>) {
+        let mut parts: Vec<&[TetId]> = self.parts.iter().collect();
+        parts.sort_unstable_by_key(|tets| tets[0]);
+        for part in parts {
+            let piece = number(self.pieces.len());
+            let mut volume = Sum::default();
+            for &tet in part {
+                self.piece_of[tet.index()] = piece;
+                volume.add(cuttable.mesh().volume(tet));
+            }
+            let rest = &mut self.pieces[from as usize];
+            rest.tets -= part.len();
+            rest.volume.add(-volume.total());
+            self.pieces.push(Record {
+                parent: Some(from),
+                tets: part.len(),
+                volume,
+            });
+            self.alive += 1;
+            events.push(PieceEvent::Detached {
+                piece,
+                from,
+                tets: part.len(),
+                volume: volume.total(),
+            });
+        }
+    }
+
+    /// The pieces that exist, ascending by id.
+    pub fn iter(&self) -> impl Iterator<Item = Piece> + '_ {
+        (0..self.pieces.len()).filter_map(|id| self.piece(number(id)))
+    }
+
+    /// How many pieces exist.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.alive
+    }
+
+    /// A piece by its id, if it exists.
+    #[must_use]
+    pub fn piece(&self, id: u32) -> Option<Piece> {
+        let record = self.pieces.get(id as usize)?;
+        (record.tets > 0).then(|| Piece {
+            id,
+            parent: record.parent,
+            tets: record.tets,
+            volume: record.volume.total(),
+        })
+    }
+
+    /// The id of the piece that a tet belongs to.
+    ///
+    /// # Panics
+    /// If the tet does not exist.
+    #[must_use]
+    pub fn piece_of(&self, tet: TetId) -> u32 {
+        self.piece_of[tet.index()]
+    }
+
+    /// How often the search of the last [`PieceTracker::follow`] looked at a tet: what it cost. A tet is looked at once
+    /// for each of its corners, and once more for each if it came off.
+    #[must_use]
+    pub fn looks(&self) -> usize {
+        self.parts.looks
+    }
+
+    /// Counts everything anew and compares: partition, numbers of tets, and volumes to 1e-12 of each (and as much of
+    /// the body's as the rounded positions of new particles may make, 1e-15 and more far from the origin). O(tets); for tests and on request.
+    ///
+    /// # Errors
+    /// [`CutError::Pieces`] names the first difference.
+    pub fn check(&self, cuttable: &CuttableMesh) -> Result<(), CutError> {
+        let mesh = cuttable.mesh();
+        let differs = |what: String| Err(CutError::Pieces(what));
+        let counted = mesh.pieces();
+        if self.piece_of.len() != mesh.tets.len() {
+            return differs(format!(
+                "{} tets are known, there are {}",
+                self.piece_of.len(),
+                mesh.tets.len()
+            ));
+        }
+        let mut id_of = vec![None; counted.count];
+        for (tet, (&label, &id)) in counted.labels.iter().zip(&self.piece_of).enumerate() {
+            if *id_of[label as usize].get_or_insert(id) != id {
+                return differs(format!("tet {tet} is not on piece {id}"));
+            }
+        }
+        if counted.count != self.alive || self.iter().count() != self.alive {
+            return differs(format!(
+                "{} pieces are known, there are {}",
+                self.alive, counted.count
+            ));
+        }
+        let ids: Vec<u32> = id_of.into_iter().flatten().collect();
+        let mut sorted = ids.clone();
+        sorted.sort_unstable();
+        if let Some(pair) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+            return differs(format!("piece {} is in several parts", pair[0]));
+        }
+        let total = mesh.total_volume();
+        let farthest = |far: f64, x: &glam::DVec3| far.max(x.abs().max_element());
+        let far = mesh.positions.iter().fold(0.0, farthest) / total.cbrt();
+        let counts = counted.sizes().into_iter().zip(counted.volumes(mesh));
+        for (id, (tets, volume)) in ids.into_iter().zip(counts) {
+            let Record {
+                tets: known,
+                volume: sum,
+                ..
+            } = self.pieces[id as usize];
+            let tolerance = 1e-12 * volume + 1e-15 * far.max(1.0) * total;
+            if known != tets || (sum.total() - volume).abs() > tolerance {
+                return differs(format!(
+                    "piece {id} has {tets} tets and {volume} m³, not {known} and {}",
+                    sum.total()
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn number(pieces: usize) -> u32 {
+    u32::try_from(pieces).expect("fewer than 2³² pieces")
+}

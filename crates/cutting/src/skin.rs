@@ -1,0 +1,223 @@
+//! [`Skin`]: the boundary as a renderer wants it, following cuts.
+//!
+//! A dense list of triangles over render vertices. A render vertex is a particle on one kind of boundary: a particle on
+//! the rim of a cut has one for the outer surface and one for each cut surface, so that shading breaks there and is
+//! smooth elsewhere. Positions and attributes are those of the particle, which [`CutDelta::extend_with`] interpolates
+//! on cut edges. Following a delta costs what the boundary lost and gained; normals cost a pass over the triangles,
+//! since they follow the motion.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+use incise_mesh::{ParticleId, TetId};
+
+use crate::delta::{BoundaryTriangle, CutDelta, FaceTag};
+
+/// A particle on one kind of boundary.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct SkinVertex {
+    /// Whose position and attributes it has.
+    pub particle: ParticleId,
+    /// The kind of boundary.
+    pub tag: FaceTag,
+}
+
+/// What [`Skin::follow`] changed, for partial uploads: ascending indices, each once.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SkinChange {
+    /// Triangles that are new or have moved; those past the end of the list are gone.
+    pub triangles: Vec<usize>,
+    /// Vertices that are new.
+    pub vertices: Vec<usize>,
+}
+
+/// A triangle list that follows cuts.
+///
+/// # Example
+/// ```
+/// use glam::DVec3;
+/// use incise_cutting::{CutOptions, CuttableMesh, FaceTag, Plane, Skin, cut_plane};
+/// use incise_mesh::generate::kuhn_box;
+///
+/// let mut body = CuttableMesh::new(kuhn_box([3; 3], DVec3::ONE))?;
+/// let mut skin = Skin::new(body.boundary());
+/// let positions = body.mesh().positions.clone();
+/// let plane = Plane { point: DVec3::splat(0.4), normal: DVec3::X };
+/// let delta = cut_plane(&mut body, &positions, &plane, &CutOptions::default())?;
+/// let changed = skin.follow(&delta);
+/// println!("{} triangles to upload", changed.triangles.len());
+/// let normals = skin.normals(&body.mesh().positions);
+/// for (vertex, normal) in skin.vertices().iter().zip(&normals) {
+///     if vertex.tag == FaceTag::Cut(0) {
+///         assert!((normal.x.abs() - 1.0).abs() < 0.2, "flat across the rim, too");
+///     }
+/// }
+/// # Ok::<(), incise_cutting::CutError>(())
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct Skin {
+    vertices: Vec<SkinVertex>,
+    /// For each vertex the number of triangles that use it.
+    uses: Vec<u32>,
+    /// Vertices without a triangle, to be used again.
+    vacant: Vec<u32>,
+    triangles: Vec<[u32; 3]>,
+    /// For each triangle its face.
+    faces: Vec<(TetId, u8)>,
+    /// Never iterated: their order is that of a hash.
+    place_of_face: HashMap<(TetId, u8), u32>,
+    place_of_vertex: HashMap<SkinVertex, u32>,
+}
+
+impl Skin {
+    /// The skin of the triangles given, as of [`crate::CuttableMesh::boundary`].
+    #[must_use]
+    pub fn new(boundary: impl IntoIterator<Item = BoundaryTriangle>) -> Self {
+        let mut skin = Self::default();
+        for triangle in boundary {
+            skin.add(&triangle);
+        }
+        skin
+    }
+
+    /// The corners of the triangles, counterclockwise seen from outside, as indices of vertices.
+    #[must_use]
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// The tet behind a triangle.
+    ///
+    /// # Panics
+    /// If there is no such triangle.
+    #[must_use]
+    pub fn tet(&self, triangle: usize) -> TetId {
+        self.faces[triangle].0
+    }
+
+    /// What a triangle is.
+    ///
+    /// # Panics
+    /// If there is no such triangle.
+    #[must_use]
+    pub fn tag(&self, triangle: usize) -> FaceTag {
+        self.vertices[self.triangles[triangle][0] as usize].tag
+    }
+
+    /// The vertices. Some may have no triangle: their places are used again.
+    #[must_use]
+    pub fn vertices(&self) -> &[SkinVertex] {
+        &self.vertices
+    }
+
+    /// Follows a cut or a removal.
+    ///
+    /// # Panics
+    /// If the delta does not follow the last one.
+    pub fn follow(&mut self, delta: &CutDelta) -> SkinChange {
+        let mut change = SkinChange::default();
+        for triangle in &delta.surface_removed {
+            self.remove(triangle, &mut change);
+        }
+        for moved in &delta.moved {
+            for opposite in 0..4 {
+                if let Some(place) = self.place_of_face.remove(&(moved.from, opposite)) {
+                    self.place_of_face.insert((moved.to, opposite), place);
+                    self.faces[place as usize].0 = moved.to;
+                }
+            }
+        }
+        for triangle in &delta.surface_added {
+            change.triangles.push(self.triangles.len());
+            change
+                .vertices
+                .extend(self.add(triangle).into_iter().flatten());
+        }
+        change
+            .triangles
+            .retain(|&place| place < self.triangles.len());
+        for list in [&mut change.triangles, &mut change.vertices] {
+            list.sort_unstable();
+            list.dedup();
+        }
+        change
+    }
+
+    /// The normals of the vertices of unit length for the present positions of the particles; zero where a vertex has
+    /// no triangle or only flat ones. O(triangles).
+    ///
+    /// # Panics
+    /// If a particle has no position.
+    #[must_use]
+    pub fn normals(&self, positions: &[DVec3]) -> Vec<DVec3> {
+        let mut normals = vec![DVec3::ZERO; self.vertices.len()];
+        for corners in &self.triangles {
+            let at = |v: u32| positions[self.vertices[v as usize].particle.index()];
+            let [a, b, c] = corners.map(at);
+            // As long as twice the area: large triangles count more.
+            let across = (b - a).cross(c - a);
+            for v in corners {
+                normals[*v as usize] += across;
+            }
+        }
+        for normal in &mut normals {
+            *normal = normal.normalize_or_zero();
+        }
+        normals
+    }
+
+    /// Returns for each corner its vertex if that is new.
+    fn add(&mut self, triangle: &BoundaryTriangle) -> [Option<usize>; 3] {
+        let tag = triangle.tag;
+        let vertices = triangle
+            .particles
+            .map(|particle| self.vertex(SkinVertex { particle, tag }));
+        let place = index(self.triangles.len());
+        self.triangles.push(vertices.map(|(v, _)| v));
+        self.faces.push((triangle.tet, triangle.opposite));
+        let before = self
+            .place_of_face
+            .insert((triangle.tet, triangle.opposite), place);
+        assert!(before.is_none(), "a face is on the boundary once");
+        vertices.map(|(v, new)| new.then_some(v as usize))
+    }
+
+    /// The place of a vertex and whether it is new.
+    fn vertex(&mut self, vertex: SkinVertex) -> (u32, bool) {
+        if let Some(&place) = self.place_of_vertex.get(&vertex) {
+            self.uses[place as usize] += 1;
+            return (place, false);
+        }
+        let place = self.vacant.pop().unwrap_or_else(|| {
+            self.vertices.push(vertex);
+            self.uses.push(0);
+            index(self.vertices.len() - 1)
+        });
+        self.vertices[place as usize] = vertex;
+        self.uses[place as usize] = 1;
+        self.place_of_vertex.insert(vertex, place);
+        (place, true)
+    }
+
+    fn remove(&mut self, triangle: &BoundaryTriangle, change: &mut SkinChange) {
+        let face = (triangle.tet, triangle.opposite);
+        let place = self.place_of_face.remove(&face);
+        let place = place.expect("the triangle was on the boundary") as usize;
+        for v in self.triangles.swap_remove(place) {
+            self.uses[v as usize] -= 1;
+            if self.uses[v as usize] == 0 {
+                self.place_of_vertex.remove(&self.vertices[v as usize]);
+                self.vacant.push(v);
+            }
+        }
+        self.faces.swap_remove(place);
+        if let Some(moved) = self.faces.get(place) {
+            self.place_of_face.insert(*moved, index(place));
+            change.triangles.push(place);
+        }
+    }
+}
+
+fn index(place: usize) -> u32 {
+    u32::try_from(place).expect("fewer than 2³² triangles")
+}

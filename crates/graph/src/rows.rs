@@ -1,0 +1,232 @@
+//! Ragged arrays that change: rows one after the other, each with some room to grow.
+//!
+//! As in CSR all values lie in one array, but a row names its start, its length and its room, so a
+//! row that runs out of room moves to the end and leaves a hole. Rooms grow by a quarter and 4, and
+//! [`Rows::tidy`] closes the holes once more than two thirds of the array are holes and room, so
+//! memory stays within three times the values (and a constant), and each value pushed costs O(1)
+//! amortized: between two tidy-ups at least a number of values proportional to all is pushed or
+//! removed.
+
+use crate::csr::offset;
+
+/// Values beyond three times the held ones that are not worth a tidy-up.
+const SPARE: usize = 64;
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Span {
+    start: u32,
+    length: u32,
+    room: u32,
+}
+
+/// Rows of values, each of which can grow and shrink by itself.
+///
+/// Deterministic: the order within a row is what the calls say. Methods that move values return how
+/// many, so that a caller can count its cost.
+///
+/// ```
+/// use incise_graph::Rows;
+///
+/// let mut rows = Rows::default();
+/// rows.refill(2, [(1, 'a'), (0, 'b'), (1, 'c')].into_iter());
+/// assert_eq!(rows.row(1), ['a', 'c']);
+/// rows.push(0, 'd');
+/// assert_eq!(rows.swap_remove(1, 0), 'a');
+/// assert_eq!((rows.row(0), rows.row(1)), (&['b', 'd'][..], &['c'][..]));
+/// ```
+#[derive(Clone, Debug)]
+pub struct Rows<T> {
+    spans: Vec<Span>,
+    values: Vec<T>,
+    /// Values in rows.
+    held: usize,
+}
+
+/// No rows.
+impl<T> Default for Rows<T> {
+    fn default() -> Self {
+        Self {
+            spans: Vec::new(),
+            values: Vec::new(),
+            held: 0,
+        }
+    }
+}
+
+impl<T: Copy> Rows<T> {
+    /// Replaces everything by `rows` rows without room to grow, using the memory again. An entry is
+    /// a row and a value; the values of a row keep their order. O(rows + entries).
+    ///
+    /// # Panics
+    /// If an entry names another row, or there are 2³² entries.
+    pub fn refill(&mut self, rows: usize, entries: impl Iterator<Item = (usize, T)> + Clone) {
+        self.spans.clear();
+        self.spans.resize(rows, Span::default());
+        self.values.clear();
+        for (row, value) in entries.clone() {
+            self.spans[row].room += 1;
+            self.values.push(value);
+        }
+        self.held = self.values.len();
+        let mut start = 0;
+        for span in &mut self.spans {
+            span.start = start;
+            start = offset(start as usize + span.room as usize);
+        }
+        for (row, value) in entries {
+            let span = &mut self.spans[row];
+            self.values[(span.start + span.length) as usize] = value;
+            span.length += 1;
+        }
+    }
+
+    /// The number of rows, empty ones included.
+    #[must_use]
+    pub fn row_count(&self) -> usize {
+        self.spans.len()
+    }
+
+    /// The number of values in all rows.
+    #[must_use]
+    pub fn value_count(&self) -> usize {
+        self.held
+    }
+
+    /// The values of a row.
+    ///
+    /// # Panics
+    /// If there is no such row.
+    #[must_use]
+    pub fn row(&self, row: usize) -> &[T] {
+        let span = self.spans[row];
+        &self.values[span.start as usize..(span.start + span.length) as usize]
+    }
+
+    /// All rows.
+    pub fn rows(&self) -> impl ExactSizeIterator<Item = &[T]> {
+        (0..self.row_count()).map(|row| self.row(row))
+    }
+
+    /// Appends empty rows until there are `rows`, or takes the last ones away. O(rows changed).
+    pub fn set_row_count(&mut self, rows: usize) {
+        let gone = self.spans.get(rows..).unwrap_or(&[]);
+        self.held -= gone.iter().map(|span| span.length as usize).sum::<usize>();
+        self.spans.resize(rows, Span::default());
+    }
+
+    /// Appends a value to a row; returns how many values moved for it. Amortized O(1).
+    ///
+    /// # Panics
+    /// If there is no such row, or the array would hold 2³² values.
+    pub fn push(&mut self, row: usize, value: T) -> usize {
+        let Span {
+            start,
+            length,
+            room,
+        } = self.spans[row];
+        let mut moved = 0;
+        if length == room {
+            let old = start as usize..(start + length) as usize;
+            let room = old.len() + old.len() / 4 + 4;
+            let mut first = old.start;
+            // The last row grows where it is.
+            if old.end != self.values.len() {
+                moved = old.len();
+                first = self.values.len();
+                self.values.extend_from_within(old);
+            }
+            self.values.resize(first + room, value);
+            offset(self.values.len());
+            self.spans[row] = Span {
+                start: offset(first),
+                length,
+                room: offset(room),
+            };
+        }
+        let span = &mut self.spans[row];
+        self.values[(span.start + span.length) as usize] = value;
+        span.length += 1;
+        self.held += 1;
+        moved
+    }
+
+    /// Inserts a value before the one at `at`; returns how many values moved for it. O(row).
+    ///
+    /// # Panics
+    /// If there is no such row or `at` is past its end.
+    pub fn insert(&mut self, row: usize, at: usize, value: T) -> usize {
+        let mut moved = self.push(row, value);
+        let values = &mut self.row_mut(row)[at..];
+        values.rotate_right(1);
+        moved += values.len() - 1;
+        moved
+    }
+
+    /// Removes the value at `at`, keeping the order of the others; returns how many values moved
+    /// for it. O(row).
+    ///
+    /// # Panics
+    /// If there is no such row or value.
+    pub fn remove(&mut self, row: usize, at: usize) -> usize {
+        let values = &mut self.row_mut(row)[at..];
+        values.rotate_left(1);
+        let moved = values.len() - 1;
+        self.pop(row);
+        moved
+    }
+
+    /// Removes and returns the value at `at`; the last of the row takes its place. O(1).
+    ///
+    /// # Panics
+    /// If there is no such row or value.
+    pub fn swap_remove(&mut self, row: usize, at: usize) -> T {
+        let values = self.row_mut(row);
+        let removed = values[at];
+        values[at] = values[values.len() - 1];
+        self.pop(row);
+        removed
+    }
+
+    /// Takes the last value from a row, if there is one. O(1).
+    ///
+    /// # Panics
+    /// If there is no such row.
+    pub fn pop(&mut self, row: usize) -> Option<T> {
+        let value = self.row(row).last().copied()?;
+        self.spans[row].length -= 1;
+        self.held -= 1;
+        Some(value)
+    }
+
+    /// Empties a row. O(1).
+    ///
+    /// # Panics
+    /// If there is no such row.
+    pub fn clear_row(&mut self, row: usize) {
+        self.held -= self.spans[row].length as usize;
+        self.spans[row].length = 0;
+    }
+
+    /// Closes all holes if they are too many; returns how many values moved. To be called after a
+    /// number of edits. Amortized O(1) for each of them.
+    pub fn tidy(&mut self) -> usize {
+        if self.values.len() <= 3 * self.held + SPARE {
+            return 0;
+        }
+        let mut values = Vec::with_capacity(self.held);
+        for span in &mut self.spans {
+            let first = offset(values.len());
+            let old = span.start as usize..(span.start + span.length) as usize;
+            values.extend_from_slice(&self.values[old]);
+            span.start = first;
+            span.room = span.length;
+        }
+        self.values = values;
+        self.held
+    }
+
+    fn row_mut(&mut self, row: usize) -> &mut [T] {
+        let span = self.spans[row];
+        &mut self.values[span.start as usize..(span.start + span.length) as usize]
+    }
+}

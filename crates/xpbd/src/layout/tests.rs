@@ -1,0 +1,161 @@
+//! What following costs, counted in tets filled in, and that blocks stay well used.
+
+use glam::DVec3;
+use incise_graph::{ClusterId, Clustering, ColorId, Coloring, Schedule};
+
+use super::*;
+use crate::Material;
+
+const LANES: usize = 8;
+
+/// Any tet will do; only its number tells it from others.
+fn ingredients(tet: u32) -> Ingredients<f32> {
+    let rubber = Material {
+        young_modulus: 1e6,
+        poisson_ratio: 0.45,
+        density: 1e3,
+        damping: 0.0,
+    };
+    let rest = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+    Ingredients {
+        tet: TetConstraint::new([tet, tet + 1, tet + 2, tet + 3], rest, &rubber),
+        weights: [1.0, 2.0, 3.0, 4.0],
+        constants: [1.0, 2.0, 3.0],
+    }
+}
+
+/// Clusters of five in thirty colors, and what changed.
+struct Plan {
+    clustering: Clustering,
+    coloring: Coloring,
+    tets: Vec<u32>,
+    clusters: Vec<ClusterId>,
+    schedule: Schedule,
+    layout: Layout<f32>,
+}
+
+impl Plan {
+    fn new(clusters: u32) -> Self {
+        let labels = (0..5 * clusters).map(|t| ClusterId(t / 5)).collect();
+        let clustering = Clustering::from_labels(labels).unwrap();
+        let coloring = Coloring::new((0..clusters).map(|k| ColorId(k % 30)).collect());
+        let schedule = Schedule::new(&clustering, &coloring);
+        let mut layout = Layout::default();
+        let filled = layout.follow(&schedule, LANES, true, ingredients);
+        assert_eq!(filled, 5 * clusters as usize);
+        Self {
+            clustering,
+            coloring,
+            tets: Vec::new(),
+            clusters: Vec::new(),
+            schedule,
+            layout,
+        }
+    }
+
+    /// Replaces a tet by two in a cluster of its own number or a new one.
+    fn replace(&mut self, tet: u32, color: u32) {
+        let new = self.clustering.constraint_count();
+        self.clustering.remove(tet as usize);
+        let cluster = self.clustering.new_cluster(tet as usize);
+        self.clustering.assign(new, cluster);
+        if cluster.index() == self.coloring.vertex_count() {
+            self.coloring.push(ColorId(color));
+        }
+        self.tets.extend([tet, u32::try_from(new).unwrap()]);
+        self.recolor(cluster, color);
+    }
+
+    fn recolor(&mut self, cluster: ClusterId, color: u32) {
+        self.coloring.set(cluster.index(), ColorId(color));
+        self.clusters.push(cluster);
+    }
+
+    /// Follows and checks; returns the tets filled in.
+    fn follow(&mut self) -> usize {
+        self.schedule.update(
+            &self.clustering,
+            &self.coloring,
+            &std::mem::take(&mut self.tets),
+            &std::mem::take(&mut self.clusters),
+        );
+        assert!(!self.layout.fits(&self.schedule));
+        let filled = self.layout.follow(&self.schedule, LANES, true, ingredients);
+        assert!(self.layout.fits(&self.schedule));
+        self.layout.check(&self.schedule, ingredients).unwrap();
+        filled
+    }
+}
+
+/// A cut of 20 tets changes up to 20 clusters of 5 and makes 20 of 2, whatever the size of the body. What is formed
+/// anew now and then is less than that in the long run.
+#[test]
+fn following_a_cut_costs_what_was_cut() {
+    for clusters in [2_000, 20_000] {
+        let (mut plan, cuts, mut filled) = (Plan::new(clusters), 40, 0);
+        for cut in 0..cuts {
+            for i in 0..20 {
+                plan.replace((cut * 20 + i) * 11, (7 * i + cut) % 32);
+            }
+            filled += plan.follow();
+        }
+        assert!(
+            filled <= 2 * 40 * 20 * (5 + 2),
+            "{filled} of {clusters} clusters"
+        );
+    }
+}
+
+/// Clusters that wander leave holes everywhere: colors are formed anew (the check proves that none is wasteful), and
+/// blocks without clusters do not pile up.
+#[test]
+fn blocks_stay_well_used() {
+    let clusters = 600;
+    let (mut plan, mut filled, rounds) = (Plan::new(clusters), 0, 300);
+    let first = plan.layout.block_count();
+    for round in 0..rounds {
+        for i in 0..20 {
+            let k = (round * 20 + i) * 7 % clusters;
+            // Most crowd into few colors, then into others.
+            plan.recolor(ClusterId(k), (i * i + round / 10) % 40);
+        }
+        filled += plan.follow();
+        let used: usize = plan.layout.usages.iter().map(|u| u.blocks as usize).sum();
+        assert_eq!(used + plan.layout.free_blocks, plan.layout.block_count());
+        assert!(plan.layout.free_blocks <= used);
+    }
+    let last = plan.layout.block_count();
+    assert!(last < 4 * first, "{last} blocks instead of {first}");
+    // A cluster that moves takes its five tets; forming anew costs no more than some times that.
+    assert!(filled < 4 * 5 * 20 * rounds as usize, "{filled}");
+}
+
+/// Only the tets that were touched, each once.
+#[test]
+fn a_touched_tet_is_filled_in_once() {
+    let mut plan = Plan::new(100);
+    for tet in [3, 7, 3, 499, 1_000] {
+        plan.layout.touch(tet);
+    }
+    assert!(!plan.layout.fits(&plan.schedule));
+    let filled = plan.layout.follow(&plan.schedule, LANES, true, ingredients);
+    assert_eq!(filled, 3);
+    // Also if its cluster moves at the same time.
+    plan.layout.touch(7);
+    plan.recolor(ClusterId(1), 31);
+    assert_eq!(plan.follow(), 5);
+}
+
+/// Another schedule, even an equal one, is not followed but laid out.
+#[test]
+fn another_schedule_is_laid_out() {
+    let mut plan = Plan::new(50);
+    let copy = plan.schedule.clone();
+    assert!(plan.layout.fits(&copy));
+    let equal = Schedule::new(&plan.clustering, &plan.coloring);
+    assert!(!plan.layout.fits(&equal));
+    assert_eq!(plan.layout.follow(&equal, LANES, true, ingredients), 250);
+    plan.layout.forget();
+    assert!(!plan.layout.fits(&equal));
+    assert_eq!(plan.layout.follow(&equal, LANES, true, ingredients), 250);
+}
