@@ -97,6 +97,37 @@ pub enum CutError {
         /// Positions given.
         given: usize,
     },
+    /// A surface without triangles cannot cut.
+    #[error("the surface has no triangles")]
+    EmptySurface,
+    /// A triangle of a surface names a point that does not exist.
+    #[error("triangle {triangle} of the surface names point {point}, of {points}")]
+    TriangleIndex {
+        /// Number of the triangle.
+        triangle: usize,
+        /// The point it names.
+        point: u32,
+        /// Number of points.
+        points: usize,
+    },
+    /// A triangle of a surface has no area and so no direction.
+    #[error("triangle {triangle} of the surface has area {area:e} m²: its points lie on a line")]
+    FlatTriangle {
+        /// Number of the triangle.
+        triangle: usize,
+        /// Its area in m².
+        area: f64,
+    },
+    /// The two polylines of a strip do not belong together.
+    #[error(
+        "a strip between polylines of {first} and {second} points: it needs as many on both, two at least"
+    )]
+    StripPoints {
+        /// Points of the first polyline.
+        first: usize,
+        /// Points of the second.
+        second: usize,
+    },
     /// The pieces that are tracked are not those of the mesh, which would be a defect of this crate.
     #[error("the pieces are not current: {0}")]
     Pieces(String),

@@ -31,10 +31,13 @@ mod cuttable;
 mod delta;
 mod error;
 mod faces;
+mod level_set;
 mod meet;
+mod memory;
 mod near;
 mod operation;
 mod options;
+mod parallel;
 mod parts;
 mod pieces;
 mod plane;
@@ -42,10 +45,14 @@ mod quality;
 mod remove;
 mod separate;
 mod sides;
+mod signs;
 mod skin;
 mod stars;
+mod stroke;
 mod surface;
 mod sweep;
+mod tree;
+mod triangles;
 mod undo;
 
 pub use bisect::{SplitEdge, split_tet};
@@ -54,12 +61,15 @@ pub use delta::{
     AddedTet, BoundaryTriangle, CutDelta, EdgePoint, FaceTag, MovedTet, RelinkedTet, RemovedTet,
 };
 pub use error::CutError;
+pub use level_set::cut_level_set;
+pub use memory::CutMemory;
 pub use options::{CutOptions, Separation};
 pub use pieces::{Piece, PieceEvent, PieceTracker};
 pub use plane::{Plane, cut_plane};
 pub use remove::{carve, remove_tets};
 pub use skin::{Skin, SkinChange, SkinVertex};
 pub use sweep::Sweep;
+pub use triangles::{TriangleSurface, cut_surface, cut_surface_joining};
 
 /// The example of the README, run as a test.
 #[cfg(doctest)]

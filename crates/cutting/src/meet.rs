@@ -40,8 +40,10 @@ pub(crate) struct Meeting {
     pub(crate) parameter: f64,
     /// Blade direction × motion of the blade relative to the material: the surface's normal, not of unit length.
     pub(crate) normal: DVec3,
-    /// From the first end of the edge to the second, at that time.
-    pub(crate) edge: DVec3,
+    /// Whether the edge runs from the negative side to the positive one.
+    pub(crate) upwards: bool,
+    /// On which side of the surface the two ends are, as far as this says.
+    pub(crate) sides: [Option<bool>; 2],
 }
 
 /// The meetings of an edge with a blade segment during a frame, in order of time; at most three.
@@ -64,11 +66,13 @@ pub(crate) fn meetings(
         let normal = along_blade.cross(blade.velocity(on_blade) - edge.velocity(parameter));
         let meets =
             within.contains(&parameter) && within.contains(&on_blade) && normal != DVec3::ZERO;
+        let upwards = normal.dot(along_edge) > 0.0;
         meets.then_some(Meeting {
             time,
             parameter: parameter.clamp(0.0, 1.0),
             normal,
-            edge: along_edge,
+            upwards,
+            sides: [Some(!upwards), Some(upwards)],
         })
     })
 }

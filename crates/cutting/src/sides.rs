@@ -1,4 +1,4 @@
-//! Which side of a swept surface the tets along it belong to.
+//! Which side of the surface of a stroke the tets along it belong to.
 //!
 //! Most tets have a particle off the surface that tells. Those with all particles on it (snapped) join a neighbor,
 //! across the face that lies most across the surface: left to themselves they could be cut off on all sides and become
@@ -8,13 +8,14 @@
 
 use std::collections::HashMap;
 
+use foldhash::fast::FixedState;
 use incise_mesh::{ParticleId, TetId, TetMesh};
 
-use crate::surface::SweptSurface;
+use crate::surface::CutSurface;
 
 /// The sides given to tets with all particles on the surface, for as long as they are not split.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct GivenSides(HashMap<TetId, bool>);
+pub(crate) struct GivenSides(HashMap<TetId, bool, FixedState>);
 
 impl GivenSides {
     /// Forgets tets that were split.
@@ -38,7 +39,7 @@ impl Sides {
     /// Finds the sides of `tets`, which ascend.
     pub(crate) fn new(
         mesh: &TetMesh,
-        surface: &SweptSurface,
+        surface: &CutSurface,
         given: &mut GivenSides,
         tets: &[TetId],
     ) -> Self {
@@ -84,11 +85,7 @@ impl Sides {
 }
 
 /// Pairs of tets with a common face, by ascending alignment of the face with the surface.
-fn shared_faces(
-    mesh: &TetMesh,
-    surface: &SweptSurface,
-    tets: &[TetId],
-) -> Vec<(f64, usize, usize)> {
+fn shared_faces(mesh: &TetMesh, surface: &CutSurface, tets: &[TetId]) -> Vec<(f64, usize, usize)> {
     let mut faces: Vec<([ParticleId; 3], usize)> = Vec::with_capacity(4 * tets.len());
     for (i, tet) in tets.iter().enumerate() {
         let [a, b, c, d] = mesh.tets[tet.index()];

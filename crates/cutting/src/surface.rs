@@ -1,16 +1,21 @@
-//! [`SweptSurface`]: what the particles on a swept surface remember of it.
+//! [`CutSurface`]: what the particles along the surface of a stroke remember of it.
 //!
-//! A sweep has no plane to give every particle a sign. Instead the ends of each edge that was met know on which side
+//! A stroke has no plane to give every particle a sign. Instead the ends of each edge that was met know on which side
 //! they were, and each particle on the surface keeps the surface's tangent plane where it was crossed, in the rest
 //! shape, where nothing moves any more. The tangents give the side where no end can (or where a stroke that came back
 //! gave it twice), and tell beforehand which particles the surface will pass closely.
+//!
+//! Only particles along the surface have an entry, so that a stroke costs nothing where it is not. Cost: a look-up.
 
+use std::collections::HashMap;
+
+use foldhash::fast::FixedState;
 use glam::DVec3;
 use incise_mesh::ParticleId;
 
 use crate::CutDelta;
 
-/// The tangent plane of the swept surface at a crossing, in the rest shape.
+/// The tangent plane of a surface at a crossing, in the rest shape.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tangent {
     pub(crate) point: DVec3,
@@ -24,14 +29,28 @@ impl Tangent {
     }
 }
 
-/// The particles on a swept surface.
-#[derive(Clone, Debug)]
-pub(crate) struct SweptSurface {
-    /// For each particle the index of its plane, if it is on the surface.
-    index: Vec<Option<u32>>,
-    tangents: Vec<Tangent>,
-    /// For each particle the side it was seen on.
-    seen: Vec<Seen>,
+/// What one particle remembers.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Mark {
+    /// The surface there, if the particle is on it.
+    pub(crate) tangent: Option<Tangent>,
+    /// On which side it was.
+    seen: Seen,
+    /// Whether one of its edges was met, so that it is decided if it is on the surface.
+    decided: bool,
+    /// Whether this was taken over from an earlier stroke.
+    adopted: bool,
+}
+
+impl Mark {
+    /// That of a particle on a surface.
+    pub(crate) fn on(tangent: Tangent) -> Self {
+        Self {
+            tangent: Some(tangent),
+            decided: true,
+            ..Self::default()
+        }
+    }
 }
 
 /// On which side of the surface a particle was when one of its edges was met.
@@ -43,39 +62,95 @@ enum Seen {
     Both,
 }
 
-impl SweptSurface {
-    pub(crate) fn new(particles: usize) -> Self {
-        Self {
-            index: vec![None; particles],
-            tangents: Vec::new(),
-            seen: vec![Seen::Never; particles],
-        }
-    }
+/// The particles along the surface of a stroke. The map is never iterated.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct CutSurface {
+    marks: HashMap<ParticleId, Mark, FixedState>,
+    /// Particles whose marks changed since a memory was last told, if it ever was.
+    news: Option<Vec<ParticleId>>,
+}
 
+impl CutSurface {
     pub(crate) fn contains(&self, particle: ParticleId) -> bool {
-        self.index[particle.index()].is_some()
+        self.tangent(particle).is_some()
     }
 
     pub(crate) fn tangent(&self, particle: ParticleId) -> Option<Tangent> {
-        self.index[particle.index()].map(|i| self.tangents[i as usize])
+        self.marks.get(&particle)?.tangent
     }
 
+    /// Whether one of the particle's edges was met.
+    pub(crate) fn is_decided(&self, particle: ParticleId) -> bool {
+        self.marks.get(&particle).is_some_and(|mark| mark.decided)
+    }
+
+    pub(crate) fn decide(&mut self, particle: ParticleId) {
+        self.edit(particle).decided = true;
+    }
+
+    /// Whether what is known of the particle was taken over from an earlier stroke.
+    pub(crate) fn is_adopted(&self, particle: ParticleId) -> bool {
+        self.marks.get(&particle).is_some_and(|mark| mark.adopted)
+    }
+
+    fn edit(&mut self, particle: ParticleId) -> &mut Mark {
+        if let Some(news) = &mut self.news {
+            news.push(particle);
+        }
+        self.marks.entry(particle).or_default()
+    }
+
+    /// Notes from now on what changes, for [`CutSurface::take_news`].
+    pub(crate) fn keep_news(&mut self) {
+        self.news.get_or_insert_default();
+    }
+
+    /// Forgets all particles from the given number on.
+    pub(crate) fn truncate(&mut self, particles: usize) {
+        self.marks.retain(|p, _| p.index() < particles);
+        if let Some(news) = &mut self.news {
+            news.retain(|p| p.index() < particles);
+        }
+    }
+
+    /// What changed since the last call, by particle.
+    pub(crate) fn take_news(&mut self) -> Vec<(ParticleId, Mark)> {
+        let mut news = self.news.as_mut().map(std::mem::take).unwrap_or_default();
+        news.sort_unstable();
+        news.dedup();
+        news.into_iter().map(|p| (p, self.marks[&p])).collect()
+    }
+
+    /// Takes over what an earlier stroke of the same surface knew of a particle, if nothing contrary is known; `upright`
+    /// says whether their positive sides are the same. Returns whether the particle came to lie on the surface by it.
+    pub(crate) fn adopt(&mut self, particle: ParticleId, mut mark: Mark, upright: bool) -> bool {
+        if self.marks.contains_key(&particle) {
+            return false;
+        }
+        if !upright {
+            mark.tangent = mark.tangent.map(|t| Tangent {
+                normal: -t.normal,
+                ..t
+            });
+            if let Seen::On(side) = &mut mark.seen {
+                *side = !*side;
+            }
+        }
+        mark.adopted = true;
+        self.marks.insert(particle, mark);
+        mark.tangent.is_some()
+    }
+
+    /// Puts a particle on the surface.
     pub(crate) fn put(&mut self, particle: ParticleId, tangent: Tangent) {
-        self.index[particle.index()] = u32::try_from(self.tangents.len()).ok();
-        self.tangents.push(tangent);
-    }
-
-    /// Appends a particle that lies on the surface.
-    pub(crate) fn push(&mut self, tangent: Tangent) {
-        let particle = ParticleId::new(self.index.len());
-        self.index.push(None);
-        self.seen.push(Seen::Never);
-        self.put(particle, tangent);
+        let mark = self.edit(particle);
+        mark.tangent = Some(tangent);
+        mark.decided = true;
     }
 
     /// Notes that a particle is on the given side of the surface.
     pub(crate) fn see(&mut self, particle: ParticleId, side: bool) {
-        let seen = &mut self.seen[particle.index()];
+        let seen = &mut self.edit(particle).seen;
         *seen = match *seen {
             Seen::Never => Seen::On(side),
             Seen::On(before) if before == side => Seen::On(side),
@@ -85,40 +160,54 @@ impl SweptSurface {
 
     /// Whether a particle was seen on both sides.
     pub(crate) fn is_seen_on_both(&self, particle: ParticleId) -> bool {
-        self.seen[particle.index()] == Seen::Both
+        self.marks
+            .get(&particle)
+            .is_some_and(|mark| mark.seen == Seen::Both)
     }
 
-    /// Appends the copies of particles.
-    pub(crate) fn push_copies(&mut self, sources: &[ParticleId]) {
-        for source in sources {
-            self.index.push(self.index[source.index()]);
-            self.seen.push(self.seen[source.index()]);
+    /// Gives the copies that a cut made what their particles remember.
+    pub(crate) fn copy(&mut self, delta: &CutDelta) {
+        let first = delta.particles_before + delta.points.len();
+        for (i, source) in delta.copies.iter().enumerate() {
+            if let Some(&mark) = self.marks.get(source) {
+                *self.edit(ParticleId::new(first + i)) = mark;
+            }
         }
     }
 
     /// Follows a cut made by another stroke. A new particle between two on the surface is on it as well, and so is one
     /// beside it that is closer than `reach` times the edge: it may lie behind the front, where no blade will come by.
     pub(crate) fn follow(&mut self, delta: &CutDelta, rest: &[DVec3], reach: f64) {
-        for point in &delta.points {
-            let here = rest[self.index.len()];
-            let [a, b] = point.ends.map(|p| self.tangent(p));
-            let length = rest[point.ends[0].index()].distance(rest[point.ends[1].index()]);
-            let close = |t: &Tangent| t.distance(here).abs() <= reach * length;
-            match (a, b) {
-                (Some(a), Some(b)) => {
-                    self.push(Tangent {
-                        point: here,
-                        normal: (a.normal + b.normal).normalize_or(a.normal),
-                    });
-                }
-                (Some(t), None) | (None, Some(t)) if close(&t) => self.push(t),
-                _ => {
-                    self.index.push(None);
-                    self.seen.push(Seen::Never);
-                }
+        for (i, point) in delta.points.iter().enumerate() {
+            let particle = ParticleId::new(delta.particles_before + i);
+            let tangents = point.ends.map(|p| self.tangent(p));
+            if let Some(tangent) = Self::between(tangents, point.ends, particle, rest, reach) {
+                self.put(particle, tangent);
             }
         }
-        self.push_copies(&delta.copies);
+        self.copy(delta);
+    }
+
+    /// The surface at a new particle on an edge whose ends have the given tangents, if it lies on the surface.
+    pub(crate) fn between(
+        tangents: [Option<Tangent>; 2],
+        ends: [ParticleId; 2],
+        particle: ParticleId,
+        rest: &[DVec3],
+        reach: f64,
+    ) -> Option<Tangent> {
+        let point = rest[particle.index()];
+        let [a, b] = ends.map(|p| rest[p.index()]);
+        match tangents {
+            [Some(a), Some(b)] => Some(Tangent {
+                point,
+                normal: (a.normal + b.normal).normalize_or(a.normal),
+            }),
+            [Some(t), None] | [None, Some(t)] => {
+                (t.distance(point).abs() <= reach * a.distance(b)).then_some(t)
+            }
+            [None, None] => None,
+        }
     }
 
     /// How much a face lies along the surface: the cosine of the angle between them, and less than that of any face on
@@ -135,22 +224,23 @@ impl SweptSurface {
     /// The side of a tet that touches the surface: the one its particles off the surface were seen on if they agree,
     /// else the one they, or without any the whole tet, lean to by the tangents of those on the surface.
     pub(crate) fn side(&self, rest: &[DVec3], corners: [ParticleId; 4]) -> bool {
-        let off = || corners.into_iter().filter(|&p| !self.contains(p));
-        let vote = |p: ParticleId| match self.seen[p.index()] {
+        let marks = corners.map(|p| self.marks.get(&p).copied().unwrap_or_default());
+        let off = || marks.iter().zip(corners).filter(|m| m.0.tangent.is_none());
+        let vote = |mark: &Mark| match mark.seen {
             Seen::On(true) => 1,
             Seen::On(false) => -1,
             _ => 0,
         };
-        let votes: i32 = off().map(vote).sum();
+        let votes: i32 = off().map(|(mark, _)| vote(mark)).sum();
         if votes != 0 {
             return votes > 0;
         }
         let leaning = |p: ParticleId| {
-            let tangents = corners.iter().filter_map(|&q| self.tangent(q));
+            let tangents = marks.iter().filter_map(|mark| mark.tangent);
             tangents.map(|t| t.distance(rest[p.index()])).sum::<f64>()
         };
         let leans: f64 = if off().next().is_some() {
-            off().map(leaning).sum()
+            off().map(|(_, p)| leaning(p)).sum()
         } else {
             corners.into_iter().map(leaning).sum()
         };

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use glam::DVec3;
-use incise_cutting::{BoundaryTriangle, CutDelta, CuttableMesh, FaceTag};
+use incise_cutting::{BoundaryTriangle, CutDelta, CutOptions, CuttableMesh, FaceTag};
 use incise_mesh::generate::{Shape, generate, kuhn_box};
 use incise_mesh::{ParticleId, TetId, TetMesh};
 
@@ -217,4 +217,38 @@ fn check_undo(before: &TetMesh, after: &CuttableMesh, delta: &CutDelta) {
         back.insert((triangle.tet, triangle.opposite, triangle.tag));
     }
     assert_eq!(tags(&undone), back);
+}
+
+/// The default options with another snap distance.
+pub(crate) fn options(snap: f64) -> CutOptions {
+    CutOptions {
+        snap,
+        ..CutOptions::default()
+    }
+}
+
+/// The volumes of the pieces, ascending.
+pub(crate) fn volumes(body: &CuttableMesh) -> Vec<f64> {
+    let mut volumes = body.mesh().pieces().volumes(body.mesh());
+    volumes.sort_by(f64::total_cmp);
+    volumes
+}
+
+/// The same mesh with its particles renamed at random, and the new name of each particle.
+pub(crate) fn relabelled(mesh: &TetMesh, seed: u64) -> (TetMesh, Vec<usize>) {
+    let mut order: Vec<usize> = (0..mesh.positions.len()).collect();
+    order.sort_by(|&a, &b| noise(seed, a).total_cmp(&noise(seed, b)));
+    let mut name = vec![0; order.len()];
+    for (new, &old) in order.iter().enumerate() {
+        name[old] = new;
+    }
+    let renamed = TetMesh {
+        positions: order.iter().map(|&old| mesh.positions[old]).collect(),
+        tets: mesh
+            .tets
+            .iter()
+            .map(|tet| tet.map(|p| ParticleId::new(name[p.index()])))
+            .collect(),
+    };
+    (renamed, name)
 }

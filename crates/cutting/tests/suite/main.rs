@@ -4,10 +4,13 @@
 
 mod bodies;
 mod deltas;
+mod joins;
+mod level_sets;
 mod pieces;
 mod planes;
 mod programs;
 mod removal;
 mod scenarios;
 mod separation;
+mod surfaces;
 mod sweeps;

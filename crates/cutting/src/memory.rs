@@ -1,0 +1,203 @@
+//! [`CutMemory`]: what finished strokes leave for later ones to join.
+//!
+//! A face opens where all three particles lie on the surface of one stroke, so a stroke that goes on where another
+//! stopped would leave the tets between both fronts as threads. The memory keeps, for each particle along earlier
+//! strokes, what they knew of it. Where a new stroke meets an edge, it looks at the particles around the edge's ends:
+//! those on an earlier surface that runs the same way (within some 25 degrees) and closely (a quarter of an edge) show
+//! that it is the same surface, and what that stroke knew there is taken over. A surface that crosses at an angle is
+//! left alone.
+//!
+//! Cost: a look-up for each particle around the edges met; the memory grows with the particles along all strokes.
+
+use std::collections::HashMap;
+
+use foldhash::fast::FixedState;
+use incise_mesh::ParticleId;
+
+use crate::stroke::{Hit, SAME_SHEET, longest_around, tets_around};
+use crate::surface::{CutSurface, Mark};
+use crate::{CutDelta, CutOptions, CuttableMesh};
+
+/// Surfaces whose normals have at least this cosine run the same way.
+const ALIGNED: f64 = 0.9;
+
+/// What earlier strokes knew of the particles along them, kept by whoever makes the strokes.
+///
+/// Hand it to [`crate::Sweep::advance_joining`] and [`crate::cut_surface_joining`]; call [`CutMemory::follow`] after
+/// cuts made without it. Without a memory strokes meet only if they overlap by a tet.
+///
+/// # Example
+/// ```
+/// use glam::DVec3;
+/// use incise_cutting::{CutMemory, CutOptions, CuttableMesh, TriangleSurface, cut_surface_joining};
+/// use incise_mesh::generate::kuhn_box;
+///
+/// let mut body = CuttableMesh::new(kuhn_box([4, 4, 4], DVec3::ONE))?;
+/// let mut memory = CutMemory::default();
+/// // The upper and the lower part of one plane, which meet in the middle of tets.
+/// for center in [0.93, -0.07] {
+///     let center = DVec3::new(0.4, 0.5, center);
+///     let half = TriangleSurface::rectangle(center, DVec3::Y, DVec3::Z * 0.5)?;
+///     let positions = body.mesh().positions.clone();
+///     cut_surface_joining(&mut body, &positions, &half, &CutOptions::default(), &mut memory)?;
+/// }
+/// assert_eq!(body.mesh().pieces().count, 2);
+/// # Ok::<(), incise_cutting::CutError>(())
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct CutMemory {
+    /// Strokes so far.
+    strokes: u32,
+    /// For each particle and 0, 1, .. a stroke it is known to with what that knows of it. Never iterated in a way that
+    /// could be seen.
+    known: HashMap<(ParticleId, u32), (u32, Mark), FixedState>,
+}
+
+impl CutMemory {
+    /// Follows a cut that was made without this memory. `options` are those of the cut.
+    ///
+    /// # Panics
+    /// If `cuttable` is not the mesh as `delta` left it.
+    pub fn follow(&mut self, cuttable: &CuttableMesh, delta: &CutDelta, options: &CutOptions) {
+        self.follow_all_but(u32::MAX, cuttable, delta, options.reach());
+    }
+
+    /// Forgets all particles from the given number on, which an undone cut had made. Linear in the memory.
+    pub fn truncate(&mut self, particles: usize) {
+        self.known.retain(|key, _| key.0.index() < particles);
+    }
+
+    pub(crate) fn next_stroke(&mut self) -> u32 {
+        self.strokes += 1;
+        self.strokes - 1
+    }
+
+    fn entries(&self, particle: ParticleId) -> impl Iterator<Item = (u32, Mark)> + '_ {
+        (0..).map_while(move |i| self.known.get(&(particle, i)).copied())
+    }
+
+    fn mark(&self, particle: ParticleId, stroke: u32) -> Option<Mark> {
+        self.entries(particle)
+            .find_map(|(of, mark)| (of == stroke).then_some(mark))
+    }
+
+    fn insert(&mut self, particle: ParticleId, stroke: u32, mark: Mark) {
+        let place = self
+            .entries(particle)
+            .take_while(|(of, _)| *of != stroke)
+            .count();
+        let place = u32::try_from(place).unwrap_or(u32::MAX);
+        self.known.insert((particle, place), (stroke, mark));
+    }
+
+    /// Takes what earlier strokes of the same surface knew of the particles around the hits over into `surface`.
+    /// Appends to `adopted` those that lie on it now. Returns whether there were any.
+    pub(crate) fn join(
+        &self,
+        stroke: u32,
+        cuttable: &CuttableMesh,
+        hits: &[Hit],
+        surface: &mut CutSurface,
+        adopted: &mut Vec<ParticleId>,
+    ) -> bool {
+        let before = adopted.len();
+        if self.known.is_empty() {
+            return false;
+        }
+        let rest = &cuttable.mesh.positions;
+        let mut corners: Vec<ParticleId> = Vec::new();
+        // Strokes of the same surface and whether their positive side is ours.
+        let mut same: Vec<(u32, bool)> = Vec::new();
+        for hit in hits {
+            let ends = hit.crossing.ends;
+            corners.clear();
+            for tet in tets_around(cuttable, &ends) {
+                corners.extend(cuttable.mesh.tets[tet.index()]);
+            }
+            corners.sort_unstable();
+            corners.dedup();
+            same.clear();
+            let close = SAME_SHEET * longest_around(cuttable, ends);
+            let ours = hit.tangent;
+            for &corner in &corners {
+                for (of, mark) in self.entries(corner).filter(|entry| entry.0 != stroke) {
+                    let Some(theirs) = mark.tangent else { continue };
+                    let cosine = ours.normal.dot(theirs.normal);
+                    if cosine.abs() >= ALIGNED
+                        && ours.distance(rest[corner.index()]).abs() <= close
+                        && theirs.distance(ours.point).abs() <= close
+                        && same.iter().all(|(known, _)| *known != of)
+                    {
+                        same.push((of, cosine > 0.0));
+                    }
+                }
+            }
+            if same.is_empty() {
+                continue;
+            }
+            for &corner in &corners {
+                for &(of, upright) in &same {
+                    let Some(mark) = self.mark(corner, of) else {
+                        continue;
+                    };
+                    // On another sheet of that stroke, unless close and alike.
+                    let beside = mark.tangent.is_some_and(|theirs| {
+                        ours.normal.dot(theirs.normal).abs() < ALIGNED
+                            || ours.distance(rest[corner.index()]).abs() > close
+                    });
+                    if !beside && surface.adopt(corner, mark, upright) {
+                        adopted.push(corner);
+                    }
+                }
+            }
+        }
+        adopted.len() > before
+    }
+
+    /// Learns what a stroke came to know since it was last asked.
+    pub(crate) fn learn(&mut self, stroke: u32, surface: &mut CutSurface) {
+        for (particle, mark) in surface.take_news() {
+            self.insert(particle, stroke, mark);
+        }
+    }
+
+    /// Follows a cut with what all strokes but one know, as [`CutSurface::follow`] does.
+    pub(crate) fn follow_all_but(
+        &mut self,
+        stroke: u32,
+        cuttable: &CuttableMesh,
+        delta: &CutDelta,
+        reach: f64,
+    ) {
+        if self.known.is_empty() {
+            return;
+        }
+        let rest = &cuttable.mesh.positions;
+        for (i, point) in delta.points.iter().enumerate() {
+            let particle = ParticleId::new(delta.particles_before + i);
+            let known: Vec<(u32, Mark)> = point
+                .ends
+                .iter()
+                .flat_map(|&end| self.entries(end))
+                .filter(|(of, mark)| *of != stroke && mark.tangent.is_some())
+                .collect();
+            for &(of, _) in &known {
+                let [a, b] = point
+                    .ends
+                    .map(|end| self.mark(end, of).and_then(|mark| mark.tangent));
+                if let Some(tangent) =
+                    CutSurface::between([a, b], point.ends, particle, rest, reach)
+                {
+                    self.insert(particle, of, Mark::on(tangent));
+                }
+            }
+        }
+        let first = delta.particles_before + delta.points.len();
+        for (i, &source) in delta.copies.iter().enumerate() {
+            let known: Vec<(u32, Mark)> = self.entries(source).collect();
+            for (of, mark) in known.into_iter().filter(|entry| entry.0 != stroke) {
+                self.insert(ParticleId::new(first + i), of, mark);
+            }
+        }
+    }
+}

@@ -1,0 +1,29 @@
+//! Maps over many items by several threads, a few by one.
+//!
+//! Results come in the order of the items and each depends on its item only, so they are the same for any number of
+//! threads. Source: plain data parallelism through the crate `rayon`. Cost: one call an item.
+
+use rayon::prelude::*;
+
+/// Fewer items than this are not worth waking another thread for.
+const PARALLEL_ITEMS: usize = 4096;
+
+/// The results of `f`, in the order of the items.
+pub(crate) fn map<T: Sync, R: Send>(items: &[T], f: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    if items.len() < PARALLEL_ITEMS {
+        return items.iter().map(f).collect();
+    }
+    items.par_iter().with_min_len(1024).map(&f).collect()
+}
+
+/// The results of `f` that are something, in the order of the items.
+pub(crate) fn filter_map<T: Sync, R: Send>(
+    items: &[T],
+    f: impl Fn(&T) -> Option<R> + Sync,
+) -> Vec<R> {
+    if items.len() < PARALLEL_ITEMS {
+        return items.iter().filter_map(f).collect();
+    }
+    let results = items.par_iter().with_min_len(1024).filter_map(&f);
+    results.collect()
+}

@@ -1,0 +1,452 @@
+//! [`Stroke`]: the engine behind every blade that is not a whole field: from met edges to a cut.
+//!
+//! A [`Blade`] says where it meets an edge; whether it moves (`sweep`) or stands (`triangles`) makes no difference here.
+//! Every edge met gets a particle there, and a face opens as soon as all three of its particles lie on the surface. So
+//! the mesh conforms after every cut, and a surface may end anywhere.
+//!
+//! A particle is put on the surface (snapped) only before any of its edges is split, else a corner already cut free
+//! could be cut off again as a chip of its own. So when a moving blade first meets an edge of a particle, the surface is
+//! continued by its tangent plane through all edges of the particle, which decides as a whole plane would. Where the
+//! body moves, a later meeting may come closer to the particle than foreseen; the new particle then keeps the snap
+//! distance, which bends the surface as snapping does, the other way.
+//!
+//! With a [`CutMemory`] the stroke takes over what earlier strokes of the same surface left beside the edges it meets,
+//! and goes on as if it were one of them.
+//!
+//! Source: paper section 4.3, with the moving front as described here. Cost: what the edges offered and the cut cost.
+
+use glam::{DMat3, DVec3};
+use incise_mesh::{ParticleId, TetId, TetMesh};
+
+use crate::meet::{Meeting, MovingSegment};
+use crate::memory::CutMemory;
+use crate::operation::{Crossing, Operation};
+use crate::parallel;
+use crate::sides::{GivenSides, Sides};
+use crate::signs::linear;
+use crate::surface::{CutSurface, Tangent};
+use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
+
+/// A meeting within this fraction of the edge's length from the tangent plane of an end is that same surface again,
+/// bent to its particles; one further away is another sheet of a stroke that came back.
+pub(crate) const SAME_SHEET: f64 = 0.25;
+/// A particle that the surface passed on both sides, and this time within this fraction of an edge, is put on it: the
+/// body between the two sheets is thinner than a tet, and cutting both would leave it as a thread.
+const BETWEEN: f64 = 0.5;
+
+/// Something that cuts.
+pub(crate) trait Blade: Sync {
+    /// Whether it comes by bit by bit, so that a particle must be decided before all meetings are known.
+    const COMES_BY: bool;
+
+    /// The first meeting with an edge that `keep` does not refuse, and how many there are.
+    fn first_meeting(
+        &self,
+        edge: &MovingSegment,
+        keep: impl Fn(&Meeting) -> bool,
+    ) -> Option<(Meeting, usize)>;
+
+    /// How often one edge can be met.
+    fn most_meetings(&self) -> usize;
+}
+
+/// The particles' positions at the beginning and the end of a frame.
+#[derive(Clone, Debug)]
+pub(crate) struct Motion {
+    pub(crate) before: Vec<DVec3>,
+    pub(crate) now: Vec<DVec3>,
+}
+
+impl Motion {
+    fn edge(&self, ends: [ParticleId; 2]) -> MovingSegment {
+        MovingSegment {
+            before: ends.map(|p| self.before[p.index()]),
+            now: ends.map(|p| self.now[p.index()]),
+        }
+    }
+
+    fn push(&mut self, crossing: &Crossing) {
+        for values in [&mut self.before, &mut self.now] {
+            let [a, b] = crossing.ends.map(|p| values[p.index()]);
+            values.push(a + (b - a) * crossing.parameter);
+        }
+    }
+}
+
+/// The state of a stroke.
+#[derive(Clone, Debug)]
+pub(crate) struct Stroke {
+    options: CutOptions,
+    surface: CutSurface,
+    given: GivenSides,
+    /// The number that the memory knows it by.
+    number: Option<u32>,
+}
+
+/// An edge met by the blade, with the surface there.
+pub(crate) struct Hit {
+    pub(crate) crossing: Crossing,
+    pub(crate) tangent: Tangent,
+    /// On which side the ends were seen.
+    sides: [Option<bool>; 2],
+    /// How often it is met.
+    meetings: usize,
+}
+
+impl Stroke {
+    pub(crate) fn new(options: CutOptions) -> Self {
+        Self {
+            options,
+            surface: CutSurface::default(),
+            given: GivenSides::default(),
+            number: None,
+        }
+    }
+
+    /// Cuts what the blade meets among the tets `near`. `motion` is extended to the new particles, its present
+    /// positions also to the copies.
+    pub(crate) fn cut<B: Blade>(
+        &mut self,
+        cuttable: &mut CuttableMesh,
+        motion: &mut Motion,
+        mut near: Vec<TetId>,
+        blade: &B,
+        mut memory: Option<&mut CutMemory>,
+    ) -> Result<CutDelta, CutError> {
+        let particles = motion.now.len();
+        let mut fresh: Vec<ParticleId> = Vec::new();
+        let mut operation = Operation::begin(cuttable, &self.options);
+        // A round a meeting of an edge: then nothing is left, but what would be cut off by more is smaller than a tet. Near
+        // the tip of a surface there may be no end to it: every new edge crosses it again, nearer to the tip.
+        let mut rounds = 1 + blade.most_meetings();
+        let mut round = 0;
+        while round < rounds {
+            let edges = edges_of(&operation.cuttable.mesh, &near);
+            let mut hits = self.hits(operation.cuttable, &edges, motion, blade);
+            if let Some(memory) = &mut memory {
+                let number = *self.number.get_or_insert_with(|| memory.next_stroke());
+                self.surface.keep_news();
+                let cuttable = &*operation.cuttable;
+                if memory.join(number, cuttable, &hits, &mut self.surface, &mut fresh) {
+                    hits = self.hits(cuttable, &edges, motion, blade);
+                }
+            }
+            if hits.is_empty() {
+                break;
+            }
+            if round == 0 && !B::COMES_BY {
+                rounds = hits.iter().map(|hit| hit.meetings).max().unwrap_or(0);
+            }
+            round += 1;
+            let snapped = self.snap(operation.cuttable, &hits, B::COMES_BY);
+            near = match self.open(&mut operation, motion, hits, &snapped, &mut fresh) {
+                Ok(touched) => touched,
+                Err(error) => return Err(self.give_up(operation, motion, particles, error)),
+            };
+        }
+
+        while let (Some(memory), Some(number)) = (&memory, self.number) {
+            let gaps = self.gaps(operation.cuttable, &fresh);
+            if gaps.is_empty() {
+                break;
+            }
+            let cuttable = &*operation.cuttable;
+            if memory.join(number, cuttable, &gaps, &mut self.surface, &mut fresh) {
+                continue;
+            }
+            let snapped = self.snap(cuttable, &gaps, false);
+            if let Err(error) = self.open(&mut operation, motion, gaps, &snapped, &mut fresh) {
+                return Err(self.give_up(operation, motion, particles, error));
+            }
+        }
+
+        let seeds = self.seeds(operation.cuttable, &fresh);
+        let along = tets_around(operation.cuttable, &seeds);
+        let mesh = &operation.cuttable.mesh;
+        let sides = Sides::new(mesh, &self.surface, &mut self.given, &along);
+        operation.separate(&seeds, |face| {
+            face.particles.iter().all(|&p| self.surface.contains(p)) && sides.differ(face.tets)
+        });
+        let delta = operation.finish(|rest, c| self.surface.side(rest, c));
+        for source in &delta.copies {
+            motion.now.push(motion.now[source.index()]);
+        }
+        self.surface.copy(&delta);
+        if let (Some(memory), Some(number)) = (memory, self.number) {
+            memory.follow_all_but(number, cuttable, &delta, self.options.reach());
+            memory.learn(number, &mut self.surface);
+        }
+        Ok(delta)
+    }
+
+    /// Takes the cut back, and what the stroke knows of the particles that are gone by it.
+    fn give_up(
+        &mut self,
+        operation: Operation<'_>,
+        motion: &mut Motion,
+        particles: usize,
+        error: CutError,
+    ) -> CutError {
+        operation.roll_back();
+        motion.before.truncate(particles);
+        motion.now.truncate(particles);
+        self.surface.truncate(particles);
+        error
+    }
+
+    /// Splits the edges that were hit and have no end on the surface. Returns the tets touched.
+    fn open(
+        &mut self,
+        operation: &mut Operation<'_>,
+        motion: &mut Motion,
+        mut hits: Vec<Hit>,
+        snapped: &[ParticleId],
+        fresh: &mut Vec<ParticleId>,
+    ) -> Result<Vec<TetId>, CutError> {
+        operation.delta.snapped += snapped.len();
+        hits.retain(|hit| {
+            let ends = hit.crossing.ends;
+            ends.iter().all(|p| snapped.binary_search(p).is_err())
+        });
+        let reach = self.options.reach();
+        for hit in &mut hits {
+            hit.crossing.parameter = hit.crossing.parameter.clamp(reach, 1.0 - reach);
+        }
+        let near = operation.split(&hits.iter().map(|hit| hit.crossing).collect::<Vec<_>>())?;
+        self.given.forget(near.iter().copied());
+        fresh.extend(snapped);
+        for hit in hits {
+            let point = ParticleId::new(motion.now.len());
+            fresh.push(point);
+            motion.push(&hit.crossing);
+            self.surface.put(point, hit.tangent);
+        }
+        Ok(near)
+    }
+
+    /// The edges between this stroke's surface and the one it joins.
+    ///
+    /// Where the two run beside each other, an edge may slip through between the end of one and the start of the other.
+    /// So in tets that have particles of both, an edge that no blade met is taken to cross the mean of their tangent
+    /// planes, if its ends lie on different sides.
+    fn gaps(&self, cuttable: &CuttableMesh, fresh: &[ParticleId]) -> Vec<Hit> {
+        let rest = &cuttable.mesh.positions;
+        let mut gaps: Vec<Hit> = Vec::new();
+        for tet in tets_around(cuttable, fresh) {
+            let corners = cuttable.mesh.tets[tet.index()];
+            let on = || corners.into_iter().filter(|&p| self.surface.contains(p));
+            let joins = on().any(|p| self.surface.is_adopted(p))
+                && on().any(|p| !self.surface.is_adopted(p));
+            let mut off = corners.into_iter().filter(|&p| !self.surface.contains(p));
+            let (true, Some(a), Some(b)) = (joins, off.next(), off.next()) else {
+                continue;
+            };
+            let ends = [a.min(b), a.max(b)];
+            let tangents = on().filter_map(|p| self.surface.tangent(p));
+            let distances = ends.map(|p| {
+                let each = tangents.clone().map(|t| t.distance(rest[p.index()]));
+                each.sum::<f64>()
+            });
+            if distances[0] * distances[1] >= 0.0 {
+                continue;
+            }
+            let parameter = linear(distances);
+            let crossing = Crossing { ends, parameter };
+            let upwards = distances[0] < 0.0;
+            gaps.push(Hit {
+                crossing,
+                tangent: Tangent {
+                    point: rest[ends[0].index()].lerp(rest[ends[1].index()], parameter),
+                    normal: tangents
+                        .map(|t| t.normal)
+                        .sum::<DVec3>()
+                        .normalize_or_zero(),
+                },
+                sides: [Some(!upwards), Some(upwards)],
+                meetings: 1,
+            });
+        }
+        gaps.sort_by_key(|hit| hit.crossing.ends);
+        gaps.dedup_by_key(|hit| hit.crossing.ends);
+        gaps
+    }
+
+    /// Follows a cut that another stroke made.
+    pub(crate) fn follow(&mut self, cuttable: &CuttableMesh, delta: &CutDelta) {
+        self.given.forget(delta.removed.iter().map(|tet| tet.tet));
+        self.surface
+            .follow(delta, &cuttable.mesh.positions, self.options.reach());
+    }
+
+    /// The edges met, each with its first meeting that is not with the sheet one of its ends lies on.
+    fn hits(
+        &self,
+        cuttable: &CuttableMesh,
+        edges: &[[ParticleId; 2]],
+        motion: &Motion,
+        blade: &impl Blade,
+    ) -> Vec<Hit> {
+        let rest = &cuttable.mesh.positions;
+        parallel::filter_map(edges, |&ends| {
+            if ends.iter().all(|&p| self.surface.contains(p)) {
+                return None;
+            }
+            let [a, b] = ends.map(|p| rest[p.index()]);
+            let known = ends.iter().find_map(|&p| self.surface.tangent(p));
+            let adopted = || ends.iter().any(|&p| self.surface.is_adopted(p));
+            let old = |m: &Meeting| {
+                known.is_some_and(|t| {
+                    let distance = t.distance(a.lerp(b, m.parameter)).abs();
+                    distance <= SAME_SHEET * a.distance(b)
+                        || (adopted() && distance <= SAME_SHEET * longest_around(cuttable, ends))
+                })
+            };
+            let (meeting, meetings) = blade.first_meeting(&motion.edge(ends), |m| !old(m))?;
+            Some(Hit {
+                meetings,
+                ..hit(cuttable, &motion.now, ends, &meeting)
+            })
+        })
+    }
+
+    /// Notes what the hits say of their ends, and puts those on the surface that it passes closely.
+    fn snap(&mut self, cuttable: &CuttableMesh, hits: &[Hit], foresee: bool) -> Vec<ParticleId> {
+        for hit in hits {
+            for (particle, side) in hit.crossing.ends.into_iter().zip(hit.sides) {
+                if let Some(side) = side {
+                    self.surface.see(particle, side);
+                }
+            }
+        }
+        let mut snapped: Vec<(ParticleId, Tangent)> = Vec::new();
+        for hit in hits {
+            let at = hit.crossing.parameter;
+            for (particle, fraction) in hit.crossing.ends.into_iter().zip([at, 1.0 - at]) {
+                let undecided = !self.surface.is_decided(particle);
+                let close = fraction < self.options.tolerance
+                    || (undecided && fraction < self.options.snap)
+                    || (undecided
+                        && foresee
+                        && self.passes_closely(cuttable, particle, &hit.tangent))
+                    || (fraction < BETWEEN && self.surface.is_seen_on_both(particle));
+                if close && !self.surface.contains(particle) {
+                    snapped.push((particle, hit.tangent));
+                }
+            }
+        }
+        for particle in hits.iter().flat_map(|hit| hit.crossing.ends) {
+            self.surface.decide(particle);
+        }
+        snapped.sort_by_key(|(particle, _)| *particle);
+        snapped.dedup_by_key(|(particle, _)| *particle);
+        for &(particle, tangent) in &snapped {
+            self.surface.put(particle, tangent);
+        }
+        snapped.into_iter().map(|(particle, _)| particle).collect()
+    }
+
+    /// Whether the plane crosses one of the particle's edges within the snap distance from it.
+    fn passes_closely(
+        &self,
+        cuttable: &CuttableMesh,
+        particle: ParticleId,
+        plane: &Tangent,
+    ) -> bool {
+        let rest = &cuttable.mesh.positions;
+        let here = plane.distance(rest[particle.index()]);
+        cuttable.around(particle).any(|tet| {
+            cuttable.mesh.tets[tet.index()].iter().any(|&other| {
+                let there = plane.distance(rest[other.index()]);
+                (here > 0.0) != (there > 0.0)
+                    && here.abs() < self.options.snap * (here - there).abs()
+            })
+        })
+    }
+
+    /// The particles whose stars can come apart: the fresh ones and those on the surface beside them. Ascending.
+    fn seeds(&self, cuttable: &CuttableMesh, fresh: &[ParticleId]) -> Vec<ParticleId> {
+        let around = fresh.iter().flat_map(|&p| cuttable.around(p));
+        let mut seeds: Vec<ParticleId> = around
+            .flat_map(|tet| cuttable.mesh.tets[tet.index()])
+            .filter(|&p| self.surface.contains(p))
+            .collect();
+        seeds.sort_unstable();
+        seeds.dedup();
+        seeds
+    }
+}
+
+/// The tets around the given particles, each once, ascending.
+pub(crate) fn tets_around(cuttable: &CuttableMesh, particles: &[ParticleId]) -> Vec<TetId> {
+    let mut tets: Vec<TetId> = particles.iter().flat_map(|&p| cuttable.around(p)).collect();
+    tets.sort_unstable();
+    tets.dedup();
+    tets
+}
+
+/// The edges of the given tets, each once, ascending.
+fn edges_of(mesh: &TetMesh, tets: &[TetId]) -> Vec<[ParticleId; 2]> {
+    let mut edges = Vec::with_capacity(6 * tets.len());
+    for tet in tets {
+        let c = mesh.tets[tet.index()];
+        for (i, j) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
+            edges.push([c[i].min(c[j]), c[i].max(c[j])]);
+        }
+    }
+    edges.sort_unstable();
+    edges.dedup();
+    edges
+}
+
+/// The length at rest of the longest edge of the tets around an edge's ends.
+pub(crate) fn longest_around(cuttable: &CuttableMesh, ends: [ParticleId; 2]) -> f64 {
+    let rest = &cuttable.mesh.positions;
+    let mut longest: f64 = 0.0;
+    for end in ends {
+        for tet in cuttable.around(end) {
+            for corner in cuttable.mesh.tets[tet.index()] {
+                longest = longest.max(rest[corner.index()].distance_squared(rest[end.index()]));
+            }
+        }
+    }
+    longest.sqrt()
+}
+
+/// What a meeting says of the surface, with its tangent plane carried back to the rest shape.
+///
+/// With deformation gradient F, `n · F dX = (Fᵀ n) · dX`: the normal goes back by the transpose, summed over the tets
+/// around the edge, which are taken in ascending order: the sum must not depend on the order of a list.
+fn hit(cuttable: &CuttableMesh, now: &[DVec3], ends: [ParticleId; 2], meeting: &Meeting) -> Hit {
+    let rest = &cuttable.mesh.positions;
+    let edges_from = |values: &[DVec3], c: [ParticleId; 4]| {
+        let [a, b, c, d] = c.map(|p| values[p.index()]);
+        DMat3::from_cols(b - a, c - a, d - a)
+    };
+    let mut around: Vec<TetId> = cuttable
+        .around(ends[0])
+        .filter(|tet| cuttable.mesh.tets[tet.index()].contains(&ends[1]))
+        .collect();
+    around.sort_unstable();
+    let mut normal = DVec3::ZERO;
+    for tet in around {
+        let corners = cuttable.mesh.tets[tet.index()];
+        let gradient = edges_from(now, corners) * edges_from(rest, corners).inverse();
+        normal += (gradient.transpose() * meeting.normal).normalize_or_zero();
+    }
+    let [a, b] = ends.map(|p| rest[p.index()]);
+    // In a body crushed flat there is no way back; the crossed edge itself then serves as the normal.
+    let along = (b - a).normalize_or_zero() * if meeting.upwards { 1.0 } else { -1.0 };
+    let tangent = Tangent {
+        point: a + (b - a) * meeting.parameter,
+        normal: normal.try_normalize().unwrap_or(along),
+    };
+    Hit {
+        crossing: Crossing {
+            ends,
+            parameter: meeting.parameter,
+        },
+        tangent,
+        sides: meeting.sides,
+        meetings: 1,
+    }
+}

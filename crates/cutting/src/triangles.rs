@@ -1,0 +1,401 @@
+//! [`TriangleSurface`] and [`cut_surface`]: a surface of triangles cuts where it stands.
+//!
+//! An edge is met where a triangle lies between its ends: the ends have different orientations with the triangle, and
+//! the edge's line has the same orientation with all three of its sides. Orientations are exact, so triangles with a
+//! common side decide alike on which of them is met, and being met on the side itself counts for both: nothing slips
+//! through between them. An end on the surface, or next to it by the tolerance, counts as met and moves onto it. What
+//! follows is the same as for a moving blade (see the module `stroke`), in one go.
+//!
+//! Source: orientations by J. R. Shewchuk 1997 (through `incise_mesh::orientation`); the sides of a line by
+//! Segura and Feito 2001. Cost: O(log m) a tet for m triangles to find those near, then the cut.
+
+use std::cmp::Ordering;
+
+use glam::DVec3;
+use incise_mesh::{TetId, TetMesh, orientation};
+
+use crate::meet::{Meeting, MovingSegment};
+use crate::memory::CutMemory;
+use crate::parallel;
+use crate::plane::require_finite;
+use crate::stroke::{Blade, Motion, SAME_SHEET, Stroke};
+use crate::sweep::require_count;
+use crate::tree::{Bounds, BoxTree};
+use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
+
+/// A triangle is flat if its area is smaller than this fraction of its longest side squared: its normal would be noise.
+const FLAT: f64 = 1e-12;
+
+/// Triangles to cut along: a bounded plane, a strip, any open or closed surface.
+///
+/// Triangles that share a side are turned the same way where that is possible; a surface with one side only (a Möbius
+/// strip) has a seam somewhere, at which tets may hang together. Surfaces may cross themselves; crossings within one
+/// tet may leave it uncut there, as with two strokes at the same time.
+#[derive(Clone, Debug)]
+pub struct TriangleSurface {
+    points: Vec<DVec3>,
+    triangles: Vec<[u32; 3]>,
+    /// Unit length.
+    normals: Vec<DVec3>,
+    tree: BoxTree,
+}
+
+impl TriangleSurface {
+    /// Takes over points in m, where the body is now, and three of them for each triangle.
+    ///
+    /// # Errors
+    /// If there is no triangle, a point is not finite or does not exist, or a triangle has no area.
+    ///
+    /// # Example
+    /// ```
+    /// use glam::DVec3;
+    /// use incise_cutting::TriangleSurface;
+    ///
+    /// let points = [DVec3::ZERO, DVec3::X, DVec3::Y];
+    /// assert!(TriangleSurface::new(&points, &[[0, 1, 2]]).is_ok());
+    /// assert!(TriangleSurface::new(&points, &[[0, 1, 1]]).is_err());
+    /// ```
+    pub fn new(points: &[DVec3], triangles: &[[u32; 3]]) -> Result<Self, CutError> {
+        if triangles.is_empty() {
+            return Err(CutError::EmptySurface);
+        }
+        points
+            .iter()
+            .try_for_each(|&x| require_finite("a point of the surface", x))?;
+        let mut normals = Vec::with_capacity(triangles.len());
+        for (number, triangle) in triangles.iter().enumerate() {
+            if let Some(&point) = triangle.iter().find(|&&p| p as usize >= points.len()) {
+                return Err(CutError::TriangleIndex {
+                    triangle: number,
+                    point,
+                    points: points.len(),
+                });
+            }
+            normals.push(unit_normal(number, triangle.map(|p| points[p as usize]))?);
+        }
+        let mut triangles = triangles.to_vec();
+        for i in turned(&triangles) {
+            triangles[i].swap(1, 2);
+            normals[i] = -normals[i];
+        }
+        let boxes = triangles
+            .iter()
+            .map(|t| Bounds::around(t.map(|p| points[p as usize])));
+        let tree = BoxTree::new(boxes.collect());
+        Ok(Self {
+            points: points.to_vec(),
+            triangles,
+            normals,
+            tree,
+        })
+    }
+
+    /// A parallelogram around `center`, which reaches from it by plus and minus `half_u` and `half_v`, all in m.
+    ///
+    /// # Errors
+    /// If a number is not finite or the two directions are the same.
+    pub fn rectangle(center: DVec3, half_u: DVec3, half_v: DVec3) -> Result<Self, CutError> {
+        let (low, high) = (half_u + half_v, half_u - half_v);
+        let points = [center - low, center + high, center + low, center - high];
+        Self::new(&points, &[[0, 1, 2], [0, 2, 3]])
+    }
+
+    /// The strip between two polylines of equally many points in m. Where they touch, it ends in a point.
+    ///
+    /// # Errors
+    /// If the polylines have less than two points or not equally many, if a number is not finite, or if a triangle has
+    /// three different points on one line.
+    pub fn strip(first: &[DVec3], second: &[DVec3]) -> Result<Self, CutError> {
+        if first.len() != second.len() || first.len() < 2 {
+            return Err(CutError::StripPoints {
+                first: first.len(),
+                second: second.len(),
+            });
+        }
+        let points: Vec<DVec3> = first
+            .iter()
+            .zip(second)
+            .flat_map(|(a, b)| [*a, *b])
+            .collect();
+        let numbers = 0..u32::try_from(2 * (first.len() - 1)).unwrap_or(u32::MAX);
+        let in_pairs = numbers.step_by(2);
+        let both = in_pairs.flat_map(|i| [[i, i + 2, i + 3], [i, i + 3, i + 1]]);
+        let point = |p: u32| points[p as usize];
+        let distinct = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(point);
+            a != b && b != c && c != a
+        };
+        Self::new(&points, &both.filter(distinct).collect::<Vec<_>>())
+    }
+
+    fn corners(&self, triangle: usize) -> [DVec3; 3] {
+        self.triangles[triangle].map(|p| self.points[p as usize])
+    }
+
+    /// Where a triangle meets the edge from `a` to `b`; ends within `tolerance` of the edge count as on it.
+    fn meeting(&self, triangle: usize, [a, b]: [DVec3; 2], tolerance: f64) -> Option<Meeting> {
+        let [p, q, r] = self.corners(triangle);
+        let [at_a, at_b] = [a, b].map(|x| orientation([p, q, r, x]));
+        let parameter = if at_a == 0.0 && at_b == 0.0 {
+            return None; // in the triangle's plane: the edges across it decide
+        } else if (at_a <= 0.0 && at_b >= 0.0) || (at_a >= 0.0 && at_b <= 0.0) {
+            at_a / (at_a - at_b)
+        } else if at_a.abs() <= tolerance * at_b.abs() {
+            0.0
+        } else if at_b.abs() <= tolerance * at_a.abs() {
+            1.0
+        } else {
+            return None;
+        };
+        if !parameter.is_finite() {
+            return None;
+        }
+        let sides = [[p, q], [q, r], [r, p]].map(|[x, y]| orientation([a, b, x, y]));
+        let inside = sides.iter().all(|&s| s >= 0.0) || sides.iter().all(|&s| s <= 0.0);
+        inside.then_some(Meeting {
+            time: parameter,
+            parameter,
+            normal: self.normals[triangle],
+            upwards: at_a < at_b,
+            sides: [None; 2],
+        })
+    }
+
+    /// The tets that a triangle comes near, ascending.
+    fn near(&self, mesh: &TetMesh, positions: &[DVec3], tolerance: f64) -> Vec<TetId> {
+        let tets: Vec<TetId> = (0..mesh.tets.len()).map(TetId::new).collect();
+        parallel::filter_map(&tets, |&tet| {
+            let corners = mesh.tets[tet.index()].map(|p| positions[p.index()]);
+            let bounds = with_margin(Bounds::around(corners), tolerance);
+            let size = bounds.high - bounds.low;
+            // On one side of the plane by more than rounding and the tolerance.
+            let apart = |&triangle: &usize| {
+                let (point, normal) = (self.corners(triangle)[0], self.normals[triangle]);
+                let distances = corners.map(|x| normal.dot(x - point));
+                let scale = (corners[0] - point).abs().max_element() + size.max_element();
+                let margin = 2.0 * tolerance * size.max_element() + 1e-12 * scale;
+                distances.iter().all(|&d| d > margin) || distances.iter().all(|&d| d < -margin)
+            };
+            let mut triangles = self.tree.overlapping(bounds);
+            triangles.any(|t| !apart(&t)).then_some(tet)
+        })
+    }
+}
+
+/// A surface in its place.
+struct StandingBlade<'a> {
+    surface: &'a TriangleSurface,
+    tolerance: f64,
+}
+
+impl Blade for StandingBlade<'_> {
+    const COMES_BY: bool = false;
+
+    fn first_meeting(
+        &self,
+        edge: &MovingSegment,
+        keep: impl Fn(&Meeting) -> bool,
+    ) -> Option<(Meeting, usize)> {
+        let bounds = with_margin(Bounds::around(edge.now), self.tolerance);
+        let mut all: Vec<Meeting> = self
+            .surface
+            .tree
+            .overlapping(bounds)
+            .filter_map(|t| self.surface.meeting(t, edge.now, self.tolerance))
+            .collect();
+        // Ties are those of triangles that share a side or a corner there.
+        all.sort_by(|m, n| {
+            let by_normal = || m.normal.to_array().partial_cmp(&n.normal.to_array());
+            m.time
+                .total_cmp(&n.time)
+                .then_with(|| m.upwards.cmp(&n.upwards))
+                .then_with(|| by_normal().unwrap_or(Ordering::Equal))
+        });
+        let sides = [!all.first()?.upwards, all.last()?.upwards].map(Some);
+        all.retain(keep);
+        without_returns(&mut all, edge.now, self.tolerance);
+        let first = *all.first()?;
+        Some((Meeting { sides, ..first }, all.len()))
+    }
+
+    fn most_meetings(&self) -> usize {
+        self.surface.triangles.len()
+    }
+}
+
+/// Takes out where an edge goes through the surface and soon comes back: what lies between is thinner than a tet, and
+/// cutting once would put the far end on the wrong side. `meetings` ascend; those next to an end stay, since they move
+/// it onto the surface.
+fn without_returns(meetings: &mut Vec<Meeting>, [a, b]: [DVec3; 2], tolerance: f64) {
+    let inner = |m: &Meeting| m.parameter > tolerance && m.parameter < 1.0 - tolerance;
+    let mut kept: Vec<Meeting> = Vec::with_capacity(meetings.len());
+    for &meeting in meetings.iter() {
+        let Some(last) = kept.last().filter(|last| inner(last) && inner(&meeting)) else {
+            kept.push(meeting);
+            continue;
+        };
+        let between = (b - a) * (meeting.parameter - last.parameter);
+        if meeting.upwards == last.upwards {
+            // On a common side of two triangles, or with a sheet in between that runs the other way and was taken out.
+            if meeting.parameter > last.parameter {
+                kept.push(meeting);
+            }
+        } else if last.normal.dot(between).abs() <= SAME_SHEET * a.distance(b) {
+            kept.pop();
+        } else {
+            kept.push(meeting);
+        }
+    }
+    *meetings = kept;
+}
+
+/// Cuts along a surface of triangles.
+///
+/// # Arguments
+/// `positions` are the particles' present positions in m, where the surface is; the mesh at rest is cut at the same
+/// fractions of its edges.
+///
+/// # Returns
+/// What changed. Where the surface ends inside the body, the cut ends in the tet before: the rim of a slit. What is
+/// smaller than a tet and meets no edge cuts nothing.
+///
+/// # Errors
+/// If the options are not valid or `positions` has another length than the mesh; nothing is changed then.
+///
+/// # Determinism
+/// The same input gives the same bits for any number of threads.
+///
+/// # Example
+/// ```
+/// use glam::DVec3;
+/// use incise_cutting::{CutOptions, CuttableMesh, TriangleSurface, cut_surface};
+/// use incise_mesh::generate::kuhn_box;
+///
+/// // A slit from above, half as deep as the box.
+/// let mut body = CuttableMesh::new(kuhn_box([4, 4, 4], DVec3::ONE))?;
+/// let positions = body.mesh().positions.clone();
+/// let center = DVec3::new(0.4, 0.5, 1.0);
+/// let slit = TriangleSurface::rectangle(center, DVec3::Y, DVec3::Z * 0.5)?;
+/// let delta = cut_surface(&mut body, &positions, &slit, &CutOptions::default())?;
+/// assert!(!delta.is_empty());
+/// assert_eq!(body.mesh().pieces().count, 1);
+/// # Ok::<(), incise_cutting::CutError>(())
+/// ```
+pub fn cut_surface(
+    cuttable: &mut CuttableMesh,
+    positions: &[DVec3],
+    surface: &TriangleSurface,
+    options: &CutOptions,
+) -> Result<CutDelta, CutError> {
+    cut(cuttable, positions, surface, options, None)
+}
+
+/// The same as [`cut_surface`], for a surface that goes on where an earlier one stopped: see [`CutMemory`], which holds
+/// the earlier strokes and learns this one.
+///
+/// # Errors
+/// As [`cut_surface`].
+pub fn cut_surface_joining(
+    cuttable: &mut CuttableMesh,
+    positions: &[DVec3],
+    surface: &TriangleSurface,
+    options: &CutOptions,
+    memory: &mut CutMemory,
+) -> Result<CutDelta, CutError> {
+    cut(cuttable, positions, surface, options, Some(memory))
+}
+
+fn cut(
+    cuttable: &mut CuttableMesh,
+    positions: &[DVec3],
+    surface: &TriangleSurface,
+    options: &CutOptions,
+    memory: Option<&mut CutMemory>,
+) -> Result<CutDelta, CutError> {
+    let _span = tracing::debug_span!("cutting::surface").entered();
+    options.check()?;
+    require_count(cuttable.mesh(), positions)?;
+    let tolerance = options.tolerance;
+    let near = surface.near(cuttable.mesh(), positions, tolerance);
+    let mut motion = Motion {
+        before: positions.to_vec(),
+        now: positions.to_vec(),
+    };
+    let blade = StandingBlade { surface, tolerance };
+    Stroke::new(*options).cut(cuttable, &mut motion, near, &blade, memory)
+}
+
+/// The box and twice the tolerance around it.
+fn with_margin(bounds: Bounds, tolerance: f64) -> Bounds {
+    let margin = DVec3::splat(2.0 * tolerance * (bounds.high - bounds.low).max_element());
+    Bounds {
+        low: bounds.low - margin,
+        high: bounds.high + margin,
+    }
+}
+
+/// The direction of a triangle, if it has an area.
+fn unit_normal(triangle: usize, [a, b, c]: [DVec3; 3]) -> Result<DVec3, CutError> {
+    let sides = [b - a, c - b, a - c];
+    // Scaled first, so that squares neither under- nor overflow.
+    let longest = sides
+        .iter()
+        .map(|s| s.abs().max_element())
+        .fold(0.0, f64::max);
+    let flat = |area| CutError::FlatTriangle { triangle, area };
+    if longest < f64::MIN_POSITIVE {
+        return Err(flat(0.0));
+    }
+    let double = (sides[0] / longest).cross(-sides[2] / longest);
+    let area = 0.5 * double.length();
+    // Not `<=`: what is not a number is refused as well.
+    if area > FLAT {
+        Ok(double.normalize())
+    } else {
+        Err(flat(area * longest * longest))
+    }
+}
+
+/// The triangles to turn around so that neighbors across a side run the same way, as far as possible: each part of
+/// the surface follows its first triangle. Sides of three and more triangles pass nothing on.
+fn turned(triangles: &[[u32; 3]]) -> Vec<usize> {
+    let mut sides: Vec<([u32; 2], usize, bool)> = Vec::with_capacity(3 * triangles.len());
+    for (i, &[a, b, c]) in triangles.iter().enumerate() {
+        for [from, to] in [[a, b], [b, c], [c, a]] {
+            sides.push(([from.min(to), from.max(to)], i, from < to));
+        }
+    }
+    sides.sort_unstable();
+    // Neighbors of each triangle and whether they run the other way, three places a triangle.
+    let mut neighbors: Vec<[Option<(usize, bool)>; 3]> = vec![[None; 3]; triangles.len()];
+    for shared in sides.chunk_by(|a, b| a.0 == b.0) {
+        let [(_, i, up), (_, j, other_up)] = *shared else {
+            continue;
+        };
+        for (one, other) in [(i, j), (j, i)] {
+            if let Some(place) = neighbors[one].iter_mut().find(|place| place.is_none()) {
+                *place = Some((other, up == other_up));
+            }
+        }
+    }
+    let mut turn: Vec<Option<bool>> = vec![None; triangles.len()];
+    let mut queue = Vec::new();
+    for start in 0..triangles.len() {
+        if turn[start].is_some() {
+            continue;
+        }
+        turn[start] = Some(false);
+        queue.push((start, false));
+        while let Some((i, this)) = queue.pop() {
+            for (j, against) in neighbors[i].into_iter().flatten() {
+                if turn[j].is_none() {
+                    turn[j] = Some(this != against);
+                    queue.push((j, this != against));
+                }
+            }
+        }
+    }
+    (0..triangles.len())
+        .filter(|&i| turn[i] == Some(true))
+        .collect()
+}

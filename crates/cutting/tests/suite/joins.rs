@@ -1,0 +1,194 @@
+//! Strokes that meet earlier ones through a memory.
+
+use glam::DVec3;
+use incise_cutting::{
+    CutDelta, CutMemory, CuttableMesh, Plane, Sweep, TriangleSurface, cut_plane,
+    cut_surface_joining,
+};
+use incise_mesh::generate::kuhn_box;
+use proptest::prelude::*;
+
+use crate::bodies::{body, check_cut, jittered_box, noise, options, volumes};
+
+/// Moves a blade by `path` times 0 to 1 in `frames` steps; checks everything after each.
+fn sweep(
+    body: &mut CuttableMesh,
+    memory: &mut CutMemory,
+    blade: [DVec3; 2],
+    path: [DVec3; 2],
+    frames: usize,
+    snap: f64,
+) {
+    let pose =
+        |frame: usize| blade.map(|x| x + path[0].lerp(path[1], frame as f64 / frames as f64));
+    let rest = body.mesh().positions.clone();
+    let mut stroke = Sweep::new(body, &rest, &pose(0), options(snap)).unwrap();
+    for frame in 1..=frames {
+        let before = body.mesh().clone();
+        let delta = stroke
+            .advance_joining(body, &before.positions, &pose(frame), memory)
+            .unwrap();
+        check_cut(&before, body, &delta);
+    }
+}
+
+fn stand(
+    body: &mut CuttableMesh,
+    memory: &mut CutMemory,
+    surface: &TriangleSurface,
+    snap: f64,
+) -> CutDelta {
+    let before = body.mesh().clone();
+    let delta =
+        cut_surface_joining(body, &before.positions, surface, &options(snap), memory).unwrap();
+    check_cut(&before, body, &delta);
+    delta
+}
+
+const BLADE: [DVec3; 2] = [DVec3::new(0.42, -1.0, 0.0), DVec3::new(0.47, 2.0, 0.0)];
+
+fn z(from: f64, to: f64) -> [DVec3; 2] {
+    [DVec3::Z * from, DVec3::Z * to]
+}
+
+/// Stopped half-way, and a new stroke goes on: from the same line, from the other side meeting exactly or overlapping a
+/// little, or beside it by a tenth of an edge.
+#[test]
+fn strokes_that_go_on() {
+    let h = 0.2;
+    for snap in [0.0, 0.05, 0.1, 0.2] {
+        for depth in [0.37, 0.5, 0.61, 0.6] {
+            let goes_on = [
+                ("the same line", z(depth, -0.2), 0.0),
+                ("overlapping", z(depth + 0.3 * h, -0.2), 0.0),
+                ("other side", z(-0.2, depth), 0.0),
+                ("other side, overlapping", z(-0.2, depth + 0.2 * h), 0.0),
+                ("beside it", z(depth, -0.2), 0.1 * h),
+                ("other side, beside it", z(-0.2, depth), 0.1 * h),
+                (
+                    "other side, beside it, overlapping",
+                    z(-0.2, depth + 0.5 * h),
+                    0.1 * h,
+                ),
+            ];
+            for (what, path, beside) in goes_on {
+                for mesh in [kuhn_box([5; 3], DVec3::ONE), jittered_box(5, 0.15, 3)] {
+                    let mut body = CuttableMesh::new(mesh).unwrap();
+                    let mut memory = CutMemory::default();
+                    sweep(&mut body, &mut memory, BLADE, z(1.2, depth), 7, snap);
+                    assert_eq!(body.mesh().pieces().count, 1);
+                    let blade = BLADE.map(|x| x + DVec3::X * beside);
+                    sweep(&mut body, &mut memory, blade, path, 7, snap);
+                    let volumes = volumes(&body);
+                    assert_eq!(
+                        volumes.len(),
+                        2,
+                        "{what}, snap {snap}, depth {depth}: {volumes:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// Crossing strokes are left alone: half as deep they leave one piece, to the ground four.
+#[test]
+fn strokes_that_cross() {
+    for (depth, pieces) in [(0.5, 1), (1.2, 4)] {
+        for snap in [0.0, 0.1] {
+            let mut body = CuttableMesh::new(jittered_box(5, 0.15, 11)).unwrap();
+            let mut memory = CutMemory::default();
+            let first = [DVec3::new(0.47, -1.0, 1.1), DVec3::new(0.47, 2.0, 1.1)];
+            let second = [DVec3::new(-1.0, 0.53, 1.1), DVec3::new(2.0, 0.53, 1.1)];
+            for blade in [first, second] {
+                sweep(&mut body, &mut memory, blade, z(0.0, -depth), 9, snap);
+            }
+            assert_eq!(body.mesh().pieces().count, pieces);
+        }
+    }
+}
+
+/// Half a cross from above, the rest from below: four pieces.
+#[test]
+fn a_cross_in_four_strokes() {
+    let mut body = CuttableMesh::new(jittered_box(5, 0.15, 11)).unwrap();
+    let mut memory = CutMemory::default();
+    let first = [DVec3::new(0.47, -1.0, 0.0), DVec3::new(0.47, 2.0, 0.0)];
+    let second = [DVec3::new(-1.0, 0.53, 0.0), DVec3::new(2.0, 0.53, 0.0)];
+    for path in [z(1.1, 0.45), z(-0.1, 0.45)] {
+        for blade in [first, second] {
+            sweep(&mut body, &mut memory, blade, path, 6, 0.1);
+        }
+    }
+    assert_eq!(body.mesh().pieces().count, 4);
+}
+
+/// A standing surface in four parts, cut one after the other.
+#[test]
+fn a_plane_in_parts() {
+    for snap in [0.0, 0.1] {
+        let mut body = CuttableMesh::new(jittered_box(5, 0.15, 4)).unwrap();
+        let mut memory = CutMemory::default();
+        let line = 0.47;
+        for (y, z) in [(-1.0, -1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0)] {
+            assert_eq!(body.mesh().pieces().count, 1);
+            let center = DVec3::new(0.43, line + y, line + z);
+            let part = TriangleSurface::rectangle(center, DVec3::Y, DVec3::Z).unwrap();
+            stand(&mut body, &mut memory, &part, snap);
+        }
+        assert_eq!(body.mesh().pieces().count, 2, "snap {snap}");
+    }
+}
+
+/// The same stroke again and again changes nothing after the first time.
+#[test]
+fn the_same_again() {
+    for snap in [0.0, 0.1, 0.2] {
+        let mut body = CuttableMesh::new(jittered_box(5, 0.15, 4)).unwrap();
+        let mut memory = CutMemory::default();
+        let center = DVec3::new(0.43, 0.5, 0.9);
+        let slit = TriangleSurface::rectangle(center, DVec3::Y, DVec3::new(0.1, 0.0, 0.5)).unwrap();
+        for time in 0..4 {
+            let delta = stand(&mut body, &mut memory, &slit, snap);
+            assert_eq!(delta.is_empty(), time > 0, "time {time}, snap {snap}");
+        }
+        let mut body = CuttableMesh::new(jittered_box(5, 0.15, 4)).unwrap();
+        let mut memory = CutMemory::default();
+        for time in 0..4 {
+            let before = body.mesh().clone();
+            sweep(&mut body, &mut memory, BLADE, z(1.2, 0.4), 5, snap);
+            assert_eq!(body.mesh() == &before, time > 0, "time {time}, snap {snap}");
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+
+    /// Two strokes of one plane that meet at any depth cut like the whole plane.
+    #[test]
+    fn halves_of_a_plane(
+        kind in 1_usize..6, seed in any::<u64>(), depth in -0.2..0.2_f64, frames in 1_usize..12,
+        from_both in prop::bool::ANY, snap in prop::sample::select(vec![0.0, 0.05, 0.1, 0.2]),
+    ) {
+        let mesh = body(kind, seed);
+        let normal = DVec3::from_array([0, 1, 2].map(|k| noise(seed, k)));
+        let along = DVec3::from_array([3, 4, 5].map(|k| noise(seed, k)));
+        prop_assume!(normal.length() > 0.1 && normal.cross(along).length() > 0.1);
+        let center = mesh.positions.iter().sum::<DVec3>() / mesh.positions.len() as f64;
+        let normal = normal.normalize();
+        let along = (along - normal * along.dot(normal)).normalize();
+        let path = normal.cross(along);
+        let blade = [center - along * 4.0, center + along * 4.0];
+
+        let mut whole = CuttableMesh::new(mesh.clone()).unwrap();
+        cut_plane(&mut whole, &mesh.positions, &Plane { point: center, normal }, &options(snap)).unwrap();
+        let mut cut = CuttableMesh::new(mesh).unwrap();
+        let mut memory = CutMemory::default();
+        sweep(&mut cut, &mut memory, blade, [path * 3.0, path * depth], frames, snap);
+        let second = if from_both { [path * -3.0, path * depth] } else { [path * depth, path * -3.0] };
+        sweep(&mut cut, &mut memory, blade, second, frames, snap);
+        let (cut, whole) = (volumes(&cut), volumes(&whole));
+        prop_assert_eq!(cut.len(), whole.len(), "{:?} {:?}", &cut, &whole);
+    }
+}
