@@ -1,5 +1,8 @@
 //! [`CuttableMesh`]: a mesh together with the lists that make cutting it local.
 
+use std::collections::HashMap;
+
+use foldhash::fast::FixedState;
 use incise_mesh::{ParticleId, TetId, TetMesh};
 
 use crate::faces::{Behind, Face, Faces};
@@ -16,6 +19,8 @@ pub struct CuttableMesh {
     pub(crate) mesh: TetMesh,
     pub(crate) stars: Stars,
     pub(crate) faces: Faces,
+    /// How far planes and level sets were bent to particles. Never iterated.
+    pub(crate) bent: HashMap<ParticleId, f64, FixedState>,
 }
 
 impl CuttableMesh {
@@ -27,7 +32,12 @@ impl CuttableMesh {
         mesh.check()?;
         let stars = Stars::new(&mesh);
         let faces = Faces::new(&mesh);
-        Ok(Self { mesh, stars, faces })
+        Ok(Self {
+            mesh,
+            stars,
+            faces,
+            bent: HashMap::default(),
+        })
     }
 
     /// The mesh at rest, with all cuts made so far.

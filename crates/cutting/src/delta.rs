@@ -133,6 +133,8 @@ pub struct CutDelta {
     pub surface_added: Vec<BoundaryTriangle>,
     /// Particles that the surface was bent to by snapping.
     pub snapped: usize,
+    /// Those particles off a plane or level set that no earlier one had been bent to: kept for undo.
+    pub bent: Vec<ParticleId>,
     /// The smallest volume of a child as a fraction of its parent's (1 if none was cut).
     pub worst_volume_ratio: f64,
     /// The smallest and the largest dihedral angle of a child at rest in degrees, if any tet was cut.

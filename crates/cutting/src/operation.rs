@@ -6,6 +6,7 @@
 //! what changed is kept until the delta is written.
 
 use std::collections::BTreeMap;
+use std::collections::hash_map::Entry;
 
 use glam::DVec3;
 use incise_mesh::{ParticleId, TetId, signed_volume};
@@ -206,8 +207,19 @@ impl<'a> Operation<'a> {
         let copy = ParticleId::new(mesh.positions.len());
         mesh.positions.push(mesh.positions[source.index()]);
         self.cuttable.stars.push_particle();
+        if let Some(&distance) = self.cuttable.bent.get(&source) {
+            self.cuttable.bent.insert(copy, distance);
+        }
         self.delta.copies.push(source);
         copy
+    }
+
+    /// Notes that the surface was bent to a particle over a distance. Must not be called after [`Operation::separate`].
+    pub(crate) fn bend(&mut self, particle: ParticleId, distance: f64) {
+        if let Entry::Vacant(entry) = self.cuttable.bent.entry(particle) {
+            entry.insert(distance);
+            self.delta.bent.push(particle);
+        }
     }
 
     /// The particle that a copy made by this operation was made of, or the particle itself.

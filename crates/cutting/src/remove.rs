@@ -147,7 +147,9 @@ impl Operation<'_> {
 
 /// Moves the last tets into the slots that have become free.
 fn fill_gaps(cuttable: &mut CuttableMesh, doomed: &BTreeSet<TetId>, delta: &mut CutDelta) {
-    let CuttableMesh { mesh, stars, faces } = cuttable;
+    let CuttableMesh {
+        mesh, stars, faces, ..
+    } = cuttable;
     let after = delta.tets_after();
     let first = TetId::new(after);
     let gaps = doomed.range(..first);

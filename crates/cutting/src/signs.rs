@@ -36,7 +36,8 @@ pub(crate) fn cut_by_signs(
             value: broken.parameter,
         });
     }
-    let snapped = snap(&crossings, &values, options, &mut on_surface);
+    let mut snapped = snap(&crossings, &values, options, &mut on_surface);
+    snapped += keep_bent(cuttable, &crossings, &values, &mut on_surface);
     let free = |c: &&Crossing| c.ends.iter().all(|p| !on_surface[p.index()]);
     let flagged: Vec<Crossing> = crossings.iter().filter(free).copied().collect();
 
@@ -44,6 +45,10 @@ pub(crate) fn cut_by_signs(
     let mut operation = Operation::begin(cuttable, options);
     operation.delta.snapped = snapped;
     operation.split(&flagged)?;
+    let bent = (0..particles).filter(|&p| on_surface[p] && values[p] != 0.0);
+    for p in bent {
+        operation.bend(ParticleId::new(p), values[p].abs());
+    }
     values.resize(values.len() + flagged.len(), 0.0);
     on_surface.resize(on_surface.len() + flagged.len(), true);
 
@@ -127,4 +132,54 @@ fn snap(
         }
     }
     snapped
+}
+
+/// Puts particles back on the surface that an earlier cut was bent to, where this one would only cut off what lies
+/// between the two. Returns how many.
+///
+/// A particle is snapped because of one of its edges. After the cut that edge may belong to a copy, and nothing would
+/// tell the other copies: the same cut again would take chips off. So particles that are no further from this surface
+/// than from the one bent to them, and that have nobody on their side but others of their kind, stay on it.
+fn keep_bent(
+    cuttable: &CuttableMesh,
+    crossings: &[Crossing],
+    values: &[f64],
+    on_surface: &mut [bool],
+) -> usize {
+    // Rounding between two runs of the same cut, and a body that moved a little in between.
+    const AGAIN: f64 = 1.01;
+    let ends = crossings.iter().flat_map(|crossing| crossing.ends);
+    let close = |p: &ParticleId| {
+        let bend = cuttable.bent.get(p);
+        bend.is_some_and(|bend| values[p.index()].abs() <= AGAIN * bend)
+    };
+    let mut kept: Vec<ParticleId> = ends
+        .filter(close)
+        .filter(|p| !on_surface[p.index()])
+        .collect();
+    kept.sort_unstable();
+    kept.dedup();
+    loop {
+        let alone = |p: &ParticleId| {
+            let tets = cuttable.stars.around(*p);
+            let mut others = tets.flat_map(|tet| cuttable.mesh.tets[tet.index()]);
+            let side = values[p.index()] > 0.0;
+            others.all(|q| {
+                let value = values[q.index()];
+                on_surface[q.index()]
+                    || value == 0.0
+                    || (value > 0.0) != side
+                    || kept.binary_search(&q).is_ok()
+            })
+        };
+        let next: Vec<ParticleId> = kept.iter().copied().filter(alone).collect();
+        if next.len() == kept.len() {
+            break;
+        }
+        kept = next;
+    }
+    for p in &kept {
+        on_surface[p.index()] = true;
+    }
+    kept.len()
 }

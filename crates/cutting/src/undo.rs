@@ -54,7 +54,16 @@ impl CuttableMesh {
 
 impl CutDelta {
     pub(crate) fn take_back(&self, cuttable: &mut CuttableMesh) {
-        let CuttableMesh { mesh, stars, faces } = cuttable;
+        let CuttableMesh {
+            mesh,
+            stars,
+            faces,
+            bent,
+        } = cuttable;
+        let new = (self.particles_before..self.particles_after()).map(ParticleId::new);
+        for particle in new.chain(self.bent.iter().copied()) {
+            bent.remove(&particle);
+        }
         let face = |tet: TetId, opposite: u8| Face::of(tet)[usize::from(opposite)];
         for triangle in &self.surface_added {
             faces.close(face(triangle.tet, triangle.opposite));

@@ -109,6 +109,7 @@ impl Whole {
             surface_removed: delta.surface_removed.iter().map(triangle).collect(),
             surface_added: Vec::new(),
             snapped: delta.snapped,
+            bent: delta.bent.iter().map(|&p| particle(p)).collect(),
             worst_volume_ratio: delta.worst_volume_ratio,
             dihedral: delta.dihedral,
         };
