@@ -1,8 +1,8 @@
 //! Cutting tetrahedral meshes: planes and swept blades in, one [`CutDelta`] out.
 //!
-//! A [`CuttableMesh`] holds a mesh at rest. [`cut_plane`] cuts it with a whole plane at once; a [`Sweep`] moves a blade
-//! through it frame by frame. Both work where the blade is, in the body's present, deformed state, and cut the rest
-//! shape at the same fractions of its edges. Both change the mesh in place and return what they changed; nobody has to
+//! A [`CuttableMesh`] holds a mesh at rest. [`cut_plane`] cuts it with a whole plane at once, [`cut_level_set`] along
+//! the zero set of a field, [`cut_surface`] along triangles; a [`Sweep`] moves a blade through it frame by frame. All work where the blade is, in the body's present, deformed state, and cut the rest
+//! shape at the same fractions of its edges. All change the mesh in place and return what they changed; nobody has to
 //! compare before and after.
 //!
 //! - Crossed edges get a particle, the tets around them are split by ordered bisection ([`split_tet`]): the mesh

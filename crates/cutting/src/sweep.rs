@@ -111,8 +111,9 @@ impl Sweep {
     /// What changed; nothing if the blade met no edge.
     ///
     /// # Errors
-    /// If the blade is not finite or has another number of points, or `positions` has another length than the mesh;
-    /// nothing is changed then.
+    /// If the blade is not finite or has another number of points, `positions` has another length than the mesh, or the
+    /// mesh would grow beyond the options' limit; the mesh is not changed then. After the last of these the stroke may
+    /// have noted particles that it did not cut: start a new one.
     ///
     /// # Determinism
     /// The same history gives the same bits on every machine.

@@ -56,8 +56,8 @@ fn z(from: f64, to: f64) -> [DVec3; 2] {
 #[test]
 fn strokes_that_go_on() {
     let h = 0.2;
-    for snap in [0.0, 0.05, 0.1, 0.2] {
-        for depth in [0.37, 0.5, 0.61, 0.6] {
+    for snap in [0.0, 0.1, 0.2] {
+        for depth in [0.37, 0.6] {
             let goes_on = [
                 ("the same line", z(depth, -0.2), 0.0),
                 ("overlapping", z(depth + 0.3 * h, -0.2), 0.0),
