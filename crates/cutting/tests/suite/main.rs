@@ -7,3 +7,4 @@ mod pieces;
 mod planes;
 mod scenarios;
 mod sweeps;
+mod symmetry;
