@@ -3,12 +3,18 @@
 //! A search starts at each particle where the piece may have come apart. All advance in lockstep, one particle a round,
 //! from a particle to the particles of the tets around it. Searches that meet become one. A search with nothing left to
 //! find has found a complete part; once a single search is left the others are all parts that came off, and what that
-//! one would still find is the rest. So a slit costs the way around its front, and a part that comes off about twice
-//! its own size, however large the rest is.
+//! one would still find is the rest. So a slit costs the way around its front, and a part that comes off a few times its
+//! own size, however large the rest is.
+//!
+//! Walking from star to star costs some ten times as much for a tet as a pass over all tets in order. So once the
+//! searches have looked at tets a quarter as often as the body has tets, they are given up and the pieces are counted
+//! anew, which costs about as much again.
 //!
 //! Source: parallel search from both ends of a deleted edge, as in Y. Shiloach and S. Even, "An On-Line Edge-Deletion
-//! Problem", 1981. Cost: O(seeds + parts × the largest part that came off); where two parts still hang together far
-//! away, as in a ring cut once, up to the whole piece.
+//! Problem", 1981. Cost: O(seeds + parts × the largest part that came off), at most O(seeds + tets). A piece cut in
+//! places far from each other at once has searches in all of them that must meet, which mostly ends in a count.
+
+use std::cmp::Reverse;
 
 use incise_mesh::{ParticleId, TetId};
 
@@ -59,14 +65,15 @@ impl Parts {
     /// none is without tets. Afterwards [`Parts::iter`] lists the parts.
     ///
     /// What is left is not among them: it is the part whose search was still going on when all others had ended, or, if
-    /// none was, the one with the most tets, then the one with the lowest tet.
+    /// none was or the searches were given up, the one with the most tets, then the one with the lowest tet.
     pub(crate) fn find(&mut self, cuttable: &CuttableMesh, seeds: &[ParticleId]) {
         self.tets.clear();
         self.ends.clear();
         self.search_of.resize(cuttable.mesh().positions.len(), NONE);
         let mut going: Vec<u32> = seeds.iter().map(|&seed| self.start(seed)).collect();
         let mut ended: Vec<u32> = Vec::new();
-        while going.len() > 1 {
+        let most = self.looks + cuttable.mesh().tets.len() / 4;
+        while going.len() > 1 && self.looks <= most {
             for &search in &going {
                 // Others may have become one with it in this round.
                 if self.searches[search as usize].parent == search {
@@ -81,8 +88,12 @@ impl Parts {
                 parent == search && open.first != NONE
             });
         }
-        for &search in &ended {
-            self.gather(cuttable, search);
+        if going.len() > 1 {
+            self.count(cuttable, seeds);
+        } else {
+            for &search in &ended {
+                self.gather(cuttable, search);
+            }
         }
         if going.is_empty() {
             self.keep_largest();
@@ -102,7 +113,7 @@ impl Parts {
     }
 
     fn start(&mut self, seed: ParticleId) -> u32 {
-        let search = count(self.searches.len());
+        let search = index(self.searches.len());
         let empty = List {
             first: NONE,
             last: NONE,
@@ -119,7 +130,7 @@ impl Parts {
     /// Notes a particle that no search has found.
     fn find_particle(&mut self, search: u32, particle: ParticleId) {
         self.search_of[particle.index()] = search;
-        let one = count(self.found.len());
+        let one = index(self.found.len());
         self.found.push(Found {
             particle,
             next: NONE,
@@ -208,14 +219,49 @@ impl Parts {
         self.ends.push(self.tets.len());
     }
 
+    /// Lists the tets of all parts with a seed but the largest, found by a count of the whole body.
+    fn count(&mut self, cuttable: &CuttableMesh, seeds: &[ParticleId]) {
+        let pieces = cuttable.mesh().pieces();
+        let sizes = pieces.sizes();
+        let first_tets = seeds.iter().filter_map(|&p| cuttable.around(p).next());
+        let mut parts: Vec<usize> = first_tets
+            .map(|tet| pieces.labels[tet.index()] as usize)
+            .collect();
+        parts.sort_unstable();
+        parts.dedup();
+        // Labels ascend with the lowest tet.
+        let largest = parts
+            .iter()
+            .copied()
+            .max_by_key(|&part| (sizes[part], Reverse(part)));
+        parts.retain(|&part| Some(part) != largest);
+        // Where the next tet of each part goes.
+        let mut place = vec![usize::MAX; pieces.count];
+        let mut end = 0;
+        for part in parts {
+            place[part] = end;
+            end += sizes[part];
+            self.ends.push(end);
+        }
+        self.tets.resize(end, TetId(0));
+        for (&label, tet) in pieces.labels.iter().zip((0..).map(TetId)) {
+            let place = &mut place[label as usize];
+            if *place != usize::MAX {
+                self.tets[*place] = tet;
+                *place += 1;
+            }
+        }
+        self.looks += pieces.labels.len();
+    }
+
     /// Takes the largest part off the list of those that came off.
     fn keep_largest(&mut self) {
-        let sizes = self.iter().enumerate();
-        let rank = |tets: &[TetId]| (tets.len(), std::cmp::Reverse(tets[0]));
-        let Some((largest, range)) = sizes.max_by_key(|(_, tets)| rank(tets)) else {
+        let parts = self.iter().enumerate();
+        let rank = |tets: &[TetId]| (tets.len(), Reverse(tets[0]));
+        let Some((largest, tets)) = parts.max_by_key(|(_, tets)| rank(tets)) else {
             return;
         };
-        let size = range.len();
+        let size = tets.len();
         let end = self.ends.remove(largest);
         self.tets.drain(end - size..end);
         for end in &mut self.ends[largest..] {
@@ -234,6 +280,6 @@ impl List {
 }
 
 /// A number of things that are particles, of which there are fewer than 2³².
-fn count(things: usize) -> u32 {
+fn index(things: usize) -> u32 {
     ParticleId::new(things).0
 }

@@ -6,9 +6,12 @@
 //! their own and the one left keeps its name.
 //!
 //! Cost: [`PieceTracker::new`] a pass over the tets. [`PieceTracker::follow`] what the cut touched, the way around the
-//! front of a slit, and about twice the parts that come off. Memory: 4 bytes a tet and a particle.
+//! front of a slit, and a few times the parts that come off, at most about three such passes. Memory: 4 bytes a tet and a
+//! particle. Measured on grids of 10,000, 80,000 and 660,000 tets, as tets looked at ([`PieceTracker::looks`]): 54 a
+//! frame for a slit four cells wide, whatever the grid; 6,000 for a corner of 426 tets; 220, 430 and 860 a frame for a
+//! blade as wide as the grid while it goes down, and all of the grid when it comes out below.
 //!
-//! The trade: where two sides of a cut hang together only far away (a ring cut once) the search goes all the way.
+//! The trade: where two sides of a cut hang together only far away (a ring cut once) everything is looked at.
 //! Structures that answer in logarithmic time exist (Holm, de Lichtenberg and Thorup 2001); their constant costs every
 //! cut more than this costs the usual ones.
 
@@ -143,8 +146,8 @@ impl PieceTracker {
     /// Follows a cut.
     ///
     /// A part that comes off gets the next number. Which part keeps the old one: the one whose search was still going
-    /// on when the searches of all others had ended, mostly the largest; if the last ended in the same round, the one
-    /// with the most tets, then the one with the lowest tet.
+    /// on when the searches of all others had ended, mostly the largest; if the last ended in the same round or the
+    /// searches were given up for a count, the one with the most tets, then the one with the lowest tet.
     ///
     /// # Returns
     /// What happened, ascending by the piece it happened to, then by the lowest tet of the part that came off.
@@ -298,8 +301,8 @@ impl PieceTracker {
         self.piece_of[tet.index()]
     }
 
-    /// How often the search of the last [`PieceTracker::follow`] looked at a tet: what it cost. A tet is looked at once
-    /// for each of its corners, and once more for each if it came off.
+    /// How often the last [`PieceTracker::follow`] looked at a tet: what it cost. A search looks at a tet once for each of
+    /// its corners, and once more for each if it came off; a count looks once at each.
     #[must_use]
     pub fn looks(&self) -> usize {
         self.parts.looks

@@ -14,3 +14,4 @@ mod scenarios;
 mod separation;
 mod surfaces;
 mod sweeps;
+mod symmetry;

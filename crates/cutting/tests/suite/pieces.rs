@@ -294,6 +294,32 @@ fn removal() {
     ));
 }
 
+/// Several parts of different size come off a large body at once: the search knows them all without going far.
+#[test]
+fn parts_that_come_off_together() {
+    let n = 20;
+    let mut tracked = Tracked::new(kuhn_box([n; 3], DVec3::ONE));
+    let tets = tracked.body.mesh().tets.len();
+    // Cubes of 1, 2 and 3 cells along an edge, with a hole around them.
+    let hole = |t: usize| {
+        let [x, y, z] = [t / 6 % n, t / 6 / n % n, t / 6 / n / n];
+        let cube = |from: usize, size: usize| (from..from + size).contains(&x) && y.max(z) < size;
+        x < 9 && y.max(z) < 4 && !(cube(0, 1) || cube(2, 2) || cube(5, 3))
+    };
+    let events = tracked.delete(hole);
+    let mut sizes: Vec<usize> = events
+        .iter()
+        .map(|event| match event {
+            PieceEvent::Detached { from: 0, tets, .. } => *tets,
+            other => panic!("{other:?}"),
+        })
+        .collect();
+    sizes.sort_unstable();
+    assert_eq!(sizes, [6, 6 * 8, 6 * 27]);
+    let looks = tracked.pieces.looks();
+    assert!(looks < tets / 4, "{looks} looks for {tets} tets");
+}
+
 /// A mesh of several bodies starts with as many pieces.
 #[test]
 fn pieces_before_all_cuts() {
@@ -358,12 +384,21 @@ fn looks_follow_the_cut() {
     // Stars at the boundary are smaller than inside, hence 20 instead of 12.
     assert!(looks < 20 * chip, "{looks} looks for a chip of {chip}");
 
+    // Halved bodies and rings cut once make it count all tets, after a search that looked at tets a quarter as often.
+    let mut halved = Tracked::new(kuhn_box([12; 3], DVec3::ONE));
+    assert_eq!(halved.plane(DVec3::X * 0.51, DVec3::X, 0.1).len(), 1);
     let mut ring = Tracked::new(generate(Shape::Torus, 3000).unwrap());
     let half = |angle: f64| [DVec3::ZERO, DVec3::new(angle.cos(), angle.sin(), 0.0) * 3.0];
     let pose = |angle: f64| half(angle).map(|x| x + DVec3::Z * 2.0);
     let (came_off, looks) = ring.sweep(pose(0.4), DVec3::NEG_Z * 4.0, 8);
     assert_eq!(came_off, 0);
-    let tets = ring.body.mesh().tets.len();
-    assert!(looks > tets, "{looks} looks around a ring of {tets}");
+    for (tracked, looks) in [(&halved, halved.pieces.looks()), (&ring, looks)] {
+        let tets = tracked.body.mesh().tets.len();
+        // A round of the searches may go over the limit by the stars of all seeds.
+        assert!(
+            4 * looks > 5 * tets && looks < 2 * tets,
+            "{looks} looks for {tets} tets"
+        );
+    }
     assert_eq!(ring.sweep(pose(2.4), DVec3::NEG_Z * 4.0, 8).0, 1);
 }

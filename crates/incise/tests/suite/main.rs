@@ -17,6 +17,7 @@ mod pieces;
 mod preset;
 mod regions;
 mod reports;
+mod scenarios;
 mod sleep;
 mod substeps;
 mod support;
