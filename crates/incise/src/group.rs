@@ -155,7 +155,7 @@ impl Group {
             rest.wake();
         }
         self.solver.follow(delta, &self.cuttable, ms)?;
-        self.plan.follow(delta, ms)?;
+        self.plan.follow(delta, &self.cuttable, ms)?;
         let Some(volumes) = &self.volumes else {
             return Ok(());
         };

@@ -3,9 +3,9 @@
 use std::num::NonZeroUsize;
 use std::time::Instant;
 
-use incise_clustering::{Method, cluster, update_local};
+use incise_clustering::{Method, Moved, cluster, merge_small, update_local};
 use incise_coloring::{Algorithm, Recoloring, color};
-use incise_cutting::CutDelta;
+use incise_cutting::{CutDelta, CuttableMesh, RelinkedTet, RemovedTet};
 use incise_graph::{Clustering, Coloring, Incidence, Schedule};
 use incise_mesh::{ParticleId, TetId, TetMesh};
 
@@ -24,6 +24,8 @@ pub(crate) struct Plan {
     pub(crate) schedule: Schedule,
     /// The largest size of a cluster.
     limit: NonZeroUsize,
+    /// Whether clusters that a cut leaves small are merged.
+    merges: bool,
 }
 
 impl Plan {
@@ -43,6 +45,7 @@ impl Plan {
             recoloring,
             schedule,
             limit: method.max_size(),
+            merges: scene.solver.merge_clusters,
         })
     }
 
@@ -51,31 +54,42 @@ impl Plan {
         self.recoloring.coloring()
     }
 
-    /// Follows a cut: the cut tets leave their clusters, the children on each side of each become new clusters, and
-    /// these get colors; everything else stays. Only the schedule is sorted anew as a whole.
-    pub(crate) fn follow(&mut self, delta: &CutDelta, ms: &mut Milliseconds) -> Result<(), Error> {
+    /// Follows a cut: cut and deleted tets leave their clusters, the children on each side of a cut tet become new
+    /// clusters, those around the cut that are small are merged, and who has new particles gets a color; everything else
+    /// stays. Only the schedule is sorted anew as a whole. `cuttable` is the mesh after the cut.
+    pub(crate) fn follow(
+        &mut self,
+        delta: &CutDelta,
+        cuttable: &CuttableMesh,
+        ms: &mut Milliseconds,
+    ) -> Result<(), Error> {
         let start = Instant::now();
-        let mut removed = Vec::with_capacity(4 * delta.removed.len());
-        for tet in &delta.removed {
-            self.pair_up(tet.tet, tet.corners, &mut removed);
-        }
+        let gone = delta.removed.iter().chain(&delta.deleted);
+        let gone: Vec<(u32, &RemovedTet)> = gone
+            .filter_map(|tet| Some((self.clustering.cluster_of(tet.tet.index())?.0, tet)))
+            .collect();
+        let relinked = delta.relinked.iter();
+        let relinked: Vec<(u32, &RelinkedTet)> = relinked
+            .filter_map(|tet| Some((self.clustering.cluster_of(tet.tet.index())?.0, tet)))
+            .collect();
         self.update_clusters(delta)?;
+        let merged = if self.merges {
+            self.merge(delta, &gone, cuttable)
+        } else {
+            Vec::new()
+        };
         let clustered = Instant::now();
-        self.recolor(delta, removed)?;
+        let mut changed = self.recolor(delta, &gone, &relinked, &merged, cuttable)?;
         let colored = Instant::now();
+        // The clusters whose members or color are not what they were.
+        changed.sort_unstable();
+        changed.dedup();
         self.schedule
             .rebuild(&self.clustering, self.recoloring.coloring());
         ms.cluster += milliseconds(clustered - start);
         ms.color += milliseconds(colored - clustered);
         ms.schedule += milliseconds(colored.elapsed());
         Ok(())
-    }
-
-    /// Lists the particles of a tet as pairs with its cluster.
-    fn pair_up(&self, tet: TetId, corners: [ParticleId; 4], pairs: &mut Vec<(u32, u32)>) {
-        if let Some(cluster) = self.clustering.cluster_of(tet.index()) {
-            pairs.extend(corners.map(|p| (cluster.0, p.0)));
-        }
     }
 
     fn update_clusters(&mut self, delta: &CutDelta) -> Result<(), Error> {
@@ -103,22 +117,95 @@ impl Plan {
             &values,
             self.limit,
         )?;
+        for tet in &delta.deleted {
+            self.clustering.remove(tet.tet.index());
+        }
+        for tet in &delta.moved {
+            self.clustering.renumber(tet.from.index(), tet.to.index());
+        }
+        self.clustering.truncate(delta.tets_after());
         Ok(())
     }
 
-    /// Colors the new clusters, and old ones where the cut brought them new particles.
-    fn recolor(&mut self, delta: &CutDelta, mut removed: Vec<(u32, u32)>) -> Result<(), Error> {
+    /// Merges the small ones of the clusters that the cut made, took from or may have brought apart.
+    fn merge(
+        &mut self,
+        delta: &CutDelta,
+        gone: &[(u32, &RemovedTet)],
+        cuttable: &CuttableMesh,
+    ) -> Vec<Moved> {
+        let _span = tracing::debug_span!("incise::merge").entered();
+        let mut shrunk: Vec<u32> = gone.iter().map(|(cluster, _)| *cluster).collect();
+        shrunk.sort_unstable();
+        shrunk.dedup();
+        // What is left of a cluster hangs on particles of what is gone, or on copies of them.
+        let corners = gone.iter().flat_map(|(_, tet)| tet.corners);
+        let mut particles: Vec<ParticleId> = corners.collect();
+        particles.sort_unstable();
+        particles.dedup();
+        let is_left = |tet: &TetId| {
+            let cluster = self.clustering.cluster_of(tet.index());
+            cluster.is_some_and(|cluster| shrunk.binary_search(&cluster.0).is_ok())
+        };
+        let around = particles.iter().flat_map(|&p| cuttable.around(p));
+        let mut seeds: Vec<u32> = around.filter(is_left).map(|tet| tet.0).collect();
+        seeds.extend(delta.added.iter().map(|tet| tet.tet.0));
+        seeds.extend(delta.relinked.iter().map(|tet| tet.tet.0));
+        merge_small(
+            &mut self.clustering,
+            &seeds,
+            self.limit,
+            |tet| cuttable.mesh().tets[tet as usize].map(|p| p.0),
+            |particle| cuttable.around(ParticleId(particle)).map(|tet| tet.0),
+        )
+    }
+
+    /// Colors the new clusters, and old ones that the cut or a merger brought new particles. Returns the clusters whose
+    /// members or color changed, and perhaps others, some several times.
+    fn recolor(
+        &mut self,
+        delta: &CutDelta,
+        gone: &[(u32, &RemovedTet)],
+        relinked: &[(u32, &RelinkedTet)],
+        merged: &[Moved],
+        cuttable: &CuttableMesh,
+    ) -> Result<Vec<u32>, Error> {
         let _span = tracing::debug_span!("incise::color").entered();
-        let mut added = Vec::with_capacity(4 * delta.added.len());
+        let label = |tet: TetId| self.clustering.labels()[tet.index()].0;
+        let (mut removed, mut added) = (Vec::new(), Vec::new());
+        for (cluster, tet) in gone {
+            removed.extend(tet.corners.map(|p| (*cluster, p.0)));
+        }
         for tet in &delta.added {
-            self.pair_up(tet.tet, tet.corners, &mut added);
+            let cluster = label(tet.tet);
+            added.extend(tet.corners.map(|p| (cluster, p.0)));
         }
-        for tet in &delta.relinked {
-            self.pair_up(tet.tet, tet.before, &mut removed);
-            self.pair_up(tet.tet, tet.after, &mut added);
+        for (before, tet) in relinked {
+            let after = label(tet.tet);
+            for (p, q) in tet.before.into_iter().zip(tet.after) {
+                if (*before, p) != (after, q) {
+                    removed.push((*before, p.0));
+                    added.push((after, q.0));
+                }
+            }
         }
+        let mut known: Vec<TetId> = delta.added.iter().map(|tet| tet.tet).collect();
+        known.extend(delta.relinked.iter().map(|tet| tet.tet));
+        known.sort_unstable();
+        for moved in merged {
+            let tet = TetId(moved.constraint);
+            if known.binary_search(&tet).is_err() {
+                let corners = cuttable.mesh().tets[tet.index()];
+                removed.extend(corners.map(|p| (moved.from.0, p.0)));
+                added.extend(corners.map(|p| (label(tet), p.0)));
+            }
+        }
+        let mut changed: Vec<u32> = delta.moved.iter().map(|tet| label(tet.to)).collect();
+        changed.extend(removed.iter().chain(&added).map(|pair| pair.0));
+        // A new cluster may have been merged away at once, but its number is in use.
+        self.recoloring.reserve(self.clustering.cluster_count());
         self.recoloring.apply(&removed, &added)?;
-        Ok(())
+        Ok(changed)
     }
 
     /// Proves clusters, colors and schedule against the mesh, from scratch.

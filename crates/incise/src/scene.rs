@@ -161,6 +161,10 @@ pub struct SolverSpec {
     pub coarse: bool,
     /// How constraints are put together: `none` or `serial:K`.
     pub clustering: String,
+    /// Whether clusters that a cut leaves small are merged with neighbors. It makes a cut a little dearer, and all frames
+    /// after many cuts cheaper; without it clusters shrink and colors grow with every cut, as in the paper.
+    #[serde(skip_serializing_if = "is_true")]
+    pub merge_clusters: bool,
     /// How clusters are colored, by the name of an [`Algorithm`](incise_coloring::Algorithm). Clusters that cuts make are
     /// colored one by one, until they need more colors than they should; then all are colored anew, with `auto`.
     pub coloring: String,
@@ -188,6 +192,7 @@ impl Default for SolverSpec {
             delay: 10,
             coarse: false,
             clustering: "serial:10".to_owned(),
+            merge_clusters: true,
             coloring: "auto".to_owned(),
             precision: Precision::F32,
             kappa_limit: 1.0,
@@ -446,6 +451,9 @@ pub fn nearest<'a>(unknown: &str, known: impl IntoIterator<Item = &'a str>) -> O
 
 fn is_false(flag: &bool) -> bool {
     !flag
+}
+fn is_true(flag: &bool) -> bool {
+    *flag
 }
 fn one() -> u64 {
     1

@@ -178,6 +178,16 @@ impl Recoloring {
         self.links.incidence()
     }
 
+    /// Makes sure that there are `vertices` vertices at least; new ones have no particles and color 0. O(new vertices).
+    pub fn reserve(&mut self, vertices: usize) {
+        self.links.reserve_vertices(vertices);
+        let before = self.coloring.vertex_count();
+        for v in (0..).take(vertices).skip(before) {
+            self.coloring.push(UNCOLORED);
+            self.set(v, ColorId(0));
+        }
+    }
+
     /// Removes and adds (vertex, particle) pairs and colors what needs a color.
     ///
     /// Removals come first. A vertex is removed by removing all its pairs, moved to a copy of a

@@ -1,0 +1,259 @@
+//! Merging what a cut left small: clusters around the cut join neighbors that have room.
+//!
+//! A cut takes members out of clusters and puts their parts into clusters of their own, a few constraints each
+//! ([`update_local`](crate::update_local)). Cut again and again, clusters shrink and colors grow. So the clusters that
+//! the cut made or took from, if they fill at most half of the size limit, are merged with a neighbor: the smallest
+//! first, each with the neighbor that shares most particles with it among those that have room, and again as long as the
+//! result is small itself. Of two clusters that fit into one, one fills at most half of it, so no pair is overlooked for
+//! that limit. Clusters across a cut share no particle and are never merged. Where a cut left a cluster in parts that
+//! share nothing any more, each part goes its own way.
+//!
+//! The paper leaves this open (section 4.3 and figure 8, where colors grow from cut to cut). Greedy agglomeration, the
+//! score is that of [`greedy_k_neighbor`](crate::greedy_k_neighbor). Cost: O(m (k + v)) for m small clusters at the cut,
+//! with k = `max_size` squared and v the constraints at the particles of one cluster, whatever the size of the rest.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::num::NonZeroUsize;
+
+use incise_graph::{ClusterId, Clustering};
+
+/// A constraint that changed its cluster, and the cluster it was in before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Moved {
+    /// The constraint.
+    pub constraint: u32,
+    /// Its cluster before; perhaps vacant now.
+    pub from: ClusterId,
+}
+
+/// Merges the small clusters among those of `seeds` with neighbors.
+///
+/// Small is a cluster of at most half of `max_size` constraints. It is merged with the cluster that shares most
+/// particles with it (of equal ones the smaller, of these the one with the smaller number) among those that it fits
+/// into; no cluster gets larger than `max_size`. The larger of the two keeps its number (of equal ones the smaller
+/// number), the other number becomes vacant. Nothing but the clusters of the seeds, and clusters that share a particle
+/// with them or with what they were merged with, changes.
+///
+/// # Arguments
+/// `seeds` are constraints of the clusters to look at, in any order, those without a cluster are skipped: after a cut,
+/// the new constraints and the others in clusters that lost some. `particles_of` gives the particles of a constraint,
+/// `constraints_of` the constraints at a particle, in any order: the result does not depend on it.
+///
+/// # Returns
+/// The constraints that are in another cluster now, ascending.
+///
+/// # Panics
+/// If a seed or a constraint at a particle is no number of the clustering.
+///
+/// Deterministic. For the cost see the module's source: O(m (k + v)) for m small clusters, each with v constraints at its
+/// particles, and k the square of `max_size`.
+///
+/// ```
+/// use std::num::NonZeroUsize;
+///
+/// use incise_clustering::merge_small;
+/// use incise_graph::{ClusterId, Clustering, Incidence};
+///
+/// // A row of eight springs; a cut has left 1 and 2 as clusters of their own.
+/// let springs = Incidence::from_constraints(9, (0u32..8).map(|i| [i, i + 1]))?;
+/// let labels = [0, 1, 2, 3, 3, 3, 3, 3].map(ClusterId).to_vec();
+/// let mut clustering = Clustering::from_labels(labels)?;
+/// let limit = NonZeroUsize::MIN.saturating_add(4);
+/// let moved = merge_small(
+///     &mut clustering,
+///     &[1, 2],
+///     limit,
+///     |c| springs.particles_of(c as usize).iter().copied(),
+///     |p| springs.constraints_of(p as usize).iter().copied(),
+/// );
+/// assert_eq!(moved.iter().map(|moved| moved.constraint).collect::<Vec<_>>(), [1, 2]);
+/// assert_eq!(clustering.sizes(), [3, 0, 0, 5]);
+/// # Ok::<(), incise_graph::GraphError>(())
+/// ```
+pub fn merge_small<P, C>(
+    clustering: &mut Clustering,
+    seeds: &[u32],
+    max_size: NonZeroUsize,
+    particles_of: impl Fn(u32) -> P,
+    constraints_of: impl Fn(u32) -> C,
+) -> Vec<Moved>
+where
+    P: IntoIterator<Item = u32>,
+    C: IntoIterator<Item = u32>,
+{
+    let max_size = max_size.get();
+    let small = max_size / 2;
+    if small == 0 {
+        return Vec::new();
+    }
+    let mut merging = Merging {
+        clustering,
+        particles_of,
+        constraints_of,
+        members: Vec::new(),
+        particles: Vec::new(),
+        near: Vec::new(),
+        moved: Vec::new(),
+    };
+    let mut waiting = merging.small_parts(seeds, small);
+    while let Some(Reverse((size, seed))) = waiting.pop() {
+        // A part that has joined another one meanwhile waits there, under its new size.
+        if merging.flood(seed, size) != size {
+            continue;
+        }
+        if let Some((merged, seed)) = merging.merge(max_size)
+            && merged <= small
+        {
+            waiting.push(Reverse((merged, seed)));
+        }
+    }
+    merging.finish()
+}
+
+/// The work of merging.
+struct Merging<'a, F, G> {
+    clustering: &'a mut Clustering,
+    particles_of: F,
+    constraints_of: G,
+    /// The part flooded last: constraints of one cluster that hang together, and their particles.
+    members: Vec<u32>,
+    particles: Vec<u32>,
+    /// Work: a cluster, a particle it shares with the part, and its smallest constraint there.
+    near: Vec<(ClusterId, u32, u32)>,
+    moved: Vec<Moved>,
+}
+
+impl<P, C, F, G> Merging<'_, F, G>
+where
+    P: IntoIterator<Item = u32>,
+    C: IntoIterator<Item = u32>,
+    F: Fn(u32) -> P,
+    G: Fn(u32) -> C,
+{
+    /// The parts of at most `small` constraints that hold a seed: size and smallest member.
+    fn small_parts(&mut self, seeds: &[u32], small: usize) -> BinaryHeap<Reverse<(usize, u32)>> {
+        let clustered = seeds.iter().filter_map(|&c| {
+            let cluster = self.clustering.cluster_of(c as usize)?;
+            Some((cluster, c))
+        });
+        let mut seeds: Vec<(ClusterId, u32)> = clustered.collect();
+        seeds.sort_unstable();
+        seeds.dedup();
+        let mut parts = Vec::new();
+        for same in seeds.chunk_by(|a, b| a.0 == b.0) {
+            let mut seen: Vec<u32> = Vec::new();
+            for &(_, seed) in same {
+                if seen.contains(&seed) {
+                    continue;
+                }
+                let size = self.flood(seed, small);
+                seen.extend(&self.members);
+                if size <= small {
+                    let first = self.members.iter().copied().fold(seed, u32::min);
+                    parts.push(Reverse((size, first)));
+                }
+            }
+        }
+        parts.into()
+    }
+
+    /// Finds the constraints of the seed's cluster that hang together with it, until they are more than `enough`;
+    /// returns how many were found.
+    fn flood(&mut self, seed: u32, enough: usize) -> usize {
+        let cluster = self.clustering.cluster_of(seed as usize);
+        self.members.clear();
+        self.particles.clear();
+        self.members.push(seed);
+        let mut next = 0;
+        while let Some(&member) = self.members.get(next) {
+            next += 1;
+            for particle in (self.particles_of)(member) {
+                if self.particles.contains(&particle) {
+                    continue;
+                }
+                self.particles.push(particle);
+                for c in (self.constraints_of)(particle) {
+                    if self.clustering.cluster_of(c as usize) == cluster
+                        && !self.members.contains(&c)
+                    {
+                        self.members.push(c);
+                    }
+                }
+            }
+            if self.members.len() > enough {
+                break;
+            }
+        }
+        self.members.len()
+    }
+
+    /// Merges the flooded part with its best neighbor; returns the size of the result and a member, or nothing if no
+    /// neighbor has room.
+    fn merge(&mut self, max_size: usize) -> Option<(usize, u32)> {
+        let seed = self.members[0];
+        let own = self.clustering.cluster_of(seed as usize)?;
+        let (other, neighbor) = self.best_neighbor(own, max_size)?;
+        let (part, others) = (self.members.len(), self.clustering.size(other));
+        let whole = part == self.clustering.size(own);
+        let kept = if whole && (Reverse(part), own) < (Reverse(others), other) {
+            // Parts of the neighbor that do not hang together with this one stay where they are.
+            self.flood(neighbor, usize::MAX);
+            own
+        } else {
+            other
+        };
+        for i in 0..self.members.len() {
+            self.put(self.members[i], kept);
+        }
+        Some((self.clustering.size(kept), seed))
+    }
+
+    /// The cluster with room that shares most particles with the flooded part, and a constraint of it that does.
+    fn best_neighbor(&mut self, own: ClusterId, max_size: usize) -> Option<(ClusterId, u32)> {
+        let room = max_size - self.members.len();
+        self.near.clear();
+        for &particle in &self.particles {
+            for c in (self.constraints_of)(particle) {
+                if let Some(cluster) = self.clustering.cluster_of(c as usize)
+                    && cluster != own
+                    && self.clustering.size(cluster) <= room
+                {
+                    self.near.push((cluster, particle, c));
+                }
+            }
+        }
+        self.near.sort_unstable();
+        self.near.dedup_by_key(|near| (near.0, near.1));
+        let clusters = self.near.chunk_by(|a, b| a.0 == b.0);
+        let scored = clusters.map(|shared| {
+            let (cluster, _, constraint) = shared[0];
+            let size = self.clustering.size(cluster);
+            ((shared.len(), Reverse((size, cluster))), constraint)
+        });
+        let ((_, Reverse((_, cluster))), constraint) = scored.max()?;
+        Some((cluster, constraint))
+    }
+
+    /// Moves a constraint into a cluster.
+    fn put(&mut self, constraint: u32, cluster: ClusterId) {
+        if let Some(from) = self.clustering.remove(constraint as usize) {
+            self.clustering.assign(constraint as usize, cluster);
+            self.moved.push(Moved { constraint, from });
+        }
+    }
+
+    /// The constraints that moved, each with the cluster it was in at first.
+    fn finish(self) -> Vec<Moved> {
+        let Self {
+            clustering,
+            mut moved,
+            ..
+        } = self;
+        // Stable: of several moves the first stays.
+        moved.sort_by_key(|moved| moved.constraint);
+        moved.dedup_by_key(|moved| moved.constraint);
+        moved.retain(|moved| clustering.cluster_of(moved.constraint as usize) != Some(moved.from));
+        moved
+    }
+}
