@@ -12,7 +12,7 @@
 //! score is that of [`greedy_k_neighbor`](crate::greedy_k_neighbor). Cost: O(m (k + v)) for m small clusters at the cut,
 //! with k = `max_size` squared and v the constraints at the particles of one cluster, whatever the size of the rest.
 
-use std::cmp::Reverse;
+use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 use std::num::NonZeroUsize;
 
@@ -96,16 +96,36 @@ where
         near: Vec::new(),
         moved: Vec::new(),
     };
-    let mut waiting = merging.small_parts(seeds, small);
-    while let Some(Reverse((size, seed))) = waiting.pop() {
-        // A part that has joined another one meanwhile waits there, under its new size.
-        if merging.flood(seed, size) != size {
-            continue;
+    let seeds = merging.by_cluster(seeds);
+    let mut waiting = BinaryHeap::new();
+    for same in seeds.chunk_by(|a, b| a.0 == b.0) {
+        let (cluster, seed) = same[0];
+        let size = merging.clustering.size(cluster);
+        if size <= small {
+            waiting.push(Reverse((size, seed)));
+        } else {
+            merging.small_parts(same, small, &mut waiting);
         }
-        if let Some((merged, seed)) = merging.merge(max_size)
-            && merged <= small
-        {
-            waiting.push(Reverse((merged, seed)));
+    }
+    while let Some(Reverse((size, seed))) = waiting.pop() {
+        match merging.flood(seed, size).cmp(&size) {
+            // It has joined another one, which waits under its new size.
+            Ordering::Greater => {}
+            Ordering::Equal => {
+                if let Some((merged, seed)) = merging.merge(max_size)
+                    && merged <= small
+                {
+                    waiting.push(Reverse((merged, seed)));
+                }
+            }
+            // A cluster in parts: this one, and perhaps others.
+            Ordering::Less => {
+                waiting.push(Reverse((merging.members.len(), seed)));
+                let cluster = merging.clustering.cluster_of(seed as usize);
+                let from = seeds.partition_point(|seed| Some(seed.0) < cluster);
+                let to = seeds.partition_point(|seed| Some(seed.0) <= cluster);
+                merging.small_parts(&seeds[from..to], small, &mut waiting);
+            }
         }
     }
     merging.finish()
@@ -116,10 +136,11 @@ struct Merging<'a, F, G> {
     clustering: &'a mut Clustering,
     particles_of: F,
     constraints_of: G,
-    /// The part flooded last: constraints of one cluster that hang together, and their particles.
+    /// The part flooded last: constraints of one cluster that hang together.
     members: Vec<u32>,
+    /// Its particles.
     particles: Vec<u32>,
-    /// Work: a cluster, a particle it shares with the part, and its smallest constraint there.
+    /// For each constraint of others at these particles: its cluster, the particle and itself.
     near: Vec<(ClusterId, u32, u32)>,
     moved: Vec<Moved>,
 }
@@ -131,8 +152,8 @@ where
     F: Fn(u32) -> P,
     G: Fn(u32) -> C,
 {
-    /// The parts of at most `small` constraints that hold a seed: size and smallest member.
-    fn small_parts(&mut self, seeds: &[u32], small: usize) -> BinaryHeap<Reverse<(usize, u32)>> {
+    /// The seeds that are in a cluster, with it, sorted.
+    fn by_cluster(&self, seeds: &[u32]) -> Vec<(ClusterId, u32)> {
         let clustered = seeds.iter().filter_map(|&c| {
             let cluster = self.clustering.cluster_of(c as usize)?;
             Some((cluster, c))
@@ -140,52 +161,66 @@ where
         let mut seeds: Vec<(ClusterId, u32)> = clustered.collect();
         seeds.sort_unstable();
         seeds.dedup();
-        let mut parts = Vec::new();
-        for same in seeds.chunk_by(|a, b| a.0 == b.0) {
-            let mut seen: Vec<u32> = Vec::new();
-            for &(_, seed) in same {
-                if seen.contains(&seed) {
-                    continue;
-                }
-                let size = self.flood(seed, small);
-                seen.extend(&self.members);
-                if size <= small {
-                    let first = self.members.iter().copied().fold(seed, u32::min);
-                    parts.push(Reverse((size, first)));
-                }
+        seeds
+    }
+
+    /// Lists the parts of at most `small` constraints that hold one of the seeds of a cluster, those that are in it no
+    /// more left out: size and smallest member.
+    fn small_parts(
+        &mut self,
+        seeds: &[(ClusterId, u32)],
+        small: usize,
+        parts: &mut BinaryHeap<Reverse<(usize, u32)>>,
+    ) {
+        let mut seen: Vec<u32> = Vec::new();
+        for &(cluster, seed) in seeds {
+            let there = self.clustering.cluster_of(seed as usize) == Some(cluster);
+            if !there || seen.contains(&seed) {
+                continue;
+            }
+            let size = self.flood(seed, small);
+            seen.extend(&self.members);
+            if size <= small {
+                let first = self.members.iter().copied().fold(seed, u32::min);
+                parts.push(Reverse((size, first)));
             }
         }
-        parts.into()
     }
 
     /// Finds the constraints of the seed's cluster that hang together with it, until they are more than `enough`;
-    /// returns how many were found.
+    /// returns how many were found. Other clusters at their particles are noted.
     fn flood(&mut self, seed: u32, enough: usize) -> usize {
-        let cluster = self.clustering.cluster_of(seed as usize);
-        self.members.clear();
-        self.particles.clear();
-        self.members.push(seed);
+        let Self {
+            clustering,
+            members,
+            particles,
+            near,
+            ..
+        } = self;
+        let own = clustering.labels()[seed as usize];
+        members.clear();
+        particles.clear();
+        near.clear();
+        members.push(seed);
         let mut next = 0;
-        while let Some(&member) = self.members.get(next) {
-            next += 1;
-            for particle in (self.particles_of)(member) {
-                if self.particles.contains(&particle) {
+        while next < members.len() && members.len() <= enough {
+            for particle in (self.particles_of)(members[next]) {
+                if particles.contains(&particle) {
                     continue;
                 }
-                self.particles.push(particle);
+                particles.push(particle);
                 for c in (self.constraints_of)(particle) {
-                    if self.clustering.cluster_of(c as usize) == cluster
-                        && !self.members.contains(&c)
-                    {
-                        self.members.push(c);
+                    let cluster = clustering.labels()[c as usize];
+                    if cluster != own {
+                        near.push((cluster, particle, c));
+                    } else if !members.contains(&c) {
+                        members.push(c);
                     }
                 }
             }
-            if self.members.len() > enough {
-                break;
-            }
+            next += 1;
         }
-        self.members.len()
+        members.len()
     }
 
     /// Merges the flooded part with its best neighbor; returns the size of the result and a member, or nothing if no
@@ -193,7 +228,7 @@ where
     fn merge(&mut self, max_size: usize) -> Option<(usize, u32)> {
         let seed = self.members[0];
         let own = self.clustering.cluster_of(seed as usize)?;
-        let (other, neighbor) = self.best_neighbor(own, max_size)?;
+        let (other, neighbor) = self.best_neighbor(max_size)?;
         let (part, others) = (self.members.len(), self.clustering.size(other));
         let whole = part == self.clustering.size(own);
         let kept = if whole && (Reverse(part), own) < (Reverse(others), other) {
@@ -210,19 +245,12 @@ where
     }
 
     /// The cluster with room that shares most particles with the flooded part, and a constraint of it that does.
-    fn best_neighbor(&mut self, own: ClusterId, max_size: usize) -> Option<(ClusterId, u32)> {
+    fn best_neighbor(&mut self, max_size: usize) -> Option<(ClusterId, u32)> {
         let room = max_size - self.members.len();
-        self.near.clear();
-        for &particle in &self.particles {
-            for c in (self.constraints_of)(particle) {
-                if let Some(cluster) = self.clustering.cluster_of(c as usize)
-                    && cluster != own
-                    && self.clustering.size(cluster) <= room
-                {
-                    self.near.push((cluster, particle, c));
-                }
-            }
-        }
+        let clustering = &*self.clustering;
+        self.near.retain(|&(cluster, ..)| {
+            cluster != ClusterId::NONE && clustering.size(cluster) <= room
+        });
         self.near.sort_unstable();
         self.near.dedup_by_key(|near| (near.0, near.1));
         let clusters = self.near.chunk_by(|a, b| a.0 == b.0);

@@ -205,6 +205,7 @@ impl Plan {
         // A new cluster may have been merged away at once, but its number is in use.
         self.recoloring.reserve(self.clustering.cluster_count());
         self.recoloring.apply(&removed, &added)?;
+        changed.extend(self.recoloring.changed());
         Ok(changed)
     }
 
