@@ -5,6 +5,7 @@
 //! makes 20 Gauss-Seidel iterations a frame on one thread. At the end everything derived is checked.
 
 use std::fmt::Write;
+use std::num::NonZeroU32;
 use std::path::PathBuf;
 
 use anyhow::Context;
@@ -12,7 +13,7 @@ use clap::Args;
 use comfy_table::Table;
 use incise::mesh::TetMesh;
 use incise::mesh::glam::DVec3;
-use incise::scene::StrokeSpec;
+use incise::scene::{ReclusterSpec, StrokeSpec};
 use incise::{FrameReport, Scene, Simulation};
 
 use crate::models::{Model, models};
@@ -92,8 +93,17 @@ fn runs(model: &Model, strokes: u64) -> anyhow::Result<Vec<Run>> {
     let scale = scene.body[0].scale;
     scene.stroke = small_strokes(&model.mesh, scale, strokes);
     let mut runs = Vec::new();
-    for (name, merges) in [("no merging", false), ("merging", true)] {
+    let renewing = Some(ReclusterSpec {
+        wear: 1.25,
+        frames: NonZeroU32::MIN.saturating_add(9),
+    });
+    for (name, merges, recluster) in [
+        ("no merging", false, None),
+        ("merging", true, None),
+        ("and re-clustering", true, renewing),
+    ] {
         scene.solver.merge_clusters = merges;
+        scene.solver.recluster = recluster;
         runs.push(Run {
             name,
             simulation: Simulation::with_threads(&scene, 1)?,
@@ -205,6 +215,7 @@ fn costs(runs: &[Run]) -> Table {
         "cluster + color ms (median)",
         "the largest",
         "of the time to solve",
+        "re-clustered",
         "all frames ms",
     ]);
     for run in runs {

@@ -94,6 +94,7 @@ where
         members: Vec::new(),
         particles: Vec::new(),
         near: Vec::new(),
+        shared: Vec::new(),
         moved: Vec::new(),
     };
     let seeds = merging.by_cluster(seeds);
@@ -131,6 +132,17 @@ where
     merging.finish()
 }
 
+/// What the flooded part shares with another cluster.
+struct Shared {
+    cluster: ClusterId,
+    /// The particle counted last.
+    particle: u32,
+    /// How many particles.
+    count: u32,
+    /// The smallest constraint of the cluster that shares one.
+    constraint: u32,
+}
+
 /// The work of merging.
 struct Merging<'a, F, G> {
     clustering: &'a mut Clustering,
@@ -142,6 +154,8 @@ struct Merging<'a, F, G> {
     particles: Vec<u32>,
     /// For each constraint of others at these particles: its cluster, the particle and itself.
     near: Vec<(ClusterId, u32, u32)>,
+    /// Those of the clusters there that have room.
+    shared: Vec<Shared>,
     moved: Vec<Moved>,
 }
 
@@ -247,20 +261,36 @@ where
     /// The cluster with room that shares most particles with the flooded part, and a constraint of it that does.
     fn best_neighbor(&mut self, max_size: usize) -> Option<(ClusterId, u32)> {
         let room = max_size - self.members.len();
-        let clustering = &*self.clustering;
-        self.near.retain(|&(cluster, ..)| {
-            cluster != ClusterId::NONE && clustering.size(cluster) <= room
-        });
-        self.near.sort_unstable();
-        self.near.dedup_by_key(|near| (near.0, near.1));
-        let clusters = self.near.chunk_by(|a, b| a.0 == b.0);
-        let scored = clusters.map(|shared| {
-            let (cluster, _, constraint) = shared[0];
-            let size = self.clustering.size(cluster);
-            ((shared.len(), Reverse((size, cluster))), constraint)
-        });
-        let ((_, Reverse((_, cluster))), constraint) = scored.max()?;
-        Some((cluster, constraint))
+        self.shared.clear();
+        for &(cluster, particle, constraint) in &self.near {
+            if cluster == ClusterId::NONE || self.clustering.size(cluster) > room {
+                continue;
+            }
+            // Few have room; and entries come particle by particle.
+            match self
+                .shared
+                .iter_mut()
+                .find(|shared| shared.cluster == cluster)
+            {
+                Some(shared) => {
+                    shared.count += u32::from(shared.particle != particle);
+                    shared.particle = particle;
+                    shared.constraint = shared.constraint.min(constraint);
+                }
+                None => self.shared.push(Shared {
+                    cluster,
+                    particle,
+                    count: 1,
+                    constraint,
+                }),
+            }
+        }
+        let size = |shared: &&Shared| {
+            let size = self.clustering.size(shared.cluster);
+            (shared.count, Reverse((size, shared.cluster)))
+        };
+        let best = self.shared.iter().max_by_key(size)?;
+        Some((best.cluster, best.constraint))
     }
 
     /// Moves a constraint into a cluster.

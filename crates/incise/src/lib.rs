@@ -35,6 +35,7 @@ mod measure;
 mod method;
 mod plan;
 mod preset;
+mod recluster;
 mod region;
 pub mod report;
 pub mod scene;

@@ -22,20 +22,50 @@ pub(crate) struct Plan {
     pub(crate) clustering: Clustering,
     recoloring: Recoloring,
     pub(crate) schedule: Schedule,
-    /// The largest size of a cluster.
-    limit: NonZeroUsize,
+    recipe: Recipe,
+}
+
+/// How a plan is made and kept.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Recipe {
+    method: Method,
+    algorithm: Algorithm,
     /// Whether clusters that a cut leaves small are merged.
     merges: bool,
 }
 
+/// What a cut did to clusters, as they were before.
+#[derive(Default)]
+struct Edit<'a> {
+    /// The tets that are no more.
+    gone: Vec<(u32, &'a RemovedTet)>,
+    /// Those with other corners.
+    relinked: Vec<(u32, &'a RelinkedTet)>,
+}
+
+impl Recipe {
+    /// The largest size of a cluster.
+    fn limit(self) -> NonZeroUsize {
+        self.method.max_size()
+    }
+}
+
 impl Plan {
     pub(crate) fn new(scene: &Scene, mesh: &TetMesh) -> Result<Self, Error> {
+        let recipe = Recipe {
+            method: scene.solver.clustering.parse()?,
+            algorithm: scene.solver.coloring.parse()?,
+            merges: scene.solver.merge_clusters,
+        };
+        Self::of(recipe, mesh)
+    }
+
+    /// Clusters and colors a mesh.
+    pub(crate) fn of(recipe: Recipe, mesh: &TetMesh) -> Result<Self, Error> {
         let _span = tracing::debug_span!("incise::plan").entered();
-        let method: Method = scene.solver.clustering.parse()?;
-        let algorithm: Algorithm = scene.solver.coloring.parse()?;
         let incidence = incidence(mesh)?;
-        let clustering = cluster(method, &incidence);
-        let coloring = color(algorithm, &incidence.quotient(&clustering), 0)?.coloring;
+        let clustering = cluster(recipe.method, &incidence);
+        let coloring = color(recipe.algorithm, &incidence.quotient(&clustering), 0)?.coloring;
         let schedule = Schedule::new(&clustering, &coloring);
         let tets = mesh.tets.iter().zip(clustering.labels());
         let pairs = tets.flat_map(|(corners, cluster)| corners.map(|p| (cluster.0, p.0)));
@@ -44,9 +74,20 @@ impl Plan {
             clustering,
             recoloring,
             schedule,
-            limit: method.max_size(),
-            merges: scene.solver.merge_clusters,
+            recipe,
         })
+    }
+
+    pub(crate) fn recipe(&self) -> Recipe {
+        self.recipe
+    }
+
+    /// The number of colors and the mean size of the clusters, both 1 if there are none. O(1).
+    pub(crate) fn measures(&self) -> [f64; 2] {
+        let clusters = self.clustering.occupied().max(1) as f64;
+        let tets = self.clustering.constraint_count() as f64;
+        let colors = self.recoloring.color_count() as f64;
+        [colors.max(1.0), (tets / clusters).max(1.0)]
     }
 
     /// The color of each cluster.
@@ -64,22 +105,15 @@ impl Plan {
         ms: &mut Milliseconds,
     ) -> Result<(), Error> {
         let start = Instant::now();
-        let gone = delta.removed.iter().chain(&delta.deleted);
-        let gone: Vec<(u32, &RemovedTet)> = gone
-            .filter_map(|tet| Some((self.clustering.cluster_of(tet.tet.index())?.0, tet)))
-            .collect();
-        let relinked = delta.relinked.iter();
-        let relinked: Vec<(u32, &RelinkedTet)> = relinked
-            .filter_map(|tet| Some((self.clustering.cluster_of(tet.tet.index())?.0, tet)))
-            .collect();
-        self.update_clusters(delta)?;
-        let merged = if self.merges {
-            self.merge(delta, &gone, cuttable)
+        let edit = self.edit(delta)?;
+        let merged = if self.recipe.merges {
+            let seeds = self.seeds(delta, &edit.gone, cuttable);
+            self.merge(&seeds, cuttable)
         } else {
             Vec::new()
         };
         let clustered = Instant::now();
-        let mut changed = self.recolor(delta, &gone, &relinked, &merged, cuttable)?;
+        let mut changed = self.recolor(delta, &edit, &merged, cuttable)?;
         let colored = Instant::now();
         // The clusters whose members or color are not what they were.
         changed.sort_unstable();
@@ -90,6 +124,51 @@ impl Plan {
         ms.color += milliseconds(colored - clustered);
         ms.schedule += milliseconds(colored.elapsed());
         Ok(())
+    }
+
+    /// Follows several cuts at once, whose last left the mesh as `cuttable`: each by itself first, then small clusters
+    /// among all that they touched are merged. Costs what the cuts did, and O(tets).
+    pub(crate) fn catch_up(
+        &mut self,
+        deltas: &[CutDelta],
+        cuttable: &CuttableMesh,
+    ) -> Result<(), Error> {
+        if deltas.is_empty() {
+            return Ok(());
+        }
+        let mut touched = Vec::new();
+        for delta in deltas {
+            let edit = self.edit(delta)?;
+            touched.extend(self.recolor(delta, &edit, &[], cuttable)?);
+        }
+        if self.recipe.merges {
+            let mut is_touched = vec![false; self.clustering.cluster_count()];
+            for cluster in touched {
+                is_touched[cluster as usize] = true;
+            }
+            let labels = (0..).zip(self.clustering.labels());
+            let seeds = labels.filter(|(_, cluster)| is_touched[cluster.index()]);
+            let seeds: Vec<u32> = seeds.map(|(tet, _)| tet).collect();
+            let merged = self.merge(&seeds, cuttable);
+            self.recolor(&CutDelta::default(), &Edit::default(), &merged, cuttable)?;
+        }
+        self.schedule
+            .rebuild(&self.clustering, self.recoloring.coloring());
+        Ok(())
+    }
+
+    /// Takes cut and deleted tets out of their clusters and makes clusters of the children.
+    fn edit<'a>(&mut self, delta: &'a CutDelta) -> Result<Edit<'a>, Error> {
+        let gone = delta.removed.iter().chain(&delta.deleted);
+        let gone = gone
+            .filter_map(|tet| Some((self.clustering.cluster_of(tet.tet.index())?.0, tet)))
+            .collect();
+        let relinked = delta.relinked.iter();
+        let relinked = relinked
+            .filter_map(|tet| Some((self.clustering.cluster_of(tet.tet.index())?.0, tet)))
+            .collect();
+        self.update_clusters(delta)?;
+        Ok(Edit { gone, relinked })
     }
 
     fn update_clusters(&mut self, delta: &CutDelta) -> Result<(), Error> {
@@ -115,7 +194,7 @@ impl Plan {
             &removed,
             &offsets,
             &values,
-            self.limit,
+            self.recipe.limit(),
         )?;
         for tet in &delta.deleted {
             self.clustering.remove(tet.tet.index());
@@ -127,14 +206,13 @@ impl Plan {
         Ok(())
     }
 
-    /// Merges the small ones of the clusters that the cut made, took from or may have brought apart.
-    fn merge(
-        &mut self,
+    /// Tets of the clusters that a cut made, took from or may have brought apart.
+    fn seeds(
+        &self,
         delta: &CutDelta,
         gone: &[(u32, &RemovedTet)],
         cuttable: &CuttableMesh,
-    ) -> Vec<Moved> {
-        let _span = tracing::debug_span!("incise::merge").entered();
+    ) -> Vec<u32> {
         let mut shrunk: Vec<u32> = gone.iter().map(|(cluster, _)| *cluster).collect();
         shrunk.sort_unstable();
         shrunk.dedup();
@@ -151,10 +229,16 @@ impl Plan {
         let mut seeds: Vec<u32> = around.filter(is_left).map(|tet| tet.0).collect();
         seeds.extend(delta.added.iter().map(|tet| tet.tet.0));
         seeds.extend(delta.relinked.iter().map(|tet| tet.tet.0));
+        seeds
+    }
+
+    /// Merges the small ones of the clusters of some tets.
+    fn merge(&mut self, seeds: &[u32], cuttable: &CuttableMesh) -> Vec<Moved> {
+        let _span = tracing::debug_span!("incise::merge").entered();
         merge_small(
             &mut self.clustering,
-            &seeds,
-            self.limit,
+            seeds,
+            self.recipe.limit(),
             |tet| cuttable.mesh().tets[tet as usize].map(|p| p.0),
             |particle| cuttable.around(ParticleId(particle)).map(|tet| tet.0),
         )
@@ -165,22 +249,21 @@ impl Plan {
     fn recolor(
         &mut self,
         delta: &CutDelta,
-        gone: &[(u32, &RemovedTet)],
-        relinked: &[(u32, &RelinkedTet)],
+        edit: &Edit<'_>,
         merged: &[Moved],
         cuttable: &CuttableMesh,
     ) -> Result<Vec<u32>, Error> {
         let _span = tracing::debug_span!("incise::color").entered();
         let label = |tet: TetId| self.clustering.labels()[tet.index()].0;
         let (mut removed, mut added) = (Vec::new(), Vec::new());
-        for (cluster, tet) in gone {
+        for (cluster, tet) in &edit.gone {
             removed.extend(tet.corners.map(|p| (*cluster, p.0)));
         }
         for tet in &delta.added {
             let cluster = label(tet.tet);
             added.extend(tet.corners.map(|p| (cluster, p.0)));
         }
-        for (before, tet) in relinked {
+        for (before, tet) in &edit.relinked {
             let after = label(tet.tet);
             for (p, q) in tet.before.into_iter().zip(tet.after) {
                 if (*before, p) != (after, q) {
@@ -212,7 +295,7 @@ impl Plan {
     /// Proves clusters, colors and schedule against the mesh, from scratch.
     pub(crate) fn check(&self, mesh: &TetMesh) -> Result<(), Error> {
         self.clustering.check()?;
-        if self.clustering.max_size() > self.limit.get() {
+        if self.clustering.max_size() > self.recipe.limit().get() {
             return Err(Error::Inconsistent(format!(
                 "a cluster has {} tets",
                 self.clustering.max_size()

@@ -13,6 +13,7 @@ mod mistakes;
 mod parsing;
 mod physics;
 mod preset;
+mod recluster;
 mod regions;
 mod reports;
 mod sleep;
