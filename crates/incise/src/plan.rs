@@ -317,3 +317,65 @@ pub(crate) fn incidence(mesh: &TetMesh) -> Result<Incidence, Error> {
         mesh.tets.iter().copied(),
     )?)
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+    use incise_cutting::MovedTet;
+    use incise_mesh::generate::kuhn_box;
+
+    use super::*;
+
+    /// What taking some tets away changes; `gone` ascends.
+    fn taking_away(mesh: &TetMesh, gone: &[usize]) -> CutDelta {
+        let after = mesh.tets.len() - gone.len();
+        let deleted = gone.iter().map(|&t| RemovedTet {
+            tet: TetId::new(t),
+            corners: mesh.tets[t],
+        });
+        let free = gone.iter().copied().filter(|&t| t < after);
+        let last = (after..mesh.tets.len()).filter(|t| !gone.contains(t));
+        let moved = last.zip(free).map(|(from, to)| MovedTet {
+            from: TetId::new(from),
+            to: TetId::new(to),
+            corners: mesh.tets[from],
+        });
+        CutDelta {
+            particles_before: mesh.positions.len(),
+            tets_before: mesh.tets.len(),
+            deleted: deleted.collect(),
+            moved: moved.collect(),
+            ..CutDelta::default()
+        }
+    }
+
+    /// Bites of tets around one place after the other, down to a few tets, with and without merging.
+    #[test]
+    fn tets_taken_away_leave_clusters_and_others_take_over_their_numbers() {
+        for merges in [true, false] {
+            let mut scene = Scene::default();
+            scene.solver.merge_clusters = merges;
+            let mut mesh = kuhn_box([6, 6, 6], DVec3::ONE);
+            let mut plan = Plan::new(&scene, &mesh).unwrap();
+            let (mut moved, mut bite) = (0, 0);
+            while mesh.tets.len() > 40 {
+                let mut gone: Vec<usize> = if bite % 2 == 0 {
+                    (0..mesh.tets.len()).skip(bite % 7).step_by(9).collect()
+                } else {
+                    (0..mesh.tets.len()).skip(10 * bite).take(30).collect()
+                };
+                gone.truncate(mesh.tets.len() - 1);
+                bite += 1;
+                let delta = taking_away(&mesh, &gone);
+                moved += delta.moved.len();
+                delta.apply(&mut mesh);
+                let cuttable = CuttableMesh::new(mesh.clone()).unwrap();
+                let mut ms = Milliseconds::default();
+                plan.follow(&delta, &cuttable, &mut ms).unwrap();
+                plan.check(&mesh).unwrap();
+                assert_eq!(plan.clustering.constraint_count(), mesh.tets.len());
+            }
+            assert!(moved > 50 && bite > 5, "{moved} moved in {bite} bites");
+        }
+    }
+}
