@@ -2,7 +2,7 @@
 //!
 //! The same scene runs without merging, with it, and with re-clustering in the background, frame by frame in turn, so
 //! that what else the machine does falls on all. Nothing moves: the strokes fall on the mesh at rest, and the solver
-//! makes 20 Gauss-Seidel iterations a frame on one thread. At the end everything derived is checked.
+//! makes 20 Gauss-Seidel iterations a frame. At the end everything derived is checked.
 
 use std::fmt::Write;
 use std::num::NonZeroU32;
@@ -11,6 +11,9 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::Args;
 use comfy_table::Table;
+use incise::clustering::cluster;
+use incise::coloring::auto;
+use incise::graph::Incidence;
 use incise::mesh::TetMesh;
 use incise::mesh::glam::DVec3;
 use incise::scene::{ReclusterSpec, StrokeSpec};
@@ -30,6 +33,9 @@ pub(crate) struct WearArguments {
     /// How many strokes.
     #[arg(long, value_name = "N", default_value_t = 200)]
     strokes: u64,
+    /// How many threads solve.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    threads: usize,
     /// Write the tables to this file as well.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -48,6 +54,8 @@ struct Run {
     name: &'static str,
     simulation: Simulation,
     reports: Vec<FrameReport>,
+    /// Clusters and colors of a plan made from the mesh as it is after each part.
+    fresh: Vec<[usize; 2]>,
 }
 
 #[expect(
@@ -63,15 +71,24 @@ pub(crate) fn wear(arguments: &WearArguments) -> anyhow::Result<()> {
         None => generated,
     };
     let model = model.with_context(|| format!("there is no model {}", arguments.model))?;
-    let mut runs = runs(model, arguments.strokes)?;
+    let mut runs = runs(model, arguments.strokes, arguments.threads)?;
     let frames = FRAMES * arguments.strokes;
-    for _ in 0..frames {
+    for frame in 0..frames {
         for run in &mut runs {
             let report = run.simulation.step()?.clone();
             run.reports.push(report);
+            if (1..=PARTS).any(|part| frame + 1 == frames * part / PARTS) {
+                run.fresh.push(fresh_plan(run.simulation.mesh())?);
+            }
         }
     }
-    let mut text = format!("## {}, {} strokes\n\n", model.name, arguments.strokes);
+    let WearArguments {
+        strokes, threads, ..
+    } = arguments;
+    let mut text = format!(
+        "## {}, {strokes} strokes, {threads} thread(s)\n\n",
+        model.name
+    );
     writeln!(text, "{}", course(&runs, frames))?;
     writeln!(text, "\n{}", costs(&runs))?;
     for run in &runs {
@@ -84,7 +101,7 @@ pub(crate) fn wear(arguments: &WearArguments) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn runs(model: &Model, strokes: u64) -> anyhow::Result<Vec<Run>> {
+fn runs(model: &Model, strokes: u64, threads: usize) -> anyhow::Result<Vec<Run>> {
     let mut scene = Scene::built_in();
     scene.world = incise::scene::WorldSpec::default();
     model.put_into(&mut scene.body[0]);
@@ -106,8 +123,9 @@ fn runs(model: &Model, strokes: u64) -> anyhow::Result<Vec<Run>> {
         scene.solver.recluster = recluster;
         runs.push(Run {
             name,
-            simulation: Simulation::with_threads(&scene, 1)?,
+            simulation: Simulation::with_threads(&scene, threads)?,
             reports: Vec::new(),
+            fresh: Vec::new(),
         });
     }
     Ok(runs)
@@ -164,6 +182,16 @@ impl Dice {
     }
 }
 
+/// Clusters and colors of a plan made as at the start.
+fn fresh_plan(mesh: &TetMesh) -> anyhow::Result<[usize; 2]> {
+    let tets = mesh.tets.iter().copied();
+    let incidence = Incidence::from_constraints(mesh.positions.len(), tets)?;
+    let method = Scene::built_in().solver.clustering.parse()?;
+    let clustering = cluster(method, &incidence);
+    let coloring = auto(&incidence.quotient(&clustering)).coloring;
+    Ok([clustering.occupied(), coloring.color_count()])
+}
+
 /// Clusters, colors and the time to solve after each part of the strokes.
 fn course(runs: &[Run], frames: u64) -> Table {
     let mut table = table([
@@ -172,16 +200,19 @@ fn course(runs: &[Run], frames: u64) -> Table {
         "tets",
         "clusters",
         "mean size",
+        "of a fresh plan",
         "colors",
+        "of a fresh plan",
         "solve ms (median)",
         "times no merging",
     ]);
-    for part in 1..=PARTS {
+    for (part, i) in (1..=PARTS).zip(0..) {
         let end = (frames * part / PARTS) as usize;
         let start = (frames * (part - 1) / PARTS) as usize;
         let mut first = None;
         for run in runs {
-            let Some(last) = run.reports[..end].last() else {
+            let fresh = run.fresh.get::<usize>(i);
+            let (Some(last), Some(fresh)) = (run.reports[..end].last(), fresh) else {
                 continue;
             };
             let reports = &run.reports[start..end];
@@ -195,7 +226,9 @@ fn course(runs: &[Run], frames: u64) -> Table {
                 last.tets.to_string(),
                 last.clusters.to_string(),
                 format!("{:.2}", last.tets as f64 / last.clusters as f64),
+                format!("{:.2}", last.tets as f64 / fresh[0] as f64),
                 last.colors.to_string(),
+                fresh[1].to_string(),
                 format!("{ms:.3}"),
                 format!("{:.2}", ms / first),
             ]);
@@ -230,6 +263,7 @@ fn costs(runs: &[Run]) -> Table {
         let color: f64 = cutting().map(|report| report.ms.color).sum();
         let both = || cutting().map(|report| report.ms.cluster + report.ms.color);
         let solve: f64 = cutting().map(|report| report.ms.solve).sum();
+        let total: f64 = run.reports.iter().map(|report| report.ms.total).sum();
         table.add_row([
             run.name.to_owned(),
             frames.to_string(),
@@ -239,16 +273,15 @@ fn costs(runs: &[Run]) -> Table {
             format!("{:.3}", median(both())),
             format!("{:.3}", both().fold(0.0, f64::max)),
             format!("{:.3}", (cluster + color) / solve),
-            format!(
-                "{:.0}",
-                run.reports
-                    .iter()
-                    .map(|report| report.ms.total)
-                    .sum::<f64>()
-            ),
+            count(run.reports.iter().map(|report| report.reclustered)),
+            format!("{total:.0}"),
         ]);
     }
     table
+}
+
+fn count(numbers: impl Iterator<Item = usize>) -> String {
+    numbers.sum::<usize>().to_string()
 }
 
 /// The middle one, or 0 of none.

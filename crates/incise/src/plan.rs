@@ -206,7 +206,7 @@ impl Plan {
         Ok(())
     }
 
-    /// Tets of the clusters that a cut made, took from or may have brought apart.
+    /// Tets of the clusters that a cut made or took from. Those that only come apart keep their size: they stay.
     fn seeds(
         &self,
         delta: &CutDelta,
@@ -228,7 +228,6 @@ impl Plan {
         let around = particles.iter().flat_map(|&p| cuttable.around(p));
         let mut seeds: Vec<u32> = around.filter(is_left).map(|tet| tet.0).collect();
         seeds.extend(delta.added.iter().map(|tet| tet.tet.0));
-        seeds.extend(delta.relinked.iter().map(|tet| tet.tet.0));
         seeds
     }
 
