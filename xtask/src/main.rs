@@ -6,6 +6,7 @@ mod coloring;
 mod models;
 mod solver;
 mod sweep;
+mod wear;
 
 use clap::{Parser, Subcommand};
 use comfy_table::presets::ASCII_MARKDOWN;
@@ -27,6 +28,8 @@ enum Command {
     Solver(solver::SolverArguments),
     /// Cut meshes, check everything and write a table.
     Sweep(sweep::SweepArguments),
+    /// Cut a mesh many times in small strokes, and see what becomes of clusters, colors and the time to solve.
+    Wear(wear::WearArguments),
 }
 
 fn main() -> anyhow::Result<()> {
@@ -34,6 +37,7 @@ fn main() -> anyhow::Result<()> {
         Command::Coloring(arguments) => coloring::coloring(&arguments),
         Command::Solver(arguments) => solver::solver(&arguments),
         Command::Sweep(arguments) => sweep::sweep(&arguments),
+        Command::Wear(arguments) => wear::wear(&arguments),
     }
 }
 

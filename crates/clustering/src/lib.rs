@@ -5,7 +5,7 @@
 //! better (Gauss-Seidel inside a cluster) and leaves a smaller graph to color. [`serial_neighbor`]
 //! is the paper's clustering (Algorithm 2), [`greedy_k_neighbor`] the one it compares with, and
 //! [`pressure`] one that aims at few colors; [`update_local`] changes only what a cut has touched
-//! (section 4.3).
+//! (section 4.3), and [`merge_small`] joins what the cut left small with its neighbors.
 //!
 //! The algorithms take an [`Incidence`](incise_graph::Incidence) of anything; they know nothing of
 //! meshes. A graph alone is enough for [`serial_neighbor`].
@@ -30,6 +30,7 @@
 mod candidates;
 mod error;
 mod greedy_k_neighbor;
+mod merge;
 mod method;
 mod parts;
 mod pressure;
@@ -38,6 +39,7 @@ mod update;
 
 pub use error::ClusteringError;
 pub use greedy_k_neighbor::greedy_k_neighbor;
+pub use merge::{Moved, merge_small};
 pub use method::{Method, cluster};
 pub use pressure::pressure;
 pub use serial_neighbor::{serial_neighbor, serial_neighbor_incidence};

@@ -1,10 +1,11 @@
-//! Clusterings against a slow reading of the paper's algorithm, and local updates against
+//! Clusterings against a slow reading of the paper's algorithm, local updates and mergers against
 //! recounting everything.
 
 #![expect(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 mod greedy_k_neighbor;
 mod inputs;
+mod merge;
 mod methods;
 mod serial_neighbor;
 mod update;

@@ -13,7 +13,7 @@ use crate::{Classes, ClusterId, GraphError};
 /// removed.
 ///
 /// Invariant: a cluster number is *vacant* (waits to be used again) exactly if its cluster has no
-/// member, so there are never more numbers than constraints.
+/// member, so there are never more numbers than there were constraints at once.
 ///
 /// ```
 /// use incise_graph::Clustering;
@@ -204,6 +204,45 @@ impl Clustering {
         self.sizes[cluster.index()] += 1;
     }
 
+    /// Gives constraint `from` the number `to`, which is in no cluster; `from` is in no cluster then. O(1).
+    ///
+    /// Its cluster keeps number and size.
+    ///
+    /// # Panics
+    /// If there is no constraint `from`, or if `to` is in a cluster.
+    ///
+    /// ```
+    /// use incise_graph::{ClusterId, Clustering};
+    ///
+    /// // Constraint 0 goes, and the last one takes over its number.
+    /// let mut clustering = Clustering::none(3);
+    /// clustering.remove(0);
+    /// clustering.renumber(2, 0);
+    /// clustering.truncate(2);
+    /// assert_eq!(clustering.labels(), [2, 1].map(ClusterId));
+    /// clustering.check()?;
+    /// # Ok::<(), incise_graph::GraphError>(())
+    /// ```
+    pub fn renumber(&mut self, from: usize, to: usize) {
+        self.place(to);
+        self.labels[to] = std::mem::replace(&mut self.labels[from], ClusterId::NONE);
+    }
+
+    /// Forgets the constraint numbers from `constraints` on; O(1) for each. Cluster numbers stay as they are.
+    ///
+    /// # Panics
+    /// If one of them is in a cluster.
+    pub fn truncate(&mut self, constraints: usize) {
+        for c in constraints..self.labels.len() {
+            assert!(
+                self.labels[c] == ClusterId::NONE,
+                "constraint {c} is in cluster {}",
+                self.labels[c]
+            );
+        }
+        self.labels.truncate(constraints);
+    }
+
     /// Makes sure that constraint `c` exists and is in no cluster.
     fn place(&mut self, c: usize) {
         if c >= self.labels.len() {
@@ -318,6 +357,32 @@ mod tests {
         let mut clustering = Clustering::none(2);
         clustering.remove(1);
         clustering.assign(1, ClusterId(1));
+    }
+
+    #[test]
+    fn the_last_member_of_a_cluster_may_be_renumbered() {
+        let mut clustering = Clustering::none(4);
+        clustering.remove(0);
+        clustering.remove(1);
+        clustering.renumber(3, 0);
+        clustering.truncate(3);
+        clustering.check().unwrap();
+        assert_eq!(
+            clustering.labels(),
+            [ClusterId(3), ClusterId::NONE, ClusterId(2)]
+        );
+        // Shorter than its cluster numbers: they are still right, and used again.
+        clustering.renumber(2, 1);
+        clustering.truncate(2);
+        clustering.check().unwrap();
+        assert_eq!(clustering.new_cluster(2), ClusterId(1));
+        clustering.check().unwrap();
+    }
+
+    #[test]
+    #[should_panic(expected = "constraint 1 is in cluster 1")]
+    fn what_is_clustered_is_not_forgotten() {
+        Clustering::none(2).truncate(1);
     }
 
     #[test]

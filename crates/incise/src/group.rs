@@ -4,6 +4,8 @@
 //! each is precise around its own origin, and a body moves to the bit as it would alone in the scene. Cost: that of its
 //! parts.
 
+use std::time::Instant;
+
 use glam::DVec3;
 use incise_cutting::{CutDelta, CuttableMesh, PieceEvent, PieceTracker};
 use incise_xpbd::{KappaLimit, StepReport, StepSettings};
@@ -12,7 +14,8 @@ use crate::backend::{AnySolver, each};
 use crate::handle::Handle;
 use crate::joined::Joined;
 use crate::plan::Plan;
-use crate::report::Milliseconds;
+use crate::recluster::Recluster;
+use crate::report::{Milliseconds, milliseconds};
 use crate::sleep::Rest;
 use crate::substeps::Choice;
 use crate::volume::Volumes;
@@ -43,6 +46,8 @@ pub(crate) struct Group {
     pub(crate) cut_kappa: Option<CutKappa>,
     /// Whether it sleeps, in a scene where bodies may.
     pub(crate) rest: Option<Rest>,
+    /// What renews the plan, in a scene where plans are renewed.
+    recluster: Option<Recluster>,
 }
 
 /// What cuts did to kappa.
@@ -87,7 +92,9 @@ impl Group {
             volumes.constrain(&mut solver, &cuttable, &plan.schedule)?;
         }
         solver.prepare(&scene.solver)?;
+        let recluster = scene.solver.recluster;
         let mut group = Self {
+            recluster: recluster.map(|spec| Recluster::new(spec, &plan)),
             solver,
             plan,
             settings,
@@ -160,11 +167,30 @@ impl Group {
         }
         self.solver.follow(delta, &self.cuttable, ms)?;
         let events = self.pieces.follow(&self.cuttable, delta);
-        self.plan.follow(delta, ms)?;
+        self.plan.follow(delta, &self.cuttable, ms)?;
+        if let Some(recluster) = &mut self.recluster {
+            recluster.note(delta);
+        }
         if let Some(volumes) = &self.volumes {
             volumes.follow(&mut self.solver, delta, &self.cuttable, &self.plan.schedule)?;
         }
         Ok(events)
+    }
+
+    /// Renews clusters, colors and schedule if that is due in the frame of a number, after its strokes; tells whether it
+    /// was.
+    pub(crate) fn renew_plan(&mut self, frame: u64, ms: &mut Milliseconds) -> Result<bool, Error> {
+        let Some(recluster) = &mut self.recluster else {
+            return Ok(false);
+        };
+        let start = Instant::now();
+        let renewed = recluster.advance(frame, &mut self.plan, &self.cuttable)?;
+        if let Some(volumes) = self.volumes.as_ref().filter(|_| renewed) {
+            let (nothing, schedule) = (CutDelta::default(), &self.plan.schedule);
+            volumes.follow(&mut self.solver, &nothing, &self.cuttable, schedule)?;
+        }
+        ms.cluster += milliseconds(start.elapsed());
+        Ok(renewed)
     }
 
     /// Notes the largest kappa before the first cut of a frame. O(tets).

@@ -36,6 +36,7 @@ mod method;
 mod pieces;
 mod plan;
 mod preset;
+mod recluster;
 mod region;
 pub mod report;
 pub mod scene;

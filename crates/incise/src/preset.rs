@@ -20,7 +20,7 @@ pub enum Preset {
 impl SolverSpec {
     /// The setting of the paper's experiments: frames of 0.016 s in a single step of many iterations, one constraint of
     /// a tet after the other, relaxation 0.8 for Gauss-Seidel and 0.1 for Jacobi and Chebyshev (table 3), SCGC colors
-    /// on serial clusters of 10, nothing softened. The paper's convergence experiments take 500 iterations (section
+    /// on serial clusters of 10 that are never merged, nothing softened. The paper's convergence experiments take 500 iterations (section
     /// 5.1.1); how many its animations take it does not say. It has no descent; with that, the keys that only
     /// constraints have keep their defaults.
     ///
@@ -48,6 +48,7 @@ impl SolverSpec {
             form,
             relaxation,
             clustering: "serial:10".to_owned(),
+            merge_clusters: false,
             coloring: "scgc".to_owned(),
             kappa_limit: f64::INFINITY,
             ..Self::of(method)

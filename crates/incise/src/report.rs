@@ -69,6 +69,10 @@ pub struct FrameReport {
     /// Particles that had to be put back because they would have become infinite; absent if none.
     #[serde(skip_serializing_if = "is_zero")]
     pub repaired: usize,
+    /// Groups of joined bodies whose clusters and colors were made anew in the background and taken in this frame; absent
+    /// if none.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub reclustered: usize,
     /// Where it was computed: `cpu`.
     pub backend: &'static str,
     /// In which precision: `f32` or `f64`.

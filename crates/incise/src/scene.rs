@@ -13,6 +13,7 @@ pub use crate::handle::{HandleSpec, TurnSpec};
 pub use crate::link::{EndSpec, LinkSpec};
 pub use crate::method::{Form, Method};
 pub use crate::preset::Preset;
+pub use crate::recluster::ReclusterSpec;
 pub use crate::sleep::SleepSpec;
 pub use crate::substeps::Substeps;
 
@@ -161,6 +162,13 @@ pub struct SolverSpec {
     pub coarse: bool,
     /// How constraints are put together: `none` or `serial:K`.
     pub clustering: String,
+    /// Whether clusters that a cut leaves small are merged with neighbors. It makes a cut a little dearer, and all frames
+    /// after many cuts cheaper; without it clusters shrink and colors grow with every cut, as in the paper.
+    #[serde(skip_serializing_if = "is_true")]
+    pub merge_clusters: bool,
+    /// When clusters and colors that many cuts have worn are made anew, in the background; absent: never.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recluster: Option<ReclusterSpec>,
     /// How clusters are colored, by the name of an [`Algorithm`](incise_coloring::Algorithm). Clusters that cuts make are
     /// colored one by one, until they need more colors than they should; then all are colored anew, with `auto`.
     pub coloring: String,
@@ -188,6 +196,8 @@ impl Default for SolverSpec {
             delay: 10,
             coarse: false,
             clustering: "serial:10".to_owned(),
+            merge_clusters: true,
+            recluster: None,
             coloring: "auto".to_owned(),
             precision: Precision::F32,
             kappa_limit: 1.0,
@@ -446,6 +456,9 @@ pub fn nearest<'a>(unknown: &str, known: impl IntoIterator<Item = &'a str>) -> O
 
 fn is_false(flag: &bool) -> bool {
     !flag
+}
+fn is_true(flag: &bool) -> bool {
+    *flag
 }
 fn one() -> u64 {
     1

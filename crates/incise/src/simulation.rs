@@ -185,6 +185,10 @@ impl Simulation {
         let mut ms = Milliseconds::default();
         let mut detached = Vec::new();
         let cut = self.carry_out_strokes(&mut detached, &mut ms)?;
+        let mut reclustered = 0;
+        for group in &mut self.groups {
+            reclustered += usize::from(group.renew_plan(self.next_frame, &mut ms)?);
+        }
 
         let before_solve = Instant::now();
         let (frame, residual) = (self.next_frame, self.wants(Quantity::Residual));
@@ -200,6 +204,7 @@ impl Simulation {
             cut,
             detached,
             repaired,
+            reclustered,
             ..FrameReport::default()
         };
         self.measure();
@@ -451,6 +456,9 @@ fn check_limits(scene: &Scene) -> Result<(), Error> {
     }
     if scene.solver.max_substeps == 0 {
         return Err(value("solver.max_substeps", 0, "at least 1"));
+    }
+    if let Some(recluster) = scene.solver.recluster {
+        recluster.check()?;
     }
     if let Some(sleep) = scene.solver.sleep {
         for (key, number) in [("speed", sleep.speed), ("time", sleep.time)] {

@@ -171,22 +171,26 @@ impl Whole {
         }
     }
 
-    /// The clusters of all groups and their colors: those of a group follow those of the groups before it. O(tets).
+    /// The clusters of all groups and their colors: those of a group follow those of the groups before it, vacant numbers
+    /// are left out. O(tets).
     pub(crate) fn plan(&self, groups: &[Group]) -> (Clustering, Coloring) {
         let mut labels = vec![ClusterId::NONE; self.mesh.tets.len()];
         let mut colors = Vec::new();
         for (numbers, group) in self.numbers.iter().zip(groups) {
+            let plan = &group.plan;
+            let mut names = Vec::with_capacity(plan.clustering.cluster_count());
+            for (&size, &color) in plan.clustering.sizes().iter().zip(plan.coloring().colors()) {
+                names.push(ClusterId::new(colors.len()));
+                colors.extend((size > 0).then_some(color));
+            }
             for (t, tet) in numbers.tets.iter().enumerate() {
-                if let Some(cluster) = group.plan.clustering.cluster_of(t) {
-                    labels[tet.index()] = ClusterId::new(colors.len() + cluster.index());
+                if let Some(cluster) = plan.clustering.cluster_of(t) {
+                    labels[tet.index()] = names[cluster.index()];
                 }
             }
-            colors.extend_from_slice(group.plan.coloring().colors());
         }
         let clustering = Clustering::from_labels(labels)
-            .expect("each group has at most as many cluster numbers as tets");
-        // Vacant numbers at the end are left out.
-        colors.truncate(clustering.cluster_count());
+            .expect("each group has at most as many clusters with a tet as it has tets");
         (clustering, Coloring::new(colors))
     }
 

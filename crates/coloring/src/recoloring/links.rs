@@ -1,11 +1,11 @@
 //! Incidence that changes: who is at which particle, in linked lists.
 //!
 //! A link joins a vertex (a constraint or a cluster) and a particle. It lies in two lists, that of
-//! its particle and that of its vertex. A cluster has a link for every one of its constraints at a
-//! particle, so the links are a multiset; the valence of a particle counts different vertices. How
-//! many particles have each valence is kept up to date, and with it the largest valence, which
-//! bounds the colors from below. Cost: O(links at the particle + links of the vertex) for a link
-//! added or removed; a removed link's place is used again.
+//! its particle and that of its vertex. A cluster may be at a particle with several constraints, so
+//! a link counts how often it was added; it goes when it was removed as often. The valence of a
+//! particle is the number of its links. How many particles have each valence is kept up to date,
+//! and with it the largest valence, which bounds the colors from below. Cost: O(links at the
+//! particle) to add, and O(links of the vertex) more for a link that goes; its place is used again.
 
 use incise_graph::Incidence;
 
@@ -16,6 +16,8 @@ const NONE: u32 = u32::MAX;
 struct Link {
     vertex: u32,
     particle: u32,
+    /// How often it was added and not removed.
+    count: u32,
     next_at_particle: u32,
     previous_at_particle: u32,
     next_of_vertex: u32,
@@ -65,8 +67,29 @@ impl Links {
         }
     }
 
-    /// Links a vertex and a particle; both may be new.
+    /// The place of the link between a vertex and a particle.
+    fn find(&self, vertex: u32, particle: u32) -> Option<u32> {
+        let mut place = *self.at_particle.get(particle as usize)?;
+        while let Some(link) = self.links.get(place as usize) {
+            if link.vertex == vertex {
+                return Some(place);
+            }
+            place = link.next_at_particle;
+        }
+        None
+    }
+
+    /// Are a vertex and a particle linked?
+    pub(super) fn contains(&self, vertex: u32, particle: u32) -> bool {
+        self.find(vertex, particle).is_some()
+    }
+
+    /// Links a vertex and a particle, once more if they are linked; both may be new.
     pub(super) fn add(&mut self, vertex: u32, particle: u32) {
+        if let Some(place) = self.find(vertex, particle) {
+            self.links[place as usize].count += 1;
+            return;
+        }
         grow(&mut self.of_vertex, vertex, NONE);
         if self.particle_count() <= particle as usize {
             let new = particle as usize + 1 - self.particle_count();
@@ -74,14 +97,12 @@ impl Links {
             grow(&mut self.valence, particle, 0);
             self.count(0, new);
         }
-        if !self.at(particle).any(|u| u == vertex) {
-            let valence = self.valence[particle as usize];
-            self.move_particle(particle, valence + 1);
-        }
+        self.move_particle(particle, self.valence[particle as usize] + 1);
         let first = self.at_particle[particle as usize];
         let link = Link {
             vertex,
             particle,
+            count: 1,
             next_at_particle: first,
             previous_at_particle: NONE,
             next_of_vertex: self.of_vertex[vertex as usize],
@@ -103,25 +124,15 @@ impl Links {
         self.of_vertex[vertex as usize] = place;
     }
 
-    /// Removes one link between a vertex and a particle; false if there is none.
-    pub(super) fn remove(&mut self, vertex: u32, particle: u32) -> bool {
-        let Some(&first) = self.of_vertex.get(vertex as usize) else {
-            return false;
-        };
-        let mut before = NONE;
-        let mut place = first;
-        while place != NONE && self.links[place as usize].particle != particle {
-            before = place;
-            place = self.links[place as usize].next_of_vertex;
+    /// Takes back one addition of a link; `None` if there is none, else whether the link is gone.
+    pub(super) fn remove(&mut self, vertex: u32, particle: u32) -> Option<bool> {
+        let place = self.find(vertex, particle)?;
+        let link = &mut self.links[place as usize];
+        link.count -= 1;
+        if link.count > 0 {
+            return Some(false);
         }
-        if place == NONE {
-            return false;
-        }
-        let link = self.links[place as usize];
-        match before {
-            NONE => self.of_vertex[vertex as usize] = link.next_of_vertex,
-            _ => self.links[before as usize].next_of_vertex = link.next_of_vertex,
-        }
+        let link = *link;
         match link.previous_at_particle {
             NONE => self.at_particle[particle as usize] = link.next_at_particle,
             before => self.links[before as usize].next_at_particle = link.next_at_particle,
@@ -130,12 +141,19 @@ impl Links {
             self.links[link.next_at_particle as usize].previous_at_particle =
                 link.previous_at_particle;
         }
-        self.free.push(place);
-        if !self.at(particle).any(|u| u == vertex) {
-            let valence = self.valence[particle as usize];
-            self.move_particle(particle, valence - 1);
+        let first = self.of_vertex[vertex as usize];
+        if first == place {
+            self.of_vertex[vertex as usize] = link.next_of_vertex;
+        } else {
+            let mut before = first;
+            while self.links[before as usize].next_of_vertex != place {
+                before = self.links[before as usize].next_of_vertex;
+            }
+            self.links[before as usize].next_of_vertex = link.next_of_vertex;
         }
-        true
+        self.free.push(place);
+        self.move_particle(particle, self.valence[particle as usize] - 1);
+        Some(true)
     }
 
     /// The vertex of each link at a particle.
@@ -150,7 +168,7 @@ impl Links {
     }
 
     /// The particle of each link of a vertex.
-    pub(super) fn of(&self, v: u32) -> impl Iterator<Item = u32> {
+    pub(super) fn of(&self, v: u32) -> impl Iterator<Item = u32> + Clone {
         let first = self.of_vertex.get(v as usize);
         let first = first.and_then(|&first| self.links.get(first as usize));
         let links =
@@ -164,12 +182,17 @@ impl Links {
         all.filter(move |&u| u != v)
     }
 
+    /// The sum of the valences of a vertex's particles.
+    pub(super) fn crowding(&self, v: u32) -> u64 {
+        let valences = self.of(v).map(|p| self.valence[p as usize]);
+        valences.map(u64::from).sum()
+    }
+
     /// The links as fixed incidence; vertices without any have no particles.
     pub(super) fn incidence(&self) -> Incidence {
         let rows = (0..).take(self.vertex_count()).map(|v| {
             let mut particles: Vec<u32> = self.of(v).collect();
             particles.sort_unstable();
-            particles.dedup();
             particles
         });
         Incidence::from_constraints(self.particle_count(), rows)

@@ -16,13 +16,14 @@
 //! on the size of the rest.
 
 mod links;
+mod taken;
 
 use incise_graph::{ColorId, Coloring, Incidence};
 
 use crate::conflicts::UNCOLORED;
-use crate::first_fit::FirstFit;
 use crate::{ColoringError, auto};
 use links::Links;
+use taken::Taken;
 
 /// What an edit did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -70,13 +71,15 @@ pub struct Recolored {
 pub struct Recoloring {
     links: Links,
     coloring: Coloring,
+    /// The colors at each particle; those of its vertices, except while an edit is under way.
+    taken: Taken,
+    /// The vertices that the last edit gave another color.
+    changed: Vec<u32>,
     /// The number of vertices of each color; the last is not 0.
     sizes: Vec<u32>,
     /// The number of colors after the last full coloring.
     reference: usize,
     slack: usize,
-    /// See [`Recoloring::changed`].
-    changed: Vec<u32>,
 }
 
 impl Recoloring {
@@ -141,10 +144,11 @@ impl Recoloring {
         let mut recoloring = Self {
             links,
             coloring,
+            taken: Taken::default(),
+            changed: Vec::new(),
             sizes: Vec::new(),
             reference: 0,
             slack,
-            changed: Vec::new(),
         };
         recoloring.count();
         recoloring
@@ -154,13 +158,6 @@ impl Recoloring {
     #[must_use]
     pub fn coloring(&self) -> &Coloring {
         &self.coloring
-    }
-
-    /// The vertices that the last edit gave another color, new ones included, some of them several
-    /// times; complete unless it colored all anew ([`Recolored::full`]).
-    #[must_use]
-    pub fn changed(&self) -> &[u32] {
-        &self.changed
     }
 
     /// The number of colors: the largest label plus one. O(1).
@@ -188,6 +185,23 @@ impl Recoloring {
         self.links.incidence()
     }
 
+    /// The vertices that the last edit may have given another color, or that came or went with it, ascending; all after
+    /// a full coloring.
+    #[must_use]
+    pub fn changed(&self) -> &[u32] {
+        &self.changed
+    }
+
+    /// Makes sure that there are `vertices` vertices at least; new ones have no particles and color 0. O(new vertices).
+    pub fn reserve(&mut self, vertices: usize) {
+        self.links.reserve_vertices(vertices);
+        let before = self.coloring.vertex_count();
+        for v in (0..).take(vertices).skip(before) {
+            self.coloring.push(UNCOLORED);
+            self.set(v, ColorId(0));
+        }
+    }
+
     /// Removes and adds (vertex, particle) pairs and colors what needs a color.
     ///
     /// Removals come first. A vertex is removed by removing all its pairs, moved to a copy of a
@@ -205,22 +219,28 @@ impl Recoloring {
         let mut report = Recolored::default();
         self.changed.clear();
         self.unlink(removed)?;
-        for &(v, particle) in added {
-            self.links.add(v, particle);
-        }
-        let before = self.coloring.vertex_count();
-        for _ in before..self.links.vertex_count() {
-            self.coloring.push(UNCOLORED);
-        }
         report.visited += (removed.len() + added.len()) as u64;
-        let pairs = removed.iter().chain(added);
-        let mut touched: Vec<u32> = pairs.map(|&(v, _)| v).collect();
-        // New numbers that were skipped are touched, too: they are absent.
-        touched.extend((0..).take(self.links.vertex_count()).skip(before));
-        touched.sort_unstable();
-        touched.dedup();
-        let waiting = self.release(&touched, added, &mut report);
-        for v in waiting {
+        let mut waiting = self.link(added);
+        for &(v, _) in removed {
+            if !self.links.has(v) {
+                self.set(v, ColorId(0));
+                self.changed.push(v);
+            }
+        }
+        // Who can keep the old color does, before anybody takes another one.
+        waiting.sort_unstable();
+        waiting.retain(|&(v, old)| {
+            report.visited += self.links.of(v).count() as u64;
+            let keeps = old != UNCOLORED && self.taken.is_free(self.links.of(v), old);
+            if keeps {
+                report.colored += 1;
+                self.set(v, old);
+            }
+            !keeps
+        });
+        // The most crowded first.
+        waiting.sort_by_cached_key(|&(v, _)| (std::cmp::Reverse(self.links.crowding(v)), v));
+        for (v, _) in waiting {
             self.place(v, &mut report);
         }
         while self.sizes.last() == Some(&0) {
@@ -233,6 +253,9 @@ impl Recoloring {
             report.full = true;
             report.colored = self.coloring.vertex_count();
             report.colors = self.color_count();
+        } else {
+            self.changed.sort_unstable();
+            self.changed.dedup();
         }
         Ok(report)
     }
@@ -242,15 +265,28 @@ impl Recoloring {
         let incidence = self.links.incidence();
         self.coloring = auto(&incidence).coloring;
         self.count();
+        self.changed.clear();
+        self.changed.extend((0..).take(self.links.vertex_count()));
     }
 
-    /// Counts the classes of a coloring that is all new.
+    /// Counts the classes of a coloring that is all new, and notes its colors at the particles.
     fn count(&mut self) {
+        self.taken = self.taken_anew();
         self.sizes = vec![0; self.coloring.color_count()];
         for color in self.coloring.colors() {
             self.sizes[color.index()] += 1;
         }
         self.reference = self.color_count();
+    }
+
+    /// The colors at each particle, from the links.
+    fn taken_anew(&self) -> Taken {
+        let mut taken = Taken::default();
+        taken.reserve_particles(self.links.particle_count());
+        for (v, &color) in (0..).zip(self.coloring.colors()) {
+            taken.take(self.links.of(v), color);
+        }
+        taken
     }
 
     /// Recomputes everything from the links and compares. O(links log links).
@@ -264,7 +300,8 @@ impl Recoloring {
         for color in self.coloring.colors() {
             sizes[color.index()] += 1;
         }
-        if sizes == self.sizes && self.links.counts_agree(&incidence) {
+        let at_particles = self.taken.agrees_with(&self.taken_anew());
+        if sizes == self.sizes && at_particles && self.links.counts_agree(&incidence) {
             Ok(())
         } else {
             Err(ColoringError::Books)
@@ -274,55 +311,59 @@ impl Recoloring {
     /// Removes all pairs, or none.
     fn unlink(&mut self, removed: &[(u32, u32)]) -> Result<(), ColoringError> {
         for (done, &(vertex, particle)) in removed.iter().enumerate() {
-            if !self.links.remove(vertex, particle) {
-                for &(vertex, particle) in &removed[..done] {
-                    self.links.add(vertex, particle);
+            match self.links.remove(vertex, particle) {
+                Some(false) => {}
+                Some(true) => {
+                    let color = self.coloring.color(vertex as usize);
+                    self.taken.give_back(std::iter::once(particle), color);
                 }
-                return Err(ColoringError::NotThere { vertex, particle });
+                None => {
+                    for &(vertex, particle) in &removed[..done] {
+                        self.links.add(vertex, particle);
+                        let color = self.coloring.color(vertex as usize);
+                        self.taken.take(std::iter::once(particle), color);
+                    }
+                    return Err(ColoringError::NotThere { vertex, particle });
+                }
             }
         }
         Ok(())
     }
 
-    /// Takes their color from touched vertices that cannot keep it; returns those that need one,
-    /// most crowded first.
-    fn release(
-        &mut self,
-        touched: &[u32],
-        added: &[(u32, u32)],
-        report: &mut Recolored,
-    ) -> Vec<u32> {
-        let mut gained: Vec<u32> = added.iter().map(|&(v, _)| v).collect();
-        gained.sort_unstable();
+    /// Adds pairs. Returns the vertices that came to new particles, each once, with the color that they had: they have
+    /// none now.
+    fn link(&mut self, added: &[(u32, u32)]) -> Vec<(u32, ColorId)> {
         let mut waiting = Vec::new();
-        for &v in touched {
-            let color = self.coloring.color(v as usize);
-            if !self.links.has(v) {
-                self.set(v, ColorId(0));
-            } else if gained.binary_search(&v).is_ok() {
-                let mut crowding = 0;
-                let mut free = color != UNCOLORED;
-                for u in self.links.neighbors(v) {
-                    crowding += 1;
-                    free &= self.coloring.color(u as usize) != color;
-                }
-                report.visited += crowding;
-                if free {
-                    report.colored += 1;
-                } else {
-                    self.set(v, UNCOLORED);
-                    waiting.push((std::cmp::Reverse(crowding), v));
-                }
+        for &(v, particle) in added {
+            let vertices = self.coloring.vertex_count();
+            if vertices <= v as usize {
+                // Numbers that are skipped have no particles.
+                self.reserve(v as usize + 1);
+                self.changed.extend((0..=v).skip(vertices));
             }
+            if self.links.contains(v, particle) {
+                self.links.add(v, particle);
+                continue;
+            }
+            let color = self.coloring.color(v as usize);
+            if color != UNCOLORED {
+                // Who was nowhere has no color to keep.
+                let old = if self.links.has(v) { color } else { UNCOLORED };
+                waiting.push((v, old));
+                self.taken.give_back(self.links.of(v), color);
+                self.set(v, UNCOLORED);
+            }
+            self.links.add(v, particle);
         }
-        waiting.sort_unstable();
-        waiting.into_iter().map(|(_, v)| v).collect()
+        self.taken.reserve_particles(self.links.particle_count());
+        waiting
     }
 
     /// Finds a color for an uncolored vertex.
     fn place(&mut self, v: u32, report: &mut Recolored) {
         report.colored += 1;
-        let color = self.smallest_free(v, None, report);
+        self.changed.push(v);
+        let color = self.smallest_free(v, report);
         // Below this, more colors cost nothing that a full coloring would not cost, too.
         let accepted = self.reference.max(self.bound());
         if color.index() >= accepted && self.displace(v, accepted, report) {
@@ -331,13 +372,11 @@ impl Recoloring {
         self.set(v, color);
     }
 
-    /// The smallest color, other than `except`, that no neighbor of `v` has.
-    fn smallest_free(&self, v: u32, except: Option<ColorId>, report: &mut Recolored) -> ColorId {
-        let mut taken: Vec<ColorId> = except.into_iter().collect();
-        let neighbors = self.links.neighbors(v);
-        taken.extend(neighbors.map(|u| self.coloring.color(u as usize)));
-        report.visited += taken.len() as u64;
-        FirstFit::default().choose(taken.len(), taken.into_iter())
+    /// The smallest color that no neighbor of `v` has, nor `v` itself.
+    fn smallest_free(&self, v: u32, report: &mut Recolored) -> ColorId {
+        let particles = self.links.of(v);
+        report.visited += particles.clone().count() as u64;
+        self.taken.first_free(particles)
     }
 
     /// Gives `v` the first color below `accepted` whose holders around can all move to other colors
@@ -352,22 +391,24 @@ impl Recoloring {
             .map(|u| (self.coloring.color(u as usize), u))
             .filter(|(color, _)| color.index() < accepted)
             .collect();
+        report.visited += around.len() as u64;
         around.sort_unstable();
         around.dedup();
-        report.visited += around.len() as u64;
         for holders in around.chunk_by(|a, b| a.0 == b.0) {
             let color = holders[0].0;
             let moves: Option<Vec<(u32, ColorId)>> = holders
                 .iter()
                 .map(|&(_, u)| {
-                    let other = self.smallest_free(u, Some(color), report);
+                    let other = self.smallest_free(u, report);
                     (other.index() < accepted).then_some((u, other))
                 })
                 .collect();
             if let Some(moves) = moves {
                 report.displaced += moves.len();
                 for (u, other) in moves {
+                    self.taken.give_back(self.links.of(u), color);
                     self.set(u, other);
+                    self.changed.push(u);
                 }
                 self.set(v, color);
                 return true;
@@ -376,10 +417,9 @@ impl Recoloring {
         false
     }
 
-    /// Changes a color and the sizes with it.
+    /// Gives a vertex that holds no color at its particles a color, or none, and counts it.
     fn set(&mut self, v: u32, color: ColorId) {
         let old = self.coloring.color(v as usize);
-        self.changed.push(v);
         if old != UNCOLORED {
             self.sizes[old.index()] -= 1;
         }
@@ -388,6 +428,7 @@ impl Recoloring {
                 self.sizes.resize(color.index() + 1, 0);
             }
             self.sizes[color.index()] += 1;
+            self.taken.take(self.links.of(v), color);
         }
         self.coloring.set(v as usize, color);
     }

@@ -79,8 +79,8 @@ fn results_are_those_of_the_last_version() {
          {body}damping = 0.001\n{strokes}"
     ));
     for (precision, golden) in [
-        (Precision::F32, 0x3640_a007_f849_40ec),
-        (Precision::F64, 0xe92c_6995_24d1_bab4),
+        (Precision::F32, 0x31db_02b8_3968_b60f),
+        (Precision::F64, 0x74ac_a02e_30d3_9691),
     ] {
         scene.solver.precision = precision;
         for threads in 1..=3 {

@@ -15,6 +15,7 @@ mod parsing;
 mod physics;
 mod pieces;
 mod preset;
+mod recluster;
 mod regions;
 mod reports;
 mod scenarios;

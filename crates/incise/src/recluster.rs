@@ -1,0 +1,149 @@
+//! [`Recluster`]: fresh clusters and colors for a worn plan, made in the background.
+//!
+//! Cuts change clusters where they are, so a plan wears: after many cuts it has more colors and smaller clusters than one
+//! made from the mesh as it is now. When it has worn enough, a copy of the mesh goes to a thread of its own, which
+//! clusters and colors it as at the start. A fixed number of frames later, after the strokes of that frame, the new plan
+//! takes the place of the old one, and follows the cuts made meanwhile: first each by itself, then small clusters around
+//! all of them are merged. If the thread is not done by then the frame waits. So it depends on the scene alone in which
+//! frame which plan comes, never on time or on the number of threads.
+//!
+//! The trade: the thread needs a core; the frame that starts it copies the mesh, the one that swaps costs what following
+//! the cuts of the frames between took, and a schedule and layout, as any frame with a cut. More frames between wait less
+//! and follow more. Clusters and colors far from all cuts change, too, and with them the order of solving: the result
+//! differs as much as between two numberings of the mesh.
+//!
+//! The paper leaves this open. Cost: clustering and coloring in the background; beside it two divisions a frame.
+
+use std::num::NonZeroU32;
+use std::thread::JoinHandle;
+
+use incise_cutting::{CutDelta, CuttableMesh};
+use serde::{Deserialize, Serialize};
+
+use crate::plan::{Plan, Recipe};
+use crate::{Error, limits};
+
+/// When clusters and colors are made anew in the background, and how long that may take.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReclusterSpec {
+    /// How far they may wear first, above 1: the number of colors over that of the last whole plan, or the mean cluster
+    /// size of that over the present one, whichever is larger.
+    #[serde(default = "five_quarters")]
+    pub wear: f64,
+    /// After how many frames the new ones are taken, at least 1. A frame that comes too early waits for them.
+    #[serde(default = "ten")]
+    pub frames: NonZeroU32,
+}
+
+fn five_quarters() -> f64 {
+    1.25
+}
+fn ten() -> NonZeroU32 {
+    NonZeroU32::MIN.saturating_add(9)
+}
+
+impl ReclusterSpec {
+    /// Refuses a limit that the first cut would exceed, or none.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        if self.wear.is_finite() && self.wear > 1.0 {
+            return Ok(());
+        }
+        Err(limits::value(
+            "solver.recluster.wear",
+            self.wear,
+            "above 1 and finite",
+        ))
+    }
+}
+
+/// What watches over the wear of a plan.
+#[derive(Debug)]
+pub(crate) struct Recluster {
+    spec: ReclusterSpec,
+    /// Colors and mean cluster size of the last whole plan.
+    fresh: [f64; 2],
+    pending: Option<Pending>,
+}
+
+/// A plan in the making.
+#[derive(Debug)]
+struct Pending {
+    /// The frame that takes it.
+    due: u64,
+    thread: JoinHandle<Result<Plan, Error>>,
+    /// The cuts since.
+    deltas: Vec<CutDelta>,
+}
+
+impl Recluster {
+    pub(crate) fn new(spec: ReclusterSpec, plan: &Plan) -> Self {
+        Self {
+            spec,
+            fresh: plan.measures(),
+            pending: None,
+        }
+    }
+
+    /// Notes a cut for the plan in the making.
+    pub(crate) fn note(&mut self, delta: &CutDelta) {
+        if let Some(pending) = &mut self.pending {
+            pending.deltas.push(delta.clone());
+        }
+    }
+
+    /// Takes the new plan if this is its frame, else starts one if the present one has worn; tells whether it was taken.
+    pub(crate) fn advance(
+        &mut self,
+        frame: u64,
+        plan: &mut Plan,
+        cuttable: &CuttableMesh,
+    ) -> Result<bool, Error> {
+        if self.pending.is_none() && self.wear(plan) >= self.spec.wear {
+            let due = frame + u64::from(self.spec.frames.get());
+            self.pending = Some(Pending::start(due, plan.recipe(), cuttable)?);
+        }
+        let Some(pending) = self.pending.take_if(|pending| pending.due == frame) else {
+            return Ok(false);
+        };
+        *plan = pending.finish(cuttable)?;
+        self.fresh = plan.measures();
+        Ok(true)
+    }
+
+    fn wear(&self, plan: &Plan) -> f64 {
+        let ([colors, size], now) = (self.fresh, plan.measures());
+        (now[0] / colors).max(size / now[1])
+    }
+}
+
+impl Pending {
+    fn start(due: u64, recipe: Recipe, cuttable: &CuttableMesh) -> Result<Self, Error> {
+        let refused = |message: String| Error::Threads {
+            threads: 1,
+            message,
+        };
+        let mesh = cuttable.mesh().clone();
+        // A pool of its own: the caller's may be the one that waits.
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+        let pool = pool.map_err(|error| refused(error.to_string()))?;
+        let thread = std::thread::Builder::new()
+            .name("incise-recluster".to_owned())
+            .spawn(move || pool.install(|| Plan::of(recipe, &mesh)))
+            .map_err(|error| refused(error.to_string()))?;
+        Ok(Self {
+            due,
+            thread,
+            deltas: Vec::new(),
+        })
+    }
+
+    /// Waits for the plan and lets it follow what has been cut meanwhile.
+    fn finish(self, cuttable: &CuttableMesh) -> Result<Plan, Error> {
+        let plan = self.thread.join();
+        let mut plan =
+            plan.map_err(|_| Error::Inconsistent("clustering in the background failed".into()))??;
+        plan.catch_up(&self.deltas, cuttable)?;
+        Ok(plan)
+    }
+}

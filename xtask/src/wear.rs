@@ -1,0 +1,292 @@
+//! `cargo xtask wear`: many small strokes into one mesh, and what becomes of clusters, colors and the time to solve.
+//!
+//! The same scene runs without merging, with it, and with re-clustering in the background, frame by frame in turn, so
+//! that what else the machine does falls on all. Nothing moves: the strokes fall on the mesh at rest, and the solver
+//! makes 20 Gauss-Seidel iterations a frame. At the end everything derived is checked.
+
+use std::fmt::Write;
+use std::num::NonZeroU32;
+use std::path::PathBuf;
+
+use anyhow::Context;
+use clap::Args;
+use comfy_table::Table;
+use incise::clustering::cluster;
+use incise::coloring::auto;
+use incise::graph::Incidence;
+use incise::mesh::TetMesh;
+use incise::mesh::glam::DVec3;
+use incise::scene::{ReclusterSpec, StrokeSpec};
+use incise::{FrameReport, Scene, Simulation};
+
+use crate::models::{Model, models};
+use crate::table;
+
+#[derive(Debug, Args)]
+pub(crate) struct WearArguments {
+    /// Take the .vtk meshes of this folder instead of generated ones.
+    #[arg(long, value_name = "DIR")]
+    models: Option<PathBuf>,
+    /// Only the model of this name.
+    #[arg(long, value_name = "NAME", default_value = "liver_11k")]
+    model: String,
+    /// How many strokes.
+    #[arg(long, value_name = "N", default_value_t = 200)]
+    strokes: u64,
+    /// How many threads solve.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    threads: usize,
+    /// Write the tables to this file as well.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// Frames a stroke takes.
+const FRAMES: u64 = 5;
+/// The parts of the run that rows are about.
+const PARTS: u64 = 4;
+/// Depth of a stroke and its length, as parts of the largest extent of the body.
+const DEPTH: f64 = 0.12;
+const LENGTH: f64 = 0.15;
+
+/// One way to keep the plan, and what it has been through.
+struct Run {
+    name: &'static str,
+    simulation: Simulation,
+    reports: Vec<FrameReport>,
+    /// Clusters and colors of a plan made from the mesh as it is after each part.
+    fresh: Vec<[usize; 2]>,
+}
+
+#[expect(
+    clippy::print_stdout,
+    reason = "the tables are the result of the command"
+)]
+pub(crate) fn wear(arguments: &WearArguments) -> anyhow::Result<()> {
+    let models = models(arguments.models.as_deref(), usize::MAX, false)?;
+    let named = models.iter().find(|model| model.name == arguments.model);
+    let generated = models.iter().find(|model| model.name.starts_with("liver"));
+    let model = match arguments.models {
+        Some(_) => named,
+        None => generated,
+    };
+    let model = model.with_context(|| format!("there is no model {}", arguments.model))?;
+    let mut runs = runs(model, arguments.strokes, arguments.threads)?;
+    let frames = FRAMES * arguments.strokes;
+    for frame in 0..frames {
+        for run in &mut runs {
+            let report = run.simulation.step()?.clone();
+            run.reports.push(report);
+            if (1..=PARTS).any(|part| frame + 1 == frames * part / PARTS) {
+                run.fresh.push(fresh_plan(run.simulation.mesh())?);
+            }
+        }
+    }
+    let WearArguments {
+        strokes, threads, ..
+    } = arguments;
+    let mut text = format!(
+        "## {}, {strokes} strokes, {threads} thread(s)\n\n",
+        model.name
+    );
+    writeln!(text, "{}", course(&runs, frames))?;
+    writeln!(text, "\n{}", costs(&runs))?;
+    for run in &runs {
+        run.simulation.check()?;
+    }
+    println!("{text}");
+    if let Some(path) = &arguments.out {
+        std::fs::write(path, text)?;
+    }
+    Ok(())
+}
+
+fn runs(model: &Model, strokes: u64, threads: usize) -> anyhow::Result<Vec<Run>> {
+    let mut scene = Scene::built_in();
+    scene.world = incise::scene::WorldSpec::default();
+    model.put_into(&mut scene.body[0]);
+    scene.solver.substeps = 1.into();
+    scene.solver.iterations = 20;
+    let scale = scene.body[0].scale;
+    scene.stroke = small_strokes(&model.mesh, scale, strokes);
+    let mut runs = Vec::new();
+    let renewing = Some(ReclusterSpec {
+        wear: 1.25,
+        frames: NonZeroU32::MIN.saturating_add(9),
+    });
+    for (name, merges, recluster) in [
+        ("no merging", false, None),
+        ("merging", true, None),
+        ("and re-clustering", true, renewing),
+    ] {
+        scene.solver.merge_clusters = merges;
+        scene.solver.recluster = recluster;
+        runs.push(Run {
+            name,
+            simulation: Simulation::with_threads(&scene, threads)?,
+            reports: Vec::new(),
+            fresh: Vec::new(),
+        });
+    }
+    Ok(runs)
+}
+
+/// Short sweeps of a short blade into the surface at random places, one after the other.
+fn small_strokes(mesh: &TetMesh, scale: f64, strokes: u64) -> Vec<StrokeSpec> {
+    let surface = mesh.surface();
+    let low = mesh.positions.iter().copied().reduce(DVec3::min);
+    let high = mesh.positions.iter().copied().reduce(DVec3::max);
+    let (low, high) = (low.unwrap_or_default(), high.unwrap_or_default());
+    let size = (high - low).max_element();
+    let mut dice = Dice(7);
+    let stroke = |i: u64| {
+        let triangle = surface.triangles[dice.below(surface.triangles.len())];
+        let [a, b, c] = triangle.map(|p| mesh.positions[p.index()]);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let turn = DVec3::new(dice.unit(), dice.unit(), dice.unit());
+        let along = normal.cross(turn).normalize_or_zero() * LENGTH * size;
+        let middle = (a + b + c) / 3.0 - 0.5 * along;
+        let blade = [
+            middle + 0.2 * DEPTH * size * normal,
+            middle - DEPTH * size * normal,
+        ];
+        StrokeSpec::Sweep {
+            frames: [FRAMES * i, FRAMES * i + FRAMES - 1],
+            blade: blade.map(|x| (x * scale).to_array()).to_vec(),
+            path: vec![[0.0; 3], (along * scale).to_array()],
+            snap: 0.1,
+        }
+    };
+    (0..strokes).map(stroke).collect()
+}
+
+/// A linear congruential generator (Knuth's constants), of which the high bits are used.
+struct Dice(u64);
+
+impl Dice {
+    fn next(&mut self) -> u64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        self.0 >> 33
+    }
+
+    fn below(&mut self, end: usize) -> usize {
+        usize::try_from(self.next()).unwrap_or(0) % end
+    }
+
+    /// From -1 to 1.
+    fn unit(&mut self) -> f64 {
+        self.next() as f64 / f64::from(1u32 << 30) - 1.0
+    }
+}
+
+/// Clusters and colors of a plan made as at the start.
+fn fresh_plan(mesh: &TetMesh) -> anyhow::Result<[usize; 2]> {
+    let tets = mesh.tets.iter().copied();
+    let incidence = Incidence::from_constraints(mesh.positions.len(), tets)?;
+    let method = Scene::built_in().solver.clustering.parse()?;
+    let clustering = cluster(method, &incidence);
+    let coloring = auto(&incidence.quotient(&clustering)).coloring;
+    Ok([clustering.occupied(), coloring.color_count()])
+}
+
+/// Clusters, colors and the time to solve after each part of the strokes.
+fn course(runs: &[Run], frames: u64) -> Table {
+    let mut table = table([
+        "strokes",
+        "",
+        "tets",
+        "clusters",
+        "mean size",
+        "of a fresh plan",
+        "colors",
+        "of a fresh plan",
+        "solve ms (median)",
+        "times no merging",
+    ]);
+    for (part, i) in (1..=PARTS).zip(0..) {
+        let end = (frames * part / PARTS) as usize;
+        let start = (frames * (part - 1) / PARTS) as usize;
+        let mut first = None;
+        for run in runs {
+            let fresh = run.fresh.get::<usize>(i);
+            let (Some(last), Some(fresh)) = (run.reports[..end].last(), fresh) else {
+                continue;
+            };
+            let reports = &run.reports[start..end];
+            // In a frame with a cut the solver also puts the tets in order.
+            let quiet = reports.iter().filter(|report| report.cut.is_none());
+            let ms = median(quiet.map(|report| report.ms.solve));
+            let first = *first.get_or_insert(ms);
+            table.add_row([
+                (frames * part / PARTS / FRAMES).to_string(),
+                run.name.to_owned(),
+                last.tets.to_string(),
+                last.clusters.to_string(),
+                format!("{:.2}", last.tets as f64 / last.clusters as f64),
+                format!("{:.2}", last.tets as f64 / fresh[0] as f64),
+                last.colors.to_string(),
+                fresh[1].to_string(),
+                format!("{ms:.3}"),
+                format!("{:.2}", ms / first),
+            ]);
+        }
+    }
+    table
+}
+
+/// What following a cut took.
+fn costs(runs: &[Run]) -> Table {
+    let mut table = table([
+        "",
+        "frames with a cut",
+        "tets cut in them",
+        "cluster µs a cut tet",
+        "color µs a cut tet",
+        "cluster + color ms (median)",
+        "the largest",
+        "of the time to solve",
+        "re-clustered",
+        "all frames ms",
+    ]);
+    for run in runs {
+        let cutting = || {
+            let cut = |report: &&FrameReport| report.cut.is_some();
+            run.reports.iter().filter(cut)
+        };
+        let frames = cutting().count();
+        let tets = cutting().filter_map(|report| report.cut);
+        let tets = tets.map(|cut| cut.tets_cut).sum::<usize>() as f64;
+        let cluster: f64 = cutting().map(|report| report.ms.cluster).sum();
+        let color: f64 = cutting().map(|report| report.ms.color).sum();
+        let both = || cutting().map(|report| report.ms.cluster + report.ms.color);
+        let solve: f64 = cutting().map(|report| report.ms.solve).sum();
+        let total: f64 = run.reports.iter().map(|report| report.ms.total).sum();
+        table.add_row([
+            run.name.to_owned(),
+            frames.to_string(),
+            format!("{:.1}", tets / frames as f64),
+            format!("{:.2}", 1e3 * cluster / tets),
+            format!("{:.2}", 1e3 * color / tets),
+            format!("{:.3}", median(both())),
+            format!("{:.3}", both().fold(0.0, f64::max)),
+            format!("{:.3}", (cluster + color) / solve),
+            count(run.reports.iter().map(|report| report.reclustered)),
+            format!("{total:.0}"),
+        ]);
+    }
+    table
+}
+
+fn count(numbers: impl Iterator<Item = usize>) -> String {
+    numbers.sum::<usize>().to_string()
+}
+
+/// The middle one, or 0 of none.
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
