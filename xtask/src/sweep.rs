@@ -83,7 +83,7 @@ fn cutting(models: &[&Model]) -> anyhow::Result<Table> {
                 let scale = scene.body[0].scale;
                 pieces_by_sign(&model.mesh, |x| normal.dot(x * scale - a) > 0.0)
             }
-            StrokeSpec::Plane { .. } => anyhow::bail!("the built-in stroke is a sweep"),
+            _ => anyhow::bail!("the built-in stroke is a sweep"),
         };
         run(
             &mut table,

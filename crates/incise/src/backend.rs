@@ -163,6 +163,12 @@ impl AnySolver {
                 let star = cuttable.around(p).map(TetId::index);
                 solver.set_mass_in_star(p.index(), mass(solver, cuttable, p), star);
             }
+            // Particles that lost all their tets stay where they are.
+            for p in delta.deleted.iter().flat_map(|tet| tet.corners) {
+                if cuttable.around(p).next().is_none() {
+                    solver.set_velocity(p.index(), DVec3::ZERO);
+                }
+            }
         });
         match self {
             Self::Single(backend) => backend.follow(ms),

@@ -8,6 +8,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 use incise_cutting::{CutDelta, CuttableMesh, PieceEvent, PieceTracker};
+use incise_mesh::signed_volume;
 use incise_xpbd::{KappaLimit, StepReport, StepSettings};
 
 use crate::backend::{AnySolver, each};
@@ -40,6 +41,8 @@ pub(crate) struct Group {
     pub(crate) pieces: PieceTracker,
     /// Volume at rest in m³ before all cuts.
     pub(crate) initial_volume: f64,
+    /// Volume at rest in m³ that strokes have taken away.
+    pub(crate) removed_volume: f64,
     /// What was chosen, if the scene left it open.
     pub(crate) choice: Option<Choice>,
     /// What the last cut did to kappa, if that is to be reported.
@@ -103,6 +106,7 @@ impl Group {
             positions: Vec::new(),
             pieces: PieceTracker::new(&cuttable),
             initial_volume: cuttable.mesh().total_volume(),
+            removed_volume: 0.0,
             cuttable,
             bodies: joined.bodies,
             choice,
@@ -164,6 +168,10 @@ impl Group {
     ) -> Result<Vec<PieceEvent>, Error> {
         if let Some(rest) = &mut self.rest {
             rest.wake();
+        }
+        let positions = &self.cuttable.mesh().positions;
+        for tet in &delta.deleted {
+            self.removed_volume += signed_volume(tet.corners.map(|p| positions[p.index()]));
         }
         self.solver.follow(delta, &self.cuttable, ms)?;
         let events = self.pieces.follow(&self.cuttable, delta);
@@ -234,9 +242,10 @@ impl Group {
         let farthest = |far: f64, x: &DVec3| far.max(x.abs().max_element());
         let far = mesh.positions.iter().fold(0.0, farthest) / initial.cbrt();
         // Far from the origin the positions of new particles are rounded by 1e-16 of the distance.
-        if (volume - initial).abs() > (1e-12 + 1e-15 * far) * initial {
+        let expected = initial - self.removed_volume;
+        if (volume - expected).abs() > (1e-12 + 1e-15 * far) * initial {
             return Err(Error::Inconsistent(format!(
-                "the volume at rest was {initial} and is {volume}"
+                "the volume at rest should be {expected} and is {volume}"
             )));
         }
         self.solver.check(&self.cuttable, &self.plan.schedule)?;

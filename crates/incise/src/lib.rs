@@ -44,6 +44,7 @@ mod simulation;
 mod sleep;
 mod strokes;
 mod substeps;
+mod tool;
 mod volume;
 mod whole;
 

@@ -1,4 +1,4 @@
-//! Which particles of a body lie in a [`Region`] of the scene.
+//! [`Solid`]: a [`Region`] of the scene in space, and which particles of a body lie in one.
 
 use glam::DVec3;
 
@@ -6,49 +6,118 @@ use crate::Error;
 use crate::limits::{coordinates, direction, value};
 use crate::scene::Region;
 
+/// A part of space.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Solid {
+    HalfSpace { point: DVec3, normal: DVec3 },
+    Box { low: DVec3, high: DVec3 },
+    Sphere { center: DVec3, radius: f64 },
+}
+
+impl Solid {
+    /// The region in space; `None` if it is a list of particles.
+    pub(crate) fn new(field: &str, region: &Region) -> Result<Option<Self>, Error> {
+        Ok(Some(match region {
+            Region::HalfSpace { point, normal } => Self::HalfSpace {
+                point: coordinates(&format!("{field}.half_space.point"), *point)?,
+                normal: direction(&format!("{field}.half_space.normal"), *normal)?,
+            },
+            Region::Box { low, high } => {
+                let low = coordinates(&format!("{field}.box.low"), *low)?;
+                let high = coordinates(&format!("{field}.box.high"), *high)?;
+                if !low.cmple(high).all() {
+                    let range = "such that low is at most high in all coordinates";
+                    return Err(value(format!("{field}.box"), "inside out", range));
+                }
+                Self::Box { low, high }
+            }
+            Region::Sphere { center, radius } => {
+                let center = coordinates(&format!("{field}.sphere.center"), *center)?;
+                if !(radius.is_finite() && *radius >= 0.0) {
+                    let field = format!("{field}.sphere.radius");
+                    return Err(value(field, radius, "at least 0 and finite"));
+                }
+                let radius = *radius;
+                Self::Sphere { center, radius }
+            }
+            Region::Particles(_) => return Ok(None),
+        }))
+    }
+
+    /// Whether a point is in it, the boundary included.
+    pub(crate) fn contains(&self, x: DVec3) -> bool {
+        match *self {
+            Self::HalfSpace { point, normal } => normal.dot(x - point) >= 0.0,
+            Self::Box { low, high } => x.cmpge(low).all() && x.cmple(high).all(),
+            Self::Sphere { center, radius } => x.distance(center) <= radius,
+        }
+    }
+
+    /// The distance from its boundary in m, negative inside.
+    pub(crate) fn distance(&self, x: DVec3) -> f64 {
+        match *self {
+            Self::HalfSpace { point, normal } => -normal.dot(x - point),
+            Self::Box { low, high } => {
+                let beyond = (low - x).max(x - high);
+                beyond.max(DVec3::ZERO).length() + beyond.max_element().min(0.0)
+            }
+            Self::Sphere { center, radius } => x.distance(center) - radius,
+        }
+    }
+}
+
 /// The numbers of the particles at rest at `positions` that lie in a region, ascending.
 pub(crate) fn particles(
     field: &str,
     region: &Region,
     positions: &[DVec3],
 ) -> Result<Vec<usize>, Error> {
-    let all = |inside: &dyn Fn(DVec3) -> bool| {
+    if let Some(solid) = Solid::new(field, region)? {
         let numbers = 0..positions.len();
-        Ok(numbers.filter(|&p| inside(positions[p])).collect())
+        return Ok(numbers.filter(|&p| solid.contains(positions[p])).collect());
+    }
+    let Region::Particles(particles) = region else {
+        return Ok(Vec::new());
     };
-    match region {
-        Region::HalfSpace { point, normal } => {
-            let point = coordinates(&format!("{field}.half_space.point"), *point)?;
-            let normal = direction(&format!("{field}.half_space.normal"), *normal)?;
-            all(&|x| normal.dot(x - point) >= 0.0)
+    let count = positions.len();
+    if let Some(p) = particles.iter().find(|p| **p as usize >= count) {
+        let range = format!("below {count}, the body's number of particles");
+        return Err(value(format!("{field}.particles"), p, range));
+    }
+    let mut numbers: Vec<usize> = particles.iter().map(|&p| p as usize).collect();
+    numbers.sort_unstable();
+    numbers.dedup();
+    Ok(numbers)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Known distances, inside and out.
+    #[test]
+    fn distances() {
+        let solid = Solid::Box {
+            low: DVec3::ZERO,
+            high: DVec3::new(1.0, 2.0, 3.0),
+        };
+        for (x, distance) in [
+            ([0.5, 1.0, 1.5], -0.5),
+            ([0.5, 1.9, 1.5], -0.1),
+            ([1.5, 1.0, 1.0], 0.5),
+            ([-3.0, 6.0, 1.0], 5.0),
+            ([1.0, 1.0, 1.0], 0.0),
+        ] {
+            let x = DVec3::from_array(x);
+            assert!((solid.distance(x) - distance).abs() < 1e-15);
+            assert_eq!(solid.contains(x), distance <= 0.0);
         }
-        Region::Box { low, high } => {
-            let low = coordinates(&format!("{field}.box.low"), *low)?;
-            let high = coordinates(&format!("{field}.box.high"), *high)?;
-            if !low.cmple(high).all() {
-                let range = "such that low is at most high in all coordinates";
-                return Err(value(format!("{field}.box"), "inside out", range));
-            }
-            all(&|x| x.cmpge(low).all() && x.cmple(high).all())
-        }
-        Region::Sphere { center, radius } => {
-            let center = coordinates(&format!("{field}.sphere.center"), *center)?;
-            if !(radius.is_finite() && *radius >= 0.0) {
-                let field = format!("{field}.sphere.radius");
-                return Err(value(field, radius, "at least 0 and finite"));
-            }
-            all(&|x| x.distance(center) <= *radius)
-        }
-        Region::Particles(particles) => {
-            let count = positions.len();
-            if let Some(p) = particles.iter().find(|p| **p as usize >= count) {
-                let range = format!("below {count}, the body's number of particles");
-                return Err(value(format!("{field}.particles"), p, range));
-            }
-            let mut numbers: Vec<usize> = particles.iter().map(|&p| p as usize).collect();
-            numbers.sort_unstable();
-            numbers.dedup();
-            Ok(numbers)
-        }
+        let (center, radius) = (DVec3::X, 2.0);
+        let ball = Solid::Sphere { center, radius };
+        assert_eq!(ball.distance(DVec3::new(1.0, 3.0, 0.0)), 1.0);
+        let (point, normal) = (DVec3::Z, DVec3::Z);
+        let above = Solid::HalfSpace { point, normal };
+        assert_eq!(above.distance(DVec3::Z * 3.0), -2.0);
+        assert!(above.contains(DVec3::Z * 3.0));
     }
 }

@@ -124,6 +124,12 @@ pub struct CutReport {
     pub snapped: usize,
     /// The smallest volume of a new tet as a fraction of the one it was cut from.
     pub worst_volume_ratio: f64,
+    /// Tets that were taken away; absent if none.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub tets_removed: usize,
+    /// The smallest and the largest dihedral angle of a new tet at rest in degrees; absent if none is new.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dihedral: Option<[f64; 2]>,
 }
 
 impl CutReport {
@@ -133,7 +139,13 @@ impl CutReport {
         self.tets_created += delta.added.len();
         self.particles_created += delta.points.len() + delta.copies.len();
         self.snapped += delta.snapped;
+        self.tets_removed += delta.deleted.len();
         self.worst_volume_ratio = self.worst_volume_ratio.min(delta.worst_volume_ratio);
+        let range = |[a, b]: [f64; 2], [c, d]: [f64; 2]| [a.min(c), b.max(d)];
+        self.dihedral = match (self.dihedral, delta.dihedral) {
+            (Some(known), Some(new)) => Some(range(known, new)),
+            (known, new) => known.or(new),
+        };
     }
 }
 
@@ -144,7 +156,9 @@ impl Default for CutReport {
             tets_created: 0,
             particles_created: 0,
             snapped: 0,
+            tets_removed: 0,
             worst_volume_ratio: 1.0,
+            dihedral: None,
         }
     }
 }

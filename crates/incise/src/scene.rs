@@ -335,14 +335,70 @@ pub enum StrokeSpec {
         #[serde(default = "tenth")]
         snap: f64,
     },
+    /// A bounded plane, at once.
+    Rectangle {
+        /// The frame at whose start it cuts.
+        frame: u64,
+        /// Its middle in m.
+        center: [f64; 3],
+        /// From the middle to the middle of one side in m.
+        half_u: [f64; 3],
+        /// From the middle to the middle of the next side in m.
+        half_v: [f64; 3],
+        /// Snap distance as a fraction of an edge.
+        #[serde(default = "tenth")]
+        snap: f64,
+    },
+    /// A surface of triangles, open or closed, at once.
+    Surface {
+        /// The frame at whose start it cuts.
+        frame: u64,
+        /// The corners in m.
+        points: Vec<[f64; 3]>,
+        /// Three numbers of corners each.
+        triangles: Vec<[u32; 3]>,
+        /// Snap distance as a fraction of an edge.
+        #[serde(default = "tenth")]
+        snap: f64,
+    },
+    /// A cut around a region, at once: what is inside comes off as a plug.
+    Plug {
+        /// The frame at whose start it cuts.
+        frame: u64,
+        /// What comes off, in the space where the body is then; not `particles`.
+        region: Region,
+        /// Snap distance as a fraction of an edge.
+        #[serde(default = "tenth")]
+        snap: f64,
+    },
+    /// Tets taken away, at once: those with their middle in a region.
+    Remove {
+        /// The frame at whose start they go.
+        frame: u64,
+        /// Where, in the space where the body is then; not `particles`.
+        region: Region,
+    },
 }
 
 impl StrokeSpec {
+    /// The first frame in which the stroke cuts or, for a moved blade, has its first pose.
+    #[must_use]
+    pub fn first_frame(&self) -> u64 {
+        match self {
+            Self::Sweep { frames, .. } => frames[0],
+            _ => self.last_frame(),
+        }
+    }
+
     /// The last frame in which the stroke cuts.
     #[must_use]
     pub fn last_frame(&self) -> u64 {
         match self {
-            Self::Plane { frame, .. } => *frame,
+            Self::Plane { frame, .. }
+            | Self::Rectangle { frame, .. }
+            | Self::Surface { frame, .. }
+            | Self::Plug { frame, .. }
+            | Self::Remove { frame, .. } => *frame,
             Self::Sweep { frames, .. } => frames[1],
         }
     }

@@ -8,6 +8,7 @@ use std::borrow::Cow;
 use std::time::Instant;
 
 use glam::DVec3;
+use incise_cutting::{BoundaryTriangle, CutDelta, FaceTag};
 use incise_graph::{Clustering, Coloring, Schedule};
 use incise_mesh::{Surface, TetMesh};
 use rayon::ThreadPool;
@@ -72,6 +73,8 @@ pub struct Simulation {
     timeline: Timeline,
     /// Whether a particle lies on a cut; empty before the first.
     on_cut: Vec<bool>,
+    /// What the strokes of the last frame changed.
+    deltas: Vec<CutDelta>,
     next_frame: u64,
     report: FrameReport,
     pool: Option<ThreadPool>,
@@ -113,7 +116,7 @@ impl Simulation {
             Precision::F64 => 1e-9,
         });
         for stroke in &scene.stroke {
-            timeline.add(stroke.clone())?;
+            timeline.add(stroke)?;
         }
         check_limits(scene)?;
         let bodies = Body::all(scene)?;
@@ -138,6 +141,7 @@ impl Simulation {
             every: scene.report.every,
             precision,
             on_cut: Vec::new(),
+            deltas: Vec::new(),
             pieces: PieceNumbers::new(&groups),
             groups,
             whole,
@@ -159,7 +163,7 @@ impl Simulation {
     /// # Errors
     /// If a value of the stroke lies outside its range.
     pub fn cut(&mut self, stroke: StrokeSpec) -> Result<(), Error> {
-        self.timeline.add(stroke)
+        self.timeline.add(&stroke)
     }
 
     /// Advances by one frame and reports on it.
@@ -247,8 +251,10 @@ impl Simulation {
             whole,
             pieces,
             on_cut,
+            deltas,
             ..
         } = self;
+        deltas.clear();
         let mut report: Option<CutReport> = None;
         let mut measuring = 0.0;
         timeline.advance(self.next_frame, groups, |number, group, delta| {
@@ -265,11 +271,14 @@ impl Simulation {
             report.get_or_insert_default().add(delta);
             let of_whole = whole.as_mut().map(|whole| whole.follow(number, delta));
             let delta = of_whole.as_ref().unwrap_or(delta);
-            on_cut.resize(delta.particles_before, false);
-            on_cut.resize(delta.particles_after(), true);
-            for source in &delta.copies {
-                on_cut[source.index()] = true;
+            on_cut.resize(delta.particles_after(), false);
+            let bare = |triangle: &&BoundaryTriangle| triangle.tag != FaceTag::Outer;
+            for triangle in delta.surface_added.iter().filter(bare) {
+                for p in triangle.particles {
+                    on_cut[p.index()] = true;
+                }
             }
+            deltas.push(delta.clone());
             Ok(())
         })?;
         ms.cut = milliseconds(start.elapsed()) - ms.cluster - ms.color - ms.schedule - measuring;
@@ -370,8 +379,28 @@ impl Simulation {
         self.mesh().surface()
     }
 
-    /// Whether each particle lies where a stroke cut; empty before the first cut. A boundary triangle with all three
-    /// is part of a cut face.
+    /// What the strokes of the last frame changed, in the order in which they did, in the numbers of
+    /// [`Simulation::mesh`]: for renderers ([`incise_cutting::Skin`]), recorders and whoever else follows the mesh.
+    #[must_use]
+    pub fn deltas(&self) -> &[CutDelta] {
+        &self.deltas
+    }
+
+    /// The boundary triangles with what each of them is: outer surface or laid bare by the stroke of a number, counted
+    /// from 0 in the order of the scene and of [`Simulation::cut`]. No pass over the mesh.
+    pub fn boundary(&self) -> impl Iterator<Item = BoundaryTriangle> + '_ {
+        let groups = self.groups.iter().enumerate();
+        groups.flat_map(move |(g, group)| {
+            let triangles = group.cuttable.boundary();
+            triangles.map(move |triangle| match &self.whole {
+                Some(whole) => whole.triangle(g, &triangle),
+                None => triangle,
+            })
+        })
+    }
+
+    /// Whether each particle is on a cut face; empty before the first cut. At the rim, triangles of the outer surface can
+    /// have three such particles, too: [`Simulation::boundary`] tells them apart.
     #[must_use]
     pub fn on_cut(&self) -> &[bool] {
         &self.on_cut

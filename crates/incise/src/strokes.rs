@@ -1,19 +1,24 @@
 //! [`Timeline`]: the strokes of a scene, carried out frame by frame.
 
 use glam::DVec3;
-use incise_cutting::{CutDelta, CutError, CutOptions, Plane, Sweep, cut_plane};
+use incise_cutting::{
+    CutDelta, CutMemory, CutOptions, Sweep, carve, cut_level_set, cut_plane, cut_surface_joining,
+};
 
 use crate::Error;
 use crate::group::Group;
-use crate::limits::{coordinates, direction, value};
 use crate::scene::StrokeSpec;
+use crate::tool::{Tool, tool};
 
 /// A stroke and how far it is.
 #[derive(Debug)]
 struct Stroke {
     field: String,
-    spec: StrokeSpec,
-    /// One for each group of bodies once the blade has its first pose.
+    tool: Tool,
+    options: CutOptions,
+    /// The frames in which it cuts first and last.
+    frames: [u64; 2],
+    /// One for each group of bodies once a blade has its first pose.
     sweeps: Vec<Sweep>,
 }
 
@@ -21,81 +26,41 @@ struct Stroke {
 #[derive(Debug, Default)]
 pub(crate) struct Timeline {
     strokes: Vec<Stroke>,
-    added: usize,
+    added: u32,
     /// Smallest snap distance: rounding of the positions in the solver's precision.
     tolerance: f64,
+    /// For each group what its strokes leave for later ones to join; empty before the first stroke.
+    memories: Vec<CutMemory>,
 }
 
 impl Timeline {
     pub(crate) fn new(tolerance: f64) -> Self {
         Self {
-            strokes: Vec::new(),
-            added: 0,
             tolerance,
+            ..Self::default()
         }
     }
 
-    /// Adds a stroke, if all its values are in their ranges.
-    pub(crate) fn add(&mut self, mut spec: StrokeSpec) -> Result<(), Error> {
+    /// Adds a stroke, if all its values are in their ranges. Faces it lays bare are tagged with its number, counted from
+    /// 0 in the order of adding.
+    pub(crate) fn add(&mut self, spec: &StrokeSpec) -> Result<(), Error> {
         let field = format!("stroke[{}]", self.added);
-        let cut = |key: &str, source: CutError| Error::Cut {
-            field: format!("{field}.{key}"),
-            source,
+        let (tool, snap) = tool(&field, spec)?;
+        let options = CutOptions {
+            snap,
+            tolerance: self.tolerance,
+            tag: self.added,
+            ..CutOptions::default()
         };
-        match &mut spec {
-            StrokeSpec::Plane {
-                point,
-                normal,
-                snap,
-                ..
-            } => {
-                let options = self.options(*snap).check();
-                options.map_err(|source| cut("snap", source))?;
-                coordinates(&format!("{field}.point"), *point)?;
-                *normal = direction(&format!("{field}.normal"), *normal)?.to_array();
-            }
-            StrokeSpec::Sweep {
-                frames,
-                blade,
-                path,
-                snap,
-            } => {
-                let options = self.options(*snap).check();
-                options.map_err(|source| cut("snap", source))?;
-                if frames[0] >= frames[1] {
-                    let range = "two frames, the second after the first";
-                    return Err(value(
-                        format!("{field}.frames"),
-                        format!("{frames:?}"),
-                        range,
-                    ));
-                }
-                if path.len() < 2 {
-                    return Err(value(
-                        format!("{field}.path"),
-                        format!("{} point(s)", path.len()),
-                        "at least two",
-                    ));
-                }
-                for &offset in path.iter() {
-                    coordinates(&format!("{field}.path"), offset)?;
-                }
-                for &point in blade.iter() {
-                    coordinates(&format!("{field}.blade"), point)?;
-                }
-                let length: f64 = blade
-                    .windows(2)
-                    .map(|ends| vector(ends[0]).distance(vector(ends[1])))
-                    .sum();
-                if blade.len() < 2 || length == 0.0 {
-                    let points = blade.len();
-                    return Err(cut("blade", CutError::ShortBlade { points, length }));
-                }
-            }
-        }
+        options.check().map_err(|source| Error::Cut {
+            field: format!("{field}.snap"),
+            source,
+        })?;
         self.strokes.push(Stroke {
             field,
-            spec,
+            tool,
+            options,
+            frames: [spec.first_frame(), spec.last_frame()],
             sweeps: Vec::new(),
         });
         self.added += 1;
@@ -110,9 +75,14 @@ impl Timeline {
         groups: &mut [Group],
         mut follow: impl FnMut(usize, &mut Group, &CutDelta) -> Result<(), Error>,
     ) -> Result<(), Error> {
+        if self.strokes.is_empty() {
+            return Ok(());
+        }
+        self.memories.resize_with(groups.len(), CutMemory::default);
         for i in 0..self.strokes.len() {
             for (g, group) in groups.iter_mut().enumerate() {
-                let Some(delta) = self.strokes[i].advance(frame, self.tolerance, g, group)? else {
+                let stroke = &mut self.strokes[i];
+                let Some(delta) = stroke.advance(frame, g, group, &mut self.memories[g])? else {
                     continue;
                 };
                 if delta.is_empty() {
@@ -127,76 +97,54 @@ impl Timeline {
                 follow(g, group, &delta)?;
             }
         }
-        self.strokes
-            .retain(|stroke| frame < stroke.spec.last_frame());
+        self.strokes.retain(|stroke| frame < stroke.frames[1]);
         Ok(())
-    }
-
-    fn options(&self, snap: f64) -> CutOptions {
-        CutOptions {
-            snap,
-            tolerance: self.tolerance,
-            ..CutOptions::default()
-        }
     }
 }
 
 impl Stroke {
-    /// Moves in the group of the given number.
+    /// Cuts, or moves, in the group of the given number.
     fn advance(
         &mut self,
         frame: u64,
-        tolerance: f64,
         number: usize,
         group: &mut Group,
+        memory: &mut CutMemory,
     ) -> Result<Option<CutDelta>, Error> {
-        let (cuttable, positions) = (&mut group.cuttable, &group.positions);
-        let cut = |source| Error::Cut {
+        let [first, last] = self.frames;
+        if frame < first {
+            return Ok(None);
+        }
+        let (cuttable, positions, options) = (&mut group.cuttable, &group.positions, &self.options);
+        let cut = match &self.tool {
+            Tool::Sweep { blade, path } => {
+                let elapsed = (frame.min(last) - first) as f64 / (last - first) as f64;
+                let offset = along(path, elapsed);
+                let pose: Vec<DVec3> = blade.iter().map(|x| *x + offset).collect();
+                match self.sweeps.get_mut(number) {
+                    Some(sweep) => sweep.advance_joining(cuttable, positions, &pose, memory),
+                    None => Sweep::new(cuttable, positions, &pose, *options).map(|sweep| {
+                        self.sweeps.push(sweep);
+                        CutDelta::default()
+                    }),
+                }
+            }
+            Tool::Surface(surface) => {
+                cut_surface_joining(cuttable, positions, surface, options, memory)
+            }
+            Tool::Plane(plane) => cut_plane(cuttable, positions, plane, options),
+            Tool::Plug(solid) => cut_level_set(cuttable, positions, |x| solid.distance(x), options),
+            Tool::Remove(solid) => carve(cuttable, positions, |x| solid.contains(x), options.tag),
+        };
+        let delta = cut.map_err(|source| Error::Cut {
             field: self.field.clone(),
             source,
-        };
-        match &self.spec {
-            StrokeSpec::Plane {
-                frame: due,
-                point,
-                normal,
-                snap,
-            } if *due <= frame => {
-                let options = CutOptions {
-                    snap: *snap,
-                    tolerance,
-                    ..CutOptions::default()
-                };
-                cut_plane(cuttable, positions, &plane(*point, *normal), &options)
-                    .map(Some)
-                    .map_err(cut)
-            }
-            StrokeSpec::Sweep {
-                frames: [first, last],
-                blade,
-                path,
-                snap,
-            } if *first <= frame => {
-                let elapsed = (frame.min(*last) - first) as f64 / (last - first) as f64;
-                let offset = along(path, elapsed);
-                let pose: Vec<DVec3> = blade.iter().map(|x| vector(*x) + offset).collect();
-                if let Some(sweep) = self.sweeps.get_mut(number) {
-                    return sweep
-                        .advance(cuttable, positions, &pose)
-                        .map(Some)
-                        .map_err(cut);
-                }
-                let options = CutOptions {
-                    snap: *snap,
-                    tolerance,
-                    ..CutOptions::default()
-                };
-                let sweep = Sweep::new(cuttable, positions, &pose, options);
-                self.sweeps.push(sweep.map_err(cut)?);
-                Ok(None)
-            }
-            _ => Ok(None),
+        })?;
+        let joins = matches!(self.tool, Tool::Sweep { .. } | Tool::Surface(_));
+        if !joins && !delta.is_empty() {
+            memory.follow(&group.cuttable, &delta, &self.options);
         }
+        Ok(Some(delta))
     }
 }
 
@@ -210,18 +158,7 @@ pub(crate) fn along(path: &[[f64; 3]], fraction: f64) -> DVec3 {
         }
         rest -= 1.0;
     }
-    vector(from).lerp(vector(to), rest.min(1.0))
-}
-
-fn plane(point: [f64; 3], normal: [f64; 3]) -> Plane {
-    Plane {
-        point: vector(point),
-        normal: vector(normal),
-    }
-}
-
-fn vector(v: [f64; 3]) -> DVec3 {
-    DVec3::from_array(v)
+    DVec3::from_array(from).lerp(DVec3::from_array(to), rest.min(1.0))
 }
 
 #[cfg(test)]

@@ -65,6 +65,12 @@ impl Volumes {
             for tet in &delta.relinked {
                 solver.relink_volume(tet.tet.index(), tet.after.map(|p| p.0));
             }
+            // Constraints past the last tet stay in the list, but no schedule names them any more.
+            for tet in &delta.moved {
+                let body = solver.material_of(tet.to.index());
+                let constraint = self.constraint(body, tet.corners, mesh.corners(tet.to));
+                solver.put_volume(tet.to.index(), constraint).map_err(refused)?;
+            }
             solver.reschedule_volumes(schedule);
         });
         Ok(())

@@ -121,18 +121,21 @@ impl Whole {
         }
         numbers.tets.truncate(delta.tets_after());
         self.fill_gaps(&mut whole);
-        let numbers = &self.numbers[group];
         let triangles = delta.surface_added.iter();
-        whole.surface_added = triangles
-            .map(|triangle| BoundaryTriangle {
-                tet: numbers.tets[triangle.tet.index()],
-                particles: triangle.particles.map(|p| numbers.particles[p.index()]),
-                ..*triangle
-            })
-            .collect();
+        whole.surface_added = triangles.map(|t| self.triangle(group, t)).collect();
         whole.apply(&mut self.mesh);
         whole.extend_particles(&mut self.positions);
         whole
+    }
+
+    /// A boundary triangle of a group in the numbers of the whole.
+    pub(crate) fn triangle(&self, group: usize, triangle: &BoundaryTriangle) -> BoundaryTriangle {
+        let numbers = &self.numbers[group];
+        BoundaryTriangle {
+            tet: numbers.tets[triangle.tet.index()],
+            particles: triangle.particles.map(|p| numbers.particles[p.index()]),
+            ..*triangle
+        }
     }
 
     /// Gives the numbers of deleted tets to the last ones, whichever groups they belong to. O(tets) if there are any.

@@ -20,6 +20,7 @@ mod regions;
 mod reports;
 mod scenarios;
 mod sleep;
+mod strokes;
 mod substeps;
 mod support;
 mod values;

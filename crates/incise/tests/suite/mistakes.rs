@@ -90,7 +90,7 @@ fn the_largest_frame_number_does_not_overflow() {
     let mut scene = sound();
     match &mut scene.stroke[0] {
         StrokeSpec::Plane { frame, .. } => *frame = u64::MAX,
-        StrokeSpec::Sweep { .. } => panic!("the first stroke is a plane"),
+        _ => panic!("the first stroke is a plane"),
     }
     *sweep(&mut scene).0 = [0, u64::MAX];
     assert_eq!(scene.frames_needed(), u64::MAX);

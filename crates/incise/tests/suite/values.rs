@@ -48,7 +48,7 @@ pub(crate) fn plane(scene: &mut Scene) -> (&mut [f64; 3], &mut [f64; 3], &mut f6
             snap,
             ..
         } => (point, normal, snap),
-        StrokeSpec::Sweep { .. } => panic!("the first stroke is a plane"),
+        _ => panic!("the first stroke is a plane"),
     }
 }
 
@@ -68,7 +68,7 @@ pub(crate) fn sweep(scene: &mut Scene) -> SweepParts<'_> {
             path,
             snap,
         } => (frames, blade, path, snap),
-        StrokeSpec::Plane { .. } => panic!("the second stroke is a sweep"),
+        _ => panic!("the second stroke is a sweep"),
     }
 }
 

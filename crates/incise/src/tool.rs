@@ -1,0 +1,110 @@
+//! [`Tool`]: what a stroke of the scene cuts with, its values checked.
+
+use glam::DVec3;
+use incise_cutting::{CutError, Plane, TriangleSurface};
+
+use crate::Error;
+use crate::limits::{coordinates, direction, value};
+use crate::region::Solid;
+use crate::scene::{Region, StrokeSpec};
+
+/// What a stroke cuts with.
+#[derive(Debug)]
+pub(crate) enum Tool {
+    Plane(Plane),
+    Surface(TriangleSurface),
+    /// What is inside comes off.
+    Plug(Solid),
+    /// What is inside goes.
+    Remove(Solid),
+    /// A polyline and the offsets it passes through.
+    Sweep {
+        blade: Vec<DVec3>,
+        path: Vec<[f64; 3]>,
+    },
+}
+
+/// The tool of a stroke and its snap distance.
+pub(crate) fn tool(field: &str, spec: &StrokeSpec) -> Result<(Tool, f64), Error> {
+    let point = |key: &str, x: &[f64; 3]| coordinates(&format!("{field}.{key}"), *x);
+    let points = |key: &str, list: &[[f64; 3]]| -> Result<Vec<DVec3>, Error> {
+        list.iter().map(|x| point(key, x)).collect()
+    };
+    let surface = |key: &str, result: Result<TriangleSurface, CutError>| {
+        result.map(Tool::Surface).map_err(|source| Error::Cut {
+            field: format!("{field}.{key}"),
+            source,
+        })
+    };
+    Ok(match spec {
+        StrokeSpec::Plane {
+            point: x,
+            normal,
+            snap,
+            ..
+        } => {
+            let plane = Plane {
+                point: point("point", x)?,
+                normal: direction(&format!("{field}.normal"), *normal)?,
+            };
+            (Tool::Plane(plane), *snap)
+        }
+        StrokeSpec::Rectangle {
+            center,
+            half_u,
+            half_v,
+            snap,
+            ..
+        } => {
+            let center = point("center", center)?;
+            let (u, v) = (point("half_u", half_u)?, point("half_v", half_v)?);
+            let rectangle = TriangleSurface::rectangle(center, u, v);
+            (surface("half_u", rectangle)?, *snap)
+        }
+        StrokeSpec::Surface {
+            points: corners,
+            triangles,
+            snap,
+            ..
+        } => {
+            let corners = points("points", corners)?;
+            let triangles = TriangleSurface::new(&corners, triangles);
+            (surface("triangles", triangles)?, *snap)
+        }
+        StrokeSpec::Plug { region, snap, .. } => (Tool::Plug(solid(field, region)?), *snap),
+        StrokeSpec::Remove { region, .. } => (Tool::Remove(solid(field, region)?), 0.0),
+        StrokeSpec::Sweep {
+            frames,
+            blade,
+            path,
+            snap,
+        } => {
+            if frames[0] >= frames[1] {
+                let range = "two frames, the second after the first";
+                let frames = format!("{frames:?}");
+                return Err(value(format!("{field}.frames"), frames, range));
+            }
+            if path.len() < 2 {
+                let given = format!("{} point(s)", path.len());
+                return Err(value(format!("{field}.path"), given, "at least two"));
+            }
+            points("path", path)?;
+            let (path, blade) = (path.clone(), points("blade", blade)?);
+            let length: f64 = blade.windows(2).map(|ends| ends[0].distance(ends[1])).sum();
+            if blade.len() < 2 || length == 0.0 {
+                let points = blade.len();
+                return Err(Error::Cut {
+                    field: format!("{field}.blade"),
+                    source: CutError::ShortBlade { points, length },
+                });
+            }
+            (Tool::Sweep { blade, path }, *snap)
+        }
+    })
+}
+
+fn solid(field: &str, region: &Region) -> Result<Solid, Error> {
+    let field = format!("{field}.region");
+    let range = "half_space, box or sphere";
+    Solid::new(&field, region)?.ok_or_else(|| value(field, "particles", range))
+}

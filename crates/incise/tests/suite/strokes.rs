@@ -1,0 +1,167 @@
+//! Every kind of stroke in a scene, on one body and on several, followed by everything that follows cuts.
+
+use incise::cutting::{FaceTag, Skin};
+use incise::{Scene, Simulation};
+
+/// All kinds of strokes on the first body of a scene.
+const STROKES: &str = r#"
+    [[stroke]]
+    kind = "rectangle"
+    frame = 1
+    center = [0.03, 0.0, 0.3]
+    half_u = [0.0, 0.6, 0.0]
+    half_v = [0.0, 0.0, 0.3]
+
+    [[stroke]]
+    kind = "surface"
+    frame = 2
+    points = [[-1.0, -1.0, -0.11], [1.0, -1.0, -0.11], [1.0, 1.0, -0.11], [-1.0, 1.0, -0.12]]
+    triangles = [[0, 1, 2], [0, 2, 3]]
+
+    [[stroke]]
+    kind = "plug"
+    frame = 3
+    region = { sphere = { center = [-0.2, 0.0, 0.2], radius = 0.15 } }
+
+    [[stroke]]
+    kind = "remove"
+    frame = 4
+    region = { box = { low = [-1.0, -1.0, -1.0], high = [1.0, 1.0, -0.3] } }
+
+    [[stroke]]
+    kind = "sweep"
+    frames = [3, 8]
+    blade = [[-1.0, 0.07, 0.6], [1.0, 0.07, 0.6]]
+    path = [[0, 0, 0], [0, 0, -1.2]]
+
+    [[stroke]]
+    kind = "plane"
+    frame = 9
+    point = [0.1, 0.0, 0.0]
+    normal = [1.0, 0.3, 0.1]
+"#;
+
+fn scene(bodies: usize, more: &str) -> Scene {
+    let mut text =
+        String::from("[report]\nquantities = [\"volume\", \"speed\", \"energy\", \"kappa\"]\n");
+    text += "[solver]\nprecision = \"f64\"\n";
+    for i in 0..bodies {
+        text += &format!(
+            "[[body]]\nshape = {{ kind = \"sphere\", tets = 700 }}\nposition = [{}.0, 0.0, 0.0]\n{more}\n",
+            3 * i
+        );
+    }
+    Scene::from_toml(&(text + STROKES)).unwrap()
+}
+
+/// Runs the scene; checks everything in every frame and follows it with a skin. Returns the number of pieces.
+fn run(scene: &Scene) -> usize {
+    let mut simulation = Simulation::new(scene).unwrap();
+    let mut skin = Skin::new(simulation.boundary());
+    let mut mesh = simulation.mesh().clone();
+    let mut removed = 0;
+    for frame in 0..11 {
+        let report = simulation.step().unwrap().clone();
+        simulation.check().unwrap();
+        for delta in simulation.deltas() {
+            delta.apply(&mut mesh);
+            skin.follow(delta);
+        }
+        assert_eq!(&mesh, simulation.mesh(), "the deltas say everything");
+        let mut followed: Vec<_> = (0..skin.triangles().len())
+            .map(|i| (skin.tet(i), skin.tag(i)))
+            .collect();
+        let mut expected: Vec<_> = simulation.boundary().map(|t| (t.tet, t.tag)).collect();
+        followed.sort_unstable();
+        expected.sort_unstable();
+        assert_eq!(followed, expected, "frame {frame}");
+        if let Some(cut) = report.cut {
+            removed += cut.tets_removed;
+            assert!(
+                cut.dihedral
+                    .is_none_or(|[a, b]| 0.0 < a && a < b && b < 180.0)
+            );
+        }
+        assert!(simulation.positions().iter().all(|x| x.is_finite()));
+        let line = serde_json::to_string(&report).unwrap();
+        assert!(!line.contains("NaN"), "{line}");
+    }
+    assert!(removed > 10);
+    let tags: std::collections::BTreeSet<FaceTag> = simulation.boundary().map(|t| t.tag).collect();
+    for stroke in 0..6 {
+        assert!(
+            tags.contains(&FaceTag::Cut(stroke)),
+            "stroke {stroke} laid faces bare"
+        );
+    }
+    simulation.report().pieces
+}
+
+#[test]
+fn all_kinds_on_one_body() {
+    assert!(run(&scene(1, "")) > 4);
+}
+
+#[test]
+fn all_kinds_on_one_of_two_bodies() {
+    let alone = run(&scene(1, ""));
+    assert_eq!(run(&scene(2, "")), alone + 1);
+}
+
+#[test]
+fn all_kinds_with_volume_constraints() {
+    assert!(run(&scene(1, "volume_compliance = 0.0")) > 4);
+}
+
+/// A body that is removed as a whole leaves a simulation that goes on with nothing.
+#[test]
+fn everything_removed() {
+    for bodies in [1, 2] {
+        let mut scene = scene(bodies, "");
+        scene.stroke.truncate(4);
+        scene.stroke.drain(..3);
+        let text = scene.to_toml().unwrap().replace("-0.3", "1.0");
+        let mut simulation = Simulation::new(&Scene::from_toml(&text).unwrap()).unwrap();
+        for _ in 0..8 {
+            let report = simulation.step().unwrap();
+            let line = serde_json::to_string(report).unwrap();
+            assert!(
+                !line.contains("NaN") && !line.contains("_error\":null"),
+                "{line}"
+            );
+            simulation.check().unwrap();
+        }
+        assert_eq!(simulation.report().pieces, bodies - 1);
+        assert_eq!(simulation.pieces().len(), bodies - 1);
+    }
+}
+
+#[test]
+fn mistakes_name_the_key() {
+    let refuse = |stroke: &str, expected: &str| {
+        let text =
+            format!("[[body]]\nshape = {{ kind = \"sphere\", tets = 100 }}\n[[stroke]]\n{stroke}");
+        let error = Simulation::new(&Scene::from_toml(&text).unwrap()).unwrap_err();
+        assert!(error.to_string().contains(expected), "{error}");
+    };
+    refuse(
+        "kind = \"rectangle\"\nframe = 1\ncenter = [0,0,0]\nhalf_u = [1,0,0]\nhalf_v = [2,0,0]",
+        "stroke[0].half_u",
+    );
+    refuse(
+        "kind = \"surface\"\nframe = 1\npoints = [[0,0,0],[1,0,0],[0,1,0]]\ntriangles = [[0,1,3]]",
+        "stroke[0].triangles",
+    );
+    refuse(
+        "kind = \"plug\"\nframe = 1\nregion = { sphere = { center = [0,0,0], radius = -1.0 } }",
+        "stroke[0].region.sphere.radius",
+    );
+    refuse(
+        "kind = \"remove\"\nframe = 1\nregion = { particles = [1] }",
+        "stroke[0].region",
+    );
+    refuse(
+        "kind = \"plug\"\nframe = 1\nsnap = 0.3\nregion = { sphere = { center = [0,0,0], radius = 1.0 } }",
+        "stroke[0].snap",
+    );
+}
