@@ -246,6 +246,12 @@ impl<R: Real> Backend<R> {
         }
     }
 
+    fn lay_out(&mut self, schedule: &Schedule) {
+        if self.descent.is_none() {
+            self.solver.lay_out(schedule);
+        }
+    }
+
     fn follow(&mut self, ms: &mut Milliseconds) -> Result<(), Error> {
         let Self { solver, descent } = self;
         descent

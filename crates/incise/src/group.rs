@@ -182,6 +182,9 @@ impl Group {
         if let Some(volumes) = &self.volumes {
             volumes.follow(&mut self.solver, delta, &self.cuttable, &self.plan.schedule)?;
         }
+        let start = Instant::now();
+        self.solver.lay_out(&self.plan.schedule);
+        ms.schedule += milliseconds(start.elapsed());
         Ok(events)
     }
 

@@ -304,7 +304,9 @@ impl Simulation {
                 Quantity::Volume => {
                     let volume = volume(&self.groups);
                     report.volume = Some(volume.total);
-                    report.volume_error = Some(volume.total / volume.rest - 1.0);
+                    // Nothing may be left.
+                    let error = volume.total / volume.rest - 1.0;
+                    report.volume_error = Some(if volume.rest > 0.0 { error } else { 0.0 });
                     report.min_volume_ratio = Some(volume.min_ratio);
                     report.inverted_tets = Some(volume.inverted);
                 }

@@ -60,6 +60,7 @@ pub(super) fn scatter<R: Real, S: Simd>(
     write: impl Fn(u32, [R; 4]),
 ) {
     let lanes = R::Lanes::<S>::LEN;
+    let corners = &corners[..lanes];
     for (k, &[x, y, z, w]) in x.iter().enumerate() {
         let (even, more_even) = x.interleave(z);
         let (odd, more_odd) = y.interleave(w);
@@ -70,10 +71,16 @@ pub(super) fn scatter<R: Real, S: Simd>(
         b.store_slice(&mut buffer[lanes..2 * lanes]);
         c.store_slice(&mut buffer[2 * lanes..3 * lanes]);
         d.store_slice(&mut buffer[3 * lanes..4 * lanes]);
-        for (lane, (values, corner)) in buffer.chunks_exact(4).zip(corners).enumerate() {
-            if active & (1 << lane) != 0 {
-                write(corner[k], [values[0], values[1], values[2], values[3]]);
-            }
+        let lane = |lane: usize| {
+            let at = 4 * lane;
+            let values = [buffer[at], buffer[at + 1], buffer[at + 2], buffer[at + 3]];
+            write(corners[lane][k], values);
+        };
+        // Most blocks are full: they need no look at each bit.
+        if active.count_ones() as usize == lanes {
+            (0..lanes).for_each(lane);
+        } else {
+            (0..lanes).filter(|l| active & (1 << l) != 0).for_each(lane);
         }
     }
 }
