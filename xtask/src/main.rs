@@ -4,6 +4,7 @@
 
 mod coloring;
 mod models;
+mod soak;
 mod solver;
 mod sweep;
 mod wear;
@@ -26,6 +27,8 @@ enum Command {
     Coloring(coloring::ColoringArguments),
     /// Compare the methods of the solver: what they cost and what they are worth.
     Solver(solver::SolverArguments),
+    /// Make random strokes by the thousand and check everything after each.
+    SoakCut(soak::SoakArguments),
     /// Cut meshes, check everything and write a table.
     Sweep(sweep::SweepArguments),
     /// Cut a mesh many times in small strokes, and see what becomes of clusters, colors and the time to solve.
@@ -36,6 +39,7 @@ fn main() -> anyhow::Result<()> {
     match Arguments::parse().command {
         Command::Coloring(arguments) => coloring::coloring(&arguments),
         Command::Solver(arguments) => solver::solver(&arguments),
+        Command::SoakCut(arguments) => soak::soak(&arguments),
         Command::Sweep(arguments) => sweep::sweep(&arguments),
         Command::Wear(arguments) => wear::wear(&arguments),
     }

@@ -31,7 +31,8 @@ impl Model {
         })
     }
 
-    fn read(path: PathBuf) -> anyhow::Result<Self> {
+    /// The mesh of a file, checked.
+    pub(crate) fn read(path: PathBuf) -> anyhow::Result<Self> {
         let mesh = io::read(&path)?;
         mesh.check().with_context(|| path.display().to_string())?;
         let name = path

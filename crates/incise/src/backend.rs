@@ -176,6 +176,14 @@ impl AnySolver {
         }
     }
 
+    /// Brings the layout up to date with the schedule; the next step would do it otherwise. Descent has none.
+    pub(crate) fn lay_out(&mut self, schedule: &Schedule) {
+        match self {
+            Self::Single(backend) => backend.lay_out(schedule),
+            Self::Double(backend) => backend.lay_out(schedule),
+        }
+    }
+
     /// Recomputes masses, corners and what a step would solve, and compares; for tests and on request.
     pub(crate) fn check(&self, cuttable: &CuttableMesh, schedule: &Schedule) -> Result<(), Error> {
         let mesh = cuttable.mesh();

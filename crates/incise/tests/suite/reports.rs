@@ -73,6 +73,7 @@ fn without_a_report_there_are_counts_and_times() {
                 "particles_created",
                 "snapped",
                 "worst_volume_ratio",
+                "dihedral",
             ];
             assert_eq!(keys(&report["cut"]), set(&cut));
             let came_off = ["piece", "from", "tets", "volume", "mass"];

@@ -1,0 +1,295 @@
+//! `cargo xtask soak-cut`: random strokes by the thousand, everything checked after each.
+//!
+//! The body sags under its weight, held on one side, with a ground for what comes off. Each stroke is of a random kind
+//! and place, a few edges large: rectangles, bent strips, plugs, blades swept over several frames, the stroke before
+//! once more, now and then a bite taken out. After every frame with a stroke everything derived is recomputed and
+//! compared (`Simulation::check`), positions must be finite and what the deltas say must be what the mesh is. Cutting
+//! only ever adds tets, so a body that has grown threefold is replaced by a fresh one. All is determined by the seed.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use anyhow::{Context, ensure};
+use clap::Args;
+use incise::cutting::Skin;
+use incise::mesh::glam::DVec3;
+use incise::scene::{BodySpec, Precision, Region, StrokeSpec};
+use incise::{Scene, Simulation};
+
+use crate::models::{Model, models};
+use crate::table;
+
+#[derive(Debug, Args)]
+pub(crate) struct SoakArguments {
+    /// How many strokes on each mesh.
+    #[arg(long, default_value_t = 10_000)]
+    strokes: u64,
+    /// The seed of all randomness.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Stop after so many seconds in all.
+    #[arg(long, value_name = "SECONDS")]
+    seconds: Option<f64>,
+    /// A small generated mesh only.
+    #[arg(long)]
+    quick: bool,
+    /// Also the mesh of this file.
+    #[arg(long, value_name = "FILE")]
+    mesh: Option<PathBuf>,
+}
+
+/// What a soak saw.
+#[derive(Debug, Default)]
+struct Tally {
+    strokes: u64,
+    cut: u64,
+    bodies: u64,
+    tets_cut: usize,
+    tets_created: usize,
+    detached: usize,
+    most_pieces: usize,
+    least_dihedral: f64,
+    least_ratio: f64,
+    most_colors: usize,
+}
+
+#[expect(
+    clippy::print_stdout,
+    reason = "the table is the result of the command"
+)]
+pub(crate) fn soak(arguments: &SoakArguments) -> anyhow::Result<()> {
+    let mut bodies = models(None, 12_000, arguments.quick)?;
+    bodies.retain(|model| model.name.contains("liver"));
+    if let Some(path) = &arguments.mesh {
+        bodies.insert(0, Model::read(path.clone())?);
+    }
+    let start = Instant::now();
+    let mut table = table([
+        "mesh",
+        "strokes",
+        "that cut",
+        "violations",
+        "bodies used up",
+        "tets cut",
+        "tets each became",
+        "pieces detached",
+        "most pieces",
+        "most colors",
+        "smallest dihedral",
+        "worst volume ratio",
+    ]);
+    for (i, model) in bodies.iter().enumerate() {
+        // Each mesh gets its share of the time.
+        let share = (i + 1) as f64 / bodies.len() as f64;
+        let end = arguments.seconds.map(|seconds| seconds * share);
+        let late = || end.is_some_and(|end| start.elapsed().as_secs_f64() > end);
+        let tally = soak_one(model, arguments, late)?;
+        table.add_row([
+            model.name.clone(),
+            tally.strokes.to_string(),
+            tally.cut.to_string(),
+            "0".to_owned(),
+            tally.bodies.to_string(),
+            tally.tets_cut.to_string(),
+            format!(
+                "{:.2}",
+                tally.tets_created as f64 / tally.tets_cut.max(1) as f64
+            ),
+            tally.detached.to_string(),
+            tally.most_pieces.to_string(),
+            tally.most_colors.to_string(),
+            format!("{:.3}°", tally.least_dihedral),
+            format!("{:.1e}", tally.least_ratio),
+        ]);
+    }
+    println!("{table}");
+    Ok(())
+}
+
+/// Runs until all strokes are made or it is `late`; fails at the first violation.
+fn soak_one(
+    model: &Model,
+    arguments: &SoakArguments,
+    late: impl Fn() -> bool,
+) -> anyhow::Result<Tally> {
+    let mut random = Random(arguments.seed);
+    let mut tally = Tally {
+        least_dihedral: f64::INFINITY,
+        least_ratio: 1.0,
+        ..Tally::default()
+    };
+    while tally.strokes < arguments.strokes && !late() {
+        tally.bodies += 1;
+        let mut simulation = Simulation::new(&scene(model, &mut random))?;
+        let limit = 3 * simulation.mesh().tets.len();
+        let mut skin = Skin::new(simulation.boundary());
+        let mut last = None;
+        while tally.strokes < arguments.strokes && simulation.mesh().tets.len() < limit && !late() {
+            let stroke = match last.take() {
+                Some(stroke) if random.below(8) == 0 => stroke,
+                _ => random_stroke(&simulation, &mut random),
+            };
+            let frame = simulation.report().frame + 1;
+            let stroke = due(stroke, frame);
+            let frames = stroke.last_frame() - stroke.first_frame() + 1;
+            simulation.cut(stroke.clone())?;
+            tally.strokes += 1;
+            for _ in 0..frames {
+                follow(&mut simulation, &mut skin, &mut tally).with_context(|| {
+                    let (seed, strokes) = (arguments.seed, tally.strokes);
+                    format!("{}, seed {seed}, stroke {strokes}: {stroke:?}", model.name)
+                })?;
+            }
+            last = Some(stroke);
+        }
+    }
+    Ok(tally)
+}
+
+/// Makes a frame and checks everything.
+fn follow(simulation: &mut Simulation, skin: &mut Skin, tally: &mut Tally) -> anyhow::Result<()> {
+    let report = simulation.step()?.clone();
+    simulation.check()?;
+    for delta in simulation.deltas() {
+        skin.follow(delta);
+    }
+    ensure!(
+        skin.triangles().len() == simulation.boundary().count(),
+        "the skin has other triangles than the body"
+    );
+    let finite = simulation.positions().iter().all(|x| x.is_finite());
+    ensure!(finite, "a position is not finite");
+    if let Some(cut) = report.cut {
+        tally.cut += 1;
+        tally.tets_cut += cut.tets_cut;
+        tally.tets_created += cut.tets_created;
+        tally.least_ratio = tally.least_ratio.min(cut.worst_volume_ratio);
+        let least = cut.dihedral.map_or(f64::INFINITY, |[least, _]| least);
+        tally.least_dihedral = tally.least_dihedral.min(least);
+    }
+    tally.detached += report.detached.len();
+    tally.most_pieces = tally.most_pieces.max(report.pieces);
+    tally.most_colors = tally.most_colors.max(report.colors);
+    Ok(())
+}
+
+/// The built-in scene without its stroke, with a ground below.
+fn scene(model: &Model, random: &mut Random) -> Scene {
+    let mut scene = Scene::built_in();
+    scene.stroke.clear();
+    model.put_into(&mut scene.body[0]);
+    let body: &mut BodySpec = &mut scene.body[0];
+    body.young_modulus = 2e4;
+    scene.solver.precision = [Precision::F32, Precision::F64][random.below(2)];
+    scene.world.ground = Some(incise::scene::GroundSpec {
+        height: -1.0,
+        friction: 0.5,
+    });
+    scene
+}
+
+/// A stroke a few edges large at a random particle.
+fn random_stroke(simulation: &Simulation, random: &mut Random) -> StrokeSpec {
+    let positions = simulation.positions();
+    let mesh = simulation.mesh();
+    let tet = mesh.tets[random.below(mesh.tets.len())];
+    let center = positions[tet[0].index()];
+    let edge = mesh.positions[tet[0].index()].distance(mesh.positions[tet[1].index()]);
+    let size = edge.max(0.02) * (0.5 + 3.0 * random.unit());
+    let (u, v) = (random.direction(), random.direction());
+    let normal = u.cross(v).normalize_or(DVec3::X);
+    let v = normal.cross(u) * size;
+    let u = u * size;
+    let array = DVec3::to_array;
+    let (frame, snap) = (0, [0.0, 0.05, 0.1, 0.1, 0.1, 0.2][random.below(6)]);
+    match random.below(10) {
+        0..=3 => StrokeSpec::Rectangle {
+            frame,
+            center: array(&center),
+            half_u: array(&u),
+            half_v: array(&v),
+            snap,
+        },
+        4 | 5 => {
+            // A strip of two bays, bent at the middle.
+            let bend = normal * size * random.unit();
+            let rows = [center - v, center + bend, center + v];
+            let points = rows
+                .iter()
+                .flat_map(|row| [array(&(*row - u)), array(&(*row + u))]);
+            StrokeSpec::Surface {
+                frame,
+                points: points.collect(),
+                triangles: vec![[0, 1, 3], [0, 3, 2], [2, 3, 5], [2, 5, 4]],
+                snap,
+            }
+        }
+        6 => StrokeSpec::Plug {
+            frame,
+            region: Region::Sphere {
+                center: array(&center),
+                radius: size,
+            },
+            snap,
+        },
+        7 if random.below(8) == 0 => StrokeSpec::Remove {
+            frame,
+            region: Region::Sphere {
+                center: array(&center),
+                radius: 0.5 * size,
+            },
+        },
+        _ => {
+            let frames = 2 + random.below(6) as u64;
+            let middle = center + normal * size * 0.3;
+            StrokeSpec::Sweep {
+                frames: [0, frames],
+                blade: vec![array(&(middle - u)), array(&(middle + u))],
+                path: vec![array(&-v), array(&(normal * size * 0.2)), array(&v)],
+                snap,
+            }
+        }
+    }
+}
+
+/// The stroke from a frame on.
+fn due(mut stroke: StrokeSpec, now: u64) -> StrokeSpec {
+    match &mut stroke {
+        StrokeSpec::Plane { frame, .. }
+        | StrokeSpec::Rectangle { frame, .. }
+        | StrokeSpec::Surface { frame, .. }
+        | StrokeSpec::Plug { frame, .. }
+        | StrokeSpec::Remove { frame, .. } => *frame = now,
+        StrokeSpec::Sweep { frames, .. } => *frames = [now, now + frames[1] - frames[0]],
+    }
+    stroke
+}
+
+/// Splitmix64.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut x = self.0;
+        x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        x ^ (x >> 31)
+    }
+
+    /// In 0..1.
+    fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn below(&mut self, count: usize) -> usize {
+        usize::try_from(self.next() % count as u64).unwrap_or(0)
+    }
+
+    fn direction(&mut self) -> DVec3 {
+        let coordinate = |random: &mut Self| 2.0 * random.unit() - 1.0;
+        let x = coordinate(self);
+        let (y, z) = (coordinate(self), coordinate(self));
+        DVec3::new(x, y, z).normalize_or(DVec3::Z)
+    }
+}
