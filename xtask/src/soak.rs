@@ -59,7 +59,7 @@ struct Tally {
 )]
 pub(crate) fn soak(arguments: &SoakArguments) -> anyhow::Result<()> {
     let mut bodies = models(None, 12_000, arguments.quick)?;
-    bodies.retain(|model| model.name.contains("liver"));
+    bodies.retain(|model| model.name.contains("liver") && model.mesh.tets.len() <= 12_000);
     if let Some(path) = &arguments.mesh {
         bodies.insert(0, Model::read(path.clone())?);
     }
