@@ -5,15 +5,15 @@
 //! less than one tet, and a stroke may stop anywhere. The blade is followed in the material's own time (see the module
 //! `meet`), so a body that moves or deforms between frames leaves no gap.
 //!
-//! Source: paper section 4.3, with the moving front as described here. Cost of a frame: a pass over particles and tets
-//! to find those near the blade, then the cut.
+//! Source: paper section 4.3, with the moving front as described here. Cost: a pass over particles and tets at the
+//! start; in each frame a copy of the positions, the boxes of the boundary triangles (see the module `near`) and the cut.
 
 use glam::DVec3;
 use incise_mesh::TetMesh;
 
 use crate::meet::{Meeting, MovingSegment, meetings};
 use crate::memory::CutMemory;
-use crate::near::near_tets;
+use crate::near::Search;
 use crate::plane::require_finite;
 use crate::stroke::{Blade, Motion, Stroke};
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
@@ -68,6 +68,9 @@ pub struct Sweep {
     blade: Vec<DVec3>,
     /// Positions of the particles at the last pose.
     before: Vec<DVec3>,
+    /// Room for those at the next one.
+    room: Vec<DVec3>,
+    search: Search,
     stroke: Stroke,
 }
 
@@ -97,6 +100,8 @@ impl Sweep {
         Ok(Self {
             blade: blade.to_vec(),
             before: positions.to_vec(),
+            room: Vec::new(),
+            search: Search::new(cuttable.mesh(), positions, &between(blade, blade)),
             stroke: Stroke::new(options),
         })
     }
@@ -162,33 +167,34 @@ impl Sweep {
         }
         require_count(cuttable.mesh(), positions)?;
 
-        let pairs = self.blade.windows(2).zip(blade.windows(2));
-        let segments: Vec<MovingSegment> = pairs
-            .map(|(b, n)| MovingSegment {
-                before: [b[0], b[1]],
-                now: [n[0], n[1]],
-            })
-            .collect();
-        let near = near_tets(cuttable.mesh(), &self.before, positions, &segments);
+        let segments = between(&self.blade, blade);
+        let near = self
+            .search
+            .find(cuttable, &self.before, positions, &segments);
         let mut motion = Motion {
             before: std::mem::take(&mut self.before),
-            now: positions.to_vec(),
+            now: std::mem::take(&mut self.room),
         };
+        motion.now.clear();
+        motion.now.extend_from_slice(positions);
         let blade_between = MovingBlade(segments);
         let result = self
             .stroke
             .cut(cuttable, &mut motion, near, &blade_between, memory);
-        match result {
-            Ok(delta) => {
-                self.before = motion.now;
-                self.blade.copy_from_slice(blade);
-                Ok(delta)
-            }
-            Err(error) => {
-                self.before = motion.before;
-                Err(error)
-            }
-        }
+        let (before, room) = match result {
+            Ok(_) => (motion.now, motion.before),
+            Err(_) => (motion.before, motion.now),
+        };
+        (self.before, self.room) = (before, room);
+        let delta = result?;
+        self.blade.copy_from_slice(blade);
+        self.search.keep(&delta);
+        Ok(delta)
+    }
+
+    #[cfg(test)]
+    pub(crate) fn search_mut(&mut self) -> &mut Search {
+        &mut self.search
     }
 
     /// Follows a cut that another stroke made since the last call of [`Sweep::advance`].
@@ -200,8 +206,19 @@ impl Sweep {
     /// If `cuttable` is not the mesh as `delta` left it.
     pub fn follow(&mut self, cuttable: &CuttableMesh, delta: &CutDelta) {
         delta.extend_particles(&mut self.before);
+        self.search.follow(delta);
         self.stroke.follow(cuttable, delta);
     }
+}
+
+/// The segments of a blade that moves from one pose to another.
+fn between(before: &[DVec3], now: &[DVec3]) -> Vec<MovingSegment> {
+    let pairs = before.windows(2).zip(now.windows(2));
+    let segments = pairs.map(|(b, n)| MovingSegment {
+        before: [b[0], b[1]],
+        now: [n[0], n[1]],
+    });
+    segments.collect()
 }
 
 pub(crate) fn require_count(mesh: &TetMesh, positions: &[DVec3]) -> Result<(), CutError> {
