@@ -27,6 +27,7 @@
 //! This crate knows nothing of constraints, solvers, colors or the GPU.
 
 mod bisect;
+mod closest;
 mod cuttable;
 mod delta;
 mod error;

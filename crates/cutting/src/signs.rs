@@ -9,6 +9,7 @@ use incise_mesh::ParticleId;
 
 use crate::operation::{Crossing, Operation};
 use crate::parallel;
+use crate::stroke::AGAIN;
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh, Separation};
 
 /// Cuts where `values`, one a particle, change their sign. `what` they are is named if one is not finite.
@@ -146,8 +147,6 @@ fn keep_bent(
     values: &[f64],
     on_surface: &mut [bool],
 ) -> usize {
-    // Rounding between two runs of the same cut, and a body that moved a little in between.
-    const AGAIN: f64 = 1.01;
     let ends = crossings.iter().flat_map(|crossing| crossing.ends);
     let close = |p: &ParticleId| {
         let bend = cuttable.bent.get(p);

@@ -165,6 +165,14 @@ impl CutSurface {
             .is_some_and(|mark| mark.seen == Seen::Both)
     }
 
+    /// The side that a particle was always seen on.
+    pub(crate) fn seen(&self, particle: ParticleId) -> Option<bool> {
+        match self.marks.get(&particle)?.seen {
+            Seen::On(side) => Some(side),
+            _ => None,
+        }
+    }
+
     /// Gives the copies that a cut made what their particles remember.
     pub(crate) fn copy(&mut self, delta: &CutDelta) {
         let first = delta.particles_before + delta.points.len();

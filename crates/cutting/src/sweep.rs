@@ -38,6 +38,15 @@ impl Blade for MovingBlade {
     fn most_meetings(&self) -> usize {
         3 * self.0.len()
     }
+
+    /// It has moved on: the particles remember.
+    fn side(&self, _: DVec3, _: f64) -> Option<bool> {
+        None
+    }
+
+    fn touches(&self, _: DVec3, _: f64) -> Option<DVec3> {
+        None
+    }
 }
 
 /// A stroke in progress.

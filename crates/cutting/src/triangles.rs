@@ -14,6 +14,7 @@ use std::cmp::Ordering;
 use glam::DVec3;
 use incise_mesh::{TetId, TetMesh, orientation};
 
+use crate::closest::Closest;
 use crate::meet::{Meeting, MovingSegment};
 use crate::memory::CutMemory;
 use crate::parallel;
@@ -25,6 +26,9 @@ use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
 /// A triangle is flat if its area is smaller than this fraction of its longest side squared: its normal would be noise.
 const FLAT: f64 = 1e-12;
+
+/// How far from a place on an edge its sides are asked, as a fraction of the edge.
+const BESIDE: f64 = 1.0 / 64.0;
 
 /// Triangles to cut along: a bounded plane, a strip, any open or closed surface.
 ///
@@ -161,6 +165,12 @@ impl TriangleSurface {
         })
     }
 
+    /// The point closest to `x`; `reach` is a guess at its distance.
+    fn closest(&self, x: DVec3, reach: f64) -> Option<Closest> {
+        let (corners, normal) = (|t| self.corners(t), |t: usize| self.normals[t]);
+        Closest::new(&self.tree, corners, normal, x, reach)
+    }
+
     /// The tets that a triangle comes near, ascending.
     fn near(&self, mesh: &TetMesh, positions: &[DVec3], tolerance: f64) -> Vec<TetId> {
         let tets: Vec<TetId> = (0..mesh.tets.len()).map(TetId::new).collect();
@@ -203,7 +213,6 @@ impl Blade for StandingBlade<'_> {
             .overlapping(bounds)
             .filter_map(|t| self.surface.meeting(t, edge.now, self.tolerance))
             .collect();
-        // Ties are those of triangles that share a side or a corner there.
         all.sort_by(|m, n| {
             let by_normal = || m.normal.to_array().partial_cmp(&n.normal.to_array());
             m.time
@@ -211,6 +220,7 @@ impl Blade for StandingBlade<'_> {
                 .then_with(|| m.upwards.cmp(&n.upwards))
                 .then_with(|| by_normal().unwrap_or(Ordering::Equal))
         });
+        let mut all = self.one_a_place(&all, edge.now);
         let sides = [!all.first()?.upwards, all.last()?.upwards].map(Some);
         all.retain(keep);
         without_returns(&mut all, edge.now, self.tolerance);
@@ -220,6 +230,47 @@ impl Blade for StandingBlade<'_> {
 
     fn most_meetings(&self) -> usize {
         self.surface.triangles.len()
+    }
+
+    fn side(&self, x: DVec3, reach: f64) -> Option<bool> {
+        self.surface.closest(x, reach)?.side()
+    }
+
+    fn touches(&self, x: DVec3, length: f64) -> Option<DVec3> {
+        let reach = self.tolerance * length;
+        let closest = self.surface.closest(x, reach)?;
+        (closest.offset.length() <= reach).then_some(closest.normal)
+    }
+}
+
+impl StandingBlade<'_> {
+    /// Leaves one meeting at each place: ties are those of triangles that share a side or a corner there. Where they run
+    /// different ways, the surface may be crossed or only touched, which its sides before and behind the place say.
+    /// `meetings` ascend.
+    fn one_a_place(&self, meetings: &[Meeting], [a, b]: [DVec3; 2]) -> Vec<Meeting> {
+        let same = |m: &Meeting, n: &Meeting| n.parameter - m.parameter <= self.tolerance;
+        let places = meetings.chunk_by(same);
+        places
+            .filter_map(|place| {
+                let first = place[0];
+                if place.iter().all(|m| m.upwards == first.upwards) {
+                    return Some(first);
+                }
+                let beside = |step: f64| {
+                    let at = first.parameter + step;
+                    let inside = self.tolerance < at && at < 1.0 - self.tolerance;
+                    let side = || self.side(a.lerp(b, at), BESIDE * a.distance(b));
+                    inside.then(side).flatten()
+                };
+                let upwards = match (beside(-BESIDE), beside(BESIDE)) {
+                    (Some(before), Some(behind)) if before == behind => return None,
+                    (_, Some(behind)) => behind,
+                    (Some(before), None) => !before,
+                    (None, None) => first.upwards,
+                };
+                place.iter().find(|m| m.upwards == upwards).copied()
+            })
+            .collect()
     }
 }
 
