@@ -262,7 +262,7 @@ impl Plan {
             added.extend(tet.corners.map(|p| (cluster, p.0)));
         }
         for (before, tet) in &edit.relinked {
-            let after = label(tet.tet);
+            let after = label(delta.slot_after(tet.tet));
             for (p, q) in tet.before.into_iter().zip(tet.after) {
                 if (*before, p) != (after, q) {
                     removed.push((*before, p.0));
@@ -271,7 +271,7 @@ impl Plan {
             }
         }
         let mut known: Vec<TetId> = delta.added.iter().map(|tet| tet.tet).collect();
-        known.extend(delta.relinked.iter().map(|tet| tet.tet));
+        known.extend(delta.relinked.iter().map(|tet| delta.slot_after(tet.tet)));
         known.sort_unstable();
         for moved in merged {
             let tet = TetId(moved.constraint);
