@@ -51,6 +51,7 @@ mod stars;
 mod stroke;
 mod surface;
 mod sweep;
+mod tiles;
 mod tree;
 mod triangles;
 mod undo;

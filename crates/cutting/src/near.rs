@@ -15,22 +15,20 @@
 //! as in inverted ones, that is in none, as long as none is inverted. Where tets are inverted, those found hang
 //! together with tets the blade came from.
 //!
-//! Cost of a frame: the boxes of the boundary triangles, then what is near. A scan of all particles and tets happens
-//! once, at the first pose, which may lie anywhere in the body.
+//! Cost of a frame: how far the particles moved and a test for each box of boundary triangles (see the module `tiles`),
+//! then what is near. A scan of all particles and tets happens once, at the first pose, which may lie anywhere in the
+//! body.
 
 use glam::DVec3;
 use incise_mesh::{ParticleId, TetId, TetMesh};
 
 use crate::delta::FaceTag;
-use crate::faces::Face;
+use crate::faces::{Face, TILE};
 use crate::meet::MovingSegment;
 use crate::parallel;
+use crate::tiles::Tiles;
 use crate::tree::Bounds;
 use crate::{CutDelta, CuttableMesh};
-
-/// Boundary triangles that share a box. They come in the order of the tets they belong to, which is one in space too
-/// for most meshes.
-const TILE: usize = 64;
 
 /// The box around the region a segment sweeps.
 struct SweptBox {
@@ -130,6 +128,7 @@ pub(crate) struct Search {
     found: Lists,
     /// Particles that came since the last frame, by whatever cut.
     fresh: Vec<ParticleId>,
+    tiles: Tiles,
     marks: Marks,
     /// Whether to look at all tets in every frame.
     #[cfg(test)]
@@ -153,6 +152,7 @@ impl Search {
             known,
             found: Lists::default(),
             fresh: Vec::new(),
+            tiles: Tiles::default(),
             marks: Marks::default(),
             #[cfg(test)]
             everywhere: false,
@@ -169,7 +169,7 @@ impl Search {
     ) -> Vec<TetId> {
         let mut near: Vec<TetId> = Vec::new();
         self.found.clear();
-        let tiles = tiles(cuttable, before, now);
+        self.tiles.begin(&cuttable.faces, before, now);
         for (i, segment) in blade.iter().enumerate() {
             let swept = SweptBox::new(segment);
             self.marks.begin(now.len());
@@ -184,11 +184,10 @@ impl Search {
             };
             let mut next = flood.corners.len();
             let boundary = cuttable.faces.boundary();
-            for (tile, triangles) in tiles.iter().zip(boundary.chunks(TILE)) {
-                if !swept.misses(tile) {
-                    flood.enter(triangles);
-                }
-            }
+            let missed = |bounds: &Bounds| swept.misses(bounds);
+            self.tiles.reached(cuttable, now, missed, |tile| {
+                flood.enter(boundary.iter().skip(tile * TILE).take(TILE));
+            });
             for &seed in self.known.of(i).iter().chain(&self.fresh) {
                 // A cut taken back takes its particles along.
                 if seed.index() < now.len() {
@@ -220,22 +219,16 @@ impl Search {
         self.follow(delta);
     }
 
+    /// Forgets a frame that did not come to be.
+    pub(crate) fn forget(&mut self) {
+        self.tiles.clear();
+    }
+
     /// Follows a cut made by whomever.
     pub(crate) fn follow(&mut self, delta: &CutDelta) {
         let new = delta.particles_before..delta.particles_after();
         self.fresh.extend(new.map(ParticleId::new));
     }
-}
-
-/// The boxes around the boundary triangles' paths.
-fn tiles(cuttable: &CuttableMesh, before: &[DVec3], now: &[DVec3]) -> Vec<Bounds> {
-    let boundary = cuttable.faces.boundary();
-    let tiles = boundary.chunks(TILE).map(|triangles| {
-        let faces = triangles.iter().map(|(face, _)| *face);
-        let corners = faces.flat_map(|face| face.particles(&cuttable.mesh));
-        Bounds::around(corners.flat_map(|p| [before[p.index()], now[p.index()]]))
-    });
-    tiles.collect()
 }
 
 /// A flood over the near tets of one segment.
@@ -251,7 +244,7 @@ struct Flood<'a, O> {
 
 impl<O: Fn(ParticleId) -> u8> Flood<'_, O> {
     /// Looks at the tets behind those of the triangles that are near.
-    fn enter(&mut self, triangles: &[(Face, FaceTag)]) {
+    fn enter<'b>(&mut self, triangles: impl Iterator<Item = &'b (Face, FaceTag)>) {
         for (face, _) in triangles {
             let particles = face.particles(&self.cuttable.mesh);
             let bits = particles.map(|p| self.marks.bits(p, &self.outside));

@@ -181,15 +181,19 @@ impl Sweep {
         let result = self
             .stroke
             .cut(cuttable, &mut motion, near, &blade_between, memory);
-        let (before, room) = match result {
-            Ok(_) => (motion.now, motion.before),
-            Err(_) => (motion.before, motion.now),
-        };
-        (self.before, self.room) = (before, room);
-        let delta = result?;
-        self.blade.copy_from_slice(blade);
-        self.search.keep(&delta);
-        Ok(delta)
+        match result {
+            Ok(delta) => {
+                (self.before, self.room) = (motion.now, motion.before);
+                self.blade.copy_from_slice(blade);
+                self.search.keep(&delta);
+                Ok(delta)
+            }
+            Err(error) => {
+                (self.before, self.room) = (motion.before, motion.now);
+                self.search.forget();
+                Err(error)
+            }
+        }
     }
 
     #[cfg(test)]
