@@ -30,39 +30,42 @@ use crate::tiles::Tiles;
 use crate::tree::Bounds;
 use crate::{CutDelta, CuttableMesh};
 
-/// The box around the region a segment sweeps.
-struct SweptBox {
+/// A box along axes of its own.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Slabs {
     axes: [DVec3; 3],
     low: [f64; 3],
     high: [f64; 3],
 }
 
-impl SweptBox {
-    fn new(blade: &MovingSegment) -> Self {
+impl Slabs {
+    /// The smallest box around points, with a margin.
+    pub(crate) fn around(axes: [DVec3; 3], points: &[DVec3], margin: f64) -> Self {
+        let along = |axis: DVec3| points.iter().map(move |x| axis.dot(*x));
+        Self {
+            axes,
+            low: axes.map(|axis| along(axis).fold(f64::INFINITY, f64::min) - margin),
+            high: axes.map(|axis| along(axis).fold(f64::NEG_INFINITY, f64::max) + margin),
+        }
+    }
+
+    /// The box around the region a segment sweeps.
+    fn swept(blade: &MovingSegment) -> Self {
         let ends = [blade.before[0], blade.before[1], blade.now[0], blade.now[1]];
         let along = (ends[1] - ends[0]).normalize_or(DVec3::X);
         let motion = ends[2] + ends[3] - ends[0] - ends[1];
         let sideways =
             (motion - along * motion.dot(along)).normalize_or(along.any_orthonormal_vector());
-        let axes = [along, sideways, along.cross(sideways)];
-        let extent = |axis: DVec3, pick: fn(f64, f64) -> f64| {
-            ends.map(|x| axis.dot(x)).into_iter().reduce(pick)
-        };
         // Rounding and the slack of the exact test.
         let size = ends
             .iter()
             .map(|x| (*x - ends[0]).length() + x.length())
             .fold(0.0, f64::max);
-        let margin = 1e-8 * size;
-        Self {
-            axes,
-            low: axes.map(|axis| extent(axis, f64::min).unwrap_or(0.0) - margin),
-            high: axes.map(|axis| extent(axis, f64::max).unwrap_or(0.0) + margin),
-        }
+        Self::around([along, sideways, along.cross(sideways)], &ends, 1e-8 * size)
     }
 
     /// One bit per face that the point lies outside of.
-    fn outside(&self, x: DVec3) -> u8 {
+    pub(crate) fn outside(&self, x: DVec3) -> u8 {
         let mut bits = 0;
         for i in 0..3 {
             let along = self.axes[i].dot(x);
@@ -85,12 +88,34 @@ impl SweptBox {
     }
 }
 
+/// A blade segment with the region it sweeps in a frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SweptSegment {
+    pub(crate) segment: MovingSegment,
+    swept: Slabs,
+}
+
+impl SweptSegment {
+    pub(crate) fn new(segment: MovingSegment) -> Self {
+        let swept = Slabs::swept(&segment);
+        Self { segment, swept }
+    }
+
+    /// The faces of the region's box that a particle lies outside of.
+    fn outside(&self, before: DVec3, now: DVec3) -> u8 {
+        self.swept.outside(before) & self.swept.outside(now)
+    }
+
+    /// Whether the segment cannot have met an edge.
+    pub(crate) fn misses(&self, edge: &MovingSegment) -> bool {
+        let bits = self.outside(edge.before[0], edge.now[0]);
+        bits != 0 && bits & self.outside(edge.before[1], edge.now[1]) != 0
+    }
+}
+
 /// The tets that a segment can have met while the particles moved from `before` to `now`, ascending: by a look at all.
-fn scan(mesh: &TetMesh, before: &[DVec3], now: &[DVec3], segment: &MovingSegment) -> Vec<TetId> {
-    let swept = SweptBox::new(segment);
-    let outside = parallel::map_numbers(now.len(), |p| {
-        swept.outside(before[p]) & swept.outside(now[p])
-    });
+fn scan(mesh: &TetMesh, before: &[DVec3], now: &[DVec3], segment: &SweptSegment) -> Vec<TetId> {
+    let outside = parallel::map_numbers(now.len(), |p| segment.outside(before[p], now[p]));
     parallel::filter_map_numbers(mesh.tets.len(), |t| {
         let bits = mesh.tets[t].map(|p| outside[p.index()]);
         let near = bits[0] & bits[1] & bits[2] & bits[3] == 0;
@@ -137,7 +162,7 @@ pub(crate) struct Search {
 
 impl Search {
     /// Looks for a blade in its first pose. O(n), in parallel.
-    pub(crate) fn new(mesh: &TetMesh, positions: &[DVec3], blade: &[MovingSegment]) -> Self {
+    pub(crate) fn new(mesh: &TetMesh, positions: &[DVec3], blade: &[SweptSegment]) -> Self {
         let mut known = Lists::default();
         for segment in blade {
             let near = scan(mesh, positions, positions, segment);
@@ -165,26 +190,23 @@ impl Search {
         cuttable: &CuttableMesh,
         before: &[DVec3],
         now: &[DVec3],
-        blade: &[MovingSegment],
+        blade: &[SweptSegment],
     ) -> Vec<TetId> {
         let mut near: Vec<TetId> = Vec::new();
         self.found.clear();
         self.tiles.begin(&cuttable.faces, before, now);
         for (i, segment) in blade.iter().enumerate() {
-            let swept = SweptBox::new(segment);
             self.marks.begin(now.len());
             let mut flood = Flood {
                 cuttable,
                 marks: &mut self.marks,
-                outside: |p: ParticleId| {
-                    swept.outside(before[p.index()]) & swept.outside(now[p.index()])
-                },
+                outside: |p: ParticleId| segment.outside(before[p.index()], now[p.index()]),
                 corners: &mut self.found.particles,
                 near: &mut near,
             };
             let mut next = flood.corners.len();
             let boundary = cuttable.faces.boundary();
-            let missed = |bounds: &Bounds| swept.misses(bounds);
+            let missed = |bounds: &Bounds| segment.swept.misses(bounds);
             self.tiles.reached(cuttable, now, missed, |tile| {
                 flood.enter(boundary.iter().skip(tile * TILE).take(TILE));
             });

@@ -164,9 +164,8 @@ impl Stroke {
         let along = tets_around(operation.cuttable, &seeds);
         let mesh = &operation.cuttable.mesh;
         let sides = Sides::new(mesh, &self.surface, &mut self.given, &along);
-        operation.separate(&seeds, |face| {
-            face.particles.iter().all(|&p| self.surface.contains(p)) && sides.differ(face.tets)
-        });
+        let on = |p| self.surface.contains(p);
+        operation.separate(&seeds, on, |face| sides.differ(face.tets));
         let delta = operation.finish(|rest, c| self.surface.side(rest, c));
         for source in &delta.copies {
             motion.now.push(motion.now[source.index()]);
