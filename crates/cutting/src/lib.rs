@@ -52,6 +52,7 @@ mod stars;
 mod stroke;
 mod surface;
 mod sweep;
+mod tiles;
 mod tree;
 mod triangles;
 mod undo;

@@ -15,56 +15,57 @@
 //! as in inverted ones, that is in none, as long as none is inverted. Where tets are inverted, those found hang
 //! together with tets the blade came from.
 //!
-//! Cost of a frame: the boxes of the boundary triangles, then what is near. A scan of all particles and tets happens
-//! once, at the first pose, which may lie anywhere in the body.
+//! Cost of a frame: how far the particles moved and a test for each box of boundary triangles (see the module `tiles`),
+//! then what is near. A scan of all particles and tets happens once, at the first pose, which may lie anywhere in the
+//! body.
 
 use glam::DVec3;
 use incise_mesh::{ParticleId, TetId, TetMesh};
 
 use crate::delta::FaceTag;
-use crate::faces::Face;
+use crate::faces::{Face, TILE};
 use crate::meet::MovingSegment;
 use crate::parallel;
+use crate::tiles::Tiles;
 use crate::tree::Bounds;
 use crate::{CutDelta, CuttableMesh};
 
-/// Boundary triangles that share a box. They come in the order of the tets they belong to, which is one in space too
-/// for most meshes.
-const TILE: usize = 64;
-
-/// The box around the region a segment sweeps.
-struct SweptBox {
+/// A box along axes of its own.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Slabs {
     axes: [DVec3; 3],
     low: [f64; 3],
     high: [f64; 3],
 }
 
-impl SweptBox {
-    fn new(blade: &MovingSegment) -> Self {
+impl Slabs {
+    /// The smallest box around points, with a margin.
+    pub(crate) fn around(axes: [DVec3; 3], points: &[DVec3], margin: f64) -> Self {
+        let along = |axis: DVec3| points.iter().map(move |x| axis.dot(*x));
+        Self {
+            axes,
+            low: axes.map(|axis| along(axis).fold(f64::INFINITY, f64::min) - margin),
+            high: axes.map(|axis| along(axis).fold(f64::NEG_INFINITY, f64::max) + margin),
+        }
+    }
+
+    /// The box around the region a segment sweeps.
+    fn swept(blade: &MovingSegment) -> Self {
         let ends = [blade.before[0], blade.before[1], blade.now[0], blade.now[1]];
         let along = (ends[1] - ends[0]).normalize_or(DVec3::X);
         let motion = ends[2] + ends[3] - ends[0] - ends[1];
         let sideways =
             (motion - along * motion.dot(along)).normalize_or(along.any_orthonormal_vector());
-        let axes = [along, sideways, along.cross(sideways)];
-        let extent = |axis: DVec3, pick: fn(f64, f64) -> f64| {
-            ends.map(|x| axis.dot(x)).into_iter().reduce(pick)
-        };
         // Rounding and the slack of the exact test.
         let size = ends
             .iter()
             .map(|x| (*x - ends[0]).length() + x.length())
             .fold(0.0, f64::max);
-        let margin = 1e-8 * size;
-        Self {
-            axes,
-            low: axes.map(|axis| extent(axis, f64::min).unwrap_or(0.0) - margin),
-            high: axes.map(|axis| extent(axis, f64::max).unwrap_or(0.0) + margin),
-        }
+        Self::around([along, sideways, along.cross(sideways)], &ends, 1e-8 * size)
     }
 
     /// One bit per face that the point lies outside of.
-    fn outside(&self, x: DVec3) -> u8 {
+    pub(crate) fn outside(&self, x: DVec3) -> u8 {
         let mut bits = 0;
         for i in 0..3 {
             let along = self.axes[i].dot(x);
@@ -87,12 +88,34 @@ impl SweptBox {
     }
 }
 
+/// A blade segment with the region it sweeps in a frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SweptSegment {
+    pub(crate) segment: MovingSegment,
+    swept: Slabs,
+}
+
+impl SweptSegment {
+    pub(crate) fn new(segment: MovingSegment) -> Self {
+        let swept = Slabs::swept(&segment);
+        Self { segment, swept }
+    }
+
+    /// The faces of the region's box that a particle lies outside of.
+    fn outside(&self, before: DVec3, now: DVec3) -> u8 {
+        self.swept.outside(before) & self.swept.outside(now)
+    }
+
+    /// Whether the segment cannot have met an edge.
+    pub(crate) fn misses(&self, edge: &MovingSegment) -> bool {
+        let bits = self.outside(edge.before[0], edge.now[0]);
+        bits != 0 && bits & self.outside(edge.before[1], edge.now[1]) != 0
+    }
+}
+
 /// The tets that a segment can have met while the particles moved from `before` to `now`, ascending: by a look at all.
-fn scan(mesh: &TetMesh, before: &[DVec3], now: &[DVec3], segment: &MovingSegment) -> Vec<TetId> {
-    let swept = SweptBox::new(segment);
-    let outside = parallel::map_numbers(now.len(), |p| {
-        swept.outside(before[p]) & swept.outside(now[p])
-    });
+fn scan(mesh: &TetMesh, before: &[DVec3], now: &[DVec3], segment: &SweptSegment) -> Vec<TetId> {
+    let outside = parallel::map_numbers(now.len(), |p| segment.outside(before[p], now[p]));
     parallel::filter_map_numbers(mesh.tets.len(), |t| {
         let bits = mesh.tets[t].map(|p| outside[p.index()]);
         let near = bits[0] & bits[1] & bits[2] & bits[3] == 0;
@@ -130,6 +153,7 @@ pub(crate) struct Search {
     found: Lists,
     /// Particles that came since the last frame, by whatever cut.
     fresh: Vec<ParticleId>,
+    tiles: Tiles,
     marks: Marks,
     /// Whether to look at all tets in every frame.
     #[cfg(test)]
@@ -138,7 +162,7 @@ pub(crate) struct Search {
 
 impl Search {
     /// Looks for a blade in its first pose. O(n), in parallel.
-    pub(crate) fn new(mesh: &TetMesh, positions: &[DVec3], blade: &[MovingSegment]) -> Self {
+    pub(crate) fn new(mesh: &TetMesh, positions: &[DVec3], blade: &[SweptSegment]) -> Self {
         let mut known = Lists::default();
         for segment in blade {
             let near = scan(mesh, positions, positions, segment);
@@ -153,6 +177,7 @@ impl Search {
             known,
             found: Lists::default(),
             fresh: Vec::new(),
+            tiles: Tiles::default(),
             marks: Marks::default(),
             #[cfg(test)]
             everywhere: false,
@@ -165,30 +190,26 @@ impl Search {
         cuttable: &CuttableMesh,
         before: &[DVec3],
         now: &[DVec3],
-        blade: &[MovingSegment],
+        blade: &[SweptSegment],
     ) -> Vec<TetId> {
         let mut near: Vec<TetId> = Vec::new();
         self.found.clear();
-        let tiles = tiles(cuttable, before, now);
+        self.tiles.begin(&cuttable.faces, before, now);
         for (i, segment) in blade.iter().enumerate() {
-            let swept = SweptBox::new(segment);
             self.marks.begin(now.len());
             let mut flood = Flood {
                 cuttable,
                 marks: &mut self.marks,
-                outside: |p: ParticleId| {
-                    swept.outside(before[p.index()]) & swept.outside(now[p.index()])
-                },
+                outside: |p: ParticleId| segment.outside(before[p.index()], now[p.index()]),
                 corners: &mut self.found.particles,
                 near: &mut near,
             };
             let mut next = flood.corners.len();
             let boundary = cuttable.faces.boundary();
-            for (tile, triangles) in tiles.iter().zip(boundary.chunks(TILE)) {
-                if !swept.misses(tile) {
-                    flood.enter(triangles);
-                }
-            }
+            let missed = |bounds: &Bounds| segment.swept.misses(bounds);
+            self.tiles.reached(cuttable, now, missed, |tile| {
+                flood.enter(boundary.iter().skip(tile * TILE).take(TILE));
+            });
             for &seed in self.known.of(i).iter().chain(&self.fresh) {
                 // A cut taken back takes its particles along.
                 if seed.index() < now.len() {
@@ -220,22 +241,16 @@ impl Search {
         self.follow(delta);
     }
 
+    /// Forgets a frame that did not come to be.
+    pub(crate) fn forget(&mut self) {
+        self.tiles.clear();
+    }
+
     /// Follows a cut made by whomever.
     pub(crate) fn follow(&mut self, delta: &CutDelta) {
         let new = delta.particles_before..delta.particles_after();
         self.fresh.extend(new.map(ParticleId::new));
     }
-}
-
-/// The boxes around the boundary triangles' paths.
-fn tiles(cuttable: &CuttableMesh, before: &[DVec3], now: &[DVec3]) -> Vec<Bounds> {
-    let boundary = cuttable.faces.boundary();
-    let tiles = boundary.chunks(TILE).map(|triangles| {
-        let faces = triangles.iter().map(|(face, _)| *face);
-        let corners = faces.flat_map(|face| face.particles(&cuttable.mesh));
-        Bounds::around(corners.flat_map(|p| [before[p.index()], now[p.index()]]))
-    });
-    tiles.collect()
 }
 
 /// A flood over the near tets of one segment.
@@ -251,7 +266,7 @@ struct Flood<'a, O> {
 
 impl<O: Fn(ParticleId) -> u8> Flood<'_, O> {
     /// Looks at the tets behind those of the triangles that are near.
-    fn enter(&mut self, triangles: &[(Face, FaceTag)]) {
+    fn enter<'b>(&mut self, triangles: impl Iterator<Item = &'b (Face, FaceTag)>) {
         for (face, _) in triangles {
             let particles = face.particles(&self.cuttable.mesh);
             let bits = particles.map(|p| self.marks.bits(p, &self.outside));

@@ -70,7 +70,7 @@ pub fn remove_tets(
     }
     seeds.sort_unstable();
     seeds.dedup();
-    operation.separate(&seeds, |_| false);
+    operation.separate(&seeds, |_| false, |_| false);
 
     let (cuttable, mut delta) = operation.write(|_, _| true);
     let corners = |tet: &TetId| cuttable.mesh.tets[tet.index()];

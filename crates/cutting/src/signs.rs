@@ -68,9 +68,9 @@ pub(crate) fn cut_by_signs(
         .collect();
     let on = |p: ParticleId| on_surface[p.index()];
     match options.separation {
-        Separation::CutFaces => operation.separate(&seeds, |face| {
+        Separation::CutFaces => operation.separate(&seeds, on, |face| {
             let [one, other] = face.corners.map(side);
-            one != other && face.particles.into_iter().all(on)
+            one != other
         }),
         Separation::SharedOriginal => {
             operation.separate_by_particles(&seeds, |p| p.index() < particles);
@@ -82,12 +82,15 @@ pub(crate) fn cut_by_signs(
 
 /// The edges whose ends lie on different sides, smaller end first, ascending.
 fn crossed(cuttable: &CuttableMesh, values: &[f64]) -> Vec<[ParticleId; 2]> {
-    let mut ends: Vec<[ParticleId; 2]> = Vec::new();
-    for corners in &cuttable.mesh.tets {
+    let tets = &cuttable.mesh.tets;
+    let cut = parallel::filter_map_numbers(tets.len(), |t| {
+        let d = tets[t].map(|p| values[p.index()]);
+        let one_side = d.iter().all(|&d| d >= 0.0) || d.iter().all(|&d| d <= 0.0);
+        (!one_side).then_some(tets[t])
+    });
+    let mut ends: Vec<[ParticleId; 2]> = Vec::with_capacity(4 * cut.len());
+    for corners in cut {
         let d = corners.map(|p| values[p.index()]);
-        if d.iter().all(|&d| d >= 0.0) || d.iter().all(|&d| d <= 0.0) {
-            continue;
-        }
         for i in 0..4 {
             for j in i + 1..4 {
                 if (d[i] < 0.0 && d[j] > 0.0) || (d[i] > 0.0 && d[j] < 0.0) {

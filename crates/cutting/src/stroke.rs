@@ -181,9 +181,8 @@ impl Stroke {
         let standing =
             |corners: [ParticleId; 4]| standing_side(&self.surface, blade, corners, &motion.now);
         let sides = Sides::new(mesh, &self.surface, &mut self.given, &along, standing);
-        operation.separate(&seeds, |face| {
-            face.particles.iter().all(|&p| self.surface.contains(p)) && sides.differ(face.tets)
-        });
+        let on = |p| self.surface.contains(p);
+        operation.separate(&seeds, on, |face| sides.differ(face.tets));
         let delta = operation.finish(|rest, c| self.surface.side(rest, c));
         for source in &delta.copies {
             motion.now.push(motion.now[source.index()]);

@@ -13,13 +13,13 @@ use incise_mesh::TetMesh;
 
 use crate::meet::{Meeting, MovingSegment, meetings};
 use crate::memory::CutMemory;
-use crate::near::Search;
+use crate::near::{Search, SweptSegment};
 use crate::plane::require_finite;
 use crate::stroke::{Blade, Motion, Stroke};
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
 /// A blade on its way from one pose to the next.
-struct MovingBlade(Vec<MovingSegment>);
+struct MovingBlade(Vec<SweptSegment>);
 
 impl Blade for MovingBlade {
     const COMES_BY: bool = true;
@@ -29,7 +29,8 @@ impl Blade for MovingBlade {
         edge: &MovingSegment,
         keep: impl Fn(&Meeting) -> bool,
     ) -> Option<(Meeting, usize)> {
-        let all = self.0.iter().flat_map(|segment| meetings(edge, segment));
+        let near = self.0.iter().filter(|swept| !swept.misses(edge));
+        let all = near.flat_map(|swept| meetings(edge, &swept.segment));
         let first = all.filter(keep).min_by(|m, n| m.time.total_cmp(&n.time))?;
         Some((first, 1))
     }
@@ -190,15 +191,19 @@ impl Sweep {
         let result = self
             .stroke
             .cut(cuttable, &mut motion, near, &blade_between, memory);
-        let (before, room) = match result {
-            Ok(_) => (motion.now, motion.before),
-            Err(_) => (motion.before, motion.now),
-        };
-        (self.before, self.room) = (before, room);
-        let delta = result?;
-        self.blade.copy_from_slice(blade);
-        self.search.keep(&delta);
-        Ok(delta)
+        match result {
+            Ok(delta) => {
+                (self.before, self.room) = (motion.now, motion.before);
+                self.blade.copy_from_slice(blade);
+                self.search.keep(&delta);
+                Ok(delta)
+            }
+            Err(error) => {
+                (self.before, self.room) = (motion.before, motion.now);
+                self.search.forget();
+                Err(error)
+            }
+        }
     }
 
     #[cfg(test)]
@@ -221,11 +226,13 @@ impl Sweep {
 }
 
 /// The segments of a blade that moves from one pose to another.
-fn between(before: &[DVec3], now: &[DVec3]) -> Vec<MovingSegment> {
+fn between(before: &[DVec3], now: &[DVec3]) -> Vec<SweptSegment> {
     let pairs = before.windows(2).zip(now.windows(2));
-    let segments = pairs.map(|(b, n)| MovingSegment {
-        before: [b[0], b[1]],
-        now: [n[0], n[1]],
+    let segments = pairs.map(|(b, n)| {
+        SweptSegment::new(MovingSegment {
+            before: [b[0], b[1]],
+            now: [n[0], n[1]],
+        })
     });
     segments.collect()
 }

@@ -7,7 +7,8 @@
 //! follows is the same as for a moving blade (see the module `stroke`), in one go.
 //!
 //! Source: orientations by J. R. Shewchuk 1997 (through `incise_mesh::orientation`); the sides of a line by
-//! Segura and Feito 2001. Cost: O(log m) a tet for m triangles to find those near, then the cut.
+//! Segura and Feito 2001. A surface may stand anywhere in the body, so all tets are looked at, in parallel. Cost: a few
+//! bit operations a tet, O(log m) for each in the box around m triangles, then the cut.
 
 use std::cmp::Ordering;
 
@@ -17,6 +18,7 @@ use incise_mesh::{TetId, TetMesh, orientation};
 use crate::closest::Closest;
 use crate::meet::{Meeting, MovingSegment};
 use crate::memory::CutMemory;
+use crate::near::Slabs;
 use crate::parallel;
 use crate::plane::require_finite;
 use crate::stroke::{Blade, Motion, SAME_SHEET, Stroke};
@@ -171,10 +173,30 @@ impl TriangleSurface {
         Closest::new(&self.tree, corners, normal, x, reach)
     }
 
+    /// A box around the body's part that can be met: along the surface's mean normal, since most cuts are nearly plane.
+    fn slabs(&self, positions: &[DVec3], tolerance: f64) -> Slabs {
+        let corners = (0..self.triangles.len()).map(|t| self.corners(t));
+        let normal: DVec3 = corners.map(|[a, b, c]| (b - a).cross(c - a)).sum();
+        let normal = normal.normalize_or(DVec3::Z);
+        let (u, v) = normal.any_orthonormal_pair();
+        let body = Bounds::around(positions.iter().copied());
+        let largest = |x: DVec3| x.abs().max_element();
+        let scale = largest(body.low).max(largest(body.high));
+        // Ends of edges count within the tolerance, as a fraction of the edge.
+        let margin = 4.0 * tolerance * largest(body.high - body.low) + 1e-12 * scale;
+        Slabs::around([normal, u, v], &self.points, margin)
+    }
+
     /// The tets that a triangle comes near, ascending.
     fn near(&self, mesh: &TetMesh, positions: &[DVec3], tolerance: f64) -> Vec<TetId> {
-        let tets: Vec<TetId> = (0..mesh.tets.len()).map(TetId::new).collect();
-        parallel::filter_map(&tets, |&tet| {
+        let slabs = self.slabs(positions, tolerance);
+        let outside = parallel::map(positions, |x| slabs.outside(*x));
+        parallel::filter_map_numbers(mesh.tets.len(), |t| {
+            let bits = mesh.tets[t].map(|p| outside[p.index()]);
+            if bits[0] & bits[1] & bits[2] & bits[3] != 0 {
+                return None;
+            }
+            let tet = TetId::new(t);
             let corners = mesh.tets[tet.index()].map(|p| positions[p.index()]);
             let bounds = with_margin(Bounds::around(corners), tolerance);
             let size = bounds.high - bounds.low;
