@@ -553,13 +553,13 @@ fn closed_surfaces_on_a_lattice() {
 /// Twenty triangles with sharp folds. What pokes through a tet's face at a corner of them may fall off as a crumb.
 #[test]
 fn coarse_balls() {
-    for (n, seed, snap, radius) in (0..40).flat_map(|seed| {
-        let radius = [0.35, 0.38, 0.42][seed as usize % 3];
-        [
-            (5, seed, 0.0, radius),
-            (6, seed, [0.05, 0.1, 0.2][seed as usize / 3 % 3], radius),
-        ]
-    }) {
+    let cases = (0..40_u8).flat_map(|i| {
+        let radius = [0.35, 0.38, 0.42][usize::from(i % 3)];
+        let snap = [0.05, 0.1, 0.2][usize::from(i / 3 % 3)];
+        [(5, i, 0.0, radius), (6, i, snap, radius)]
+    });
+    for (n, i, snap, radius) in cases {
+        let seed = u64::from(i);
         let mesh = if seed == 0 {
             kuhn_box([n; 3], DVec3::ONE)
         } else {
