@@ -2,11 +2,11 @@
 
 use glam::DVec3;
 use incise_cutting::{
-    CutDelta, CutError, CutMemory, CutOptions, CuttableMesh, Plane, Sweep, TriangleSurface, carve,
-    cut_level_set, cut_plane, cut_surface,
+    CutDelta, CutError, CutMemory, CutOptions, CuttableMesh, FaceTag, Plane, Sweep,
+    TriangleSurface, carve, cut_level_set, cut_plane, cut_surface,
 };
-use incise_mesh::TetMesh;
 use incise_mesh::generate::{Shape, generate, kuhn_box};
+use incise_mesh::{TetId, TetMesh};
 use proptest::prelude::*;
 
 use crate::bodies::{body, check_cut, jittered_box, noise, pieces_by_sign};
@@ -61,6 +61,18 @@ fn whole_plane(center: DVec3, along: DVec3, normal: DVec3) -> ([DVec3; 2], DVec3
     )
 }
 
+/// The volume of the tets that have all four particles on cut faces.
+fn wholly_on_the_cut(body: &CuttableMesh) -> f64 {
+    let mut on = vec![false; body.mesh().positions.len()];
+    for triangle in body.boundary().filter(|t| t.tag != FaceTag::Outer) {
+        triangle.particles.iter().for_each(|p| on[p.index()] = true);
+    }
+    let tets = body.mesh().tets.iter().enumerate();
+    tets.filter(|(_, corners)| corners.iter().all(|p| on[p.index()]))
+        .map(|(t, _)| body.mesh().volume(TetId::new(t)))
+        .sum()
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(80))]
 
@@ -89,8 +101,11 @@ proptest! {
             volumes.sort_by(f64::total_cmp);
             volumes
         };
+        // A tet with all four particles on the surface may go with either side: the plane weighs its particles, the
+        // sweep, which does not know them all at once, joins it to a neighbor.
+        let between = wholly_on_the_cut(&at_once);
         for (a, b) in volumes(&swept).into_iter().zip(volumes(&at_once)) {
-            prop_assert!((a - b).abs() < 1e-9, "{} against {}", a, b);
+            prop_assert!((a - b).abs() < 1e-9 + between, "{} against {}, {} between", a, b, between);
         }
     }
 
