@@ -12,6 +12,7 @@ use foldhash::fast::FixedState;
 use glam::DVec3;
 use incise_mesh::{ParticleId, TetId, TetMesh};
 
+use crate::CutDelta;
 use crate::stroke::Blade;
 use crate::surface::CutSurface;
 
@@ -20,12 +21,28 @@ use crate::surface::CutSurface;
 pub(crate) struct GivenSides(HashMap<TetId, bool, FixedState>);
 
 impl GivenSides {
-    /// Forgets tets that were split.
-    pub(crate) fn forget(&mut self, split: impl IntoIterator<Item = TetId>) {
-        if !self.0.is_empty() {
-            split.into_iter().for_each(|tet| {
-                self.0.remove(&tet);
-            });
+    /// Forgets a tet that was split.
+    pub(crate) fn forget(&mut self, split: TetId) -> Option<bool> {
+        self.0.remove(&split)
+    }
+
+    /// Gives a tet its side back.
+    pub(crate) fn restore(&mut self, tet: TetId, side: bool) {
+        self.0.insert(tet, side);
+    }
+
+    /// Follows a cut or a removal of somebody else.
+    pub(crate) fn follow(&mut self, delta: &CutDelta) {
+        if self.0.is_empty() {
+            return;
+        }
+        for gone in delta.removed.iter().chain(&delta.deleted) {
+            self.0.remove(&gone.tet);
+        }
+        for moved in &delta.moved {
+            if let Some(side) = self.0.remove(&moved.from) {
+                self.0.insert(moved.to, side);
+            }
         }
     }
 }

@@ -89,6 +89,8 @@ pub(crate) struct Stroke {
     options: CutOptions,
     surface: CutSurface,
     given: GivenSides,
+    /// Sides of tets split in this call.
+    forgotten: Vec<(TetId, bool)>,
     /// The number that the memory knows it by.
     number: Option<u32>,
 }
@@ -109,6 +111,7 @@ impl Stroke {
             options,
             surface: CutSurface::default(),
             given: GivenSides::default(),
+            forgotten: Vec::new(),
             number: None,
         }
     }
@@ -125,6 +128,8 @@ impl Stroke {
     ) -> Result<CutDelta, CutError> {
         let particles = motion.now.len();
         let mut fresh: Vec<ParticleId> = Vec::new();
+        self.surface.begin();
+        self.forgotten.clear();
         let mut operation = Operation::begin(cuttable, &self.options);
         // A round a meeting of an edge: then nothing is left, but what would be cut off by more is smaller than a tet. Near
         // the tip of a surface there may be no end to it: every new edge crosses it again, nearer to the tip.
@@ -195,7 +200,7 @@ impl Stroke {
         Ok(delta)
     }
 
-    /// Takes the cut back, and what the stroke knows of the particles that are gone by it.
+    /// Takes the cut back, and what the stroke learned from it.
     fn give_up(
         &mut self,
         operation: Operation<'_>,
@@ -206,7 +211,10 @@ impl Stroke {
         operation.roll_back();
         motion.before.truncate(particles);
         motion.now.truncate(particles);
-        self.surface.truncate(particles);
+        self.surface.roll_back();
+        for (tet, side) in self.forgotten.drain(..) {
+            self.given.restore(tet, side);
+        }
         error
     }
 
@@ -229,7 +237,9 @@ impl Stroke {
             hit.crossing.parameter = hit.crossing.parameter.clamp(reach, 1.0 - reach);
         }
         let near = operation.split(&hits.iter().map(|hit| hit.crossing).collect::<Vec<_>>())?;
-        self.given.forget(near.iter().copied());
+        let given = &mut self.given;
+        let forgotten = near.iter().filter_map(|&t| Some((t, given.forget(t)?)));
+        self.forgotten.extend(forgotten);
         fresh.extend(snapped);
         for hit in hits {
             let point = ParticleId::new(motion.now.len());
@@ -289,7 +299,7 @@ impl Stroke {
 
     /// Follows a cut that another stroke made.
     pub(crate) fn follow(&mut self, cuttable: &CuttableMesh, delta: &CutDelta) {
-        self.given.forget(delta.removed.iter().map(|tet| tet.tet));
+        self.given.follow(delta);
         self.surface
             .follow(delta, &cuttable.mesh.positions, self.options.reach());
     }

@@ -81,6 +81,8 @@ pub struct Sweep {
     /// Room for those at the next one.
     room: Vec<DVec3>,
     search: Search,
+    /// Number of tets of the mesh, to notice changes that the stroke did not follow.
+    tets: usize,
     stroke: Stroke,
 }
 
@@ -88,7 +90,7 @@ impl Sweep {
     /// Starts a stroke with the blade (a polyline of at least two points) in its first pose, which does not cut yet.
     ///
     /// # Errors
-    /// If the blade or the options are not valid or `positions` has another length than the mesh.
+    /// If the blade or the options are not valid or `positions` has another length than the mesh or is not finite.
     pub fn new(
         cuttable: &CuttableMesh,
         positions: &[DVec3],
@@ -106,12 +108,13 @@ impl Sweep {
                 length,
             });
         }
-        require_count(cuttable.mesh(), positions)?;
+        require_positions(cuttable.mesh(), positions)?;
         Ok(Self {
             blade: blade.to_vec(),
             before: positions.to_vec(),
             room: Vec::new(),
             search: Search::new(cuttable.mesh(), positions, &between(blade, blade)),
+            tets: cuttable.mesh.tets.len(),
             stroke: Stroke::new(options),
         })
     }
@@ -126,9 +129,9 @@ impl Sweep {
     /// What changed; nothing if the blade met no edge.
     ///
     /// # Errors
-    /// If the blade is not finite or has another number of points, `positions` has another length than the mesh, or the
-    /// mesh would grow beyond the options' limit; the mesh is not changed then. After the last of these the stroke may
-    /// have noted particles that it did not cut: start a new one.
+    /// If the blade or `positions` are not finite or have another number of points than before and than the mesh, if the
+    /// mesh was changed without [`Sweep::follow`], or if it would grow beyond the options' limit. Mesh and stroke are not
+    /// changed then.
     ///
     /// # Determinism
     /// The same history gives the same bits on every machine.
@@ -175,7 +178,14 @@ impl Sweep {
                 now: blade.len(),
             });
         }
-        require_count(cuttable.mesh(), positions)?;
+        let mesh = cuttable.mesh();
+        if (self.before.len(), self.tets) != (mesh.positions.len(), mesh.tets.len()) {
+            return Err(CutError::NotFollowed {
+                particles: self.before.len(),
+                tets: self.tets,
+            });
+        }
+        require_positions(mesh, positions)?;
 
         let segments = between(&self.blade, blade);
         let near = self
@@ -194,6 +204,7 @@ impl Sweep {
         match result {
             Ok(delta) => {
                 (self.before, self.room) = (motion.now, motion.before);
+                self.tets = cuttable.mesh.tets.len();
                 self.blade.copy_from_slice(blade);
                 self.search.keep(&delta);
                 Ok(delta)
@@ -211,7 +222,10 @@ impl Sweep {
         &mut self.search
     }
 
-    /// Follows a cut that another stroke made since the last call of [`Sweep::advance`].
+    /// Follows a cut or a removal that somebody else made since the last call of [`Sweep::advance`].
+    ///
+    /// There is no way to follow an undo: what a stroke took back saw of the body is not seen again. Go on with a clone
+    /// of the stroke from before the cut that was undone.
     ///
     /// Two strokes at the same time must keep their fronts more than a tet apart where they cross: an edge that one
     /// makes just behind the other's front is not met again, and the body may hang together there.
@@ -221,6 +235,7 @@ impl Sweep {
     pub fn follow(&mut self, cuttable: &CuttableMesh, delta: &CutDelta) {
         delta.extend_particles(&mut self.before);
         self.search.follow(delta);
+        self.tets = delta.tets_after();
         self.stroke.follow(cuttable, delta);
     }
 }
@@ -237,13 +252,12 @@ fn between(before: &[DVec3], now: &[DVec3]) -> Vec<SweptSegment> {
     segments.collect()
 }
 
-pub(crate) fn require_count(mesh: &TetMesh, positions: &[DVec3]) -> Result<(), CutError> {
-    let expected = mesh.positions.len();
-    if positions.len() == expected {
-        return Ok(());
+/// Refuses positions that are not finite or not one a particle.
+pub(crate) fn require_positions(mesh: &TetMesh, positions: &[DVec3]) -> Result<(), CutError> {
+    let (expected, given) = (mesh.positions.len(), positions.len());
+    if expected != given {
+        return Err(CutError::PositionCount { expected, given });
     }
-    Err(CutError::PositionCount {
-        expected,
-        given: positions.len(),
-    })
+    let mut positions = positions.iter();
+    positions.try_for_each(|&x| require_finite("the position of a particle", x))
 }

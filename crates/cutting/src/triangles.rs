@@ -22,7 +22,7 @@ use crate::near::Slabs;
 use crate::parallel;
 use crate::plane::require_finite;
 use crate::stroke::{Blade, Motion, SAME_SHEET, Stroke};
-use crate::sweep::require_count;
+use crate::sweep::require_positions;
 use crate::tree::{Bounds, BoxTree};
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
@@ -333,7 +333,8 @@ fn without_returns(meetings: &mut Vec<Meeting>, [a, b]: [DVec3; 2], tolerance: f
 /// smaller than a tet and meets no edge cuts nothing.
 ///
 /// # Errors
-/// If the options are not valid or `positions` has another length than the mesh; nothing is changed then.
+/// If the options are not valid or `positions` has another length than the mesh or is not finite; nothing is changed
+/// then.
 ///
 /// # Determinism
 /// The same input gives the same bits for any number of threads.
@@ -387,7 +388,7 @@ fn cut(
 ) -> Result<CutDelta, CutError> {
     let _span = tracing::debug_span!("cutting::surface").entered();
     options.check()?;
-    require_count(cuttable.mesh(), positions)?;
+    require_positions(cuttable.mesh(), positions)?;
     let tolerance = options.tolerance;
     let near = surface.near(cuttable.mesh(), positions, tolerance);
     let mut motion = Motion {

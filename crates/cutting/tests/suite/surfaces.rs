@@ -11,7 +11,9 @@ use incise_mesh::TetMesh;
 use incise_mesh::generate::kuhn_box;
 use proptest::prelude::*;
 
-use crate::bodies::{bend, body, check_cut, jittered_box, noise, options, relabelled, volumes};
+use crate::bodies::{
+    bend, body, check_cut, cuboid, icosphere, jittered_box, noise, options, relabelled, volumes,
+};
 
 /// Cuts the body at rest and checks everything.
 fn cut(body: &mut CuttableMesh, surface: &TriangleSurface, snap: f64) -> CutDelta {
@@ -25,57 +27,6 @@ fn cut_mesh(mesh: &TetMesh, surface: &TriangleSurface, snap: f64) -> CuttableMes
     let mut body = CuttableMesh::new(mesh.clone()).unwrap();
     cut(&mut body, surface, snap);
     body
-}
-
-/// An icosahedron whose triangles were quartered `times` times, on a sphere.
-fn icosphere(center: DVec3, radius: f64, times: usize) -> (Vec<DVec3>, Vec<[u32; 3]>) {
-    let golden = 0.5 * (1.0 + 5.0_f64.sqrt());
-    let mut points: Vec<DVec3> = Vec::new();
-    for (a, b) in [
-        (1.0, golden),
-        (1.0, -golden),
-        (-1.0, golden),
-        (-1.0, -golden),
-    ] {
-        points.extend([
-            DVec3::new(0.0, a, b),
-            DVec3::new(a, b, 0.0),
-            DVec3::new(b, 0.0, a),
-        ]);
-    }
-    let mut triangles = Vec::new();
-    let beside = |a: usize, b: usize| (points[a].distance(points[b]) - 2.0).abs() < 1e-9;
-    for a in 0..12 {
-        for b in a + 1..12 {
-            for c in b + 1..12 {
-                if beside(a, b) && beside(b, c) && beside(c, a) {
-                    triangles.push([a, b, c].map(|i| u32::try_from(i).unwrap()));
-                }
-            }
-        }
-    }
-    for _ in 0..times {
-        let mut finer = Vec::new();
-        for [a, b, c] in triangles {
-            let mut middle = |i: u32, j: u32| {
-                let at = points[i as usize] + points[j as usize];
-                let known = points.iter().position(|x| x.distance(at) < 1e-9);
-                u32::try_from(known.unwrap_or_else(|| {
-                    points.push(at);
-                    points.len() - 1
-                }))
-                .unwrap()
-            };
-            let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
-            finer.extend([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]);
-        }
-        triangles = finer;
-        points.iter_mut().for_each(|x| *x *= 0.5);
-    }
-    points
-        .iter_mut()
-        .for_each(|x| *x = center + x.normalize() * radius);
-    (points, triangles)
 }
 
 fn close(one: &CuttableMesh, other: &CuttableMesh, slack: f64) -> bool {
@@ -413,32 +364,6 @@ fn any_number_of_threads_gives_the_same_bits() {
     assert!(results[0].iter().all(|delta| !delta.is_empty()));
 }
 
-/// The eight corners of a cube and two triangles for each face.
-fn cube(low: DVec3, high: DVec3) -> (Vec<DVec3>, Vec<[u32; 3]>) {
-    let corner = |i: u32| {
-        let pick = |axis: usize| {
-            if i >> axis & 1 == 0 {
-                low[axis]
-            } else {
-                high[axis]
-            }
-        };
-        DVec3::new(pick(0), pick(1), pick(2))
-    };
-    let quads = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
-    let triangles = quads
-        .into_iter()
-        .flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
-    ((0..8).map(corner).collect(), triangles.collect())
-}
-
 /// An octahedron.
 fn octahedron(center: DVec3, radius: f64) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let axes = [
@@ -476,21 +401,21 @@ fn closed_surfaces_on_a_lattice() {
     let solids = [
         (
             "a cube along faces",
-            cube(half - quarter, half + quarter),
+            cuboid(half - quarter, half + quarter),
             4,
             0.125,
             true,
         ),
         (
             "a cube half a cell off",
-            cube(half - 0.125, half + 0.375),
+            cuboid(half - 0.125, half + 0.375),
             4,
             0.125,
             false,
         ),
         (
             "a cube half a cell off along an axis",
-            cube(
+            cuboid(
                 half - DVec3::new(0.25, 0.25, 0.125),
                 half + DVec3::new(0.25, 0.25, 0.375),
             ),
@@ -553,13 +478,13 @@ fn closed_surfaces_on_a_lattice() {
 /// Twenty triangles with sharp folds. What pokes through a tet's face at a corner of them may fall off as a crumb.
 #[test]
 fn coarse_balls() {
-    for (n, seed, snap, radius) in (0..40).flat_map(|seed| {
-        let radius = [0.35, 0.38, 0.42][seed as usize % 3];
-        [
-            (5, seed, 0.0, radius),
-            (6, seed, [0.05, 0.1, 0.2][seed as usize / 3 % 3], radius),
-        ]
-    }) {
+    let cases = (0..40_u8).flat_map(|i| {
+        let radius = [0.35, 0.38, 0.42][usize::from(i % 3)];
+        let snap = [0.05, 0.1, 0.2][usize::from(i / 3 % 3)];
+        [(5, i, 0.0, radius), (6, i, snap, radius)]
+    });
+    for (n, i, snap, radius) in cases {
+        let seed = u64::from(i);
         let mesh = if seed == 0 {
             kuhn_box([n; 3], DVec3::ONE)
         } else {
