@@ -217,7 +217,7 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
     /// tet stretched a hundred times it is 10⁸ times what kappa says, and such tets throw their corners away, farther
     /// each time. A constraint over a number has the same solutions and pulls the same way, less.
     #[inline(always)]
-    fn volume(&self, f: &Matrix<R::Lanes<S>>) -> (Matrix<R::Lanes<S>>, R::Lanes<S>, R::Lanes<S>) {
+    fn volume(&self, f: &Matrix<R::Lanes<S>>) -> (Matrix<R::Lanes<S>>, [R::Lanes<S>; 2]) {
         let mut cofactor = cofactor::<R, S>(f);
         let [a, b, c] = &cofactor;
         let square = dot::<R, S>(a, a) + dot::<R, S>(b, b) + dot::<R, S>(c, c);
@@ -234,7 +234,7 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
             volume *= scale;
             gamma *= scale;
         }
-        (cofactor, volume, gamma)
+        (cofactor, [volume, gamma])
     }
 
     /// The change of F's corners per weight that satisfies both constraints to first order, and of the multipliers.
@@ -251,7 +251,7 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
     ) -> Matrix<R::Lanes<S>> {
         let (one, zero) = (self.splat(R::ONE), self.splat(R::ZERO));
         let (norm, scale) = self.norm(f);
-        let (cofactor, volume, gamma) = self.volume(f);
+        let (cofactor, [volume, gamma]) = self.volume(f);
         let trace = (self.rest(9) + self.rest(10) + self.rest(11)) * self.time_squared;
         let mut m11 = self.weighted(f) * scale * scale;
         let mut m22 = self.weighted(&cofactor);
@@ -316,7 +316,7 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
         old: &Matrix<R::Lanes<S>>,
         multiplier: &mut R::Lanes<S>,
     ) -> Matrix<R::Lanes<S>> {
-        let (cofactor, volume, gamma) = self.volume(f);
+        let (cofactor, [volume, gamma]) = self.volume(f);
         let mut constraint = volume - gamma;
         let mut m = self.weighted(&cofactor) * self.ratio;
         if K::DAMPED {
