@@ -52,6 +52,15 @@ pub(crate) trait Kind {
 
 type Matrix<V> = [[V; 3]; 3];
 
+/// What the hydrostatic constraint is made of.
+struct Volume<V> {
+    /// The derivative of det F.
+    cofactor: Matrix<V>,
+    /// det F.
+    volume: V,
+    gamma: V,
+}
+
 /// The norm of the derivative of det F, √3 at rest, up to which tets resist a change of volume as their material says:
 /// that of a tet stretched two and a half times along each axis, or fifty times along one while it is thinned
 /// to the same volume. No tissue gets there unbroken.
@@ -217,7 +226,7 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
     /// tet stretched a hundred times it is 10⁸ times what kappa says, and such tets throw their corners away, farther
     /// each time. A constraint over a number has the same solutions and pulls the same way, less.
     #[inline(always)]
-    fn volume(&self, f: &Matrix<R::Lanes<S>>) -> (Matrix<R::Lanes<S>>, [R::Lanes<S>; 2]) {
+    fn volume(&self, f: &Matrix<R::Lanes<S>>) -> Volume<R::Lanes<S>> {
         let mut cofactor = cofactor::<R, S>(f);
         let [a, b, c] = &cofactor;
         let square = dot::<R, S>(a, a) + dot::<R, S>(b, b) + dot::<R, S>(c, c);
@@ -234,7 +243,11 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
             volume *= scale;
             gamma *= scale;
         }
-        (cofactor, [volume, gamma])
+        Volume {
+            cofactor,
+            volume,
+            gamma,
+        }
     }
 
     /// The change of F's corners per weight that satisfies both constraints to first order, and of the multipliers.
@@ -251,7 +264,11 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
     ) -> Matrix<R::Lanes<S>> {
         let (one, zero) = (self.splat(R::ONE), self.splat(R::ZERO));
         let (norm, scale) = self.norm(f);
-        let (cofactor, [volume, gamma]) = self.volume(f);
+        let Volume {
+            cofactor,
+            volume,
+            gamma,
+        } = self.volume(f);
         let trace = (self.rest(9) + self.rest(10) + self.rest(11)) * self.time_squared;
         let mut m11 = self.weighted(f) * scale * scale;
         let mut m22 = self.weighted(&cofactor);
@@ -316,7 +333,11 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
         old: &Matrix<R::Lanes<S>>,
         multiplier: &mut R::Lanes<S>,
     ) -> Matrix<R::Lanes<S>> {
-        let (cofactor, [volume, gamma]) = self.volume(f);
+        let Volume {
+            cofactor,
+            volume,
+            gamma,
+        } = self.volume(f);
         let mut constraint = volume - gamma;
         let mut m = self.weighted(&cofactor) * self.ratio;
         if K::DAMPED {

@@ -323,6 +323,7 @@ fn a_step_out_of_range_is_reported() {
 
 /// A body torn out of all shape, softened so that kappa is at most 1: how much farther than at the start a particle
 /// ever gets from the origin.
+#[expect(clippy::cast_possible_truncation, reason = "from 0 to 4")]
 fn thrown<R: Real>(method: Method, stretch: f64, seed: u64) -> f64 {
     // Layers between a hundred thousandth and the whole of a cell: cuts leave such tets side by side.
     let mut mesh = kuhn_box([4, 4, 4], DVec3::splat(1.0));
