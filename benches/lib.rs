@@ -1,7 +1,8 @@
 //! The cases that all benches share, and the frame around each bench file.
 //!
 //! A bench file is one call of [`run`] with what it measures on one case. Names are `crate/operation/case`, throughput
-//! is always counted in tets of the case's mesh, so that any two lines of the output compare.
+//! is counted in tets of the case's mesh, so that any two lines of the output compare, or where cost follows a cut, in
+//! tets cut.
 
 // A bench that cannot set its case up has nothing to measure; the panic says where.
 #![expect(clippy::unwrap_used, reason = "benches stop at the first surprise")]
@@ -132,7 +133,19 @@ impl Case {
 ///
 /// # Panics
 /// If a mesh cannot be read.
-pub fn run(crate_name: &str, mut bench: impl FnMut(&mut Bench<'_, '_>)) {
+pub fn run(crate_name: &str, bench: impl FnMut(&mut Bench<'_, '_>)) {
+    run_with(crate_name, &[], bench);
+}
+
+/// The same with further cases, by name. They are large: `--test`, which runs everything once, leaves them out.
+///
+/// # Panics
+/// If a mesh cannot be read.
+pub fn run_with(
+    crate_name: &str,
+    large: &[(&str, Source)],
+    mut bench: impl FnMut(&mut Bench<'_, '_>),
+) {
     let mut criterion = Criterion::default()
         .sample_size(10)
         .warm_up_time(Duration::from_millis(200))
@@ -150,6 +163,11 @@ pub fn run(crate_name: &str, mut bench: impl FnMut(&mut Bench<'_, '_>)) {
     measure(Case::new("liver-11k", Source::Liver(11_000)));
     measure(Case::new("liver-50k", Source::Liver(50_000)));
     measure(Case::new("grid-10k", Source::Grid(12)));
+    if !std::env::args().any(|argument| argument == "--test") {
+        for (name, source) in large {
+            measure(Case::new(*name, source.clone()));
+        }
+    }
     for path in models() {
         let name = path.file_stem().unwrap().to_string_lossy().into_owned();
         measure(Case::new(name, Source::File(path)));
@@ -198,5 +216,19 @@ impl Bench<'_, '_> {
     ) {
         let id = BenchmarkId::new(operation, &self.case.name);
         self.group.bench_function(id, &mut iteration);
+    }
+
+    /// Measures an operation whose throughput is counted in `elements` of its own, such as tets cut, not in the tets of
+    /// the mesh.
+    pub fn measure_per(
+        &mut self,
+        operation: &str,
+        elements: usize,
+        iteration: impl FnMut(&mut Bencher<'_, WallTime>),
+    ) {
+        self.group.throughput(Throughput::Elements(elements as u64));
+        self.measure(operation, iteration);
+        let tets = self.case.mesh.tets.len();
+        self.group.throughput(Throughput::Elements(tets as u64));
     }
 }

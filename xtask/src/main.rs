@@ -3,6 +3,7 @@
 //! One module per command; no algorithms of its own, except the slow ones that results are compared with.
 
 mod coloring;
+mod cutting;
 mod models;
 mod soak;
 mod solver;
@@ -25,6 +26,8 @@ struct Arguments {
 enum Command {
     /// Cluster and color meshes in every way there is, and write tables.
     Coloring(coloring::ColoringArguments),
+    /// What a cut costs by stage and size of the mesh, and what snapping trades.
+    Cutting(cutting::CuttingArguments),
     /// Compare the methods of the solver: what they cost and what they are worth.
     Solver(solver::SolverArguments),
     /// Make random strokes by the thousand and check everything after each.
@@ -38,6 +41,7 @@ enum Command {
 fn main() -> anyhow::Result<()> {
     match Arguments::parse().command {
         Command::Coloring(arguments) => coloring::coloring(&arguments),
+        Command::Cutting(arguments) => cutting::cutting(&arguments),
         Command::Solver(arguments) => solver::solver(&arguments),
         Command::SoakCut(arguments) => soak::soak(&arguments),
         Command::Sweep(arguments) => sweep::sweep(&arguments),

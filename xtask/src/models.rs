@@ -22,7 +22,8 @@ enum Source {
 }
 
 impl Model {
-    fn generated(shape: Shape, tets: usize) -> anyhow::Result<Self> {
+    /// A generated shape.
+    pub(crate) fn generated(shape: Shape, tets: usize) -> anyhow::Result<Self> {
         let name = format!("{shape} (generated)");
         Ok(Self {
             name,

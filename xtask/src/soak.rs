@@ -9,9 +9,10 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use anyhow::{Context, ensure};
+use anyhow::{Context, bail, ensure};
 use clap::Args;
 use incise::cutting::Skin;
+use incise::mesh::TetId;
 use incise::mesh::glam::DVec3;
 use incise::scene::{BodySpec, Precision, Region, StrokeSpec};
 use incise::{Scene, Simulation};
@@ -157,8 +158,18 @@ fn follow(simulation: &mut Simulation, skin: &mut Skin, tally: &mut Tally) -> an
         skin.triangles().len() == simulation.boundary().count(),
         "the skin has other triangles than the body"
     );
-    let finite = simulation.positions().iter().all(|x| x.is_finite());
-    ensure!(finite, "a position is not finite");
+    let mut positions = simulation.positions().iter().enumerate();
+    if let Some((p, x)) = positions.find(|(_, x)| !x.is_finite()) {
+        let mesh = simulation.mesh();
+        let around = mesh.tets.iter().enumerate();
+        let around = around.filter(|(_, tet)| tet.iter().any(|q| q.index() == p));
+        let volumes: Vec<f64> = around.map(|(t, _)| mesh.volume(TetId::new(t))).collect();
+        bail!(
+            "particle {p} is at {x} in {} with {} repaired; volumes of its tets: {volumes:?}",
+            report.precision,
+            report.repaired
+        );
+    }
     if let Some(cut) = report.cut {
         tally.cut += 1;
         tally.tets_cut += cut.tets_cut;

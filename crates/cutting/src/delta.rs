@@ -120,7 +120,7 @@ pub struct CutDelta {
     pub removed: Vec<RemovedTet>,
     /// Their children, ascending by parent, then by slot.
     pub added: Vec<AddedTet>,
-    /// Tets that were not cut but have other corners now, ascending.
+    /// Tets that were not cut but have other corners now, ascending by the slot before any moves.
     pub relinked: Vec<RelinkedTet>,
     /// Tets taken away without children, ascending by the slot they had before.
     pub deleted: Vec<RemovedTet>,
@@ -161,6 +161,14 @@ impl CutDelta {
     #[must_use]
     pub fn tets_after(&self) -> usize {
         self.tets_before + self.added.len() - self.removed.len() - self.deleted.len()
+    }
+
+    /// The slot now of a tet that was not deleted.
+    #[must_use]
+    pub fn slot_after(&self, tet: TetId) -> TetId {
+        // Both ends of the moves ascend.
+        let moved = self.moved.binary_search_by_key(&tet, |moved| moved.from);
+        moved.map_or(tet, |i| self.moved[i].to)
     }
 
     /// Extends a quantity carried by particles to the new ones: interpolated on edges, repeated for copies.

@@ -118,6 +118,17 @@ pub enum CutError {
         /// Its area in m².
         area: f64,
     },
+    /// The mesh was changed since the last call without the stroke being told.
+    #[error(
+        "the stroke goes on from a mesh of {particles} particles and {tets} tets, which has changed since: let it \
+         follow cuts and removals, and go on with an earlier clone after an undo"
+    )]
+    NotFollowed {
+        /// Particles the stroke knows.
+        particles: usize,
+        /// Tets the stroke knows.
+        tets: usize,
+    },
     /// The two polylines of a strip do not belong together.
     #[error(
         "a strip between polylines of {first} and {second} points: it needs as many on both, two at least"

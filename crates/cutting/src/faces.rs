@@ -10,11 +10,15 @@
 use incise_mesh::{ParticleId, TetId, TetMesh};
 
 use crate::delta::{BoundaryTriangle, FaceTag};
+use crate::tree::Bounds;
 
 /// Marks a place in the list of boundary triangles.
 const BOUNDARY: u32 = 1 << 31;
 /// A face between children of one tet whose twin is not known yet.
 pub(crate) const INNER: u32 = u32::MAX;
+/// Boundary triangles that count as neighbors: this many in a row of their list, which starts in an order in space; the
+/// triangles of a cut follow, in the order of their tets.
+pub(crate) const TILE: usize = 64;
 /// The corners of the face opposite to each corner, counterclockwise seen from outside a positive tet.
 const OPPOSITE: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
@@ -72,6 +76,8 @@ pub(crate) struct Faces {
     links: Vec<u32>,
     /// The boundary triangles, in the order in which they came to be.
     boundary: Vec<(Face, FaceTag)>,
+    /// How often triangles came to or went from each tile of the list.
+    versions: Vec<u32>,
 }
 
 impl Faces {
@@ -79,14 +85,15 @@ impl Faces {
         let mut faces = Self {
             links: vec![INNER; 4 * mesh.tets.len()],
             boundary: Vec::new(),
+            versions: Vec::new(),
         };
         let tets = (0..mesh.tets.len()).map(TetId::new);
         let sides = sides(mesh, tets.flat_map(Face::of));
         faces.pair_up(&sides);
-        for face in (0..mesh.tets.len()).map(TetId::new).flat_map(Face::of) {
-            if faces.links[face.0 as usize] == INNER {
-                faces.open(face, FaceTag::Outer);
-            }
+        let all = (0..mesh.tets.len()).map(TetId::new).flat_map(Face::of);
+        let outer: Vec<Face> = all.filter(|&face| faces.is_loose(face)).collect();
+        for face in in_space(mesh, outer) {
+            faces.open(face, FaceTag::Outer);
         }
         faces
     }
@@ -94,6 +101,20 @@ impl Faces {
     /// The boundary triangles, in an order that is the same for the same history.
     pub(crate) fn boundary(&self) -> &[(Face, FaceTag)] {
         &self.boundary
+    }
+
+    /// A number for each tile of the boundary triangles that changes when a triangle comes to it. Parts of a triangle that
+    /// take its place do not count.
+    pub(crate) fn versions(&self) -> &[u32] {
+        &self.versions
+    }
+
+    fn note_change(&mut self, place: usize) {
+        let tile = place / TILE;
+        if tile == self.versions.len() {
+            self.versions.push(0);
+        }
+        self.versions[tile] = self.versions[tile].wrapping_add(1);
     }
 
     pub(crate) fn behind(&self, face: Face) -> Behind {
@@ -161,6 +182,7 @@ impl Faces {
         let place =
             u32::try_from(self.boundary.len()).expect("fewer boundary triangles than faces");
         self.boundary.push((face, tag));
+        self.note_change(place as usize);
         self.links[face.0 as usize] = BOUNDARY | place;
     }
 
@@ -169,6 +191,7 @@ impl Faces {
         let link = std::mem::replace(&mut self.links[face.0 as usize], INNER);
         debug_assert!(link != INNER && link & BOUNDARY != 0);
         self.boundary.swap_remove((link & !BOUNDARY) as usize);
+        self.note_change((link & !BOUNDARY) as usize);
         if let Some((moved, _)) = self.boundary.get((link & !BOUNDARY) as usize) {
             self.links[moved.0 as usize] = link;
         }
@@ -263,6 +286,29 @@ impl Faces {
             Some(Face(0))
         }
     }
+}
+
+/// Faces in an order in which neighbors in the list are neighbors in space: that of their first particles along a
+/// Z-curve (G. M. Morton 1966), whatever order the mesh has.
+fn in_space(mesh: &TetMesh, faces: Vec<Face>) -> Vec<Face> {
+    const CELLS: f64 = 1023.0;
+    let at = |face: Face| mesh.positions[face.particles(mesh)[0].index()];
+    let bounds = Bounds::around(faces.iter().map(|&face| at(face)));
+    let size = bounds.high - bounds.low;
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "in 0..=CELLS, and 0 where the box is flat"
+    )]
+    let code = |face: Face| {
+        let cell = (at(face) - bounds.low) / size * CELLS;
+        let cell = cell.to_array().map(|c| c as u32);
+        let bits = (0..10).rev().flat_map(|i| cell.map(|c| c >> i & 1));
+        bits.fold(0, |code, bit| code << 1 | bit)
+    };
+    let mut sorted: Vec<(u32, Face)> = faces.into_iter().map(|face| (code(face), face)).collect();
+    sorted.sort_unstable();
+    sorted.into_iter().map(|(_, face)| face).collect()
 }
 
 /// Faces with their particles, sorted so that twins are neighbors.

@@ -10,6 +10,7 @@ use incise_mesh::ParticleId;
 
 use crate::parallel;
 use crate::signs::{cut_by_signs, linear};
+use crate::sweep::require_positions;
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
 /// Steps of regula falsi before bisection takes over. Smooth fields need about six.
@@ -31,7 +32,7 @@ const RESOLUTION: f64 = 1e-15;
 ///
 /// # Errors
 /// If the field is not finite at a particle or on a crossed edge, if the options are not valid, or if `positions` has
-/// another length than the mesh; nothing is changed then.
+/// another length than the mesh or is not finite; nothing is changed then.
 ///
 /// # Determinism
 /// The same input gives the same bits for any number of threads, if the field itself does.
@@ -58,13 +59,7 @@ pub fn cut_level_set(
 ) -> Result<CutDelta, CutError> {
     let _span = tracing::debug_span!("cutting::level_set").entered();
     options.check()?;
-    let expected = cuttable.mesh.positions.len();
-    if positions.len() != expected {
-        return Err(CutError::PositionCount {
-            expected,
-            given: positions.len(),
-        });
-    }
+    require_positions(cuttable.mesh(), positions)?;
     let values = parallel::map(positions, |&x| field(x));
     cut_by_signs(
         cuttable,

@@ -27,6 +27,7 @@
 //! This crate knows nothing of constraints, solvers, colors or the GPU.
 
 mod bisect;
+mod closest;
 mod cuttable;
 mod delta;
 mod error;
@@ -51,6 +52,7 @@ mod stars;
 mod stroke;
 mod surface;
 mod sweep;
+mod tiles;
 mod tree;
 mod triangles;
 mod undo;

@@ -27,3 +27,24 @@ pub(crate) fn filter_map<T: Sync, R: Send>(
     let results = items.par_iter().with_min_len(1024).filter_map(&f);
     results.collect()
 }
+
+/// The results of `f` for the numbers below `count`, in their order.
+pub(crate) fn map_numbers<R: Send>(count: usize, f: impl Fn(usize) -> R + Sync) -> Vec<R> {
+    if count < PARALLEL_ITEMS {
+        return (0..count).map(f).collect();
+    }
+    let numbers = (0..count).into_par_iter().with_min_len(PARALLEL_ITEMS);
+    numbers.map(&f).collect()
+}
+
+/// The results of `f` for the numbers below `count` that are something, in their order.
+pub(crate) fn filter_map_numbers<R: Send>(
+    count: usize,
+    f: impl Fn(usize) -> Option<R> + Sync,
+) -> Vec<R> {
+    if count < PARALLEL_ITEMS {
+        return (0..count).filter_map(f).collect();
+    }
+    let numbers = (0..count).into_par_iter().with_min_len(PARALLEL_ITEMS);
+    numbers.filter_map(&f).collect()
+}

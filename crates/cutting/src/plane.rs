@@ -8,6 +8,7 @@ use glam::DVec3;
 
 use crate::parallel;
 use crate::signs::cut_by_signs;
+use crate::sweep::require_positions;
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
 /// A plane through a point.
@@ -46,7 +47,8 @@ impl Plane {
 /// What changed. Nothing, if the plane misses the body or only touches it.
 ///
 /// # Errors
-/// If the plane or the options are not valid or `positions` has another length than the mesh; nothing is changed then.
+/// If the plane or the options are not valid or `positions` has another length than the mesh or is not finite; nothing is
+/// changed then.
 ///
 /// # Determinism
 /// The same input gives the same bits on every machine.
@@ -75,13 +77,7 @@ pub fn cut_plane(
     let _span = tracing::debug_span!("cutting::plane").entered();
     options.check()?;
     let normal = plane.unit_normal()?;
-    let expected = cuttable.mesh.positions.len();
-    if positions.len() != expected {
-        return Err(CutError::PositionCount {
-            expected,
-            given: positions.len(),
-        });
-    }
+    require_positions(cuttable.mesh(), positions)?;
 
     let distance = parallel::map(positions, |x| normal.dot(*x - plane.point));
     let what = "the distance of a particle from the plane";

@@ -14,6 +14,7 @@ use incise_mesh::{ParticleId, TetId};
 use crate::delta::{BoundaryTriangle, CutDelta, MovedTet, RemovedTet};
 use crate::faces::{Behind, Face};
 use crate::operation::Operation;
+use crate::sweep::require_positions;
 use crate::{CutError, CutOptions, CuttableMesh};
 
 /// Removes tets; `tets` may be in any order and repeat. The faces laid bare get the tag `tag`.
@@ -70,7 +71,7 @@ pub fn remove_tets(
     }
     seeds.sort_unstable();
     seeds.dedup();
-    operation.separate(&seeds, |_| false);
+    operation.separate(&seeds, |_| false, |_| false);
 
     let (cuttable, mut delta) = operation.write(|_, _| true);
     let corners = |tet: &TetId| cuttable.mesh.tets[tet.index()];
@@ -92,7 +93,7 @@ pub fn remove_tets(
 /// Removes the tets whose centroid, at the present `positions` of the particles, is `inside`. O(tets).
 ///
 /// # Errors
-/// If `positions` has another length than the mesh; nothing is changed then.
+/// If `positions` has another length than the mesh or is not finite; nothing is changed then.
 ///
 /// # Example
 /// ```
@@ -114,11 +115,7 @@ pub fn carve(
     inside: impl Fn(DVec3) -> bool,
     tag: u32,
 ) -> Result<CutDelta, CutError> {
-    let expected = cuttable.mesh.positions.len();
-    if positions.len() != expected {
-        let given = positions.len();
-        return Err(CutError::PositionCount { expected, given });
-    }
+    require_positions(cuttable.mesh(), positions)?;
     let centroid = |corners: &[ParticleId; 4]| {
         corners.iter().map(|p| positions[p.index()]).sum::<DVec3>() * 0.25
     };

@@ -18,10 +18,9 @@ use crate::faces::{Behind, Face};
 use crate::operation::Operation;
 use crate::sides::root;
 
-/// A face with the tets on both sides, all as they were before separation.
+/// The tets on both sides of a face, with their corners as they were before separation.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SharedFace {
-    pub(crate) particles: [ParticleId; 3],
     pub(crate) tets: [TetId; 2],
     pub(crate) corners: [[ParticleId; 4]; 2],
 }
@@ -43,22 +42,28 @@ impl Star {
 }
 
 impl Operation<'_> {
-    /// Takes the star of each of `seeds` (ascending, all on the surface) apart along the faces that are cut.
+    /// Takes the star of each of `seeds` (ascending, all on the surface) apart along the faces that are cut: those with
+    /// all particles `on` the surface whose tets it `parts`.
     ///
-    /// `is_cut` is asked about faces as they were before separation.
-    pub(crate) fn separate(&mut self, seeds: &[ParticleId], is_cut: impl Fn(&SharedFace) -> bool) {
+    /// Both are asked about particles and faces as they were before separation.
+    pub(crate) fn separate(
+        &mut self,
+        seeds: &[ParticleId],
+        on: impl Fn(ParticleId) -> bool,
+        parts: impl Fn(&SharedFace) -> bool,
+    ) {
         self.separate_with(seeds, |operation, star| {
             for i in 0..star.tets.len() {
                 for (face, other) in operation.inner_faces(star, i) {
-                    let tets = [star.tets[i], star.tets[other]];
                     let particles = face.particles(&operation.cuttable.mesh);
-                    let corners = tets.map(|t| operation.cuttable.mesh.tets[t.index()]);
-                    let shared = SharedFace {
-                        particles: particles.map(|p| operation.source(p)),
-                        tets,
-                        corners: corners.map(|tet| tet.map(|p| operation.source(p))),
+                    let mut others = particles.into_iter().filter(|&p| p != star.particle);
+                    let is_cut = others.all(|p| on(operation.source(p))) && {
+                        let tets = [star.tets[i], star.tets[other]];
+                        let corners = tets.map(|t| operation.cuttable.mesh.tets[t.index()]);
+                        let corners = corners.map(|tet| tet.map(|p| operation.source(p)));
+                        parts(&SharedFace { tets, corners })
                     };
-                    if !is_cut(&shared) {
+                    if !is_cut {
                         star.join(i, other);
                     }
                 }

@@ -9,8 +9,11 @@
 use std::collections::HashMap;
 
 use foldhash::fast::FixedState;
+use glam::DVec3;
 use incise_mesh::{ParticleId, TetId, TetMesh};
 
+use crate::CutDelta;
+use crate::stroke::Blade;
 use crate::surface::CutSurface;
 
 /// The sides given to tets with all particles on the surface, for as long as they are not split.
@@ -18,12 +21,28 @@ use crate::surface::CutSurface;
 pub(crate) struct GivenSides(HashMap<TetId, bool, FixedState>);
 
 impl GivenSides {
-    /// Forgets tets that were split.
-    pub(crate) fn forget(&mut self, split: impl IntoIterator<Item = TetId>) {
-        if !self.0.is_empty() {
-            split.into_iter().for_each(|tet| {
-                self.0.remove(&tet);
-            });
+    /// Forgets a tet that was split.
+    pub(crate) fn forget(&mut self, split: TetId) -> Option<bool> {
+        self.0.remove(&split)
+    }
+
+    /// Gives a tet its side back.
+    pub(crate) fn restore(&mut self, tet: TetId, side: bool) {
+        self.0.insert(tet, side);
+    }
+
+    /// Follows a cut or a removal of somebody else.
+    pub(crate) fn follow(&mut self, delta: &CutDelta) {
+        if self.0.is_empty() {
+            return;
+        }
+        for gone in delta.removed.iter().chain(&delta.deleted) {
+            self.0.remove(&gone.tet);
+        }
+        for moved in &delta.moved {
+            if let Some(side) = self.0.remove(&moved.from) {
+                self.0.insert(moved.to, side);
+            }
         }
     }
 }
@@ -36,15 +55,19 @@ pub(crate) struct Sides {
 }
 
 impl Sides {
-    /// Finds the sides of `tets`, which ascend.
+    /// Finds the sides of `tets`, which ascend. `standing` tells the side of a tet, if the blade can still be asked.
     pub(crate) fn new(
         mesh: &TetMesh,
         surface: &CutSurface,
         given: &mut GivenSides,
         tets: &[TetId],
+        standing: impl Fn([ParticleId; 4]) -> Option<bool>,
     ) -> Self {
         let told = |tet: &TetId| {
             let corners = mesh.tets[tet.index()];
+            if let Some(side) = standing(corners) {
+                return Some(side);
+            }
             let whole = corners.iter().all(|&p| surface.contains(p));
             if whole {
                 given.0.get(tet).copied()
@@ -82,6 +105,34 @@ impl Sides {
         };
         matches!(tets.map(side), [Some(one), Some(other)] if one != other)
     }
+}
+
+/// The side of a tet from where the blade stands: the one that its particles off the surface are on if they agree, else
+/// the one its center is on. `None` where the blade moves, or joins another whose place is not known.
+pub(crate) fn standing_side(
+    surface: &CutSurface,
+    blade: &impl Blade,
+    corners: [ParticleId; 4],
+    now: &[DVec3],
+) -> Option<bool> {
+    if corners.iter().any(|&p| surface.is_adopted(p)) {
+        return None;
+    }
+    let at = corners.map(|p| now[p.index()]);
+    let center = at.iter().sum::<DVec3>() * 0.25;
+    let reach = at.iter().map(|x| x.distance(center)).fold(0.0, f64::max);
+    let mut agreed = None;
+    for (particle, x) in corners.into_iter().zip(at) {
+        if surface.contains(particle) {
+            continue;
+        }
+        let seen = surface.seen(particle);
+        let side = seen.or_else(|| blade.side(x, 2.0 * reach))?;
+        if *agreed.get_or_insert(side) != side {
+            return blade.side(center, reach);
+        }
+    }
+    agreed.or_else(|| blade.side(center, reach))
 }
 
 /// Pairs of tets with a common face, by ascending alignment of the face with the surface.

@@ -9,6 +9,7 @@ use incise_mesh::ParticleId;
 
 use crate::operation::{Crossing, Operation};
 use crate::parallel;
+use crate::stroke::AGAIN;
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh, Separation};
 
 /// Cuts where `values`, one a particle, change their sign. `what` they are is named if one is not finite.
@@ -67,9 +68,9 @@ pub(crate) fn cut_by_signs(
         .collect();
     let on = |p: ParticleId| on_surface[p.index()];
     match options.separation {
-        Separation::CutFaces => operation.separate(&seeds, |face| {
+        Separation::CutFaces => operation.separate(&seeds, on, |face| {
             let [one, other] = face.corners.map(side);
-            one != other && face.particles.into_iter().all(on)
+            one != other
         }),
         Separation::SharedOriginal => {
             operation.separate_by_particles(&seeds, |p| p.index() < particles);
@@ -81,12 +82,15 @@ pub(crate) fn cut_by_signs(
 
 /// The edges whose ends lie on different sides, smaller end first, ascending.
 fn crossed(cuttable: &CuttableMesh, values: &[f64]) -> Vec<[ParticleId; 2]> {
-    let mut ends: Vec<[ParticleId; 2]> = Vec::new();
-    for corners in &cuttable.mesh.tets {
+    let tets = &cuttable.mesh.tets;
+    let cut = parallel::filter_map_numbers(tets.len(), |t| {
+        let d = tets[t].map(|p| values[p.index()]);
+        let one_side = d.iter().all(|&d| d >= 0.0) || d.iter().all(|&d| d <= 0.0);
+        (!one_side).then_some(tets[t])
+    });
+    let mut ends: Vec<[ParticleId; 2]> = Vec::with_capacity(4 * cut.len());
+    for corners in cut {
         let d = corners.map(|p| values[p.index()]);
-        if d.iter().all(|&d| d >= 0.0) || d.iter().all(|&d| d <= 0.0) {
-            continue;
-        }
         for i in 0..4 {
             for j in i + 1..4 {
                 if (d[i] < 0.0 && d[j] > 0.0) || (d[i] > 0.0 && d[j] < 0.0) {
@@ -146,8 +150,6 @@ fn keep_bent(
     values: &[f64],
     on_surface: &mut [bool],
 ) -> usize {
-    // Rounding between two runs of the same cut, and a body that moved a little in between.
-    const AGAIN: f64 = 1.01;
     let ends = crossings.iter().flat_map(|crossing| crossing.ends);
     let close = |p: &ParticleId| {
         let bend = cuttable.bent.get(p);

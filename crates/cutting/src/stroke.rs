@@ -22,7 +22,7 @@ use crate::meet::{Meeting, MovingSegment};
 use crate::memory::CutMemory;
 use crate::operation::{Crossing, Operation};
 use crate::parallel;
-use crate::sides::{GivenSides, Sides};
+use crate::sides::{GivenSides, Sides, standing_side};
 use crate::signs::linear;
 use crate::surface::{CutSurface, Tangent};
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
@@ -33,6 +33,10 @@ pub(crate) const SAME_SHEET: f64 = 0.25;
 /// A particle that the surface passed on both sides, and this time within this fraction of an edge, is put on it: the
 /// body between the two sheets is thinner than a tet, and cutting both would leave it as a thread.
 const BETWEEN: f64 = 0.5;
+
+/// How much further from the surface than before a particle that it was bent to may be and stay on it: rounding between
+/// two runs of the same stroke, and a body that moved a little in between.
+pub(crate) const AGAIN: f64 = 1.01;
 
 /// Something that cuts.
 pub(crate) trait Blade: Sync {
@@ -48,6 +52,12 @@ pub(crate) trait Blade: Sync {
 
     /// How often one edge can be met.
     fn most_meetings(&self) -> usize;
+
+    /// On which side of it a point lies, if it stands and can tell. `reach` is a guess at the distance.
+    fn side(&self, x: DVec3, reach: f64) -> Option<bool>;
+
+    /// Its normal, of any length, at a point that it touches while it stands. `length` is that of the longest edge there.
+    fn touches(&self, x: DVec3, length: f64) -> Option<DVec3>;
 }
 
 /// The particles' positions at the beginning and the end of a frame.
@@ -79,6 +89,8 @@ pub(crate) struct Stroke {
     options: CutOptions,
     surface: CutSurface,
     given: GivenSides,
+    /// Sides of tets split in this call.
+    forgotten: Vec<(TetId, bool)>,
     /// The number that the memory knows it by.
     number: Option<u32>,
 }
@@ -99,6 +111,7 @@ impl Stroke {
             options,
             surface: CutSurface::default(),
             given: GivenSides::default(),
+            forgotten: Vec::new(),
             number: None,
         }
     }
@@ -115,6 +128,8 @@ impl Stroke {
     ) -> Result<CutDelta, CutError> {
         let particles = motion.now.len();
         let mut fresh: Vec<ParticleId> = Vec::new();
+        self.surface.begin();
+        self.forgotten.clear();
         let mut operation = Operation::begin(cuttable, &self.options);
         // A round a meeting of an edge: then nothing is left, but what would be cut off by more is smaller than a tet. Near
         // the tip of a surface there may be no end to it: every new edge crosses it again, nearer to the tip.
@@ -138,7 +153,12 @@ impl Stroke {
                 rounds = hits.iter().map(|hit| hit.meetings).max().unwrap_or(0);
             }
             round += 1;
-            let snapped = self.snap(operation.cuttable, &hits, B::COMES_BY);
+            let touched = if round == 1 && !B::COMES_BY {
+                touched(operation.cuttable, &motion.now, &edges, blade)
+            } else {
+                Vec::new()
+            };
+            let snapped = self.snap(&mut operation, &hits, touched, B::COMES_BY);
             near = match self.open(&mut operation, motion, hits, &snapped, &mut fresh) {
                 Ok(touched) => touched,
                 Err(error) => return Err(self.give_up(operation, motion, particles, error)),
@@ -154,7 +174,7 @@ impl Stroke {
             if memory.join(number, cuttable, &gaps, &mut self.surface, &mut fresh) {
                 continue;
             }
-            let snapped = self.snap(cuttable, &gaps, false);
+            let snapped = self.snap(&mut operation, &gaps, Vec::new(), false);
             if let Err(error) = self.open(&mut operation, motion, gaps, &snapped, &mut fresh) {
                 return Err(self.give_up(operation, motion, particles, error));
             }
@@ -163,10 +183,11 @@ impl Stroke {
         let seeds = self.seeds(operation.cuttable, &fresh);
         let along = tets_around(operation.cuttable, &seeds);
         let mesh = &operation.cuttable.mesh;
-        let sides = Sides::new(mesh, &self.surface, &mut self.given, &along);
-        operation.separate(&seeds, |face| {
-            face.particles.iter().all(|&p| self.surface.contains(p)) && sides.differ(face.tets)
-        });
+        let standing =
+            |corners: [ParticleId; 4]| standing_side(&self.surface, blade, corners, &motion.now);
+        let sides = Sides::new(mesh, &self.surface, &mut self.given, &along, standing);
+        let on = |p| self.surface.contains(p);
+        operation.separate(&seeds, on, |face| sides.differ(face.tets));
         let delta = operation.finish(|rest, c| self.surface.side(rest, c));
         for source in &delta.copies {
             motion.now.push(motion.now[source.index()]);
@@ -179,7 +200,7 @@ impl Stroke {
         Ok(delta)
     }
 
-    /// Takes the cut back, and what the stroke knows of the particles that are gone by it.
+    /// Takes the cut back, and what the stroke learned from it.
     fn give_up(
         &mut self,
         operation: Operation<'_>,
@@ -190,7 +211,10 @@ impl Stroke {
         operation.roll_back();
         motion.before.truncate(particles);
         motion.now.truncate(particles);
-        self.surface.truncate(particles);
+        self.surface.roll_back();
+        for (tet, side) in self.forgotten.drain(..) {
+            self.given.restore(tet, side);
+        }
         error
     }
 
@@ -213,7 +237,9 @@ impl Stroke {
             hit.crossing.parameter = hit.crossing.parameter.clamp(reach, 1.0 - reach);
         }
         let near = operation.split(&hits.iter().map(|hit| hit.crossing).collect::<Vec<_>>())?;
-        self.given.forget(near.iter().copied());
+        let given = &mut self.given;
+        let forgotten = near.iter().filter_map(|&t| Some((t, given.forget(t)?)));
+        self.forgotten.extend(forgotten);
         fresh.extend(snapped);
         for hit in hits {
             let point = ParticleId::new(motion.now.len());
@@ -273,7 +299,7 @@ impl Stroke {
 
     /// Follows a cut that another stroke made.
     pub(crate) fn follow(&mut self, cuttable: &CuttableMesh, delta: &CutDelta) {
-        self.given.forget(delta.removed.iter().map(|tet| tet.tet));
+        self.given.follow(delta);
         self.surface
             .follow(delta, &cuttable.mesh.positions, self.options.reach());
     }
@@ -309,8 +335,16 @@ impl Stroke {
         })
     }
 
-    /// Notes what the hits say of their ends, and puts those on the surface that it passes closely.
-    fn snap(&mut self, cuttable: &CuttableMesh, hits: &[Hit], foresee: bool) -> Vec<ParticleId> {
+    /// Notes what the hits say of their ends, and puts those on the surface that it touches or passes closely.
+    fn snap(
+        &mut self,
+        operation: &mut Operation<'_>,
+        hits: &[Hit],
+        touched: Vec<(ParticleId, Tangent)>,
+        foresee: bool,
+    ) -> Vec<ParticleId> {
+        let cuttable = &*operation.cuttable;
+        let rest = &cuttable.mesh.positions;
         for hit in hits {
             for (particle, side) in hit.crossing.ends.into_iter().zip(hit.sides) {
                 if let Some(side) = side {
@@ -318,13 +352,14 @@ impl Stroke {
                 }
             }
         }
-        let mut snapped: Vec<(ParticleId, Tangent)> = Vec::new();
+        let mut snapped = touched;
         for hit in hits {
             let at = hit.crossing.parameter;
             for (particle, fraction) in hit.crossing.ends.into_iter().zip([at, 1.0 - at]) {
                 let undecided = !self.surface.is_decided(particle);
                 let close = fraction < self.options.tolerance
                     || (undecided && fraction < self.options.snap)
+                    || (undecided && self.was_bent(cuttable, particle, &hit.tangent))
                     || (undecided
                         && foresee
                         && self.passes_closely(cuttable, particle, &hit.tangent))
@@ -339,10 +374,27 @@ impl Stroke {
         }
         snapped.sort_by_key(|(particle, _)| *particle);
         snapped.dedup_by_key(|(particle, _)| *particle);
-        for &(particle, tangent) in &snapped {
+        let bent = snapped
+            .iter()
+            .map(|(p, tangent)| tangent.distance(rest[p.index()]));
+        let bent: Vec<f64> = bent.collect();
+        for (&(particle, tangent), distance) in snapped.iter().zip(bent) {
             self.surface.put(particle, tangent);
+            operation.bend(particle, distance.abs());
         }
         snapped.into_iter().map(|(particle, _)| particle).collect()
+    }
+
+    /// Whether an earlier stroke was bent to the particle over the distance it is from the plane now. Its edge that was
+    /// crossed closely may belong to a copy now, and the others would be split to take a chip off.
+    fn was_bent(&self, cuttable: &CuttableMesh, particle: ParticleId, plane: &Tangent) -> bool {
+        let Some(&bent) = cuttable.bent.get(&particle) else {
+            return false;
+        };
+        // Level sets note their values, which need not be lengths.
+        let most = self.options.snap * longest_around(cuttable, [particle; 2]);
+        let distance = plane.distance(cuttable.mesh.positions[particle.index()]);
+        distance.abs() <= (AGAIN * bent).min(most)
     }
 
     /// Whether the plane crosses one of the particle's edges within the snap distance from it.
@@ -374,6 +426,30 @@ impl Stroke {
         seeds.dedup();
         seeds
     }
+}
+
+/// The particles of the edges that the blade touches where it stands, with the surface there. Ascending.
+fn touched(
+    cuttable: &CuttableMesh,
+    now: &[DVec3],
+    edges: &[[ParticleId; 2]],
+    blade: &impl Blade,
+) -> Vec<(ParticleId, Tangent)> {
+    let mut lengths: Vec<(ParticleId, f64)> = Vec::with_capacity(2 * edges.len());
+    for &[a, b] in edges {
+        let length = now[a.index()].distance(now[b.index()]);
+        lengths.extend([(a, length), (b, length)]);
+    }
+    lengths.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
+    lengths.dedup_by_key(|(particle, _)| *particle);
+    parallel::filter_map(&lengths, |&(particle, length)| {
+        let normal = blade.touches(now[particle.index()], length)?;
+        let tangent = Tangent {
+            point: cuttable.mesh.positions[particle.index()],
+            normal: carried_back(cuttable, now, cuttable.around(particle), normal)?,
+        };
+        Some((particle, tangent))
+    })
 }
 
 /// The tets around the given particles, each once, ascending.
@@ -412,33 +488,45 @@ pub(crate) fn longest_around(cuttable: &CuttableMesh, ends: [ParticleId; 2]) -> 
     longest.sqrt()
 }
 
-/// What a meeting says of the surface, with its tangent plane carried back to the rest shape.
+/// The direction in the rest shape of a normal among the given tets.
 ///
-/// With deformation gradient F, `n · F dX = (Fᵀ n) · dX`: the normal goes back by the transpose, summed over the tets
-/// around the edge, which are taken in ascending order: the sum must not depend on the order of a list.
-fn hit(cuttable: &CuttableMesh, now: &[DVec3], ends: [ParticleId; 2], meeting: &Meeting) -> Hit {
+/// With deformation gradient F, `n · F dX = (Fᵀ n) · dX`: the normal goes back by the transpose, summed over the tets,
+/// which are taken in ascending order: the sum must not depend on the order of a list. `None` in a body crushed flat,
+/// from which there is no way back.
+fn carried_back(
+    cuttable: &CuttableMesh,
+    now: &[DVec3],
+    tets: impl Iterator<Item = TetId>,
+    present: DVec3,
+) -> Option<DVec3> {
     let rest = &cuttable.mesh.positions;
     let edges_from = |values: &[DVec3], c: [ParticleId; 4]| {
         let [a, b, c, d] = c.map(|p| values[p.index()]);
         DMat3::from_cols(b - a, c - a, d - a)
     };
-    let mut around: Vec<TetId> = cuttable
-        .around(ends[0])
-        .filter(|tet| cuttable.mesh.tets[tet.index()].contains(&ends[1]))
-        .collect();
-    around.sort_unstable();
+    let mut tets: Vec<TetId> = tets.collect();
+    tets.sort_unstable();
     let mut normal = DVec3::ZERO;
-    for tet in around {
+    for tet in tets {
         let corners = cuttable.mesh.tets[tet.index()];
         let gradient = edges_from(now, corners) * edges_from(rest, corners).inverse();
-        normal += (gradient.transpose() * meeting.normal).normalize_or_zero();
+        normal += (gradient.transpose() * present).normalize_or_zero();
     }
+    normal.try_normalize()
+}
+
+/// What a meeting says of the surface, with its tangent plane carried back to the rest shape.
+fn hit(cuttable: &CuttableMesh, now: &[DVec3], ends: [ParticleId; 2], meeting: &Meeting) -> Hit {
+    let rest = &cuttable.mesh.positions;
+    let around = cuttable
+        .around(ends[0])
+        .filter(|tet| cuttable.mesh.tets[tet.index()].contains(&ends[1]));
     let [a, b] = ends.map(|p| rest[p.index()]);
-    // In a body crushed flat there is no way back; the crossed edge itself then serves as the normal.
+    // In a body crushed flat the crossed edge itself serves as the normal.
     let along = (b - a).normalize_or_zero() * if meeting.upwards { 1.0 } else { -1.0 };
     let tangent = Tangent {
         point: a + (b - a) * meeting.parameter,
-        normal: normal.try_normalize().unwrap_or(along),
+        normal: carried_back(cuttable, now, around, meeting.normal).unwrap_or(along),
     };
     Hit {
         crossing: Crossing {

@@ -68,6 +68,8 @@ pub(crate) struct CutSurface {
     marks: HashMap<ParticleId, Mark, FixedState>,
     /// Particles whose marks changed since a memory was last told, if it ever was.
     news: Option<Vec<ParticleId>>,
+    /// What was known before each change of this call, in order.
+    journal: Vec<(ParticleId, Option<Mark>)>,
 }
 
 impl CutSurface {
@@ -97,6 +99,8 @@ impl CutSurface {
         if let Some(news) = &mut self.news {
             news.push(particle);
         }
+        let before = self.marks.get(&particle).copied();
+        self.journal.push((particle, before));
         self.marks.entry(particle).or_default()
     }
 
@@ -105,11 +109,21 @@ impl CutSurface {
         self.news.get_or_insert_default();
     }
 
-    /// Forgets all particles from the given number on.
-    pub(crate) fn truncate(&mut self, particles: usize) {
-        self.marks.retain(|p, _| p.index() < particles);
+    /// Begins a call that may be taken back.
+    pub(crate) fn begin(&mut self) {
+        self.journal.clear();
+    }
+
+    /// Takes back all changes since the call began.
+    pub(crate) fn roll_back(&mut self) {
+        for (particle, mark) in self.journal.drain(..).rev() {
+            match mark {
+                Some(mark) => self.marks.insert(particle, mark),
+                None => self.marks.remove(&particle),
+            };
+        }
         if let Some(news) = &mut self.news {
-            news.retain(|p| p.index() < particles);
+            news.clear();
         }
     }
 
@@ -137,6 +151,7 @@ impl CutSurface {
             }
         }
         mark.adopted = true;
+        self.journal.push((particle, None));
         self.marks.insert(particle, mark);
         mark.tangent.is_some()
     }
@@ -163,6 +178,14 @@ impl CutSurface {
         self.marks
             .get(&particle)
             .is_some_and(|mark| mark.seen == Seen::Both)
+    }
+
+    /// The side that a particle was always seen on.
+    pub(crate) fn seen(&self, particle: ParticleId) -> Option<bool> {
+        match self.marks.get(&particle)?.seen {
+            Seen::On(side) => Some(side),
+            _ => None,
+        }
     }
 
     /// Gives the copies that a cut made what their particles remember.

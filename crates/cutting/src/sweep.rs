@@ -5,21 +5,21 @@
 //! less than one tet, and a stroke may stop anywhere. The blade is followed in the material's own time (see the module
 //! `meet`), so a body that moves or deforms between frames leaves no gap.
 //!
-//! Source: paper section 4.3, with the moving front as described here. Cost of a frame: a pass over particles and tets
-//! to find those near the blade, then the cut.
+//! Source: paper section 4.3, with the moving front as described here. Cost: a pass over particles and tets at the
+//! start; in each frame a copy of the positions, the boxes of the boundary triangles (see the module `near`) and the cut.
 
 use glam::DVec3;
 use incise_mesh::TetMesh;
 
 use crate::meet::{Meeting, MovingSegment, meetings};
 use crate::memory::CutMemory;
-use crate::near::near_tets;
+use crate::near::{Search, SweptSegment};
 use crate::plane::require_finite;
 use crate::stroke::{Blade, Motion, Stroke};
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
 /// A blade on its way from one pose to the next.
-struct MovingBlade(Vec<MovingSegment>);
+struct MovingBlade(Vec<SweptSegment>);
 
 impl Blade for MovingBlade {
     const COMES_BY: bool = true;
@@ -29,7 +29,8 @@ impl Blade for MovingBlade {
         edge: &MovingSegment,
         keep: impl Fn(&Meeting) -> bool,
     ) -> Option<(Meeting, usize)> {
-        let all = self.0.iter().flat_map(|segment| meetings(edge, segment));
+        let near = self.0.iter().filter(|swept| !swept.misses(edge));
+        let all = near.flat_map(|swept| meetings(edge, &swept.segment));
         let first = all.filter(keep).min_by(|m, n| m.time.total_cmp(&n.time))?;
         Some((first, 1))
     }
@@ -37,6 +38,15 @@ impl Blade for MovingBlade {
     /// Three roots of a cubic a segment.
     fn most_meetings(&self) -> usize {
         3 * self.0.len()
+    }
+
+    /// It has moved on: the particles remember.
+    fn side(&self, _: DVec3, _: f64) -> Option<bool> {
+        None
+    }
+
+    fn touches(&self, _: DVec3, _: f64) -> Option<DVec3> {
+        None
     }
 }
 
@@ -68,6 +78,11 @@ pub struct Sweep {
     blade: Vec<DVec3>,
     /// Positions of the particles at the last pose.
     before: Vec<DVec3>,
+    /// Room for those at the next one.
+    room: Vec<DVec3>,
+    search: Search,
+    /// Number of tets of the mesh, to notice changes that the stroke did not follow.
+    tets: usize,
     stroke: Stroke,
 }
 
@@ -75,7 +90,7 @@ impl Sweep {
     /// Starts a stroke with the blade (a polyline of at least two points) in its first pose, which does not cut yet.
     ///
     /// # Errors
-    /// If the blade or the options are not valid or `positions` has another length than the mesh.
+    /// If the blade or the options are not valid or `positions` has another length than the mesh or is not finite.
     pub fn new(
         cuttable: &CuttableMesh,
         positions: &[DVec3],
@@ -93,10 +108,13 @@ impl Sweep {
                 length,
             });
         }
-        require_count(cuttable.mesh(), positions)?;
+        require_positions(cuttable.mesh(), positions)?;
         Ok(Self {
             blade: blade.to_vec(),
             before: positions.to_vec(),
+            room: Vec::new(),
+            search: Search::new(cuttable.mesh(), positions, &between(blade, blade)),
+            tets: cuttable.mesh.tets.len(),
             stroke: Stroke::new(options),
         })
     }
@@ -111,9 +129,9 @@ impl Sweep {
     /// What changed; nothing if the blade met no edge.
     ///
     /// # Errors
-    /// If the blade is not finite or has another number of points, `positions` has another length than the mesh, or the
-    /// mesh would grow beyond the options' limit; the mesh is not changed then. After the last of these the stroke may
-    /// have noted particles that it did not cut: start a new one.
+    /// If the blade or `positions` are not finite or have another number of points than before and than the mesh, if the
+    /// mesh was changed without [`Sweep::follow`], or if it would grow beyond the options' limit. Mesh and stroke are not
+    /// changed then.
     ///
     /// # Determinism
     /// The same history gives the same bits on every machine.
@@ -160,38 +178,54 @@ impl Sweep {
                 now: blade.len(),
             });
         }
-        require_count(cuttable.mesh(), positions)?;
+        let mesh = cuttable.mesh();
+        if (self.before.len(), self.tets) != (mesh.positions.len(), mesh.tets.len()) {
+            return Err(CutError::NotFollowed {
+                particles: self.before.len(),
+                tets: self.tets,
+            });
+        }
+        require_positions(mesh, positions)?;
 
-        let pairs = self.blade.windows(2).zip(blade.windows(2));
-        let segments: Vec<MovingSegment> = pairs
-            .map(|(b, n)| MovingSegment {
-                before: [b[0], b[1]],
-                now: [n[0], n[1]],
-            })
-            .collect();
-        let near = near_tets(cuttable.mesh(), &self.before, positions, &segments);
+        let segments = between(&self.blade, blade);
+        let near = self
+            .search
+            .find(cuttable, &self.before, positions, &segments);
         let mut motion = Motion {
             before: std::mem::take(&mut self.before),
-            now: positions.to_vec(),
+            now: std::mem::take(&mut self.room),
         };
+        motion.now.clear();
+        motion.now.extend_from_slice(positions);
         let blade_between = MovingBlade(segments);
         let result = self
             .stroke
             .cut(cuttable, &mut motion, near, &blade_between, memory);
         match result {
             Ok(delta) => {
-                self.before = motion.now;
+                (self.before, self.room) = (motion.now, motion.before);
+                self.tets = cuttable.mesh.tets.len();
                 self.blade.copy_from_slice(blade);
+                self.search.keep(&delta);
                 Ok(delta)
             }
             Err(error) => {
-                self.before = motion.before;
+                (self.before, self.room) = (motion.before, motion.now);
+                self.search.forget();
                 Err(error)
             }
         }
     }
 
-    /// Follows a cut that another stroke made since the last call of [`Sweep::advance`].
+    #[cfg(test)]
+    pub(crate) fn search_mut(&mut self) -> &mut Search {
+        &mut self.search
+    }
+
+    /// Follows a cut or a removal that somebody else made since the last call of [`Sweep::advance`].
+    ///
+    /// There is no way to follow an undo: what a stroke took back saw of the body is not seen again. Go on with a clone
+    /// of the stroke from before the cut that was undone.
     ///
     /// Two strokes at the same time must keep their fronts more than a tet apart where they cross: an edge that one
     /// makes just behind the other's front is not met again, and the body may hang together there.
@@ -200,17 +234,30 @@ impl Sweep {
     /// If `cuttable` is not the mesh as `delta` left it.
     pub fn follow(&mut self, cuttable: &CuttableMesh, delta: &CutDelta) {
         delta.extend_particles(&mut self.before);
+        self.search.follow(delta);
+        self.tets = delta.tets_after();
         self.stroke.follow(cuttable, delta);
     }
 }
 
-pub(crate) fn require_count(mesh: &TetMesh, positions: &[DVec3]) -> Result<(), CutError> {
-    let expected = mesh.positions.len();
-    if positions.len() == expected {
-        return Ok(());
+/// The segments of a blade that moves from one pose to another.
+fn between(before: &[DVec3], now: &[DVec3]) -> Vec<SweptSegment> {
+    let pairs = before.windows(2).zip(now.windows(2));
+    let segments = pairs.map(|(b, n)| {
+        SweptSegment::new(MovingSegment {
+            before: [b[0], b[1]],
+            now: [n[0], n[1]],
+        })
+    });
+    segments.collect()
+}
+
+/// Refuses positions that are not finite or not one a particle.
+pub(crate) fn require_positions(mesh: &TetMesh, positions: &[DVec3]) -> Result<(), CutError> {
+    let (expected, given) = (mesh.positions.len(), positions.len());
+    if expected != given {
+        return Err(CutError::PositionCount { expected, given });
     }
-    Err(CutError::PositionCount {
-        expected,
-        given: positions.len(),
-    })
+    let mut positions = positions.iter();
+    positions.try_for_each(|&x| require_finite("the position of a particle", x))
 }

@@ -28,6 +28,15 @@ impl Bounds {
         })
     }
 
+    /// The box and all within the distance, along the axes, around it.
+    pub(crate) fn widened(self, distance: f64) -> Self {
+        let distance = DVec3::splat(distance);
+        Self {
+            low: self.low - distance,
+            high: self.high + distance,
+        }
+    }
+
     fn with(self, other: Self) -> Self {
         Self {
             low: self.low.min(other.low),

@@ -7,24 +7,30 @@
 //! follows is the same as for a moving blade (see the module `stroke`), in one go.
 //!
 //! Source: orientations by J. R. Shewchuk 1997 (through `incise_mesh::orientation`); the sides of a line by
-//! Segura and Feito 2001. Cost: O(log m) a tet for m triangles to find those near, then the cut.
+//! Segura and Feito 2001. A surface may stand anywhere in the body, so all tets are looked at, in parallel. Cost: a few
+//! bit operations a tet, O(log m) for each in the box around m triangles, then the cut.
 
 use std::cmp::Ordering;
 
 use glam::DVec3;
 use incise_mesh::{TetId, TetMesh, orientation};
 
+use crate::closest::Closest;
 use crate::meet::{Meeting, MovingSegment};
 use crate::memory::CutMemory;
+use crate::near::Slabs;
 use crate::parallel;
 use crate::plane::require_finite;
 use crate::stroke::{Blade, Motion, SAME_SHEET, Stroke};
-use crate::sweep::require_count;
+use crate::sweep::require_positions;
 use crate::tree::{Bounds, BoxTree};
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
 /// A triangle is flat if its area is smaller than this fraction of its longest side squared: its normal would be noise.
 const FLAT: f64 = 1e-12;
+
+/// How far from a place on an edge its sides are asked, as a fraction of the edge.
+const BESIDE: f64 = 1.0 / 64.0;
 
 /// Triangles to cut along: a bounded plane, a strip, any open or closed surface.
 ///
@@ -161,10 +167,36 @@ impl TriangleSurface {
         })
     }
 
+    /// The point closest to `x`; `reach` is a guess at its distance.
+    fn closest(&self, x: DVec3, reach: f64) -> Option<Closest> {
+        let (corners, normal) = (|t| self.corners(t), |t: usize| self.normals[t]);
+        Closest::new(&self.tree, corners, normal, x, reach)
+    }
+
+    /// A box around the body's part that can be met: along the surface's mean normal, since most cuts are nearly plane.
+    fn slabs(&self, positions: &[DVec3], tolerance: f64) -> Slabs {
+        let corners = (0..self.triangles.len()).map(|t| self.corners(t));
+        let normal: DVec3 = corners.map(|[a, b, c]| (b - a).cross(c - a)).sum();
+        let normal = normal.normalize_or(DVec3::Z);
+        let (u, v) = normal.any_orthonormal_pair();
+        let body = Bounds::around(positions.iter().copied());
+        let largest = |x: DVec3| x.abs().max_element();
+        let scale = largest(body.low).max(largest(body.high));
+        // Ends of edges count within the tolerance, as a fraction of the edge.
+        let margin = 4.0 * tolerance * largest(body.high - body.low) + 1e-12 * scale;
+        Slabs::around([normal, u, v], &self.points, margin)
+    }
+
     /// The tets that a triangle comes near, ascending.
     fn near(&self, mesh: &TetMesh, positions: &[DVec3], tolerance: f64) -> Vec<TetId> {
-        let tets: Vec<TetId> = (0..mesh.tets.len()).map(TetId::new).collect();
-        parallel::filter_map(&tets, |&tet| {
+        let slabs = self.slabs(positions, tolerance);
+        let outside = parallel::map(positions, |x| slabs.outside(*x));
+        parallel::filter_map_numbers(mesh.tets.len(), |t| {
+            let bits = mesh.tets[t].map(|p| outside[p.index()]);
+            if bits[0] & bits[1] & bits[2] & bits[3] != 0 {
+                return None;
+            }
+            let tet = TetId::new(t);
             let corners = mesh.tets[tet.index()].map(|p| positions[p.index()]);
             let bounds = with_margin(Bounds::around(corners), tolerance);
             let size = bounds.high - bounds.low;
@@ -203,7 +235,6 @@ impl Blade for StandingBlade<'_> {
             .overlapping(bounds)
             .filter_map(|t| self.surface.meeting(t, edge.now, self.tolerance))
             .collect();
-        // Ties are those of triangles that share a side or a corner there.
         all.sort_by(|m, n| {
             let by_normal = || m.normal.to_array().partial_cmp(&n.normal.to_array());
             m.time
@@ -211,6 +242,7 @@ impl Blade for StandingBlade<'_> {
                 .then_with(|| m.upwards.cmp(&n.upwards))
                 .then_with(|| by_normal().unwrap_or(Ordering::Equal))
         });
+        let mut all = self.one_a_place(&all, edge.now);
         let sides = [!all.first()?.upwards, all.last()?.upwards].map(Some);
         all.retain(keep);
         without_returns(&mut all, edge.now, self.tolerance);
@@ -220,6 +252,47 @@ impl Blade for StandingBlade<'_> {
 
     fn most_meetings(&self) -> usize {
         self.surface.triangles.len()
+    }
+
+    fn side(&self, x: DVec3, reach: f64) -> Option<bool> {
+        self.surface.closest(x, reach)?.side()
+    }
+
+    fn touches(&self, x: DVec3, length: f64) -> Option<DVec3> {
+        let reach = self.tolerance * length;
+        let closest = self.surface.closest(x, reach)?;
+        (closest.offset.length() <= reach).then_some(closest.normal)
+    }
+}
+
+impl StandingBlade<'_> {
+    /// Leaves one meeting at each place: ties are those of triangles that share a side or a corner there. Where they run
+    /// different ways, the surface may be crossed or only touched, which its sides before and behind the place say.
+    /// `meetings` ascend.
+    fn one_a_place(&self, meetings: &[Meeting], [a, b]: [DVec3; 2]) -> Vec<Meeting> {
+        let same = |m: &Meeting, n: &Meeting| n.parameter - m.parameter <= self.tolerance;
+        let places = meetings.chunk_by(same);
+        places
+            .filter_map(|place| {
+                let first = place[0];
+                if place.iter().all(|m| m.upwards == first.upwards) {
+                    return Some(first);
+                }
+                let beside = |step: f64| {
+                    let at = first.parameter + step;
+                    let inside = self.tolerance < at && at < 1.0 - self.tolerance;
+                    let side = || self.side(a.lerp(b, at), BESIDE * a.distance(b));
+                    inside.then(side).flatten()
+                };
+                let upwards = match (beside(-BESIDE), beside(BESIDE)) {
+                    (Some(before), Some(behind)) if before == behind => return None,
+                    (_, Some(behind)) => behind,
+                    (Some(before), None) => !before,
+                    (None, None) => first.upwards,
+                };
+                place.iter().find(|m| m.upwards == upwards).copied()
+            })
+            .collect()
     }
 }
 
@@ -260,7 +333,8 @@ fn without_returns(meetings: &mut Vec<Meeting>, [a, b]: [DVec3; 2], tolerance: f
 /// smaller than a tet and meets no edge cuts nothing.
 ///
 /// # Errors
-/// If the options are not valid or `positions` has another length than the mesh; nothing is changed then.
+/// If the options are not valid or `positions` has another length than the mesh or is not finite; nothing is changed
+/// then.
 ///
 /// # Determinism
 /// The same input gives the same bits for any number of threads.
@@ -314,7 +388,7 @@ fn cut(
 ) -> Result<CutDelta, CutError> {
     let _span = tracing::debug_span!("cutting::surface").entered();
     options.check()?;
-    require_count(cuttable.mesh(), positions)?;
+    require_positions(cuttable.mesh(), positions)?;
     let tolerance = options.tolerance;
     let near = surface.near(cuttable.mesh(), positions, tolerance);
     let mut motion = Motion {

@@ -268,7 +268,7 @@ impl Plan {
             if *before == ClusterId::NONE {
                 continue;
             }
-            let after = self.clustering.labels()[tet.tet.index()];
+            let after = self.clustering.labels()[delta.slot_after(tet.tet).index()];
             for (p, q) in tet.before.into_iter().zip(tet.after) {
                 if (*before, p) != (after, q) {
                     removed.push((before.0, p.0));
@@ -288,9 +288,10 @@ impl Plan {
         } = &mut self.lists;
         let (tets, labels) = (&cuttable.mesh().tets, self.clustering.labels());
         for moved in merging.moved() {
-            let relinked = &delta.relinked;
             let tet = TetId(moved.constraint);
-            if relinked.binary_search_by_key(&tet, |tet| tet.tet).is_err() {
+            let before = slot_before(delta, tet);
+            let relinked = delta.relinked.binary_search_by_key(&before, |tet| tet.tet);
+            if relinked.is_err() {
                 let corners = tets[tet.index()];
                 removed.extend(corners.map(|p| (moved.from.0, p.0)));
                 added.extend(corners.map(|p| (labels[tet.index()].0, p.0)));
@@ -365,6 +366,13 @@ impl Plan {
             .check_plan(&self.clustering, self.coloring())?;
         Ok(())
     }
+}
+
+/// The slot before the cut of a tet that is in this one now.
+fn slot_before(delta: &CutDelta, tet: TetId) -> TetId {
+    // Both ends of the moves ascend.
+    let moved = delta.moved.binary_search_by_key(&tet, |moved| moved.to);
+    moved.map_or(tet, |i| delta.moved[i].from)
 }
 
 /// The particles of each tet as constraints.

@@ -82,7 +82,9 @@ fn every_line_has_exactly_the_promised_keys() {
         if i == 1 {
             assert_eq!(
                 keys(&frame["cut"]),
-                names("tets_cut, tets_created, particles_created, snapped, worst_volume_ratio")
+                names(
+                    "tets_cut, tets_created, particles_created, snapped, worst_volume_ratio, dihedral"
+                )
             );
         } else {
             assert!(frame["cut"].is_null());

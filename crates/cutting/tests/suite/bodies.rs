@@ -252,3 +252,80 @@ pub(crate) fn relabelled(mesh: &TetMesh, seed: u64) -> (TetMesh, Vec<usize>) {
     };
     (renamed, name)
 }
+
+/// An icosahedron whose triangles were quartered `times` times, on a sphere.
+pub(crate) fn icosphere(center: DVec3, radius: f64, times: usize) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+    let golden = 0.5 * (1.0 + 5.0_f64.sqrt());
+    let mut points: Vec<DVec3> = Vec::new();
+    for (a, b) in [
+        (1.0, golden),
+        (1.0, -golden),
+        (-1.0, golden),
+        (-1.0, -golden),
+    ] {
+        points.extend([
+            DVec3::new(0.0, a, b),
+            DVec3::new(a, b, 0.0),
+            DVec3::new(b, 0.0, a),
+        ]);
+    }
+    let mut triangles = Vec::new();
+    let beside = |a: usize, b: usize| (points[a].distance(points[b]) - 2.0).abs() < 1e-9;
+    for a in 0..12 {
+        for b in a + 1..12 {
+            for c in b + 1..12 {
+                if beside(a, b) && beside(b, c) && beside(c, a) {
+                    triangles.push([a, b, c].map(|i| u32::try_from(i).unwrap()));
+                }
+            }
+        }
+    }
+    for _ in 0..times {
+        let mut finer = Vec::new();
+        for [a, b, c] in triangles {
+            let mut middle = |i: u32, j: u32| {
+                let at = points[i as usize] + points[j as usize];
+                let known = points.iter().position(|x| x.distance(at) < 1e-9);
+                u32::try_from(known.unwrap_or_else(|| {
+                    points.push(at);
+                    points.len() - 1
+                }))
+                .unwrap()
+            };
+            let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+            finer.extend([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]);
+        }
+        triangles = finer;
+        points.iter_mut().for_each(|x| *x *= 0.5);
+    }
+    points
+        .iter_mut()
+        .for_each(|x| *x = center + x.normalize() * radius);
+    (points, triangles)
+}
+
+/// The eight corners of a box and two triangles for each face.
+pub(crate) fn cuboid(low: DVec3, high: DVec3) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+    let corner = |i: u32| {
+        let pick = |axis: usize| {
+            if i >> axis & 1 == 0 {
+                low[axis]
+            } else {
+                high[axis]
+            }
+        };
+        DVec3::new(pick(0), pick(1), pick(2))
+    };
+    let quads = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    let triangles = quads
+        .into_iter()
+        .flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
+    ((0..8).map(corner).collect(), triangles.collect())
+}

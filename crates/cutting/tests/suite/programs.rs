@@ -6,7 +6,8 @@
 
 use glam::DVec3;
 use incise_cutting::{
-    CutDelta, CutError, CutOptions, CuttableMesh, Plane, Separation, Skin, Sweep, carve, cut_plane,
+    CutDelta, CutError, CutMemory, CutOptions, CuttableMesh, Plane, Separation, Skin, Sweep,
+    TriangleSurface, carve, cut_level_set, cut_plane, cut_surface, cut_surface_joining,
 };
 use incise_mesh::generate::kuhn_box;
 use incise_mesh::{ParticleId, TetMesh};
@@ -109,13 +110,20 @@ struct State {
     /// Where the particles are.
     positions: Vec<DVec3>,
     skin: Skin,
-    /// With the positions before.
-    journal: Vec<(CutDelta, Vec<DVec3>)>,
+    /// With the positions and the memory before.
+    journal: Vec<(CutDelta, Vec<DVec3>, Option<CutMemory>)>,
+    /// If the strokes of this program join.
+    memory: Option<CutMemory>,
 }
 
 impl State {
-    /// Follows a stroke and checks everything. Errors must have changed nothing.
-    fn follow(&mut self, before: &TetMesh, result: Result<CutDelta, CutError>) {
+    /// Follows a stroke, before which the memory was `memory`, and checks everything. Errors must have changed nothing.
+    fn follow_from(
+        &mut self,
+        before: &TetMesh,
+        memory: Option<CutMemory>,
+        result: Result<CutDelta, CutError>,
+    ) {
         let Ok(delta) = result else {
             assert_eq!(
                 self.cuttable.mesh(),
@@ -130,14 +138,15 @@ impl State {
         delta.extend_particles(&mut self.positions);
         self.skin.follow(&delta);
         assert_eq!(self.skin.triangles().len(), self.cuttable.boundary_count());
-        self.journal.push((delta, earlier));
+        self.journal.push((delta, earlier, memory));
     }
 
     fn undo(&mut self) {
-        if let Some((delta, earlier)) = self.journal.pop() {
+        if let Some((delta, earlier, memory)) = self.journal.pop() {
             self.cuttable.undo(&delta).unwrap();
             self.cuttable.check().unwrap();
             self.positions = earlier;
+            self.memory = memory;
             self.skin = Skin::new(self.cuttable.boundary());
         }
     }
@@ -146,13 +155,15 @@ impl State {
 /// Runs the program.
 pub(crate) fn run(program: &[u8]) {
     let mut bytes = Bytes(program);
-    let mesh = body(bytes.next());
+    let kind = bytes.next();
+    let mesh = body(kind);
     let cuttable = CuttableMesh::new(mesh).unwrap();
     let mut state = State {
         positions: cuttable.mesh().positions.clone(),
         skin: Skin::new(cuttable.boundary()),
         cuttable,
         journal: Vec::new(),
+        memory: (kind / 64 == 3).then(CutMemory::default),
     };
     for tag in 0..12 {
         if bytes.is_empty() || state.cuttable.mesh().tets.len() > LARGEST / 2 {
@@ -169,7 +180,11 @@ fn step(state: &mut State, bytes: &mut Bytes<'_>, tag: u32) {
         positions,
         ..
     } = state;
-    match bytes.next() % 8 {
+    let operation = bytes.next();
+    if operation >= 192 {
+        return step_more(state, bytes, operation, tag);
+    }
+    match operation % 8 {
         0 | 1 => {
             let options = bytes.options(tag);
             let plane = Plane {
@@ -177,13 +192,13 @@ fn step(state: &mut State, bytes: &mut Bytes<'_>, tag: u32) {
                 normal: bytes.vector(),
             };
             let result = cut_plane(cuttable, positions, &plane, &options);
-            state.follow(&before, result);
+            state.followed_by_memory(&before, &options, result);
         }
         2 | 3 => sweep(state, bytes, tag),
         4 => {
             let (center, radius) = (bytes.vector(), bytes.number().abs());
             let result = carve(cuttable, positions, |x| x.distance(center) < radius, tag);
-            state.follow(&before, result);
+            state.followed_by_memory(&before, &CutOptions::default(), result);
         }
         5 => state.undo(),
         // The body moves: turned, stretched, even inverted or crushed flat; or rounded to single precision.
@@ -207,6 +222,137 @@ fn step(state: &mut State, bytes: &mut Bytes<'_>, tag: u32) {
     }
 }
 
+/// The operations of high bytes.
+fn step_more(state: &mut State, bytes: &mut Bytes<'_>, operation: u8, tag: u32) {
+    let before = state.cuttable.mesh().clone();
+    match operation % 4 {
+        0 => {
+            let options = bytes.options(tag);
+            let (center, radius) = (bytes.vector(), bytes.number());
+            let ball = |x: DVec3| x.distance(center) - radius;
+            let result = cut_level_set(&mut state.cuttable, &state.positions, ball, &options);
+            state.followed_by_memory(&before, &options, result);
+        }
+        1 | 2 => {
+            let options = bytes.options(tag);
+            let Ok(surface) = surface(bytes) else {
+                return;
+            };
+            let State {
+                cuttable,
+                positions,
+                memory,
+                ..
+            } = state;
+            let earlier = memory.clone();
+            let result = match memory {
+                Some(memory) => {
+                    cut_surface_joining(cuttable, positions, &surface, &options, memory)
+                }
+                None => cut_surface(cuttable, positions, &surface, &options),
+            };
+            state.follow_from(&before, earlier, result);
+        }
+        _ => two_sweeps(state, bytes, tag),
+    }
+}
+
+impl State {
+    /// Follows a cut that the memory did not see.
+    fn followed_by_memory(
+        &mut self,
+        before: &TetMesh,
+        options: &CutOptions,
+        result: Result<CutDelta, CutError>,
+    ) {
+        let earlier = self.memory.clone();
+        if let (Some(memory), Ok(delta)) = (&mut self.memory, &result) {
+            memory.follow(&self.cuttable, delta, options);
+        }
+        self.follow_from(before, earlier, result);
+    }
+
+    /// One step of a stroke.
+    fn advance(&mut self, stroke: &mut Sweep, blade: &[DVec3]) -> Option<CutDelta> {
+        let before = self.cuttable.mesh().clone();
+        let earlier = self.memory.clone();
+        let result = match &mut self.memory {
+            Some(memory) => {
+                stroke.advance_joining(&mut self.cuttable, &self.positions, blade, memory)
+            }
+            None => stroke.advance(&mut self.cuttable, &self.positions, blade),
+        };
+        let delta = result.as_ref().ok().cloned();
+        self.follow_from(&before, earlier, result);
+        delta
+    }
+}
+
+/// A ball of 20 or 80 triangles, a box, a rectangle, a strip, or triangles anywhere.
+fn surface(bytes: &mut Bytes<'_>) -> Result<TriangleSurface, CutError> {
+    let shape = bytes.next();
+    let (a, b) = (bytes.vector(), bytes.vector());
+    let of = |(points, triangles): (Vec<DVec3>, Vec<[u32; 3]>)| {
+        TriangleSurface::new(&points, &triangles)
+    };
+    match shape % 6 {
+        0 => of(crate::bodies::icosphere(a, b.x, usize::from(shape > 127))),
+        1 | 2 => of(crate::bodies::cuboid(a, a + b)),
+        3 => TriangleSurface::rectangle(a, b, bytes.vector()),
+        4 => {
+            let count = 2 + usize::from(shape / 6 % 4);
+            let first: Vec<DVec3> = std::iter::once(a)
+                .chain((1..count).map(|_| bytes.vector()))
+                .collect();
+            let second: Vec<DVec3> = first.iter().map(|x| *x + b).collect();
+            TriangleSurface::strip(&first, &second)
+        }
+        _ => {
+            let mut points = vec![a, b];
+            points.extend((0..1 + shape / 6 % 6).map(|_| bytes.vector()));
+            let count = u32::try_from(points.len()).unwrap_or(3);
+            let fan: Vec<[u32; 3]> = (2..count).map(|i| [i - 2, i - 1, i]).collect();
+            TriangleSurface::new(&points, &fan)
+        }
+    }
+}
+
+/// Two blades step by step in turn, with now and then tets taken away, each following what the other did.
+fn two_sweeps(state: &mut State, bytes: &mut Bytes<'_>, tag: u32) {
+    let options = bytes.options(tag);
+    let shape = bytes.next();
+    let mut strokes: Vec<(Sweep, Vec<DVec3>)> = Vec::new();
+    for _ in 0..2 {
+        let blade = vec![bytes.vector(), bytes.vector()];
+        let Ok(stroke) = Sweep::new(&state.cuttable, &state.positions, &blade, options) else {
+            return;
+        };
+        strokes.push((stroke, blade));
+    }
+    for step in 0..2 + usize::from(shape % 5) {
+        if step == 2 && shape > 191 {
+            let (center, before) = (bytes.vector(), state.cuttable.mesh().clone());
+            let near = |x: DVec3| x.distance(center) < 0.3;
+            let result = carve(&mut state.cuttable, &state.positions, near, tag);
+            if let Ok(delta) = &result {
+                for (stroke, _) in &mut strokes {
+                    stroke.follow(&state.cuttable, delta);
+                }
+            }
+            state.followed_by_memory(&before, &options, result);
+        }
+        let (stroke, blade) = &mut strokes[step % 2];
+        let shift = bytes.vector();
+        for point in blade.iter_mut() {
+            *point += shift;
+        }
+        let Some(delta) = state.advance(stroke, blade) else {
+            return;
+        };
+        strokes[1 - step % 2].0.follow(&state.cuttable, &delta);
+    }
+}
+
 /// A blade of two or three points in up to five poses, the body at rest or drifting.
 fn sweep(state: &mut State, bytes: &mut Bytes<'_>, tag: u32) {
     let options = bytes.options(tag);
@@ -227,11 +373,7 @@ fn sweep(state: &mut State, bytes: &mut Bytes<'_>, tag: u32) {
                 state.positions = moved;
             }
         }
-        let before = state.cuttable.mesh().clone();
-        let result = stroke.advance(&mut state.cuttable, &state.positions, &blade);
-        let refused = result.is_err();
-        state.follow(&before, result);
-        if refused {
+        if state.advance(&mut stroke, &blade).is_none() {
             return;
         }
     }

@@ -1,9 +1,12 @@
 //! Blades swept through resting and moving bodies.
 
 use glam::DVec3;
-use incise_cutting::{CutError, CutOptions, CuttableMesh, Plane, Sweep, cut_plane};
-use incise_mesh::TetMesh;
+use incise_cutting::{
+    CutDelta, CutError, CutMemory, CutOptions, CuttableMesh, FaceTag, Plane, Sweep,
+    TriangleSurface, carve, cut_level_set, cut_plane, cut_surface,
+};
 use incise_mesh::generate::{Shape, generate, kuhn_box};
+use incise_mesh::{TetId, TetMesh};
 use proptest::prelude::*;
 
 use crate::bodies::{body, check_cut, jittered_box, noise, pieces_by_sign};
@@ -58,6 +61,18 @@ fn whole_plane(center: DVec3, along: DVec3, normal: DVec3) -> ([DVec3; 2], DVec3
     )
 }
 
+/// The volume of the tets that have all four particles on cut faces.
+fn wholly_on_the_cut(body: &CuttableMesh) -> f64 {
+    let mut on = vec![false; body.mesh().positions.len()];
+    for triangle in body.boundary().filter(|t| t.tag != FaceTag::Outer) {
+        triangle.particles.iter().for_each(|p| on[p.index()] = true);
+    }
+    let tets = body.mesh().tets.iter().enumerate();
+    tets.filter(|(_, corners)| corners.iter().all(|p| on[p.index()]))
+        .map(|(t, _)| body.mesh().volume(TetId::new(t)))
+        .sum()
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(80))]
 
@@ -86,8 +101,11 @@ proptest! {
             volumes.sort_by(f64::total_cmp);
             volumes
         };
+        // A tet with all four particles on the surface may go with either side: the plane weighs its particles, the
+        // sweep, which does not know them all at once, joins it to a neighbor.
+        let between = wholly_on_the_cut(&at_once);
         for (a, b) in volumes(&swept).into_iter().zip(volumes(&at_once)) {
-            prop_assert!((a - b).abs() < 1e-9, "{} against {}", a, b);
+            prop_assert!((a - b).abs() < 1e-9 + between, "{} against {}, {} between", a, b, between);
         }
     }
 
@@ -367,4 +385,155 @@ fn bad_blades_are_refused() {
     ));
     let infinite = stroke.advance(&mut body, &positions, &[DVec3::ONE, DVec3::INFINITY]);
     assert!(matches!(infinite, Err(CutError::NonFinite { .. })));
+}
+
+/// A pose of the long blade that the tests below move down.
+fn pose(z: f64) -> [DVec3; 2] {
+    [DVec3::new(0.45, -1.0, z), DVec3::new(0.52, 2.0, z)]
+}
+
+/// A step that would make too many tets leaves mesh and stroke as they were: what comes after is the same, to the bit,
+/// as if it had not been tried.
+#[test]
+fn a_refused_step_is_forgotten() {
+    for snap in [0.0, 0.2] {
+        for earlier in [false, true] {
+            let mesh = jittered_box(5, 0.2, 3);
+            let mut body = CuttableMesh::new(mesh.clone()).unwrap();
+            let mut memory = CutMemory::default();
+            if earlier {
+                let mut stroke =
+                    Sweep::new(&body, &mesh.positions, &pose(-0.2), options(snap)).unwrap();
+                let delta =
+                    stroke.advance_joining(&mut body, &mesh.positions, &pose(0.1), &mut memory);
+                assert!(!delta.unwrap().is_empty());
+            }
+            let rest = |body: &CuttableMesh| body.mesh().positions.clone();
+            let whole = {
+                let (mut body, mut memory) = (body.clone(), memory.clone());
+                let mut stroke =
+                    Sweep::new(&body, &rest(&body), &pose(1.2), options(snap)).unwrap();
+                let positions = rest(&body);
+                stroke
+                    .advance_joining(&mut body, &positions, &pose(-0.2), &mut memory)
+                    .unwrap();
+                body.mesh().tets.len()
+            };
+            let limited = CutOptions {
+                max_tets: whole - 1,
+                ..options(snap)
+            };
+            let mut stroke = Sweep::new(&body, &rest(&body), &pose(1.2), limited).unwrap();
+            let positions = rest(&body);
+            stroke
+                .advance_joining(&mut body, &positions, &pose(0.7), &mut memory)
+                .unwrap();
+            let (mut twin, mut twin_body, mut twin_memory) =
+                (stroke.clone(), body.clone(), memory.clone());
+
+            let positions = rest(&body);
+            let refused = stroke.advance_joining(&mut body, &positions, &pose(-0.2), &mut memory);
+            assert!(
+                matches!(refused, Err(CutError::TooManyTets { .. })),
+                "nothing was refused"
+            );
+            assert_eq!(body.mesh(), twin_body.mesh());
+            let went_on = stroke
+                .advance_joining(&mut body, &positions, &pose(0.5), &mut memory)
+                .unwrap();
+            let expected = twin
+                .advance_joining(&mut twin_body, &positions, &pose(0.5), &mut twin_memory)
+                .unwrap();
+            assert!(!expected.is_empty());
+            assert_eq!(went_on, expected);
+        }
+    }
+}
+
+/// Positions that are not numbers change nothing, in the stroke neither.
+#[test]
+fn bad_positions_are_refused() {
+    let mesh = jittered_box(3, 0.2, 3);
+    let mut body = CuttableMesh::new(mesh.clone()).unwrap();
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let mut positions = mesh.positions.clone();
+        positions[7].y = bad;
+        let refused = |result: Result<CutDelta, CutError>| {
+            assert!(
+                matches!(result, Err(CutError::NonFinite { .. })),
+                "{result:?}"
+            );
+        };
+        let new = Sweep::new(&body, &positions, &pose(1.2), options(0.1));
+        assert!(matches!(new, Err(CutError::NonFinite { .. })));
+        let mut stroke = Sweep::new(&body, &mesh.positions, &pose(1.2), options(0.1)).unwrap();
+        refused(stroke.advance(&mut body, &positions, &pose(0.5)));
+        let surface = TriangleSurface::rectangle(DVec3::splat(0.5), DVec3::X, DVec3::Y).unwrap();
+        refused(cut_surface(&mut body, &positions, &surface, &options(0.1)));
+        refused(carve(&mut body, &positions, |_| true, 0));
+        let plane = Plane {
+            point: DVec3::splat(0.4),
+            normal: DVec3::ONE,
+        };
+        refused(cut_plane(&mut body, &positions, &plane, &options(0.1)));
+        refused(cut_level_set(
+            &mut body,
+            &positions,
+            |x| x.x.max(0.1) - 0.5,
+            &options(0.1),
+        ));
+        assert_eq!(body.mesh(), &mesh);
+        let mut other = body.clone();
+        let delta = stroke
+            .advance(&mut other, &mesh.positions, &pose(0.5))
+            .unwrap();
+        assert!(!delta.is_empty());
+    }
+}
+
+/// Tets are taken away, also beside the front, and a stroke that follows goes on; one that does not, or that an undo has
+/// overtaken, is refused.
+#[test]
+fn removals_and_undo_on_the_way() {
+    for snap in [0.0, 0.2] {
+        for inside in [0.3, 0.8] {
+            let mesh = jittered_box(5, 0.2, 3);
+            let mut body = CuttableMesh::new(mesh.clone()).unwrap();
+            let mut stroke = Sweep::new(&body, &mesh.positions, &pose(1.2), options(snap)).unwrap();
+            let advance = |stroke: &mut Sweep, body: &mut CuttableMesh, z: f64| {
+                let before = body.mesh().clone();
+                let delta = stroke.advance(body, &before.positions, &pose(z))?;
+                check_cut(&before, body, &delta);
+                Ok::<_, CutError>(delta)
+            };
+            advance(&mut stroke, &mut body, 0.6).unwrap();
+            let (early, early_body) = (stroke.clone(), body.mesh().clone());
+
+            let drill =
+                |x: DVec3| DVec3::new(x.x - 0.5, x.y - 0.5, 0.0).length() < 0.15 && x.z > inside;
+            let before = body.mesh().clone();
+            let removal = carve(&mut body, &before.positions, drill, 1).unwrap();
+            assert!(!removal.moved.is_empty());
+            let refused = advance(&mut stroke, &mut body, 0.3);
+            assert!(matches!(refused, Err(CutError::NotFollowed { .. })));
+            stroke.follow(&body, &removal);
+            advance(&mut stroke, &mut body, 0.3).unwrap();
+            let last = advance(&mut stroke, &mut body, 0.1).unwrap();
+            body.undo(&last).unwrap();
+            let refused = advance(&mut stroke, &mut body, -0.2);
+            assert!(matches!(refused, Err(CutError::NotFollowed { .. })));
+
+            // The stroke cut through all the same; whatever the drill left between.
+            let mut stroke = early;
+            let mut body = CuttableMesh::new(early_body).unwrap();
+            let removal = carve(&mut body, &before.positions, drill, 1).unwrap();
+            stroke.follow(&body, &removal);
+            for z in [0.3, 0.1, -0.2] {
+                advance(&mut stroke, &mut body, z).unwrap();
+            }
+            let mut volumes = body.mesh().pieces().volumes(body.mesh());
+            volumes.sort_by(f64::total_cmp);
+            assert!(volumes[volumes.len() - 2] > 0.3, "{volumes:?}");
+        }
+    }
 }

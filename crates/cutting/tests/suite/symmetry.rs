@@ -192,7 +192,7 @@ proptest! {
         #[expect(clippy::cast_possible_truncation, reason = "rounding is what is tested")]
         let rounded = |x: &DVec3| DVec3::from_array(x.to_array().map(|c| f64::from(c as f32)));
         case.positions = case.positions.iter().map(rounded).collect();
-        let options = CutOptions { snap, tolerance: 1e-5 };
+        let options = CutOptions { tolerance: 1e-5, ..options(snap) };
         let (mut cuttable, delta) = case.cut(&options);
         let mut positions = case.positions.clone();
         delta.extend_particles(&mut positions);

@@ -165,3 +165,34 @@ fn mistakes_name_the_key() {
         "stroke[0].snap",
     );
 }
+
+/// Bites out of a body leave parts that hang by a particle; these come apart, while the last tets move into the gaps.
+#[test]
+fn bites_that_leave_parts_hanging() {
+    let mut came_apart = 0;
+    for seed in 0..12_u32 {
+        let mut text = String::from("[[body]]\nshape = { kind = \"sphere\", tets = 700 }\n");
+        for bite in 0..6_u32 {
+            // Anywhere in the ball, small enough to leave tets between bites.
+            let at = |k: u32| {
+                f64::from((seed * 7919 + bite * 104_729 + k * 1_299_709) % 97) / 97.0 - 0.5
+            };
+            text += &format!(
+                "[[stroke]]\nkind = \"remove\"\nframe = {bite}\nregion = {{ sphere = {{ center = [{}, {}, {}], radius = 0.22 }} }}\n",
+                at(1),
+                at(2),
+                at(3)
+            );
+        }
+        let mut simulation = Simulation::new(&Scene::from_toml(&text).unwrap()).unwrap();
+        for _ in 0..7 {
+            simulation.step().unwrap();
+            simulation.check().unwrap();
+            let deltas = simulation.deltas().iter();
+            came_apart += deltas
+                .filter(|delta| !delta.copies.is_empty() && !delta.moved.is_empty())
+                .count();
+        }
+    }
+    assert!(came_apart > 5, "{came_apart} removals separated something");
+}

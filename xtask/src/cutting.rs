@@ -1,0 +1,340 @@
+//! `cargo xtask cutting`: what a cut costs by stage and size of the mesh, and what snapping trades.
+//!
+//! Costs: a blade sweeps through the middle of a body at rest in 60 frames, one thread, 20 Gauss-Seidel iterations a
+//! frame; the stages of the same frames are set beside the time to solve. Where cost follows the cut, the cost of a cut
+//! tet does not depend on the mesh.
+//!
+//! Snapping: five planes through the body one after the other. More snapping makes fewer and better tets, of which the
+//! solver asks fewer substeps, and bends the cut surface to particles of the mesh.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+use std::time::Instant;
+
+use anyhow::ensure;
+use clap::Args;
+use comfy_table::Table;
+use incise::cutting::{
+    CutOptions, CuttableMesh, FaceTag, PieceTracker, Plane, Skin, Sweep, cut_plane,
+};
+use incise::mesh::TetMesh;
+use incise::mesh::generate::Shape;
+use incise::mesh::glam::DVec3;
+use incise::scene::StrokeSpec;
+use incise::{Scene, Simulation};
+
+use crate::models::{Model, models};
+use crate::table;
+
+/// Frames of the stroke.
+const FRAMES: u32 = 60;
+
+#[derive(Debug, Args)]
+pub(crate) struct CuttingArguments {
+    /// Small generated meshes only.
+    #[arg(long)]
+    quick: bool,
+    /// Take the .vtk meshes of this folder instead of generated ones.
+    #[arg(long, value_name = "DIR")]
+    models: Option<PathBuf>,
+    /// Tets of a generated liver beside them; 0 for none.
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    largest: usize,
+    /// Write the tables to this file as well.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+#[expect(
+    clippy::print_stdout,
+    reason = "the tables are the result of the command"
+)]
+pub(crate) fn cutting(arguments: &CuttingArguments) -> anyhow::Result<()> {
+    let mut models = models(arguments.models.as_deref(), usize::MAX, arguments.quick)?;
+    if arguments.models.is_some() {
+        let chosen = ["liver_11k", "liver_89k", "armadillo_227k"];
+        models.retain(|model| chosen.contains(&model.name.as_str()));
+    }
+    if arguments.largest > 0 && !arguments.quick {
+        models.push(Model::generated(Shape::Liver, arguments.largest)?);
+    }
+    let mut text = String::new();
+    writeln!(text, "## A stroke by stages\n\n{}\n", stages(&models)?)?;
+    writeln!(text, "## Cutting by itself\n\n{}\n", alone(&models)?)?;
+    for model in models.iter().take(1) {
+        writeln!(
+            text,
+            "## Snapping, {}\n\n{}\n",
+            model.name,
+            snapping(model)?
+        )?;
+    }
+    println!("{text}");
+    if let Some(path) = &arguments.out {
+        std::fs::write(path, text)?;
+    }
+    Ok(())
+}
+
+/// The blade over the body at the start, and the way through it.
+fn stroke(mesh: &TetMesh) -> ([DVec3; 2], DVec3) {
+    let low = mesh.positions.iter().copied().reduce(DVec3::min);
+    let high = mesh.positions.iter().copied().reduce(DVec3::max);
+    let (low, high) = (low.unwrap_or_default(), high.unwrap_or_default());
+    let at = |x, y, z| low + (high - low) * DVec3::new(x, y, z);
+    // A little askew, so that no lattice is met along its planes.
+    let blade = [at(0.48, -0.2, 1.02), at(0.493, 1.2, 1.02)];
+    (blade, at(0.0, 0.0, 0.0) - at(0.0, 0.0, 1.04))
+}
+
+/// Stages of the frames that cut, in microseconds a cut tet, beside the time to solve.
+fn stages(models: &[Model]) -> anyhow::Result<Table> {
+    let mut table = table([
+        "mesh",
+        "tets",
+        "tets cut",
+        "cut µs a tet",
+        "cluster",
+        "color",
+        "schedule",
+        "in all",
+        "solve ms (median)",
+        "cut to schedule, ms (median)",
+        "share of solving",
+        "largest share of a frame",
+    ]);
+    for model in models {
+        let mut scene = Scene::built_in();
+        scene.world = incise::scene::WorldSpec::default();
+        model.put_into(&mut scene.body[0]);
+        scene.solver.substeps = 1.into();
+        scene.solver.iterations = 20;
+        let scale = scene.body[0].scale;
+        let (blade, way) = stroke(&model.mesh);
+        scene.stroke = vec![StrokeSpec::Sweep {
+            frames: [1, 1 + u64::from(FRAMES)],
+            blade: blade.map(|x| (x * scale).to_array()).to_vec(),
+            path: vec![[0.0; 3], (way * scale).to_array()],
+            snap: 0.1,
+        }];
+        let mut simulation = Simulation::with_threads(&scene, 1)?;
+        let (mut sums, mut cut_tets) = ([0.0; 4], 0);
+        let (mut solves, mut follows, mut largest) = (Vec::new(), Vec::new(), 0.0_f64);
+        for _ in 0..FRAMES + 2 {
+            let report = simulation.step()?;
+            let Some(cut) = report.cut else { continue };
+            let ms = report.ms;
+            let parts = [ms.cut, ms.cluster, ms.color, ms.schedule];
+            for (sum, part) in sums.iter_mut().zip(parts) {
+                *sum += part;
+            }
+            cut_tets += cut.tets_cut;
+            let follow: f64 = parts.iter().sum();
+            largest = largest.max(follow / ms.solve);
+            solves.push(ms.solve);
+            follows.push(follow);
+        }
+        simulation.check()?;
+        ensure!(cut_tets > 0, "the blade missed {}", model.name);
+        let [cut, cluster, color, schedule] = sums.map(|sum| 1e3 * sum / cut_tets as f64);
+        let (solve, follow) = (median(&mut solves), median(&mut follows));
+        table.add_row([
+            model.name.clone(),
+            model.mesh.tets.len().to_string(),
+            cut_tets.to_string(),
+            format!("{cut:.2}"),
+            format!("{cluster:.2}"),
+            format!("{color:.2}"),
+            format!("{schedule:.2}"),
+            format!("{:.2}", cut + cluster + color + schedule),
+            format!("{solve:.3}"),
+            format!("{follow:.3}"),
+            format!("{:.1} %", 100.0 * follow / solve),
+            format!("{:.1} %", 100.0 * largest),
+        ]);
+    }
+    Ok(table)
+}
+
+/// The cutting crate by itself: the swept blade, a plane at once, and what follows their deltas.
+fn alone(models: &[Model]) -> anyhow::Result<Table> {
+    let mut table = table([
+        "mesh",
+        "tets cut by the blade",
+        "blade µs a tet",
+        "frame ms (mean)",
+        "frame without a cut ms",
+        "pieces µs a tet",
+        "skin µs a tet",
+        "undo µs a tet",
+        "tets cut by the plane",
+        "plane µs a tet",
+    ]);
+    for model in models {
+        let base = CuttableMesh::new(model.mesh.clone())?;
+        let (blade, way) = stroke(&model.mesh);
+        let mut body = base.clone();
+        let mut positions = body.mesh().positions.clone();
+        let mut sweep = Sweep::new(&body, &positions, &blade, CutOptions::default())?;
+        let (mut pieces, mut skin) = (PieceTracker::new(&body), Skin::new(body.boundary()));
+        let (mut cut_tets, mut seconds) = (0, [0.0; 4]);
+        let mut deltas = Vec::new();
+        for frame in 1..=FRAMES {
+            let offset = way * (f64::from(frame) / f64::from(FRAMES));
+            let pose = blade.map(|x| x + offset);
+            let start = Instant::now();
+            let delta = sweep.advance(&mut body, &positions, &pose)?;
+            seconds[0] += start.elapsed().as_secs_f64();
+            delta.extend_particles(&mut positions);
+            let start = Instant::now();
+            pieces.follow(&body, &delta);
+            seconds[1] += start.elapsed().as_secs_f64();
+            let start = Instant::now();
+            skin.follow(&delta);
+            seconds[2] += start.elapsed().as_secs_f64();
+            cut_tets += delta.removed.len();
+            deltas.push(delta);
+        }
+        // Once more where the blade stands: nothing is left to cut.
+        let last = blade.map(|x| x + way);
+        let start = Instant::now();
+        ensure!(sweep.advance(&mut body, &positions, &last)?.is_empty());
+        let idle = start.elapsed().as_secs_f64();
+        let start = Instant::now();
+        for delta in deltas.iter().rev() {
+            body.undo(delta)?;
+        }
+        seconds[3] = start.elapsed().as_secs_f64();
+        ensure!(
+            body.mesh() == base.mesh(),
+            "undone, the mesh is what it was"
+        );
+
+        let plane = Plane {
+            point: blade[0],
+            normal: (blade[1] - blade[0]).cross(way),
+        };
+        let mut halves = base.clone();
+        let start = Instant::now();
+        let options = CutOptions::default();
+        let delta = cut_plane(&mut halves, &model.mesh.positions, &plane, &options)?;
+        let at_once = start.elapsed().as_secs_f64();
+        let micro =
+            |seconds: f64, tets: usize| format!("{:.2}", 1e6 * seconds / tets.max(1) as f64);
+        table.add_row([
+            model.name.clone(),
+            cut_tets.to_string(),
+            micro(seconds[0], cut_tets),
+            format!("{:.3}", 1e3 * seconds[0] / f64::from(FRAMES)),
+            format!("{:.3}", 1e3 * idle),
+            micro(seconds[1], cut_tets),
+            micro(seconds[2], cut_tets),
+            micro(seconds[3], cut_tets),
+            delta.removed.len().to_string(),
+            micro(at_once, delta.removed.len()),
+        ]);
+    }
+    Ok(table)
+}
+
+/// What snapping trades.
+fn snapping(model: &Model) -> anyhow::Result<Table> {
+    let mut table = table([
+        "snap",
+        "tets cut",
+        "tets each became",
+        "tets after",
+        "pieces",
+        "smallest dihedral",
+        "largest dihedral",
+        "worst volume ratio",
+        "substeps times",
+        "cut face from its plane (largest, in edges)",
+    ]);
+    let rest = &model.mesh;
+    let low = rest.positions.iter().copied().reduce(DVec3::min);
+    let high = rest.positions.iter().copied().reduce(DVec3::max);
+    let (low, high) = (low.unwrap_or_default(), high.unwrap_or_default());
+    let edge = mean_edge(rest);
+    let before = smallest_altitude(rest);
+    for snap in [0.0, 0.01, 0.05, 0.1, 0.15, 0.2, 0.25] {
+        let mut body = CuttableMesh::new(rest.clone())?;
+        let (mut cut, mut made, mut worst) = (0, 0, 1.0_f64);
+        let (mut dihedral, mut farthest) = ([180.0_f64, 0.0_f64], 0.0_f64);
+        let planes = [
+            ([0.5, 0.5, 0.5], [1.0, 0.1, 0.2]),
+            ([0.5, 0.5, 0.45], [0.1, 0.2, 1.0]),
+            ([0.45, 0.5, 0.5], [0.2, 1.0, -0.1]),
+            ([0.35, 0.5, 0.5], [1.0, 0.8, 0.1]),
+            ([0.6, 0.5, 0.5], [1.0, -0.5, 0.7]),
+        ];
+        for (tag, (at, normal)) in (0..).zip(planes) {
+            let plane = Plane {
+                point: low + (high - low) * DVec3::from_array(at),
+                normal: DVec3::from_array(normal),
+            };
+            let options = CutOptions {
+                snap,
+                tag,
+                ..CutOptions::default()
+            };
+            let positions = body.mesh().positions.clone();
+            let delta = cut_plane(&mut body, &positions, &plane, &options)?;
+            cut += delta.removed.len();
+            made += delta.added.len();
+            worst = worst.min(delta.worst_volume_ratio);
+            if let Some([least, most]) = delta.dihedral {
+                dihedral = [dihedral[0].min(least), dihedral[1].max(most)];
+            }
+            let unit = plane.unit_normal()?;
+            for triangle in delta
+                .surface_added
+                .iter()
+                .filter(|t| t.tag == FaceTag::Cut(tag))
+            {
+                for p in triangle.particles {
+                    let off = unit
+                        .dot(body.mesh().positions[p.index()] - plane.point)
+                        .abs();
+                    farthest = farthest.max(off);
+                }
+            }
+        }
+        body.check()?;
+        // Kappa grows with the inverse square of the smallest altitude, the substeps with its root.
+        let substeps = before / smallest_altitude(body.mesh());
+        table.add_row([
+            format!("{snap}"),
+            cut.to_string(),
+            format!("{:.2}", made as f64 / cut.max(1) as f64),
+            body.mesh().tets.len().to_string(),
+            body.mesh().pieces().count.to_string(),
+            format!("{:.4}°", dihedral[0]),
+            format!("{:.2}°", dihedral[1]),
+            format!("{worst:.1e}"),
+            format!("{substeps:.1}"),
+            format!("{:.3}", farthest / edge),
+        ]);
+    }
+    Ok(table)
+}
+
+fn smallest_altitude(mesh: &TetMesh) -> f64 {
+    mesh.quality().min_altitude
+}
+
+fn mean_edge(mesh: &TetMesh) -> f64 {
+    let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+    let mut sum = 0.0;
+    for tet in &mesh.tets {
+        for (i, j) in pairs {
+            sum += mesh.positions[tet[i].index()].distance(mesh.positions[tet[j].index()]);
+        }
+    }
+    sum / (6 * mesh.tets.len()).max(1) as f64
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
