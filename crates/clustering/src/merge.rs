@@ -71,7 +71,8 @@ struct Candidate {
 /// what is loose; those that are in none are skipped. `neighbors_of` gives the constraints that one is linked to; links
 /// go both ways.
 ///
-/// What was done is in `lists` afterwards. Deterministic: the same lists in the same order give the same clusters. For the cost see the module's source.
+/// What was done is in `lists` afterwards. Deterministic: the same lists in the same order give the same clusters. For the
+/// cost see the module's source.
 ///
 /// ```
 /// use std::num::NonZeroUsize;
@@ -248,12 +249,16 @@ impl<N: IntoIterator<Item = u32>, F: Fn(u32) -> N> Merging<'_, F> {
         grown.retain(|&seed| size(self, seed) <= self.small);
         for step in 1..=self.small {
             let mut next = 0;
-            // The list gets longer on the way: what is still small after a merger comes once more.
+            // A cluster whose other part has left may be smaller than the step.
             while let Some(&seed) = grown.get(next) {
-                next += 1;
-                if size(self, seed) == step
-                    && let Some(merged) = self.join_best(seed)
-                    && (step + 1..=self.small).contains(&merged)
+                if size(self, seed) > step {
+                    next += 1;
+                    continue;
+                }
+                grown.swap_remove(next);
+                // What is still small after a merger comes once more.
+                if let Some(merged) = self.join_best(seed)
+                    && merged <= self.small
                 {
                     grown.push(seed);
                 }
