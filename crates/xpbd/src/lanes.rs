@@ -13,13 +13,13 @@
 //!
 //! Source: Macklin and Müller 2021 (constraints), Ton-That et al. 2023 (block solve), paper equations 5 and 6. The paper
 //! prints a minus in its equation 6; its equation 3 gives the plus used here.
-//! Cost: about 310 operations, one square root and two divisions a tet (block form, undamped); in single precision 80
+//! Cost: about 330 operations, one square root and two divisions a tet (block form, undamped); in single precision 80
 //! bytes of the layout and four corners of 16 bytes, read and written. Taking corners from where they are and putting
 //! them back is more than half of the instructions, since there is no safe instruction for it.
 
 mod memory;
 
-use fearless_simd::{Select, Simd, SimdBase, SimdFloat};
+use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask};
 
 use crate::Real;
 use crate::layout::{CONSTANTS, Layout, REST};
@@ -51,6 +51,11 @@ pub(crate) trait Kind {
 }
 
 type Matrix<V> = [[V; 3]; 3];
+
+/// The norm of the derivative of det F, √3 at rest, up to which tets resist a change of volume as their material says:
+/// that of a tet stretched two and a half times along each axis, or fifty times along one while it is thinned
+/// to the same volume. No tissue gets there unbroken.
+pub(crate) const STEEP: f64 = 10.0;
 
 /// The tets of one block, with what is needed of them.
 struct Tets<'a, R: Real, S: Simd> {
@@ -206,6 +211,32 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
         (norm, self.splat(R::ONE) / norm)
     }
 
+    /// The derivative of det F, det F and γ; where the first is longer than [`STEEP`], all three are scaled down to that.
+    ///
+    /// The stiffness against a change of volume grows with the square of the derivative, which is that of an area. In a
+    /// tet stretched a hundred times it is 10⁸ times what kappa says, and such tets throw their corners away, farther
+    /// each time. A constraint over a number has the same solutions and pulls the same way, less.
+    #[inline(always)]
+    fn volume(&self, f: &Matrix<R::Lanes<S>>) -> (Matrix<R::Lanes<S>>, [R::Lanes<S>; 2]) {
+        let mut cofactor = cofactor::<R, S>(f);
+        let [a, b, c] = &cofactor;
+        let square = dot::<R, S>(a, a) + dot::<R, S>(b, b) + dot::<R, S>(c, c);
+        let mut volume = dot::<R, S>(&f[0], a);
+        let mut gamma = self.gamma;
+        let limit = R::from_f64(STEEP);
+        let steep = square.simd_gt(self.splat(limit * limit));
+        if steep.any_true() {
+            let scale = self.splat(limit) / square.sqrt();
+            let scale = steep.select(scale, self.splat(R::ONE));
+            for entry in cofactor.as_flattened_mut() {
+                *entry *= scale;
+            }
+            volume *= scale;
+            gamma *= scale;
+        }
+        (cofactor, [volume, gamma])
+    }
+
     /// The change of F's corners per weight that satisfies both constraints to first order, and of the multipliers.
     ///
     /// The equations are multiplied by stiffness and time squared, which makes the matrix one plus numbers of the order
@@ -220,13 +251,12 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
     ) -> Matrix<R::Lanes<S>> {
         let (one, zero) = (self.splat(R::ONE), self.splat(R::ZERO));
         let (norm, scale) = self.norm(f);
-        let cofactor = cofactor::<R, S>(f);
-        let volume = dot::<R, S>(&f[0], &cofactor[0]);
+        let (cofactor, [volume, gamma]) = self.volume(f);
         let trace = (self.rest(9) + self.rest(10) + self.rest(11)) * self.time_squared;
         let mut m11 = self.weighted(f) * scale * scale;
         let mut m22 = self.weighted(&cofactor);
         let mut m12 = trace * volume * scale;
-        let (mut deviatoric, mut hydrostatic) = (norm, volume - self.gamma);
+        let (mut deviatoric, mut hydrostatic) = (norm, volume - gamma);
         if K::DAMPED {
             let motion = difference::<R, S>(f, old);
             deviatoric += self.damping * scale * product::<R, S>(f, &motion);
@@ -286,8 +316,8 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
         old: &Matrix<R::Lanes<S>>,
         multiplier: &mut R::Lanes<S>,
     ) -> Matrix<R::Lanes<S>> {
-        let cofactor = cofactor::<R, S>(f);
-        let mut constraint = dot::<R, S>(&f[0], &cofactor[0]) - self.gamma;
+        let (cofactor, [volume, gamma]) = self.volume(f);
+        let mut constraint = volume - gamma;
         let mut m = self.weighted(&cofactor) * self.ratio;
         if K::DAMPED {
             let rate = product::<R, S>(&cofactor, &difference::<R, S>(f, old));

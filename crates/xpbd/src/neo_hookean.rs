@@ -7,6 +7,8 @@
 
 use glam::{DMat3, DVec3};
 
+#[cfg(test)]
+use crate::lanes::STEEP;
 use crate::{Material, Real};
 
 /// A tet with what the solver needs of its rest shape: 64 bytes in single precision.
@@ -28,6 +30,9 @@ pub(crate) struct Evaluation<R: Real> {
     pub(crate) hydrostatic: R,
     pub(crate) deviatoric_gradients: [R::Vector; 4],
     pub(crate) hydrostatic_gradients: [R::Vector; 4],
+    /// The square of the norm of the derivative of det F; only the test of the kernel needs it.
+    #[cfg(test)]
+    pub(crate) slope_squared: R,
 }
 
 impl<R: Real> TetConstraint<R> {
@@ -109,6 +114,8 @@ impl<R: Real> TetConstraint<R> {
             hydrostatic: R::dot(f1, cofactor[0]) - self.gamma,
             deviatoric_gradients: self.gradients([f1 * scale, f2 * scale, f3 * scale]),
             hydrostatic_gradients: self.gradients(cofactor),
+            #[cfg(test)]
+            slope_squared: cofactor.iter().fold(R::ZERO, |sum, &c| sum + R::dot(c, c)),
         }
     }
 
@@ -141,6 +148,13 @@ impl<R: Real> TetConstraint<R> {
         rates: [R; 2],
     ) -> Option<[R; 2]> {
         let stiffness = self.stiffness * time_squared;
+        // One over the square of what the kernel scales the constraint by.
+        let steep = R::from_f64(STEEP * STEEP);
+        let ratio = if e.slope_squared > steep {
+            self.ratio * (steep / e.slope_squared)
+        } else {
+            self.ratio
+        };
         let weights = weights.map(|w| w * stiffness);
         let weighted = |g: &[R::Vector; 4], h: &[R::Vector; 4]| {
             weights[0] * R::dot(g[0], h[0])
@@ -161,7 +175,6 @@ impl<R: Real> TetConstraint<R> {
         } else {
             parallel
         };
-        let ratio = self.ratio;
         let inverse = R::ONE / (ratio * (parallel + m22) + m11 + R::ONE);
         let b1 = -(stiffness * (e.deviatoric + rates[0]) + multipliers[0]);
         let b2 = -(stiffness * ratio * (e.hydrostatic + rates[1]) + multipliers[1]);

@@ -306,6 +306,11 @@ impl<R: Real> Solver<R> {
                 {
                     if weight::<R>(particle) <= R::ZERO {
                         *velocity = R::Vector::default();
+                        // Held, it gets no share of any correction, but no share of an infinite one is not a number.
+                        if !finite::<R>(load::<R>(particle)) {
+                            store::<R>(particle, *previous);
+                            repaired += 1;
+                        }
                         continue;
                     }
                     let predicted = *previous + *velocity * time;

@@ -152,6 +152,8 @@ fn levels() -> Vec<Level> {
 fn tets() -> impl Strategy<Value = Vec<([DVec3; 4], [DVec3; 4])>> {
     let moved = prop_oneof![
         8 => prop::array::uniform4(point()),
+        // Far beyond where the slope of the volume counts as steep.
+        2 => prop::array::uniform4(point().prop_map(|x| x * 1e3)),
         1 => point().prop_map(|x| [x; 4]),
         1 => prop::array::uniform3(point()).prop_map(|[a, b, c]| [a, b, c, a + b - c]),
     ];

@@ -321,6 +321,59 @@ fn a_step_out_of_range_is_reported() {
     assert_finite(&solver, "out of range");
 }
 
+/// A body torn out of all shape, softened so that kappa is at most 1: how much farther than at the start a particle
+/// ever gets from the origin.
+fn thrown<R: Real>(method: Method, stretch: f64, seed: u64) -> f64 {
+    // Layers between a hundred thousandth and the whole of a cell: cuts leave such tets side by side.
+    let mut mesh = kuhn_box([4, 4, 4], DVec3::splat(1.0));
+    let mut noise = Noise(seed);
+    let mut layers = [[0.0; 5]; 3];
+    for layer in &mut layers {
+        for i in 1..5 {
+            layer[i] = layer[i - 1] + 0.05 * 10f64.powf(2.5 * noise.scalar() - 2.5);
+        }
+    }
+    for x in &mut mesh.positions {
+        *x = DVec3::from_array(std::array::from_fn(|axis| layers[axis][x[axis] as usize]));
+    }
+    let settings = StepSettings::new(0.01);
+    let mut solver = body::<R>(&mesh, RUBBER);
+    solver.limit_kappa(Some(KappaLimit {
+        kappa: 1.0,
+        substep_time: settings.substep_time(),
+    }));
+    for t in 0..solver.tet_count() {
+        solver.replace_tet(t, solver.tet_particles(t), mesh.corners(TetId::new(t)));
+    }
+    disturb(&mut solver, stretch, seed);
+    let far = |solver: &Solver<R>| {
+        let positions = positions(solver);
+        positions.iter().map(|x| x.length()).fold(0.0, f64::max)
+    };
+    let (start, schedule) = (far(&solver), plain(&mesh));
+    let mut farthest = start;
+    for _ in 0..60 {
+        method.step(&mut solver, &schedule, &settings);
+        farthest = farthest.max(far(&solver));
+    }
+    farthest / start
+}
+
+/// However far a body is torn, it does not fly apart. Measured: 1.51 times as far, and 7.6 were the slope of det F not
+/// limited.
+#[test]
+fn what_is_torn_out_of_shape_is_not_thrown() {
+    for method in Method::ALL {
+        for stretch in [1.0, 1e2, 1e4] {
+            for seed in 0..10 {
+                let what = format!("{method:?}, torn by {stretch:e}, seed {seed}");
+                within(&what, thrown::<f32>(method, stretch, seed), 2.0);
+                within(&what, thrown::<f64>(method, stretch, seed), 2.0);
+            }
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(256))]
 

@@ -47,6 +47,25 @@ fn a_speck_does_not_keep_its_tet_from_moving() {
     run::<f64>(1e-310);
 }
 
+/// No share of an infinite correction is not a number: a corner that is held stays where it is all the same.
+#[test]
+fn an_infinite_correction_does_not_move_what_is_held() {
+    let material = Material {
+        young_modulus: 1e42,
+        ..RUBBER
+    };
+    let (mut solver, schedule) = tet::<f32>(CORNER.map(|x| x * 1e-4), material);
+    (1..4).for_each(|p| solver.set_mass(p, 1e35));
+    solver.set_mass(0, 0.0);
+    for (p, x) in CORNER.into_iter().enumerate() {
+        solver.set_position(p, x * 1e7);
+    }
+    let before = positions(&solver);
+    let report = solver.step(&schedule, &StepSettings::new(0.01)).unwrap();
+    assert_eq!(report.repaired, 4);
+    assert_eq!(positions(&solver), before);
+}
+
 /// What does not move has no velocity, whatever was set: else it would count as kinetic energy and start when it is
 /// given a mass.
 #[test]
