@@ -14,7 +14,8 @@ use crate::{Error, Scene};
 
 /// Colors that cuts may add before all clusters are colored anew: each color is a barrier in every iteration, but a
 /// full coloring with the schedule that it takes anew costs more than a frame. With 2, one stroke through a body of
-/// 11 000 tets took two of them; with 4 none.
+/// 11 000 tets took two of them; with 4 none. The price: the new schedule also packs the tets anew, and without it
+/// solving that stroke took 7 % more instructions.
 const SLACK: usize = 4;
 
 /// Who is solved when.
