@@ -39,7 +39,7 @@ mod update;
 
 pub use error::ClusteringError;
 pub use greedy_k_neighbor::greedy_k_neighbor;
-pub use merge::{Moved, merge_small};
+pub use merge::{MergeLists, Moved, merge_small};
 pub use method::{Method, cluster};
 pub use pressure::pressure;
 pub use serial_neighbor::{serial_neighbor, serial_neighbor_incidence};

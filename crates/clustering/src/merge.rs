@@ -1,19 +1,24 @@
-//! Merging what a cut left small: clusters around the cut join neighbors that have room.
+//! Clusters after a cut: what is loose joins small clusters or grows new ones, and what stays small merges.
 //!
-//! A cut takes members out of clusters and puts their parts into clusters of their own, a few constraints each
-//! ([`update_local`](crate::update_local)). Cut again and again, clusters shrink and colors grow. So the clusters that
-//! the cut made or took from, if they fill at most half of the size limit, are merged with a neighbor: the smallest
-//! first, each with the neighbor that shares most particles with it among those that have room, and again as long as the
-//! result is small itself. Of two clusters that fit into one, one fills at most half of it, so no pair is overlooked for
-//! that limit. Clusters across a cut share no particle and are never merged. Where a cut left a cluster in parts that
-//! share nothing any more, each part goes its own way.
+//! A cut takes members out of clusters and brings new constraints that are in none yet. Three passes over the place of
+//! the cut, all along links between constraints (of tets: across faces), so that nothing grows across a cut:
 //!
-//! The paper leaves this open (section 4.3 and figure 8, where colors grow from cut to cut). Greedy agglomeration, the
-//! score is that of [`greedy_k_neighbor`](crate::greedy_k_neighbor). Cost: O(m (k + v)) for m small clusters at the cut,
-//! with k = `max_size` squared and v the constraints at the particles of one cluster, whatever the size of the rest.
+//! 1. Small clusters that a loose constraint or a seed is linked to, those that fill at most half of the size limit,
+//!    grow into what is loose.
+//! 2. What is still loose grows new clusters, each from where the last one stopped.
+//! 3. Those of these clusters that are small merge with a neighbor that has room, the smallest first, and again as long
+//!    as the result is small itself. Of two clusters that fit into one, one fills at most half of it, so no pair among
+//!    them is overlooked.
+//!
+//! A growing cluster takes the constraint that has fewest loose neighbors left, which would be left alone otherwise; of
+//! these the one with most links into the cluster. Where a cut left a cluster in parts that are not linked any more,
+//! each part goes its own way.
+//!
+//! The paper makes one cluster of the children of each cut element (section 4.3) and leaves open how clusters of that
+//! kind stay large (figure 8, where colors grow from cut to cut). Cost: O(m k) for m loose constraints and small
+//! clusters, with k = `max_size` times the links of a constraint, whatever the size of the rest.
 
-use std::cmp::{Ordering, Reverse};
-use std::collections::BinaryHeap;
+use std::cmp::Reverse;
 use std::num::NonZeroUsize;
 
 use incise_graph::{ClusterId, Clustering};
@@ -27,291 +32,310 @@ pub struct Moved {
     pub from: ClusterId,
 }
 
-/// Merges the small clusters among those of `seeds` with neighbors.
+/// Lists that [`merge_small`] works with, kept from call to call so that it need not allocate.
+#[derive(Clone, Debug, Default)]
+pub struct MergeLists {
+    /// What a growing cluster may take next.
+    front: Vec<Candidate>,
+    /// A member of each cluster that grew, or could not: they may be small.
+    grown: Vec<u32>,
+    /// The members found last that hang together.
+    part: Vec<u32>,
+    /// Other clusters with room, the number of links to each.
+    near: Vec<(ClusterId, u32)>,
+    placed: Vec<u32>,
+    /// The same, ascending.
+    sorted: Vec<u32>,
+    moved: Vec<Moved>,
+}
+
+/// A loose constraint linked to a growing cluster.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    constraint: u32,
+    /// Links to loose constraints.
+    loose: u32,
+    /// Links into the cluster.
+    links: u32,
+}
+
+/// Puts loose constraints into clusters and merges the small clusters around them.
 ///
-/// Small is a cluster of at most half of `max_size` constraints. It is merged with the cluster that shares most
-/// particles with it (of equal ones the smaller, of these the one with the smaller number) among those that it fits
-/// into; no cluster gets larger than `max_size`. The larger of the two keeps its number (of equal ones the smaller
-/// number), the other number becomes vacant. Nothing but the clusters of the seeds, and clusters that share a particle
-/// with them or with what they were merged with, changes.
+/// Small is a cluster of at most half of `max_size` constraints. Afterwards each loose constraint is in a cluster, no
+/// cluster is larger than `max_size`, and where clusters hang together, none of those looked at that is small has a
+/// neighbor that it fits into. Nothing but clusters of seeds and clusters linked to them or to what was loose changes.
 ///
 /// # Arguments
-/// `seeds` are constraints of the clusters to look at, in any order, those without a cluster are skipped: after a cut,
-/// the new constraints and the others in clusters that lost some. `particles_of` gives the particles of a constraint,
-/// `constraints_of` the constraints at a particle, in any order: the result does not depend on it.
+/// `loose` are constraints that are in no cluster, or past the end of the clustering; others that are linked to them and
+/// in no cluster count as loose, too. `seeds` are constraints whose clusters are to be looked at beside those linked to
+/// what is loose; those that are in none are skipped. `neighbors_of` gives the constraints that one is linked to; links
+/// go both ways.
 ///
-/// # Returns
-/// The constraints that are in another cluster now, ascending.
-///
-/// # Panics
-/// If a seed or a constraint at a particle is no number of the clustering.
-///
-/// Deterministic. For the cost see the module's source: O(m (k + v)) for m small clusters, each with v constraints at its
-/// particles, and k the square of `max_size`.
+/// What was done is in `lists` afterwards. Deterministic: the same lists in the same order give the same clusters. For the
+/// cost see the module's source.
 ///
 /// ```
 /// use std::num::NonZeroUsize;
 ///
-/// use incise_clustering::merge_small;
-/// use incise_graph::{ClusterId, Clustering, Incidence};
+/// use incise_clustering::{MergeLists, merge_small};
+/// use incise_graph::{ClusterId, Clustering};
 ///
-/// // A row of eight springs; a cut has left 1 and 2 as clusters of their own.
-/// let springs = Incidence::from_constraints(9, (0u32..8).map(|i| [i, i + 1]))?;
-/// let labels = [0, 1, 2, 3, 3, 3, 3, 3].map(ClusterId).to_vec();
-/// let mut clustering = Clustering::from_labels(labels)?;
-/// let limit = NonZeroUsize::MIN.saturating_add(4);
-/// let moved = merge_small(
+/// // A row of eight springs; 3, 4 and 5 are new, and the cut has left 6 and 7 as clusters of their own.
+/// let [a, b, c] = [0, 1, 2].map(ClusterId);
+/// let none = ClusterId::NONE;
+/// let mut clustering = Clustering::from_labels(vec![a, a, a, none, none, none, b, c])?;
+/// let mut lists = MergeLists::default();
+/// merge_small(
+///     &mut lists,
 ///     &mut clustering,
-///     &[1, 2],
-///     limit,
-///     |c| springs.particles_of(c as usize).iter().copied(),
-///     |p| springs.constraints_of(p as usize).iter().copied(),
+///     &[3, 4, 5],
+///     &[7],
+///     NonZeroUsize::MIN.saturating_add(3),
+///     |spring| (spring.saturating_sub(1)..=(spring + 1).min(7)).filter(move |&other| other != spring),
 /// );
-/// assert_eq!(moved.iter().map(|moved| moved.constraint).collect::<Vec<_>>(), [1, 2]);
-/// assert_eq!(clustering.sizes(), [3, 0, 0, 5]);
+/// // Spring 6 grew to four, so 7 is too much for it.
+/// assert_eq!(clustering.labels(), [a, a, a, b, b, b, b, c]);
+/// assert_eq!((lists.placed(), lists.moved()), (&[5, 4, 3][..], &[][..]));
 /// # Ok::<(), incise_graph::GraphError>(())
 /// ```
-pub fn merge_small<P, C>(
+pub fn merge_small<N: IntoIterator<Item = u32>>(
+    lists: &mut MergeLists,
     clustering: &mut Clustering,
+    loose: &[u32],
     seeds: &[u32],
     max_size: NonZeroUsize,
-    particles_of: impl Fn(u32) -> P,
-    constraints_of: impl Fn(u32) -> C,
-) -> Vec<Moved>
-where
-    P: IntoIterator<Item = u32>,
-    C: IntoIterator<Item = u32>,
-{
+    neighbors_of: impl Fn(u32) -> N,
+) {
     let max_size = max_size.get();
-    let small = max_size / 2;
-    if small == 0 {
-        return Vec::new();
-    }
+    lists.grown.clear();
+    lists.placed.clear();
+    lists.moved.clear();
     let mut merging = Merging {
-        clustering,
-        particles_of,
-        constraints_of,
-        members: Vec::new(),
-        particles: Vec::new(),
-        near: Vec::new(),
-        shared: Vec::new(),
-        moved: Vec::new(),
+        lists: &mut *lists,
+        clustering: &mut *clustering,
+        neighbors_of,
+        max_size,
+        small: max_size / 2,
     };
-    let seeds = merging.by_cluster(seeds);
-    let mut waiting = BinaryHeap::new();
-    for same in seeds.chunk_by(|a, b| a.0 == b.0) {
-        let (cluster, seed) = same[0];
-        let size = merging.clustering.size(cluster);
-        if size <= small {
-            waiting.push(Reverse((size, seed)));
-        } else {
-            merging.small_parts(same, small, &mut waiting);
-        }
+    for &c in seeds {
+        merging.grow_if_small(c);
     }
-    while let Some(Reverse((size, seed))) = waiting.pop() {
-        match merging.flood(seed, size).cmp(&size) {
-            // It has joined another one, which waits under its new size.
-            Ordering::Greater => {}
-            Ordering::Equal => {
-                if let Some((merged, seed)) = merging.merge(max_size)
-                    && merged <= small
-                {
-                    waiting.push(Reverse((merged, seed)));
-                }
-            }
-            // A cluster in parts: this one, and perhaps others.
-            Ordering::Less => {
-                waiting.push(Reverse((merging.members.len(), seed)));
-                let cluster = merging.clustering.cluster_of(seed as usize);
-                let from = seeds.partition_point(|seed| Some(seed.0) < cluster);
-                let to = seeds.partition_point(|seed| Some(seed.0) <= cluster);
-                merging.small_parts(&seeds[from..to], small, &mut waiting);
+    for &c in loose {
+        if merging.label(c) == ClusterId::NONE {
+            for neighbor in (merging.neighbors_of)(c) {
+                merging.grow_if_small(neighbor);
             }
         }
     }
-    merging.finish()
-}
-
-/// What the flooded part shares with another cluster.
-struct Shared {
-    cluster: ClusterId,
-    /// The particle counted last.
-    particle: u32,
-    /// How many particles.
-    count: u32,
-    /// The smallest constraint of the cluster that shares one.
-    constraint: u32,
+    for &c in loose {
+        let mut next = Some(c).filter(|&c| merging.label(c) == ClusterId::NONE);
+        while let Some(start) = next {
+            merging.clustering.new_cluster(start as usize);
+            merging.lists.placed.push(start);
+            merging.grow(start);
+            next = merging.pick().map(|candidate| candidate.constraint);
+        }
+    }
+    merging.merge();
+    lists.finish(clustering);
 }
 
 /// The work of merging.
-struct Merging<'a, F, G> {
+struct Merging<'a, F> {
+    lists: &'a mut MergeLists,
     clustering: &'a mut Clustering,
-    particles_of: F,
-    constraints_of: G,
-    /// The part flooded last: constraints of one cluster that hang together.
-    members: Vec<u32>,
-    /// Its particles.
-    particles: Vec<u32>,
-    /// For each constraint of others at these particles: its cluster, the particle and itself.
-    near: Vec<(ClusterId, u32, u32)>,
-    /// Those of the clusters there that have room.
-    shared: Vec<Shared>,
-    moved: Vec<Moved>,
+    neighbors_of: F,
+    max_size: usize,
+    /// The size of the largest small cluster.
+    small: usize,
 }
 
-impl<P, C, F, G> Merging<'_, F, G>
-where
-    P: IntoIterator<Item = u32>,
-    C: IntoIterator<Item = u32>,
-    F: Fn(u32) -> P,
-    G: Fn(u32) -> C,
-{
-    /// The seeds that are in a cluster, with it, sorted.
-    fn by_cluster(&self, seeds: &[u32]) -> Vec<(ClusterId, u32)> {
-        let clustered = seeds.iter().filter_map(|&c| {
-            let cluster = self.clustering.cluster_of(c as usize)?;
-            Some((cluster, c))
-        });
-        let mut seeds: Vec<(ClusterId, u32)> = clustered.collect();
-        seeds.sort_unstable();
-        seeds.dedup();
-        seeds
+impl<N: IntoIterator<Item = u32>, F: Fn(u32) -> N> Merging<'_, F> {
+    /// The cluster of a constraint, which may be past the end.
+    fn label(&self, c: u32) -> ClusterId {
+        let label = self.clustering.labels().get(c as usize);
+        label.copied().unwrap_or(ClusterId::NONE)
     }
 
-    /// Lists the parts of at most `small` constraints that hold one of the seeds of a cluster, those that are in it no
-    /// more left out: size and smallest member.
-    fn small_parts(
-        &mut self,
-        seeds: &[(ClusterId, u32)],
-        small: usize,
-        parts: &mut BinaryHeap<Reverse<(usize, u32)>>,
-    ) {
-        let mut seen: Vec<u32> = Vec::new();
-        for &(cluster, seed) in seeds {
-            let there = self.clustering.cluster_of(seed as usize) == Some(cluster);
-            if !there || seen.contains(&seed) {
-                continue;
-            }
-            let size = self.flood(seed, small);
-            seen.extend(&self.members);
-            if size <= small {
-                let first = self.members.iter().copied().fold(seed, u32::min);
-                parts.push(Reverse((size, first)));
-            }
+    /// Grows the cluster of a constraint, if it is in one that is small.
+    fn grow_if_small(&mut self, c: u32) {
+        let cluster = self.label(c);
+        if cluster != ClusterId::NONE && self.clustering.size(cluster) <= self.small {
+            self.grow(c);
         }
     }
 
-    /// Finds the constraints of the seed's cluster that hang together with it, until they are more than `enough`;
-    /// returns how many were found. Other clusters at their particles are noted.
-    fn flood(&mut self, seed: u32, enough: usize) -> usize {
-        let Self {
-            clustering,
-            members,
-            particles,
-            near,
-            ..
-        } = self;
-        let own = clustering.labels()[seed as usize];
-        members.clear();
-        particles.clear();
-        near.clear();
-        members.push(seed);
+    /// Lets the cluster of a constraint take loose ones until it is full or finds none.
+    fn grow(&mut self, seed: u32) {
+        let cluster = self.label(seed);
+        self.lists.grown.push(seed);
+        self.lists.front.clear();
+        self.find_part(seed);
+        for i in 0..self.lists.part.len() {
+            self.look_around(self.lists.part[i], cluster);
+        }
+        while self.clustering.size(cluster) < self.max_size
+            && let Some(next) = self.pick()
+        {
+            self.clustering.assign(next.constraint as usize, cluster);
+            self.lists.placed.push(next.constraint);
+            self.look_around(next.constraint, cluster);
+        }
+    }
+
+    /// Takes the best candidate from the front.
+    fn pick(&mut self) -> Option<Candidate> {
+        let front = &mut self.lists.front;
+        let rank = |candidate: &Candidate| {
+            let Candidate {
+                constraint,
+                loose,
+                links,
+            } = *candidate;
+            (loose, Reverse(links), constraint)
+        };
+        let places = 0..front.len();
+        let best = places.min_by_key(|&place| rank(&front[place]))?;
+        Some(front.swap_remove(best))
+    }
+
+    /// Takes note of the loose neighbors of a new member.
+    fn look_around(&mut self, member: u32, cluster: ClusterId) {
+        for c in (self.neighbors_of)(member) {
+            if self.label(c) != ClusterId::NONE {
+                continue;
+            }
+            let front = &mut self.lists.front;
+            if let Some(candidate) = front.iter_mut().find(|known| known.constraint == c) {
+                candidate.links += 1;
+                candidate.loose = candidate.loose.saturating_sub(1);
+                continue;
+            }
+            let (mut loose, mut links) = (0, 0);
+            for neighbor in (self.neighbors_of)(c) {
+                let label = self.label(neighbor);
+                loose += u32::from(label == ClusterId::NONE);
+                links += u32::from(label == cluster);
+            }
+            self.lists.front.push(Candidate {
+                constraint: c,
+                loose,
+                links,
+            });
+        }
+    }
+
+    /// Finds the constraints of the seed's cluster that hang together with it.
+    fn find_part(&mut self, seed: u32) {
+        let own = self.label(seed);
+        let size = self.clustering.size(own);
+        self.lists.part.clear();
+        self.lists.part.push(seed);
         let mut next = 0;
-        while next < members.len() && members.len() <= enough {
-            for particle in (self.particles_of)(members[next]) {
-                if particles.contains(&particle) {
-                    continue;
-                }
-                particles.push(particle);
-                for c in (self.constraints_of)(particle) {
-                    let cluster = clustering.labels()[c as usize];
-                    if cluster != own {
-                        near.push((cluster, particle, c));
-                    } else if !members.contains(&c) {
-                        members.push(c);
-                    }
+        while next < self.lists.part.len() && self.lists.part.len() < size {
+            for c in (self.neighbors_of)(self.lists.part[next]) {
+                if self.label(c) == own && !self.lists.part.contains(&c) {
+                    self.lists.part.push(c);
                 }
             }
             next += 1;
         }
-        members.len()
     }
 
-    /// Merges the flooded part with its best neighbor; returns the size of the result and a member, or nothing if no
-    /// neighbor has room.
-    fn merge(&mut self, max_size: usize) -> Option<(usize, u32)> {
-        let seed = self.members[0];
-        let own = self.clustering.cluster_of(seed as usize)?;
-        let (other, neighbor) = self.best_neighbor(max_size)?;
-        let (part, others) = (self.members.len(), self.clustering.size(other));
-        let whole = part == self.clustering.size(own);
-        let kept = if whole && (Reverse(part), own) < (Reverse(others), other) {
-            // Parts of the neighbor that do not hang together with this one stay where they are.
-            self.flood(neighbor, usize::MAX);
-            own
-        } else {
-            other
-        };
-        for i in 0..self.members.len() {
-            self.put(self.members[i], kept);
-        }
-        Some((self.clustering.size(kept), seed))
-    }
-
-    /// The cluster with room that shares most particles with the flooded part, and a constraint of it that does.
-    fn best_neighbor(&mut self, max_size: usize) -> Option<(ClusterId, u32)> {
-        let room = max_size - self.members.len();
-        self.shared.clear();
-        for &(cluster, particle, constraint) in &self.near {
-            if cluster == ClusterId::NONE || self.clustering.size(cluster) > room {
-                continue;
-            }
-            // Few have room; and entries come particle by particle.
-            match self
-                .shared
-                .iter_mut()
-                .find(|shared| shared.cluster == cluster)
-            {
-                Some(shared) => {
-                    shared.count += u32::from(shared.particle != particle);
-                    shared.particle = particle;
-                    shared.constraint = shared.constraint.min(constraint);
+    /// Merges the small ones of the clusters that grew, the smallest first.
+    fn merge(&mut self) {
+        let mut grown = std::mem::take(&mut self.lists.grown);
+        let size = |merging: &Self, seed: u32| merging.clustering.size(merging.label(seed));
+        grown.retain(|&seed| size(self, seed) <= self.small);
+        for step in 1..=self.small {
+            let mut next = 0;
+            // A cluster whose other part has left may be smaller than the step.
+            while let Some(&seed) = grown.get(next) {
+                if size(self, seed) > step {
+                    next += 1;
+                    continue;
                 }
-                None => self.shared.push(Shared {
-                    cluster,
-                    particle,
-                    count: 1,
-                    constraint,
-                }),
+                grown.swap_remove(next);
+                // What is still small after a merger comes once more.
+                if let Some(merged) = self.join_best(seed)
+                    && merged <= self.small
+                {
+                    grown.push(seed);
+                }
             }
         }
-        let size = |shared: &&Shared| {
-            let size = self.clustering.size(shared.cluster);
-            (shared.count, Reverse((size, shared.cluster)))
-        };
-        let best = self.shared.iter().max_by_key(size)?;
-        Some((best.cluster, best.constraint))
+        self.lists.grown = grown;
     }
 
-    /// Moves a constraint into a cluster.
-    fn put(&mut self, constraint: u32, cluster: ClusterId) {
-        if let Some(from) = self.clustering.remove(constraint as usize) {
-            self.clustering.assign(constraint as usize, cluster);
-            self.moved.push(Moved { constraint, from });
+    /// Moves the part that holds the seed into the neighbor that it has most links to, of equal ones the smaller, of
+    /// these the one with the smaller number, among those with room. Returns the size of the result, or nothing if none
+    /// has room.
+    fn join_best(&mut self, seed: u32) -> Option<usize> {
+        self.find_part(seed);
+        let own = self.label(seed);
+        let room = self.max_size - self.lists.part.len();
+        self.lists.near.clear();
+        for i in 0..self.lists.part.len() {
+            for c in (self.neighbors_of)(self.lists.part[i]) {
+                let cluster = self.label(c);
+                if cluster == own || cluster == ClusterId::NONE {
+                    continue;
+                }
+                let near = &mut self.lists.near;
+                match near.iter_mut().find(|near| near.0 == cluster) {
+                    Some(near) => near.1 += 1,
+                    None if self.clustering.size(cluster) <= room => near.push((cluster, 1)),
+                    None => {}
+                }
+            }
         }
+        let rank = |&&(cluster, links): &&(ClusterId, u32)| {
+            let size = self.clustering.size(cluster);
+            (links, Reverse((size, cluster)))
+        };
+        let &(best, _) = self.lists.near.iter().max_by_key(rank)?;
+        for &constraint in &self.lists.part {
+            if let Some(from) = self.clustering.remove(constraint as usize) {
+                self.clustering.assign(constraint as usize, best);
+                self.lists.moved.push(Moved { constraint, from });
+            }
+        }
+        Some(self.clustering.size(best))
+    }
+}
+
+impl MergeLists {
+    /// What was loose in the last call, in the order in which it found clusters: members of one mostly follow another.
+    #[must_use]
+    pub fn placed(&self) -> &[u32] {
+        &self.placed
     }
 
-    /// The constraints that moved, each with the cluster it was in at first.
-    fn finish(self) -> Vec<Moved> {
+    /// The constraints that were in a cluster before the last call and are in another one now, ascending.
+    #[must_use]
+    pub fn moved(&self) -> &[Moved] {
+        &self.moved
+    }
+
+    /// Leaves the constraints that moved, each with the cluster it was in at first.
+    fn finish(&mut self, clustering: &Clustering) {
         let Self {
-            clustering,
-            mut moved,
+            moved,
+            placed,
+            sorted,
             ..
         } = self;
+        if moved.is_empty() {
+            return;
+        }
         // Stable: of several moves the first stays.
         moved.sort_by_key(|moved| moved.constraint);
         moved.dedup_by_key(|moved| moved.constraint);
-        moved.retain(|moved| clustering.cluster_of(moved.constraint as usize) != Some(moved.from));
-        moved
+        sorted.clone_from(placed);
+        sorted.sort_unstable();
+        moved.retain(|moved| {
+            let now = clustering.labels()[moved.constraint as usize];
+            now != moved.from && sorted.binary_search(&moved.constraint).is_err()
+        });
     }
 }

@@ -3,44 +3,37 @@
 use std::collections::BTreeSet;
 use std::num::NonZeroUsize;
 
-use incise_clustering::{Moved, merge_small, serial_neighbor_incidence};
+use incise_clustering::{MergeLists, Moved, merge_small, serial_neighbor_incidence};
 use incise_graph::{ClusterId, Clustering, Incidence};
 use proptest::prelude::*;
 
 use crate::inputs::{awkward, incidences};
 
-/// Merges with the incidence's own lists, each turned around if asked.
+/// The constraints that share a particle with one.
+fn neighbors(incidence: &Incidence, c: u32) -> BTreeSet<u32> {
+    let particles = incidence.particles_of(c as usize).iter();
+    let mut near: BTreeSet<u32> = particles
+        .flat_map(|&p| incidence.constraints_of(p as usize))
+        .copied()
+        .collect();
+    near.remove(&c);
+    near
+}
+
+/// Merges, where constraints are linked that share a particle.
 fn merge(
     clustering: &mut Clustering,
     incidence: &Incidence,
+    loose: &[u32],
     seeds: &[u32],
     limit: usize,
-    reversed: bool,
-) -> Vec<Moved> {
-    let turned = |row: &[u32]| {
-        let mut row = row.to_vec();
-        if reversed {
-            row.reverse();
-        }
-        row
-    };
+) -> MergeLists {
     let limit = NonZeroUsize::new(limit).unwrap();
-    merge_small(
-        clustering,
-        seeds,
-        limit,
-        |c| turned(incidence.particles_of(c as usize)),
-        |p| turned(incidence.constraints_of(p as usize)),
-    )
-}
-
-/// The distinct particles of a cluster.
-fn particles(clustering: &Clustering, incidence: &Incidence, cluster: ClusterId) -> BTreeSet<u32> {
-    let members = clustering.members();
-    let members = members.members(cluster.index()).iter();
-    members
-        .flat_map(|&c| incidence.particles_of(c as usize).to_vec())
-        .collect()
+    let mut lists = MergeLists::default();
+    merge_small(&mut lists, clustering, loose, seeds, limit, |c| {
+        neighbors(incidence, c)
+    });
+    lists
 }
 
 /// The constraints that hang together with `c` within its cluster, by brute force.
@@ -49,9 +42,7 @@ fn part(clustering: &Clustering, incidence: &Incidence, c: u32) -> BTreeSet<u32>
     loop {
         let around: BTreeSet<u32> = part
             .iter()
-            .flat_map(|&c| incidence.particles_of(c as usize))
-            .flat_map(|&p| incidence.constraints_of(p as usize))
-            .copied()
+            .flat_map(|&c| neighbors(incidence, c))
             .filter(|&d| clustering.cluster_of(d as usize) == clustering.cluster_of(c as usize))
             .chain([c])
             .collect();
@@ -69,6 +60,7 @@ proptest! {
         labels in prop::collection::vec(0u32..30, 60),
         seeds in prop::collection::vec(0usize..60, 0..20),
         ks in 1usize..9,
+        past_the_end in any::<bool>(),
     ) {
         let count = incidence.constraint_count();
         // Any labels, but no cluster above the limit: who finds a cluster full is in none.
@@ -80,121 +72,147 @@ proptest! {
                 if sizes[label] <= ks { ClusterId::new(label) } else { ClusterId::NONE }
             })
             .collect();
-        let before = Clustering::from_labels(labels).unwrap();
-        let mut seeds: Vec<u32> = seeds
+        let loose: Vec<u32> = (0..).zip(&labels).filter(|(_, k)| **k == ClusterId::NONE).map(|(c, _)| c).collect();
+        let mut before = Clustering::from_labels(labels).unwrap();
+        if past_the_end {
+            // Loose ones at the end need not be known.
+            let known = before.labels().iter().rposition(|&k| k != ClusterId::NONE);
+            before.truncate(known.map_or(0, |c| c + 1));
+        }
+        let seeds: Vec<u32> = seeds
             .into_iter()
-            .filter(|&c| c < count)
+            .filter(|&c| c < before.constraint_count())
             .map(|c| u32::try_from(c).unwrap())
             .collect();
         let mut after = before.clone();
-        let moved = merge(&mut after, &incidence, &seeds, ks, false);
+        let lists = merge(&mut after, &incidence, &loose, &seeds, ks);
 
         after.check().unwrap();
         prop_assert!(after.max_size() <= ks);
-        prop_assert_eq!(after.cluster_count(), before.cluster_count());
-        prop_assert!(after.occupied() <= before.occupied());
+        prop_assert!((0..count).all(|c| after.cluster_of(c).is_some()));
+        prop_assert!(after.occupied() <= before.occupied() + loose.len());
+        let was = |c: usize| before.labels().get(c).copied().unwrap_or(ClusterId::NONE);
         let expected: Vec<Moved> = (0..)
-            .zip(before.labels().iter().zip(after.labels()))
-            .filter(|(_, (was, is))| was != is)
-            .map(|(constraint, (was, _))| Moved { constraint, from: *was })
+            .zip(after.labels())
+            .map(|(constraint, is)| (constraint, was(constraint as usize), is))
+            .filter(|(_, was, is)| was != *is && *was != ClusterId::NONE)
+            .map(|(constraint, from, _)| Moved { constraint, from })
             .collect();
-        prop_assert_eq!(&moved, &expected);
+        prop_assert_eq!(lists.moved(), &expected);
+        let mut placed = lists.placed().to_vec();
+        placed.sort_unstable();
+        prop_assert_eq!(&placed, &loose);
 
-        // The order in which seeds and neighbors are listed does not count.
-        let mut again = before.clone();
-        seeds.reverse();
-        prop_assert_eq!(&merge(&mut again, &incidence, &seeds, ks, true), &moved);
+        // Used lists are as good as new ones.
+        let (mut again, mut lists) = (before.clone(), lists);
+        let limit = NonZeroUsize::new(ks).unwrap();
+        merge_small(&mut lists, &mut again, &loose, &seeds, limit, |c| neighbors(&incidence, c));
         prop_assert_eq!(&again, &after);
+        prop_assert_eq!(lists.moved(), &expected);
 
-        // Clusters change only where clusters of seeds and their neighbors hang together.
-        let mut reached: BTreeSet<ClusterId> =
-            seeds.iter().filter_map(|&c| before.cluster_of(c as usize)).collect();
+        // Who moved was, step by step along links, not far from a seed or from what was loose.
+        let mut reached: BTreeSet<u32> = loose.iter().chain(&seeds).copied().collect();
         loop {
-            let near: BTreeSet<u32> =
-                reached.iter().flat_map(|&k| particles(&before, &incidence, k)).collect();
-            let more: BTreeSet<ClusterId> = near
-                .iter()
-                .flat_map(|&p| incidence.constraints_of(p as usize))
-                .filter_map(|&c| before.cluster_of(c as usize))
-                .chain(reached.iter().copied())
-                .collect();
+            let mut more = reached.clone();
+            more.extend(reached.iter().flat_map(|&c| neighbors(&incidence, c)));
+            let clusters: BTreeSet<ClusterId> =
+                more.iter().map(|&c| was(c as usize)).filter(|&k| k != ClusterId::NONE).collect();
+            more.extend((0..).take(count).filter(|&c| clusters.contains(&was(c as usize))));
             if more.len() == reached.len() {
                 break;
             }
             reached = more;
         }
-        for moved in &moved {
-            prop_assert!(reached.contains(&moved.from));
+        for moved in &expected {
+            prop_assert!(reached.contains(&moved.constraint));
         }
     }
 }
 
 proptest! {
-    /// Where every cluster hangs together, no seed is left in a small cluster beside one that has room for it.
+    /// Where every cluster hangs together, nothing loose and no seed is left in a small cluster beside one that has room
+    /// for it.
     #[test]
     fn whatever_fits_is_merged(
         incidence in incidences(),
-        seeds in prop::collection::vec(0usize..60, 0..20),
+        chosen in prop::collection::vec(0usize..60, 0..20),
+        single in prop::collection::vec(0usize..60, 0..20),
         start in 1usize..4,
         ks in 3usize..9,
     ) {
         let mut clustering = serial_neighbor_incidence(&incidence, NonZeroUsize::new(start).unwrap());
         let count = incidence.constraint_count();
-        let seeds: Vec<u32> = (0..).take(count).filter(|&c| seeds.contains(&(c as usize))).collect();
-        merge(&mut clustering, &incidence, &seeds, ks, false);
+        let of = |list: &[usize]| -> Vec<u32> {
+            (0..).take(count).filter(|&c| list.contains(&(c as usize))).collect()
+        };
+        let (mut seeds, mut loose) = (of(&chosen), of(&single));
+        // Whole clusters become loose, so that the others still hang together.
+        let gone: BTreeSet<_> = loose.iter().filter_map(|&c| clustering.cluster_of(c as usize)).collect();
+        loose = (0..).take(count).filter(|&c| {
+            clustering.cluster_of(c as usize).is_some_and(|k| gone.contains(&k))
+        }).collect();
+        for &c in &loose {
+            clustering.remove(c as usize);
+        }
+        merge(&mut clustering, &incidence, &loose, &seeds, ks);
+        seeds.extend(&loose);
         for &seed in &seeds {
             let own = clustering.cluster_of(seed as usize).unwrap();
             let size = clustering.size(own);
-            let particles = particles(&clustering, &incidence, own);
-            for &d in particles.iter().flat_map(|&p| incidence.constraints_of(p as usize)) {
-                let other = clustering.cluster_of(d as usize).unwrap();
-                let fits = other != own && size <= ks / 2 && size + clustering.size(other) <= ks;
-                prop_assert!(!fits, "{own} fits into {other}");
+            for c in part(&clustering, &incidence, seed) {
+                for d in neighbors(&incidence, c) {
+                    let other = clustering.cluster_of(d as usize).unwrap();
+                    let fits = other != own && size <= ks / 2 && size + clustering.size(other) <= ks;
+                    prop_assert!(!fits, "{own} fits into {other}");
+                }
             }
         }
     }
 }
 
 #[test]
-fn single_constraints_become_full_clusters_or_nearly_so() {
+fn loose_constraints_become_full_clusters_or_nearly_so() {
     for incidence in awkward() {
         let count = incidence.constraint_count();
         for ks in [1, 2, 5, 10] {
-            let mut clustering = Clustering::none(count);
-            let seeds: Vec<u32> = (0..).take(count).collect();
-            merge(&mut clustering, &incidence, &seeds, ks, false);
+            let mut clustering = Clustering::default();
+            let loose: Vec<u32> = (0..).take(count).collect();
+            merge(&mut clustering, &incidence, &loose, &[], ks);
             clustering.check().unwrap();
             assert!(clustering.max_size() <= ks);
-            // Each cluster is one part: merging never joins what shares nothing.
-            for c in 0..u32::try_from(count).unwrap() {
+            // Each cluster is one part: merging never joins what is not linked.
+            for c in loose {
                 let own = clustering.cluster_of(c as usize).unwrap();
                 assert_eq!(part(&clustering, &incidence, c).len(), clustering.size(own));
             }
         }
     }
     let row = Incidence::from_constraints(301, (0u32..300).map(|i| [i, i + 1])).unwrap();
-    let mut clustering = Clustering::none(300);
-    let seeds: Vec<u32> = (0..300).collect();
-    merge(&mut clustering, &row, &seeds, 10, false);
-    // No two neighbors fit into one cluster of 10, so each pair of neighbors holds more.
-    assert!(clustering.occupied() < 60, "{}", clustering.occupied());
+    let mut clustering = Clustering::default();
+    // From one end or from both: what is left over is at most the last cluster.
+    for loose in [(0..300).collect::<Vec<u32>>(), (0..300).rev().collect()] {
+        clustering.clone_from(&Clustering::default());
+        merge(&mut clustering, &row, &loose, &[], 10);
+        assert_eq!(clustering.occupied(), 30);
+    }
 }
 
 /// Two triangles side by side; a cut has parted the left one from the right ones.
 #[test]
-fn nothing_is_merged_across_a_cut() {
+fn nothing_grows_or_is_merged_across_a_cut() {
     let incidence = Incidence::from_constraints(7, [[0u32, 1, 2], [3, 4, 5], [3, 4, 6]]).unwrap();
-    let mut clustering = Clustering::none(3);
-    let moved = merge(&mut clustering, &incidence, &[0, 1], 4, false);
-    let from = ClusterId(2);
-    assert_eq!(
-        moved,
-        [Moved {
-            constraint: 2,
-            from
-        }]
-    );
-    assert_eq!(clustering.sizes(), [1, 2, 0]);
+    let mut clustering = Clustering::default();
+    merge(&mut clustering, &incidence, &[0, 1, 2], &[], 4);
+    assert_eq!(clustering.labels(), [0, 1, 1].map(ClusterId));
+    let mut clustering = Clustering::from_labels([0, 1, 2].map(ClusterId).to_vec()).unwrap();
+    let lists = merge(&mut clustering, &incidence, &[], &[0, 1], 4);
+    let from = ClusterId(1);
+    let expected = Moved {
+        constraint: 1,
+        from,
+    };
+    assert_eq!(lists.moved(), [expected]);
+    assert_eq!(clustering.sizes(), [1, 0, 2]);
 }
 
 /// A cluster of four that a cut brought apart: each half joins its own side.
@@ -213,19 +231,43 @@ fn parts_of_a_cluster_go_their_own_ways() {
     let incidence = Incidence::from_constraints(10, rows).unwrap();
     let labels = [0, 0, 0, 0, 1, 1, 2, 2].map(ClusterId).to_vec();
     let mut clustering = Clustering::from_labels(labels).unwrap();
-    let moved = merge(&mut clustering, &incidence, &[0, 2], 4, false);
-    assert_eq!(moved.len(), 4);
-    // Of two clusters of one size the smaller number is kept.
-    assert_eq!(clustering.labels(), [1, 1, 0, 0, 1, 1, 0, 0].map(ClusterId));
+    // The cluster in parts is larger than half of the limit; its neighbors are not, and it has room for one of them.
+    let lists = merge(&mut clustering, &incidence, &[], &[4, 6], 6);
+    let moved = [4, 5].map(|constraint| Moved {
+        constraint,
+        from: ClusterId(1),
+    });
+    assert_eq!(lists.moved(), moved);
+    let labels = [0, 0, 0, 0, 1, 1, 2, 2].map(ClusterId).to_vec();
+    let mut clustering = Clustering::from_labels(labels).unwrap();
+    merge(&mut clustering, &incidence, &[], &[0, 2], 8);
+    assert_eq!(clustering.labels(), [1, 1, 2, 2, 1, 1, 2, 2].map(ClusterId));
     assert_eq!(clustering.occupied(), 2);
 }
 
-/// The neighbor on a face wins over one on an edge.
+/// A remnant grows into what is loose before that makes clusters of its own.
 #[test]
-fn a_face_counts_more_than_an_edge() {
-    let rows = [[0u32, 1, 2, 3], [2, 3, 4, 5], [1, 2, 3, 6]];
-    let incidence = Incidence::from_constraints(7, rows).unwrap();
-    let mut clustering = Clustering::none(3);
-    merge(&mut clustering, &incidence, &[0], 2, false);
-    assert_eq!(clustering.sizes(), [2, 1, 0]);
+fn small_clusters_grow_first() {
+    let row = Incidence::from_constraints(11, (0u32..10).map(|i| [i, i + 1])).unwrap();
+    let mut labels = vec![ClusterId::NONE; 10];
+    labels[..2].fill(ClusterId(0));
+    labels[8..].fill(ClusterId(1));
+    let mut clustering = Clustering::from_labels(labels).unwrap();
+    let lists = merge(&mut clustering, &row, &[2, 3, 4, 5, 6, 7], &[], 5);
+    assert_eq!(clustering.sizes()[..2], [5, 5]);
+    assert!(lists.moved().is_empty());
+}
+
+/// The neighbor with more links wins.
+#[test]
+fn more_links_count_more() {
+    let links: [&[u32]; 5] = [&[2, 3, 4], &[], &[0, 3], &[0, 2], &[0]];
+    let labels = [0, 1, 2, 2, 3].map(ClusterId).to_vec();
+    let mut clustering = Clustering::from_labels(labels).unwrap();
+    let limit = NonZeroUsize::new(3).unwrap();
+    let mut lists = MergeLists::default();
+    merge_small(&mut lists, &mut clustering, &[], &[0], limit, |c| {
+        links[c as usize].iter().copied()
+    });
+    assert_eq!(clustering.sizes(), [0, 1, 3, 1]);
 }

@@ -71,8 +71,9 @@ impl AnySolver {
             for (t, tet) in mesh.tets.iter().enumerate() {
                 solver.push_tet(tet.map(|p| p.0), mesh.corners(TetId::new(t)), joined.material_of[t]);
             }
+            let mut star = Vec::new();
             for (p, &fixed) in joined.fixed.iter().enumerate() {
-                solver.set_mass(p, mass(solver, cuttable, ParticleId::new(p)));
+                solver.set_mass(p, mass(solver, cuttable, ParticleId::new(p), &mut star));
                 if fixed {
                     solver.set_fixed(p, true);
                 }
@@ -159,9 +160,10 @@ impl AnySolver {
                 solver.move_tet(tet.from.index(), tet.to.index());
             }
             solver.truncate_tets(delta.tets_after());
+            let mut star = Vec::new();
             for p in touched(delta) {
-                let star = cuttable.around(p).map(TetId::index);
-                solver.set_mass_in_star(p.index(), mass(solver, cuttable, p), star);
+                let mass = mass(solver, cuttable, p, &mut star);
+                solver.set_mass_in_star(p.index(), mass, star.iter().map(|tet| tet.index()));
             }
             // Particles that lost all their tets stay where they are.
             for p in delta.deleted.iter().flat_map(|tet| tet.corners) {
@@ -196,8 +198,10 @@ impl AnySolver {
                     return Err(Error::Inconsistent(format!("tet {t} has other particles in the solver")));
                 }
             }
+            let mut star = Vec::new();
             for p in 0..mesh.positions.len() {
-                let (stored, fresh) = (solver.mass(p), mass(solver, cuttable, ParticleId::new(p)));
+                let fresh = mass(solver, cuttable, ParticleId::new(p), &mut star);
+                let stored = solver.mass(p);
                 if (stored - fresh).abs() > 1e-12 * fresh {
                     return Err(Error::Inconsistent(format!("particle {p} has mass {stored} instead of {fresh}")));
                 }
@@ -268,13 +272,19 @@ impl<R: Real> Backend<R> {
     }
 }
 
-/// A quarter of the mass of each tet around a particle, summed in the order of the tets.
-fn mass<R: Real>(solver: &Solver<R>, cuttable: &CuttableMesh, particle: ParticleId) -> f64 {
-    let mut tets: Vec<TetId> = cuttable.around(particle).collect();
-    tets.sort_unstable();
+/// A quarter of the mass of each tet around a particle, summed in the order of the tets, which `star` has afterwards.
+fn mass<R: Real>(
+    solver: &Solver<R>,
+    cuttable: &CuttableMesh,
+    particle: ParticleId,
+    star: &mut Vec<TetId>,
+) -> f64 {
+    star.clear();
+    star.extend(cuttable.around(particle));
+    star.sort_unstable();
     let quarter = |t: &TetId| 0.25 * solver.density_of(t.index()) * cuttable.mesh().volume(*t);
     // Rounding can make the volume of a sliver negative.
-    tets.iter().map(quarter).sum::<f64>().max(0.0)
+    star.iter().map(quarter).sum::<f64>().max(0.0)
 }
 
 /// The particles whose tets changed, ascending.

@@ -3,18 +3,20 @@
 use std::num::NonZeroUsize;
 use std::time::Instant;
 
-use incise_clustering::{Method, Moved, cluster, merge_small, update_local};
+use incise_clustering::{MergeLists, Method, cluster, merge_small, update_local};
 use incise_coloring::{Algorithm, Recoloring, color};
-use incise_cutting::{CutDelta, CuttableMesh, RelinkedTet, RemovedTet};
+use incise_cutting::{CutDelta, CuttableMesh};
 use incise_graph::{ClusterId, Clustering, Coloring, Incidence, Schedule};
-use incise_mesh::{ParticleId, TetId, TetMesh};
+use incise_mesh::{TetId, TetMesh};
 
 use crate::report::{Milliseconds, milliseconds};
 use crate::{Error, Scene};
 
 /// Colors that cuts may add before all clusters are colored anew: each color is a barrier in every iteration, but a
-/// full coloring takes longer than a frame on a large body.
-const SLACK: usize = 2;
+/// full coloring with the schedule that it takes anew costs more than a frame. With 2, one stroke through a body of
+/// 11 000 tets took two of them; with 4 none. The price: the new schedule also packs the tets anew, and without it
+/// solving that stroke took 7 % more instructions.
+const SLACK: usize = 4;
 
 /// Who is solved when.
 #[derive(Debug)]
@@ -23,6 +25,7 @@ pub(crate) struct Plan {
     recoloring: Recoloring,
     pub(crate) schedule: Schedule,
     recipe: Recipe,
+    lists: Lists,
 }
 
 /// How a plan is made and kept.
@@ -34,13 +37,20 @@ pub(crate) struct Recipe {
     merges: bool,
 }
 
-/// What a cut did to clusters, as they were before.
-#[derive(Default)]
-struct Edit<'a> {
-    /// The tets that are no more.
-    gone: Vec<(u32, &'a RemovedTet)>,
-    /// Those with other corners.
-    relinked: Vec<(u32, &'a RelinkedTet)>,
+/// Lists that following a cut works with, kept so that a frame need not allocate them.
+#[derive(Debug, Default)]
+struct Lists {
+    /// Pairs of a cluster and a particle that are no more, one for each tet.
+    removed: Vec<(u32, u32)>,
+    /// Those that are new.
+    added: Vec<(u32, u32)>,
+    /// The clusters of the relinked tets before.
+    relinked: Vec<ClusterId>,
+    /// Tets in no cluster.
+    loose: Vec<u32>,
+    /// Tets whose clusters may be small.
+    seeds: Vec<u32>,
+    merging: MergeLists,
 }
 
 impl Recipe {
@@ -75,6 +85,7 @@ impl Plan {
             recoloring,
             schedule,
             recipe,
+            lists: Lists::default(),
         })
     }
 
@@ -95,9 +106,9 @@ impl Plan {
         self.recoloring.coloring()
     }
 
-    /// Follows a cut: cut and deleted tets leave their clusters, the children on each side of a cut tet become new
-    /// clusters, those around the cut that are small are merged, and who has new particles gets a color; everything else
-    /// stays. `cuttable` is the mesh after the cut.
+    /// Follows a cut: cut and deleted tets leave their clusters, the children join small clusters around or become new
+    /// ones, what stays small is merged, and who has new particles gets a color; everything else stays. Without merging
+    /// the children on each side of a cut tet become clusters of their own. `cuttable` is the mesh after the cut.
     pub(crate) fn follow(
         &mut self,
         delta: &CutDelta,
@@ -105,25 +116,36 @@ impl Plan {
         ms: &mut Milliseconds,
     ) -> Result<(), Error> {
         let start = Instant::now();
-        let edit = self.edit(delta)?;
-        let merged = if self.recipe.merges {
-            let seeds = self.seeds(delta, &edit.gone, cuttable);
-            self.merge(&seeds, cuttable)
+        self.take_out(delta);
+        if self.recipe.merges {
+            let Lists { loose, seeds, .. } = &mut self.lists;
+            loose.clear();
+            loose.extend(delta.added.iter().map(|tet| tet.tet.0));
+            // What is left of a cluster has a face at a child of what was cut, or in the new boundary.
+            seeds.clear();
+            seeds.extend(delta.surface_added.iter().map(|triangle| triangle.tet.0));
+            self.merge(cuttable);
         } else {
-            Vec::new()
-        };
+            self.add_groups(delta)?;
+        }
         let clustered = Instant::now();
-        let all = self.recolor(delta, &edit, &merged, cuttable)?;
+        self.relink(delta);
+        if self.recipe.merges {
+            self.link_merged(delta, cuttable);
+        } else {
+            self.link_groups(delta);
+        }
+        let all = self.recolor()?;
         let colored = Instant::now();
-        self.reschedule(delta, &merged, all);
+        self.reschedule(delta, all);
         ms.cluster += milliseconds(clustered - start);
         ms.color += milliseconds(colored - clustered);
         ms.schedule += milliseconds(colored.elapsed());
         Ok(())
     }
 
-    /// Follows several cuts at once, whose last left the mesh as `cuttable`: each by itself first, then small clusters
-    /// among all that they touched are merged. Costs what the cuts did, and O(tets).
+    /// Follows several cuts at once, whose last left the mesh as `cuttable`. If clusters are merged, children stay loose
+    /// until the end. Costs what the cuts did, and O(tets).
     pub(crate) fn catch_up(
         &mut self,
         deltas: &[CutDelta],
@@ -132,47 +154,74 @@ impl Plan {
         if deltas.is_empty() {
             return Ok(());
         }
-        let mut touched = Vec::new();
+        let mut is_touched = vec![false; self.clustering.cluster_count()];
         for delta in deltas {
-            let edit = self.edit(delta)?;
-            touched.extend(edit.gone.iter().map(|(cluster, _)| *cluster));
-            let labels = self.clustering.labels();
-            touched.extend(delta.added.iter().map(|tet| labels[tet.tet.index()].0));
-            self.recolor(delta, &edit, &[], cuttable)?;
+            self.take_out(delta);
+            if self.recipe.merges {
+                for &(cluster, _) in &self.lists.removed {
+                    is_touched[cluster as usize] = true;
+                }
+                self.relink(delta);
+            } else {
+                self.add_groups(delta)?;
+                self.relink(delta);
+                self.link_groups(delta);
+            }
+            self.recolor()?;
         }
         if self.recipe.merges {
-            let mut is_touched = vec![false; self.clustering.cluster_count()];
-            for cluster in touched {
-                is_touched[cluster as usize] = true;
+            let Lists { loose, seeds, .. } = &mut self.lists;
+            loose.clear();
+            seeds.clear();
+            let labels = self.clustering.labels();
+            for tet in 0..cuttable.mesh().tets.len() {
+                let id = TetId::new(tet).0;
+                match labels.get(tet) {
+                    None | Some(&ClusterId::NONE) => loose.push(id),
+                    Some(cluster) if is_touched[cluster.index()] => seeds.push(id),
+                    Some(_) => {}
+                }
             }
-            let labels = (0..).zip(self.clustering.labels());
-            let seeds = labels.filter(|(_, cluster)| is_touched[cluster.index()]);
-            let seeds: Vec<u32> = seeds.map(|(tet, _)| tet).collect();
-            let merged = self.merge(&seeds, cuttable);
-            self.recolor(&CutDelta::default(), &Edit::default(), &merged, cuttable)?;
+            self.merge(cuttable);
+            self.link_merged(&CutDelta::default(), cuttable);
+            self.recolor()?;
         }
         self.schedule
             .rebuild(&self.clustering, self.recoloring.coloring());
         Ok(())
     }
 
-    /// Takes cut and deleted tets out of their clusters and makes clusters of the children.
-    fn edit<'a>(&mut self, delta: &'a CutDelta) -> Result<Edit<'a>, Error> {
-        let gone = delta.removed.iter().chain(&delta.deleted);
-        let gone = gone
-            .filter_map(|tet| Some((self.clustering.cluster_of(tet.tet.index())?.0, tet)))
-            .collect();
-        let relinked = delta.relinked.iter();
-        let relinked = relinked
-            .filter_map(|tet| Some((self.clustering.cluster_of(tet.tet.index())?.0, tet)))
-            .collect();
-        self.update_clusters(delta)?;
-        Ok(Edit { gone, relinked })
+    /// The cluster of a tet, if it is in one; it may be past the end.
+    fn cluster_of(&self, tet: TetId) -> Option<ClusterId> {
+        let label = self.clustering.labels().get(tet.index()).copied();
+        label.filter(|&cluster| cluster != ClusterId::NONE)
     }
 
-    fn update_clusters(&mut self, delta: &CutDelta) -> Result<(), Error> {
+    /// Takes cut and deleted tets out of their clusters, and notes their pairs and the clusters of relinked tets.
+    fn take_out(&mut self, delta: &CutDelta) {
+        self.lists.relinked.clear();
+        for tet in &delta.relinked {
+            let cluster = self.cluster_of(tet.tet).unwrap_or(ClusterId::NONE);
+            self.lists.relinked.push(cluster);
+        }
+        for tet in delta.removed.iter().chain(&delta.deleted) {
+            if let Some(cluster) = self.cluster_of(tet.tet) {
+                self.clustering.remove(tet.tet.index());
+                let pairs = tet.corners.map(|p| (cluster.0, p.0));
+                self.lists.removed.extend(pairs);
+            }
+        }
+        for tet in &delta.moved {
+            if tet.from.index() < self.clustering.constraint_count() {
+                self.clustering.renumber(tet.from.index(), tet.to.index());
+            }
+        }
+        self.clustering.truncate(delta.tets_after());
+    }
+
+    /// Makes clusters of the children on each side of each cut tet.
+    fn add_groups(&mut self, delta: &CutDelta) -> Result<(), Error> {
         let _span = tracing::debug_span!("incise::cluster").entered();
-        let removed: Vec<u32> = delta.removed.iter().map(|tet| tet.tet.0).collect();
         let mut children: Vec<_> = delta
             .added
             .iter()
@@ -188,112 +237,106 @@ impl Plan {
                     .map_err(|_| Error::Inconsistent("too many tets".into()))?,
             );
         }
-        update_local(
-            &mut self.clustering,
-            &removed,
-            &offsets,
-            &values,
-            self.recipe.limit(),
-        )?;
-        for tet in &delta.deleted {
-            self.clustering.remove(tet.tet.index());
-        }
-        for tet in &delta.moved {
-            self.clustering.renumber(tet.from.index(), tet.to.index());
-        }
-        self.clustering.truncate(delta.tets_after());
+        let limit = self.recipe.limit();
+        update_local(&mut self.clustering, &[], &offsets, &values, limit)?;
         Ok(())
     }
 
-    /// Tets of the clusters that a cut made or took from. Those that only come apart keep their size: they stay.
-    fn seeds(
-        &self,
-        delta: &CutDelta,
-        gone: &[(u32, &RemovedTet)],
-        cuttable: &CuttableMesh,
-    ) -> Vec<u32> {
-        let mut shrunk: Vec<u32> = gone.iter().map(|(cluster, _)| *cluster).collect();
-        shrunk.sort_unstable();
-        shrunk.dedup();
-        // What is left of a cluster hangs on particles of what is gone, or on copies of them.
-        let corners = gone.iter().flat_map(|(_, tet)| tet.corners);
-        let mut particles: Vec<ParticleId> = corners.collect();
-        particles.sort_unstable();
-        particles.dedup();
-        let is_left = |tet: &TetId| {
-            let cluster = self.clustering.cluster_of(tet.index());
-            cluster.is_some_and(|cluster| shrunk.binary_search(&cluster.0).is_ok())
-        };
-        let around = particles.iter().flat_map(|&p| cuttable.around(p));
-        let mut seeds: Vec<u32> = around.filter(is_left).map(|tet| tet.0).collect();
-        seeds.extend(delta.added.iter().map(|tet| tet.tet.0));
-        seeds
-    }
-
-    /// Merges the small ones of the clusters of some tets.
-    fn merge(&mut self, seeds: &[u32], cuttable: &CuttableMesh) -> Vec<Moved> {
+    /// Puts loose tets into clusters and merges the small ones around.
+    fn merge(&mut self, cuttable: &CuttableMesh) {
         let _span = tracing::debug_span!("incise::merge").entered();
         merge_small(
+            &mut self.lists.merging,
             &mut self.clustering,
-            seeds,
+            &self.lists.loose,
+            &self.lists.seeds,
             self.recipe.limit(),
-            |tet| cuttable.mesh().tets[tet as usize].map(|p| p.0),
-            |particle| cuttable.around(ParticleId(particle)).map(|tet| tet.0),
-        )
+            |tet| {
+                let neighbors = cuttable.neighbors(TetId(tet)).into_iter();
+                neighbors.flatten().map(|tet| tet.0)
+            },
+        );
     }
 
-    /// Colors the new clusters, and old ones that the cut or a merger brought new particles. Returns whether all
-    /// clusters have been colored anew.
-    fn recolor(
-        &mut self,
-        delta: &CutDelta,
-        edit: &Edit<'_>,
-        merged: &[Moved],
-        cuttable: &CuttableMesh,
-    ) -> Result<bool, Error> {
-        let _span = tracing::debug_span!("incise::color").entered();
-        let label = |tet: TetId| self.clustering.labels()[tet.index()].0;
-        let (mut removed, mut added) = (Vec::new(), Vec::new());
-        for (cluster, tet) in &edit.gone {
-            removed.extend(tet.corners.map(|p| (*cluster, p.0)));
-        }
-        for tet in &delta.added {
-            let cluster = label(tet.tet);
-            added.extend(tet.corners.map(|p| (cluster, p.0)));
-        }
-        for (before, tet) in &edit.relinked {
-            let after = label(delta.slot_after(tet.tet));
+    /// Notes the pairs of tets with other corners, which may be in another cluster now.
+    fn relink(&mut self, delta: &CutDelta) {
+        let Lists {
+            removed,
+            added,
+            relinked,
+            ..
+        } = &mut self.lists;
+        for (tet, before) in delta.relinked.iter().zip(relinked) {
+            if *before == ClusterId::NONE {
+                continue;
+            }
+            let after = self.clustering.labels()[delta.slot_after(tet.tet).index()];
             for (p, q) in tet.before.into_iter().zip(tet.after) {
                 if (*before, p) != (after, q) {
-                    removed.push((*before, p.0));
-                    added.push((after, q.0));
+                    removed.push((before.0, p.0));
+                    added.push((after.0, q.0));
                 }
             }
         }
-        let mut known: Vec<TetId> = delta.added.iter().map(|tet| tet.tet).collect();
-        known.extend(delta.relinked.iter().map(|tet| delta.slot_after(tet.tet)));
-        known.sort_unstable();
-        for moved in merged {
+    }
+
+    /// Notes the pairs of tets that were loose or moved.
+    fn link_merged(&mut self, delta: &CutDelta, cuttable: &CuttableMesh) {
+        let Lists {
+            removed,
+            added,
+            merging,
+            ..
+        } = &mut self.lists;
+        let (tets, labels) = (&cuttable.mesh().tets, self.clustering.labels());
+        for moved in merging.moved() {
             let tet = TetId(moved.constraint);
-            if known.binary_search(&tet).is_err() {
-                let corners = cuttable.mesh().tets[tet.index()];
+            let before = slot_before(delta, tet);
+            let relinked = delta.relinked.binary_search_by_key(&before, |tet| tet.tet);
+            if relinked.is_err() {
+                let corners = tets[tet.index()];
                 removed.extend(corners.map(|p| (moved.from.0, p.0)));
-                added.extend(corners.map(|p| (label(tet), p.0)));
+                added.extend(corners.map(|p| (labels[tet.index()].0, p.0)));
             }
         }
+        for &tet in merging.placed() {
+            let cluster = labels[tet as usize].0;
+            added.extend(tets[tet as usize].map(|p| (cluster, p.0)));
+        }
+    }
+
+    /// Notes the pairs of the children, where they are clusters of their own.
+    fn link_groups(&mut self, delta: &CutDelta) {
+        let labels = self.clustering.labels();
+        for tet in &delta.added {
+            let cluster = labels[tet.tet.index()].0;
+            let pairs = tet.corners.map(|p| (cluster, p.0));
+            self.lists.added.extend(pairs);
+        }
+    }
+
+    /// Colors new clusters, and old ones that have new particles. Returns whether all clusters have been colored anew.
+    fn recolor(&mut self) -> Result<bool, Error> {
+        let _span = tracing::debug_span!("incise::color").entered();
         // A new cluster may have been merged away at once, but its number is in use.
         self.recoloring.reserve(self.clustering.cluster_count());
-        Ok(self.recoloring.apply(&removed, &added)?.full)
+        let Lists { removed, added, .. } = &mut self.lists;
+        let full = self.recoloring.apply(removed, added)?.full;
+        removed.clear();
+        added.clear();
+        Ok(full)
     }
 
     /// Lets the schedule follow clusters and colors.
-    fn reschedule(&mut self, delta: &CutDelta, merged: &[Moved], all: bool) {
+    fn reschedule(&mut self, delta: &CutDelta, all: bool) {
         let coloring = self.recoloring.coloring();
         if all {
             self.schedule.rebuild(&self.clustering, coloring);
             return;
         }
         let removed = delta.removed.iter().chain(&delta.deleted);
+        // Empty if nothing is ever merged.
+        let merged = self.lists.merging.moved();
         let tets: Vec<u32> = removed
             .map(|tet| tet.tet)
             .chain(delta.added.iter().map(|tet| tet.tet))
@@ -327,6 +370,13 @@ impl Plan {
     }
 }
 
+/// The slot before the cut of a tet that is in this one now.
+fn slot_before(delta: &CutDelta, tet: TetId) -> TetId {
+    // Both ends of the moves ascend.
+    let moved = delta.moved.binary_search_by_key(&tet, |moved| moved.to);
+    moved.map_or(tet, |i| delta.moved[i].from)
+}
+
 /// The particles of each tet as constraints.
 pub(crate) fn incidence(mesh: &TetMesh) -> Result<Incidence, Error> {
     Ok(Incidence::from_constraints(
@@ -338,7 +388,7 @@ pub(crate) fn incidence(mesh: &TetMesh) -> Result<Incidence, Error> {
 #[cfg(test)]
 mod tests {
     use glam::DVec3;
-    use incise_cutting::MovedTet;
+    use incise_cutting::{MovedTet, RemovedTet};
     use incise_mesh::generate::kuhn_box;
 
     use super::*;

@@ -79,17 +79,37 @@ impl Links {
         None
     }
 
-    /// Are a vertex and a particle linked?
-    pub(super) fn contains(&self, vertex: u32, particle: u32) -> bool {
-        self.find(vertex, particle).is_some()
-    }
-
     /// Links a vertex and a particle, once more if they are linked; both may be new.
     pub(super) fn add(&mut self, vertex: u32, particle: u32) {
-        if let Some(place) = self.find(vertex, particle) {
-            self.links[place as usize].count += 1;
-            return;
+        if !self.repeat(vertex, particle) {
+            self.insert(vertex, particle);
         }
+    }
+
+    /// Counts a link once more; false if there is none. O(links at the particle).
+    pub(super) fn repeat(&mut self, vertex: u32, particle: u32) -> bool {
+        let place = self.find(vertex, particle);
+        if let Some(place) = place {
+            self.links[place as usize].count += 1;
+        }
+        place.is_some()
+    }
+
+    /// The same, where a link could only be the last that came to the particle. O(1).
+    pub(super) fn repeat_last(&mut self, vertex: u32, particle: u32) -> bool {
+        let place = self.at_particle.get(particle as usize).copied();
+        let last = place.and_then(|place| self.links.get_mut(place as usize));
+        match last {
+            Some(link) if link.vertex == vertex => {
+                link.count += 1;
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// Links a vertex and a particle that are not linked; both may be new. O(1).
+    pub(super) fn insert(&mut self, vertex: u32, particle: u32) {
         grow(&mut self.of_vertex, vertex, NONE);
         if self.particle_count() <= particle as usize {
             let new = particle as usize + 1 - self.particle_count();

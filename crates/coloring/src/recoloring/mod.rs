@@ -18,6 +18,8 @@
 mod links;
 mod taken;
 
+use std::cmp::Reverse;
+
 use incise_graph::{ColorId, Coloring, Incidence};
 
 use crate::conflicts::UNCOLORED;
@@ -80,6 +82,10 @@ pub struct Recoloring {
     /// The number of colors after the last full coloring.
     reference: usize,
     slack: usize,
+    /// Vertices that an edit leaves without a color, and the color that they had.
+    waiting: Vec<(u32, ColorId)>,
+    /// Those that cannot keep it, by the valences of their particles.
+    crowded: Vec<(Reverse<u64>, u32)>,
 }
 
 impl Recoloring {
@@ -149,6 +155,8 @@ impl Recoloring {
             sizes: Vec::new(),
             reference: 0,
             slack,
+            waiting: Vec::new(),
+            crowded: Vec::new(),
         };
         recoloring.count();
         recoloring
@@ -220,13 +228,16 @@ impl Recoloring {
         self.changed.clear();
         self.unlink(removed)?;
         report.visited += (removed.len() + added.len()) as u64;
-        let mut waiting = self.link(added);
-        for &(v, _) in removed {
+        self.link(added);
+        // The pairs of one vertex often follow each other.
+        for run in removed.chunk_by(|a, b| a.0 == b.0) {
+            let v = run[0].0;
             if !self.links.has(v) {
                 self.set(v, ColorId(0));
                 self.changed.push(v);
             }
         }
+        let mut waiting = std::mem::take(&mut self.waiting);
         // Who can keep the old color does, before anybody takes another one.
         waiting.sort_unstable();
         waiting.retain(|&(v, old)| {
@@ -239,10 +250,17 @@ impl Recoloring {
             !keeps
         });
         // The most crowded first.
-        waiting.sort_by_cached_key(|&(v, _)| (std::cmp::Reverse(self.links.crowding(v)), v));
-        for (v, _) in waiting {
-            self.place(v, &mut report);
+        self.crowded.clear();
+        let crowded = waiting.iter().map(|&(v, _)| {
+            let crowding = self.links.crowding(v);
+            (Reverse(crowding), v)
+        });
+        self.crowded.extend(crowded);
+        self.crowded.sort_unstable();
+        for i in 0..self.crowded.len() {
+            self.place(self.crowded[i].1, &mut report);
         }
+        self.waiting = waiting;
         while self.sizes.last() == Some(&0) {
             self.sizes.pop();
         }
@@ -330,33 +348,40 @@ impl Recoloring {
         Ok(())
     }
 
-    /// Adds pairs. Returns the vertices that came to new particles, each once, with the color that they had: they have
-    /// none now.
-    fn link(&mut self, added: &[(u32, u32)]) -> Vec<(u32, ColorId)> {
-        let mut waiting = Vec::new();
-        for &(v, particle) in added {
+    /// Adds pairs. Notes the vertices that came to new particles, each once, with the color that they had: they have none
+    /// now.
+    fn link(&mut self, added: &[(u32, u32)]) {
+        self.waiting.clear();
+        for run in added.chunk_by(|a, b| a.0 == b.0) {
+            let v = run[0].0;
             let vertices = self.coloring.vertex_count();
             if vertices <= v as usize {
                 // Numbers that are skipped have no particles.
                 self.reserve(v as usize + 1);
                 self.changed.extend((0..=v).skip(vertices));
             }
-            if self.links.contains(v, particle) {
-                self.links.add(v, particle);
-                continue;
+            // Who was nowhere has no color to keep, and no links but those of this run, which come first at particles.
+            let is_new = !self.links.has(v);
+            for &(_, particle) in run {
+                let known = if is_new {
+                    self.links.repeat_last(v, particle)
+                } else {
+                    self.links.repeat(v, particle)
+                };
+                if known {
+                    continue;
+                }
+                let color = self.coloring.color(v as usize);
+                if color != UNCOLORED {
+                    let old = if is_new { UNCOLORED } else { color };
+                    self.waiting.push((v, old));
+                    self.taken.give_back(self.links.of(v), color);
+                    self.set(v, UNCOLORED);
+                }
+                self.links.insert(v, particle);
             }
-            let color = self.coloring.color(v as usize);
-            if color != UNCOLORED {
-                // Who was nowhere has no color to keep.
-                let old = if self.links.has(v) { color } else { UNCOLORED };
-                waiting.push((v, old));
-                self.taken.give_back(self.links.of(v), color);
-                self.set(v, UNCOLORED);
-            }
-            self.links.add(v, particle);
         }
         self.taken.reserve_particles(self.links.particle_count());
-        waiting
     }
 
     /// Finds a color for an uncolored vertex.

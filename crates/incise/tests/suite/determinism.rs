@@ -79,8 +79,8 @@ fn results_are_those_of_the_last_version() {
          {body}damping = 0.001\n{strokes}"
     ));
     for (precision, golden) in [
-        (Precision::F32, 0x31db_02b8_3968_b60f),
-        (Precision::F64, 0x74ac_a02e_30d3_9691),
+        (Precision::F32, 0x7758_9f43_7e01_9b5e),
+        (Precision::F64, 0xe0be_44b5_c0b1_786e),
     ] {
         scene.solver.precision = precision;
         for threads in 1..=3 {
