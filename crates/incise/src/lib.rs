@@ -42,6 +42,7 @@ pub mod report;
 pub mod scene;
 mod simulation;
 mod sleep;
+mod stroke_spec;
 mod strokes;
 mod substeps;
 mod tool;

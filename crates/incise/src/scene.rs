@@ -14,7 +14,9 @@ pub use crate::link::{EndSpec, LinkSpec};
 pub use crate::method::{Form, Method};
 pub use crate::preset::Preset;
 pub use crate::recluster::ReclusterSpec;
+pub use crate::region::Region;
 pub use crate::sleep::SleepSpec;
+pub use crate::stroke_spec::StrokeSpec;
 pub use crate::substeps::Substeps;
 
 /// A scene.
@@ -278,132 +280,6 @@ pub struct ShapeSpec {
     pub tets: usize,
 }
 
-/// Some of a body's particles.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Region {
-    /// Those on the side of a plane that its normal points to.
-    HalfSpace {
-        /// A point on the plane.
-        point: [f64; 3],
-        /// Its normal.
-        normal: [f64; 3],
-    },
-    /// Those in an axis-aligned box.
-    Box {
-        /// The corner with the smallest coordinates.
-        low: [f64; 3],
-        /// The corner with the largest coordinates.
-        high: [f64; 3],
-    },
-    /// Those in a sphere.
-    Sphere {
-        /// Its center.
-        center: [f64; 3],
-        /// Its radius.
-        radius: f64,
-    },
-    /// Those with these numbers in the body's mesh.
-    Particles(Vec<u32>),
-}
-
-/// A cut.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
-pub enum StrokeSpec {
-    /// A whole plane, at once.
-    Plane {
-        /// The frame at whose start it cuts.
-        frame: u64,
-        /// A point on the plane in m.
-        point: [f64; 3],
-        /// Its normal.
-        normal: [f64; 3],
-        /// Snap distance as a fraction of an edge.
-        #[serde(default = "tenth")]
-        snap: f64,
-    },
-    /// A blade moved along a path, cutting as it goes.
-    Sweep {
-        /// The frames at whose start the blade is at the path's start and end.
-        frames: [u64; 2],
-        /// The blade: a polyline in m.
-        blade: Vec<[f64; 3]>,
-        /// Offsets of the blade in m, passed through at equal times.
-        path: Vec<[f64; 3]>,
-        /// Snap distance as a fraction of an edge.
-        #[serde(default = "tenth")]
-        snap: f64,
-    },
-    /// A bounded plane, at once.
-    Rectangle {
-        /// The frame at whose start it cuts.
-        frame: u64,
-        /// Its middle in m.
-        center: [f64; 3],
-        /// From the middle to the middle of one side in m.
-        half_u: [f64; 3],
-        /// From the middle to the middle of the next side in m.
-        half_v: [f64; 3],
-        /// Snap distance as a fraction of an edge.
-        #[serde(default = "tenth")]
-        snap: f64,
-    },
-    /// A surface of triangles, open or closed, at once.
-    Surface {
-        /// The frame at whose start it cuts.
-        frame: u64,
-        /// The corners in m.
-        points: Vec<[f64; 3]>,
-        /// Three numbers of corners each.
-        triangles: Vec<[u32; 3]>,
-        /// Snap distance as a fraction of an edge.
-        #[serde(default = "tenth")]
-        snap: f64,
-    },
-    /// A cut around a region, at once: what is inside comes off as a plug.
-    Plug {
-        /// The frame at whose start it cuts.
-        frame: u64,
-        /// What comes off, in the space where the body is then; not `particles`.
-        region: Region,
-        /// Snap distance as a fraction of an edge.
-        #[serde(default = "tenth")]
-        snap: f64,
-    },
-    /// Tets taken away, at once: those with their middle in a region.
-    Remove {
-        /// The frame at whose start they go.
-        frame: u64,
-        /// Where, in the space where the body is then; not `particles`.
-        region: Region,
-    },
-}
-
-impl StrokeSpec {
-    /// The first frame in which the stroke cuts or, for a moved blade, has its first pose.
-    #[must_use]
-    pub fn first_frame(&self) -> u64 {
-        match self {
-            Self::Sweep { frames, .. } => frames[0],
-            _ => self.last_frame(),
-        }
-    }
-
-    /// The last frame in which the stroke cuts.
-    #[must_use]
-    pub fn last_frame(&self) -> u64 {
-        match self {
-            Self::Plane { frame, .. }
-            | Self::Rectangle { frame, .. }
-            | Self::Surface { frame, .. }
-            | Self::Plug { frame, .. }
-            | Self::Remove { frame, .. } => *frame,
-            Self::Sweep { frames, .. } => frames[1],
-        }
-    }
-}
-
 impl Scene {
     /// The built-in scene: a generated liver held at one side, sliced by a moving blade.
     ///
@@ -530,9 +406,6 @@ fn nearly_incompressible() -> f64 {
 }
 fn water() -> f64 {
     1000.0
-}
-fn tenth() -> f64 {
-    0.1
 }
 
 #[cfg(test)]

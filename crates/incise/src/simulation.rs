@@ -18,7 +18,7 @@ use crate::body::Body;
 use crate::group::Group;
 use crate::islands::islands;
 use crate::joined::Joined;
-use crate::limits::value;
+use crate::limits::{self, value};
 use crate::measure::{by_body, energy, kappa, max_speed, residual, softened, volume};
 use crate::method::settings;
 use crate::pieces::PieceNumbers;
@@ -118,7 +118,7 @@ impl Simulation {
         for stroke in &scene.stroke {
             timeline.add(stroke)?;
         }
-        check_limits(scene)?;
+        limits::check(scene)?;
         let bodies = Body::all(scene)?;
         let islands = islands(bodies.len(), &link::pairs(scene, bodies.len())?);
         let several = islands.iter().any(|&island| island > 0);
@@ -477,30 +477,4 @@ impl Simulation {
             .as_ref()
             .map_or(Ok(()), |whole| whole.check(&self.groups))
     }
-}
-
-/// Refuses limits that are none.
-fn check_limits(scene: &Scene) -> Result<(), Error> {
-    let kappa = scene.solver.kappa_limit;
-    if kappa.is_nan() || kappa <= 0.0 {
-        return Err(value("solver.kappa_limit", kappa, "positive"));
-    }
-    if scene.solver.max_substeps == 0 {
-        return Err(value("solver.max_substeps", 0, "at least 1"));
-    }
-    if let Some(recluster) = scene.solver.recluster {
-        recluster.check()?;
-    }
-    if let Some(sleep) = scene.solver.sleep {
-        for (key, number) in [("speed", sleep.speed), ("time", sleep.time)] {
-            if !(number.is_finite() && number > 0.0) {
-                return Err(value(
-                    format!("solver.sleep.{key}"),
-                    number,
-                    "positive and finite",
-                ));
-            }
-        }
-    }
-    Ok(())
 }
