@@ -2,7 +2,7 @@
 //!
 //! Costs: a blade sweeps through the middle of a body at rest in 60 frames, one thread, 20 Gauss-Seidel iterations a
 //! frame; the stages of the same frames are set beside the time to solve. Where cost follows the cut, the cost of a cut
-//! tet does not depend on the mesh.
+//! tet does not depend on the mesh. The same stroke faster and slower: a frame of a slow one cuts fewer tets.
 //!
 //! Snapping: five planes through the body one after the other. More snapping makes fewer and better tets, of which the
 //! solver asks fewer substeps, and bends the cut surface to particles of the mesh.
@@ -60,7 +60,17 @@ pub(crate) fn cutting(arguments: &CuttingArguments) -> anyhow::Result<()> {
     }
     let mut text = String::new();
     writeln!(text, "## A stroke by stages\n\n{}\n", stages(&models)?)?;
-    writeln!(text, "## Cutting by itself\n\n{}\n", alone(&models)?)?;
+    for model in models.iter().take(1) {
+        let table = speeds(model, arguments.quick)?;
+        writeln!(
+            text,
+            "## A stroke by its speed, {}\n\n{table}\n",
+            model.name
+        )?;
+    }
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    let table = one.install(|| alone(&models))?;
+    writeln!(text, "## Cutting by itself\n\n{table}\n")?;
     for model in models.iter().take(1) {
         writeln!(
             text,
@@ -87,6 +97,65 @@ fn stroke(mesh: &TetMesh) -> ([DVec3; 2], DVec3) {
     (blade, at(0.0, 0.0, 0.0) - at(0.0, 0.0, 1.04))
 }
 
+/// What a stroke through the middle of a body in so many frames costs.
+struct Cost {
+    cut_tets: usize,
+    cutting_frames: usize,
+    /// Microseconds a cut tet: cut, cluster, color, schedule.
+    stages: [f64; 4],
+    /// Median in ms.
+    solve: f64,
+    /// Median of all stages in ms.
+    follow: f64,
+    /// The largest share of solving in a frame.
+    largest: f64,
+}
+
+impl Cost {
+    fn measure(model: &Model, frames: u32) -> anyhow::Result<Self> {
+        let mut scene = Scene::built_in();
+        scene.world = incise::scene::WorldSpec::default();
+        model.put_into(&mut scene.body[0]);
+        scene.solver.substeps = 1.into();
+        scene.solver.iterations = 20;
+        let scale = scene.body[0].scale;
+        let (blade, way) = stroke(&model.mesh);
+        scene.stroke = vec![StrokeSpec::Sweep {
+            frames: [1, 1 + u64::from(frames)],
+            blade: blade.map(|x| (x * scale).to_array()).to_vec(),
+            path: vec![[0.0; 3], (way * scale).to_array()],
+            snap: 0.1,
+        }];
+        let mut simulation = Simulation::with_threads(&scene, 1)?;
+        let (mut sums, mut cut_tets) = ([0.0; 4], 0);
+        let (mut solves, mut follows, mut largest) = (Vec::new(), Vec::new(), 0.0_f64);
+        for _ in 0..frames + 2 {
+            let report = simulation.step()?;
+            let Some(cut) = report.cut else { continue };
+            let ms = report.ms;
+            let parts = [ms.cut, ms.cluster, ms.color, ms.schedule];
+            for (sum, part) in sums.iter_mut().zip(parts) {
+                *sum += part;
+            }
+            cut_tets += cut.tets_cut;
+            let follow: f64 = parts.iter().sum();
+            largest = largest.max(follow / ms.solve);
+            solves.push(ms.solve);
+            follows.push(follow);
+        }
+        simulation.check()?;
+        ensure!(cut_tets > 0, "the blade missed {}", model.name);
+        Ok(Self {
+            cut_tets,
+            cutting_frames: solves.len(),
+            stages: sums.map(|sum| 1e3 * sum / cut_tets as f64),
+            solve: median(&mut solves),
+            follow: median(&mut follows),
+            largest,
+        })
+    }
+}
+
 /// Stages of the frames that cut, in microseconds a cut tet, beside the time to solve.
 fn stages(models: &[Model]) -> anyhow::Result<Table> {
     let mut table = table([
@@ -104,53 +173,57 @@ fn stages(models: &[Model]) -> anyhow::Result<Table> {
         "largest share of a frame",
     ]);
     for model in models {
-        let mut scene = Scene::built_in();
-        scene.world = incise::scene::WorldSpec::default();
-        model.put_into(&mut scene.body[0]);
-        scene.solver.substeps = 1.into();
-        scene.solver.iterations = 20;
-        let scale = scene.body[0].scale;
-        let (blade, way) = stroke(&model.mesh);
-        scene.stroke = vec![StrokeSpec::Sweep {
-            frames: [1, 1 + u64::from(FRAMES)],
-            blade: blade.map(|x| (x * scale).to_array()).to_vec(),
-            path: vec![[0.0; 3], (way * scale).to_array()],
-            snap: 0.1,
-        }];
-        let mut simulation = Simulation::with_threads(&scene, 1)?;
-        let (mut sums, mut cut_tets) = ([0.0; 4], 0);
-        let (mut solves, mut follows, mut largest) = (Vec::new(), Vec::new(), 0.0_f64);
-        for _ in 0..FRAMES + 2 {
-            let report = simulation.step()?;
-            let Some(cut) = report.cut else { continue };
-            let ms = report.ms;
-            let parts = [ms.cut, ms.cluster, ms.color, ms.schedule];
-            for (sum, part) in sums.iter_mut().zip(parts) {
-                *sum += part;
-            }
-            cut_tets += cut.tets_cut;
-            let follow: f64 = parts.iter().sum();
-            largest = largest.max(follow / ms.solve);
-            solves.push(ms.solve);
-            follows.push(follow);
-        }
-        simulation.check()?;
-        ensure!(cut_tets > 0, "the blade missed {}", model.name);
-        let [cut, cluster, color, schedule] = sums.map(|sum| 1e3 * sum / cut_tets as f64);
-        let (solve, follow) = (median(&mut solves), median(&mut follows));
-        table.add_row([
+        let cost = Cost::measure(model, FRAMES)?;
+        let mut row = vec![
             model.name.clone(),
             model.mesh.tets.len().to_string(),
-            cut_tets.to_string(),
-            format!("{cut:.2}"),
-            format!("{cluster:.2}"),
-            format!("{color:.2}"),
-            format!("{schedule:.2}"),
-            format!("{:.2}", cut + cluster + color + schedule),
-            format!("{solve:.3}"),
-            format!("{follow:.3}"),
-            format!("{:.1} %", 100.0 * follow / solve),
-            format!("{:.1} %", 100.0 * largest),
+            cost.cut_tets.to_string(),
+        ];
+        let all: f64 = cost.stages.iter().sum();
+        row.extend(
+            cost.stages
+                .iter()
+                .chain([&all])
+                .map(|us| format!("{us:.2}")),
+        );
+        row.extend([
+            format!("{:.3}", cost.solve),
+            format!("{:.3}", cost.follow),
+            format!("{:.1} %", 100.0 * cost.follow / cost.solve),
+            format!("{:.1} %", 100.0 * cost.largest),
+        ]);
+        table.add_row(row);
+    }
+    Ok(table)
+}
+
+/// The same stroke at different speeds.
+fn speeds(model: &Model, quick: bool) -> anyhow::Result<Table> {
+    let mut table = table([
+        "frames of the stroke",
+        "cm a second at 60 frames a second",
+        "tets cut a frame",
+        "cut to schedule, µs a tet",
+        "cut to schedule, ms (median)",
+        "solve ms (median)",
+        "share of solving",
+        "largest share of a frame",
+    ]);
+    let mut scene = Scene::built_in();
+    model.put_into(&mut scene.body[0]);
+    let length = stroke(&model.mesh).1.length() * scene.body[0].scale;
+    let all = [15, 30, FRAMES, 120, 240, 480];
+    for &frames in if quick { &all[1..3] } else { &all[..] } {
+        let cost = Cost::measure(model, frames)?;
+        table.add_row([
+            frames.to_string(),
+            format!("{:.1}", 100.0 * length * 60.0 / f64::from(frames)),
+            format!("{:.1}", cost.cut_tets as f64 / cost.cutting_frames as f64),
+            format!("{:.2}", cost.stages.iter().sum::<f64>()),
+            format!("{:.3}", cost.follow),
+            format!("{:.3}", cost.solve),
+            format!("{:.1} %", 100.0 * cost.follow / cost.solve),
+            format!("{:.1} %", 100.0 * cost.largest),
         ]);
     }
     Ok(table)
