@@ -16,7 +16,7 @@ use crate::delta::{
     AddedTet, BoundaryTriangle, CutDelta, EdgePoint, FaceTag, RelinkedTet, RemovedTet,
 };
 use crate::faces::{Behind, Face, face_of};
-use crate::quality::Dihedrals;
+use crate::quality::{Dihedrals, is_thin};
 use crate::{CutError, CutOptions, CuttableMesh, SplitEdge};
 
 /// An edge and where it is crossed.
@@ -26,6 +26,29 @@ pub(crate) struct Crossing {
     pub(crate) ends: [ParticleId; 2],
     /// Where: 0 at the first end, 1 at the second.
     pub(crate) parameter: f64,
+}
+
+impl Crossing {
+    fn point(&self) -> EdgePoint {
+        EdgePoint {
+            ends: self.ends,
+            parameter: self.parameter,
+        }
+    }
+
+    /// The end that is nearer, the first of two that are as near.
+    pub(crate) fn nearer_end(&self) -> ParticleId {
+        self.ends[usize::from(self.parameter > 0.5)]
+    }
+}
+
+/// Why a split was not made. It has changed nothing then.
+#[derive(Debug)]
+pub(crate) enum Refusal {
+    /// There would be too many tets.
+    TooMany(CutError),
+    /// At these crossings, numbers ascending, tets would become too thin to have a volume: they must move to an end.
+    TooThin(Vec<usize>),
 }
 
 /// A tet as it was before the operation.
@@ -69,10 +92,7 @@ impl<'a> Operation<'a> {
     /// Puts a particle on each crossed edge and splits the tets around. `crossings` ascend by their ends.
     ///
     /// Must not be called after [`Operation::separate`]. Returns the tets touched, ascending.
-    ///
-    /// # Errors
-    /// If there would be too many tets; this call has changed nothing then.
-    pub(crate) fn split(&mut self, crossings: &[Crossing]) -> Result<Vec<TetId>, CutError> {
+    pub(crate) fn split(&mut self, crossings: &[Crossing]) -> Result<Vec<TetId>, Refusal> {
         let mesh = &mut self.cuttable.mesh;
         let mut edges: Vec<(f64, SplitEdge)> = Vec::with_capacity(crossings.len());
         for (i, crossing) in crossings.iter().enumerate() {
@@ -95,6 +115,17 @@ impl<'a> Operation<'a> {
         }
         work.sort_unstable();
 
+        let points: Vec<EdgePoint> = crossings.iter().map(Crossing::point).collect();
+        let at_rest: Vec<DVec3> = points
+            .iter()
+            .map(|point| point.interpolate(&mesh.positions))
+            .collect();
+        let at = |p: ParticleId| match p.index().checked_sub(mesh.positions.len()) {
+            Some(new) => at_rest[new],
+            None => mesh.positions[p.index()],
+        };
+        let mut thin: Vec<usize> = Vec::new();
+
         let mut families: Vec<(TetId, usize)> = Vec::new();
         let mut children = Vec::new();
         let (mut of_tet, mut family) = (Vec::new(), Vec::new());
@@ -104,24 +135,29 @@ impl<'a> Operation<'a> {
             of_tet.extend(group.iter().map(|&(_, rank)| edges[rank].1));
             let whole = (mesh.tets[tet.index()], self.cuttable.faces.links_of(tet));
             split_linked(whole, &of_tet, &mut family);
+            if family.iter().any(|(corners, _)| is_thin(corners.map(at))) {
+                let first = mesh.positions.len();
+                thin.extend(of_tet.iter().map(|edge| edge.point.index() - first));
+            }
             families.push((tet, family.len()));
             children.append(&mut family);
         }
         let tets = mesh.tets.len() + children.len() - families.len();
         if tets > self.max_tets {
             let limit = self.max_tets;
-            return Err(CutError::TooManyTets { tets, limit });
+            return Err(Refusal::TooMany(CutError::TooManyTets { tets, limit }));
+        }
+        if !thin.is_empty() {
+            thin.sort_unstable();
+            thin.dedup();
+            return Err(Refusal::TooThin(thin));
         }
 
-        for crossing in crossings {
-            let on_edge = EdgePoint {
-                ends: crossing.ends,
-                parameter: crossing.parameter,
-            };
-            mesh.positions.push(on_edge.interpolate(&mesh.positions));
+        for _ in &points {
             self.cuttable.stars.push_particle();
-            self.delta.points.push(on_edge);
         }
+        mesh.positions.extend(at_rest);
+        self.delta.points.extend(points);
         let mut touched = Vec::with_capacity(children.len());
         let mut children = children.into_iter();
         for (tet, size) in families {

@@ -28,7 +28,9 @@ pub struct CutOptions {
     /// more jagged rim.
     pub snap: f64,
     /// The same, never off: it keeps rounding from making zero-volume tets when a surface runs through particles.
-    /// Use about 1e-9 for positions in double and 1e-5 for positions in single precision.
+    /// Use about 1e-9 for positions in double and 1e-5 for positions in single precision. Where cuts of cuts would
+    /// leave tets thinner than a few units of the last digit of their coordinates at rest, crossings move to the nearer
+    /// end, however far it is.
     pub tolerance: f64,
     /// A guard on the volume of children as a fraction of their parent's, from 0 (off) to 0.015. Where snapping alone
     /// does not promise it, crossings are snapped from as far as it takes. A tet whose edges were met in several steps of one frame

@@ -55,9 +55,40 @@ impl Dihedrals {
     }
 }
 
+/// How many units of the last digit of its coordinates a tet must be thick.
+const THICKNESS: f64 = 8.0;
+
+/// Whether rounding may hide the volume of a tet: it is thinner than some units of the last digit of its coordinates, or
+/// inverted.
+pub(crate) fn is_thin(corners: [DVec3; 4]) -> bool {
+    let [a, b, c, d] = corners;
+    let edges = [b - a, c - a, d - a];
+    let longest = edges.into_iter().map(DVec3::length_squared);
+    let longest = longest.fold(0.0, f64::max);
+    let far = corners.into_iter().map(|x| x.abs().max_element());
+    let far = far.fold(0.0, f64::max);
+    let determinant = edges[0].cross(edges[1]).dot(edges[2]);
+    !(determinant > THICKNESS * f64::EPSILON * far * longest)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn thin_is_what_the_last_digit_hides() {
+        for size in [1e-9, 1.0, 1e9] {
+            let tet = |height: f64| [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z * height];
+            let is_thin = |height| is_thin(tet(height).map(|x| x * size));
+            assert!(!is_thin(1.0) && !is_thin(1e-14));
+            assert!(is_thin(1e-15) && is_thin(0.0) && is_thin(-1.0));
+        }
+        // Ten units away the last digit is ten times as large.
+        let away = |height: f64| {
+            [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z * height].map(|x| x + DVec3::X * 10.0)
+        };
+        assert!(is_thin(away(1e-14)) && !is_thin(away(1e-13)));
+    }
 
     #[test]
     fn of_known_tets() {

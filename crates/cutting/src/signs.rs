@@ -7,7 +7,7 @@
 
 use incise_mesh::ParticleId;
 
-use crate::operation::{Crossing, Operation};
+use crate::operation::{Crossing, Operation, Refusal};
 use crate::parallel;
 use crate::stroke::AGAIN;
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh, Separation};
@@ -39,13 +39,23 @@ pub(crate) fn cut_by_signs(
     }
     let mut snapped = snap(&crossings, &values, options, &mut on_surface);
     snapped += keep_bent(cuttable, &crossings, &values, &mut on_surface);
-    let free = |c: &&Crossing| c.ends.iter().all(|p| !on_surface[p.index()]);
-    let flagged: Vec<Crossing> = crossings.iter().filter(free).copied().collect();
-
     let particles = values.len();
     let mut operation = Operation::begin(cuttable, options);
+    let mut flagged = crossings;
+    loop {
+        flagged.retain(|c| c.ends.iter().all(|p| !on_surface[p.index()]));
+        match operation.split(&flagged) {
+            Ok(_) => break,
+            Err(Refusal::TooMany(error)) => return Err(error),
+            Err(Refusal::TooThin(refused)) => {
+                for c in refused {
+                    let near = flagged[c].nearer_end().index();
+                    snapped += usize::from(!std::mem::replace(&mut on_surface[near], true));
+                }
+            }
+        }
+    }
     operation.delta.snapped = snapped;
-    operation.split(&flagged)?;
     let bent = (0..particles).filter(|&p| on_surface[p] && values[p] != 0.0);
     for p in bent {
         operation.bend(ParticleId::new(p), values[p].abs());

@@ -20,7 +20,7 @@ use incise_mesh::{ParticleId, TetId, TetMesh};
 
 use crate::meet::{Meeting, MovingSegment};
 use crate::memory::CutMemory;
-use crate::operation::{Crossing, Operation};
+use crate::operation::{Crossing, Operation, Refusal};
 use crate::parallel;
 use crate::sides::{GivenSides, Sides, standing_side};
 use crate::signs::linear;
@@ -236,7 +236,24 @@ impl Stroke {
         for hit in &mut hits {
             hit.crossing.parameter = hit.crossing.parameter.clamp(reach, 1.0 - reach);
         }
-        let near = operation.split(&hits.iter().map(|hit| hit.crossing).collect::<Vec<_>>())?;
+        let near = loop {
+            let crossings: Vec<Crossing> = hits.iter().map(|hit| hit.crossing).collect();
+            match operation.split(&crossings) {
+                Ok(near) => break near,
+                Err(Refusal::TooMany(error)) => return Err(error),
+                Err(Refusal::TooThin(refused)) => {
+                    let ends = refused.into_iter().map(|i| {
+                        let hit = &hits[i];
+                        (hit.crossing.nearer_end(), hit.tangent)
+                    });
+                    let ends = self.bend(operation, ends.collect());
+                    let off = |p: &ParticleId| ends.binary_search(p).is_err();
+                    hits.retain(|hit| hit.crossing.ends.iter().all(off));
+                    operation.delta.snapped += ends.len();
+                    fresh.extend(ends);
+                }
+            }
+        };
         let given = &mut self.given;
         let forgotten = near.iter().filter_map(|&t| Some((t, given.forget(t)?)));
         self.forgotten.extend(forgotten);
@@ -344,7 +361,6 @@ impl Stroke {
         foresee: bool,
     ) -> Vec<ParticleId> {
         let cuttable = &*operation.cuttable;
-        let rest = &cuttable.mesh.positions;
         for hit in hits {
             for (particle, side) in hit.crossing.ends.into_iter().zip(hit.sides) {
                 if let Some(side) = side {
@@ -372,8 +388,18 @@ impl Stroke {
         for particle in hits.iter().flat_map(|hit| hit.crossing.ends) {
             self.surface.decide(particle);
         }
+        self.bend(operation, snapped)
+    }
+
+    /// Puts particles on the surface, each by the first of its planes; returns them ascending.
+    fn bend(
+        &mut self,
+        operation: &mut Operation<'_>,
+        mut snapped: Vec<(ParticleId, Tangent)>,
+    ) -> Vec<ParticleId> {
         snapped.sort_by_key(|(particle, _)| *particle);
         snapped.dedup_by_key(|(particle, _)| *particle);
+        let rest = &operation.cuttable.mesh.positions;
         let bent = snapped
             .iter()
             .map(|(p, tangent)| tangent.distance(rest[p.index()]));

@@ -394,6 +394,15 @@ mod tests {
         ]);
     }
 
+    /// Found by the fuzzer: strokes that cut the same slivers again and again made tets that rounding left no volume.
+    #[test]
+    fn slivers_of_slivers_keep_a_volume() {
+        super::run(&[
+            5, 6, 40, 24, 211, 218, 24, 40, 218, 218, 218, 24, 40, 218, 218, 24, 218, 218, 180,
+            218, 24, 40, 218, 218, 218, 218, 218, 24, 218, 218, 218, 18, 32, 28,
+        ]);
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(60))]
 
