@@ -68,7 +68,8 @@ pub(crate) fn is_thin(corners: [DVec3; 4]) -> bool {
     let far = corners.into_iter().map(|x| x.abs().max_element());
     let far = far.fold(0.0, f64::max);
     let determinant = edges[0].cross(edges[1]).dot(edges[2]);
-    !(determinant > THICKNESS * f64::EPSILON * far * longest)
+    let is_thick = determinant > THICKNESS * f64::EPSILON * far * longest;
+    !is_thick
 }
 
 #[cfg(test)]
