@@ -101,7 +101,8 @@ impl CutMemory {
         adopted: &mut Vec<ParticleId>,
     ) -> bool {
         let before = adopted.len();
-        if self.known.is_empty() {
+        // A first stroke knows no other.
+        if self.known.is_empty() || (stroke == 0 && self.strokes == 1) {
             return false;
         }
         let rest = &cuttable.mesh.positions;

@@ -329,6 +329,7 @@ impl Marks {
         }
     }
 
+    #[inline]
     fn bits(&mut self, particle: ParticleId, outside: impl Fn(ParticleId) -> u8) -> u8 {
         let mark = &mut self.marks[particle.index()];
         if *mark & (u32::MAX << 8) != self.flood {

@@ -488,16 +488,21 @@ pub(crate) fn tets_around(cuttable: &CuttableMesh, particles: &[ParticleId]) -> 
 
 /// The edges of the given tets, each once, ascending.
 fn edges_of(mesh: &TetMesh, tets: &[TetId]) -> Vec<[ParticleId; 2]> {
-    let mut edges = Vec::with_capacity(6 * tets.len());
+    // Both ends in one number, which sorts at less than half the cost of a pair.
+    let mut edges: Vec<u64> = Vec::with_capacity(6 * tets.len());
     for tet in tets {
-        let c = mesh.tets[tet.index()];
+        let c = mesh.tets[tet.index()].map(|p| p.0);
         for (i, j) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
-            edges.push([c[i].min(c[j]), c[i].max(c[j])]);
+            edges.push(u64::from(c[i].min(c[j])) << 32 | u64::from(c[i].max(c[j])));
         }
     }
     edges.sort_unstable();
     edges.dedup();
-    edges
+    let ends = |edge: u64| {
+        let [a, b, c, d, e, f, g, h] = edge.to_be_bytes();
+        [[a, b, c, d], [e, f, g, h]].map(|end| ParticleId(u32::from_be_bytes(end)))
+    };
+    edges.into_iter().map(ends).collect()
 }
 
 /// The length at rest of the longest edge of the tets around an edge's ends.
