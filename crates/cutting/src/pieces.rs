@@ -345,7 +345,13 @@ impl PieceTracker {
         let total = mesh.total_volume();
         let farthest = |far: f64, x: &glam::DVec3| far.max(x.abs().max_element());
         let far = mesh.positions.iter().fold(0.0, farthest) / total.cbrt();
-        let counts = counted.sizes().into_iter().zip(counted.volumes(mesh));
+        // Plain sums of a million volumes are off by more than is allowed here.
+        let mut volumes = vec![Sum::default(); counted.count];
+        for (tet, &label) in counted.labels.iter().enumerate() {
+            volumes[label as usize].add(mesh.volume(TetId::new(tet)));
+        }
+        let volumes = volumes.into_iter().map(Sum::total);
+        let counts = counted.sizes().into_iter().zip(volumes);
         for (id, (tets, volume)) in ids.into_iter().zip(counts) {
             let Record {
                 tets: known,
