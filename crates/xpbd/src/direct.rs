@@ -38,7 +38,7 @@ struct Pattern {
 /// Two constraints of a tet as the system sees them.
 struct Rows {
     evaluation: Evaluation<f64>,
-    /// Roots of stiffness times Δt².
+    /// Roots of stiffness times Δt², the second less where the volume has a steep slope, as in the kernel.
     scales: [f64; 2],
     /// One over one plus the damping, which is what the identity becomes with it.
     compliance: f64,
@@ -189,9 +189,11 @@ impl<R: Real> Solver<R> {
 
     fn rows(&self, tet: usize, time: f64) -> Rows {
         let damping = self.materials[usize::from(self.material_of[tet])].damping / time;
+        let evaluation = self.evaluate(&self.tets[tet].to_f64());
+        let [deviatoric, hydrostatic] = self.scales(tet, time);
         Rows {
-            evaluation: self.evaluate(&self.tets[tet].to_f64()),
-            scales: self.scales(tet, time),
+            scales: [deviatoric, hydrostatic * evaluation.hydrostatic_scale()],
+            evaluation,
             compliance: 1.0 / (1.0 + damping),
         }
     }

@@ -7,7 +7,7 @@
 
 use glam::{DMat3, DVec3};
 
-#[cfg(test)]
+#[cfg(any(test, feature = "direct"))]
 use crate::lanes::STEEP;
 use crate::{Material, Real};
 
@@ -30,9 +30,9 @@ pub(crate) struct Evaluation<R: Real> {
     pub(crate) hydrostatic: R,
     pub(crate) deviatoric_gradients: [R::Vector; 4],
     pub(crate) hydrostatic_gradients: [R::Vector; 4],
-    /// The square of the norm of the derivative of det F; only the test of the kernel needs it.
-    #[cfg(test)]
-    pub(crate) slope_squared: R,
+    /// The square of the norm of the derivative of det F; what only measures has no use for it.
+    #[cfg(any(test, feature = "direct"))]
+    slope_squared: R,
 }
 
 impl<R: Real> TetConstraint<R> {
@@ -114,7 +114,7 @@ impl<R: Real> TetConstraint<R> {
             hydrostatic: R::dot(f1, cofactor[0]) - self.gamma,
             deviatoric_gradients: self.gradients([f1 * scale, f2 * scale, f3 * scale]),
             hydrostatic_gradients: self.gradients(cofactor),
-            #[cfg(test)]
+            #[cfg(any(test, feature = "direct"))]
             slope_squared: cofactor.iter().fold(R::ZERO, |sum, &c| sum + R::dot(c, c)),
         }
     }
@@ -128,6 +128,19 @@ impl<R: Real> TetConstraint<R> {
         let g2 = d1 * q[3] + d2 * q[4] + d3 * q[5];
         let g3 = d1 * q[6] + d2 * q[7] + d3 * q[8];
         [-(g1 + g2 + g3), g1, g2, g3]
+    }
+}
+
+#[cfg(any(test, feature = "direct"))]
+impl<R: Real> Evaluation<R> {
+    /// What solvers scale the hydrostatic constraint by: 1, or less where det F has a slope beyond [`STEEP`].
+    pub(crate) fn hydrostatic_scale(&self) -> R {
+        let limit = R::from_f64(STEEP);
+        if self.slope_squared > limit * limit {
+            limit / self.slope_squared.sqrt()
+        } else {
+            R::ONE
+        }
     }
 }
 
@@ -148,13 +161,8 @@ impl<R: Real> TetConstraint<R> {
         rates: [R; 2],
     ) -> Option<[R; 2]> {
         let stiffness = self.stiffness * time_squared;
-        // One over the square of what the kernel scales the constraint by.
-        let steep = R::from_f64(STEEP * STEEP);
-        let ratio = if e.slope_squared > steep {
-            self.ratio * (steep / e.slope_squared)
-        } else {
-            self.ratio
-        };
+        let scale = e.hydrostatic_scale();
+        let ratio = self.ratio * scale * scale;
         let weights = weights.map(|w| w * stiffness);
         let weighted = |g: &[R::Vector; 4], h: &[R::Vector; 4]| {
             weights[0] * R::dot(g[0], h[0])

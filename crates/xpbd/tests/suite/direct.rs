@@ -43,7 +43,7 @@ fn one_tet_moves_as_with_the_block_solve() {
             disturb(&mut solver, 0.1, 25);
             solver.set_fixed(3, true);
             let settings = settings(&solver);
-            for _ in 0..5 {
+            for _ in 0..4 {
                 if direct {
                     solver.step_direct(&settings).unwrap();
                 } else {
@@ -55,7 +55,8 @@ fn one_tet_moves_as_with_the_block_solve() {
         within(
             &format!("kappa {kappa}"),
             largest_distance(&block, &direct),
-            // At rest pushes of kappa times the size cancel; what rounding leaves grows over 15 substeps.
+            // At rest pushes of kappa times the size cancel; what rounding leaves grows over 12 substeps, a hundred times a
+            // frame: measured 2e-14 after the first and 1.3e-9 after the last.
             1e-11 * (kappa * kappa).max(1.0),
         );
     }
