@@ -1,0 +1,12 @@
+//! Soft bodies on the GPU: coloring and XPBD through wgpu, without leaving the device.
+
+mod array;
+mod context;
+mod error;
+mod kernel;
+mod traffic;
+
+pub use context::{AdapterDescription, GpuContext, GpuOptions};
+pub use error::GpuError;
+pub use traffic::Traffic;
+pub use wgpu;
