@@ -29,7 +29,11 @@ pub(crate) struct Array<T> {
 
 impl<T: NoUninit + AnyBitPattern> Array<T> {
     /// As many zeros.
-    pub(crate) fn zeros(gpu: &GpuContext, what: &'static str, len: usize) -> Result<Self, GpuError> {
+    pub(crate) fn zeros(
+        gpu: &GpuContext,
+        what: &'static str,
+        len: usize,
+    ) -> Result<Self, GpuError> {
         Self::with_usage(gpu, what, len, BufferUsages::STORAGE)
     }
 
@@ -80,12 +84,17 @@ impl<T: NoUninit + AnyBitPattern> Array<T> {
     /// # Panics
     /// Past the end.
     pub(crate) fn write(&self, gpu: &GpuContext, start: usize, values: &[T]) {
-        assert!(start + values.len() <= self.len, "{}: past the end", self.what);
+        assert!(
+            start + values.len() <= self.len,
+            "{}: past the end",
+            self.what
+        );
         if values.is_empty() {
             return;
         }
         let data: &[u8] = bytemuck::cast_slice(values);
-        gpu.queue().write_buffer(&self.buffer, bytes::<T>(start), data);
+        gpu.queue()
+            .write_buffer(&self.buffer, bytes::<T>(start), data);
         count(&gpu.counters().uploaded_bytes, data.len() as u64);
     }
 
@@ -205,10 +214,14 @@ fn buffer(
     if bytes > limit {
         return Err(GpuError::TooLarge { what, bytes, limit });
     }
-    let memory = gpu.device().push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+    let memory = gpu
+        .device()
+        .push_error_scope(wgpu::ErrorFilter::OutOfMemory);
     let buffer = gpu.device().create_buffer(&wgpu::BufferDescriptor {
         label: Some(what),
-        size: bytes.max(SMALLEST).next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT),
+        size: bytes
+            .max(SMALLEST)
+            .next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT),
         usage,
         mapped_at_creation: false,
     });

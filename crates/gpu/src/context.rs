@@ -198,7 +198,10 @@ impl GpuContext {
     /// # Errors
     /// The first report.
     pub fn check(&self) -> Result<(), GpuError> {
-        let report = self.report.lock().unwrap_or_else(|poison| poison.into_inner());
+        let report = self
+            .report
+            .lock()
+            .unwrap_or_else(|poison| poison.into_inner());
         report.clone().map_or(Ok(()), Err)
     }
 
@@ -239,7 +242,9 @@ fn note(report: &Report, error: GpuError) {
 
 /// All adapters, best first.
 fn enumerate(options: &GpuOptions) -> Vec<Adapter> {
-    let backends = options.backends.unwrap_or(Backends::VULKAN | Backends::METAL | Backends::DX12);
+    let backends = options
+        .backends
+        .unwrap_or(Backends::VULKAN | Backends::METAL | Backends::DX12);
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
         backends,
         flags: wgpu::InstanceFlags::default().with_env(),

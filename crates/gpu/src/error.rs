@@ -23,7 +23,9 @@ pub enum GpuError {
         message: String,
     },
     /// A buffer would be larger than the device allows.
-    #[error("{what} need {bytes} bytes on the GPU, and one buffer holds {limit}: take a smaller body or another device")]
+    #[error(
+        "{what} need {bytes} bytes on the GPU, and one buffer holds {limit}: take a smaller body or another device"
+    )]
     TooLarge {
         /// What was to be stored.
         what: &'static str,
@@ -59,7 +61,9 @@ pub enum GpuError {
         what: &'static str,
     },
     /// A cluster does not fit into a block of the GPU.
-    #[error("cluster {cluster} has {tets} tets and a block holds {limit}: cluster with a smaller size")]
+    #[error(
+        "cluster {cluster} has {tets} tets and a block holds {limit}: cluster with a smaller size"
+    )]
     Block {
         /// The cluster.
         cluster: u32,

@@ -33,6 +33,7 @@ const WIDEST: u32 = 65_535;
 pub(crate) struct Kernel {
     pipeline: ComputePipeline,
     layout: wgpu::BindGroupLayout,
+    uses: Vec<Use>,
 }
 
 impl Kernel {
@@ -82,15 +83,23 @@ impl Kernel {
             Some(error) => Err(GpuError::Command {
                 message: format!("{name}: {error}"),
             }),
-            None => Ok(Self { pipeline, layout }),
+            None => Ok(Self {
+                pipeline,
+                layout,
+                uses: uses.to_vec(),
+            }),
         }
     }
 
-    /// Binds buffers in the order of the shader's numbers. `uses` is what the kernel was made with.
-    pub(crate) fn bind(&self, gpu: &GpuContext, buffers: &[(&Buffer, Use)]) -> BindGroup {
+    /// Binds buffers in the order of the shader's numbers.
+    ///
+    /// # Panics
+    /// If there are not as many as the kernel uses.
+    pub(crate) fn bind(&self, gpu: &GpuContext, buffers: &[&Buffer]) -> BindGroup {
+        assert_eq!(buffers.len(), self.uses.len(), "a buffer for each use");
         let entries: Vec<_> = (0..)
-            .zip(buffers)
-            .map(|(binding, &(buffer, usage))| wgpu::BindGroupEntry {
+            .zip(buffers.iter().zip(&self.uses))
+            .map(|(binding, (&buffer, &usage))| wgpu::BindGroupEntry {
                 binding,
                 resource: match usage {
                     Use::Part(bytes) => wgpu::BindingResource::Buffer(wgpu::BufferBinding {
@@ -112,10 +121,22 @@ impl Kernel {
 
 fn binding_type(usage: Use) -> wgpu::BindingType {
     let (ty, has_dynamic_offset, size) = match usage {
-        Use::Read => (wgpu::BufferBindingType::Storage { read_only: true }, false, None),
-        Use::Write => (wgpu::BufferBindingType::Storage { read_only: false }, false, None),
+        Use::Read => (
+            wgpu::BufferBindingType::Storage { read_only: true },
+            false,
+            None,
+        ),
+        Use::Write => (
+            wgpu::BufferBindingType::Storage { read_only: false },
+            false,
+            None,
+        ),
         Use::Uniform => (wgpu::BufferBindingType::Uniform, false, None),
-        Use::Part(bytes) => (wgpu::BufferBindingType::Uniform, true, wgpu::BufferSize::new(bytes)),
+        Use::Part(bytes) => (
+            wgpu::BufferBindingType::Uniform,
+            true,
+            wgpu::BufferSize::new(bytes),
+        ),
     };
     wgpu::BindingType::Buffer {
         ty,
@@ -150,7 +171,13 @@ impl<'a> Recorder<'a> {
     ///
     /// More than 65,535 workgroups become a grid: `workgroup_index` in the shaders' common part numbers them, and the
     /// last row may be longer than asked for.
-    pub(crate) fn dispatch(&mut self, kernel: &Kernel, bound: &BindGroup, offsets: &[u32], groups: usize) {
+    pub(crate) fn dispatch(
+        &mut self,
+        kernel: &Kernel,
+        bound: &BindGroup,
+        offsets: &[u32],
+        groups: usize,
+    ) {
         if groups == 0 {
             return;
         }
@@ -158,7 +185,8 @@ impl<'a> Recorder<'a> {
         let rows = groups.div_ceil(WIDEST);
         self.pass.set_pipeline(&kernel.pipeline);
         self.pass.set_bind_group(0, bound, offsets);
-        self.pass.dispatch_workgroups(groups.div_ceil(rows), rows, 1);
+        self.pass
+            .dispatch_workgroups(groups.div_ceil(rows), rows, 1);
         count(&self.gpu.counters().dispatches, 1);
     }
 

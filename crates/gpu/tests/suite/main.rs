@@ -1,3 +1,7 @@
-//! The tests of this crate.
+//! Tests of the kernels against their CPU twins, and of what moves between host and device.
+//!
+//! They need an adapter; Mesa's lavapipe, which is a processor, will do. Without one they skip with a line on stderr,
+//! unless `INCISE_REQUIRE_GPU` is set: then they fail.
 
-fn main() {}
+mod device;
+mod support;
