@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use crate::real::{finite, load, store, weight};
 use crate::step::Factors;
 use crate::step::PARALLEL_PARTICLES;
-use crate::{Real, Solver, XpbdError};
+use crate::{AttachmentData, Real, Solver, XpbdError};
 
 /// Where a handle is and how it is turned.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -130,6 +130,23 @@ impl<R: Real> Attachments<R> {
     /// Whether a particle is where its handle says, whatever pulls on it.
     pub(crate) fn holds(&self, particle: usize) -> bool {
         self.get(particle).is_some_and(|a| a.compliance == 0.0)
+    }
+
+    /// What hangs on handles.
+    pub(crate) fn list(&self) -> impl ExactSizeIterator<Item = AttachmentData> + '_ {
+        self.list.iter().map(|attachment| AttachmentData {
+            particle: attachment.particle,
+            handle: attachment.handle,
+            place: attachment.place,
+            compliance: attachment.compliance,
+            damping: attachment.damping,
+        })
+    }
+
+    /// The poses of all handles at a fraction of the frame.
+    pub(crate) fn poses(&self, fraction: f64) -> impl ExactSizeIterator<Item = Pose> + '_ {
+        let handles = self.handles.iter();
+        handles.map(move |handle| handle.from.toward(&handle.to, fraction))
     }
 
     /// Attaches the last particle as `of` is, if it is.
@@ -276,6 +293,7 @@ impl<R: Real> Solver<R> {
             Ok(place) => list[place] = attachment,
             Err(place) => list.insert(place, attachment),
         }
+        self.note(|changes| changes.attachments = true);
         self.set_weight(particle);
         Ok(())
     }
@@ -287,6 +305,7 @@ impl<R: Real> Solver<R> {
     pub fn detach(&mut self, particle: usize) {
         if let Ok(place) = self.attachments.find(particle) {
             self.attachments.list.remove(place);
+            self.note(|changes| changes.attachments = true);
         }
         self.set_weight(particle);
     }

@@ -142,6 +142,7 @@ impl<R: Real> Solver<R> {
         }
         let distances = Constraints::new("distance", self.particle_count(), list, schedule)?;
         self.distances = (!constraints.is_empty()).then_some(distances);
+        self.note(|changes| changes.distances = true);
         Ok(())
     }
 

@@ -166,6 +166,7 @@ impl<R: Real> Solver<R> {
         }
         let volumes = Constraints::new("volume", self.particle_count(), list, schedule)?;
         self.volume_constraints = (!constraints.is_empty()).then_some(volumes);
+        self.note(|changes| changes.volumes = true);
         Ok(())
     }
 
@@ -193,6 +194,7 @@ impl<R: Real> Solver<R> {
         let volumes = self.volume_constraints.as_mut();
         let volumes = volumes.expect("volume constraints are edited where there are some");
         volumes.put(place, TetVolume::new(&constraint));
+        self.note(|changes| changes.volumes = true);
         Ok(())
     }
 
@@ -205,6 +207,7 @@ impl<R: Real> Solver<R> {
         let volumes = self.volume_constraints.as_mut();
         let volumes = volumes.expect("volume constraints are edited where there are some");
         volumes.list[constraint].particles = particles;
+        self.note(|changes| changes.volumes = true);
     }
 
     /// Takes over the order of solving after edits; without volume constraints nothing happens. As with that of the
@@ -220,6 +223,7 @@ impl<R: Real> Solver<R> {
                 "the schedule belongs to these volume constraints"
             );
             volumes.schedule.clone_from(schedule);
+            self.note(|changes| changes.volumes = true);
         }
     }
 }
