@@ -136,12 +136,10 @@ impl<T: NoUninit + AnyBitPattern> Array<T> {
     /// Waits for the device and reads the first values.
     pub(crate) fn read_first(&self, gpu: &GpuContext, len: usize) -> Result<Vec<T>, GpuError> {
         assert!(len <= self.len, "{}: past the end", self.what);
-        let mut values = Vec::new();
-        if len > 0 {
-            let staging = self.stage(gpu, len)?;
-            staging.collect(gpu, &mut values)?;
+        match len {
+            0 => Ok(Vec::new()),
+            _ => self.stage(gpu, len)?.collect(gpu),
         }
-        Ok(values)
     }
 
     /// Starts a copy of the first values that the host can wait for later.
@@ -177,7 +175,7 @@ pub(crate) struct Staging<T> {
 
 impl<T: NoUninit + AnyBitPattern> Staging<T> {
     /// Waits for it.
-    pub(crate) fn collect(self, gpu: &GpuContext, values: &mut Vec<T>) -> Result<(), GpuError> {
+    pub(crate) fn collect(self, gpu: &GpuContext) -> Result<Vec<T>, GpuError> {
         gpu.wait()?;
         let lost = |message: String| GpuError::Lost { message };
         let mapped = self.receiver.recv();
@@ -186,15 +184,14 @@ impl<T: NoUninit + AnyBitPattern> Staging<T> {
             .map_err(lost)?;
         let view = self.buffer.slice(..).get_mapped_range();
         let view = view.map_err(|error| lost(error.to_string()))?;
-        values.clear();
         // The view has the alignment of bytes.
         let data = &view[..usize::try_from(bytes::<T>(self.len)).unwrap_or(usize::MAX)];
-        values.extend(bytemuck::pod_collect_to_vec::<u8, T>(data));
+        let values = bytemuck::pod_collect_to_vec::<u8, T>(data);
         count(&gpu.counters().readbacks, 1);
         count(&gpu.counters().read_bytes, bytes::<T>(self.len));
         drop(view);
         self.buffer.unmap();
-        Ok(())
+        Ok(values)
     }
 }
 

@@ -37,7 +37,8 @@ pub(crate) struct Kernel {
 }
 
 impl Kernel {
-    /// Compiles a shader whose entry point is `main`. `parts` are put together as one text.
+    /// Compiles a shader whose entry point is `main`. `parts` are put together as one text; `constants` are the values of
+    /// its overrides.
     ///
     /// # Errors
     /// If the device refuses it.
@@ -46,6 +47,7 @@ impl Kernel {
         name: &str,
         parts: &[&str],
         uses: &[Use],
+        constants: &[(&str, f64)],
     ) -> Result<Self, GpuError> {
         let device = gpu.device();
         let refused = device.push_error_scope(wgpu::ErrorFilter::Validation);
@@ -76,7 +78,10 @@ impl Kernel {
             layout: Some(&all),
             module: &module,
             entry_point: Some("main"),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants,
+                ..wgpu::PipelineCompilationOptions::default()
+            },
             cache: None,
         });
         match pollster::block_on(refused.pop()) {

@@ -7,6 +7,7 @@
 use glam::DVec3;
 
 use crate::collider::Obstacle;
+use crate::lanes::STEEP;
 use crate::layout::{CONSTANTS, REST};
 use crate::{Pose, Real, Solver, StepSettings};
 
@@ -223,6 +224,10 @@ impl<R: Real> Solver<R> {
 }
 
 impl Solver<f32> {
+    /// The norm of the derivative of det F (√3 at rest) up to which tets resist a change of volume as their material says;
+    /// from there on derivative, det F and γ are scaled down to it.
+    pub const STEEP: f64 = STEEP;
+
     /// The colliders `elapsed` s after the start of the frame, at the end of a substep, relative to the origin, as 20
     /// numbers each.
     ///

@@ -1,6 +1,6 @@
 //! Choosing an adapter, and what happens without one.
 
-use incise_gpu::{GpuContext, GpuError, GpuOptions};
+use incise_gpu::{GpuContext, GpuError, GpuOptions, wgpu};
 
 use crate::support::gpu;
 
@@ -47,7 +47,7 @@ fn an_unknown_adapter_is_an_error_that_names_the_others() {
 #[test]
 fn without_drivers_there_is_an_error_and_no_panic() {
     let options = GpuOptions {
-        backends: Some(incise_gpu::wgpu::Backends::empty()),
+        backends: Some(wgpu::Backends::empty()),
         ..GpuOptions::default()
     };
     let error = GpuContext::new(&options).expect_err("nobody was asked");

@@ -4,4 +4,5 @@
 //! unless `INCISE_REQUIRE_GPU` is set: then they fail.
 
 mod device;
+mod solver;
 mod support;
