@@ -72,6 +72,12 @@ pub enum GpuError {
         /// The most tets of a block.
         limit: usize,
     },
+    /// The device does not have what the host says: a defect of this crate or of a driver.
+    #[error("internal check failed: on the GPU, {what} differs")]
+    Inconsistent {
+        /// What differs.
+        what: String,
+    },
     /// An algorithm gave up; a defect, since all of them end.
     #[error("{algorithm} did not end after {rounds} rounds")]
     Stalled {

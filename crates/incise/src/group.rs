@@ -11,9 +11,10 @@ use incise_cutting::{CutDelta, CuttableMesh, PieceEvent, PieceTracker};
 use incise_mesh::signed_volume;
 use incise_xpbd::{KappaLimit, StepReport, StepSettings};
 
-use crate::backend::{AnySolver, each};
+use crate::backend::{AnySolver, each, each_mut};
 use crate::handle::Handle;
 use crate::joined::Joined;
+use crate::place::Place;
 use crate::plan::Plan;
 use crate::recluster::Recluster;
 use crate::report::{Milliseconds, milliseconds};
@@ -65,6 +66,7 @@ pub(crate) struct CutKappa {
 impl Group {
     pub(crate) fn new(
         scene: &Scene,
+        place: &Place,
         mut settings: StepSettings,
         mut joined: Joined,
     ) -> Result<Self, Error> {
@@ -83,7 +85,7 @@ impl Group {
                 kappa,
                 substep_time,
             };
-            solver.limit_kappa(limit, cuttable.mesh());
+            solver.limit_kappa(limit, cuttable.mesh())?;
         }
         for handle in &mut joined.handles {
             handle.attach(&mut solver)?;
@@ -94,7 +96,7 @@ impl Group {
         if let Some(volumes) = &volumes {
             volumes.constrain(&mut solver, &cuttable, &plan.schedule)?;
         }
-        solver.prepare(&scene.solver)?;
+        solver.prepare(&scene.solver, place)?;
         let recluster = scene.solver.recluster;
         let mut group = Self {
             recluster: recluster.map(|spec| Recluster::new(spec, &plan)),
@@ -143,7 +145,7 @@ impl Group {
         collider::advance(&mut self.settings);
         let time = self.settings.time_step;
         if let Some(rest) = self.rest.as_mut().filter(|_| !moved) {
-            each!(&mut self.solver, solver => if rest.count(solver.max_speed(), time) {
+            each_mut!(&mut self.solver, solver => if rest.count(solver.max_speed(), time) {
                 for p in 0..solver.particle_count() {
                     solver.set_velocity(p, DVec3::ZERO);
                 }
@@ -182,9 +184,7 @@ impl Group {
         if let Some(volumes) = &self.volumes {
             volumes.follow(&mut self.solver, delta, &self.cuttable, &self.plan.schedule)?;
         }
-        let start = Instant::now();
-        self.solver.lay_out(&self.plan.schedule);
-        ms.schedule += milliseconds(start.elapsed());
+        self.solver.lay_out(&self.plan.schedule, ms)?;
         Ok(events)
     }
 

@@ -22,6 +22,7 @@ use crate::limits::{self, value};
 use crate::measure::{by_body, energy, kappa, max_speed, residual, softened, volume};
 use crate::method::settings;
 use crate::pieces::PieceNumbers;
+use crate::place::Place;
 use crate::report::{
     CutReport, DetachedReport, FrameReport, Milliseconds, PieceReport, SoftenedReport, milliseconds,
 };
@@ -65,6 +66,7 @@ pub struct Simulation {
     quantities: Vec<Quantity>,
     every: u64,
     precision: Precision,
+    place: Place,
     /// In the order of their first bodies.
     groups: Vec<Group>,
     /// All groups together, if there are several.
@@ -86,7 +88,7 @@ impl Simulation {
     /// # Errors
     /// If a value of the scene lies outside its range or a mesh cannot be read or is broken.
     pub fn new(scene: &Scene) -> Result<Self, Error> {
-        Self::build(scene, None)
+        Self::build(scene, Place::choose(scene)?, None)
     }
 
     /// The same on a number of threads of its own. The result is the same to the bit for any number.
@@ -102,10 +104,24 @@ impl Simulation {
             threads,
             message: error.to_string(),
         })?;
-        Self::build(scene, Some(pool))
+        Self::build(scene, Place::choose(scene)?, Some(pool))
     }
 
-    fn build(scene: &Scene, pool: Option<ThreadPool>) -> Result<Self, Error> {
+    /// Sets a scene up on a device that is open, whatever its `solver.backend` says: a renderer's, that of another
+    /// simulation.
+    ///
+    /// # Errors
+    /// As [`Simulation::new`], and if the device cannot do what the scene asks for.
+    #[cfg(feature = "gpu")]
+    pub fn on_device(
+        scene: &Scene,
+        gpu: std::sync::Arc<crate::gpu::GpuContext>,
+    ) -> Result<Self, Error> {
+        crate::place::check(scene)?;
+        Self::build(scene, Place::on(gpu), None)
+    }
+
+    fn build(scene: &Scene, place: Place, pool: Option<ThreadPool>) -> Result<Self, Error> {
         let settings = settings(scene)?;
         if scene.report.every == 0 {
             return Err(value("report.every", 0, "at least 1"));
@@ -127,7 +143,7 @@ impl Simulation {
         let make_groups = || {
             let groups = joined.into_par_iter();
             groups
-                .map(|joined| Group::new(scene, settings.clone(), joined))
+                .map(|joined| Group::new(scene, &place, settings.clone(), joined))
                 .collect::<Result<Vec<_>, _>>()
         };
         let groups = match &pool {
@@ -140,6 +156,7 @@ impl Simulation {
             quantities: scene.report.quantities.clone(),
             every: scene.report.every,
             precision,
+            place,
             on_cut: Vec::new(),
             deltas: Vec::new(),
             pieces: PieceNumbers::new(&groups),
@@ -188,6 +205,10 @@ impl Simulation {
         let start = Instant::now();
         let mut ms = Milliseconds::default();
         let mut detached = Vec::new();
+        let mut repaired = 0;
+        if self.place.is_device() && self.timeline.is_due(self.next_frame) {
+            repaired += self.fetch(&mut ms)?;
+        }
         let cut = self.carry_out_strokes(&mut detached, &mut ms)?;
         let mut reclustered = 0;
         for group in &mut self.groups {
@@ -197,11 +218,14 @@ impl Simulation {
         let before_solve = Instant::now();
         let (frame, residual) = (self.next_frame, self.wants(Quantity::Residual));
         let groups = self.groups.par_iter_mut();
-        let repaired = groups
+        repaired += groups
             .map(|group| group.step(frame, residual).map(|step| step.repaired))
             .try_reduce(|| 0, |a, b| Ok(a + b))?;
         ms.solve = milliseconds(before_solve.elapsed());
 
+        if !self.place.is_device() || self.fetches() {
+            repaired += self.fetch(&mut ms)?;
+        }
         self.report = FrameReport {
             frame: self.next_frame,
             time_s: (self.next_frame + 1) as f64 * self.time_step,
@@ -212,10 +236,10 @@ impl Simulation {
             ..FrameReport::default()
         };
         self.measure();
-        self.collect_positions();
         self.count();
         ms.total = milliseconds(start.elapsed());
-        ms.other = ms.total - ms.cut - ms.cluster - ms.color - ms.schedule - ms.solve;
+        ms.other = ms.total
+            - (ms.cut + ms.cluster + ms.color + ms.schedule + ms.upload + ms.solve + ms.readback);
         self.report.ms = ms;
         self.next_frame += 1;
         Ok(())
@@ -281,7 +305,8 @@ impl Simulation {
             deltas.push(delta.clone());
             Ok(())
         })?;
-        ms.cut = milliseconds(start.elapsed()) - ms.cluster - ms.color - ms.schedule - measuring;
+        let others = ms.cluster + ms.color + ms.schedule + ms.upload + measuring;
+        ms.cut = milliseconds(start.elapsed()) - others;
         Ok(report)
     }
 
@@ -319,6 +344,55 @@ impl Simulation {
         }
     }
 
+    /// Whether the frame to come reports something that depends on the state.
+    fn fetches(&self) -> bool {
+        let state = |quantity: &Quantity| *quantity != Quantity::Kappa;
+        let reports = self.next_frame.is_multiple_of(self.every);
+        reports && self.quantities.iter().any(state)
+    }
+
+    /// Takes over state and positions; returns how many particles a device had to put back since the last time.
+    fn fetch(&mut self, ms: &mut Milliseconds) -> Result<usize, Error> {
+        let start = Instant::now();
+        let mut repaired = 0;
+        for group in &mut self.groups {
+            repaired += group.solver.read_back()?;
+        }
+        if self.place.is_device() {
+            ms.readback += milliseconds(start.elapsed());
+        }
+        self.collect_positions();
+        Ok(repaired)
+    }
+
+    /// Makes [`Simulation::positions`] those of now, if the state is on a device: waits for it and fetches them.
+    /// Otherwise they are, and nothing happens.
+    ///
+    /// A frame does this by itself only if a stroke is due, since a blade has to know where the body is, or if it reports
+    /// a quantity that depends on the state.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub fn read_back(&mut self) -> Result<(), Error> {
+        if self.place.is_device() {
+            self.report.repaired += self.fetch(&mut Milliseconds::default())?;
+        }
+        Ok(())
+    }
+
+    /// What is to be said about where it is computed: the device, or why there is none; `None` if the scene asked for
+    /// the processor.
+    #[must_use]
+    pub fn backend_note(&self) -> Option<&str> {
+        self.place.note.as_deref()
+    }
+
+    /// The device solvers of the scene's groups of bodies, for renderers; none on the processor.
+    #[cfg(feature = "gpu")]
+    pub fn device_solvers(&self) -> impl Iterator<Item = &crate::gpu::GpuSolver> + '_ {
+        self.groups.iter().filter_map(|group| group.solver.device())
+    }
+
     /// Takes over the positions of the solvers.
     fn collect_positions(&mut self) {
         for group in &mut self.groups {
@@ -343,7 +417,7 @@ impl Simulation {
         report.clusters = clusters;
         report.colors = colors;
         report.pieces = self.groups.iter().map(|group| group.pieces.count()).sum();
-        report.backend = "cpu";
+        report.backend = self.place.name();
         report.precision = self.precision.name();
     }
 
@@ -353,7 +427,8 @@ impl Simulation {
         &self.report
     }
 
-    /// The present positions of all particles in m.
+    /// The positions of all particles in m: the present ones, or, if the state is on a device, those when it was last
+    /// fetched: see [`Simulation::read_back`].
     #[must_use]
     pub fn positions(&self) -> &[DVec3] {
         match &self.whole {

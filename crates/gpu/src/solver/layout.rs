@@ -108,6 +108,11 @@ impl Layout {
             .map(|place| place as usize)
     }
 
+    /// The tet in a place that has one.
+    pub(crate) fn tet(&self, place: usize) -> u32 {
+        self.tets[place]
+    }
+
     /// Where the `k`-th tet of a seat is.
     fn place_of(&self, seat: u32, k: usize) -> usize {
         let seat = seat as usize;

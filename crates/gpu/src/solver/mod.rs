@@ -10,6 +10,7 @@
 //! Cost: a dispatch a color and two or three a substep; uploads only of what edits changed.
 
 mod body;
+mod check;
 mod colors;
 mod frame;
 mod kernels;
@@ -21,7 +22,7 @@ mod tile;
 use std::sync::Arc;
 
 use incise_graph::Schedule;
-use incise_xpbd::{Solver, StepSettings};
+use incise_xpbd::{Pose, Solver, StepSettings};
 
 pub(crate) use kernels::SOURCES;
 pub use layout::Form;
@@ -215,6 +216,14 @@ impl GpuSolver {
     pub fn edit(&mut self) -> Result<&mut Solver<f32>, GpuError> {
         self.read_back()?;
         Ok(&mut self.host)
+    }
+
+    /// Says where a handle is at the end of the next frame, as [`Solver::move_handle`] does, without reading back.
+    ///
+    /// # Panics
+    /// As [`Solver::move_handle`].
+    pub fn move_handle(&mut self, handle: u32, pose: Pose) {
+        self.host.move_handle(handle, pose);
     }
 
     /// The solver as the host last saw it: topology, masses and materials are those of now, the state is an old one

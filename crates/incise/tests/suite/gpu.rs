@@ -1,0 +1,229 @@
+//! Scenes on a GPU: the same as on the processor, and nothing fetched that nobody asked for.
+//!
+//! They need an adapter (Mesa's lavapipe will do) and skip with a line on stderr without one, unless
+//! `INCISE_REQUIRE_GPU` is set: then they fail.
+
+use std::sync::{Arc, OnceLock};
+
+use incise::gpu::{GpuContext, GpuError, GpuOptions};
+use incise::mesh::glam::DVec3;
+use incise::scene::{Backend, Precision, Quantity};
+use incise::{Error, Scene, Simulation};
+
+static CONTEXT: OnceLock<Result<Arc<GpuContext>, GpuError>> = OnceLock::new();
+
+/// The device of all tests, or `None` on a machine without one, which is said.
+fn gpu(test: &str) -> Option<Arc<GpuContext>> {
+    let open = || GpuContext::new(&GpuOptions::from_env()).map(Arc::new);
+    match CONTEXT.get_or_init(open) {
+        Ok(gpu) => Some(Arc::clone(gpu)),
+        Err(error) => {
+            let required = std::env::var_os("INCISE_REQUIRE_GPU").is_some();
+            assert!(!required, "a GPU is required: {error}");
+            eprintln!("SKIPPED {test}: {error}");
+            None
+        }
+    }
+}
+
+/// A device with a count of its own.
+fn counting(gpu: &GpuContext) -> Arc<GpuContext> {
+    Arc::new(GpuContext::from_device(
+        gpu.device().clone(),
+        gpu.queue().clone(),
+    ))
+}
+
+fn scene(tets: usize, clustering: &str) -> Scene {
+    let mut scene = Scene::built_in();
+    scene.body[0].shape = Some(incise::scene::ShapeSpec {
+        kind: "liver".into(),
+        tets,
+    });
+    scene.solver.clustering = clustering.into();
+    scene
+}
+
+fn farthest(a: &[DVec3], b: &[DVec3]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| a.distance(*b))
+        .fold(0.0, f64::max)
+}
+
+/// The main job, frame by frame: the same cut, the same pieces, and the body where it is on the processor.
+#[test]
+fn the_cut_liver_is_the_same() {
+    let Some(gpu) = gpu("the_cut_liver_is_the_same") else {
+        return;
+    };
+    let scene = scene(5000, "serial:10");
+    let mut here = Simulation::new(&scene).unwrap();
+    let mut there = Simulation::on_device(&scene, gpu).unwrap();
+    for frame in 0..200 {
+        let one = here.step().unwrap().clone();
+        let other = there.step().unwrap();
+        assert_eq!(other.backend, "gpu");
+        assert_eq!(
+            (one.tets, one.pieces, one.cut),
+            (other.tets, other.pieces, other.cut),
+            "{frame}"
+        );
+        assert_eq!(
+            (one.colors, one.clusters),
+            (other.colors, other.clusters),
+            "{frame}"
+        );
+        if frame % 20 == 19 {
+            there.check().unwrap();
+            there.read_back().unwrap();
+            let far = farthest(here.positions(), there.positions());
+            // The liver has a length of 1.
+            assert!(far < 1e-4, "frame {frame}: {far}");
+        }
+    }
+    assert!(here.report().pieces > 1);
+    assert_eq!(there.report().repaired, 0);
+}
+
+/// In tiles: another order of solving, so other positions, but the same laws.
+#[test]
+fn the_cut_liver_in_tiles_comes_apart_all_the_same() {
+    let Some(gpu) = gpu("the_cut_liver_in_tiles_comes_apart_all_the_same") else {
+        return;
+    };
+    let mut scene = scene(2000, "pressure:128");
+    scene.report.quantities = vec![Quantity::Volume, Quantity::Energy];
+    let mut there = Simulation::on_device(&scene, gpu).unwrap();
+    for frame in 0..120 {
+        let report = there.step().unwrap();
+        let (volume, inverted) = (report.volume_error.unwrap(), report.inverted_tets.unwrap());
+        assert!(volume.abs() < 0.05, "{frame}: {volume}");
+        assert_eq!(inverted, 0, "{frame}");
+        if report.cut.is_some() {
+            there.check().unwrap();
+        }
+    }
+    assert!(there.report().pieces > 1);
+    assert!(there.positions().iter().all(|x| x.is_finite()));
+}
+
+/// What moves between host and device in a frame without blade and report, and what a cut sends.
+#[test]
+fn frames_fetch_nothing_and_cuts_send_what_they_cut() {
+    let Some(gpu) = gpu("frames_fetch_nothing_and_cuts_send_what_they_cut") else {
+        return;
+    };
+    for clustering in ["serial:10", "pressure:128"] {
+        let gpu = counting(&gpu);
+        let scene = scene(8000, clustering);
+        let mut there = Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap();
+        there.step().unwrap();
+        let whole = gpu.traffic().uploaded_bytes;
+        let (mut cutting, mut sent) = (0, 0);
+        for frame in 1..90 {
+            let before = gpu.traffic();
+            let report = there.step().unwrap();
+            let spent = gpu.traffic().since(before);
+            let due = scene
+                .stroke
+                .iter()
+                .any(|s| (s.first_frame()..=s.last_frame()).contains(&frame));
+            match report.cut {
+                _ if !due => {
+                    assert_eq!((spent.readbacks, spent.uploaded_bytes), (0, 0), "{frame}");
+                    assert_eq!((spent.submits, spent.passes), (1, 1), "{frame}");
+                }
+                None => {}
+                Some(cut) => {
+                    cutting += 1;
+                    sent += spent.uploaded_bytes;
+                    // 112 bytes a tet; around each tet that is cut some ten others have other masses, and in tiles all
+                    // of a touched tile are sent: measured are 3 to 9 kB, in tiles up to 60.
+                    let most = if clustering == "serial:10" {
+                        20_000
+                    } else {
+                        150_000
+                    };
+                    let each = spent.uploaded_bytes / cut.tets_cut.max(1) as u64;
+                    assert!(each < most, "{clustering} {frame}: {each} bytes a cut tet");
+                }
+            }
+        }
+        assert!(
+            cutting > 20 && sent / cutting < whole / 4,
+            "{clustering}: {sent} of {whole}"
+        );
+    }
+}
+
+#[test]
+fn a_report_fetches_what_it_needs() {
+    let Some(gpu) = gpu("a_report_fetches_what_it_needs") else {
+        return;
+    };
+    let mut scene = scene(500, "serial:10");
+    scene.stroke.clear();
+    scene.report.every = 5;
+    scene.report.quantities = vec![
+        Quantity::Residual,
+        Quantity::Energy,
+        Quantity::Volume,
+        Quantity::Speed,
+        Quantity::Kappa,
+    ];
+    let gpu = counting(&gpu);
+    let mut here = Simulation::new(&scene).unwrap();
+    let mut there = Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap();
+    for frame in 0..11 {
+        let before = gpu.traffic();
+        let one = here.step().unwrap().clone();
+        let other = there.step().unwrap().clone();
+        let fetched = gpu.traffic().since(before).readbacks > 0;
+        assert_eq!(fetched, frame % 5 == 0);
+        assert_eq!(other.energy.is_some(), frame % 5 == 0);
+        if let (Some(one), Some(other)) = (one.energy, other.energy) {
+            assert!((one.kinetic / other.kinetic - 1.0).abs() < 1e-3);
+        }
+        if let (Some(one), Some(other)) = (one.residual, other.residual) {
+            assert!(
+                (one.force / other.force - 1.0).abs() < 0.05,
+                "{one:?} {other:?}"
+            );
+        }
+        assert_eq!(one.kappa, other.kappa);
+    }
+}
+
+#[test]
+fn what_a_device_does_not_do_is_refused_and_auto_goes_elsewhere() {
+    let mut doubled = scene(200, "serial:10");
+    doubled.solver.precision = Precision::F64;
+    let large = scene(200, "pressure:200");
+    for (mut scene, field) in [(doubled, "solver.precision"), (large, "solver.clustering")] {
+        scene.solver.backend = Backend::Gpu;
+        let error = Simulation::new(&scene).unwrap_err();
+        assert!(
+            matches!(&error, Error::Value { field: f, .. } if f == field),
+            "{error}"
+        );
+        scene.solver.backend = Backend::Auto;
+        let mut simulation = Simulation::new(&scene).unwrap();
+        assert!(simulation.backend_note().unwrap().contains(field));
+        assert_eq!(simulation.step().unwrap().backend, "cpu");
+    }
+}
+
+#[test]
+fn auto_takes_no_processor_in_disguise() {
+    let Some(gpu) = gpu("auto_takes_no_processor_in_disguise") else {
+        return;
+    };
+    let mut scene = scene(200, "serial:10");
+    scene.solver.backend = Backend::Auto;
+    let mut simulation = Simulation::new(&scene).unwrap();
+    let backend = simulation.step().unwrap().backend;
+    assert_eq!(backend, if gpu.adapter().software { "cpu" } else { "gpu" });
+    assert!(simulation.backend_note().is_some());
+}
