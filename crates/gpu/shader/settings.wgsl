@@ -18,7 +18,7 @@ struct Settings {
     depth: u32,
     // Places in all.
     places: u32,
-    // l/mu, gamma and the damping time, where there is but one material.
+    // l/mu, gamma and the damping time, where there is but one material; then 0, which compilers must not know.
     material: vec4<f32>,
 }
 

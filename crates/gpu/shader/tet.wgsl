@@ -108,6 +108,12 @@ fn volume(tet: Tet, f: Columns) -> Volume {
     return Volume(cofactor, det, gamma);
 }
 
+// Keeps compilers from multiplying this with something else first. At rest the determinant of the system is a difference
+// of equal products, and another order of their factors is another noise.
+fn pinned(x: f32) -> f32 {
+    return bitcast<f32>(bitcast<u32>(x) ^ bitcast<u32>(settings.material.w));
+}
+
 // Both constraints as one system; moves the corners and changes both multipliers.
 fn solve_both(tet: Tet, x: Corners, f: Columns, old: Columns, multipliers: ptr<function, vec2<f32>>) -> Corners {
     let norm = sqrt(product(f, f));
@@ -116,7 +122,7 @@ fn solve_both(tet: Tet, x: Corners, f: Columns, old: Columns, multipliers: ptr<f
     let scale = settings.one / select(settings.one, norm, directed);
     let v = volume(tet, f);
     let trace = (tet.same.x + tet.same.y + tet.same.z) * settings.time_squared;
-    var m11 = weighted(tet, f) * scale * scale;
+    var m11 = pinned(weighted(tet, f) * scale * scale);
     var m22 = weighted(tet, v.cofactor);
     var m12 = trace * v.volume * scale;
     var deviatoric = norm;
@@ -126,9 +132,9 @@ fn solve_both(tet: Tet, x: Corners, f: Columns, old: Columns, multipliers: ptr<f
         deviatoric += tet.damping * scale * product(f, motion);
         hydrostatic += tet.damping * product(v.cofactor, motion);
         let damped = settings.one + tet.damping;
-        m11 *= damped;
-        m22 *= damped;
-        m12 *= damped;
+        m11 = pinned(m11 * damped);
+        m22 = pinned(m22 * damped);
+        m12 = pinned(m12 * damped);
     }
     let parallel = m11 * m22 - m12 * m12;
     // Where rounding makes it negative it is noise; what overflowed stays so.
