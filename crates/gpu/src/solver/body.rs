@@ -8,7 +8,7 @@ use incise_graph::Schedule;
 use incise_xpbd::{Changes, Solver};
 
 use super::colors::Colors;
-use super::kernels::{Kernels, PATCH_PARTICLES, PATCH_TETS};
+use super::kernels::{Kernels, PATCH_PARTICLES, PATCH_TETS, Variant};
 use super::layout::{Form, Layout, THREADS};
 use super::numbers::{NUMBERS, Part, ParticlePatch, TetPatch};
 use super::tile::TILE_NUMBERS;
@@ -74,7 +74,7 @@ impl Body {
         self.follow_particles(gpu, kernels, solver, changes)?;
         let patch = self.layout.follow(schedule, solver, changes)?;
         if patch.regrouped {
-            self.colors.follow(gpu, &self.layout.seats)?;
+            self.colors.follow(gpu, self.layout.seats.groups())?;
         }
         let various = !solver.is_uniform();
         let places = self.layout.place_count();
@@ -97,25 +97,23 @@ impl Body {
         }
         for patches in patch.tets.chunks(PATCHES) {
             self.tet_patches.replace(gpu, patches)?;
-            let kernel = kernels.patching(gpu, &PATCH_TETS, various)?;
-            let bound = kernel.bind(
-                gpu,
-                &[
-                    self.part.buffer(),
-                    self.tet_patches.buffer(),
-                    self.corners.buffer(),
-                    self.rest.buffer(),
-                    self.constants.buffer(),
-                ],
-            );
+            let variant = Variant {
+                various,
+                ..Variant::default()
+            };
+            let buffers = [
+                self.part.buffer(),
+                self.tet_patches.buffer(),
+                self.corners.buffer(),
+                self.rest.buffer(),
+                self.constants.buffer(),
+            ];
+            let bound = kernels.bind(gpu, &PATCH_TETS, variant, &buffers)?;
             self.part.write(gpu, 0, &[count(patches.len())]);
             let mut encoder = gpu.encoder("patch tets");
-            Recorder::new(gpu, &mut encoder, "patch tets", None).dispatch(
-                &kernel,
-                &bound,
-                &[],
-                patches.len().div_ceil(THREADS),
-            );
+            let mut pass = Recorder::new(gpu, &mut encoder, "patch tets", None);
+            bound.run(&mut pass, &[], patches.len().div_ceil(THREADS));
+            drop(pass);
             gpu.submit(encoder)?;
         }
         Ok(())
@@ -160,24 +158,18 @@ impl Body {
                 })
                 .collect();
             self.particle_patches.replace(gpu, &patches)?;
-            let kernel = kernels.plain(gpu, &PATCH_PARTICLES)?;
-            let bound = kernel.bind(
-                gpu,
-                &[
-                    self.part.buffer(),
-                    self.particle_patches.buffer(),
-                    self.particles.buffer(),
-                    self.velocities.buffer(),
-                ],
-            );
+            let buffers = [
+                self.part.buffer(),
+                self.particle_patches.buffer(),
+                self.particles.buffer(),
+                self.velocities.buffer(),
+            ];
+            let bound = kernels.bind(gpu, &PATCH_PARTICLES, Variant::default(), &buffers)?;
             self.part.write(gpu, 0, &[count(patches.len())]);
             let mut encoder = gpu.encoder("patch particles");
-            Recorder::new(gpu, &mut encoder, "patch particles", None).dispatch(
-                &kernel,
-                &bound,
-                &[],
-                patches.len().div_ceil(THREADS),
-            );
+            let mut pass = Recorder::new(gpu, &mut encoder, "patch particles", None);
+            bound.run(&mut pass, &[], patches.len().div_ceil(THREADS));
+            drop(pass);
             gpu.submit(encoder)?;
         }
         Ok(())

@@ -15,8 +15,10 @@ mod frame;
 mod kernels;
 mod layout;
 mod numbers;
+mod obstacles;
 mod seats;
 mod tile;
+mod turns;
 
 use std::sync::Arc;
 
@@ -29,7 +31,7 @@ pub use layout::Form;
 use crate::array::Array;
 use crate::{GpuContext, GpuError};
 use body::Body;
-use frame::Frame;
+use frame::{Frame, Scene};
 use kernels::Kernels;
 
 /// A body that is solved on a device.
@@ -170,7 +172,14 @@ impl GpuSolver {
             repaired,
             ..
         } = self;
-        frame.record(gpu, kernels, body, host, repaired, settings, keep)?;
+        let scene = Scene {
+            gpu,
+            kernels,
+            body,
+            host,
+            repaired,
+        };
+        frame.record(scene, settings, keep)?;
         self.ahead = true;
         self.host.end_frame();
         Ok(())
@@ -196,7 +205,12 @@ impl GpuSolver {
             body,
             ..
         } = self;
-        body.follow(gpu, kernels, host, schedule, &changes)
+        let followed = body.follow(gpu, kernels, host, schedule, &changes);
+        // What was not followed is not known any more. Edits wait for the device: it is not ahead of them.
+        if followed.is_err() && !self.ahead {
+            self.host.track_changes();
+        }
+        followed
     }
 
     /// The solver with the state of the device, which is waited for if it has gone on.
@@ -266,7 +280,7 @@ impl GpuSolver {
     /// Bytes of device memory.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        self.body.bytes()
+        self.body.bytes() + self.frame.bytes()
     }
 
     /// Dispatches of one pass over the tets.

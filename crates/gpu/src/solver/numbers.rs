@@ -18,7 +18,9 @@ pub(crate) struct Settings {
     pub(crate) steep: f32,
     pub(crate) particles: u32,
     pub(crate) depth: u32,
-    pub(crate) places: u32,
+    pub(crate) obstacles: u32,
+    pub(crate) handles: u32,
+    pub(crate) unused: [u32; 3],
     pub(crate) material: [f32; 4],
 }
 
@@ -28,6 +30,16 @@ pub(crate) struct Settings {
 pub(crate) struct Part {
     pub(crate) first: u32,
     pub(crate) count: u32,
+}
+
+/// `Turn` in `turn.wgsl`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Turn {
+    pub(crate) substep: u32,
+    pub(crate) iteration: u32,
+    pub(crate) weight: f32,
+    pub(crate) unused: u32,
 }
 
 /// `TetPatch` in `patch_tets.wgsl`.
