@@ -16,12 +16,12 @@ struct Settings {
     particles: u32,
     // Places that a thread has for tets.
     depth: u32,
-    // Colliders, and handles.
+    // Colliders, handles, and what hangs on those rigidly or by a compliance.
     obstacles: u32,
     handles: u32,
-    unused_a: u32,
-    unused_b: u32,
-    unused_c: u32,
+    held: u32,
+    hanging: u32,
+    unused: u32,
     // l/mu, gamma and the damping time, where there is but one material.
     material: vec4<f32>,
 }

@@ -8,6 +8,7 @@ use incise_graph::Schedule;
 use incise_xpbd::{Changes, Solver};
 
 use super::colors::Colors;
+use super::handles::Handles;
 use super::kernels::{Kernels, PATCH_PARTICLES, PATCH_TETS, Variant};
 use super::layout::{Form, Layout, THREADS};
 use super::numbers::{NUMBERS, Part, ParticlePatch, TetPatch};
@@ -37,6 +38,8 @@ pub(crate) struct Body {
     pub(crate) multipliers: Array<[f32; 2]>,
     /// Empty unless a step is Jacobi's.
     pub(crate) corrections: Array<[f32; 4]>,
+    /// If something hangs on handles.
+    pub(crate) handles: Option<Handles>,
     tet_patches: Array<TetPatch>,
     particle_patches: Array<ParticlePatch>,
     part: Array<Part>,
@@ -56,6 +59,7 @@ impl Body {
             tiles: Array::zeros(gpu, "tiles", 0)?,
             multipliers: Array::zeros(gpu, "multipliers", 0)?,
             corrections: Array::zeros(gpu, "corrections", 0)?,
+            handles: None,
             tet_patches: Array::zeros(gpu, "patches of tets", 0)?,
             particle_patches: Array::zeros(gpu, "patches of particles", 0)?,
             part: Array::with_usage(gpu, "size of a patch", 1, wgpu::BufferUsages::UNIFORM)?,
@@ -72,6 +76,7 @@ impl Body {
         changes: &Changes,
     ) -> Result<(), GpuError> {
         self.follow_particles(gpu, kernels, solver, changes)?;
+        Handles::follow(&mut self.handles, gpu, solver, changes)?;
         let patch = self.layout.follow(schedule, solver, changes)?;
         if patch.regrouped {
             self.colors.follow(gpu, self.layout.seats.groups())?;
@@ -177,7 +182,7 @@ impl Body {
 
     /// Bytes of all arrays.
     pub(crate) fn bytes(&self) -> u64 {
-        [
+        let arrays: u64 = [
             self.particles.buffer(),
             self.previous.buffer(),
             self.velocities.buffer(),
@@ -194,7 +199,8 @@ impl Body {
         ]
         .into_iter()
         .map(wgpu::Buffer::size)
-        .sum()
+        .sum();
+        arrays + self.handles.as_ref().map_or(0, Handles::bytes)
     }
 }
 

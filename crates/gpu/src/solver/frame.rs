@@ -7,6 +7,7 @@ use incise_xpbd::{Form as Solving, Method, Solver, StepSettings};
 use wgpu::{Buffer, BufferUsages};
 
 use super::body::Body;
+use super::handles::{self, Handles};
 use super::kernels::{Bound, CLEAR, Kernels, PREDICT, UPDATE_VELOCITIES, Variant, solve};
 use super::layout::{Form, THREADS};
 use super::numbers::Settings;
@@ -82,7 +83,11 @@ impl Frame {
         let mut pass = Recorder::new(gpu, &mut encoder, "frame", None);
         let particles = host.particle_count().div_ceil(THREADS);
         for substep in 0..settings.substeps {
+            let start = turns::offset(settings, substep, 0);
             passes.predict.run(&mut pass, &[], particles);
+            if let Some(handles) = &passes.handles {
+                handles.move_held(&mut pass, start);
+            }
             if let Some(clear) = &passes.clear {
                 let words = 2 * body.layout.place_count();
                 clear.run(&mut pass, &[], words.div_ceil(THREADS));
@@ -97,11 +102,17 @@ impl Frame {
             for iteration in 0..settings.iterations {
                 let turn = turns::offset(settings, substep, iteration);
                 body.colors.run(&mut pass, &passes.solve, &passes.tail);
+                if let Some(handles) = &passes.handles {
+                    handles.solve(&mut pass, turn);
+                }
                 if let Some(project) = &passes.project {
                     project.run(&mut pass, &[turn], particles);
                 }
             }
             passes.update.run(&mut pass, &[], particles);
+            if let Some(handles) = &passes.handles {
+                handles.update_held(&mut pass);
+            }
         }
         drop(pass);
         gpu.submit(encoder)
@@ -128,7 +139,10 @@ impl Frame {
         if let Some(obstacles) = &mut self.obstacles {
             obstacles.follow(gpu, host, settings)?;
         }
-        let takes_turns = self.obstacles.is_some();
+        if let Some(handles) = &mut body.handles {
+            handles.prepare(gpu, host, settings)?;
+        }
+        let takes_turns = self.obstacles.is_some() || body.handles.is_some();
         if takes_turns && self.turns.is_none() {
             self.turns = Some(Turns::new(gpu)?);
         }
@@ -171,8 +185,10 @@ impl Frame {
             particles: index(host.particle_count()),
             depth: index(depth),
             obstacles: index(settings.colliders.len()),
-            handles: 0,
-            unused: [0; 3],
+            handles: index(body.handles.as_ref().map_or(0, Handles::handle_count)),
+            held: index(body.handles.as_ref().map_or(0, Handles::held_count)),
+            hanging: index(body.handles.as_ref().map_or(0, Handles::hanging_count)),
+            unused: 0,
             material,
         };
         if self.sent != Some(values) {
@@ -213,13 +229,21 @@ fn refuse(host: &Solver<f32>, settings: &StepSettings) -> Result<(), GpuError> {
     if settings.method != Method::GaussSeidel {
         return unsupported("other methods than Gauss-Seidel");
     }
-    if host.attachments().len() > 0 {
-        return unsupported("handles");
-    }
     if host.distance_count() > 0 || host.volume_count() > 0 {
         return unsupported("distance and volume constraints");
     }
     Ok(())
+}
+
+/// The buffers that what is not a tet may need.
+#[derive(Debug)]
+pub(crate) struct Shared<'a> {
+    pub(crate) settings: &'a Buffer,
+    pub(crate) turns: &'a Buffer,
+    pub(crate) particles: &'a Buffer,
+    pub(crate) previous: &'a Buffer,
+    pub(crate) velocities: &'a Buffer,
+    pub(crate) repaired: &'a Buffer,
 }
 
 /// The kernels of a step, in the order of a substep; those that it does not need are not there.
@@ -232,6 +256,7 @@ struct Passes {
     tail: Bound,
     project: Option<Bound>,
     update: Bound,
+    handles: Option<handles::Passes>,
 }
 
 impl Frame {
@@ -286,6 +311,14 @@ impl Frame {
             repaired.buffer(),
         ];
         let turns = self.turns.as_ref().map(Turns::buffer);
+        let shared = turns.map(|turns| Shared {
+            settings: constants,
+            turns,
+            particles,
+            previous,
+            velocities,
+            repaired: repaired.buffer(),
+        });
         Ok(Passes {
             predict: bind(
                 &PREDICT,
@@ -299,10 +332,14 @@ impl Frame {
             solve: bind(solve(form, false), variant, &tets)?,
             tail: bind(solve(form, true), variant, &tets)?,
             update: bind(&UPDATE_VELOCITIES, plain, &update)?,
-            project: match (&self.obstacles, turns) {
-                (Some(obstacles), Some(turns)) => {
-                    let buffers = [constants, turns, particles, previous];
-                    Some(obstacles.bind(gpu, kernels, buffers)?)
+            project: match (&self.obstacles, &shared) {
+                (Some(obstacles), Some(shared)) => Some(obstacles.bind(gpu, kernels, shared)?),
+                _ => None,
+            },
+            handles: match (&body.handles, &shared) {
+                (Some(handles), Some(shared)) => {
+                    let several = settings.iterations > 1;
+                    Some(handles.bind(gpu, kernels, shared, several)?)
                 }
                 _ => None,
             },

@@ -191,6 +191,48 @@ pub(crate) const PROJECT_TO_COLLIDERS: Source = Source {
     flags: &[],
 };
 
+pub(crate) const MOVE_HELD: Source = Source {
+    name: "move_held",
+    parts: text!("common", "settings", "turn", "attachments", "move_held"),
+    uses: &[
+        Use::Uniform,
+        Use::Part(TURN),
+        Use::Write,
+        Use::Read,
+        Use::Read,
+        Use::Write,
+    ],
+    flags: &[],
+};
+
+pub(crate) const SOLVE_ATTACHMENTS: Source = Source {
+    name: "solve_attachments",
+    parts: text!(
+        "common",
+        "settings",
+        "turn",
+        "attachments",
+        "solve_attachments"
+    ),
+    uses: &[
+        Use::Uniform,
+        Use::Part(TURN),
+        Use::Write,
+        Use::Read,
+        Use::Read,
+        Use::Read,
+        Use::Write,
+    ],
+    flags: &[Flag::Keeps],
+};
+
+pub(crate) const UPDATE_HELD: Source = Source {
+    name: "update_held",
+    parts: text!("common", "settings", "attachments", "update_held"),
+    uses: &[Use::Uniform, Use::Read, Use::Read, Use::Write, Use::Read],
+    flags: &[],
+};
+
 /// The shaders of the solver.
 pub(crate) const SOURCES: &[Source] = &[
     PREDICT,
@@ -203,6 +245,9 @@ pub(crate) const SOURCES: &[Source] = &[
     PATCH_PARTICLES,
     CLEAR,
     PROJECT_TO_COLLIDERS,
+    MOVE_HELD,
+    SOLVE_ATTACHMENTS,
+    UPDATE_HELD,
 ];
 
 /// The kernel that solves colors, or a row of colors of one group each.

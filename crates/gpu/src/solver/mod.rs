@@ -12,6 +12,7 @@
 mod body;
 mod colors;
 mod frame;
+mod handles;
 mod kernels;
 mod layout;
 mod numbers;
@@ -23,7 +24,7 @@ mod turns;
 use std::sync::Arc;
 
 use incise_graph::Schedule;
-use incise_xpbd::{Solver, StepSettings};
+use incise_xpbd::{Pose, Solver, StepSettings};
 
 pub(crate) use kernels::SOURCES;
 pub use layout::Form;
@@ -229,6 +230,15 @@ impl GpuSolver {
     pub fn edit(&mut self) -> Result<&mut Solver<f32>, GpuError> {
         self.read_back()?;
         Ok(&mut self.host)
+    }
+
+    /// Says where a handle is at the end of the next frame, as [`Solver::move_handle`] does, without waiting for the
+    /// device.
+    ///
+    /// # Panics
+    /// If the handle does not exist, the pose is not finite or its rotation not of length 1.
+    pub fn move_handle(&mut self, handle: u32, pose: Pose) {
+        self.host.move_handle(handle, pose);
     }
 
     /// The solver as the host last saw it: topology, masses and materials are those of now, the state is an old one

@@ -20,7 +20,9 @@ pub(crate) struct Settings {
     pub(crate) depth: u32,
     pub(crate) obstacles: u32,
     pub(crate) handles: u32,
-    pub(crate) unused: [u32; 3],
+    pub(crate) held: u32,
+    pub(crate) hanging: u32,
+    pub(crate) unused: u32,
     pub(crate) material: [f32; 4],
 }
 
@@ -39,6 +41,18 @@ pub(crate) struct Turn {
     pub(crate) substep: u32,
     pub(crate) iteration: u32,
     pub(crate) weight: f32,
+    pub(crate) unused: u32,
+}
+
+/// `Attachment` in `attachments.wgsl`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Attachment {
+    pub(crate) place: [f32; 3],
+    pub(crate) particle: u32,
+    pub(crate) handle: u32,
+    pub(crate) compliance: f32,
+    pub(crate) damping: f32,
     pub(crate) unused: u32,
 }
 

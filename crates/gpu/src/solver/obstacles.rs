@@ -5,8 +5,8 @@
 //! bytes a collider and substep.
 
 use incise_xpbd::{Solver, StepSettings};
-use wgpu::Buffer;
 
+use super::frame::Shared;
 use super::kernels::{Bound, Kernels, PROJECT_TO_COLLIDERS, Variant};
 use crate::array::Array;
 use crate::{GpuContext, GpuError};
@@ -53,9 +53,15 @@ impl Obstacles {
         &self,
         gpu: &GpuContext,
         kernels: &mut Kernels,
-        [settings, turns, particles, previous]: [&Buffer; 4],
+        shared: &Shared<'_>,
     ) -> Result<Bound, GpuError> {
-        let buffers = [settings, turns, particles, previous, self.array.buffer()];
+        let buffers = [
+            shared.settings,
+            shared.turns,
+            shared.particles,
+            shared.previous,
+            self.array.buffer(),
+        ];
         kernels.bind(gpu, &PROJECT_TO_COLLIDERS, Variant::default(), &buffers)
     }
 

@@ -5,6 +5,7 @@
 
 mod colliders;
 mod device;
+mod handles;
 mod solver;
 mod support;
 mod twin;
