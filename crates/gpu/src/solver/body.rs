@@ -8,7 +8,8 @@ use incise_graph::Schedule;
 use incise_xpbd::{Changes, Solver};
 
 use super::colors::Colors;
-use super::kernels::{Kernels, PATCH_PARTICLES, PATCH_TETS};
+use super::handles::Handles;
+use super::kernels::{Kernels, PATCH_PARTICLES, PATCH_TETS, Variant};
 use super::layout::{Form, Layout, THREADS};
 use super::numbers::{NUMBERS, Part, ParticlePatch, TetPatch};
 use super::tile::TILE_NUMBERS;
@@ -37,6 +38,8 @@ pub(crate) struct Body {
     pub(crate) multipliers: Array<[f32; 2]>,
     /// Empty unless a step is Jacobi's.
     pub(crate) corrections: Array<[f32; 4]>,
+    /// If something hangs on handles.
+    pub(crate) handles: Option<Handles>,
     tet_patches: Array<TetPatch>,
     particle_patches: Array<ParticlePatch>,
     part: Array<Part>,
@@ -56,6 +59,7 @@ impl Body {
             tiles: Array::zeros(gpu, "tiles", 0)?,
             multipliers: Array::zeros(gpu, "multipliers", 0)?,
             corrections: Array::zeros(gpu, "corrections", 0)?,
+            handles: None,
             tet_patches: Array::zeros(gpu, "patches of tets", 0)?,
             particle_patches: Array::zeros(gpu, "patches of particles", 0)?,
             part: Array::with_usage(gpu, "size of a patch", 1, wgpu::BufferUsages::UNIFORM)?,
@@ -72,9 +76,10 @@ impl Body {
         changes: &Changes,
     ) -> Result<(), GpuError> {
         self.follow_particles(gpu, kernels, solver, changes)?;
+        Handles::follow(&mut self.handles, gpu, solver, changes)?;
         let patch = self.layout.follow(schedule, solver, changes)?;
         if patch.regrouped {
-            self.colors.follow(gpu, &self.layout.seats)?;
+            self.colors.follow(gpu, self.layout.seats.groups())?;
         }
         let various = !solver.is_uniform();
         let places = self.layout.place_count();
@@ -97,25 +102,23 @@ impl Body {
         }
         for patches in patch.tets.chunks(PATCHES) {
             self.tet_patches.replace(gpu, patches)?;
-            let kernel = kernels.patching(gpu, &PATCH_TETS, various)?;
-            let bound = kernel.bind(
-                gpu,
-                &[
-                    self.part.buffer(),
-                    self.tet_patches.buffer(),
-                    self.corners.buffer(),
-                    self.rest.buffer(),
-                    self.constants.buffer(),
-                ],
-            );
+            let variant = Variant {
+                various,
+                ..Variant::default()
+            };
+            let buffers = [
+                self.part.buffer(),
+                self.tet_patches.buffer(),
+                self.corners.buffer(),
+                self.rest.buffer(),
+                self.constants.buffer(),
+            ];
+            let bound = kernels.bind(gpu, &PATCH_TETS, variant, &buffers)?;
             self.part.write(gpu, 0, &[count(patches.len())]);
             let mut encoder = gpu.encoder("patch tets");
-            Recorder::new(gpu, &mut encoder, "patch tets", None).dispatch(
-                &kernel,
-                &bound,
-                &[],
-                patches.len().div_ceil(THREADS),
-            );
+            let mut pass = Recorder::new(gpu, &mut encoder, "patch tets", None);
+            bound.run(&mut pass, &[], patches.len().div_ceil(THREADS));
+            drop(pass);
             gpu.submit(encoder)?;
         }
         Ok(())
@@ -160,24 +163,18 @@ impl Body {
                 })
                 .collect();
             self.particle_patches.replace(gpu, &patches)?;
-            let kernel = kernels.plain(gpu, &PATCH_PARTICLES)?;
-            let bound = kernel.bind(
-                gpu,
-                &[
-                    self.part.buffer(),
-                    self.particle_patches.buffer(),
-                    self.particles.buffer(),
-                    self.velocities.buffer(),
-                ],
-            );
+            let buffers = [
+                self.part.buffer(),
+                self.particle_patches.buffer(),
+                self.particles.buffer(),
+                self.velocities.buffer(),
+            ];
+            let bound = kernels.bind(gpu, &PATCH_PARTICLES, Variant::default(), &buffers)?;
             self.part.write(gpu, 0, &[count(patches.len())]);
             let mut encoder = gpu.encoder("patch particles");
-            Recorder::new(gpu, &mut encoder, "patch particles", None).dispatch(
-                &kernel,
-                &bound,
-                &[],
-                patches.len().div_ceil(THREADS),
-            );
+            let mut pass = Recorder::new(gpu, &mut encoder, "patch particles", None);
+            bound.run(&mut pass, &[], patches.len().div_ceil(THREADS));
+            drop(pass);
             gpu.submit(encoder)?;
         }
         Ok(())
@@ -185,7 +182,7 @@ impl Body {
 
     /// Bytes of all arrays.
     pub(crate) fn bytes(&self) -> u64 {
-        [
+        let arrays: u64 = [
             self.particles.buffer(),
             self.previous.buffer(),
             self.velocities.buffer(),
@@ -202,7 +199,8 @@ impl Body {
         ]
         .into_iter()
         .map(wgpu::Buffer::size)
-        .sum()
+        .sum();
+        arrays + self.handles.as_ref().map_or(0, Handles::bytes)
     }
 }
 

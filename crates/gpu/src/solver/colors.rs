@@ -6,12 +6,14 @@
 //!
 //! Cost: O(groups) on the host when they changed, uploads in pieces of 256 bytes.
 
+use incise_graph::Rows;
+
 use crate::array::Array;
-use crate::kernel::STRIDE;
+use crate::kernel::{Recorder, STRIDE};
 use crate::{GpuContext, GpuError};
 
+use super::kernels::Bound;
 use super::numbers::Part;
-use super::seats::Seats;
 
 /// Numbers that are compared and sent together.
 const PIECE: usize = 64;
@@ -51,15 +53,19 @@ impl Colors {
     }
 
     /// Takes over the groups of all colors.
-    pub(crate) fn follow(&mut self, gpu: &GpuContext, seats: &Seats) -> Result<(), GpuError> {
-        let colors = seats.color_count();
+    pub(crate) fn follow(
+        &mut self,
+        gpu: &GpuContext,
+        groups_of: &Rows<u32>,
+    ) -> Result<(), GpuError> {
+        let colors = groups_of.row_count();
         self.rooms.resize(colors, 0);
         let (mut lists, mut parts) = (Vec::new(), Vec::new());
         self.runs.clear();
         let mut alone: Vec<u32> = Vec::new();
         let mut tails: Vec<(usize, Vec<u32>)> = Vec::new();
         for color in 0..colors {
-            let groups = seats.groups(color);
+            let groups = groups_of.row(color);
             if self.rooms[color] < groups.len() {
                 self.rooms[color] = groups.len() + groups.len() / 2;
             }
@@ -84,6 +90,14 @@ impl Colors {
         }
         self.lists.set(gpu, lists)?;
         self.parts.set(gpu, parts)
+    }
+
+    /// Records a pass, with the kernel for one color and that for several.
+    pub(crate) fn run(&self, pass: &mut Recorder<'_>, one: &Bound, several: &Bound) {
+        for run in &self.runs {
+            let solve = if run.tail { several } else { one };
+            solve.run(pass, &[run.offset], run.groups);
+        }
     }
 
     /// Ends a row of colors of one group each.

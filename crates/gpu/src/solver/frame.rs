@@ -3,17 +3,18 @@
 //! Everything that differs from substep to substep is in buffers before the pass begins, so it needs no break. Twin:
 //! `Solver::substep` of incise-xpbd. Cost: recording a third of a microsecond a dispatch.
 
-use std::sync::Arc;
-
 use incise_xpbd::{Form as Solving, Method, Solver, StepSettings};
-use wgpu::{BindGroup, Buffer, BufferUsages};
+use wgpu::{Buffer, BufferUsages};
 
 use super::body::Body;
-use super::kernels::{CLEAR_MULTIPLIERS, Kernels, PREDICT, UPDATE_VELOCITIES, Variant, solve};
+use super::handles::{self, Handles};
+use super::kernels::{Bound, CLEAR, Kernels, PREDICT, UPDATE_VELOCITIES, Variant, solve};
 use super::layout::{Form, THREADS};
 use super::numbers::Settings;
+use super::obstacles::Obstacles;
+use super::turns::{self, Turns};
 use crate::array::{Array, Staging};
-use crate::kernel::{Kernel, Recorder};
+use crate::kernel::Recorder;
 use crate::{GpuContext, GpuError};
 
 /// What a step needs beside the body.
@@ -21,10 +22,24 @@ use crate::{GpuContext, GpuError};
 pub(crate) struct Frame {
     settings: Array<Settings>,
     sent: Option<Settings>,
+    /// If something asks for its turn.
+    turns: Option<Turns>,
+    /// If there are colliders.
+    obstacles: Option<Obstacles>,
     /// Positions before the constraints of the last substep; empty unless a step keeps them.
     predicted: Array<[f32; 4]>,
     /// Whether the last step kept what residuals need.
     kept: bool,
+}
+
+/// What a step reads and writes beside that.
+#[derive(Debug)]
+pub(crate) struct Scene<'a> {
+    pub(crate) gpu: &'a GpuContext,
+    pub(crate) kernels: &'a mut Kernels,
+    pub(crate) body: &'a mut Body,
+    pub(crate) host: &'a Solver<f32>,
+    pub(crate) repaired: &'a Array<u32>,
 }
 
 impl Frame {
@@ -32,71 +47,109 @@ impl Frame {
         Ok(Self {
             settings: Array::with_usage(gpu, "settings", 1, BufferUsages::UNIFORM)?,
             sent: None,
+            turns: None,
+            obstacles: None,
             predicted: Array::zeros(gpu, "predicted positions", 0)?,
             kept: false,
         })
     }
 
     /// Records a step and hands it over.
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "the parts of a solver, borrowed one by one"
-    )]
     pub(crate) fn record(
         &mut self,
-        gpu: &GpuContext,
-        kernels: &mut Kernels,
-        body: &mut Body,
-        host: &Solver<f32>,
-        repaired: &Array<u32>,
+        scene: Scene<'_>,
         settings: &StepSettings,
         keep: bool,
     ) -> Result<(), GpuError> {
+        let Scene { gpu, host, .. } = scene;
         refuse(host, settings)?;
-        self.send_settings(gpu, body, host, settings);
         let keeps = keep || settings.iterations > 1;
-        if keeps {
-            body.multipliers.resize(gpu, body.layout.place_count())?;
-        }
+        self.prepare(gpu, scene.body, host, settings, keeps)?;
         if keep {
             self.predicted.resize(gpu, host.particle_count())?;
         }
         self.kept = keep;
-        let bound = Bound::new(
+        let passes = self.bind(
             gpu,
-            kernels,
-            body,
+            scene.kernels,
+            scene.body,
             host,
-            &self.settings,
-            repaired,
+            scene.repaired,
             settings,
             keeps,
         )?;
+        let body = &*scene.body;
         let mut encoder = gpu.encoder("frame");
         let mut pass = Recorder::new(gpu, &mut encoder, "frame", None);
         let particles = host.particle_count().div_ceil(THREADS);
-        for substep in 1..=settings.substeps {
-            bound.predict.run(&mut pass, &[], particles);
-            if let Some(clear) = &bound.clear {
-                clear.run(&mut pass, &[], body.layout.place_count().div_ceil(THREADS));
+        for substep in 0..settings.substeps {
+            let start = turns::offset(settings, substep, 0);
+            passes.predict.run(&mut pass, &[], particles);
+            if let Some(handles) = &passes.handles {
+                handles.move_held(&mut pass, start);
             }
-            if keep && substep == settings.substeps {
+            if let Some(clear) = &passes.clear {
+                let words = 2 * body.layout.place_count();
+                clear.run(&mut pass, &[], words.div_ceil(THREADS));
+            }
+            if keep && substep + 1 == settings.substeps {
                 drop(pass);
                 let bytes = (host.particle_count() * size_of::<[f32; 4]>()) as u64;
                 let (from, to) = (body.particles.buffer(), self.predicted.buffer());
                 encoder.copy_buffer_to_buffer(from, 0, to, 0, bytes);
                 pass = Recorder::new(gpu, &mut encoder, "frame", None);
             }
-            for _ in 0..settings.iterations {
-                for run in &body.colors.runs {
-                    let solve = if run.tail { &bound.tail } else { &bound.solve };
-                    solve.run(&mut pass, &[run.offset], run.groups);
+            for iteration in 0..settings.iterations {
+                let turn = turns::offset(settings, substep, iteration);
+                body.colors.run(&mut pass, &passes.solve, &passes.tail);
+                if let Some(handles) = &passes.handles {
+                    handles.solve(&mut pass, turn);
+                }
+                if let Some(project) = &passes.project {
+                    project.run(&mut pass, &[turn], particles);
                 }
             }
-            bound.update.run(&mut pass, &[], particles);
+            passes.update.run(&mut pass, &[], particles);
+            if let Some(handles) = &passes.handles {
+                handles.update_held(&mut pass);
+            }
         }
         drop(pass);
         gpu.submit(encoder)
+    }
+
+    /// Brings what the frame needs to the device, unless it is there.
+    fn prepare(
+        &mut self,
+        gpu: &GpuContext,
+        body: &mut Body,
+        host: &Solver<f32>,
+        settings: &StepSettings,
+        keeps: bool,
+    ) -> Result<(), GpuError> {
+        self.send_settings(gpu, body, host, settings);
+        if keeps {
+            body.multipliers.resize(gpu, body.layout.place_count())?;
+        }
+        self.obstacles = match (self.obstacles.take(), settings.colliders.is_empty()) {
+            (_, true) => None,
+            (Some(obstacles), false) => Some(obstacles),
+            (None, false) => Some(Obstacles::new(gpu)?),
+        };
+        if let Some(obstacles) = &mut self.obstacles {
+            obstacles.follow(gpu, host, settings)?;
+        }
+        if let Some(handles) = &mut body.handles {
+            handles.prepare(gpu, host, settings)?;
+        }
+        let takes_turns = self.obstacles.is_some() || body.handles.is_some();
+        if takes_turns && self.turns.is_none() {
+            self.turns = Some(Turns::new(gpu)?);
+        }
+        match &mut self.turns {
+            Some(turns) if takes_turns => turns.follow(gpu, settings),
+            _ => Ok(()),
+        }
     }
 
     /// Sends the settings if they are others.
@@ -131,13 +184,24 @@ impl Frame {
             steep: Solver::<f32>::STEEP as f32,
             particles: index(host.particle_count()),
             depth: index(depth),
-            places: index(body.layout.place_count()),
+            obstacles: index(settings.colliders.len()),
+            handles: index(body.handles.as_ref().map_or(0, Handles::handle_count)),
+            held: index(body.handles.as_ref().map_or(0, Handles::held_count)),
+            hanging: index(body.handles.as_ref().map_or(0, Handles::hanging_count)),
+            unused: 0,
             material,
         };
         if self.sent != Some(values) {
             self.settings.write(gpu, 0, &[values]);
             self.sent = Some(values);
         }
+    }
+
+    /// Bytes of what the step needs.
+    pub(crate) fn bytes(&self) -> u64 {
+        let turns = self.turns.as_ref().map_or(0, |turns| turns.buffer().size());
+        let obstacles = self.obstacles.as_ref().map_or(0, Obstacles::bytes);
+        self.settings.buffer().size() + self.predicted.buffer().size() + turns + obstacles
     }
 
     /// Starts to read what residuals need, if the last step kept it.
@@ -165,61 +229,52 @@ fn refuse(host: &Solver<f32>, settings: &StepSettings) -> Result<(), GpuError> {
     if settings.method != Method::GaussSeidel {
         return unsupported("other methods than Gauss-Seidel");
     }
-    if !settings.colliders.is_empty() {
-        return unsupported("colliders");
-    }
-    if host.attachments().len() > 0 {
-        return unsupported("handles");
-    }
     if host.distance_count() > 0 || host.volume_count() > 0 {
         return unsupported("distance and volume constraints");
     }
     Ok(())
 }
 
-/// A kernel with its buffers.
-struct BoundKernel {
-    kernel: Arc<Kernel>,
-    group: BindGroup,
+/// The buffers that what is not a tet may need.
+#[derive(Debug)]
+pub(crate) struct Shared<'a> {
+    pub(crate) settings: &'a Buffer,
+    pub(crate) turns: &'a Buffer,
+    pub(crate) particles: &'a Buffer,
+    pub(crate) previous: &'a Buffer,
+    pub(crate) velocities: &'a Buffer,
+    pub(crate) repaired: &'a Buffer,
 }
 
-impl BoundKernel {
-    fn new(gpu: &GpuContext, kernel: Arc<Kernel>, buffers: &[&Buffer]) -> Self {
-        let group = kernel.bind(gpu, buffers);
-        Self { kernel, group }
-    }
-
-    fn run(&self, pass: &mut Recorder<'_>, offsets: &[u32], groups: usize) {
-        pass.dispatch(&self.kernel, &self.group, offsets, groups);
-    }
-}
-
-/// The kernels of a step.
-struct Bound {
-    predict: BoundKernel,
+/// The kernels of a step, in the order of a substep; those that it does not need are not there.
+#[derive(Debug)]
+struct Passes {
+    predict: Bound,
     /// Where multipliers are kept.
-    clear: Option<BoundKernel>,
-    solve: BoundKernel,
-    tail: BoundKernel,
-    update: BoundKernel,
+    clear: Option<Bound>,
+    solve: Bound,
+    tail: Bound,
+    project: Option<Bound>,
+    update: Bound,
+    handles: Option<handles::Passes>,
 }
 
-impl Bound {
+impl Frame {
     #[expect(
         clippy::too_many_arguments,
         reason = "the parts of a solver, borrowed one by one"
     )]
-    fn new(
+    fn bind(
+        &self,
         gpu: &GpuContext,
         kernels: &mut Kernels,
         body: &Body,
         host: &Solver<f32>,
-        constants: &Array<Settings>,
         repaired: &Array<u32>,
         settings: &StepSettings,
         keeps: bool,
-    ) -> Result<Self, GpuError> {
-        let constants = constants.buffer();
+    ) -> Result<Passes, GpuError> {
+        let constants = self.settings.buffer();
         let (particles, previous) = (body.particles.buffer(), body.previous.buffer());
         let velocities = body.velocities.buffer();
         let variant = Variant {
@@ -245,36 +300,49 @@ impl Bound {
             body.colors.lists.array.buffer(),
             last,
         ];
-        let mut solving = |tail| {
-            let kernel = kernels.solving(gpu, solve(body.layout.form, tail), variant)?;
-            Ok::<_, GpuError>(BoundKernel::new(gpu, kernel, &tets))
-        };
-        let (solve, tail) = (solving(false)?, solving(true)?);
-        let mut plain = |source, buffers: &[&Buffer]| {
-            let kernel = kernels.plain(gpu, source)?;
-            Ok::<_, GpuError>(BoundKernel::new(gpu, kernel, buffers))
-        };
-        Ok(Self {
-            predict: plain(&PREDICT, &[constants, particles, previous, velocities])?,
+        let mut bind =
+            |source, variant, buffers: &[&Buffer]| kernels.bind(gpu, source, variant, buffers);
+        let (form, plain) = (body.layout.form, Variant::default());
+        let update = [
+            constants,
+            particles,
+            previous,
+            velocities,
+            repaired.buffer(),
+        ];
+        let turns = self.turns.as_ref().map(Turns::buffer);
+        let shared = turns.map(|turns| Shared {
+            settings: constants,
+            turns,
+            particles,
+            previous,
+            velocities,
+            repaired: repaired.buffer(),
+        });
+        Ok(Passes {
+            predict: bind(
+                &PREDICT,
+                plain,
+                &[constants, particles, previous, velocities],
+            )?,
             clear: match keeps {
-                true => Some(plain(
-                    &CLEAR_MULTIPLIERS,
-                    &[constants, body.multipliers.buffer()],
-                )?),
+                true => Some(bind(&CLEAR, plain, &[body.multipliers.buffer()])?),
                 false => None,
             },
-            solve,
-            tail,
-            update: plain(
-                &UPDATE_VELOCITIES,
-                &[
-                    constants,
-                    particles,
-                    previous,
-                    velocities,
-                    repaired.buffer(),
-                ],
-            )?,
+            solve: bind(solve(form, false), variant, &tets)?,
+            tail: bind(solve(form, true), variant, &tets)?,
+            update: bind(&UPDATE_VELOCITIES, plain, &update)?,
+            project: match (&self.obstacles, &shared) {
+                (Some(obstacles), Some(shared)) => Some(obstacles.bind(gpu, kernels, shared)?),
+                _ => None,
+            },
+            handles: match (&body.handles, &shared) {
+                (Some(handles), Some(shared)) => {
+                    let several = settings.iterations > 1;
+                    Some(handles.bind(gpu, kernels, shared, several)?)
+                }
+                _ => None,
+            },
         })
     }
 }

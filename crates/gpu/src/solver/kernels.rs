@@ -1,4 +1,4 @@
-//! The kernels of the solver, and [`Variant`]: which of their branches are compiled.
+//! The kernels of the solver, [`Variant`]: which of their branches are compiled, and [`Bound`]: one with its buffers.
 //!
 //! A scene without damping, without multipliers to keep, of one material, gets kernels that know nothing of them. A
 //! kernel is compiled when the first step needs it.
@@ -7,8 +7,10 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::sync::Arc;
 
+use wgpu::{BindGroup, Buffer};
+
 use super::layout::Form;
-use crate::kernel::{Kernel, Use};
+use crate::kernel::{Kernel, Recorder, Use};
 use crate::{GpuContext, GpuError};
 
 /// The text of a kernel and how it uses its buffers.
@@ -16,7 +18,19 @@ use crate::{GpuContext, GpuError};
 pub(crate) struct Source {
     pub(crate) name: &'static str,
     pub(crate) parts: &'static [&'static str],
-    uses: &'static [Use],
+    pub(crate) uses: &'static [Use],
+    /// The branches that it has.
+    flags: &'static [Flag],
+}
+
+/// A branch of kernels, compiled or not.
+#[derive(Clone, Copy, Debug)]
+enum Flag {
+    Damped,
+    Sequential,
+    Keeps,
+    Jacobi,
+    Uniform,
 }
 
 macro_rules! text {
@@ -25,8 +39,9 @@ macro_rules! text {
     };
 }
 
-/// Bytes of a part.
+/// Bytes of a part, and of a turn.
 const PART: u64 = 8;
+const TURN: u64 = 16;
 
 /// What kernels that solve tets use.
 const TETS: &[Use] = &[
@@ -56,16 +71,28 @@ const TILES: &[Use] = &[
     Use::Read,
 ];
 
+const TETS_FLAGS: &[Flag] = &[
+    Flag::Damped,
+    Flag::Sequential,
+    Flag::Keeps,
+    Flag::Uniform,
+    Flag::Jacobi,
+];
+
+const TILES_FLAGS: &[Flag] = &[Flag::Damped, Flag::Sequential, Flag::Keeps, Flag::Uniform];
+
 pub(crate) const PREDICT: Source = Source {
     name: "predict",
     parts: text!("common", "settings", "predict"),
     uses: &[Use::Uniform, Use::Write, Use::Write, Use::Write],
+    flags: &[],
 };
 
 pub(crate) const UPDATE_VELOCITIES: Source = Source {
     name: "update_velocities",
     parts: text!("common", "settings", "update_velocities"),
     uses: &[Use::Uniform, Use::Write, Use::Read, Use::Write, Use::Write],
+    flags: &[],
 };
 
 const SOLVE_THREADS: Source = Source {
@@ -79,6 +106,7 @@ const SOLVE_THREADS: Source = Source {
         "solve_threads"
     ),
     uses: TETS,
+    flags: TETS_FLAGS,
 };
 
 const SOLVE_THREADS_TAIL: Source = Source {
@@ -92,6 +120,7 @@ const SOLVE_THREADS_TAIL: Source = Source {
         "solve_threads_tail"
     ),
     uses: TETS,
+    flags: TETS_FLAGS,
 };
 
 const SOLVE_WORKGROUPS: Source = Source {
@@ -105,6 +134,7 @@ const SOLVE_WORKGROUPS: Source = Source {
         "solve_workgroups"
     ),
     uses: TILES,
+    flags: TILES_FLAGS,
 };
 
 const SOLVE_WORKGROUPS_TAIL: Source = Source {
@@ -118,24 +148,89 @@ const SOLVE_WORKGROUPS_TAIL: Source = Source {
         "solve_workgroups_tail"
     ),
     uses: TILES,
+    flags: TILES_FLAGS,
 };
 
 pub(crate) const PATCH_TETS: Source = Source {
     name: "patch_tets",
     parts: text!("common", "settings", "patch_tets"),
     uses: &[Use::Uniform, Use::Read, Use::Write, Use::Write, Use::Write],
+    flags: &[Flag::Uniform],
 };
 
 pub(crate) const PATCH_PARTICLES: Source = Source {
     name: "patch_particles",
     parts: text!("common", "settings", "patch_particles"),
     uses: &[Use::Uniform, Use::Read, Use::Write, Use::Write],
+    flags: &[],
 };
 
-pub(crate) const CLEAR_MULTIPLIERS: Source = Source {
-    name: "clear_multipliers",
-    parts: text!("common", "settings", "clear_multipliers"),
-    uses: &[Use::Uniform, Use::Write],
+pub(crate) const CLEAR: Source = Source {
+    name: "clear",
+    parts: text!("common", "clear"),
+    uses: &[Use::Write],
+    flags: &[],
+};
+
+pub(crate) const PROJECT_TO_COLLIDERS: Source = Source {
+    name: "project_to_colliders",
+    parts: text!(
+        "common",
+        "settings",
+        "turn",
+        "direction",
+        "project_to_colliders"
+    ),
+    uses: &[
+        Use::Uniform,
+        Use::Part(TURN),
+        Use::Write,
+        Use::Read,
+        Use::Read,
+    ],
+    flags: &[],
+};
+
+pub(crate) const MOVE_HELD: Source = Source {
+    name: "move_held",
+    parts: text!("common", "settings", "turn", "attachments", "move_held"),
+    uses: &[
+        Use::Uniform,
+        Use::Part(TURN),
+        Use::Write,
+        Use::Read,
+        Use::Read,
+        Use::Write,
+    ],
+    flags: &[],
+};
+
+pub(crate) const SOLVE_ATTACHMENTS: Source = Source {
+    name: "solve_attachments",
+    parts: text!(
+        "common",
+        "settings",
+        "turn",
+        "attachments",
+        "solve_attachments"
+    ),
+    uses: &[
+        Use::Uniform,
+        Use::Part(TURN),
+        Use::Write,
+        Use::Read,
+        Use::Read,
+        Use::Read,
+        Use::Write,
+    ],
+    flags: &[Flag::Keeps],
+};
+
+pub(crate) const UPDATE_HELD: Source = Source {
+    name: "update_held",
+    parts: text!("common", "settings", "attachments", "update_held"),
+    uses: &[Use::Uniform, Use::Read, Use::Read, Use::Write, Use::Read],
+    flags: &[],
 };
 
 /// The shaders of the solver.
@@ -148,7 +243,11 @@ pub(crate) const SOURCES: &[Source] = &[
     SOLVE_WORKGROUPS_TAIL,
     PATCH_TETS,
     PATCH_PARTICLES,
-    CLEAR_MULTIPLIERS,
+    CLEAR,
+    PROJECT_TO_COLLIDERS,
+    MOVE_HELD,
+    SOLVE_ATTACHMENTS,
+    UPDATE_HELD,
 ];
 
 /// The kernel that solves colors, or a row of colors of one group each.
@@ -172,6 +271,20 @@ pub(crate) struct Variant {
     pub(crate) various: bool,
 }
 
+impl Variant {
+    /// The override that a flag is in shaders, with its value.
+    fn value(self, flag: Flag) -> (&'static str, f64) {
+        let (name, on) = match flag {
+            Flag::Damped => ("DAMPED", self.damped),
+            Flag::Sequential => ("SEQUENTIAL", self.sequential),
+            Flag::Keeps => ("KEEPS", self.keeps),
+            Flag::Jacobi => ("JACOBI", self.jacobi),
+            Flag::Uniform => ("UNIFORM", !self.various),
+        };
+        (name, f64::from(u8::from(on)))
+    }
+}
+
 /// Compiled kernels.
 #[derive(Debug, Default)]
 pub(crate) struct Kernels {
@@ -179,66 +292,47 @@ pub(crate) struct Kernels {
 }
 
 impl Kernels {
-    /// Compiles a kernel that has no branches to choose, unless it is compiled.
-    pub(crate) fn plain(
-        &mut self,
-        gpu: &GpuContext,
-        source: &Source,
-    ) -> Result<Arc<Kernel>, GpuError> {
-        self.get(gpu, source, Variant::default(), &[])
-    }
-
-    /// The same for one that patches tets.
-    pub(crate) fn patching(
-        &mut self,
-        gpu: &GpuContext,
-        source: &Source,
-        various: bool,
-    ) -> Result<Arc<Kernel>, GpuError> {
-        let variant = Variant {
-            various,
-            ..Variant::default()
-        };
-        self.get(gpu, source, variant, &[("UNIFORM", flag(!various))])
-    }
-
-    /// The same for one that solves tets.
-    pub(crate) fn solving(
+    /// Compiles a kernel, unless it is compiled.
+    pub(crate) fn get(
         &mut self,
         gpu: &GpuContext,
         source: &Source,
         variant: Variant,
-    ) -> Result<Arc<Kernel>, GpuError> {
-        let mut constants = vec![
-            ("DAMPED", flag(variant.damped)),
-            ("SEQUENTIAL", flag(variant.sequential)),
-            ("KEEPS", flag(variant.keeps)),
-            ("UNIFORM", flag(!variant.various)),
-        ];
-        if source.uses == TETS {
-            constants.push(("JACOBI", flag(variant.jacobi)));
-        }
-        self.get(gpu, source, variant, &constants)
-    }
-
-    fn get(
-        &mut self,
-        gpu: &GpuContext,
-        source: &Source,
-        variant: Variant,
-        constants: &[(&str, f64)],
     ) -> Result<Arc<Kernel>, GpuError> {
         let kernel = match self.compiled.entry((source.name, variant)) {
             Entry::Occupied(kernel) => kernel.into_mut(),
             Entry::Vacant(place) => {
-                let kernel = Kernel::new(gpu, source.name, source.parts, source.uses, constants)?;
-                place.insert(Arc::new(kernel))
+                let constants: Vec<_> = source.flags.iter().map(|f| variant.value(*f)).collect();
+                let (name, parts, uses) = (source.name, source.parts, source.uses);
+                place.insert(Arc::new(Kernel::new(gpu, name, parts, uses, &constants)?))
             }
         };
         Ok(Arc::clone(kernel))
     }
+
+    /// Compiles a kernel, unless it is compiled, and binds it.
+    pub(crate) fn bind(
+        &mut self,
+        gpu: &GpuContext,
+        source: &Source,
+        variant: Variant,
+        buffers: &[&Buffer],
+    ) -> Result<Bound, GpuError> {
+        let kernel = self.get(gpu, source, variant)?;
+        let group = kernel.bind(gpu, buffers);
+        Ok(Bound { kernel, group })
+    }
 }
 
-fn flag(on: bool) -> f64 {
-    f64::from(u8::from(on))
+/// A kernel with its buffers.
+#[derive(Debug)]
+pub(crate) struct Bound {
+    kernel: Arc<Kernel>,
+    group: BindGroup,
+}
+
+impl Bound {
+    pub(crate) fn run(&self, pass: &mut Recorder<'_>, offsets: &[u32], groups: usize) {
+        pass.dispatch(&self.kernel, &self.group, offsets, groups);
+    }
 }

@@ -13,11 +13,14 @@ mod body;
 mod check;
 mod colors;
 mod frame;
+mod handles;
 mod kernels;
 mod layout;
 mod numbers;
+mod obstacles;
 mod seats;
 mod tile;
+mod turns;
 
 use std::sync::Arc;
 
@@ -30,7 +33,7 @@ pub use layout::Form;
 use crate::array::Array;
 use crate::{GpuContext, GpuError};
 use body::Body;
-use frame::Frame;
+use frame::{Frame, Scene};
 use kernels::Kernels;
 
 /// A body that is solved on a device.
@@ -171,7 +174,14 @@ impl GpuSolver {
             repaired,
             ..
         } = self;
-        frame.record(gpu, kernels, body, host, repaired, settings, keep)?;
+        let scene = Scene {
+            gpu,
+            kernels,
+            body,
+            host,
+            repaired,
+        };
+        frame.record(scene, settings, keep)?;
         self.ahead = true;
         self.host.end_frame();
         Ok(())
@@ -197,7 +207,12 @@ impl GpuSolver {
             body,
             ..
         } = self;
-        body.follow(gpu, kernels, host, schedule, &changes)
+        let followed = body.follow(gpu, kernels, host, schedule, &changes);
+        // What was not followed is not known any more. Edits wait for the device: it is not ahead of them.
+        if followed.is_err() && !self.ahead {
+            self.host.track_changes();
+        }
+        followed
     }
 
     /// The solver with the state of the device, which is waited for if it has gone on.
@@ -218,10 +233,11 @@ impl GpuSolver {
         Ok(&mut self.host)
     }
 
-    /// Says where a handle is at the end of the next frame, as [`Solver::move_handle`] does, without reading back.
+    /// Says where a handle is at the end of the next frame, as [`Solver::move_handle`] does, without waiting for the
+    /// device.
     ///
     /// # Panics
-    /// As [`Solver::move_handle`].
+    /// If the handle does not exist, the pose is not finite or its rotation not of length 1.
     pub fn move_handle(&mut self, handle: u32, pose: Pose) {
         self.host.move_handle(handle, pose);
     }
@@ -275,7 +291,7 @@ impl GpuSolver {
     /// Bytes of device memory.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        self.body.bytes()
+        self.body.bytes() + self.frame.bytes()
     }
 
     /// Dispatches of one pass over the tets.

@@ -18,7 +18,11 @@ pub(crate) struct Settings {
     pub(crate) steep: f32,
     pub(crate) particles: u32,
     pub(crate) depth: u32,
-    pub(crate) places: u32,
+    pub(crate) obstacles: u32,
+    pub(crate) handles: u32,
+    pub(crate) held: u32,
+    pub(crate) hanging: u32,
+    pub(crate) unused: u32,
     pub(crate) material: [f32; 4],
 }
 
@@ -28,6 +32,28 @@ pub(crate) struct Settings {
 pub(crate) struct Part {
     pub(crate) first: u32,
     pub(crate) count: u32,
+}
+
+/// `Turn` in `turn.wgsl`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Turn {
+    pub(crate) substep: u32,
+    pub(crate) iteration: u32,
+    pub(crate) weight: f32,
+    pub(crate) unused: u32,
+}
+
+/// `Attachment` in `attachments.wgsl`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Attachment {
+    pub(crate) place: [f32; 3],
+    pub(crate) particle: u32,
+    pub(crate) handle: u32,
+    pub(crate) compliance: f32,
+    pub(crate) damping: f32,
+    pub(crate) unused: u32,
 }
 
 /// `TetPatch` in `patch_tets.wgsl`.

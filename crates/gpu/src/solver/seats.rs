@@ -81,9 +81,9 @@ impl Seats {
         self.colors.row_count()
     }
 
-    /// The groups of a color.
-    pub(crate) fn groups(&self, color: usize) -> &[u32] {
-        self.colors.row(color)
+    /// The groups of each color.
+    pub(crate) fn groups(&self) -> &Rows<u32> {
+        &self.colors
     }
 
     /// The cluster in a seat.
@@ -263,7 +263,7 @@ mod tests {
                 let seat = seats.seat(cluster).expect("every cluster has a seat");
                 assert_eq!(seats.cluster(seat), Some(cluster));
                 let group = index(seat as usize / seats.width);
-                assert!(seats.groups(color).contains(&group));
+                assert!(seats.groups().row(color).contains(&group));
                 seen += 1;
             }
         }

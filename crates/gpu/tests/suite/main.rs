@@ -3,6 +3,9 @@
 //! They need an adapter; Mesa's lavapipe, which is a processor, will do. Without one they skip with a line on stderr,
 //! unless `INCISE_REQUIRE_GPU` is set: then they fail.
 
+mod colliders;
 mod device;
+mod handles;
 mod solver;
 mod support;
+mod twin;

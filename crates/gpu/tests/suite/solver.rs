@@ -13,7 +13,7 @@ use incise_xpbd::{Form as Solving, Material, Solver, StepSettings};
 
 use crate::support::gpu;
 
-const SOFT: Material = Material {
+pub(crate) const SOFT: Material = Material {
     young_modulus: 1e5,
     poisson_ratio: 0.45,
     density: 1000.0,
@@ -46,7 +46,7 @@ pub(crate) fn body(mesh: &TetMesh, materials: &[Material]) -> Solver<f32> {
 }
 
 /// A schedule on clusters, and one without clusters that solves the tets in the order in which tiles do.
-fn schedules(mesh: &TetMesh, method: &str) -> (Schedule, Schedule) {
+pub(crate) fn schedules(mesh: &TetMesh, method: &str) -> (Schedule, Schedule) {
     let incidence =
         Incidence::from_constraints(mesh.positions.len(), mesh.tets.iter().copied()).unwrap();
     let clustering = cluster(method.parse::<Clustered>().unwrap(), &incidence);
@@ -63,7 +63,7 @@ fn schedules(mesh: &TetMesh, method: &str) -> (Schedule, Schedule) {
     (Schedule::new(&clustering, &outer), tiled)
 }
 
-fn share(gpu: &'static GpuContext) -> Arc<GpuContext> {
+pub(crate) fn share(gpu: &'static GpuContext) -> Arc<GpuContext> {
     Arc::new(GpuContext::from_device(
         gpu.device().clone(),
         gpu.queue().clone(),
@@ -71,12 +71,12 @@ fn share(gpu: &'static GpuContext) -> Arc<GpuContext> {
 }
 
 /// The largest distance of a particle from its twin, in units of the body's size of 1.
-fn distance(a: &Solver<f32>, b: &Solver<f32>) -> f64 {
+pub(crate) fn distance(a: &Solver<f32>, b: &Solver<f32>) -> f64 {
     let apart = |p| a.position(p).distance(b.position(p));
     (0..a.particle_count()).map(apart).fold(0.0, f64::max)
 }
 
-fn settings() -> StepSettings {
+pub(crate) fn settings() -> StepSettings {
     StepSettings {
         substeps: 4,
         gravity: Some(DVec3::new(0.0, 0.0, -9.81)),
