@@ -3,5 +3,7 @@
 //! They need an adapter; Mesa's lavapipe, which is a processor, will do. Without one they skip with a line on stderr,
 //! unless `INCISE_REQUIRE_GPU` is set: then they fail.
 
+mod coloring;
 mod device;
+mod shaders;
 mod support;
