@@ -6,12 +6,6 @@
 // The mark of a vertex without a color; below it is the smallest color that it may still get.
 const PENDING: u32 = 0x80000000u;
 
-struct Round {
-    vertices: u32,
-    // Which of the two lists is read.
-    parity: u32,
-}
-
 struct Work {
     counts: array<atomic<u32>, 2>,
     // Rounds that had something to do.
@@ -25,7 +19,6 @@ struct Work {
     list: array<u32>,
 }
 
-@group(0) @binding(0) var<uniform> current: Round;
 @group(0) @binding(1) var<storage, read_write> work: Work;
 
 var<workgroup> kept: atomic<u32>;

@@ -2,8 +2,7 @@
 
 use std::mem::offset_of;
 
-use crate::coloring::SOURCES;
-use crate::coloring::{Round, Work};
+use crate::coloring::{Round, SOURCES, VivaceSettings, WlcWork, Work};
 
 /// A kernel as it is given to the driver; its entry point is `main`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -61,5 +60,12 @@ pub fn shared_structs() -> Vec<SharedStruct> {
     vec![
         shared!(Round { vertices, parity }),
         shared!(Work { counts, rounds, colors, rest, window } "list"),
+        shared!(VivaceSettings {
+            seed_low,
+            seed_high,
+            shrinking,
+            highest_of_all
+        }),
+        shared!(WlcWork { begin, count, done, lost, chunk, rounds } "list"),
     ]
 }

@@ -122,33 +122,193 @@ macro_rules! source {
     };
 }
 
-use Use::{Read, Write};
+use Use::{Read, Uniform, Write};
 
 source!(
     NEXT,
     "next",
-    ["common", "grid", "worklist"],
+    ["common", "grid", "round", "worklist"],
     [PART, Write, Write]
 );
-source!(ALL, "all", ["common", "worklist"], [PART, Write, Write]);
+source!(
+    ALL,
+    "all",
+    ["common", "round", "worklist"],
+    [PART, Write, Write]
+);
 source!(
     JONES_PLASSMANN,
     "jones_plassmann",
-    ["common", "worklist", "priority", "first_fit"],
+    ["common", "round", "worklist", "priority", "first_fit"],
     [PART, Write, Read, Read, Write, Write]
 );
 source!(
     HIGHER,
     "higher",
-    ["common", "worklist", "priority", "search", "palettes"],
+    [
+        "common", "round", "worklist", "priority", "search", "palettes"
+    ],
     [PART, Write, Read, Read, Write, Write, Write]
 );
 source!(
     SCGC,
     "scgc",
-    ["common", "worklist", "search", "palettes"],
+    ["common", "round", "worklist", "search", "palettes"],
     [PART, Write, Read, Read, Write, Write, Write, Write]
+);
+source!(
+    ECL_GC_LARGE_START,
+    "ecl_gc_large_start",
+    ["common", "round", "worklist"],
+    [PART, Write, Read, Write]
+);
+source!(
+    ECL_GC_LARGE,
+    "ecl_gc_large",
+    ["common", "round", "worklist", "search", "palettes"],
+    [PART, Write, Read, Read, Read, Write, Write]
+);
+source!(
+    ECL_GC_SMALL_START,
+    "ecl_gc_small_start",
+    ["common", "round", "worklist", "search"],
+    [PART, Write, Read, Read, Read, Write, Write]
+);
+source!(
+    ECL_GC_SMALL,
+    "ecl_gc_small",
+    ["common", "round", "worklist"],
+    [PART, Write, Read, Read, Write, Write, Write]
+);
+source!(
+    VIVACE_START,
+    "vivace_start",
+    ["common", "round", "worklist", "vivace_options", "palettes"],
+    [PART, Write, Uniform, Read, Write, Write]
+);
+source!(
+    VIVACE_PICK,
+    "vivace_pick",
+    [
+        "common",
+        "round",
+        "worklist",
+        "vivace_options",
+        "palettes",
+        "random"
+    ],
+    [PART, Write, Uniform, Read, Write, Write]
+);
+source!(
+    VIVACE_KEEP,
+    "vivace_keep",
+    ["common", "round", "worklist", "vivace_options"],
+    [PART, Write, Uniform, Read, Read, Read, Write]
+);
+source!(
+    VIVACE_RENEW,
+    "vivace_renew",
+    [
+        "common",
+        "round",
+        "worklist",
+        "vivace_options",
+        "palettes",
+        "first_fit"
+    ],
+    [PART, Write, Read, Read, Read, Read, Write]
+);
+source!(
+    WLC_START,
+    "wlc_start",
+    ["common", "grid", "round", "wlc_work"],
+    [PART, Write, Uniform, Write, Write, Write]
+);
+source!(
+    WLC_CHOOSE,
+    "wlc_choose",
+    ["common", "round", "wlc_work", "first_fit"],
+    [PART, Read, Read, Read, Write, Read]
+);
+source!(
+    WLC_LOSE,
+    "wlc_lose",
+    ["common", "round", "wlc_work"],
+    [PART, Read, Read, Read, Read, Write]
+);
+source!(
+    WLC_GATHER,
+    "wlc_gather",
+    ["common", "grid", "round", "wlc_work"],
+    [PART, Write, Write, Read, Write, Write]
+);
+source!(
+    LABELS_MARK,
+    "labels_mark",
+    ["common", "round", "labels"],
+    [PART, Write, Read]
+);
+source!(
+    LABELS_NUMBER,
+    "labels_number",
+    ["common", "round", "labels"],
+    [PART, Write]
+);
+source!(
+    LABELS_RENAME,
+    "labels_rename",
+    ["common", "round", "labels"],
+    [PART, Write, Write]
+);
+source!(
+    INCIDENCE_DEGREES,
+    "incidence_degrees",
+    ["common", "round", "worklist", "incidence"],
+    [PART, Write, Read, Read, Write]
+);
+source!(
+    SCGC_INCIDENCE,
+    "scgc_incidence",
+    [
+        "common",
+        "round",
+        "worklist",
+        "priority",
+        "incidence",
+        "waits"
+    ],
+    [PART, Write, Read, Read, Read, Write, Write, Write]
+);
+source!(
+    SCGC_INCIDENCE_WINDOW,
+    "scgc_incidence_window",
+    ["common", "round", "worklist", "waits"],
+    [PART, Write, Read, Write]
 );
 
 /// All of them.
-pub(crate) const SOURCES: &[Source] = &[NEXT, ALL, JONES_PLASSMANN, HIGHER, SCGC];
+pub(crate) const SOURCES: &[Source] = &[
+    NEXT,
+    ALL,
+    JONES_PLASSMANN,
+    HIGHER,
+    SCGC,
+    ECL_GC_LARGE_START,
+    ECL_GC_LARGE,
+    ECL_GC_SMALL_START,
+    ECL_GC_SMALL,
+    VIVACE_START,
+    VIVACE_PICK,
+    VIVACE_KEEP,
+    VIVACE_RENEW,
+    WLC_START,
+    WLC_CHOOSE,
+    WLC_LOSE,
+    WLC_GATHER,
+    LABELS_MARK,
+    LABELS_NUMBER,
+    LABELS_RENAME,
+    INCIDENCE_DEGREES,
+    SCGC_INCIDENCE,
+    SCGC_INCIDENCE_WINDOW,
+];

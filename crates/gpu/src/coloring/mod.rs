@@ -18,18 +18,31 @@
 //! **Traffic.** Nothing is uploaded, but 16 bytes with the options of [`vivace`] and [`wlc`]; what is read back is 24 bytes
 //! per 32 rounds.
 
+mod ecl_gc;
 mod graph;
+mod incidence;
 mod jones_plassmann;
 mod kernels;
+mod labels;
 mod result;
 mod rounds;
 mod scgc;
+mod scgc_incidence;
+mod vivace;
+mod wlc;
 
+pub use ecl_gc::ecl_gc;
 pub use graph::DeviceGraph;
+pub use incidence::DeviceIncidence;
 pub use jones_plassmann::jones_plassmann;
 pub use kernels::ColoringKernels;
 pub use result::DeviceColoring;
 pub use scgc::scgc;
+pub use scgc_incidence::scgc_incidence;
+pub use vivace::vivace;
+pub use wlc::wlc;
 
 pub(crate) use kernels::SOURCES;
 pub(crate) use rounds::{Round, Work};
+pub(crate) use vivace::VivaceSettings;
+pub(crate) use wlc::WlcWork;
