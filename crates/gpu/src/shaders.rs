@@ -2,7 +2,7 @@
 
 use std::mem::offset_of;
 
-use crate::coloring::{Round, SOURCES, VivaceSettings, WlcWork, Work};
+use crate::coloring::{Round, SEARCH_WORDS, SOURCES, VivaceSettings, WAIT_WORDS, WlcWork, Work};
 
 /// A kernel as it is given to the driver; its entry point is `main`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -32,40 +32,69 @@ pub fn shaders() -> Vec<Shader> {
         .collect()
 }
 
-/// Where a struct that host and kernels share has its fields on the host.
+/// What the host takes a struct of its kernels for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct SharedStruct {
     /// Its name, the same in all kernels that have it.
     pub name: &'static str,
-    /// Field and offset in bytes. What follows the last one on the device only is there with the size.
+    /// All fields with their offsets in bytes, but for a list of any length at the end; none if the host only makes room
+    /// for it.
     pub fields: Vec<(&'static str, usize)>,
+    /// The size in bytes, without such a list.
+    pub size: usize,
 }
 
 macro_rules! shared {
-    ($of:ident { $($field:ident),* } $($rest:literal)?) => {
+    ($of:ident { $($field:ident),* }) => {
         SharedStruct {
             name: stringify!($of),
-            fields: vec![
-                $((stringify!($field), offset_of!($of, $field)),)*
-                $(($rest, size_of::<$of>()),)?
-            ],
+            fields: vec![$((stringify!($field), offset_of!($of, $field))),*],
+            size: size_of::<$of>(),
+        }
+    };
+    ($name:literal, $words:expr) => {
+        SharedStruct {
+            name: $name,
+            fields: vec![],
+            size: $words * size_of::<u32>(),
         }
     };
 }
 
 /// All structs that host and kernels share.
+///
+/// ```
+/// for shared in incise_gpu::shared_structs() {
+///     assert!(shared.fields.iter().all(|&(_, offset)| offset < shared.size));
+/// }
+/// ```
 #[must_use]
 pub fn shared_structs() -> Vec<SharedStruct> {
     vec![
         shared!(Round { vertices, parity }),
-        shared!(Work { counts, rounds, colors, rest, window } "list"),
+        shared!(Work {
+            counts,
+            rounds,
+            colors,
+            rest,
+            window
+        }),
         shared!(VivaceSettings {
             seed_low,
             seed_high,
             shrinking,
             highest_of_all
         }),
-        shared!(WlcWork { begin, count, done, lost, chunk, rounds } "list"),
+        shared!(WlcWork {
+            begin,
+            count,
+            done,
+            lost,
+            chunk,
+            rounds
+        }),
+        shared!("Search", SEARCH_WORDS),
+        shared!("Wait", WAIT_WORDS),
     ]
 }

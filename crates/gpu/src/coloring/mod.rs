@@ -44,5 +44,7 @@ pub use wlc::wlc;
 
 pub(crate) use kernels::SOURCES;
 pub(crate) use rounds::{Round, Work};
+pub(crate) use scgc::SEARCH_WORDS;
+pub(crate) use scgc_incidence::WAIT_WORDS;
 pub(crate) use vivace::VivaceSettings;
 pub(crate) use wlc::WlcWork;

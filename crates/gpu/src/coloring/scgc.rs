@@ -10,7 +10,7 @@ use crate::array::Array;
 use crate::{GpuContext, GpuError};
 
 /// Words of `Search` in the shaders.
-pub(super) const SEARCH_WORDS: usize = 3;
+pub(crate) const SEARCH_WORDS: usize = 3;
 
 /// Colors with all shortcuts: a vertex goes as soon as no neighbor of higher priority can take its color.
 ///

@@ -14,7 +14,7 @@ use crate::array::Array;
 use crate::{GpuContext, GpuError};
 
 /// Words of `Wait` in the shaders.
-const WAIT_WORDS: usize = 3;
+pub(crate) const WAIT_WORDS: usize = 3;
 
 /// Colors constraints so that those on one particle differ, with shortcuts 1 and 3.
 ///
