@@ -1,5 +1,7 @@
 //! Colorings on the device equal those of the CPU, whatever the graph.
 
+#![expect(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
 use std::num::NonZeroUsize;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
