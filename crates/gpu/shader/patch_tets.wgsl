@@ -2,9 +2,7 @@
 
 struct TetPatch {
     place: u32,
-    unused_a: u32,
-    unused_b: u32,
-    unused_c: u32,
+    unused: array<u32, 3>,
     corners: vec4<u32>,
     rest: array<f32, 16>,
     constants: vec4<f32>,

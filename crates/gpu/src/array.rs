@@ -22,8 +22,6 @@ pub(crate) struct Array<T> {
     buffer: Buffer,
     len: usize,
     usage: BufferUsages,
-    /// Counts the buffers there were: who bound an older one must bind again.
-    generation: u32,
     of: PhantomData<T>,
 }
 
@@ -51,7 +49,6 @@ impl<T: NoUninit + AnyBitPattern> Array<T> {
             buffer,
             len,
             usage,
-            generation: 0,
             of: PhantomData,
         })
     }
@@ -73,10 +70,6 @@ impl<T: NoUninit + AnyBitPattern> Array<T> {
 
     pub(crate) fn buffer(&self) -> &Buffer {
         &self.buffer
-    }
-
-    pub(crate) fn generation(&self) -> u32 {
-        self.generation
     }
 
     /// Overwrites values from a place on, before the next submit.
@@ -109,7 +102,6 @@ impl<T: NoUninit + AnyBitPattern> Array<T> {
             encoder.copy_buffer_to_buffer(&self.buffer, 0, &larger, 0, self.buffer.size());
             gpu.submit(encoder)?;
             self.buffer = larger;
-            self.generation += 1;
         }
         self.len = len;
         Ok(())
@@ -121,7 +113,6 @@ impl<T: NoUninit + AnyBitPattern> Array<T> {
             let roomy = bytes::<T>(values.len() + values.len() / 2).min(gpu.buffer_limit());
             let size = roomy.max(bytes::<T>(values.len()));
             self.buffer = buffer(gpu, self.what, size, self.usage)?;
-            self.generation += 1;
         }
         self.len = values.len();
         self.write(gpu, 0, values);

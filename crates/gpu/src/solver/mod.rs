@@ -29,6 +29,7 @@ use incise_xpbd::{Pose, Solver, StepSettings};
 
 pub(crate) use kernels::SOURCES;
 pub use layout::Form;
+pub(crate) use numbers::{Attachment, Part, ParticlePatch, Settings, TetPatch, Turn};
 
 use crate::array::Array;
 use crate::{GpuContext, GpuError};

@@ -3,9 +3,14 @@
 //! They need an adapter; Mesa's lavapipe, which is a processor, will do. Without one they skip with a line on stderr,
 //! unless `INCISE_REQUIRE_GPU` is set: then they fail.
 
+#![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
+#![allow(clippy::print_stderr, reason = "a test that is skipped says so")]
+
 mod colliders;
+mod coloring;
 mod device;
 mod handles;
+mod shaders;
 mod solver;
 mod support;
 mod twin;
