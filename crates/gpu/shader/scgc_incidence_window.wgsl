@@ -15,7 +15,6 @@ fn main(
         stays = true;
         atomicStore(&waits[v].taken[0], 0u);
         atomicStore(&waits[v].taken[1], 0u);
-        waits[v].stopped_by = 0u;
     }
     if v == 0u {
         work.window += 64u;

@@ -24,7 +24,8 @@ pub(crate) struct Source {
 /// Compiled kernels and work arrays of all colorings, for one device.
 ///
 /// Keep it as long as the device: the first coloring of a kind compiles its kernels, all others find them. The arrays
-/// are as large as the largest graph so far needs: about 20 bytes per vertex and 4 per edge and direction.
+/// are as large as the largest input so far needs: for [`scgc`](super::scgc()) 24 bytes per vertex and a little more than 8
+/// per edge, for all algorithms together about 70 bytes per vertex.
 #[derive(Debug, Default)]
 pub struct ColoringKernels {
     compiled: BTreeMap<&'static str, Arc<Kernel>>,

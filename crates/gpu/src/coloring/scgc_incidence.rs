@@ -3,7 +3,7 @@
 //! Twin of [`incise_coloring::scgc`] on an [`Incidence`](incise_graph::Incidence). A tetrahedron has about 65 neighbors
 //! and four particles, so the graph costs more to build and to hold than this takes. Degrees are counted on the
 //! device first. Cost: a walk over the neighbors for the degrees, and one each time that a constraint loses the neighbor
-//! it waits for; memory of 20 bytes per constraint and 8 per particle beside the input.
+//! it waits for; memory of 24 bytes per constraint and 8 per particle beside input and result.
 
 use super::kernels::{
     ALL, ColoringKernels, INCIDENCE_DEGREES, SCGC_INCIDENCE, SCGC_INCIDENCE_WINDOW,

@@ -190,6 +190,13 @@ fn stars(count: u32, leaves: u32) -> ConstraintGraph {
     ConstraintGraph::from_edges((count * (leaves + 1)) as usize, &edges).unwrap()
 }
 
+/// A clique of which each vertex has a neighbor of its own.
+fn thorny(n: u32) -> ConstraintGraph {
+    let pairs = (0..n).flat_map(|b| (0..b).map(move |a| (a, b)));
+    let edges: Vec<_> = pairs.chain((0..n).map(|v| (v, n + v))).collect();
+    ConstraintGraph::from_edges(2 * n as usize, &edges).unwrap()
+}
+
 /// Each pair an edge with the same chance, from none to all.
 fn random_graph() -> impl Strategy<Value = ConstraintGraph> {
     (0u32..90, 0.0f64..1.0).prop_flat_map(|(n, density)| {
@@ -249,6 +256,10 @@ fn degrees_have_no_limit() {
     // Centers on both sides of ECL-GC's threshold.
     for leaves in [30, 31, 32, 33] {
         check(gpu, &stars(3, leaves));
+    }
+    // Colors beyond the palettes of small neighbors.
+    for n in [33, 66] {
+        check(gpu, &thorny(n));
     }
     // One constraint on many particles, each with another constraint.
     let center = std::iter::once((0..1280u32).collect());
