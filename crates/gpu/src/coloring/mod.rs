@@ -18,6 +18,7 @@
 //! **Traffic.** Nothing is uploaded, but 16 bytes with the options of [`vivace`] and [`wlc`]; what is read back is 24 bytes
 //! per 32 rounds.
 
+mod algorithm;
 mod ecl_gc;
 mod graph;
 mod incidence;
@@ -31,6 +32,7 @@ mod scgc_incidence;
 mod vivace;
 mod wlc;
 
+pub use algorithm::color;
 pub use ecl_gc::ecl_gc;
 pub use graph::DeviceGraph;
 pub use incidence::DeviceIncidence;
