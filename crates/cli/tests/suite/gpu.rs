@@ -87,7 +87,8 @@ fn auto_always_runs_and_says_where() {
 
 #[test]
 fn colorings_on_a_gpu_are_those_of_the_processor() {
-    let place = Place::with_mesh();
+    let place = Place::new();
+    place.good(&["mesh", "generate", "box", "--tets", "300", "tet.vtk"]);
     let color = |backend: &str, algorithm: &str, csv: &str| {
         place.incise(&[
             "color",
