@@ -5,6 +5,7 @@
 
 mod colliders;
 mod device;
+mod edits;
 mod handles;
 mod solver;
 mod support;
