@@ -12,6 +12,7 @@ use super::kernels::{Bound, CLEAR, Kernels, PREDICT, UPDATE_VELOCITIES, Variant,
 use super::layout::{Form, THREADS};
 use super::numbers::Settings;
 use super::obstacles::Obstacles;
+use super::scalars;
 use super::turns::{self, Turns};
 use crate::array::{Array, Staging};
 use crate::kernel::Recorder;
@@ -92,6 +93,9 @@ impl Frame {
                 let words = 2 * body.layout.place_count();
                 clear.run(&mut pass, &[], words.div_ceil(THREADS));
             }
+            for scalars in &passes.scalars {
+                scalars.begin(&mut pass);
+            }
             if keep && substep + 1 == settings.substeps {
                 drop(pass);
                 let bytes = (host.particle_count() * size_of::<[f32; 4]>()) as u64;
@@ -104,6 +108,9 @@ impl Frame {
                 body.colors.run(&mut pass, &passes.solve, &passes.tail);
                 if let Some(handles) = &passes.handles {
                     handles.solve(&mut pass, turn);
+                }
+                for scalars in &passes.scalars {
+                    scalars.solve(&mut pass);
                 }
                 if let Some(project) = &passes.project {
                     project.run(&mut pass, &[turn], particles);
@@ -141,6 +148,11 @@ impl Frame {
         }
         if let Some(handles) = &mut body.handles {
             handles.prepare(gpu, host, settings)?;
+        }
+        if settings.iterations > 1 {
+            for scalars in body.distances.iter_mut().chain(&mut body.volumes) {
+                scalars.keep_multipliers(gpu)?;
+            }
         }
         let takes_turns = self.obstacles.is_some() || body.handles.is_some();
         if takes_turns && self.turns.is_none() {
@@ -229,9 +241,6 @@ fn refuse(host: &Solver<f32>, settings: &StepSettings) -> Result<(), GpuError> {
     if settings.method != Method::GaussSeidel {
         return unsupported("other methods than Gauss-Seidel");
     }
-    if host.distance_count() > 0 || host.volume_count() > 0 {
-        return unsupported("distance and volume constraints");
-    }
     Ok(())
 }
 
@@ -248,7 +257,7 @@ pub(crate) struct Shared<'a> {
 
 /// The kernels of a step, in the order of a substep; those that it does not need are not there.
 #[derive(Debug)]
-struct Passes {
+struct Passes<'a> {
     predict: Bound,
     /// Where multipliers are kept.
     clear: Option<Bound>,
@@ -257,6 +266,8 @@ struct Passes {
     project: Option<Bound>,
     update: Bound,
     handles: Option<handles::Passes>,
+    /// Distances before volumes.
+    scalars: Vec<scalars::Passes<'a>>,
 }
 
 impl Frame {
@@ -264,16 +275,16 @@ impl Frame {
         clippy::too_many_arguments,
         reason = "the parts of a solver, borrowed one by one"
     )]
-    fn bind(
+    fn bind<'a>(
         &self,
         gpu: &GpuContext,
         kernels: &mut Kernels,
-        body: &Body,
+        body: &'a Body,
         host: &Solver<f32>,
         repaired: &Array<u32>,
         settings: &StepSettings,
         keeps: bool,
-    ) -> Result<Passes, GpuError> {
+    ) -> Result<Passes<'a>, GpuError> {
         let constants = self.settings.buffer();
         let (particles, previous) = (body.particles.buffer(), body.previous.buffer());
         let velocities = body.velocities.buffer();
@@ -300,8 +311,6 @@ impl Frame {
             body.colors.lists.array.buffer(),
             last,
         ];
-        let mut bind =
-            |source, variant, buffers: &[&Buffer]| kernels.bind(gpu, source, variant, buffers);
         let (form, plain) = (body.layout.form, Variant::default());
         let update = [
             constants,
@@ -319,6 +328,14 @@ impl Frame {
             velocities,
             repaired: repaired.buffer(),
         });
+        let several = settings.iterations > 1;
+        let mut scalars = Vec::new();
+        for constraints in body.distances.iter().chain(&body.volumes) {
+            let buffers = [constants, particles, previous];
+            scalars.push(constraints.bind(gpu, kernels, buffers, several)?);
+        }
+        let mut bind =
+            |source, variant, buffers: &[&Buffer]| kernels.bind(gpu, source, variant, buffers);
         Ok(Passes {
             predict: bind(
                 &PREDICT,
@@ -337,12 +354,10 @@ impl Frame {
                 _ => None,
             },
             handles: match (&body.handles, &shared) {
-                (Some(handles), Some(shared)) => {
-                    let several = settings.iterations > 1;
-                    Some(handles.bind(gpu, kernels, shared, several)?)
-                }
+                (Some(handles), Some(shared)) => Some(handles.bind(gpu, kernels, shared, several)?),
                 _ => None,
             },
+            scalars,
         })
     }
 }

@@ -17,6 +17,7 @@ mod kernels;
 mod layout;
 mod numbers;
 mod obstacles;
+mod scalars;
 mod seats;
 mod tile;
 mod turns;

@@ -7,6 +7,7 @@ mod colliders;
 mod device;
 mod edits;
 mod handles;
+mod scalars;
 mod solver;
 mod support;
 mod twin;
