@@ -3,11 +3,12 @@
 //! Everything that differs from substep to substep is in buffers before the pass begins, so it needs no break. Twin:
 //! `Solver::substep` of incise-xpbd. Cost: recording a third of a microsecond a dispatch.
 
-use incise_xpbd::{Form as Solving, Method, Solver, StepSettings};
+use incise_xpbd::{Form as Solving, Solver, StepSettings};
 use wgpu::{Buffer, BufferUsages};
 
 use super::body::Body;
 use super::handles::{self, Handles};
+use super::jacobi::{self, Jacobi};
 use super::kernels::{Bound, CLEAR, Kernels, PREDICT, UPDATE_VELOCITIES, Variant, solve};
 use super::layout::{Form, THREADS};
 use super::numbers::Settings;
@@ -27,6 +28,8 @@ pub(crate) struct Frame {
     turns: Option<Turns>,
     /// If there are colliders.
     obstacles: Option<Obstacles>,
+    /// If iterations are Jacobi's.
+    jacobi: Option<Jacobi>,
     /// Positions before the constraints of the last substep; empty unless a step keeps them.
     predicted: Array<[f32; 4]>,
     /// Whether the last step kept what residuals need.
@@ -50,6 +53,7 @@ impl Frame {
             sent: None,
             turns: None,
             obstacles: None,
+            jacobi: None,
             predicted: Array::zeros(gpu, "predicted positions", 0)?,
             kept: false,
         })
@@ -63,7 +67,6 @@ impl Frame {
         keep: bool,
     ) -> Result<(), GpuError> {
         let Scene { gpu, host, .. } = scene;
-        refuse(host, settings)?;
         let keeps = keep || settings.iterations > 1;
         self.prepare(gpu, scene.body, host, settings, keeps)?;
         if keep {
@@ -106,6 +109,9 @@ impl Frame {
             for iteration in 0..settings.iterations {
                 let turn = turns::offset(settings, substep, iteration);
                 body.colors.run(&mut pass, &passes.solve, &passes.tail);
+                if let Some(jacobi) = &passes.jacobi {
+                    jacobi.run(&mut pass, turn, particles);
+                }
                 if let Some(handles) = &passes.handles {
                     handles.solve(&mut pass, turn);
                 }
@@ -138,6 +144,7 @@ impl Frame {
         if keeps {
             body.multipliers.resize(gpu, body.layout.place_count())?;
         }
+        Jacobi::prepare(&mut self.jacobi, gpu, body, host.particle_count(), settings)?;
         self.obstacles = match (self.obstacles.take(), settings.colliders.is_empty()) {
             (_, true) => None,
             (Some(obstacles), false) => Some(obstacles),
@@ -154,7 +161,8 @@ impl Frame {
                 scalars.keep_multipliers(gpu)?;
             }
         }
-        let takes_turns = self.obstacles.is_some() || body.handles.is_some();
+        let takes_turns =
+            self.obstacles.is_some() || body.handles.is_some() || self.jacobi.is_some();
         if takes_turns && self.turns.is_none() {
             self.turns = Some(Turns::new(gpu)?);
         }
@@ -213,7 +221,9 @@ impl Frame {
     pub(crate) fn bytes(&self) -> u64 {
         let turns = self.turns.as_ref().map_or(0, |turns| turns.buffer().size());
         let obstacles = self.obstacles.as_ref().map_or(0, Obstacles::bytes);
-        self.settings.buffer().size() + self.predicted.buffer().size() + turns + obstacles
+        let jacobi = self.jacobi.as_ref().map_or(0, Jacobi::bytes);
+        let always = self.settings.buffer().size() + self.predicted.buffer().size();
+        always + turns + obstacles + jacobi
     }
 
     /// Starts to read what residuals need, if the last step kept it.
@@ -233,15 +243,6 @@ impl Frame {
         let multipliers = body.multipliers.stage(gpu, body.multipliers.len())?;
         Ok(Some((predicted, multipliers)))
     }
-}
-
-/// What the device does not do.
-fn refuse(host: &Solver<f32>, settings: &StepSettings) -> Result<(), GpuError> {
-    let unsupported = |what| Err(GpuError::Unsupported { what });
-    if settings.method != Method::GaussSeidel {
-        return unsupported("other methods than Gauss-Seidel");
-    }
-    Ok(())
 }
 
 /// The buffers that what is not a tet may need.
@@ -265,6 +266,7 @@ struct Passes<'a> {
     tail: Bound,
     project: Option<Bound>,
     update: Bound,
+    jacobi: Option<jacobi::Passes>,
     handles: Option<handles::Passes>,
     /// Distances before volumes.
     scalars: Vec<scalars::Passes<'a>>,
@@ -292,7 +294,7 @@ impl Frame {
             damped: host.is_damped(),
             sequential: settings.form == Solving::Sequential,
             keeps,
-            jacobi: false,
+            jacobi: self.jacobi.is_some(),
             various: !host.is_uniform(),
         };
         let last = match body.layout.form {
@@ -355,6 +357,12 @@ impl Frame {
             },
             handles: match (&body.handles, &shared) {
                 (Some(handles), Some(shared)) => Some(handles.bind(gpu, kernels, shared, several)?),
+                _ => None,
+            },
+            jacobi: match (&self.jacobi, &shared) {
+                (Some(jacobi), Some(shared)) => {
+                    Some(jacobi.bind(gpu, kernels, body, shared, keeps)?)
+                }
                 _ => None,
             },
             scalars,

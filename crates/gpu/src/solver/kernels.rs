@@ -234,6 +234,26 @@ pub(crate) const UPDATE_HELD: Source = Source {
     flags: &[],
 };
 
+pub(crate) const APPLY_CORRECTIONS: Source = Source {
+    name: "apply_corrections",
+    parts: text!("common", "settings", "turn", "apply_corrections"),
+    uses: &[
+        Use::Uniform,
+        Use::Part(TURN),
+        Use::Write,
+        Use::Write,
+        Use::Write,
+    ],
+    flags: &[Flag::Keeps],
+};
+
+pub(crate) const EXTRAPOLATE_MULTIPLIERS: Source = Source {
+    name: "extrapolate_multipliers",
+    parts: text!("common", "turn", "extrapolate_multipliers"),
+    uses: &[Use::Write, Use::Part(TURN), Use::Write],
+    flags: &[],
+};
+
 /// What kernels that solve constraints of one number use.
 const SCALARS: &[Use] = &[
     Use::Uniform,
@@ -314,6 +334,8 @@ pub(crate) const SOURCES: &[Source] = &[
     SOLVE_DISTANCES_TAIL,
     SOLVE_VOLUMES,
     SOLVE_VOLUMES_TAIL,
+    APPLY_CORRECTIONS,
+    EXTRAPOLATE_MULTIPLIERS,
 ];
 
 /// The kernel that solves colors, or a row of colors of one group each.

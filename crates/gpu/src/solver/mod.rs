@@ -13,6 +13,7 @@ mod body;
 mod colors;
 mod frame;
 mod handles;
+mod jacobi;
 mod kernels;
 mod layout;
 mod numbers;

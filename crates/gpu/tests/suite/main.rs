@@ -6,7 +6,9 @@
 mod colliders;
 mod device;
 mod edits;
+mod extremes;
 mod handles;
+mod jacobi;
 mod scalars;
 mod solver;
 mod support;

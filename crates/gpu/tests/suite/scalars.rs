@@ -42,14 +42,14 @@ fn springs(mesh: &TetMesh, damping: f64) -> Vec<DistanceConstraint> {
         .collect()
 }
 
-fn set_springs(solver: &mut Solver<f32>, mesh: &TetMesh, damping: f64, clustered: bool) {
+pub(crate) fn set_springs(solver: &mut Solver<f32>, mesh: &TetMesh, damping: f64, clustered: bool) {
     let springs = springs(mesh, damping);
     let particles: Vec<_> = springs.iter().map(|spring| spring.particles).collect();
     let order = order(mesh.positions.len(), &particles, clustered);
     solver.set_distances(&springs, order).unwrap();
 }
 
-fn set_volumes(solver: &mut Solver<f32>, mesh: &TetMesh, damping: f64, clustered: bool) {
+pub(crate) fn set_volumes(solver: &mut Solver<f32>, mesh: &TetMesh, damping: f64, clustered: bool) {
     let particles: Vec<_> = mesh.tets.iter().map(|tet| tet.map(|p| p.0)).collect();
     let constraints: Vec<_> = particles
         .iter()
