@@ -4,13 +4,13 @@ use glam::{DVec3, dvec3};
 use incise_gpu::{Form, GpuContext};
 use incise_graph::{Clustering, ColorId, Coloring, Incidence};
 use incise_mesh::TetId;
-use incise_xpbd::{Pose, Solver};
+use incise_xpbd::{Collider, Pose, Solver, StepSettings};
 use proptest::prelude::*;
 use proptest::sample::Index;
 
 use crate::solver::{SOFT, clusters, settings, tiled};
 use crate::support::gpu;
-use crate::twin::{FORMS, Twins, bar};
+use crate::twin::{FORMS, Twins, bar, free};
 
 /// Density of [`SOFT`] and a quarter: what a corner gets of a tet.
 const SHARE: f64 = 250.0;
@@ -260,4 +260,45 @@ fn run(gpu: &'static GpuContext, form: (&str, Form), rounds: &[Vec<Edit>]) -> f6
         far = f64::max(far, edited.twins.apart());
     }
     far
+}
+
+/// A body that has moved on gets a new origin, and what is around it is told relative to that.
+#[test]
+fn a_body_that_moves_on_gets_a_new_origin() {
+    let Some(gpu) = gpu("a_body_that_moves_on_gets_a_new_origin") else {
+        return;
+    };
+    let speed = dvec3(40.0, 0.0, 0.0);
+    let mut twins = Twins::new(gpu, &bar(), SOFT, FORMS[0], |solver| {
+        free(solver);
+        let handle = solver.add_handle(Pose::at(DVec3::ZERO));
+        for p in 0..solver.particle_count() {
+            solver.set_velocity(p, speed);
+            if solver.position(p).x > 0.9 {
+                let compliance = if p % 2 == 0 { 0.0 } else { 1e-3 };
+                solver.attach(p, handle, compliance, 0.01).unwrap();
+            }
+        }
+    });
+    let mut settings = StepSettings {
+        colliders: vec![Collider {
+            velocity: dvec3(0.0, 0.0, 0.5),
+            ..Collider::ground(-0.01, 0.0)
+        }],
+        ..settings()
+    };
+    let start = twins.host.origin();
+    for frame in 1..=8 {
+        let pose = Pose::at(speed * settings.time_step * f64::from(frame));
+        twins.device.move_handle(0, pose);
+        twins.host.move_handle(0, pose);
+        twins.step(&settings);
+        settings.colliders[0] = settings.colliders[0].moved(settings.time_step);
+        // Rounding in another order, of numbers up to three times the size of the body.
+        let far = twins.apart();
+        assert!(far < 1e-5, "frame {frame}: {far}");
+    }
+    twins.step(&settings);
+    assert_eq!(twins.device.as_last_seen().origin(), twins.host.origin());
+    assert!(twins.host.origin().distance(start) > 1.0);
 }
