@@ -37,7 +37,7 @@ pub(crate) struct Body {
     pub(crate) tiles: Array<u32>,
     /// Empty unless a step keeps them.
     pub(crate) multipliers: Array<[f32; 2]>,
-    /// Empty unless a step is Jacobi's.
+    /// Empty until a step is Jacobi's; all 0 between its iterations.
     pub(crate) corrections: Array<[f32; 4]>,
     /// If something hangs on handles.
     pub(crate) handles: Option<Handles>,

@@ -145,14 +145,7 @@ impl Frame {
             body.multipliers.resize(gpu, body.layout.place_count())?;
         }
         Jacobi::prepare(&mut self.jacobi, gpu, body, host.particle_count(), settings)?;
-        self.obstacles = match (self.obstacles.take(), settings.colliders.is_empty()) {
-            (_, true) => None,
-            (Some(obstacles), false) => Some(obstacles),
-            (None, false) => Some(Obstacles::new(gpu)?),
-        };
-        if let Some(obstacles) = &mut self.obstacles {
-            obstacles.follow(gpu, host, settings)?;
-        }
+        Obstacles::follow(&mut self.obstacles, gpu, host, settings)?;
         if let Some(handles) = &mut body.handles {
             handles.prepare(gpu, host, settings)?;
         }
@@ -161,15 +154,8 @@ impl Frame {
                 scalars.keep_multipliers(gpu)?;
             }
         }
-        let takes_turns =
-            self.obstacles.is_some() || body.handles.is_some() || self.jacobi.is_some();
-        if takes_turns && self.turns.is_none() {
-            self.turns = Some(Turns::new(gpu)?);
-        }
-        match &mut self.turns {
-            Some(turns) if takes_turns => turns.follow(gpu, settings),
-            _ => Ok(()),
-        }
+        let asks = self.obstacles.is_some() || body.handles.is_some() || self.jacobi.is_some();
+        Turns::follow(&mut self.turns, gpu, settings, asks)
     }
 
     /// Sends the settings if they are others.

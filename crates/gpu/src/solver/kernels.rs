@@ -316,6 +316,7 @@ const SOLVE_VOLUMES_TAIL: Source = Source {
 };
 
 /// The shaders of the solver.
+#[cfg(test)]
 pub(crate) const SOURCES: &[Source] = &[
     PREDICT,
     UPDATE_VELOCITIES,

@@ -1,14 +1,15 @@
 //! Edits of a body on the device are followed: it stays the twin of one that was edited the same way.
 
 use glam::{DVec3, dvec3};
-use incise_gpu::{Form, GpuContext};
+use incise_gpu::{Form, GpuContext, GpuError};
 use incise_graph::{Clustering, ColorId, Coloring, Incidence};
 use incise_mesh::TetId;
+use incise_mesh::generate::kuhn_box;
 use incise_xpbd::{Collider, Pose, Solver, StepSettings};
 use proptest::prelude::*;
 use proptest::sample::Index;
 
-use crate::solver::{SOFT, clusters, settings, tiled};
+use crate::solver::{SOFT, clusters, schedules, settings, tiled};
 use crate::support::gpu;
 use crate::twin::{FORMS, Twins, bar, free};
 
@@ -301,4 +302,30 @@ fn a_body_that_moves_on_gets_a_new_origin() {
     twins.step(&settings);
     assert_eq!(twins.device.as_last_seen().origin(), twins.host.origin());
     assert!(twins.host.origin().distance(start) > 1.0);
+}
+
+/// After a step that was refused, what was edited before it is not forgotten.
+#[test]
+fn a_refused_step_loses_no_edits() {
+    let Some(gpu) = gpu("a_refused_step_loses_no_edits") else {
+        return;
+    };
+    let mesh = bar();
+    let mut twins = Twins::new(gpu, &mesh, SOFT, FORMS[1], handles);
+    twins.step(&settings());
+    twins.edit(|solver| {
+        let last = solver.particle_count() - 1;
+        solver.attach(last, 1, 0.0, 0.0).unwrap();
+        solver.set_velocity(3, DVec3::Z);
+        solver.replace_tet(7, solver.tet_particles(7), mesh.corners(TetId::new(8)));
+    });
+    // Of another body, refused for the size of its clusters.
+    let (other, _) = schedules(&kuhn_box([4, 4, 4], DVec3::ONE), "pressure:200");
+    let error = twins.device.step(&other, &settings());
+    assert!(matches!(error, Err(GpuError::Block { .. })));
+    for _ in 0..3 {
+        twins.step(&settings());
+    }
+    // A few frames of rounding in another order.
+    assert!(twins.apart() < 1e-5);
 }

@@ -2,6 +2,7 @@
 
 use glam::dvec3;
 use incise_gpu::{Form, GpuError, GpuSolver};
+use incise_mesh::generate::{Shape, generate};
 use incise_xpbd::{Collider, Form as Solving, Material, Method, Pose, Solver, StepSettings};
 
 use crate::solver::{SOFT, body, schedules, settings, share};
@@ -139,6 +140,26 @@ fn methods_take_turns() {
     }
     // Eight frames of rounding in another order.
     assert!(twins.apart() < 1e-5);
+}
+
+/// Colors of several groups have dispatches of their own.
+#[test]
+fn large_bodies_gather_as_well() {
+    let Some(gpu) = gpu("large_bodies_gather_as_well") else {
+        return;
+    };
+    let mesh = generate(Shape::Sphere, 4000).unwrap();
+    let mut twins = Twins::new(gpu, &mesh, SOFT, ("none", Form::Threads), |_| ());
+    let settings = StepSettings {
+        substeps: 1,
+        iterations: 8,
+        ..iterated(CHEBYSHEV)
+    };
+    twins.step(&settings);
+    twins.step(&settings);
+    assert!(twins.device.dispatches_per_pass() > 4);
+    // Two frames of rounding in another order.
+    assert!(twins.apart() < 1e-6);
 }
 
 #[test]
