@@ -89,7 +89,7 @@ fn twins(test: &str, settings: &StepSettings, prepare: impl Fn(&mut Solver<f32>)
 fn iterated() -> StepSettings {
     StepSettings {
         substeps: 2,
-        iterations: 2,
+        iterations: 3,
         relaxation: 0.9,
         ..settings()
     }
