@@ -69,6 +69,7 @@ impl Seats {
         }
     }
 
+    #[cfg(test)]
     pub(crate) fn group_count(&self) -> usize {
         self.groups.len()
     }
@@ -107,10 +108,7 @@ impl Seats {
     /// Makes this the seats of a schedule.
     pub(crate) fn follow(&mut self, schedule: &Schedule) -> Moved {
         let changes = self.revision.and_then(|r| schedule.changes_since(r));
-        let moved = match changes {
-            Some(changes) => Some(self.reseat(schedule, changes)),
-            None => None,
-        };
+        let moved = changes.map(|changes| self.reseat(schedule, changes));
         self.revision = Some(schedule.revision());
         let spare = SPARE * self.color_count().max(1) * self.width;
         match moved {

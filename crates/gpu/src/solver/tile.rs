@@ -113,7 +113,7 @@ mod tests {
                 .into_iter()
                 .filter(|c| (0..4).all(|i| (0..i).all(|j| c[i] != c[j])))
                 .collect();
-            let tets: Vec<u32> = (0..corners.len() as u32).map(|t| 2 * t).collect();
+            let tets: Vec<u32> = (0..index(corners.len())).map(|t| 2 * t).collect();
             let tile = Tile::new(&tets, |t| corners[t as usize / 2]);
             let mut all: Vec<u32> = tile.tets().map(|(tet, _)| tet).collect();
             for (tet, local) in tile.tets() {

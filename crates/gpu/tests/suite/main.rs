@@ -3,6 +3,8 @@
 //! They need an adapter; Mesa's lavapipe, which is a processor, will do. Without one they skip with a line on stderr,
 //! unless `INCISE_REQUIRE_GPU` is set: then they fail.
 
+#![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
+
 mod colliders;
 mod device;
 mod edits;

@@ -98,7 +98,7 @@ fn iterated() -> StepSettings {
 #[test]
 fn springs_pull() {
     twins("springs_pull", &settings(), |solver| {
-        set_springs(solver, &bar(), 0.0, false)
+        set_springs(solver, &bar(), 0.0, false);
     });
 }
 
@@ -106,21 +106,21 @@ fn springs_pull() {
 fn springs_are_damped_and_solved_in_clusters() {
     let test = "springs_are_damped_and_solved_in_clusters";
     twins(test, &settings(), |solver| {
-        set_springs(solver, &bar(), 0.01, true)
+        set_springs(solver, &bar(), 0.01, true);
     });
 }
 
 #[test]
 fn springs_keep_multipliers() {
     twins("springs_keep_multipliers", &iterated(), |solver| {
-        set_springs(solver, &bar(), 0.01, false)
+        set_springs(solver, &bar(), 0.01, false);
     });
 }
 
 #[test]
 fn volumes_are_kept() {
     twins("volumes_are_kept", &settings(), |solver| {
-        set_volumes(solver, &bar(), 0.0, false)
+        set_volumes(solver, &bar(), 0.0, false);
     });
 }
 

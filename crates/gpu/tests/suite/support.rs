@@ -7,6 +7,7 @@ use incise_gpu::{GpuContext, GpuError, GpuOptions};
 static CONTEXT: OnceLock<Result<GpuContext, GpuError>> = OnceLock::new();
 
 /// The device, or `None` on a machine without one, which is said.
+#[expect(clippy::print_stderr, reason = "what was skipped is to be seen")]
 pub(crate) fn gpu(test: &str) -> Option<&'static GpuContext> {
     match CONTEXT.get_or_init(|| GpuContext::new(&GpuOptions::from_env())) {
         Ok(gpu) => Some(gpu),
