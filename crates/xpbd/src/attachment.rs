@@ -166,6 +166,7 @@ impl<R: Real> Attachments<R> {
                 place: a.place.lerp(b.place, parameter),
                 compliance: a.compliance.max(b.compliance),
                 damping: a.damping.max(b.damping),
+                target: a.target + (b.target - a.target) * R::from_f64(parameter),
                 ..a
             };
             self.append(attachment, particle);

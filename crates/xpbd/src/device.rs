@@ -5,6 +5,7 @@
 //! crate does. Nothing of this costs a solver anything that nobody asked to keep track. Cost: a number an edit.
 
 use glam::DVec3;
+use incise_graph::Schedule;
 
 use crate::collider::Obstacle;
 use crate::lanes::STEEP;
@@ -37,6 +38,34 @@ pub struct AttachmentData {
     pub compliance: f64,
     /// Damping time in s.
     pub damping: f64,
+}
+
+/// A distance constraint as a kernel wants it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DistanceData<R> {
+    /// Its particles.
+    pub particles: [u32; 2],
+    /// Their distance at rest in m.
+    pub length: R,
+    /// In m/N.
+    pub compliance: R,
+    /// Damping time in s.
+    pub damping: R,
+    /// Whether it acts only while the particles are farther apart.
+    pub only_when_longer: bool,
+}
+
+/// A volume constraint as a kernel wants it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VolumeData<R> {
+    /// Its particles.
+    pub particles: [u32; 4],
+    /// One over six times the volume at rest in 1/m³; 0 takes no part.
+    pub per_six_volumes: R,
+    /// Compliance over the volume at rest in 1/J.
+    pub compliance: R,
+    /// Damping time in s.
+    pub damping: R,
 }
 
 /// What edits have changed.
@@ -215,6 +244,39 @@ impl<R: Real> Solver<R> {
     /// The poses of all handles at a fraction of the frame.
     pub fn handle_poses(&self, fraction: f64) -> impl ExactSizeIterator<Item = Pose> + '_ {
         self.attachments.poses(fraction)
+    }
+
+    /// A distance constraint as a kernel wants it.
+    ///
+    /// # Panics
+    /// If the constraint does not exist.
+    #[must_use]
+    pub fn distance_data(&self, constraint: u32) -> DistanceData<R> {
+        let distances = self.distances.as_ref();
+        distances.expect("there are distance constraints").list[constraint as usize].data()
+    }
+
+    /// The order in which distance constraints are solved, if there are any.
+    #[must_use]
+    pub fn distance_schedule(&self) -> Option<&Schedule> {
+        self.distances.as_ref().map(|distances| &distances.schedule)
+    }
+
+    /// A volume constraint as a kernel wants it.
+    ///
+    /// # Panics
+    /// If the constraint does not exist.
+    #[must_use]
+    pub fn volume_data(&self, constraint: u32) -> VolumeData<R> {
+        let volumes = self.volume_constraints.as_ref();
+        volumes.expect("there are volume constraints").list[constraint as usize].data()
+    }
+
+    /// The order in which volume constraints are solved, if there are any.
+    #[must_use]
+    pub fn volume_schedule(&self) -> Option<&Schedule> {
+        let volumes = self.volume_constraints.as_ref();
+        volumes.map(|volumes| &volumes.schedule)
     }
 
     /// Ends a frame that was computed elsewhere: the handles have arrived.

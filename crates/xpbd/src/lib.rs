@@ -72,7 +72,7 @@ pub use descent::{
     Correction, CorrectionReport, CorrectionSettings, DescentReport, DescentSettings, Guess,
     ImplicitStep, Stars,
 };
-pub use device::{AttachmentData, Changes, TetData};
+pub use device::{AttachmentData, Changes, DistanceData, TetData, VolumeData};
 pub use distance::DistanceConstraint;
 pub use error::XpbdError;
 pub use material::Material;

@@ -12,7 +12,7 @@ use glam::DVec3;
 use incise_graph::Schedule;
 
 use crate::scalar::{Constraints, Scalar};
-use crate::{Real, Solver, XpbdError};
+use crate::{Real, Solver, VolumeData, XpbdError};
 
 /// Keeps the volume that four particles span. See [`Solver::set_volumes`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,6 +85,16 @@ impl<R: Real> TetVolume<R> {
             per_six_volumes: R::from_f64(if sound { per_six } else { 0.0 }),
             compliance: R::from_f64(if sound { compliance } else { 0.0 }),
             damping: R::from_f64(constraint.damping),
+        }
+    }
+
+    /// All there is to know.
+    pub(crate) fn data(&self) -> VolumeData<R> {
+        VolumeData {
+            particles: self.particles,
+            per_six_volumes: self.per_six_volumes,
+            compliance: self.compliance,
+            damping: self.damping,
         }
     }
 }

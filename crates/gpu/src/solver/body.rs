@@ -12,6 +12,7 @@ use super::handles::Handles;
 use super::kernels::{Kernels, PATCH_PARTICLES, PATCH_TETS, Variant};
 use super::layout::{Form, Layout, THREADS};
 use super::numbers::{NUMBERS, Part, ParticlePatch, TetPatch};
+use super::scalars::{Kind, Scalars};
 use super::tile::TILE_NUMBERS;
 use crate::array::Array;
 use crate::kernel::Recorder;
@@ -36,10 +37,13 @@ pub(crate) struct Body {
     pub(crate) tiles: Array<u32>,
     /// Empty unless a step keeps them.
     pub(crate) multipliers: Array<[f32; 2]>,
-    /// Empty unless a step is Jacobi's.
+    /// Empty until a step is Jacobi's; all 0 between its iterations.
     pub(crate) corrections: Array<[f32; 4]>,
     /// If something hangs on handles.
     pub(crate) handles: Option<Handles>,
+    /// If there are such constraints.
+    pub(crate) distances: Option<Scalars>,
+    pub(crate) volumes: Option<Scalars>,
     tet_patches: Array<TetPatch>,
     particle_patches: Array<ParticlePatch>,
     part: Array<Part>,
@@ -60,6 +64,8 @@ impl Body {
             multipliers: Array::zeros(gpu, "multipliers", 0)?,
             corrections: Array::zeros(gpu, "corrections", 0)?,
             handles: None,
+            distances: None,
+            volumes: None,
             tet_patches: Array::zeros(gpu, "patches of tets", 0)?,
             particle_patches: Array::zeros(gpu, "patches of particles", 0)?,
             part: Array::with_usage(gpu, "size of a patch", 1, wgpu::BufferUsages::UNIFORM)?,
@@ -77,6 +83,12 @@ impl Body {
     ) -> Result<(), GpuError> {
         self.follow_particles(gpu, kernels, solver, changes)?;
         Handles::follow(&mut self.handles, gpu, solver, changes)?;
+        if changes.distances {
+            Scalars::follow(&mut self.distances, gpu, solver, Kind::Distance)?;
+        }
+        if changes.volumes {
+            Scalars::follow(&mut self.volumes, gpu, solver, Kind::Volume)?;
+        }
         let patch = self.layout.follow(schedule, solver, changes)?;
         if patch.regrouped {
             self.colors.follow(gpu, self.layout.seats.groups())?;
@@ -200,7 +212,9 @@ impl Body {
         .into_iter()
         .map(wgpu::Buffer::size)
         .sum();
-        arrays + self.handles.as_ref().map_or(0, Handles::bytes)
+        let scalars = self.distances.iter().chain(&self.volumes);
+        let handles = self.handles.as_ref().map_or(0, Handles::bytes);
+        arrays + handles + scalars.map(Scalars::bytes).sum::<u64>()
     }
 }
 

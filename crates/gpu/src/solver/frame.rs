@@ -3,15 +3,17 @@
 //! Everything that differs from substep to substep is in buffers before the pass begins, so it needs no break. Twin:
 //! `Solver::substep` of incise-xpbd. Cost: recording a third of a microsecond a dispatch.
 
-use incise_xpbd::{Form as Solving, Method, Solver, StepSettings};
+use incise_xpbd::{Form as Solving, Solver, StepSettings};
 use wgpu::{Buffer, BufferUsages};
 
 use super::body::Body;
 use super::handles::{self, Handles};
+use super::jacobi::{self, Jacobi};
 use super::kernels::{Bound, CLEAR, Kernels, PREDICT, UPDATE_VELOCITIES, Variant, solve};
 use super::layout::{Form, THREADS};
 use super::numbers::Settings;
 use super::obstacles::Obstacles;
+use super::scalars;
 use super::turns::{self, Turns};
 use crate::array::{Array, Staging};
 use crate::kernel::Recorder;
@@ -26,6 +28,8 @@ pub(crate) struct Frame {
     turns: Option<Turns>,
     /// If there are colliders.
     obstacles: Option<Obstacles>,
+    /// If iterations are Jacobi's.
+    jacobi: Option<Jacobi>,
     /// Positions before the constraints of the last substep; empty unless a step keeps them.
     predicted: Array<[f32; 4]>,
     /// Whether the last step kept what residuals need.
@@ -49,6 +53,7 @@ impl Frame {
             sent: None,
             turns: None,
             obstacles: None,
+            jacobi: None,
             predicted: Array::zeros(gpu, "predicted positions", 0)?,
             kept: false,
         })
@@ -62,7 +67,6 @@ impl Frame {
         keep: bool,
     ) -> Result<(), GpuError> {
         let Scene { gpu, host, .. } = scene;
-        refuse(host, settings)?;
         let keeps = keep || settings.iterations > 1;
         self.prepare(gpu, scene.body, host, settings, keeps)?;
         if keep {
@@ -92,6 +96,9 @@ impl Frame {
                 let words = 2 * body.layout.place_count();
                 clear.run(&mut pass, &[], words.div_ceil(THREADS));
             }
+            for scalars in &passes.scalars {
+                scalars.begin(&mut pass);
+            }
             if keep && substep + 1 == settings.substeps {
                 drop(pass);
                 let bytes = (host.particle_count() * size_of::<[f32; 4]>()) as u64;
@@ -102,8 +109,14 @@ impl Frame {
             for iteration in 0..settings.iterations {
                 let turn = turns::offset(settings, substep, iteration);
                 body.colors.run(&mut pass, &passes.solve, &passes.tail);
+                if let Some(jacobi) = &passes.jacobi {
+                    jacobi.run(&mut pass, turn, particles);
+                }
                 if let Some(handles) = &passes.handles {
                     handles.solve(&mut pass, turn);
+                }
+                for scalars in &passes.scalars {
+                    scalars.solve(&mut pass);
                 }
                 if let Some(project) = &passes.project {
                     project.run(&mut pass, &[turn], particles);
@@ -131,25 +144,18 @@ impl Frame {
         if keeps {
             body.multipliers.resize(gpu, body.layout.place_count())?;
         }
-        self.obstacles = match (self.obstacles.take(), settings.colliders.is_empty()) {
-            (_, true) => None,
-            (Some(obstacles), false) => Some(obstacles),
-            (None, false) => Some(Obstacles::new(gpu)?),
-        };
-        if let Some(obstacles) = &mut self.obstacles {
-            obstacles.follow(gpu, host, settings)?;
-        }
+        Jacobi::prepare(&mut self.jacobi, gpu, body, host.particle_count(), settings)?;
+        Obstacles::follow(&mut self.obstacles, gpu, host, settings)?;
         if let Some(handles) = &mut body.handles {
             handles.prepare(gpu, host, settings)?;
         }
-        let takes_turns = self.obstacles.is_some() || body.handles.is_some();
-        if takes_turns && self.turns.is_none() {
-            self.turns = Some(Turns::new(gpu)?);
+        if settings.iterations > 1 {
+            for scalars in body.distances.iter_mut().chain(&mut body.volumes) {
+                scalars.keep_multipliers(gpu)?;
+            }
         }
-        match &mut self.turns {
-            Some(turns) if takes_turns => turns.follow(gpu, settings),
-            _ => Ok(()),
-        }
+        let asks = self.obstacles.is_some() || body.handles.is_some() || self.jacobi.is_some();
+        Turns::follow(&mut self.turns, gpu, settings, asks)
     }
 
     /// Sends the settings if they are others.
@@ -201,7 +207,9 @@ impl Frame {
     pub(crate) fn bytes(&self) -> u64 {
         let turns = self.turns.as_ref().map_or(0, |turns| turns.buffer().size());
         let obstacles = self.obstacles.as_ref().map_or(0, Obstacles::bytes);
-        self.settings.buffer().size() + self.predicted.buffer().size() + turns + obstacles
+        let jacobi = self.jacobi.as_ref().map_or(0, Jacobi::bytes);
+        let always = self.settings.buffer().size() + self.predicted.buffer().size();
+        always + turns + obstacles + jacobi
     }
 
     /// Starts to read what residuals need, if the last step kept it.
@@ -223,18 +231,6 @@ impl Frame {
     }
 }
 
-/// What the device does not do.
-fn refuse(host: &Solver<f32>, settings: &StepSettings) -> Result<(), GpuError> {
-    let unsupported = |what| Err(GpuError::Unsupported { what });
-    if settings.method != Method::GaussSeidel {
-        return unsupported("other methods than Gauss-Seidel");
-    }
-    if host.distance_count() > 0 || host.volume_count() > 0 {
-        return unsupported("distance and volume constraints");
-    }
-    Ok(())
-}
-
 /// The buffers that what is not a tet may need.
 #[derive(Debug)]
 pub(crate) struct Shared<'a> {
@@ -248,7 +244,7 @@ pub(crate) struct Shared<'a> {
 
 /// The kernels of a step, in the order of a substep; those that it does not need are not there.
 #[derive(Debug)]
-struct Passes {
+struct Passes<'a> {
     predict: Bound,
     /// Where multipliers are kept.
     clear: Option<Bound>,
@@ -256,7 +252,10 @@ struct Passes {
     tail: Bound,
     project: Option<Bound>,
     update: Bound,
+    jacobi: Option<jacobi::Passes>,
     handles: Option<handles::Passes>,
+    /// Distances before volumes.
+    scalars: Vec<scalars::Passes<'a>>,
 }
 
 impl Frame {
@@ -264,16 +263,16 @@ impl Frame {
         clippy::too_many_arguments,
         reason = "the parts of a solver, borrowed one by one"
     )]
-    fn bind(
+    fn bind<'a>(
         &self,
         gpu: &GpuContext,
         kernels: &mut Kernels,
-        body: &Body,
+        body: &'a Body,
         host: &Solver<f32>,
         repaired: &Array<u32>,
         settings: &StepSettings,
         keeps: bool,
-    ) -> Result<Passes, GpuError> {
+    ) -> Result<Passes<'a>, GpuError> {
         let constants = self.settings.buffer();
         let (particles, previous) = (body.particles.buffer(), body.previous.buffer());
         let velocities = body.velocities.buffer();
@@ -281,7 +280,7 @@ impl Frame {
             damped: host.is_damped(),
             sequential: settings.form == Solving::Sequential,
             keeps,
-            jacobi: false,
+            jacobi: self.jacobi.is_some(),
             various: !host.is_uniform(),
         };
         let last = match body.layout.form {
@@ -300,8 +299,6 @@ impl Frame {
             body.colors.lists.array.buffer(),
             last,
         ];
-        let mut bind =
-            |source, variant, buffers: &[&Buffer]| kernels.bind(gpu, source, variant, buffers);
         let (form, plain) = (body.layout.form, Variant::default());
         let update = [
             constants,
@@ -319,6 +316,14 @@ impl Frame {
             velocities,
             repaired: repaired.buffer(),
         });
+        let several = settings.iterations > 1;
+        let mut scalars = Vec::new();
+        for constraints in body.distances.iter().chain(&body.volumes) {
+            let buffers = [constants, particles, previous];
+            scalars.push(constraints.bind(gpu, kernels, buffers, several)?);
+        }
+        let mut bind =
+            |source, variant, buffers: &[&Buffer]| kernels.bind(gpu, source, variant, buffers);
         Ok(Passes {
             predict: bind(
                 &PREDICT,
@@ -337,12 +342,16 @@ impl Frame {
                 _ => None,
             },
             handles: match (&body.handles, &shared) {
-                (Some(handles), Some(shared)) => {
-                    let several = settings.iterations > 1;
-                    Some(handles.bind(gpu, kernels, shared, several)?)
+                (Some(handles), Some(shared)) => Some(handles.bind(gpu, kernels, shared, several)?),
+                _ => None,
+            },
+            jacobi: match (&self.jacobi, &shared) {
+                (Some(jacobi), Some(shared)) => {
+                    Some(jacobi.bind(gpu, kernels, body, shared, keeps)?)
                 }
                 _ => None,
             },
+            scalars,
         })
     }
 }

@@ -10,6 +10,7 @@ use std::sync::Arc;
 use wgpu::{BindGroup, Buffer};
 
 use super::layout::Form;
+use super::scalars::Kind;
 use crate::kernel::{Kernel, Recorder, Use};
 use crate::{GpuContext, GpuError};
 
@@ -233,6 +234,87 @@ pub(crate) const UPDATE_HELD: Source = Source {
     flags: &[],
 };
 
+pub(crate) const APPLY_CORRECTIONS: Source = Source {
+    name: "apply_corrections",
+    parts: text!("common", "settings", "turn", "apply_corrections"),
+    uses: &[
+        Use::Uniform,
+        Use::Part(TURN),
+        Use::Write,
+        Use::Write,
+        Use::Write,
+    ],
+    flags: &[Flag::Keeps],
+};
+
+pub(crate) const EXTRAPOLATE_MULTIPLIERS: Source = Source {
+    name: "extrapolate_multipliers",
+    parts: text!("common", "turn", "extrapolate_multipliers"),
+    uses: &[Use::Write, Use::Part(TURN), Use::Write],
+    flags: &[],
+};
+
+/// What kernels that solve constraints of one number use.
+const SCALARS: &[Use] = &[
+    Use::Uniform,
+    Use::Part(PART),
+    Use::Write,
+    Use::Read,
+    Use::Read,
+    Use::Read,
+    Use::Read,
+    Use::Write,
+    Use::Read,
+];
+
+const SOLVE_DISTANCES: Source = Source {
+    name: "solve_distances",
+    parts: text!(
+        "common",
+        "settings",
+        "direction",
+        "scalar",
+        "distance",
+        "solve_threads"
+    ),
+    uses: SCALARS,
+    flags: &[Flag::Damped, Flag::Keeps],
+};
+
+const SOLVE_DISTANCES_TAIL: Source = Source {
+    name: "solve_distances_tail",
+    parts: text!(
+        "common",
+        "settings",
+        "direction",
+        "scalar",
+        "distance",
+        "solve_threads_tail"
+    ),
+    uses: SCALARS,
+    flags: &[Flag::Damped, Flag::Keeps],
+};
+
+const SOLVE_VOLUMES: Source = Source {
+    name: "solve_volumes",
+    parts: text!("common", "settings", "scalar", "volume", "solve_threads"),
+    uses: SCALARS,
+    flags: &[Flag::Damped, Flag::Keeps],
+};
+
+const SOLVE_VOLUMES_TAIL: Source = Source {
+    name: "solve_volumes_tail",
+    parts: text!(
+        "common",
+        "settings",
+        "scalar",
+        "volume",
+        "solve_threads_tail"
+    ),
+    uses: SCALARS,
+    flags: &[Flag::Damped, Flag::Keeps],
+};
+
 /// The shaders of the solver.
 pub(crate) const SOURCES: &[Source] = &[
     PREDICT,
@@ -248,6 +330,12 @@ pub(crate) const SOURCES: &[Source] = &[
     MOVE_HELD,
     SOLVE_ATTACHMENTS,
     UPDATE_HELD,
+    SOLVE_DISTANCES,
+    SOLVE_DISTANCES_TAIL,
+    SOLVE_VOLUMES,
+    SOLVE_VOLUMES_TAIL,
+    APPLY_CORRECTIONS,
+    EXTRAPOLATE_MULTIPLIERS,
 ];
 
 /// The kernel that solves colors, or a row of colors of one group each.
@@ -257,6 +345,14 @@ pub(crate) fn solve(form: Form, tail: bool) -> &'static Source {
         (Form::Threads, true) => &SOLVE_THREADS_TAIL,
         (Form::Workgroups, false) => &SOLVE_WORKGROUPS,
         (Form::Workgroups, true) => &SOLVE_WORKGROUPS_TAIL,
+    }
+}
+
+/// The kernels that solve a color of constraints of one number, and a row of small colors.
+pub(crate) fn solve_scalars(kind: Kind) -> [&'static Source; 2] {
+    match kind {
+        Kind::Distance => [&SOLVE_DISTANCES, &SOLVE_DISTANCES_TAIL],
+        Kind::Volume => [&SOLVE_VOLUMES, &SOLVE_VOLUMES_TAIL],
     }
 }
 

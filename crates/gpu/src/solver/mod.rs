@@ -1,24 +1,30 @@
 //! [`GpuSolver`]: XPBD on the device.
 //!
 //! A [`Solver`] on the host stays where tets, masses, materials and what holds particles are edited; the device has a
-//! copy of all of it and the state. A step is recorded as one pass and handed over in one submit: predict, solve color
-//! by color, collide, update velocities, substep by substep. Nothing is read back: whoever wants to know something asks
-//! ([`GpuSolver::host`]), and that waits for the device.
+//! copy of all of it and the state. A step is recorded as one pass and handed over in one submit: predict, put what is
+//! held to its handles, solve color by color, pull at attachments, solve distances and volumes, collide, update
+//! velocities, substep by substep. What a scene does not have takes no memory and no dispatch. Nothing is read back:
+//! whoever wants to know something asks ([`GpuSolver::host`]), and that waits for the device.
 //!
 //! Twin: `Solver::step` of incise-xpbd, with the same schedule in the form [`Form::Threads`]. Positions agree up to the
 //! rounding of sums, which compilers of shaders may take in another order or fuse.
-//! Cost: a dispatch a color and two or three a substep; uploads only of what edits changed.
+//! Cost: a dispatch a color and two or three a substep, one more for each other thing in the scene; uploads only of what
+//! edits changed and of handles and colliders that move.
 
 mod body;
 mod check;
 mod colors;
 mod frame;
 mod handles;
+mod jacobi;
 mod kernels;
 mod layout;
 mod numbers;
 mod obstacles;
+mod scalars;
 mod seats;
+#[cfg(test)]
+mod shaders;
 mod tile;
 mod turns;
 
@@ -130,8 +136,8 @@ impl GpuSolver {
     /// are edits of the solver; another one is laid out anew.
     ///
     /// # Errors
-    /// If the settings do not pass [`StepSettings::check`]; if the scene asks for something that the device does not do;
-    /// if a cluster is larger than the form allows; if the device is lost or out of memory.
+    /// If the settings do not pass [`StepSettings::check`]; if they ask for Jacobi or Chebyshev iterations in
+    /// [`Form::Workgroups`]; if a cluster is larger than the form allows; if the device is lost or out of memory.
     ///
     /// # Panics
     /// If the schedule names a tet that does not exist.

@@ -21,29 +21,34 @@ pub(crate) struct Obstacles {
 }
 
 impl Obstacles {
-    pub(crate) fn new(gpu: &GpuContext) -> Result<Self, GpuError> {
-        Ok(Self {
-            array: Array::zeros(gpu, "colliders", 0)?,
-            sent: Vec::new(),
-            next: Vec::new(),
-        })
-    }
-
-    /// Sends the colliders of a frame unless they are there.
+    /// Sends the colliders of a frame unless they are there; nothing is kept for none.
     pub(crate) fn follow(
-        &mut self,
+        this: &mut Option<Self>,
         gpu: &GpuContext,
         host: &Solver<f32>,
         settings: &StepSettings,
     ) -> Result<(), GpuError> {
-        self.next.clear();
+        if settings.colliders.is_empty() {
+            *this = None;
+            return Ok(());
+        }
+        let obstacles = match this {
+            Some(obstacles) => obstacles,
+            None => this.insert(Self {
+                array: Array::zeros(gpu, "colliders", 0)?,
+                sent: Vec::new(),
+                next: Vec::new(),
+            }),
+        };
+        obstacles.next.clear();
         for substep in 1..=settings.substeps {
             let elapsed = f64::from(substep) * settings.substep_time();
-            self.next.extend(host.obstacle_data(settings, elapsed));
+            let data = host.obstacle_data(settings, elapsed);
+            obstacles.next.extend(data);
         }
-        if self.next != self.sent {
-            self.array.replace(gpu, &self.next)?;
-            std::mem::swap(&mut self.next, &mut self.sent);
+        if obstacles.next != obstacles.sent {
+            obstacles.array.replace(gpu, &obstacles.next)?;
+            std::mem::swap(&mut obstacles.next, &mut obstacles.sent);
         }
         Ok(())
     }

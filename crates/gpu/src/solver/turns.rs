@@ -23,30 +23,35 @@ pub(crate) struct Turns {
 const PER_STRIDE: usize = STRIDE as usize / size_of::<Turn>();
 
 impl Turns {
-    pub(crate) fn new(gpu: &GpuContext) -> Result<Self, GpuError> {
-        Ok(Self {
-            array: Array::with_usage(gpu, "turns", 0, BufferUsages::UNIFORM)?,
-            sent: None,
-        })
-    }
-
     pub(crate) fn buffer(&self) -> &Buffer {
         self.array.buffer()
     }
 
-    /// Sends the turns of a frame unless they are there.
+    /// Sends the turns of a frame unless they are there; nothing is kept where nobody `asks`.
     pub(crate) fn follow(
-        &mut self,
+        this: &mut Option<Self>,
         gpu: &GpuContext,
         settings: &StepSettings,
+        asks: bool,
     ) -> Result<(), GpuError> {
+        if !asks {
+            *this = None;
+            return Ok(());
+        }
+        let all = match this {
+            Some(turns) => turns,
+            None => this.insert(Self {
+                array: Array::with_usage(gpu, "turns", 0, BufferUsages::UNIFORM)?,
+                sent: None,
+            }),
+        };
         let StepSettings {
             substeps,
             iterations,
             method,
             ..
         } = *settings;
-        if self.sent == Some((substeps, iterations, method)) {
+        if all.sent == Some((substeps, iterations, method)) {
             return Ok(());
         }
         let weights = weights(method, iterations);
@@ -63,15 +68,17 @@ impl Turns {
         let turns: Vec<_> = (0..substeps)
             .flat_map(|substep| (0..).zip(&weights).map(move |at| turn(substep, at)))
             .collect();
-        self.array.replace(gpu, &turns)?;
-        self.sent = Some((substeps, iterations, method));
+        all.array.replace(gpu, &turns)?;
+        all.sent = Some((substeps, iterations, method));
         Ok(())
     }
 }
 
 /// Where the turn of an iteration is, in bytes.
 pub(crate) fn offset(settings: &StepSettings, substep: u32, iteration: u32) -> u32 {
-    (substep * settings.iterations + iteration) * STRIDE
+    let number = u64::from(substep) * u64::from(settings.iterations) + u64::from(iteration);
+    // More than a buffer holds are refused when they are sent; without turns nobody looks.
+    u32::try_from(number * u64::from(STRIDE)).unwrap_or(u32::MAX)
 }
 
 /// How far each iteration of a substep leaps; 0 is not at all. Twin: `Jacobi::extrapolate` of incise-xpbd.

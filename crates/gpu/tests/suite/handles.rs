@@ -103,6 +103,28 @@ fn hanging_particles_keep_multipliers_over_iterations() {
     );
 }
 
+/// A particle that a handle holds is fixed and let go again, which is no change of what is attached.
+#[test]
+fn held_particles_can_be_fixed_and_let_go() {
+    let Some(gpu) = gpu("held_particles_can_be_fixed_and_let_go") else {
+        return;
+    };
+    let mut twins = Twins::new(gpu, &bar(), SOFT, FORMS[0], hang);
+    let held = beyond(&twins.host, 1.0)[0];
+    let mut last = twins.host.position(held);
+    for (frame, fixed) in (1..).zip([false, true, true, false]) {
+        twins.edit(|solver| solver.set_fixed(held, fixed));
+        twins.device.move_handle(0, pose(frame));
+        twins.host.move_handle(0, pose(frame));
+        twins.step(&settings());
+        // A few frames of rounding in another order.
+        assert!(twins.apart() < 1e-5, "frame {frame}");
+        let now = twins.device.as_last_seen().position(held);
+        assert_eq!(now == last, fixed, "frame {frame}");
+        last = now;
+    }
+}
+
 /// A body that hangs on nothing but springs to handles far from the origin of their frame.
 #[test]
 fn places_far_from_the_middle_of_a_handle_are_exact() {

@@ -9,7 +9,11 @@
 mod colliders;
 mod coloring;
 mod device;
+mod edits;
+mod extremes;
 mod handles;
+mod jacobi;
+mod scalars;
 mod shaders;
 mod solver;
 mod support;

@@ -45,13 +45,18 @@ pub(crate) fn body(mesh: &TetMesh, materials: &[Material]) -> Solver<f32> {
     solver
 }
 
-/// A schedule on clusters, and one without clusters that solves the tets in the order in which tiles do.
-pub(crate) fn schedules(mesh: &TetMesh, method: &str) -> (Schedule, Schedule) {
+/// Clusters with their colors.
+pub(crate) fn clusters(mesh: &TetMesh, method: &str) -> (Clustering, Coloring) {
     let incidence =
         Incidence::from_constraints(mesh.positions.len(), mesh.tets.iter().copied()).unwrap();
     let clustering = cluster(method.parse::<Clustered>().unwrap(), &incidence);
-    let outer = greedy(&incidence.quotient(&clustering), Order::LargestFirst);
-    let inner = color_within_clusters(&incidence, &clustering);
+    let coloring = greedy(&incidence.quotient(&clustering), Order::LargestFirst);
+    (clustering, coloring)
+}
+
+/// A schedule without clusters that solves the tets in the order in which tiles do.
+pub(crate) fn tiled(incidence: &Incidence, clustering: &Clustering, outer: &Coloring) -> Schedule {
+    let inner = color_within_clusters(incidence, clustering);
     let steps = inner.color_count();
     let both = clustering.labels().iter().zip(inner.colors());
     let both = both.map(|(cluster, step)| {
@@ -59,8 +64,16 @@ pub(crate) fn schedules(mesh: &TetMesh, method: &str) -> (Schedule, Schedule) {
         ColorId(u32::try_from(color).unwrap())
     });
     let both = Coloring::new(both.collect());
-    let tiled = Schedule::new(&Clustering::none(mesh.tets.len()), &both);
-    (Schedule::new(&clustering, &outer), tiled)
+    Schedule::new(&Clustering::none(clustering.constraint_count()), &both)
+}
+
+/// A schedule on clusters, and one without that solves the tets in the order in which tiles do.
+pub(crate) fn schedules(mesh: &TetMesh, method: &str) -> (Schedule, Schedule) {
+    let incidence =
+        Incidence::from_constraints(mesh.positions.len(), mesh.tets.iter().copied()).unwrap();
+    let (clustering, coloring) = clusters(mesh, method);
+    let tiled = tiled(&incidence, &clustering, &coloring);
+    (Schedule::new(&clustering, &coloring), tiled)
 }
 
 pub(crate) fn share(gpu: &'static GpuContext) -> Arc<GpuContext> {

@@ -24,8 +24,9 @@ pub(crate) fn bar() -> TetMesh {
 pub(crate) struct Twins {
     pub(crate) device: GpuSolver,
     pub(crate) host: Solver<f32>,
-    schedule: Schedule,
-    order: Schedule,
+    pub(crate) schedule: Schedule,
+    /// That of the host.
+    pub(crate) order: Schedule,
 }
 
 impl Twins {
