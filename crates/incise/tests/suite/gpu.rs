@@ -7,7 +7,7 @@ use std::sync::{Arc, OnceLock};
 
 use incise::gpu::{GpuContext, GpuError, GpuOptions};
 use incise::mesh::glam::DVec3;
-use incise::scene::{Backend, Precision, Quantity};
+use incise::scene::{Backend, Method, Precision, Quantity};
 use incise::{Error, Scene, Simulation};
 
 static CONTEXT: OnceLock<Result<Arc<GpuContext>, GpuError>> = OnceLock::new();
@@ -41,6 +41,8 @@ fn scene(tets: usize, clustering: &str) -> Scene {
         tets,
     });
     scene.solver.clustering = clustering.into();
+    // A third of what it has, for the sake of time.
+    scene.solver.substeps = 10.into();
     scene
 }
 
@@ -94,6 +96,7 @@ fn the_cut_liver_in_tiles_comes_apart_all_the_same() {
         return;
     };
     let mut scene = scene(2000, "pressure:128");
+    scene.solver.substeps = 30.into();
     scene.report.quantities = vec![Quantity::Volume, Quantity::Energy];
     let mut there = Simulation::on_device(&scene, gpu).unwrap();
     for frame in 0..120 {
@@ -119,7 +122,7 @@ fn traffic_of_a_stroke(gpu: &GpuContext, tets: usize, clustering: &str) -> (f64,
     there.step().unwrap();
     let whole = gpu.traffic().uploaded_bytes;
     let (mut cut, mut sent, mut most) = (0, 0, 0);
-    for frame in 1..80 {
+    for frame in 1..66 {
         let before = gpu.traffic();
         let report = there.step().unwrap();
         let spent = gpu.traffic().since(before);
@@ -149,7 +152,7 @@ fn frames_fetch_nothing_and_cuts_send_what_they_cut() {
     };
     for clustering in ["serial:10", "pressure:128"] {
         let (small, _) = traffic_of_a_stroke(&gpu, 2000, clustering);
-        let (large, share) = traffic_of_a_stroke(&gpu, 16_000, clustering);
+        let (large, share) = traffic_of_a_stroke(&gpu, 12_000, clustering);
         // What a cut tet costs does not depend on the body.
         assert!(
             large < 1.5 * small,
@@ -230,4 +233,117 @@ fn auto_takes_no_processor_in_disguise() {
     let backend = simulation.step().unwrap().backend;
     assert_eq!(backend, if gpu.adapter().software { "cpu" } else { "gpu" });
     assert!(simulation.backend_note().is_some());
+}
+
+/// Every scene that the project ships, on both: what can be cut, held, linked, collided with.
+#[test]
+fn every_shipped_scene_moves_as_on_the_processor() {
+    let Some(gpu) = gpu("every_shipped_scene_moves_as_on_the_processor") else {
+        return;
+    };
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures");
+    let mut scenes = 0;
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|ending| ending != "toml") {
+            continue;
+        }
+        let mut scene = Scene::load(&path).unwrap();
+        if scene.solver.method == Method::Descent {
+            continue;
+        }
+        scene.solver.precision = Precision::F32;
+        let mut here = Simulation::new(&scene).unwrap();
+        let mut there = Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap();
+        let size = here
+            .positions()
+            .iter()
+            .map(|x| x.length())
+            .fold(0.0, f64::max);
+        for frame in 0..30 {
+            let one = here.step().unwrap().clone();
+            let other = there.step().unwrap();
+            assert_eq!(
+                (one.tets, one.pieces),
+                (other.tets, other.pieces),
+                "{} {frame}",
+                path.display()
+            );
+        }
+        there.check().unwrap();
+        there.read_back().unwrap();
+        let far = farthest(here.positions(), there.positions());
+        // Handles and links are rounded in their own way, and contacts carry it on.
+        assert!(far < 1e-4 * size, "{}: {far} of {size}", path.display());
+        scenes += 1;
+    }
+    assert!(scenes >= 4, "{scenes}");
+}
+
+/// Methods, volume constraints and materials, with a cut in the middle.
+#[test]
+fn other_methods_and_constraints_are_cut_on_a_gpu_too() {
+    let Some(gpu) = gpu("other_methods_and_constraints_are_cut_on_a_gpu_too") else {
+        return;
+    };
+    let of = |solver: &str, body: &str| {
+        Scene::from_toml(&format!(
+            r#"
+            [world]
+            gravity = [0.0, 0.0, -9.81]
+            [solver]
+            {solver}
+            [[body]]
+            shape = {{ kind = "beam", tets = 600 }}
+            fixed = [{{ half_space = {{ point = [-0.45, 0.0, 0.0], normal = [-1.0, 0.0, 0.0] }} }}]
+            {body}
+            [[body]]
+            shape = {{ kind = "box", tets = 200 }}
+            position = [0.0, 2.0, 0.0]
+            [[stroke]]
+            kind = "plane"
+            frame = 4
+            point = [0.05, 0.0, 0.0]
+            normal = [1.0, 0.1, 0.0]
+            "#
+        ))
+        .unwrap()
+    };
+    for (solver, body) in [
+        ("method = \"jacobi\"\niterations = 8\nrelaxation = 0.05", ""),
+        (
+            "method = \"chebyshev\"\niterations = 15\nrelaxation = 0.05\nspectral_radius = 0.9",
+            "",
+        ),
+        ("form = \"sequential\"", "damping = 0.01"),
+        ("iterations = 3", "volume_compliance = 1e-7"),
+        (
+            "clustering = \"pressure:64\"\nmerge_clusters = false",
+            "volume_compliance = 0.0",
+        ),
+    ] {
+        let scene = of(solver, body);
+        let tiled = solver.contains("pressure");
+        let mut here = Simulation::new(&scene).unwrap();
+        let mut there = Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap();
+        for frame in 0..10 {
+            let one = here.step().unwrap().clone();
+            let other = there.step().unwrap();
+            assert_eq!(
+                (one.pieces, one.repaired),
+                (other.pieces, other.repaired),
+                "{solver} {frame}"
+            );
+            if other.cut.is_some() {
+                there.check().unwrap();
+            }
+        }
+        there.check().unwrap();
+        there.read_back().unwrap();
+        assert_eq!(here.report().pieces, 4);
+        if !tiled {
+            let far = farthest(here.positions(), there.positions());
+            assert!(far < 1e-4, "{solver}: {far}");
+        }
+    }
 }
