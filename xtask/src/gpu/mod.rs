@@ -10,6 +10,7 @@ mod coloring;
 mod frame;
 mod iteration;
 mod measure;
+mod memory;
 mod page;
 mod recoloring;
 mod report;
@@ -35,6 +36,9 @@ pub(crate) struct GpuArguments {
     /// Take the .vtk meshes of this folder instead of generated ones.
     #[arg(long, value_name = "DIR")]
     models: Option<PathBuf>,
+    /// Only these tables, beside the bandwidth.
+    #[arg(long, value_enum, value_delimiter = ',')]
+    only: Vec<Part>,
     /// The most tets of a body; else as many as fit, or 25,000 on a software adapter.
     #[arg(long, value_name = "N")]
     largest: Option<usize>,
@@ -57,6 +61,22 @@ pub(crate) struct GpuArguments {
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
+
+/// Tables that belong together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Part {
+    /// Every algorithm on every mesh.
+    Coloring,
+    /// An iteration in every form, with residuals.
+    Iteration,
+    /// Device memory of bodies of 10,000 to a million tets.
+    Memory,
+    /// Frames with a cut and without, and coloring after a cut.
+    Frame,
+}
+
+/// Tets of bodies whose memory is told.
+const MEMORY: [usize; 3] = [10_000, 100_000, 1_000_000];
 
 /// Tets of the smallest grown body, and how many times as many the next one has.
 const SMALLEST: usize = 5_000;
@@ -104,12 +124,31 @@ fn file_name(name: &str) -> String {
 
 fn report(gpu: &Arc<GpuContext>, arguments: &GpuArguments) -> anyhow::Result<Report> {
     let facts = facts(gpu, arguments.date.clone());
-    let repeats = if arguments.quick { 3 } else { 9 };
-    let stroke_frames = if arguments.quick { 10 } else { 60 };
-    let mut notes = Vec::new();
-    let largest = arguments.largest.unwrap_or(match facts.software {
+    let mut kernels = ColoringKernels::default();
+    say("checks");
+    let checks = checks::checks(gpu, &mut kernels, !arguments.no_tests)?;
+    say("bandwidth");
+    let mut report = Report {
+        bandwidth: bandwidth::bandwidth(gpu, arguments.quick)?,
+        checks,
+        colorings: Vec::new(),
+        passes: Vec::new(),
+        memory: Vec::new(),
+        frames: Vec::new(),
+        recolorings: Vec::new(),
+        notes: Vec::new(),
+        facts,
+    };
+    let mut sweep = Sweep {
+        gpu,
+        kernels,
+        repeats: if arguments.quick { 3 } else { 9 },
+        stroke_frames: if arguments.quick { 10 } else { 60 },
+        only: &arguments.only,
+    };
+    let largest = arguments.largest.unwrap_or(match report.facts.software {
         true => {
-            notes.push(format!(
+            report.notes.push(format!(
                 "A software adapter: bodies of at most {SOFTWARE_LARGEST} tets, unless `--largest` says otherwise."
             ));
             SOFTWARE_LARGEST
@@ -118,63 +157,83 @@ fn report(gpu: &Arc<GpuContext>, arguments: &GpuArguments) -> anyhow::Result<Rep
     });
     let mut models = models(arguments.models.as_deref(), largest, arguments.quick)?;
     models.retain(|model| model.mesh.tets.len() <= largest);
-    let mut kernels = ColoringKernels::default();
-
-    say("checks");
-    let checks = checks::checks(gpu, &mut kernels, !arguments.no_tests)?;
-    say("bandwidth");
-    let bandwidth = bandwidth::bandwidth(gpu, arguments.quick)?;
-    let (mut colorings, mut passes) = (Vec::new(), Vec::new());
     for (i, model) in models.iter().enumerate() {
-        say(&format!("colorings of {}", model.name));
-        colorings.extend(coloring::colorings(gpu, &mut kernels, model, repeats)?);
-        say(&format!("iterations of {}", model.name));
-        let (name, mesh) = (&model.name, &model.mesh);
+        sweep.colorings(model, &mut report)?;
         let residuals = i == 0 || i + 1 == models.len();
-        passes.extend(iteration::passes(gpu, name, mesh, repeats, residuals)?);
+        sweep.passes(model, residuals, &mut report)?;
+        sweep.frames(model, &mut report)?;
     }
-    let (mut frames, mut recolorings) = (Vec::new(), Vec::new());
-    let mut frames_of = |model: &Model, notes: &mut Vec<String>| -> anyhow::Result<()> {
-        say(&format!("frames of {}", model.name));
-        let (rows, cut) = frame::frames(gpu, model, repeats, stroke_frames, notes)?;
-        frames.extend(rows);
-        if let Some(cut) = cut {
-            let name = &model.name;
-            let row = recoloring::recoloring(gpu, &mut kernels, name, &cut, repeats)?;
-            recolorings.push(row);
+    if sweep.wants(Part::Memory) {
+        let sizes: &[usize] = if arguments.quick { &[1500] } else { &MEMORY };
+        for &tets in sizes {
+            say(&format!("memory of {tets} tets"));
+            report.memory.extend(memory::memory(gpu, tets)?);
         }
-        Ok(())
-    };
-    for model in &models {
-        frames_of(model, &mut notes)?;
     }
     let measured: Vec<usize> = models.iter().map(|model| model.mesh.tets.len()).collect();
     drop(models);
-    let sizes = match arguments.quick {
-        true => Vec::new(),
-        false => grown(&measured, largest, facts.buffer_limit),
-    };
-    for tets in sizes {
-        let model = Model::generated(Shape::Liver, tets)?;
-        say(&format!("iterations of {tets} tets"));
-        let rows = iteration::passes(gpu, &model.name, &model.mesh, repeats, false)?;
-        let none = rows.iter().all(|row| row.run.is_none());
-        passes.extend(rows);
-        if none {
-            break;
-        }
-        frames_of(&model, &mut notes)?;
+    if arguments.quick || !(sweep.wants(Part::Iteration) || sweep.wants(Part::Frame)) {
+        return Ok(report);
     }
-    Ok(Report {
-        facts,
-        checks,
-        bandwidth,
-        colorings,
-        passes,
-        frames,
-        recolorings,
-        notes,
-    })
+    for tets in grown(&measured, largest, report.facts.buffer_limit) {
+        let model = Model::generated(Shape::Liver, tets)?;
+        sweep.passes(&model, false, &mut report)?;
+        sweep.frames(&model, &mut report)?;
+    }
+    Ok(report)
+}
+
+/// What all bodies are measured with.
+struct Sweep<'a> {
+    gpu: &'a Arc<GpuContext>,
+    kernels: ColoringKernels,
+    repeats: u32,
+    stroke_frames: u32,
+    only: &'a [Part],
+}
+
+impl Sweep<'_> {
+    fn wants(&self, part: Part) -> bool {
+        self.only.is_empty() || self.only.contains(&part)
+    }
+
+    fn colorings(&mut self, model: &Model, report: &mut Report) -> anyhow::Result<()> {
+        if !self.wants(Part::Coloring) {
+            return Ok(());
+        }
+        say(&format!("colorings of {}", model.name));
+        let rows = coloring::colorings(self.gpu, &mut self.kernels, model, self.repeats)?;
+        report.colorings.extend(rows);
+        Ok(())
+    }
+
+    fn passes(&self, model: &Model, residuals: bool, report: &mut Report) -> anyhow::Result<()> {
+        if !self.wants(Part::Iteration) {
+            return Ok(());
+        }
+        let Model { name, mesh, .. } = model;
+        say(&format!("iterations of {name}, {} tets", mesh.tets.len()));
+        let rows = iteration::passes(self.gpu, name, mesh, self.repeats, residuals)?;
+        report.passes.extend(rows);
+        Ok(())
+    }
+
+    fn frames(&mut self, model: &Model, report: &mut Report) -> anyhow::Result<()> {
+        if !self.wants(Part::Frame) {
+            return Ok(());
+        }
+        let Model { name, mesh, .. } = model;
+        say(&format!("frames of {name}, {} tets", mesh.tets.len()));
+        let notes = &mut report.notes;
+        let (rows, cut) = frame::frames(self.gpu, model, self.repeats, self.stroke_frames, notes)?;
+        report.frames.extend(rows);
+        if let Some(cut) = cut {
+            let (gpu, kernels) = (self.gpu, &mut self.kernels);
+            let row = recoloring::recoloring(gpu, kernels, name, &cut, self.repeats)?;
+            report.recolorings.push(row);
+        }
+        Ok(())
+    }
 }
 
 /// Tets of bodies beside the models: several times as many as before, as long as the limit of a buffer and that of the
@@ -243,6 +302,6 @@ mod tests {
             grown(&[11_363, 89_273], usize::MAX, mebibytes(128)),
             [5_000, 20_000, 320_000, 1_258_290]
         );
-        assert_eq!(grown(&[], 100, mebibytes(128)), []);
+        assert!(grown(&[], 100, mebibytes(128)).is_empty());
     }
 }

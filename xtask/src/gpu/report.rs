@@ -10,6 +10,7 @@ pub(crate) struct Report {
     pub(crate) bandwidth: Bandwidth,
     pub(crate) colorings: Vec<ColoringRow>,
     pub(crate) passes: Vec<PassRow>,
+    pub(crate) memory: Vec<MemoryRow>,
     pub(crate) frames: Vec<FrameRow>,
     pub(crate) recolorings: Vec<RecoloringRow>,
     /// What was left out, and why.
@@ -108,8 +109,8 @@ pub(crate) struct PassRun {
     pub(crate) recording: f64,
     /// Bytes that an iteration has to move at least; absent where that is not counted.
     pub(crate) least_bytes: Option<u64>,
-    /// Bytes of device memory with one iteration a substep, and with several.
-    pub(crate) memory: [u64; 2],
+    /// Bytes of device memory, with multipliers.
+    pub(crate) memory: u64,
 }
 
 /// Residuals after some iterations of a large step.
@@ -122,6 +123,29 @@ pub(crate) struct ResidualPoint {
     pub(crate) dual: f64,
     /// The force that is left, over the weight.
     pub(crate) force: f64,
+}
+
+/// A body on the device, in one form.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct MemoryRow {
+    pub(crate) tets: usize,
+    pub(crate) particles: usize,
+    pub(crate) form: String,
+    /// Absent if it does not fit.
+    pub(crate) used: Option<MemoryUse>,
+    /// Why something is absent.
+    pub(crate) note: String,
+}
+
+/// What a body takes on the device.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct MemoryUse {
+    /// Of device memory, without multipliers.
+    pub(crate) bytes: u64,
+    /// Sent once.
+    pub(crate) uploaded: u64,
+    /// What laying out and sending takes, in ms, once.
+    pub(crate) sending: f64,
 }
 
 /// Frames of a scene.

@@ -23,6 +23,7 @@ pub(super) fn iterations(report: &Report) -> Table {
         "ns a tet",
         "GB/s",
         "share",
+        "MiB",
     ]);
     for row in &report.passes {
         let mut cells = vec![
@@ -46,9 +47,10 @@ pub(super) fn iterations(report: &Report) -> Table {
                     format!("{:.2}", run.times.fastest * 1e6 / row.tets as f64),
                     or_dash(per_second, |rate| format!("{:.2}", rate * 1e-9)),
                     or_dash(per_second, |rate| format!("{:.1} %", share(rate))),
+                    format!("{:.1}", mebi(run.memory)),
                 ]);
             }
-            None => cells.extend(missing(&row.note, 7)),
+            None => cells.extend(missing(8)),
         }
         table.add_row(cells);
     }
@@ -89,7 +91,7 @@ pub(super) fn compared(report: &Report) -> Table {
                 cells.extend(points().map(|point| format!("{:.2e}", point.dual)));
                 cells.extend(points().map(|point| format!("{:.2e}", point.force)));
             }
-            None => cells.extend(missing(&row.note, 2 * CURVE.len())),
+            None => cells.extend(missing(2 * CURVE.len())),
         }
         table.add_row(cells);
     }
@@ -98,25 +100,30 @@ pub(super) fn compared(report: &Report) -> Table {
 
 pub(super) fn memory(report: &Report) -> Table {
     let mut table = table([
-        "mesh",
         "tets",
         "particles",
         "form",
-        "lean",
+        "MiB",
         "bytes a tet",
-        "with multipliers",
+        "sent MiB",
+        "laid out and sent ms",
     ]);
-    for row in &report.passes {
-        let Some(run) = row.run else { continue };
-        table.add_row([
-            row.mesh.clone(),
+    for row in &report.memory {
+        let mut cells = vec![
             row.tets.to_string(),
             row.particles.to_string(),
             row.form.clone(),
-            mebibytes(run.memory[0]),
-            format!("{:.0}", run.memory[0] as f64 / row.tets as f64),
-            mebibytes(run.memory[1]),
-        ]);
+        ];
+        match row.used {
+            Some(used) => cells.extend([
+                format!("{:.1}", mebi(used.bytes)),
+                format!("{:.0}", used.bytes as f64 / row.tets as f64),
+                format!("{:.1}", mebi(used.uploaded)),
+                format!("{:.1}", used.sending),
+            ]),
+            None => cells.extend(missing(4)),
+        }
+        table.add_row(cells);
     }
     table
 }
@@ -198,7 +205,7 @@ pub(super) fn colorings(report: &Report) -> Table {
                 cells.extend([median, fastest, run.upload.times.median].map(ms));
                 cells.push(format!("{:.1}", mebi(run.upload.bytes)));
             }
-            None => cells.extend(missing("no room", 7)),
+            None => cells.extend(missing(7)),
         }
         cells.push(ms(row.host_ms));
         table.add_row(cells);
@@ -267,9 +274,7 @@ fn or_dash<T>(value: Option<T>, show: impl FnOnce(T) -> String) -> String {
     value.map_or_else(|| DASH.to_owned(), show)
 }
 
-/// Why there is nothing, and dashes for the other cells.
-fn missing(why: &str, cells: usize) -> Vec<String> {
-    let mut missing = vec![DASH.to_owned(); cells];
-    missing[0] = format!("- ({why})");
-    missing
+/// Cells with nothing in them.
+fn missing(cells: usize) -> Vec<String> {
+    vec![DASH.to_owned(); cells]
 }
