@@ -149,7 +149,7 @@ fn report(gpu: &Arc<GpuContext>, arguments: &GpuArguments) -> anyhow::Result<Rep
     let largest = arguments.largest.unwrap_or(match report.facts.software {
         true => {
             report.notes.push(format!(
-                "A software adapter: bodies of at most {SOFTWARE_LARGEST} tets, unless `--largest` says otherwise."
+                "A software adapter: timed bodies have at most {SOFTWARE_LARGEST} tets, unless `--largest` says otherwise."
             ));
             SOFTWARE_LARGEST
         }
