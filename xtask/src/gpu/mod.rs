@@ -146,15 +146,16 @@ fn report(gpu: &Arc<GpuContext>, arguments: &GpuArguments) -> anyhow::Result<Rep
         stroke_frames: if arguments.quick { 10 } else { 60 },
         only: &arguments.only,
     };
-    let largest = arguments.largest.unwrap_or(match report.facts.software {
-        true => {
+    let largest = match arguments.largest {
+        Some(largest) => largest,
+        None if report.facts.software => {
             report.notes.push(format!(
                 "A software adapter: timed bodies have at most {SOFTWARE_LARGEST} tets, unless `--largest` says otherwise."
             ));
             SOFTWARE_LARGEST
         }
-        false => usize::MAX,
-    });
+        None => usize::MAX,
+    };
     let mut models = models(arguments.models.as_deref(), largest, arguments.quick)?;
     models.retain(|model| model.mesh.tets.len() <= largest);
     for (i, model) in models.iter().enumerate() {
