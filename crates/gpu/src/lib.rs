@@ -15,3 +15,8 @@ pub use shaders::{Shader, SharedStruct, shaders, shared_structs};
 pub use solver::{Form, GpuSolver};
 pub use traffic::Traffic;
 pub use wgpu;
+
+/// The example of the README, run as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
