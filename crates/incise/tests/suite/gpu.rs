@@ -3,6 +3,8 @@
 //! They need an adapter (Mesa's lavapipe will do) and skip with a line on stderr without one, unless
 //! `INCISE_REQUIRE_GPU` is set: then they fail.
 
+#![allow(clippy::print_stderr, reason = "what is skipped or sent is to be seen")]
+
 use std::sync::{Arc, OnceLock};
 
 use incise::gpu::{GpuContext, GpuError, GpuOptions};
