@@ -203,6 +203,11 @@ impl Frame {
         }
     }
 
+    /// The settings of the last step, on the device.
+    pub(crate) fn settings(&self) -> &Buffer {
+        self.settings.buffer()
+    }
+
     /// Bytes of what the step needs.
     pub(crate) fn bytes(&self) -> u64 {
         let turns = self.turns.as_ref().map_or(0, |turns| turns.buffer().size());
@@ -282,6 +287,7 @@ impl Frame {
             keeps,
             jacobi: self.jacobi.is_some(),
             various: !host.is_uniform(),
+            tiled: false,
         };
         let last = match body.layout.form {
             Form::Threads => body.corrections.buffer(),

@@ -4,7 +4,7 @@
 //! copy of all of it and the state. A step is recorded as one pass and handed over in one submit: predict, put what is
 //! held to its handles, solve color by color, pull at attachments, solve distances and volumes, collide, update
 //! velocities, substep by substep. What a scene does not have takes no memory and no dispatch. Nothing is read back:
-//! whoever wants to know something asks ([`GpuSolver::host`]), and that waits for the device.
+//! whoever wants to know something asks ([`GpuSolver::host`], [`GpuSolver::measure`]), and that waits for the device.
 //!
 //! Twin: `Solver::step` of incise-xpbd, with the same schedule in the form [`Form::Threads`]. Positions agree up to the
 //! rounding of sums, which compilers of shaders may take in another order or fuse.
@@ -19,6 +19,7 @@ mod handles;
 mod jacobi;
 mod kernels;
 mod layout;
+mod measure;
 mod numbers;
 mod obstacles;
 mod scalars;
@@ -31,17 +32,21 @@ mod turns;
 use std::sync::Arc;
 
 use incise_graph::Schedule;
-use incise_xpbd::{Pose, Solver, StepSettings};
+use incise_xpbd::{Changes, Pose, Solver, StepSettings};
 
 pub(crate) use kernels::SOURCES;
 pub use layout::Form;
-pub(crate) use numbers::{Attachment, Part, ParticlePatch, Settings, TetPatch, Turn};
+pub use measure::Measures;
+pub(crate) use numbers::{
+    Attachment, Part, ParticlePatch, ParticleSums, Settings, TetPatch, TetSums, Turn, Units,
+};
 
 use crate::array::Array;
 use crate::{GpuContext, GpuError};
 use body::Body;
 use frame::{Frame, Scene};
 use kernels::Kernels;
+use measure::Measuring;
 
 /// A body that is solved on a device.
 ///
@@ -92,6 +97,8 @@ pub struct GpuSolver {
     repaired: Array<u32>,
     /// Particles that the device put back, as far as the host knows.
     known_repaired: u32,
+    /// If somebody has measured.
+    measuring: Option<Measuring>,
 }
 
 impl GpuSolver {
@@ -110,6 +117,7 @@ impl GpuSolver {
             frame: Frame::new(&gpu)?,
             repaired: Array::zeros(&gpu, "count of repairs", 1)?,
             known_repaired: 0,
+            measuring: None,
             kernels: Kernels::default(),
             ahead: false,
             host: solver,
@@ -214,6 +222,9 @@ impl GpuSolver {
             body,
             ..
         } = self;
+        if let Some(measuring) = &mut self.measuring {
+            measuring.stale |= changes != Changes::default();
+        }
         let followed = body.follow(gpu, kernels, host, schedule, &changes);
         // What was not followed is not known any more. Edits wait for the device: it is not ahead of them.
         if followed.is_err() && !self.ahead {
@@ -282,7 +293,7 @@ impl GpuSolver {
     }
 
     /// Particles that would have become infinite or NaN and were put back instead, counted once for each substep since
-    /// the beginning, up to the last call of [`GpuSolver::host`].
+    /// the beginning, up to the last call of [`GpuSolver::host`] or [`GpuSolver::measure`].
     #[must_use]
     pub fn repaired(&self) -> u32 {
         self.known_repaired
@@ -298,7 +309,8 @@ impl GpuSolver {
     /// Bytes of device memory.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        self.body.bytes() + self.frame.bytes()
+        let measuring = self.measuring.as_ref().map_or(0, Measuring::bytes);
+        self.body.bytes() + self.frame.bytes() + measuring
     }
 
     /// Dispatches of one pass over the tets.

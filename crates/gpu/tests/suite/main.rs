@@ -13,6 +13,7 @@ mod edits;
 mod extremes;
 mod handles;
 mod jacobi;
+mod measures;
 mod scalars;
 mod shaders;
 mod solver;
