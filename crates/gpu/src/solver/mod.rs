@@ -26,6 +26,7 @@ mod scalars;
 mod seats;
 #[cfg(test)]
 mod shaders;
+mod stages;
 mod tile;
 mod turns;
 
@@ -37,6 +38,8 @@ use incise_xpbd::{Changes, Pose, Solver, StepSettings};
 pub(crate) use kernels::SOURCES;
 pub use layout::Form;
 pub use measure::Measures;
+pub use stages::StageTimes;
+
 pub(crate) use numbers::{
     Attachment, Part, ParticlePatch, ParticleSums, Settings, TetPatch, TetSums, Turn, Units,
 };

@@ -17,5 +17,6 @@ mod measures;
 mod scalars;
 mod shaders;
 mod solver;
+mod stages;
 mod support;
 mod twin;
