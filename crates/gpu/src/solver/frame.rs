@@ -4,7 +4,7 @@
 //! `Solver::substep` of incise-xpbd. Cost: recording a third of a microsecond a dispatch.
 
 use incise_xpbd::{Form as Solving, Solver, StepSettings};
-use wgpu::{Buffer, BufferUsages};
+use wgpu::{Buffer, BufferUsages, SubmissionIndex};
 
 use super::body::Body;
 use super::handles::{self, Handles};
@@ -62,13 +62,13 @@ impl Frame {
         })
     }
 
-    /// Records a step and hands it over.
+    /// Records a step and hands it over; returns what to wait for.
     pub(crate) fn record(
         &mut self,
         scene: Scene<'_>,
         settings: &StepSettings,
         keep: bool,
-    ) -> Result<(), GpuError> {
+    ) -> Result<SubmissionIndex, GpuError> {
         let Scene { gpu, host, .. } = scene;
         let keeps = keep || settings.iterations > 1;
         self.prepare(gpu, scene.body, host, settings, keeps)?;

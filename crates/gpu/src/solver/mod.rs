@@ -22,6 +22,7 @@ mod layout;
 mod measure;
 mod numbers;
 mod obstacles;
+mod readback;
 mod scalars;
 mod seats;
 #[cfg(test)]
@@ -30,14 +31,17 @@ mod stages;
 mod tile;
 mod turns;
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use incise_graph::Schedule;
 use incise_xpbd::{Changes, Pose, Solver, StepSettings};
+use wgpu::SubmissionIndex;
 
 pub(crate) use kernels::SOURCES;
 pub use layout::Form;
 pub use measure::Measures;
+pub use readback::Readback;
 pub use stages::StageTimes;
 
 pub(crate) use numbers::{
@@ -50,6 +54,9 @@ use body::Body;
 use frame::{Frame, Scene};
 use kernels::Kernels;
 use measure::Measuring;
+
+/// Frames that the device may have to do when another one is recorded.
+const FRAMES_IN_FLIGHT: usize = 2;
 
 /// A body that is solved on a device.
 ///
@@ -102,6 +109,8 @@ pub struct GpuSolver {
     known_repaired: u32,
     /// If somebody has measured.
     measuring: Option<Measuring>,
+    /// The last frames, oldest first.
+    in_flight: VecDeque<SubmissionIndex>,
 }
 
 impl GpuSolver {
@@ -121,6 +130,7 @@ impl GpuSolver {
             repaired: Array::zeros(&gpu, "count of repairs", 1)?,
             known_repaired: 0,
             measuring: None,
+            in_flight: VecDeque::new(),
             kernels: Kernels::default(),
             ahead: false,
             host: solver,
@@ -141,7 +151,7 @@ impl GpuSolver {
     }
 
     /// Advances by one frame of `settings.time_step`; returns when the commands are with the driver, not when they are
-    /// done.
+    /// done. Waits first until the device is done with the frame before the last one, so that frames do not pile up.
     ///
     /// A schedule that was [updated](Schedule::update) since the last step is followed at the cost of what changed, as
     /// are edits of the solver; another one is laid out anew.
@@ -182,6 +192,11 @@ impl GpuSolver {
     ) -> Result<(), GpuError> {
         let _span = tracing::debug_span!("gpu::step").entered();
         settings.check()?;
+        // Who is faster than the device waits here, and not at the end of memory.
+        while self.in_flight.len() >= FRAMES_IN_FLIGHT {
+            let oldest = self.in_flight.pop_front();
+            oldest.map_or(Ok(()), |oldest| self.gpu.wait_for(oldest))?;
+        }
         self.send(schedule)?;
         let Self {
             gpu,
@@ -199,7 +214,8 @@ impl GpuSolver {
             host,
             repaired,
         };
-        frame.record(scene, settings, keep)?;
+        let submission = frame.record(scene, settings, keep)?;
+        self.in_flight.push_back(submission);
         self.ahead = true;
         self.host.end_frame();
         Ok(())

@@ -4,7 +4,7 @@
 //! time at both ends of every pass into query sets, which grow with the frame. Cost: nothing while off; else a pass and
 //! 16 bytes for each change of the stage, four and more a substep, and what the device loses by not running on.
 
-use wgpu::{BufferUsages, CommandEncoder, ComputePassTimestampWrites, QuerySet};
+use wgpu::{BufferUsages, CommandEncoder, ComputePassTimestampWrites, QuerySet, SubmissionIndex};
 
 use super::GpuSolver;
 use crate::array::Array;
@@ -177,7 +177,7 @@ impl<'a> Track<'a> {
     }
 
     /// Hands the frame over.
-    pub(crate) fn submit(mut self) -> Result<(), GpuError> {
+    pub(crate) fn submit(mut self) -> Result<SubmissionIndex, GpuError> {
         self.pass = None;
         if let Some(clock) = self.clock {
             clock.resolve(self.gpu, &mut self.encoder)?;

@@ -11,6 +11,7 @@ mod coloring;
 mod device;
 mod edits;
 mod extremes;
+mod flight;
 mod handles;
 mod jacobi;
 mod measures;
