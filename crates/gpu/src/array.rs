@@ -7,7 +7,7 @@ use std::marker::PhantomData;
 use std::sync::mpsc;
 
 use bytemuck::{AnyBitPattern, NoUninit};
-use wgpu::{Buffer, BufferUsages};
+use wgpu::{Buffer, BufferUsages, SubmissionIndex};
 
 use crate::traffic::count;
 use crate::{GpuContext, GpuError};
@@ -140,7 +140,7 @@ impl<T: NoUninit + AnyBitPattern> Array<T> {
         let staging = buffer(gpu, self.what, size, usage)?;
         let mut encoder = gpu.encoder(self.what);
         encoder.copy_buffer_to_buffer(&self.buffer, 0, &staging, 0, size);
-        gpu.submit(encoder)?;
+        let submission = gpu.submit(encoder)?;
         let (sender, receiver) = mpsc::channel();
         staging.map_async(wgpu::MapMode::Read, .., move |result| {
             // Nobody waits if the staging buffer was dropped.
@@ -149,6 +149,7 @@ impl<T: NoUninit + AnyBitPattern> Array<T> {
         Ok(Staging {
             buffer: staging,
             len,
+            submission,
             receiver,
             of: PhantomData,
         })
@@ -160,6 +161,7 @@ impl<T: NoUninit + AnyBitPattern> Array<T> {
 pub(crate) struct Staging<T> {
     buffer: Buffer,
     len: usize,
+    submission: SubmissionIndex,
     receiver: mpsc::Receiver<Result<(), String>>,
     of: PhantomData<T>,
 }
@@ -167,14 +169,25 @@ pub(crate) struct Staging<T> {
 impl<T: NoUninit + AnyBitPattern> Staging<T> {
     /// Waits for it.
     pub(crate) fn collect(self, gpu: &GpuContext) -> Result<Vec<T>, GpuError> {
-        gpu.wait()?;
-        let lost = |message: String| GpuError::Lost { message };
+        gpu.wait_for(self.submission.clone())?;
         let mapped = self.receiver.recv();
-        mapped
-            .map_err(|error| lost(error.to_string()))?
-            .map_err(lost)?;
+        self.values(gpu, mapped.map_err(|error| lost(&error))?)
+    }
+
+    /// The values if they have arrived; afterwards they are gone from here.
+    pub(crate) fn try_collect(&self, gpu: &GpuContext) -> Result<Option<Vec<T>>, GpuError> {
+        gpu.look()?;
+        match self.receiver.try_recv() {
+            Ok(mapped) => self.values(gpu, mapped).map(Some),
+            Err(mpsc::TryRecvError::Empty) => Ok(None),
+            Err(error) => Err(lost(&error)),
+        }
+    }
+
+    fn values(&self, gpu: &GpuContext, mapped: Result<(), String>) -> Result<Vec<T>, GpuError> {
+        mapped.map_err(|message| GpuError::Lost { message })?;
         let view = self.buffer.slice(..).get_mapped_range();
-        let view = view.map_err(|error| lost(error.to_string()))?;
+        let view = view.map_err(|error| lost(&error))?;
         // The view has the alignment of bytes.
         let data = &view[..usize::try_from(bytes::<T>(self.len)).unwrap_or(usize::MAX)];
         let values = bytemuck::pod_collect_to_vec::<u8, T>(data);
@@ -183,6 +196,12 @@ impl<T: NoUninit + AnyBitPattern> Staging<T> {
         drop(view);
         self.buffer.unmap();
         Ok(values)
+    }
+}
+
+fn lost(error: &dyn std::error::Error) -> GpuError {
+    GpuError::Lost {
+        message: error.to_string(),
     }
 }
 

@@ -7,7 +7,9 @@
 use std::sync::{Arc, Mutex};
 
 use pollster::block_on;
-use wgpu::{Adapter, Backends, Device, DeviceType, Features, Limits, Queue};
+use wgpu::{
+    Adapter, Backends, Device, DeviceType, Features, Limits, PollType, Queue, SubmissionIndex,
+};
 
 use crate::GpuError;
 use crate::traffic::{Counters, Traffic, count};
@@ -205,11 +207,14 @@ impl GpuContext {
         report.clone().map_or(Ok(()), Err)
     }
 
-    /// Hands commands over.
-    pub(crate) fn submit(&self, encoder: wgpu::CommandEncoder) -> Result<(), GpuError> {
-        self.queue.submit([encoder.finish()]);
+    /// Hands commands over; returns what to wait for.
+    pub(crate) fn submit(
+        &self,
+        encoder: wgpu::CommandEncoder,
+    ) -> Result<SubmissionIndex, GpuError> {
+        let index = self.queue.submit([encoder.finish()]);
         count(&self.counters.submits, 1);
-        self.check()
+        self.check().map(|()| index)
     }
 
     pub(crate) fn encoder(&self, label: &str) -> wgpu::CommandEncoder {
@@ -222,7 +227,24 @@ impl GpuContext {
     /// # Errors
     /// If the device is lost.
     pub fn wait(&self) -> Result<(), GpuError> {
-        let polled = self.device.poll(wgpu::PollType::wait_indefinitely());
+        self.poll(PollType::wait_indefinitely())
+    }
+
+    /// Waits until the device has done what was handed over with this, and all before it.
+    pub(crate) fn wait_for(&self, submission: SubmissionIndex) -> Result<(), GpuError> {
+        self.poll(PollType::Wait {
+            submission_index: Some(submission),
+            timeout: None,
+        })
+    }
+
+    /// Tells who waits for something that it is done, without waiting.
+    pub(crate) fn look(&self) -> Result<(), GpuError> {
+        self.poll(PollType::Poll)
+    }
+
+    fn poll(&self, how: PollType) -> Result<(), GpuError> {
+        let polled = self.device.poll(how);
         self.check()?;
         polled.map(|_| ()).map_err(|error| GpuError::Lost {
             message: error.to_string(),

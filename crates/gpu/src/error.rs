@@ -60,6 +60,9 @@ pub enum GpuError {
         /// What was asked for.
         what: &'static str,
     },
+    /// The device has no clock for its stages.
+    #[error("this GPU cannot time its stages: it has no timestamp queries")]
+    NoTimestamps,
     /// A cluster does not fit into a block of the GPU.
     #[error(
         "cluster {cluster} has {tets} tets and a block holds {limit}: cluster with a smaller size"

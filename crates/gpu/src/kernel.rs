@@ -154,13 +154,14 @@ fn binding_type(usage: Use) -> wgpu::BindingType {
 #[derive(Debug)]
 pub(crate) struct Recorder<'a> {
     gpu: &'a GpuContext,
-    pass: ComputePass<'a>,
+    pass: ComputePass<'static>,
 }
 
 impl<'a> Recorder<'a> {
+    /// Begins a pass, which must be dropped before anything else is recorded.
     pub(crate) fn new(
         gpu: &'a GpuContext,
-        encoder: &'a mut wgpu::CommandEncoder,
+        encoder: &mut wgpu::CommandEncoder,
         label: &str,
         timestamps: Option<wgpu::ComputePassTimestampWrites<'_>>,
     ) -> Self {
@@ -169,6 +170,7 @@ impl<'a> Recorder<'a> {
             label: Some(label),
             timestamp_writes: timestamps,
         });
+        let pass = pass.forget_lifetime();
         Self { gpu, pass }
     }
 

@@ -3,7 +3,9 @@
 use std::mem::offset_of;
 
 use crate::coloring::{Round, SEARCH_WORDS, VivaceSettings, WAIT_WORDS, WlcWork, Work};
-use crate::solver::{Attachment, Part, ParticlePatch, Settings, TetPatch, Turn};
+use crate::solver::{
+    Attachment, Part, ParticlePatch, ParticleSums, Settings, TetPatch, TetSums, Turn, Units,
+};
 use crate::{coloring, solver};
 
 /// A kernel as it is given to the driver; its entry point is `main`.
@@ -141,6 +143,24 @@ pub fn shared_structs() -> Vec<SharedStruct> {
             particle,
             velocity,
             index
+        }),
+        shared!(Units {
+            places,
+            length,
+            slope,
+            unused
+        }),
+        shared!(TetSums {
+            energy,
+            change,
+            least,
+            inverted
+        }),
+        shared!(ParticleSums {
+            moment,
+            kinetic,
+            speed_squared,
+            unused
         }),
         shared!("Search", SEARCH_WORDS),
         shared!("Wait", WAIT_WORDS),

@@ -13,9 +13,10 @@ use crate::descent::Descent;
 #[cfg(feature = "gpu")]
 use crate::device::Device;
 use crate::joined::Joined;
+use crate::measure::State;
 use crate::place::Place;
 use crate::report::{Milliseconds, milliseconds};
-use crate::scene::{Method, Precision, SolverSpec};
+use crate::scene::{Method, Precision, Quantity, SolverSpec};
 
 /// A solver in one of both precisions.
 #[derive(Debug)]
@@ -162,6 +163,36 @@ impl AnySolver {
             Self::Single(_) | Self::Double(_) => Ok(0),
             #[cfg(feature = "gpu")]
             Self::Device(device) => device.read_back(),
+        }
+    }
+
+    /// How many particles a device had to put back since the last time, as far as is known here.
+    pub(crate) fn news(&mut self) -> usize {
+        match self {
+            Self::Single(_) | Self::Double(_) => 0,
+            #[cfg(feature = "gpu")]
+            Self::Device(device) => device.news(),
+        }
+    }
+
+    /// Measures the state as far as the quantities ask; on a device without fetching it.
+    pub(crate) fn state(
+        &mut self,
+        gravity: Option<DVec3>,
+        quantities: &[Quantity],
+    ) -> Result<State, Error> {
+        match self {
+            Self::Single(backend) => Ok(backend.state(gravity, quantities)),
+            Self::Double(backend) => Ok(backend.state(gravity, quantities)),
+            #[cfg(feature = "gpu")]
+            Self::Device(device) => {
+                let measures = device.solver.measure(gravity)?;
+                Ok(State {
+                    energy: Some(measures.energy),
+                    volume: Some(measures.volume),
+                    max_speed: Some(measures.max_speed),
+                })
+            }
         }
     }
 
@@ -345,6 +376,15 @@ impl<R: Real> Backend<R> {
             Some(descent) => descent.step(solver, settings, keep),
             None if keep => solver.step_keeping_residuals(schedule, settings),
             None => solver.step(schedule, settings),
+        }
+    }
+
+    fn state(&self, gravity: Option<DVec3>, quantities: &[Quantity]) -> State {
+        let (solver, asks) = (&self.solver, |quantity| quantities.contains(&quantity));
+        State {
+            energy: asks(Quantity::Energy).then(|| solver.energy(gravity)),
+            volume: asks(Quantity::Volume).then(|| solver.volume()),
+            max_speed: asks(Quantity::Speed).then(|| solver.max_speed()),
         }
     }
 

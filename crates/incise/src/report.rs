@@ -67,7 +67,7 @@ pub struct FrameReport {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub bodies: Vec<BodyReport>,
     /// Particles that had to be put back because they would have become infinite; absent if none. From a device they
-    /// are known in the frames that fetch something, for all frames since.
+    /// are known in the frames that ask it for something (a blade, a quantity of the state), for all frames since.
     #[serde(skip_serializing_if = "is_zero")]
     pub repaired: usize,
     /// Groups of joined bodies whose clusters and colors were made anew in the background and taken in this frame; absent
@@ -212,7 +212,8 @@ pub struct Milliseconds {
     pub schedule: f64,
     /// Sending to a device.
     pub upload: f64,
-    /// Solving. On a device: telling it what to do; it works on by itself.
+    /// Solving. On a device: telling it what to do, after waiting for the frame before the last one if that is not done; it
+    /// works on by itself.
     pub solve: f64,
     /// Waiting for a device and fetching from it, where somebody asked: a blade, a reported quantity.
     pub readback: f64,

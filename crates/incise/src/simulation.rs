@@ -19,7 +19,7 @@ use crate::group::Group;
 use crate::islands::islands;
 use crate::joined::Joined;
 use crate::limits::{self, value};
-use crate::measure::{by_body, energy, kappa, max_speed, residual, softened, volume};
+use crate::measure::{by_body, energy, kappa, max_speed, residual, softened, states, volume};
 use crate::method::settings;
 use crate::pieces::PieceNumbers;
 use crate::place::Place;
@@ -223,7 +223,8 @@ impl Simulation {
             .try_reduce(|| 0, |a, b| Ok(a + b))?;
         ms.solve = milliseconds(before_solve.elapsed());
 
-        if !self.place.is_device() || self.fetches() {
+        // A device measures what it has; residuals need positions and multipliers of all.
+        if !self.place.is_device() || residual {
             repaired += self.fetch(&mut ms)?;
         }
         self.report = FrameReport {
@@ -235,7 +236,7 @@ impl Simulation {
             reclustered,
             ..FrameReport::default()
         };
-        self.measure();
+        self.measure(&mut ms)?;
         self.count();
         ms.total = milliseconds(start.elapsed());
         ms.other = ms.total
@@ -311,23 +312,28 @@ impl Simulation {
     }
 
     /// Computes the quantities that this frame reports.
-    fn measure(&mut self) {
+    fn measure(&mut self, ms: &mut Milliseconds) -> Result<(), Error> {
         let kappa_too = self.wants(Quantity::Kappa);
         if kappa_too || self.chooses() || self.sleeps() {
             self.report.bodies = by_body(&mut self.groups, kappa_too);
         }
         if !self.report.frame.is_multiple_of(self.every) {
-            return;
+            return Ok(());
+        }
+        let start = Instant::now();
+        let states = states(&mut self.groups, self.gravity, &self.quantities)?;
+        if self.place.is_device() {
+            let groups = self.groups.iter_mut();
+            self.report.repaired += groups.map(|group| group.solver.news()).sum::<usize>();
+            ms.readback += milliseconds(start.elapsed());
         }
         for quantity in &self.quantities {
             let report = &mut self.report;
             match quantity {
                 Quantity::Residual => report.residual = residual(&self.groups, self.gravity),
-                Quantity::Energy => {
-                    report.energy = Some(energy(&self.groups, self.gravity));
-                }
+                Quantity::Energy => report.energy = Some(energy(&states)),
                 Quantity::Volume => {
-                    let volume = volume(&self.groups);
+                    let volume = volume(&states);
                     report.volume = Some(volume.total);
                     // Nothing may be left.
                     let error = volume.total / volume.rest - 1.0;
@@ -335,20 +341,14 @@ impl Simulation {
                     report.min_volume_ratio = Some(volume.min_ratio);
                     report.inverted_tets = Some(volume.inverted);
                 }
-                Quantity::Speed => report.max_speed = Some(max_speed(&self.groups)),
+                Quantity::Speed => report.max_speed = Some(max_speed(&states)),
                 Quantity::Kappa => {
                     report.kappa = Some(kappa(&self.groups));
                     report.softened = Some(softened(&self.groups));
                 }
             }
         }
-    }
-
-    /// Whether the frame to come reports something that depends on the state.
-    fn fetches(&self) -> bool {
-        let state = |quantity: &Quantity| *quantity != Quantity::Kappa;
-        let reports = self.next_frame.is_multiple_of(self.every);
-        reports && self.quantities.iter().any(state)
+        Ok(())
     }
 
     /// Takes over state and positions; returns how many particles a device had to put back since the last time.
@@ -368,8 +368,8 @@ impl Simulation {
     /// Makes [`Simulation::positions`] those of now, if the state is on a device: waits for it and fetches them.
     /// Otherwise they are, and nothing happens.
     ///
-    /// A frame does this by itself only if a stroke is due, since a blade has to know where the body is, or if it reports
-    /// a quantity that depends on the state.
+    /// A frame does this by itself only if a stroke is due, since a blade has to know where the body is, if it reports
+    /// residuals, or if bodies may sleep. Energies, volume and speed are summed up on the device.
     ///
     /// # Errors
     /// If the device is lost.

@@ -167,6 +167,24 @@ impl<R: Real> Solver<R> {
         }
     }
 
+    /// The volume of a tet at rest in m³, negative if it is inverted there.
+    ///
+    /// # Panics
+    /// If the tet does not exist.
+    #[must_use]
+    pub fn rest_volume(&self, tet: usize) -> f64 {
+        self.volumes[tet]
+    }
+
+    /// Whether a tet takes part: one too flat to be represented does not.
+    ///
+    /// # Panics
+    /// If the tet does not exist.
+    #[must_use]
+    pub fn takes_part(&self, tet: usize) -> bool {
+        self.tets[tet].inverse_rest != [R::ZERO; 9]
+    }
+
     /// Whether there is but one material, so that the constants of all tets are the same.
     #[must_use]
     pub fn is_uniform(&self) -> bool {

@@ -147,7 +147,12 @@ impl GpuSolver {
         if self.form() == Form::Threads {
             return Ok(());
         }
-        for tile in 0..self.body.layout.seats.seat_count() {
+        let seats = &self.body.layout.seats;
+        for tile in 0..seats.seat_count() {
+            // What is said of a tile without cluster is old.
+            if u32::try_from(tile).is_ok_and(|seat| seats.cluster(seat).is_none()) {
+                continue;
+            }
             let (steps, ends) = steps(tile, copy);
             let mut start = 0;
             for &end in &ends[..steps] {

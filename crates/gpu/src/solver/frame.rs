@@ -4,7 +4,7 @@
 //! `Solver::substep` of incise-xpbd. Cost: recording a third of a microsecond a dispatch.
 
 use incise_xpbd::{Form as Solving, Solver, StepSettings};
-use wgpu::{Buffer, BufferUsages};
+use wgpu::{Buffer, BufferUsages, SubmissionIndex};
 
 use super::body::Body;
 use super::handles::{self, Handles};
@@ -14,9 +14,9 @@ use super::layout::{Form, THREADS};
 use super::numbers::Settings;
 use super::obstacles::Obstacles;
 use super::scalars;
+use super::stages::{Clock, Stage::*, Track};
 use super::turns::{self, Turns};
 use crate::array::{Array, Staging};
-use crate::kernel::Recorder;
 use crate::{GpuContext, GpuError};
 
 /// What a step needs beside the body.
@@ -34,6 +34,8 @@ pub(crate) struct Frame {
     predicted: Array<[f32; 4]>,
     /// Whether the last step kept what residuals need.
     kept: bool,
+    /// If stages are timed.
+    clock: Option<Clock>,
 }
 
 /// What a step reads and writes beside that.
@@ -56,16 +58,17 @@ impl Frame {
             jacobi: None,
             predicted: Array::zeros(gpu, "predicted positions", 0)?,
             kept: false,
+            clock: None,
         })
     }
 
-    /// Records a step and hands it over.
+    /// Records a step and hands it over; returns what to wait for.
     pub(crate) fn record(
         &mut self,
         scene: Scene<'_>,
         settings: &StepSettings,
         keep: bool,
-    ) -> Result<(), GpuError> {
+    ) -> Result<SubmissionIndex, GpuError> {
         let Scene { gpu, host, .. } = scene;
         let keeps = keep || settings.iterations > 1;
         self.prepare(gpu, scene.body, host, settings, keeps)?;
@@ -83,52 +86,50 @@ impl Frame {
             keeps,
         )?;
         let body = &*scene.body;
-        let mut encoder = gpu.encoder("frame");
-        let mut pass = Recorder::new(gpu, &mut encoder, "frame", None);
+        let mut track = Track::new(gpu, self.clock.as_mut());
         let particles = host.particle_count().div_ceil(THREADS);
         for substep in 0..settings.substeps {
             let start = turns::offset(settings, substep, 0);
-            passes.predict.run(&mut pass, &[], particles);
+            passes.predict.run(track.at(Predict), &[], particles);
             if let Some(handles) = &passes.handles {
-                handles.move_held(&mut pass, start);
+                handles.move_held(track.at(Other), start);
             }
             if let Some(clear) = &passes.clear {
                 let words = 2 * body.layout.place_count();
-                clear.run(&mut pass, &[], words.div_ceil(THREADS));
+                clear.run(track.at(Other), &[], words.div_ceil(THREADS));
             }
             for scalars in &passes.scalars {
-                scalars.begin(&mut pass);
+                scalars.begin(track.at(Other));
             }
             if keep && substep + 1 == settings.substeps {
-                drop(pass);
                 let bytes = (host.particle_count() * size_of::<[f32; 4]>()) as u64;
                 let (from, to) = (body.particles.buffer(), self.predicted.buffer());
+                let encoder = track.between_passes();
                 encoder.copy_buffer_to_buffer(from, 0, to, 0, bytes);
-                pass = Recorder::new(gpu, &mut encoder, "frame", None);
             }
             for iteration in 0..settings.iterations {
                 let turn = turns::offset(settings, substep, iteration);
-                body.colors.run(&mut pass, &passes.solve, &passes.tail);
+                body.colors
+                    .run(track.at(Solve), &passes.solve, &passes.tail);
                 if let Some(jacobi) = &passes.jacobi {
-                    jacobi.run(&mut pass, turn, particles);
+                    jacobi.run(track.at(Solve), turn, particles);
                 }
                 if let Some(handles) = &passes.handles {
-                    handles.solve(&mut pass, turn);
+                    handles.solve(track.at(Other), turn);
                 }
                 for scalars in &passes.scalars {
-                    scalars.solve(&mut pass);
+                    scalars.solve(track.at(Other));
                 }
                 if let Some(project) = &passes.project {
-                    project.run(&mut pass, &[turn], particles);
+                    project.run(track.at(Other), &[turn], particles);
                 }
             }
-            passes.update.run(&mut pass, &[], particles);
+            passes.update.run(track.at(Update), &[], particles);
             if let Some(handles) = &passes.handles {
-                handles.update_held(&mut pass);
+                handles.update_held(track.at(Other));
             }
         }
-        drop(pass);
-        gpu.submit(encoder)
+        track.submit()
     }
 
     /// Brings what the frame needs to the device, unless it is there.
@@ -203,13 +204,24 @@ impl Frame {
         }
     }
 
+    /// What times stages, if somebody asked.
+    pub(crate) fn clock(&mut self) -> &mut Option<Clock> {
+        &mut self.clock
+    }
+
+    /// The settings of the last step, on the device.
+    pub(crate) fn settings(&self) -> &Buffer {
+        self.settings.buffer()
+    }
+
     /// Bytes of what the step needs.
     pub(crate) fn bytes(&self) -> u64 {
         let turns = self.turns.as_ref().map_or(0, |turns| turns.buffer().size());
         let obstacles = self.obstacles.as_ref().map_or(0, Obstacles::bytes);
         let jacobi = self.jacobi.as_ref().map_or(0, Jacobi::bytes);
         let always = self.settings.buffer().size() + self.predicted.buffer().size();
-        always + turns + obstacles + jacobi
+        let clock = self.clock.as_ref().map_or(0, Clock::bytes);
+        always + turns + obstacles + jacobi + clock
     }
 
     /// Starts to read what residuals need, if the last step kept it.
@@ -282,6 +294,7 @@ impl Frame {
             keeps,
             jacobi: self.jacobi.is_some(),
             various: !host.is_uniform(),
+            tiled: false,
         };
         let last = match body.layout.form {
             Form::Threads => body.corrections.buffer(),

@@ -32,6 +32,7 @@ enum Flag {
     Keeps,
     Jacobi,
     Uniform,
+    Tiled,
 }
 
 macro_rules! text {
@@ -254,6 +255,29 @@ pub(crate) const EXTRAPOLATE_MULTIPLIERS: Source = Source {
     flags: &[],
 };
 
+pub(crate) const MEASURE_TETS: Source = Source {
+    name: "measure_tets",
+    parts: text!("common", "settings", "measure_tets"),
+    uses: &[
+        Use::Uniform,
+        Use::Uniform,
+        Use::Read,
+        Use::Read,
+        Use::Read,
+        Use::Read,
+        Use::Read,
+        Use::Write,
+    ],
+    flags: &[Flag::Uniform, Flag::Tiled],
+};
+
+pub(crate) const MEASURE_PARTICLES: Source = Source {
+    name: "measure_particles",
+    parts: text!("common", "settings", "measure_particles"),
+    uses: &[Use::Uniform, Use::Read, Use::Read, Use::Read, Use::Write],
+    flags: &[],
+};
+
 /// What kernels that solve constraints of one number use.
 const SCALARS: &[Use] = &[
     Use::Uniform,
@@ -336,6 +360,8 @@ pub(crate) const SOURCES: &[Source] = &[
     SOLVE_VOLUMES_TAIL,
     APPLY_CORRECTIONS,
     EXTRAPOLATE_MULTIPLIERS,
+    MEASURE_TETS,
+    MEASURE_PARTICLES,
 ];
 
 /// The kernel that solves colors, or a row of colors of one group each.
@@ -365,6 +391,8 @@ pub(crate) struct Variant {
     pub(crate) jacobi: bool,
     /// Whether tets have materials of their own.
     pub(crate) various: bool,
+    /// Whether corners are numbered within tiles.
+    pub(crate) tiled: bool,
 }
 
 impl Variant {
@@ -376,6 +404,7 @@ impl Variant {
             Flag::Keeps => ("KEEPS", self.keeps),
             Flag::Jacobi => ("JACOBI", self.jacobi),
             Flag::Uniform => ("UNIFORM", !self.various),
+            Flag::Tiled => ("TILED", self.tiled),
         };
         (name, f64::from(u8::from(on)))
     }

@@ -95,6 +95,11 @@ impl Layout {
         self.seats.seat_count() * self.depth
     }
 
+    /// Tets that the schedule solves.
+    pub(crate) fn tet_count(&self) -> usize {
+        self.filled.iter().map(|&tets| tets as usize).sum()
+    }
+
     /// Rows of 64 places that a group has.
     pub(crate) fn depth(&self) -> usize {
         self.depth
@@ -250,12 +255,6 @@ impl Layout {
                     self.put(tet, place);
                     patch.tets.push(filled_in(place, tet, solver));
                 }
-                for k in tets.len()..self.filled[seat as usize] as usize {
-                    patch.tets.push(TetPatch {
-                        place: index(self.place_of(seat, k)),
-                        ..TetPatch::default()
-                    });
-                }
             }
             Form::Workgroups if tets.is_empty() => {}
             Form::Workgroups => {
@@ -269,6 +268,12 @@ impl Layout {
                 patch.tiles.push((seat, tile));
             }
         }
+        for k in tets.len()..self.filled[seat as usize] as usize {
+            patch.tets.push(TetPatch {
+                place: index(self.place_of(seat, k)),
+                ..TetPatch::default()
+            });
+        }
         self.filled[seat as usize] = index(tets.len());
     }
 }
@@ -281,8 +286,17 @@ fn filled_in(place: usize, tet: u32, solver: &Solver<f32>) -> TetPatch {
         unused: [0; 3],
         corners: data.corners,
         rest: data.rest,
-        constants: [ratio, gamma, damping, 0.0],
+        constants: [ratio, gamma, damping, slope(data.constants)],
     }
+}
+
+/// What rounding of ratio and γ left of the slope of the elastic energy at rest, for those who measure it.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "the device computes in single precision"
+)]
+pub(crate) fn slope([ratio, gamma, _]: [f32; 3]) -> f32 {
+    (1.0 + f64::from(ratio) * (1.0 - f64::from(gamma))) as f32
 }
 
 fn index(value: usize) -> u32 {

@@ -4,7 +4,7 @@
 //! copy of all of it and the state. A step is recorded as one pass and handed over in one submit: predict, put what is
 //! held to its handles, solve color by color, pull at attachments, solve distances and volumes, collide, update
 //! velocities, substep by substep. What a scene does not have takes no memory and no dispatch. Nothing is read back:
-//! whoever wants to know something asks ([`GpuSolver::host`]), and that waits for the device.
+//! whoever wants to know something asks ([`GpuSolver::host`], [`GpuSolver::measure`]), and that waits for the device.
 //!
 //! Twin: `Solver::step` of incise-xpbd, with the same schedule in the form [`Form::Threads`]. Positions agree up to the
 //! rounding of sums, which compilers of shaders may take in another order or fuse.
@@ -19,29 +19,44 @@ mod handles;
 mod jacobi;
 mod kernels;
 mod layout;
+mod measure;
 mod numbers;
 mod obstacles;
+mod readback;
 mod scalars;
 mod seats;
 #[cfg(test)]
 mod shaders;
+mod stages;
 mod tile;
 mod turns;
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use incise_graph::Schedule;
-use incise_xpbd::{Pose, Solver, StepSettings};
+use incise_xpbd::{Changes, Pose, Solver, StepSettings};
+use wgpu::SubmissionIndex;
 
 pub(crate) use kernels::SOURCES;
 pub use layout::Form;
-pub(crate) use numbers::{Attachment, Part, ParticlePatch, Settings, TetPatch, Turn};
+pub use measure::Measures;
+pub use readback::Readback;
+pub use stages::StageTimes;
+
+pub(crate) use numbers::{
+    Attachment, Part, ParticlePatch, ParticleSums, Settings, TetPatch, TetSums, Turn, Units,
+};
 
 use crate::array::Array;
 use crate::{GpuContext, GpuError};
 use body::Body;
 use frame::{Frame, Scene};
 use kernels::Kernels;
+use measure::Measuring;
+
+/// Frames that the device may have to do when another one is recorded.
+const FRAMES_IN_FLIGHT: usize = 2;
 
 /// A body that is solved on a device.
 ///
@@ -92,6 +107,10 @@ pub struct GpuSolver {
     repaired: Array<u32>,
     /// Particles that the device put back, as far as the host knows.
     known_repaired: u32,
+    /// If somebody has measured.
+    measuring: Option<Measuring>,
+    /// The last frames, oldest first.
+    in_flight: VecDeque<SubmissionIndex>,
 }
 
 impl GpuSolver {
@@ -110,6 +129,8 @@ impl GpuSolver {
             frame: Frame::new(&gpu)?,
             repaired: Array::zeros(&gpu, "count of repairs", 1)?,
             known_repaired: 0,
+            measuring: None,
+            in_flight: VecDeque::new(),
             kernels: Kernels::default(),
             ahead: false,
             host: solver,
@@ -130,7 +151,7 @@ impl GpuSolver {
     }
 
     /// Advances by one frame of `settings.time_step`; returns when the commands are with the driver, not when they are
-    /// done.
+    /// done. Waits first until the device is done with the frame before the last one, so that frames do not pile up.
     ///
     /// A schedule that was [updated](Schedule::update) since the last step is followed at the cost of what changed, as
     /// are edits of the solver; another one is laid out anew.
@@ -171,6 +192,11 @@ impl GpuSolver {
     ) -> Result<(), GpuError> {
         let _span = tracing::debug_span!("gpu::step").entered();
         settings.check()?;
+        // Who is faster than the device waits here, and not at the end of memory.
+        while self.in_flight.len() >= FRAMES_IN_FLIGHT {
+            let oldest = self.in_flight.pop_front();
+            oldest.map_or(Ok(()), |oldest| self.gpu.wait_for(oldest))?;
+        }
         self.send(schedule)?;
         let Self {
             gpu,
@@ -188,7 +214,8 @@ impl GpuSolver {
             host,
             repaired,
         };
-        frame.record(scene, settings, keep)?;
+        let submission = frame.record(scene, settings, keep)?;
+        self.in_flight.push_back(submission);
         self.ahead = true;
         self.host.end_frame();
         Ok(())
@@ -214,6 +241,9 @@ impl GpuSolver {
             body,
             ..
         } = self;
+        if let Some(measuring) = &mut self.measuring {
+            measuring.stale |= changes != Changes::default();
+        }
         let followed = body.follow(gpu, kernels, host, schedule, &changes);
         // What was not followed is not known any more. Edits wait for the device: it is not ahead of them.
         if followed.is_err() && !self.ahead {
@@ -282,7 +312,7 @@ impl GpuSolver {
     }
 
     /// Particles that would have become infinite or NaN and were put back instead, counted once for each substep since
-    /// the beginning, up to the last call of [`GpuSolver::host`].
+    /// the beginning, up to the last call of [`GpuSolver::host`] or [`GpuSolver::measure`].
     #[must_use]
     pub fn repaired(&self) -> u32 {
         self.known_repaired
@@ -298,7 +328,8 @@ impl GpuSolver {
     /// Bytes of device memory.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        self.body.bytes() + self.frame.bytes()
+        let measuring = self.measuring.as_ref().map_or(0, Measuring::bytes);
+        self.body.bytes() + self.frame.bytes() + measuring
     }
 
     /// Dispatches of one pass over the tets.

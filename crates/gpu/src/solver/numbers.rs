@@ -56,6 +56,36 @@ pub(crate) struct Attachment {
     pub(crate) unused: u32,
 }
 
+/// `Units` in `measure_tets.wgsl`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Units {
+    pub(crate) places: u32,
+    pub(crate) length: f32,
+    pub(crate) slope: f32,
+    pub(crate) unused: u32,
+}
+
+/// `TetSums` in `measure_tets.wgsl`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct TetSums {
+    pub(crate) energy: f32,
+    pub(crate) change: f32,
+    pub(crate) least: f32,
+    pub(crate) inverted: u32,
+}
+
+/// `ParticleSums` in `measure_particles.wgsl`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct ParticleSums {
+    pub(crate) moment: [f32; 3],
+    pub(crate) kinetic: f32,
+    pub(crate) speed_squared: f32,
+    pub(crate) unused: [f32; 3],
+}
+
 /// `TetPatch` in `patch_tets.wgsl`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]

@@ -9,6 +9,7 @@ use incise_xpbd::{Collider, Pose, Solver, StepSettings};
 use proptest::prelude::*;
 use proptest::sample::Index;
 
+use crate::measures::agree;
 use crate::solver::{SOFT, clusters, schedules, settings, tiled};
 use crate::support::gpu;
 use crate::twin::{FORMS, Twins, bar, free};
@@ -258,6 +259,7 @@ fn run(gpu: &'static GpuContext, form: (&str, Form), rounds: &[Vec<Edit>]) -> f6
             edited.twins.host.move_handle(1, pose);
             edited.twins.step(&settings());
         }
+        agree(&mut edited.twins.device);
         far = f64::max(far, edited.twins.apart());
     }
     far
