@@ -61,8 +61,9 @@ impl Place {
 
     fn cpu(reason: &str) -> Self {
         Self {
+            #[cfg(feature = "gpu")]
+            gpu: None,
             note: Some(format!("computed on the processor: {reason}")),
-            ..Self::default()
         }
     }
 

@@ -17,6 +17,7 @@ mod jacobi;
 mod measures;
 mod scalars;
 mod shaders;
+mod sizes;
 mod solver;
 mod stages;
 mod support;
