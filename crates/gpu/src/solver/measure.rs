@@ -212,6 +212,32 @@ impl GpuSolver {
     /// zero may count as inverted here and not there. The host's numbers, with the state fetched, are given where single
     /// precision overflows and where the schedule does not solve all tets; nothing is asked where the host has the state.
     ///
+    /// # Example
+    /// A particle of 2 kg falls for a tenth of a second.
+    /// ```
+    /// # use std::sync::Arc;
+    /// # use glam::DVec3;
+    /// # use incise_gpu::{Form, GpuContext, GpuError, GpuOptions, GpuSolver};
+    /// # use incise_graph::{Clustering, Coloring, Schedule};
+    /// # use incise_xpbd::{Solver, StepSettings};
+    /// # let gpu = match GpuContext::new(&GpuOptions::from_env()) {
+    /// #     Ok(gpu) => Arc::new(gpu),
+    /// #     Err(GpuError::NoAdapter { .. }) => return Ok(()),
+    /// #     Err(other) => return Err(other.into()),
+    /// # };
+    /// # let schedule = Schedule::new(&Clustering::none(0), &Coloring::new(vec![]));
+    /// let mut solver = Solver::new(&[DVec3::ZERO]);
+    /// solver.set_mass(0, 2.0);
+    /// let mut device = GpuSolver::new(gpu, solver, Form::Threads)?;
+    /// let gravity = Some(DVec3::new(0.0, 0.0, -10.0));
+    /// device.step(&schedule, &StepSettings { gravity, ..StepSettings::new(0.1) })?;
+    /// let measures = device.measure(gravity)?;
+    /// assert!((measures.max_speed - 1.0).abs() < 1e-6);
+    /// assert!((measures.energy.kinetic - 1.0).abs() < 1e-6);
+    /// assert!((measures.energy.gravity + 2.0).abs() < 1e-6);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// If the device is lost or out of memory.
     ///

@@ -192,6 +192,30 @@ impl GpuSolver {
     /// The results are the same to the bit. A timed frame is a pass for each change of the stage instead of a single one,
     /// so its stages together may take longer than the frame does otherwise.
     ///
+    /// # Example
+    /// ```
+    /// # use std::sync::Arc;
+    /// # use glam::DVec3;
+    /// # use incise_gpu::{Form, GpuContext, GpuError, GpuOptions, GpuSolver};
+    /// # use incise_graph::{Clustering, Coloring, Schedule};
+    /// # use incise_xpbd::{Solver, StepSettings};
+    /// # let gpu = match GpuContext::new(&GpuOptions::from_env()) {
+    /// #     Ok(gpu) => Arc::new(gpu),
+    /// #     Err(GpuError::NoAdapter { .. }) => return Ok(()),
+    /// #     Err(other) => return Err(other.into()),
+    /// # };
+    /// # let schedule = Schedule::new(&Clustering::none(0), &Coloring::new(vec![]));
+    /// # let timed = gpu.has_timestamps();
+    /// let mut device = GpuSolver::new(gpu, Solver::new(&[DVec3::ZERO]), Form::Threads)?;
+    /// # if timed {
+    /// device.time_stages(true)?;
+    /// device.step(&schedule, &StepSettings::new(0.01))?;
+    /// let times = device.stage_times()?.expect("the step was timed");
+    /// println!("{:.3} ms, of which {:.3} on tets", times.total(), times.solve);
+    /// # }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`GpuError::NoTimestamps`] if the device cannot; if it has no memory.
     pub fn time_stages(&mut self, on: bool) -> Result<(), GpuError> {
