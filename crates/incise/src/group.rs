@@ -18,6 +18,7 @@ use crate::place::Place;
 use crate::plan::Plan;
 use crate::recluster::Recluster;
 use crate::report::{Milliseconds, milliseconds};
+use crate::scene::Quantity;
 use crate::sleep::Rest;
 use crate::substeps::Choice;
 use crate::volume::Volumes;
@@ -145,11 +146,15 @@ impl Group {
         collider::advance(&mut self.settings);
         let time = self.settings.time_step;
         if let Some(rest) = self.rest.as_mut().filter(|_| !moved) {
-            each_mut!(&mut self.solver, solver => if rest.count(solver.max_speed(), time) {
-                for p in 0..solver.particle_count() {
-                    solver.set_velocity(p, DVec3::ZERO);
-                }
-            });
+            let state = self.solver.state(None, &[Quantity::Speed])?;
+            let falls_asleep = |speed| rest.count(speed, time);
+            if state.max_speed.is_some_and(falls_asleep) {
+                each_mut!(&mut self.solver, solver => {
+                    for p in 0..solver.particle_count() {
+                        solver.set_velocity(p, DVec3::ZERO);
+                    }
+                });
+            }
         }
         Ok(step)
     }
