@@ -87,7 +87,7 @@ pub(crate) fn cutting(arguments: &CuttingArguments) -> anyhow::Result<()> {
 }
 
 /// The blade over the body at the start, and the way through it.
-fn stroke(mesh: &TetMesh) -> ([DVec3; 2], DVec3) {
+pub(crate) fn stroke(mesh: &TetMesh) -> ([DVec3; 2], DVec3) {
     let low = mesh.positions.iter().copied().reduce(DVec3::min);
     let high = mesh.positions.iter().copied().reduce(DVec3::max);
     let (low, high) = (low.unwrap_or_default(), high.unwrap_or_default());

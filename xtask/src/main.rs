@@ -4,6 +4,7 @@
 
 mod coloring;
 mod cutting;
+mod gpu;
 mod models;
 mod soak;
 mod solver;
@@ -28,6 +29,8 @@ enum Command {
     Coloring(coloring::ColoringArguments),
     /// What a cut costs by stage and size of the mesh, and what snapping trades.
     Cutting(cutting::CuttingArguments),
+    /// Check the kernels on a GPU, time colorings, iterations and frames there, and write a page and JSON.
+    GpuSweep(gpu::GpuArguments),
     /// Compare the methods of the solver: what they cost and what they are worth.
     Solver(solver::SolverArguments),
     /// Make random strokes by the thousand and check everything after each.
@@ -42,6 +45,7 @@ fn main() -> anyhow::Result<()> {
     match Arguments::parse().command {
         Command::Coloring(arguments) => coloring::coloring(&arguments),
         Command::Cutting(arguments) => cutting::cutting(&arguments),
+        Command::GpuSweep(arguments) => gpu::sweep(&arguments),
         Command::Solver(arguments) => solver::solver(&arguments),
         Command::SoakCut(arguments) => soak::soak(&arguments),
         Command::Sweep(arguments) => sweep::sweep(&arguments),

@@ -46,9 +46,9 @@ pub(crate) struct RunArguments {
     /// Number of frames [default: 200, or more if a stroke ends later].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) frames: Option<u64>,
-    /// Where to compute; auto takes the best there is.
-    #[arg(long, value_enum, default_value_t)]
-    pub(crate) backend: BackendName,
+    /// Where to compute: auto takes a GPU if there is a real one that can do the scene [default: as the scene says].
+    #[arg(long, value_enum)]
+    pub(crate) backend: Option<BackendName>,
     /// Width of the numbers [default: as the scene says].
     #[arg(long, value_enum)]
     pub(crate) precision: Option<PrecisionName>,
@@ -93,9 +93,9 @@ pub(crate) struct ColorArguments {
     /// The clustering: none, serial:K, serial-loose:K, greedy-k:K or pressure:K.
     #[arg(long, value_name = "NAME", default_value = "none")]
     pub(crate) clustering: String,
-    /// Where to compute.
+    /// Where to compute: on a GPU jones-plassmann, ecl-gc, scgc, vivace and wlc.
     #[arg(long, value_enum, default_value_t)]
-    pub(crate) backend: BackendName,
+    pub(crate) backend: PlaceName,
     /// Seed of vivace, greedy:random, iterated-greedy and tabu; the others use none.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) seed: u64,
@@ -160,16 +160,25 @@ impl BalanceName {
     }
 }
 
-/// Where to compute.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ValueEnum)]
+/// Where to simulate.
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 pub(crate) enum BackendName {
     /// The processor.
     Cpu,
-    /// A graphics card; this version has no such backend.
+    /// A GPU, or an error.
     Gpu,
-    /// The best there is.
-    #[default]
+    /// A GPU if there is a real one that can, else the processor.
     Auto,
+}
+
+/// Where to color.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ValueEnum)]
+pub(crate) enum PlaceName {
+    /// The processor.
+    #[default]
+    Cpu,
+    /// A GPU, or an error.
+    Gpu,
 }
 
 /// Width of the numbers.

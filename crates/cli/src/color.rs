@@ -7,18 +7,16 @@ use std::time::Instant;
 
 use anyhow::anyhow;
 use incise::clustering::Method;
-use incise::coloring::{Algorithm, Colored, Conflicts, balance, color as color_by};
-use incise::graph::{Clustering, ColoringMetrics};
+use incise::coloring::{Algorithm, Conflicts, balance, color as color_by};
+use incise::graph::{Clustering, Coloring, ColoringMetrics};
 
-use crate::args::{BalanceName, ColorArguments};
+use crate::args::{BalanceName, ColorArguments, PlaceName};
 use crate::failure::Failure;
 use crate::print::print;
-use crate::run::require_cpu;
 use input::{Format, Problem};
 use report::{ColorReport, Times, table, write_csv};
 
 pub(crate) fn color(arguments: &ColorArguments) -> Result<(), Failure> {
-    require_cpu(arguments.backend)?;
     let input = |error: anyhow::Error| Failure::Input(error);
     let algorithm: Algorithm = arguments
         .algorithm
@@ -52,7 +50,11 @@ pub(crate) fn color(arguments: &ColorArguments) -> Result<(), Failure> {
             (result, cluster, clock.lap())
         }
     };
-    let coloring = result.coloring;
+    let Found {
+        coloring,
+        rounds,
+        edge_visits,
+    } = result;
 
     let proof = problem.check(&clustering, &coloring);
     let verified = proof.verified;
@@ -65,15 +67,18 @@ pub(crate) fn color(arguments: &ColorArguments) -> Result<(), Failure> {
         edges: proof.edges,
         algorithm: algorithm.to_string(),
         clustering: method.to_string(),
-        backend: "cpu",
+        backend: match arguments.backend {
+            PlaceName::Cpu => "cpu",
+            PlaceName::Gpu => "gpu",
+        },
         seed: arguments.seed,
         balanced: arguments.balance.map(BalanceName::name),
         colors: metrics.colors,
         max_clique: proof.clique,
         evenness: metrics.into(),
         by_constraints: ColoringMetrics::by_weights(&coloring, clustering.sizes()).into(),
-        rounds: result.rounds,
-        edge_visits: result.edge_visits,
+        rounds,
+        edge_visits,
         verified,
         ms: Times {
             read,
@@ -100,15 +105,32 @@ pub(crate) fn color(arguments: &ColorArguments) -> Result<(), Failure> {
     }
 }
 
+/// A coloring and what it took to find it.
+struct Found {
+    coloring: Coloring,
+    rounds: usize,
+    edge_visits: Option<u64>,
+}
+
 /// Colors the clusters and evens the colors out if that was asked for.
 fn colored(
     clusters: &impl Conflicts,
     algorithm: Algorithm,
     clustering: &Clustering,
     arguments: &ColorArguments,
-) -> Result<Colored, Failure> {
-    let mut result = color_by(algorithm, clusters, arguments.seed)
-        .map_err(|error| Failure::Run(error.into()))?;
+) -> Result<Found, Failure> {
+    let mut result = match arguments.backend {
+        PlaceName::Cpu => {
+            let result = color_by(algorithm, clusters, arguments.seed);
+            let result = result.map_err(|error| Failure::Run(error.into()))?;
+            Found {
+                coloring: result.coloring,
+                rounds: result.rounds,
+                edge_visits: result.edge_visits,
+            }
+        }
+        PlaceName::Gpu => on_gpu(algorithm, clusters, arguments.seed)?,
+    };
     match arguments.balance {
         None => {}
         Some(BalanceName::Clusters) => {
@@ -120,6 +142,31 @@ fn colored(
         }
     }
     Ok(result)
+}
+
+/// The same on a GPU; sending the graph there is part of the time.
+#[cfg(feature = "gpu")]
+fn on_gpu(algorithm: Algorithm, clusters: &impl Conflicts, seed: u64) -> Result<Found, Failure> {
+    use incise::gpu::coloring::{ColoringKernels, DeviceGraph, color};
+    use incise::gpu::{GpuContext, GpuError, GpuOptions};
+
+    let input = |error: GpuError| Failure::Input(error.into());
+    let gpu = GpuContext::new(&GpuOptions::from_env()).map_err(input)?;
+    let graph = DeviceGraph::new(&gpu, &clusters.graph()).map_err(input)?;
+    let mut kernels = ColoringKernels::default();
+    let result = color(&gpu, &mut kernels, algorithm, &graph, seed).map_err(input)?;
+    Ok(Found {
+        coloring: result.read(&gpu).map_err(input)?,
+        rounds: result.rounds(),
+        edge_visits: None,
+    })
+}
+
+#[cfg(not(feature = "gpu"))]
+fn on_gpu(_: Algorithm, _: &impl Conflicts, _: u64) -> Result<Found, Failure> {
+    Err(Failure::Input(anyhow!(
+        "this build has no GPU path: build with `--features gpu`, or use --backend cpu"
+    )))
 }
 
 /// Milliseconds from lap to lap.

@@ -132,14 +132,15 @@ impl Output {
     }
 
     /// Writes the line of a frame, and its surface if it is one to save.
-    pub(crate) fn frame(&mut self, simulation: &Simulation) -> anyhow::Result<()> {
+    pub(crate) fn frame(&mut self, simulation: &mut Simulation) -> anyhow::Result<()> {
         let report = simulation.report();
         let line = serde_json::to_string(report)?;
         for lines in &mut self.lines {
             lines.push(&line)?;
         }
         if report.frame.is_multiple_of(self.save_every) || report.frame == self.last_frame {
-            let name = format!("surface_{:05}.vtp", report.frame);
+            let (time, name) = (report.time_s, format!("surface_{:05}.vtp", report.frame));
+            simulation.read_back()?;
             let surface = simulation.surface();
             let on_cut = |p: usize| simulation.on_cut().get(p).copied().unwrap_or(false);
             let cut: Vec<f64> = surface
@@ -161,7 +162,7 @@ impl Output {
                 simulation.positions(),
                 fields,
             )?;
-            self.surfaces.push((report.time_s, name));
+            self.surfaces.push((time, name));
         }
         Ok(())
     }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::anyhow;
-use incise::scene::Precision;
+use incise::scene::{Backend, Precision};
 use incise::{Error, Scene, Simulation};
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -17,7 +17,6 @@ use crate::summary::Summary;
 const FRAMES: u64 = 200;
 
 pub(crate) fn run(arguments: &RunArguments) -> Result<(), Failure> {
-    require_cpu(arguments.backend)?;
     if let Some(path) = &arguments.save_mesh {
         require_mesh_file(path)?;
     }
@@ -49,16 +48,23 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<(), Failure> {
             simulation.check()?;
             checked += 1;
         }
-        output.frame(&simulation).map_err(Failure::Run)?;
+        output.frame(&mut simulation).map_err(Failure::Run)?;
         progress.inc(1);
     }
     progress.finish_and_clear();
+    // Without a surface of the last frame nothing has asked for it yet.
+    simulation
+        .read_back()
+        .map_err(|error| Failure::Run(error.into()))?;
     output.finish(&simulation).map_err(Failure::Run)?;
     if let Some(path) = &arguments.save_mesh {
         save_mesh(path, &simulation).map_err(Failure::Run)?;
     }
     if !arguments.quiet {
         print(summary.table([kappa, simulation.kappa()], &simulation.softened()))?;
+        if let Some(note) = simulation.backend_note() {
+            print(note)?;
+        }
         if arguments.check {
             print(format_args!(
                 "checked after each of {checked} cuts: mesh, volume at rest, masses, clusters, colors, pieces"
@@ -93,17 +99,13 @@ fn scene(arguments: &RunArguments) -> Result<Scene, Failure> {
         Some(PrecisionName::F64) => scene.solver.precision = Precision::F64,
         None => {}
     }
-    Ok(scene)
-}
-
-/// Refuses a backend that this version does not have.
-pub(crate) fn require_cpu(backend: BackendName) -> Result<(), Failure> {
-    match backend {
-        BackendName::Cpu | BackendName::Auto => Ok(()),
-        BackendName::Gpu => Err(Failure::Input(anyhow!(
-            "this version has no GPU backend: use --backend cpu or auto"
-        ))),
+    match arguments.backend {
+        Some(BackendName::Cpu) => scene.solver.backend = Backend::Cpu,
+        Some(BackendName::Gpu) => scene.solver.backend = Backend::Gpu,
+        Some(BackendName::Auto) => scene.solver.backend = Backend::Auto,
+        None => {}
     }
+    Ok(scene)
 }
 
 fn progress(frames: u64, quiet: bool) -> ProgressBar {

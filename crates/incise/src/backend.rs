@@ -1,22 +1,30 @@
 //! [`AnySolver`]: the solver in the precision and with the method that the scene asks for, and how it follows a cut.
 
+use std::time::Instant;
+
 use glam::DVec3;
 use incise_cutting::{CutDelta, CuttableMesh};
 use incise_graph::Schedule;
 use incise_mesh::{ParticleId, TetId, TetMesh};
-use incise_xpbd::{KappaLimit, Real, Residuals, Solver, StepReport, StepSettings, XpbdError};
+use incise_xpbd::{KappaLimit, Pose, Real, Residuals, Solver, StepReport, StepSettings, XpbdError};
 
 use crate::Error;
 use crate::descent::Descent;
+#[cfg(feature = "gpu")]
+use crate::device::Device;
 use crate::joined::Joined;
-use crate::report::Milliseconds;
-use crate::scene::{Method, Precision, SolverSpec};
+use crate::measure::State;
+use crate::place::Place;
+use crate::report::{Milliseconds, milliseconds};
+use crate::scene::{Method, Precision, Quantity, SolverSpec};
 
 /// A solver in one of both precisions.
 #[derive(Debug)]
 pub(crate) enum AnySolver {
     Single(Backend<f32>),
     Double(Backend<f64>),
+    #[cfg(feature = "gpu")]
+    Device(Box<Device>),
 }
 
 /// A solver and what its method needs beside it.
@@ -34,7 +42,8 @@ pub(crate) enum LastSubstep {
     Descent { force: f64, potential: f64 },
 }
 
-/// Does the same with whichever solver it is.
+/// Does the same with whichever solver it is. On a device: with the host's, whose state is that of the last time it was
+/// read back.
 macro_rules! each {
     ($any:expr, $solver:ident => $body:expr) => {
         match $any {
@@ -46,10 +55,37 @@ macro_rules! each {
                 solver: $solver,
                 ..
             }) => $body,
+            #[cfg(feature = "gpu")]
+            $crate::backend::AnySolver::Device(device) => {
+                let $solver = device.solver.as_last_seen();
+                $body
+            }
         }
     };
 }
 pub(crate) use each;
+
+/// The same to change it, in a function that may return an error. What is on a device is read back first.
+macro_rules! each_mut {
+    ($any:expr, $solver:ident => $body:expr) => {
+        match $any {
+            $crate::backend::AnySolver::Single($crate::backend::Backend {
+                solver: $solver,
+                ..
+            }) => $body,
+            $crate::backend::AnySolver::Double($crate::backend::Backend {
+                solver: $solver,
+                ..
+            }) => $body,
+            #[cfg(feature = "gpu")]
+            $crate::backend::AnySolver::Device(device) => {
+                let $solver = device.solver.edit()?;
+                $body
+            }
+        }
+    };
+}
+pub(crate) use each_mut;
 
 impl AnySolver {
     pub(crate) fn new(
@@ -63,7 +99,7 @@ impl AnySolver {
             Precision::F64 => Self::Double(Backend::new(positions)),
         };
         let mesh = cuttable.mesh();
-        each!(&mut any, solver => {
+        each_mut!(&mut any, solver => {
             for material in &joined.materials {
                 let field = "body".to_owned();
                 solver.add_material(*material).map_err(|source| Error::Xpbd { field, source })?;
@@ -82,11 +118,23 @@ impl AnySolver {
         Ok(any)
     }
 
-    /// Prepares for the method of the scene, once the tets are what they are.
-    pub(crate) fn prepare(&mut self, spec: &SolverSpec) -> Result<(), Error> {
+    /// Prepares for the method and the place of the scene, once the tets are what they are.
+    pub(crate) fn prepare(&mut self, spec: &SolverSpec, place: &Place) -> Result<(), Error> {
+        #[cfg(feature = "gpu")]
+        if let Some(gpu) = &place.gpu {
+            // Any other one will do: it is replaced at once.
+            let single = std::mem::replace(self, Self::Double(Backend::new(&[])));
+            if let Self::Single(Backend { solver, .. }) = single {
+                *self = Self::Device(Box::new(Device::new(gpu, solver, spec)?));
+            }
+            return Ok(());
+        }
+        debug_assert!(!place.is_device(), "a device was prepared");
         match self {
             Self::Single(backend) => backend.prepare(spec),
             Self::Double(backend) => backend.prepare(spec),
+            #[cfg(feature = "gpu")]
+            Self::Device(_) => Ok(()),
         }
     }
 
@@ -100,6 +148,8 @@ impl AnySolver {
         let step = match self {
             Self::Single(backend) => backend.step(schedule, settings, keep),
             Self::Double(backend) => backend.step(schedule, settings, keep),
+            #[cfg(feature = "gpu")]
+            Self::Device(device) => return device.step(schedule, settings, keep),
         };
         step.map_err(|source| Error::Xpbd {
             field: "solver".into(),
@@ -107,17 +157,71 @@ impl AnySolver {
         })
     }
 
+    /// Makes the state of a device known here; returns how many particles it had to put back since the last time.
+    pub(crate) fn read_back(&mut self) -> Result<usize, Error> {
+        match self {
+            Self::Single(_) | Self::Double(_) => Ok(0),
+            #[cfg(feature = "gpu")]
+            Self::Device(device) => device.read_back(),
+        }
+    }
+
+    /// How many particles a device had to put back since the last time, as far as is known here.
+    pub(crate) fn news(&mut self) -> usize {
+        match self {
+            Self::Single(_) | Self::Double(_) => 0,
+            #[cfg(feature = "gpu")]
+            Self::Device(device) => device.news(),
+        }
+    }
+
+    /// Measures the state as far as the quantities ask; on a device without fetching it.
+    pub(crate) fn state(
+        &mut self,
+        gravity: Option<DVec3>,
+        quantities: &[Quantity],
+    ) -> Result<State, Error> {
+        match self {
+            Self::Single(backend) => Ok(backend.state(gravity, quantities)),
+            Self::Double(backend) => Ok(backend.state(gravity, quantities)),
+            #[cfg(feature = "gpu")]
+            Self::Device(device) => {
+                let measures = device.solver.measure(gravity)?;
+                Ok(State {
+                    energy: Some(measures.energy),
+                    volume: Some(measures.volume),
+                    max_speed: Some(measures.max_speed),
+                })
+            }
+        }
+    }
+
+    /// Says where a handle is at the end of the next frame.
+    pub(crate) fn move_handle(&mut self, handle: u32, pose: Pose) {
+        match self {
+            Self::Single(backend) => backend.solver.move_handle(handle, pose),
+            Self::Double(backend) => backend.solver.move_handle(handle, pose),
+            #[cfg(feature = "gpu")]
+            Self::Device(device) => device.solver.move_handle(handle, pose),
+        }
+    }
+
     /// The residuals of the last substep, if they were kept.
     pub(crate) fn last_substep(&self, substep_time: f64) -> Option<LastSubstep> {
         match self {
             Self::Single(backend) => backend.last_substep(substep_time),
             Self::Double(backend) => backend.last_substep(substep_time),
+            #[cfg(feature = "gpu")]
+            Self::Device(device) => {
+                let residuals = device.solver.as_last_seen().residuals(substep_time);
+                residuals.map(LastSubstep::Constraints)
+            }
         }
     }
 
     /// Softens every tet, present and to come, that exceeds the limit. O(tets).
-    pub(crate) fn limit_kappa(&mut self, limit: KappaLimit, mesh: &TetMesh) {
-        each!(self, solver => {
+    pub(crate) fn limit_kappa(&mut self, limit: KappaLimit, mesh: &TetMesh) -> Result<(), Error> {
+        each_mut!(self, solver => {
             solver.limit_kappa(Some(limit));
             for t in 0..solver.tet_count() {
                 if solver.kappa_of(t, limit.substep_time) > limit.kappa {
@@ -125,6 +229,7 @@ impl AnySolver {
                 }
             }
         });
+        Ok(())
     }
 
     /// Follows a cut. Costs what the cut touched; descent sorts its stars anew, O(tets).
@@ -135,7 +240,7 @@ impl AnySolver {
         ms: &mut Milliseconds,
     ) -> Result<(), Error> {
         let mesh = cuttable.mesh();
-        each!(self, solver => {
+        each_mut!(self, solver => {
             for point in &delta.points {
                 let [a, b] = point.ends.map(ParticleId::index);
                 solver.push_particle_between(a, b, point.parameter);
@@ -175,15 +280,31 @@ impl AnySolver {
         match self {
             Self::Single(backend) => backend.follow(ms),
             Self::Double(backend) => backend.follow(ms),
+            #[cfg(feature = "gpu")]
+            Self::Device(_) => Ok(()),
         }
     }
 
-    /// Brings the layout up to date with the schedule; the next step would do it otherwise. Descent has none.
-    pub(crate) fn lay_out(&mut self, schedule: &Schedule) {
+    /// Brings the layout up to date with the schedule, or sends a device what has changed; the next step would do it
+    /// otherwise. Descent has none.
+    pub(crate) fn lay_out(
+        &mut self,
+        schedule: &Schedule,
+        ms: &mut Milliseconds,
+    ) -> Result<(), Error> {
+        let start = Instant::now();
         match self {
             Self::Single(backend) => backend.lay_out(schedule),
             Self::Double(backend) => backend.lay_out(schedule),
+            #[cfg(feature = "gpu")]
+            Self::Device(device) => {
+                device.solver.send(schedule)?;
+                ms.upload += milliseconds(start.elapsed());
+                return Ok(());
+            }
         }
+        ms.schedule += milliseconds(start.elapsed());
+        Ok(())
     }
 
     /// Recomputes masses, corners and what a step would solve, and compares; for tests and on request.
@@ -208,7 +329,20 @@ impl AnySolver {
             }
             solver.check_layout(schedule).map_err(|error| Error::Inconsistent(error.to_string()))?;
         });
+        #[cfg(feature = "gpu")]
+        if let Self::Device(device) = self {
+            device.solver.check(schedule)?;
+        }
         Ok(())
+    }
+
+    /// The solver on a device, if it is on one.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn device(&self) -> Option<&incise_gpu::GpuSolver> {
+        match self {
+            Self::Device(device) => Some(&device.solver),
+            _ => None,
+        }
     }
 
     pub(crate) fn positions(&self, out: &mut Vec<DVec3>) {
@@ -242,6 +376,15 @@ impl<R: Real> Backend<R> {
             Some(descent) => descent.step(solver, settings, keep),
             None if keep => solver.step_keeping_residuals(schedule, settings),
             None => solver.step(schedule, settings),
+        }
+    }
+
+    fn state(&self, gravity: Option<DVec3>, quantities: &[Quantity]) -> State {
+        let (solver, asks) = (&self.solver, |quantity| quantities.contains(&quantity));
+        State {
+            energy: asks(Quantity::Energy).then(|| solver.energy(gravity)),
+            volume: asks(Quantity::Volume).then(|| solver.volume()),
+            max_speed: asks(Quantity::Speed).then(|| solver.max_speed()),
         }
     }
 

@@ -72,6 +72,13 @@ pub enum Error {
     /// A derived structure no longer agrees with what it is derived from: a defect of this library.
     #[error("internal check failed: {0}")]
     Inconsistent(String),
+    /// A GPU was asked for, and this build has no path to one.
+    #[error("solver.backend is gpu, and this build has no GPU path: build with `--features gpu`")]
+    NoGpuPath,
+    /// The GPU.
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    Gpu(#[from] incise_gpu::GpuError),
     /// The threads could not be started.
     #[error("cannot start {threads} threads: {message}")]
     Threads {

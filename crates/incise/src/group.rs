@@ -11,12 +11,14 @@ use incise_cutting::{CutDelta, CuttableMesh, PieceEvent, PieceTracker};
 use incise_mesh::signed_volume;
 use incise_xpbd::{KappaLimit, StepReport, StepSettings};
 
-use crate::backend::{AnySolver, each};
+use crate::backend::{AnySolver, each, each_mut};
 use crate::handle::Handle;
 use crate::joined::Joined;
+use crate::place::Place;
 use crate::plan::Plan;
 use crate::recluster::Recluster;
 use crate::report::{Milliseconds, milliseconds};
+use crate::scene::Quantity;
 use crate::sleep::Rest;
 use crate::substeps::Choice;
 use crate::volume::Volumes;
@@ -65,6 +67,7 @@ pub(crate) struct CutKappa {
 impl Group {
     pub(crate) fn new(
         scene: &Scene,
+        place: &Place,
         mut settings: StepSettings,
         mut joined: Joined,
     ) -> Result<Self, Error> {
@@ -83,7 +86,7 @@ impl Group {
                 kappa,
                 substep_time,
             };
-            solver.limit_kappa(limit, cuttable.mesh());
+            solver.limit_kappa(limit, cuttable.mesh())?;
         }
         for handle in &mut joined.handles {
             handle.attach(&mut solver)?;
@@ -94,7 +97,7 @@ impl Group {
         if let Some(volumes) = &volumes {
             volumes.constrain(&mut solver, &cuttable, &plan.schedule)?;
         }
-        solver.prepare(&scene.solver)?;
+        solver.prepare(&scene.solver, place)?;
         let recluster = scene.solver.recluster;
         let mut group = Self {
             recluster: recluster.map(|spec| Recluster::new(spec, &plan)),
@@ -143,11 +146,15 @@ impl Group {
         collider::advance(&mut self.settings);
         let time = self.settings.time_step;
         if let Some(rest) = self.rest.as_mut().filter(|_| !moved) {
-            each!(&mut self.solver, solver => if rest.count(solver.max_speed(), time) {
-                for p in 0..solver.particle_count() {
-                    solver.set_velocity(p, DVec3::ZERO);
-                }
-            });
+            let state = self.solver.state(None, &[Quantity::Speed])?;
+            let falls_asleep = |speed| rest.count(speed, time);
+            if state.max_speed.is_some_and(falls_asleep) {
+                each_mut!(&mut self.solver, solver => {
+                    for p in 0..solver.particle_count() {
+                        solver.set_velocity(p, DVec3::ZERO);
+                    }
+                });
+            }
         }
         Ok(step)
     }
@@ -182,9 +189,7 @@ impl Group {
         if let Some(volumes) = &self.volumes {
             volumes.follow(&mut self.solver, delta, &self.cuttable, &self.plan.schedule)?;
         }
-        let start = Instant::now();
-        self.solver.lay_out(&self.plan.schedule);
-        ms.schedule += milliseconds(start.elapsed());
+        self.solver.lay_out(&self.plan.schedule, ms)?;
         Ok(events)
     }
 

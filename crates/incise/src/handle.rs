@@ -8,7 +8,7 @@ use incise_xpbd::Pose;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
-use crate::backend::{AnySolver, each};
+use crate::backend::{AnySolver, each_mut};
 use crate::collider::rotation;
 use crate::limits::{coordinates, value, within};
 use crate::region::particles;
@@ -115,7 +115,7 @@ impl Handle {
     pub(crate) fn attach(&mut self, solver: &mut AnySolver) -> Result<(), Error> {
         let field = &self.field;
         let (pose, compliance) = (self.pose(0), self.spec.compliance);
-        each!(solver, solver => {
+        each_mut!(solver, solver => {
             self.number = solver.add_handle(pose);
             for &p in &self.particles {
                 if solver.handle_of(p).is_some() {
@@ -139,7 +139,7 @@ impl Handle {
     /// Tells the solver where the handle is at the end of a frame.
     pub(crate) fn advance(&self, frame: u64, solver: &mut AnySolver) {
         let pose = self.pose(frame.saturating_add(1));
-        each!(solver, solver => solver.move_handle(self.number, pose));
+        solver.move_handle(self.number, pose);
     }
 
     /// Where the handle is at the start of a frame.

@@ -24,6 +24,8 @@ mod backend;
 mod body;
 mod collider;
 mod descent;
+#[cfg(feature = "gpu")]
+mod device;
 mod error;
 mod group;
 mod handle;
@@ -34,6 +36,7 @@ mod link;
 mod measure;
 mod method;
 mod pieces;
+mod place;
 mod plan;
 mod preset;
 mod recluster;
@@ -53,6 +56,8 @@ pub use error::Error;
 pub use incise_clustering as clustering;
 pub use incise_coloring as coloring;
 pub use incise_cutting as cutting;
+#[cfg(feature = "gpu")]
+pub use incise_gpu as gpu;
 pub use incise_graph as graph;
 pub use incise_mesh as mesh;
 pub use incise_xpbd as xpbd;

@@ -6,7 +6,7 @@ use incise_graph::{Clustering, Incidence, Schedule};
 use incise_xpbd::DistanceConstraint;
 use serde::{Deserialize, Serialize};
 
-use crate::backend::{AnySolver, each};
+use crate::backend::{AnySolver, each_mut};
 use crate::limits::{LARGEST_COORDINATE, coordinates, existing, value, within};
 use crate::{Error, Scene};
 
@@ -98,7 +98,7 @@ pub(crate) fn connect(solver: &mut AnySolver, links: &[DistanceConstraint]) -> R
     if links.is_empty() {
         return Ok(());
     }
-    each!(solver, solver => {
+    each_mut!(solver, solver => {
         let particles = links.iter().map(|link| link.particles);
         let incidence = Incidence::from_constraints(solver.particle_count(), particles)?;
         let coloring = greedy(&incidence, Order::LargestFirst);

@@ -4,11 +4,42 @@
 //! the bit. Cost: a pass over the particles or tets each.
 
 use glam::DVec3;
-use incise_xpbd::Volume;
+use incise_xpbd::{Energy, Volume};
 
+use crate::Error;
 use crate::backend::{LastSubstep, each};
 use crate::group::Group;
 use crate::report::{BodyReport, EnergyReport, ResidualReport, SoftenedReport};
+use crate::scene::Quantity;
+
+/// What the state of a group is worth, as far as somebody asked.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct State {
+    pub(crate) energy: Option<Energy>,
+    pub(crate) volume: Option<Volume>,
+    pub(crate) max_speed: Option<f64>,
+}
+
+/// Whether a quantity is one of those.
+pub(crate) fn is_of_state(quantity: &Quantity) -> bool {
+    matches!(
+        quantity,
+        Quantity::Energy | Quantity::Volume | Quantity::Speed
+    )
+}
+
+/// Measures the state of each group where it is; nothing if nobody asks.
+pub(crate) fn states(
+    groups: &mut [Group],
+    gravity: Option<DVec3>,
+    quantities: &[Quantity],
+) -> Result<Vec<State>, Error> {
+    if !quantities.iter().any(is_of_state) {
+        return Ok(Vec::new());
+    }
+    let state = |group: &mut Group| group.solver.state(gravity, quantities);
+    groups.iter_mut().map(state).collect()
+}
 
 /// Residuals of the last substep of each group awake, as one vector's length, and their potentials' sum; `None` if all
 /// sleep or one has not kept its own. What is too large for a double is the largest one.
@@ -57,14 +88,13 @@ pub(crate) fn residual(groups: &[Group], gravity: Option<DVec3>) -> Option<Resid
     })
 }
 
-pub(crate) fn energy(groups: &[Group], gravity: Option<DVec3>) -> EnergyReport {
+pub(crate) fn energy(states: &[State]) -> EnergyReport {
     let mut sum = EnergyReport {
         kinetic: 0.0,
         elastic: 0.0,
         gravity: 0.0,
     };
-    for group in groups {
-        let energy = each!(&group.solver, solver => solver.energy(gravity));
+    for energy in states.iter().filter_map(|state| state.energy) {
         sum.kinetic += energy.kinetic;
         sum.elastic += energy.elastic;
         sum.gravity += energy.gravity;
@@ -72,15 +102,14 @@ pub(crate) fn energy(groups: &[Group], gravity: Option<DVec3>) -> EnergyReport {
     sum
 }
 
-pub(crate) fn volume(groups: &[Group]) -> Volume {
+pub(crate) fn volume(states: &[State]) -> Volume {
     let mut sum = Volume {
         total: 0.0,
         rest: 0.0,
         min_ratio: 1.0,
         inverted: 0,
     };
-    for group in groups {
-        let volume = each!(&group.solver, solver => solver.volume());
+    for volume in states.iter().filter_map(|state| state.volume) {
         sum.total += volume.total;
         sum.rest += volume.rest;
         sum.min_ratio = sum.min_ratio.min(volume.min_ratio);
@@ -90,10 +119,8 @@ pub(crate) fn volume(groups: &[Group]) -> Volume {
 }
 
 /// The largest speed of a particle in m/s.
-pub(crate) fn max_speed(groups: &[Group]) -> f64 {
-    let speeds = groups
-        .iter()
-        .map(|group| each!(&group.solver, solver => solver.max_speed()));
+pub(crate) fn max_speed(states: &[State]) -> f64 {
+    let speeds = states.iter().filter_map(|state| state.max_speed);
     speeds.fold(0.0, f64::max)
 }
 

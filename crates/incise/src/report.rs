@@ -66,14 +66,15 @@ pub struct FrameReport {
     /// a body or bodies may sleep, else where kappa is reported, else absent.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub bodies: Vec<BodyReport>,
-    /// Particles that had to be put back because they would have become infinite; absent if none.
+    /// Particles that had to be put back because they would have become infinite; absent if none. From a device they
+    /// are known in the frames that ask it for something (a blade, a quantity of the state), for all frames since.
     #[serde(skip_serializing_if = "is_zero")]
     pub repaired: usize,
     /// Groups of joined bodies whose clusters and colors were made anew in the background and taken in this frame; absent
     /// if none.
     #[serde(skip_serializing_if = "is_zero")]
     pub reclustered: usize,
-    /// Where it was computed: `cpu`.
+    /// Where it was computed: `cpu` or `gpu`.
     pub backend: &'static str,
     /// In which precision: `f32` or `f64`.
     pub precision: &'static str,
@@ -211,9 +212,10 @@ pub struct Milliseconds {
     pub schedule: f64,
     /// Sending to a device.
     pub upload: f64,
-    /// Solving.
+    /// Solving. On a device: telling it what to do, after waiting for the frame before the last one if that is not done; it
+    /// works on by itself.
     pub solve: f64,
-    /// Fetching from a device.
+    /// Waiting for a device and fetching from it, where somebody asked: a blade, a reported quantity.
     pub readback: f64,
     /// Everything else: positions and reported quantities.
     pub other: f64,

@@ -12,6 +12,7 @@ pub use crate::collider::{ColliderSpec, RotationSpec};
 pub use crate::handle::{HandleSpec, TurnSpec};
 pub use crate::link::{EndSpec, LinkSpec};
 pub use crate::method::{Form, Method};
+pub use crate::place::Backend;
 pub use crate::preset::Preset;
 pub use crate::recluster::ReclusterSpec;
 pub use crate::region::Region;
@@ -176,6 +177,10 @@ pub struct SolverSpec {
     pub coloring: String,
     /// Width of the numbers.
     pub precision: Precision,
+    /// Where it is computed: `cpu`, `gpu` or `auto`. On a GPU clusters of up to 32 tets are a thread's work each, larger
+    /// ones, up to 128, that of a workgroup.
+    #[serde(skip_serializing_if = "Backend::is_cpu")]
+    pub backend: Backend,
     /// Largest kappa of a tet, positive: stiffer ones, as cuts leave them, are softened to it. `inf` softens none.
     pub kappa_limit: f64,
     /// Bodies at rest are not solved until they are cut or something moves them; absent: all are always solved.
@@ -202,6 +207,7 @@ impl Default for SolverSpec {
             recluster: None,
             coloring: "auto".to_owned(),
             precision: Precision::F32,
+            backend: Backend::Cpu,
             kappa_limit: 1.0,
             sleep: None,
         }

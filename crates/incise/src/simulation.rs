@@ -19,9 +19,10 @@ use crate::group::Group;
 use crate::islands::islands;
 use crate::joined::Joined;
 use crate::limits::{self, value};
-use crate::measure::{by_body, energy, kappa, max_speed, residual, softened, volume};
+use crate::measure::{by_body, energy, kappa, max_speed, residual, softened, states, volume};
 use crate::method::settings;
 use crate::pieces::PieceNumbers;
+use crate::place::Place;
 use crate::report::{
     CutReport, DetachedReport, FrameReport, Milliseconds, PieceReport, SoftenedReport, milliseconds,
 };
@@ -65,6 +66,7 @@ pub struct Simulation {
     quantities: Vec<Quantity>,
     every: u64,
     precision: Precision,
+    place: Place,
     /// In the order of their first bodies.
     groups: Vec<Group>,
     /// All groups together, if there are several.
@@ -86,7 +88,7 @@ impl Simulation {
     /// # Errors
     /// If a value of the scene lies outside its range or a mesh cannot be read or is broken.
     pub fn new(scene: &Scene) -> Result<Self, Error> {
-        Self::build(scene, None)
+        Self::build(scene, Place::choose(scene)?, None)
     }
 
     /// The same on a number of threads of its own. The result is the same to the bit for any number.
@@ -102,10 +104,24 @@ impl Simulation {
             threads,
             message: error.to_string(),
         })?;
-        Self::build(scene, Some(pool))
+        Self::build(scene, Place::choose(scene)?, Some(pool))
     }
 
-    fn build(scene: &Scene, pool: Option<ThreadPool>) -> Result<Self, Error> {
+    /// Sets a scene up on a device that is open, whatever its `solver.backend` says: a renderer's, that of another
+    /// simulation.
+    ///
+    /// # Errors
+    /// As [`Simulation::new`], and if the device cannot do what the scene asks for.
+    #[cfg(feature = "gpu")]
+    pub fn on_device(
+        scene: &Scene,
+        gpu: std::sync::Arc<crate::gpu::GpuContext>,
+    ) -> Result<Self, Error> {
+        crate::place::check(scene)?;
+        Self::build(scene, Place::on(gpu), None)
+    }
+
+    fn build(scene: &Scene, place: Place, pool: Option<ThreadPool>) -> Result<Self, Error> {
         let settings = settings(scene)?;
         if scene.report.every == 0 {
             return Err(value("report.every", 0, "at least 1"));
@@ -127,7 +143,7 @@ impl Simulation {
         let make_groups = || {
             let groups = joined.into_par_iter();
             groups
-                .map(|joined| Group::new(scene, settings.clone(), joined))
+                .map(|joined| Group::new(scene, &place, settings.clone(), joined))
                 .collect::<Result<Vec<_>, _>>()
         };
         let groups = match &pool {
@@ -140,6 +156,7 @@ impl Simulation {
             quantities: scene.report.quantities.clone(),
             every: scene.report.every,
             precision,
+            place,
             on_cut: Vec::new(),
             deltas: Vec::new(),
             pieces: PieceNumbers::new(&groups),
@@ -188,6 +205,10 @@ impl Simulation {
         let start = Instant::now();
         let mut ms = Milliseconds::default();
         let mut detached = Vec::new();
+        let mut repaired = 0;
+        if self.place.is_device() && self.timeline.is_due(self.next_frame) {
+            repaired += self.fetch(&mut ms)?;
+        }
         let cut = self.carry_out_strokes(&mut detached, &mut ms)?;
         let mut reclustered = 0;
         for group in &mut self.groups {
@@ -197,11 +218,15 @@ impl Simulation {
         let before_solve = Instant::now();
         let (frame, residual) = (self.next_frame, self.wants(Quantity::Residual));
         let groups = self.groups.par_iter_mut();
-        let repaired = groups
+        repaired += groups
             .map(|group| group.step(frame, residual).map(|step| step.repaired))
             .try_reduce(|| 0, |a, b| Ok(a + b))?;
         ms.solve = milliseconds(before_solve.elapsed());
 
+        // A device measures what it has; residuals need positions and multipliers of all.
+        if !self.place.is_device() || residual {
+            repaired += self.fetch(&mut ms)?;
+        }
         self.report = FrameReport {
             frame: self.next_frame,
             time_s: (self.next_frame + 1) as f64 * self.time_step,
@@ -211,11 +236,11 @@ impl Simulation {
             reclustered,
             ..FrameReport::default()
         };
-        self.measure();
-        self.collect_positions();
+        self.measure(&mut ms)?;
         self.count();
         ms.total = milliseconds(start.elapsed());
-        ms.other = ms.total - ms.cut - ms.cluster - ms.color - ms.schedule - ms.solve;
+        ms.other = ms.total
+            - (ms.cut + ms.cluster + ms.color + ms.schedule + ms.upload + ms.solve + ms.readback);
         self.report.ms = ms;
         self.next_frame += 1;
         Ok(())
@@ -281,28 +306,34 @@ impl Simulation {
             deltas.push(delta.clone());
             Ok(())
         })?;
-        ms.cut = milliseconds(start.elapsed()) - ms.cluster - ms.color - ms.schedule - measuring;
+        let others = ms.cluster + ms.color + ms.schedule + ms.upload + measuring;
+        ms.cut = milliseconds(start.elapsed()) - others;
         Ok(report)
     }
 
     /// Computes the quantities that this frame reports.
-    fn measure(&mut self) {
+    fn measure(&mut self, ms: &mut Milliseconds) -> Result<(), Error> {
         let kappa_too = self.wants(Quantity::Kappa);
         if kappa_too || self.chooses() || self.sleeps() {
             self.report.bodies = by_body(&mut self.groups, kappa_too);
         }
         if !self.report.frame.is_multiple_of(self.every) {
-            return;
+            return Ok(());
+        }
+        let start = Instant::now();
+        let states = states(&mut self.groups, self.gravity, &self.quantities)?;
+        if self.place.is_device() {
+            let groups = self.groups.iter_mut();
+            self.report.repaired += groups.map(|group| group.solver.news()).sum::<usize>();
+            ms.readback += milliseconds(start.elapsed());
         }
         for quantity in &self.quantities {
             let report = &mut self.report;
             match quantity {
                 Quantity::Residual => report.residual = residual(&self.groups, self.gravity),
-                Quantity::Energy => {
-                    report.energy = Some(energy(&self.groups, self.gravity));
-                }
+                Quantity::Energy => report.energy = Some(energy(&states)),
                 Quantity::Volume => {
-                    let volume = volume(&self.groups);
+                    let volume = volume(&states);
                     report.volume = Some(volume.total);
                     // Nothing may be left.
                     let error = volume.total / volume.rest - 1.0;
@@ -310,13 +341,56 @@ impl Simulation {
                     report.min_volume_ratio = Some(volume.min_ratio);
                     report.inverted_tets = Some(volume.inverted);
                 }
-                Quantity::Speed => report.max_speed = Some(max_speed(&self.groups)),
+                Quantity::Speed => report.max_speed = Some(max_speed(&states)),
                 Quantity::Kappa => {
                     report.kappa = Some(kappa(&self.groups));
                     report.softened = Some(softened(&self.groups));
                 }
             }
         }
+        Ok(())
+    }
+
+    /// Takes over state and positions; returns how many particles a device had to put back since the last time.
+    fn fetch(&mut self, ms: &mut Milliseconds) -> Result<usize, Error> {
+        let start = Instant::now();
+        let mut repaired = 0;
+        for group in &mut self.groups {
+            repaired += group.solver.read_back()?;
+        }
+        if self.place.is_device() {
+            ms.readback += milliseconds(start.elapsed());
+        }
+        self.collect_positions();
+        Ok(repaired)
+    }
+
+    /// Makes [`Simulation::positions`] those of now, if the state is on a device: waits for it and fetches them.
+    /// Otherwise they are, and nothing happens.
+    ///
+    /// A frame does this by itself only if a stroke is due, since a blade has to know where the body is, if it reports
+    /// residuals, or if bodies may sleep. Energies, volume and speed are summed up on the device.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub fn read_back(&mut self) -> Result<(), Error> {
+        if self.place.is_device() {
+            self.report.repaired += self.fetch(&mut Milliseconds::default())?;
+        }
+        Ok(())
+    }
+
+    /// What is to be said about where it is computed: the device, or why there is none; `None` if the scene asked for
+    /// the processor.
+    #[must_use]
+    pub fn backend_note(&self) -> Option<&str> {
+        self.place.note.as_deref()
+    }
+
+    /// The device solvers of the scene's groups of bodies, for renderers; none on the processor.
+    #[cfg(feature = "gpu")]
+    pub fn device_solvers(&self) -> impl Iterator<Item = &crate::gpu::GpuSolver> + '_ {
+        self.groups.iter().filter_map(|group| group.solver.device())
     }
 
     /// Takes over the positions of the solvers.
@@ -343,7 +417,7 @@ impl Simulation {
         report.clusters = clusters;
         report.colors = colors;
         report.pieces = self.groups.iter().map(|group| group.pieces.count()).sum();
-        report.backend = "cpu";
+        report.backend = self.place.name();
         report.precision = self.precision.name();
     }
 
@@ -353,7 +427,8 @@ impl Simulation {
         &self.report
     }
 
-    /// The present positions of all particles in m.
+    /// The positions of all particles in m: the present ones, or, if the state is on a device, those when it was last
+    /// fetched: see [`Simulation::read_back`].
     #[must_use]
     pub fn positions(&self) -> &[DVec3] {
         match &self.whole {

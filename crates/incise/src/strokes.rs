@@ -67,6 +67,11 @@ impl Timeline {
         Ok(())
     }
 
+    /// Whether a stroke begins or goes on in a frame.
+    pub(crate) fn is_due(&self, frame: u64) -> bool {
+        self.strokes.iter().any(|stroke| stroke.frames[0] <= frame)
+    }
+
     /// Carries out what is due in `frame` on every group; hands each delta to `follow` before the next stroke moves. The
     /// groups' positions are kept current.
     pub(crate) fn advance(

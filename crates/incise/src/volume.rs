@@ -11,7 +11,7 @@ use incise_mesh::{ParticleId, TetId};
 use incise_xpbd::{VolumeConstraint, XpbdError};
 
 use crate::Error;
-use crate::backend::{AnySolver, each};
+use crate::backend::{AnySolver, each_mut};
 
 /// What each body of a group asks for.
 #[derive(Debug)]
@@ -34,7 +34,7 @@ impl Volumes {
         schedule: &Schedule,
     ) -> Result<(), Error> {
         let mesh = cuttable.mesh();
-        each!(solver, solver => {
+        each_mut!(solver, solver => {
             let list: Vec<VolumeConstraint> = (0..mesh.tets.len())
                 .map(|t| {
                     let rest = mesh.corners(TetId::new(t));
@@ -56,7 +56,7 @@ impl Volumes {
         let mesh = cuttable.mesh();
         let mut added: Vec<_> = delta.added.iter().collect();
         added.sort_unstable_by_key(|tet| tet.tet);
-        each!(solver, solver => {
+        each_mut!(solver, solver => {
             for tet in added {
                 let body = solver.material_of(tet.tet.index());
                 let constraint = self.constraint(body, tet.corners, mesh.corners(tet.tet));

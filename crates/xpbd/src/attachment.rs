@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use crate::real::{finite, load, store, weight};
 use crate::step::Factors;
 use crate::step::PARALLEL_PARTICLES;
-use crate::{Real, Solver, XpbdError};
+use crate::{AttachmentData, Real, Solver, XpbdError};
 
 /// Where a handle is and how it is turned.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -132,6 +132,23 @@ impl<R: Real> Attachments<R> {
         self.get(particle).is_some_and(|a| a.compliance == 0.0)
     }
 
+    /// What hangs on handles.
+    pub(crate) fn list(&self) -> impl ExactSizeIterator<Item = AttachmentData> + '_ {
+        self.list.iter().map(|attachment| AttachmentData {
+            particle: attachment.particle,
+            handle: attachment.handle,
+            place: attachment.place,
+            compliance: attachment.compliance,
+            damping: attachment.damping,
+        })
+    }
+
+    /// The poses of all handles at a fraction of the frame.
+    pub(crate) fn poses(&self, fraction: f64) -> impl ExactSizeIterator<Item = Pose> + '_ {
+        let handles = self.handles.iter();
+        handles.map(move |handle| handle.from.toward(&handle.to, fraction))
+    }
+
     /// Attaches the last particle as `of` is, if it is.
     pub(crate) fn copy(&mut self, of: usize, copy: usize) {
         if let Some(&attachment) = self.get(of) {
@@ -149,6 +166,7 @@ impl<R: Real> Attachments<R> {
                 place: a.place.lerp(b.place, parameter),
                 compliance: a.compliance.max(b.compliance),
                 damping: a.damping.max(b.damping),
+                target: a.target + (b.target - a.target) * R::from_f64(parameter),
                 ..a
             };
             self.append(attachment, particle);
@@ -276,6 +294,7 @@ impl<R: Real> Solver<R> {
             Ok(place) => list[place] = attachment,
             Err(place) => list.insert(place, attachment),
         }
+        self.note(|changes| changes.attachments = true);
         self.set_weight(particle);
         Ok(())
     }
@@ -287,6 +306,7 @@ impl<R: Real> Solver<R> {
     pub fn detach(&mut self, particle: usize) {
         if let Ok(place) = self.attachments.find(particle) {
             self.attachments.list.remove(place);
+            self.note(|changes| changes.attachments = true);
         }
         self.set_weight(particle);
     }

@@ -319,6 +319,16 @@ impl<R: Real> Obstacle<R> {
     }
 }
 
+impl Obstacle<f32> {
+    /// All there is to know, at the places that `Solver::obstacle_data` names.
+    pub(crate) fn numbers(&self) -> [f32; 20] {
+        let mut numbers = self.solid.numbers();
+        numbers[1] = self.friction;
+        numbers[4..7].copy_from_slice(&self.motion.to_array());
+        numbers
+    }
+}
+
 impl<R: Real> Solver<R> {
     /// Puts the particles inside of colliders on their surface.
     pub(crate) fn project_to_colliders(&self, obstacles: &[Obstacle<R>]) {

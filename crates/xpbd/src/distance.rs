@@ -8,7 +8,7 @@ use incise_graph::Schedule;
 
 use crate::direction::direction;
 use crate::scalar::{Constraints, Scalar};
-use crate::{Real, Solver, XpbdError};
+use crate::{DistanceData, Real, Solver, XpbdError};
 
 /// Keeps two particles at a distance. See [`Solver::set_distances`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,6 +54,19 @@ pub(crate) struct Distance<R> {
     compliance: R,
     damping: R,
     only_when_longer: bool,
+}
+
+impl<R: Real> Distance<R> {
+    /// All there is to know.
+    pub(crate) fn data(&self) -> DistanceData<R> {
+        DistanceData {
+            particles: self.particles,
+            length: self.length,
+            compliance: self.compliance,
+            damping: self.damping,
+            only_when_longer: self.only_when_longer,
+        }
+    }
 }
 
 impl<R: Real> Scalar<R, 2> for Distance<R> {
@@ -142,6 +155,7 @@ impl<R: Real> Solver<R> {
         }
         let distances = Constraints::new("distance", self.particle_count(), list, schedule)?;
         self.distances = (!constraints.is_empty()).then_some(distances);
+        self.note(|changes| changes.distances = true);
         Ok(())
     }
 

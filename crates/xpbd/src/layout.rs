@@ -120,7 +120,7 @@ pub(crate) struct Ingredients<R> {
 
 impl<R: Real> Ingredients<R> {
     /// What is stored for the tet.
-    fn rest(&self) -> [R; REST] {
+    pub(crate) fn rest(&self) -> [R; REST] {
         let mut rest = [self.tet.stiffness; REST];
         rest[..9].copy_from_slice(&self.tet.inverse_rest);
         rest[9..15].copy_from_slice(&metric(&self.tet, self.weights));

@@ -43,6 +43,7 @@ mod attachment;
 mod collider;
 mod crew;
 mod descent;
+mod device;
 #[cfg(feature = "direct")]
 mod direct;
 mod direction;
@@ -71,6 +72,7 @@ pub use descent::{
     Correction, CorrectionReport, CorrectionSettings, DescentReport, DescentSettings, Guess,
     ImplicitStep, Stars,
 };
+pub use device::{AttachmentData, Changes, DistanceData, TetData, VolumeData};
 pub use distance::DistanceConstraint;
 pub use error::XpbdError;
 pub use material::Material;

@@ -17,7 +17,7 @@ use crate::origin::frame_of;
 use crate::real::{finite, load, store};
 use crate::scalar::Constraints;
 use crate::volume::TetVolume;
-use crate::{Material, Real, XpbdError};
+use crate::{Changes, Material, Real, XpbdError};
 
 /// The state of a simulation in one precision.
 ///
@@ -60,6 +60,8 @@ pub struct Solver<R: Real> {
     pub(crate) material_of: Vec<u16>,
     pub(crate) materials: Vec<Material>,
     kappa_limit: Option<KappaLimit>,
+    /// What edits have changed, if somebody follows.
+    pub(crate) changes: Option<Changes>,
     /// The tets in solving order.
     pub(crate) layout: Layout<R>,
     /// The instructions that this processor has.
@@ -109,6 +111,7 @@ impl<R: Real> Solver<R> {
             tets: Vec::new(),
             volumes: Vec::new(),
             kappa_limit: None,
+            changes: None,
             material_of: Vec::new(),
             materials: Vec::new(),
             layout: Layout::default(),
@@ -151,6 +154,7 @@ impl<R: Real> Solver<R> {
         material.check()?;
         self.materials.push(material);
         self.layout.forget();
+        self.note(|changes| changes.all_tets = true);
         Ok(u16::try_from(self.materials.len() - 1).expect("at most 65,536 materials"))
     }
 
@@ -163,6 +167,7 @@ impl<R: Real> Solver<R> {
         self.tets.push(constraint);
         self.volumes.push(signed_volume(rest));
         self.material_of.push(material);
+        self.note_tet(self.tets.len() - 1);
     }
 
     /// Gives a tet's place to another tet of the same material.
@@ -172,7 +177,7 @@ impl<R: Real> Solver<R> {
     pub fn replace_tet(&mut self, tet: usize, particles: [u32; 4], rest: [DVec3; 4]) {
         self.tets[tet] = self.constraint(particles, rest, self.material_of[tet]);
         self.volumes[tet] = signed_volume(rest);
-        self.layout.touch(tet);
+        self.note_tet(tet);
     }
 
     /// Hangs a tet on other particles that are copies of its own.
@@ -182,7 +187,7 @@ impl<R: Real> Solver<R> {
     pub fn relink_tet(&mut self, tet: usize, particles: [u32; 4]) {
         self.check_particles(particles);
         self.tets[tet].particles = particles;
-        self.layout.touch(tet);
+        self.note_tet(tet);
     }
 
     /// Gives a tet's place to another one, with its material; the other one stays where it is, to be taken away by
@@ -194,7 +199,7 @@ impl<R: Real> Solver<R> {
         self.tets[to] = self.tets[from];
         self.volumes[to] = self.volumes[from];
         self.material_of[to] = self.material_of[from];
-        self.layout.touch(to);
+        self.note_tet(to);
     }
 
     /// Takes the last tets away until there are `count`; nothing happens if there are no more. Schedules must not name
@@ -219,7 +224,7 @@ impl<R: Real> Solver<R> {
     /// ```
     pub fn truncate_tets(&mut self, count: usize) {
         for tet in count..self.tets.len() {
-            self.layout.touch(tet);
+            self.note_tet(tet);
         }
         self.tets.truncate(count);
         self.volumes.truncate(count);
@@ -235,6 +240,7 @@ impl<R: Real> Solver<R> {
         self.masses.truncate(count);
         self.fixed.truncate(count);
         self.attachments.truncate(count);
+        self.note(|changes| changes.attachments = true);
     }
 
     fn constraint(&self, particles: [u32; 4], rest: [DVec3; 4], material: u16) -> TetConstraint<R> {
@@ -307,6 +313,7 @@ impl<R: Real> Solver<R> {
         );
         let last = self.particles.len() - 1;
         self.attachments.between([a, b], parameter, last);
+        self.note(|changes| changes.attachments = true);
     }
 
     /// Appends a particle in the state of another one, attached to what that is attached to. It has no mass yet.
@@ -317,6 +324,7 @@ impl<R: Real> Solver<R> {
         self.push_particle(self.vector(of), self.velocities[of], self.fixed[of]);
         let last = self.particles.len() - 1;
         self.attachments.copy(of, last);
+        self.note(|changes| changes.attachments = true);
     }
 
     fn push_particle(&mut self, x: R::Vector, velocity: R::Vector, fixed: bool) {
@@ -327,6 +335,7 @@ impl<R: Real> Solver<R> {
         self.velocities.push(velocity);
         self.masses.push(0.0);
         self.fixed.push(fixed);
+        self.note_particle(self.masses.len() - 1);
     }
 
     /// Sets the mass of a particle in kg. A particle without mass does not move. As it is not known which tets have the
@@ -353,7 +362,7 @@ impl<R: Real> Solver<R> {
     ) {
         self.put_mass(particle, mass);
         if self.update_weight(particle) {
-            star.into_iter().for_each(|tet| self.layout.touch(tet));
+            star.into_iter().for_each(|tet| self.note_tet(tet));
         }
     }
 
@@ -381,11 +390,13 @@ impl<R: Real> Solver<R> {
     pub(crate) fn set_weight(&mut self, particle: usize) {
         if self.update_weight(particle) {
             self.layout.forget();
+            self.note(|changes| changes.all_tets = true);
         }
     }
 
     /// Computes the inverse mass of a particle anew; returns whether it is another one.
     fn update_weight(&mut self, particle: usize) -> bool {
+        self.note_particle(particle);
         let inverse = R::from_f64(1.0 / self.masses[particle]);
         // A mass so small that its inverse overflows belongs to a speck that could only do harm if it moved.
         let held = self.fixed[particle] || self.attachments.holds(particle);
@@ -451,6 +462,7 @@ impl<R: Real> Solver<R> {
         let x = R::from_dvec3(position - self.origin);
         assert!(finite::<R>(x), "positions are finite");
         store::<R>(&self.particles[particle], x);
+        self.note_particle(particle);
     }
 
     /// The velocity of a particle in m/s.
@@ -470,6 +482,7 @@ impl<R: Real> Solver<R> {
         let v = R::from_dvec3(velocity);
         assert!(finite::<R>(v), "velocities are finite");
         self.velocities[particle] = v;
+        self.note_particle(particle);
     }
 
     /// Writes the positions of all particles in the world in m to `out`.

@@ -226,7 +226,7 @@ impl<R: Real> Solver<R> {
     }
 
     /// What the layout needs of a tet.
-    fn ingredients(&self, t: u32) -> Ingredients<R> {
+    pub(crate) fn ingredients(&self, t: u32) -> Ingredients<R> {
         let tet = self.tets.get(t as usize);
         let tet = *tet.expect("the schedule belongs to these tets");
         let material = &self.materials[usize::from(self.material_of[t as usize])];

@@ -12,7 +12,7 @@ use glam::DVec3;
 use incise_graph::Schedule;
 
 use crate::scalar::{Constraints, Scalar};
-use crate::{Real, Solver, XpbdError};
+use crate::{Real, Solver, VolumeData, XpbdError};
 
 /// Keeps the volume that four particles span. See [`Solver::set_volumes`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,6 +85,16 @@ impl<R: Real> TetVolume<R> {
             per_six_volumes: R::from_f64(if sound { per_six } else { 0.0 }),
             compliance: R::from_f64(if sound { compliance } else { 0.0 }),
             damping: R::from_f64(constraint.damping),
+        }
+    }
+
+    /// All there is to know.
+    pub(crate) fn data(&self) -> VolumeData<R> {
+        VolumeData {
+            particles: self.particles,
+            per_six_volumes: self.per_six_volumes,
+            compliance: self.compliance,
+            damping: self.damping,
         }
     }
 }
@@ -166,6 +176,7 @@ impl<R: Real> Solver<R> {
         }
         let volumes = Constraints::new("volume", self.particle_count(), list, schedule)?;
         self.volume_constraints = (!constraints.is_empty()).then_some(volumes);
+        self.note(|changes| changes.volumes = true);
         Ok(())
     }
 
@@ -193,6 +204,7 @@ impl<R: Real> Solver<R> {
         let volumes = self.volume_constraints.as_mut();
         let volumes = volumes.expect("volume constraints are edited where there are some");
         volumes.put(place, TetVolume::new(&constraint));
+        self.note(|changes| changes.volumes = true);
         Ok(())
     }
 
@@ -205,6 +217,7 @@ impl<R: Real> Solver<R> {
         let volumes = self.volume_constraints.as_mut();
         let volumes = volumes.expect("volume constraints are edited where there are some");
         volumes.list[constraint].particles = particles;
+        self.note(|changes| changes.volumes = true);
     }
 
     /// Takes over the order of solving after edits; without volume constraints nothing happens. As with that of the
@@ -220,6 +233,7 @@ impl<R: Real> Solver<R> {
                 "the schedule belongs to these volume constraints"
             );
             volumes.schedule.clone_from(schedule);
+            self.note(|changes| changes.volumes = true);
         }
     }
 }

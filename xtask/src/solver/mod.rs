@@ -1,7 +1,7 @@
 //! `cargo xtask solver`: what the methods of the solver cost and what they are worth, as tables.
 
 mod beam;
-mod body;
+pub(crate) mod body;
 mod convergence;
 mod rest;
 mod runner;

@@ -45,13 +45,8 @@ fn names_and_numbers_that_do_not_exist() {
     let place = place();
     for (command, parts) in [
         (
-            &["run", "scene.toml", "--backend", "gpu"][..],
-            &["GPU", "--backend cpu"][..],
-        ),
-        (&["color", "tet.vtk", "--backend", "gpu"], &["GPU"]),
-        (
-            &["color", "tet.vtk", "--algorithm", "gredy"],
-            &["gredy", "auto, scgc, jones-plassmann"],
+            &["color", "tet.vtk", "--algorithm", "gredy"][..],
+            &["gredy", "auto, scgc, jones-plassmann"][..],
         ),
         (
             &["color", "tet.vtk", "--algorithm", "vivace:0"],

@@ -7,6 +7,7 @@ mod bad_graphs;
 mod bad_input;
 mod color;
 mod color_graph;
+mod gpu;
 mod help;
 mod mesh;
 mod run;

@@ -67,6 +67,8 @@ impl Place {
     /// Runs the binary here.
     pub(crate) fn incise(&self, arguments: &[&str]) -> Outcome {
         let output = Command::new(env!("CARGO_BIN_EXE_incise"))
+            // Without one, libraries of some GPU drivers complain on stderr.
+            .env("XDG_RUNTIME_DIR", self.0.path())
             .args(arguments)
             .current_dir(self.0.path())
             .output()

@@ -7,6 +7,8 @@ mod conservation;
 mod constraints;
 mod cutting;
 mod determinism;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod kappa;
 mod locality;
 mod methods;

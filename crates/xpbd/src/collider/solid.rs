@@ -167,3 +167,39 @@ fn unit(v: DVec3) -> DVec3 {
     let scaled = v / v.abs().max_element();
     scaled / scaled.length()
 }
+
+impl Solid<f32> {
+    /// The kind and the numbers, at the places that `Solver::obstacle_data` names.
+    pub(super) fn numbers(&self) -> [f32; 20] {
+        let mut numbers = [0.0; 20];
+        let mut put = |at: usize, vectors: &[glam::Vec3]| {
+            for (k, vector) in vectors.iter().enumerate() {
+                numbers[at + 3 * k..at + 3 * k + 3].copy_from_slice(&vector.to_array());
+            }
+        };
+        match *self {
+            Self::Plane { normal, offset } => {
+                put(8, &[normal]);
+                numbers[2] = offset;
+            }
+            Self::Round {
+                start,
+                axis,
+                per_squared,
+                radius,
+                aside,
+            } => {
+                put(8, &[start, axis, aside]);
+                numbers[0] = 1.0;
+                numbers[2] = radius;
+                numbers[3] = per_squared;
+            }
+            Self::Box { center, axes, half } => {
+                put(8, &[center, axes[0], axes[1], axes[2]]);
+                numbers[0] = 2.0;
+                [numbers[2], numbers[3], numbers[7]] = half;
+            }
+        }
+        numbers
+    }
+}

@@ -208,6 +208,23 @@ fn copies_and_particles_between_are_attached_too() {
     }
 }
 
+/// A cut puts a particle between two that hang at rest on a damped handle at rest: nothing moves.
+#[test]
+fn a_particle_between_begins_at_its_own_place() {
+    let mut solver = Solver::<f64>::new(&[DVec3::ZERO, DVec3::X]);
+    let handle = solver.add_handle(Pose::at(DVec3::ZERO));
+    for p in 0..2 {
+        solver.set_mass(p, 1.0);
+        solver.attach(p, handle, 1e-3, 0.1).unwrap();
+    }
+    let settings = StepSettings::new(0.01);
+    step(&mut solver, &settings);
+    solver.push_particle_between(0, 1, 0.25);
+    solver.set_mass(2, 1.0);
+    step(&mut solver, &settings);
+    assert_eq!(solver.position(2), DVec3::X * 0.25);
+}
+
 #[test]
 fn a_fixed_particle_stays_fixed_on_a_handle() {
     let mut solver = Solver::<f32>::new(&[DVec3::ONE; 2]);

@@ -1,0 +1,130 @@
+//! What the command line does with a GPU, and without one.
+
+use serde_json::Value;
+
+use crate::support::Place;
+
+/// Whether a GPU answers, software or not; if not, says so.
+fn has_gpu(test: &str, stderr: &str, code: i32) -> bool {
+    if code == 0 {
+        return true;
+    }
+    assert!(std::env::var_os("INCISE_REQUIRE_GPU").is_none(), "{stderr}");
+    assert!(
+        stderr.contains("no GPU") || stderr.contains("GPU path"),
+        "{stderr}"
+    );
+    assert_eq!((code, stderr.lines().count()), (2, 1), "{stderr}");
+    #[expect(clippy::print_stderr, reason = "a test that is skipped says so")]
+    {
+        eprintln!("SKIPPED {test}: {stderr}");
+    }
+    false
+}
+
+#[test]
+fn a_scene_runs_on_a_gpu_or_says_why_not() {
+    let place = Place::with_scene();
+    let run = [
+        "run",
+        "scene.toml",
+        "--frames",
+        "6",
+        "--backend",
+        "gpu",
+        "--out",
+        "there",
+    ];
+    let outcome = place.incise(&run);
+    if !has_gpu(
+        "a_scene_runs_on_a_gpu_or_says_why_not",
+        &outcome.stderr,
+        outcome.code,
+    ) {
+        return;
+    }
+    assert!(
+        outcome.stdout.contains("computed on "),
+        "{}",
+        outcome.stdout
+    );
+    place.good(&[
+        "run",
+        "scene.toml",
+        "--frames",
+        "6",
+        "--backend",
+        "cpu",
+        "--out",
+        "here",
+    ]);
+    let frames = |folder: &str| -> Vec<Value> {
+        let text = place.read(&format!("{folder}/frames.jsonl"));
+        text.lines()
+            .map(|line| serde_json::from_str(line).unwrap())
+            .collect()
+    };
+    for (there, here) in frames("there").iter().zip(&frames("here")) {
+        assert_eq!(
+            (&there["backend"], &here["backend"]),
+            (&"gpu".into(), &"cpu".into())
+        );
+        for key in ["tets", "pieces", "colors", "cut"] {
+            assert_eq!(there[key], here[key]);
+        }
+    }
+    assert_eq!(place.names("there"), place.names("here"));
+}
+
+#[test]
+fn auto_always_runs_and_says_where() {
+    let place = Place::with_scene();
+    let out = place.good(&["run", "scene.toml", "--frames", "2", "--backend", "auto"]);
+    assert!(out.contains("computed on "), "{out}");
+    let silent = place.good(&["run", "scene.toml", "--frames", "2"]);
+    assert!(!silent.contains("computed on "), "{silent}");
+}
+
+#[test]
+fn colorings_on_a_gpu_are_those_of_the_processor() {
+    let place = Place::new();
+    place.good(&["mesh", "generate", "box", "--tets", "300", "tet.vtk"]);
+    let color = |backend: &str, algorithm: &str, csv: &str| {
+        place.incise(&[
+            "color",
+            "tet.vtk",
+            "--backend",
+            backend,
+            "--algorithm",
+            algorithm,
+            "--csv",
+            csv,
+            "--json",
+        ])
+    };
+    for algorithm in ["scgc", "jones-plassmann", "ecl-gc", "vivace", "wlc"] {
+        let there = color("gpu", algorithm, "there.csv");
+        let test = "colorings_on_a_gpu_are_those_of_the_processor";
+        if !has_gpu(test, &there.stderr, there.code) {
+            return;
+        }
+        assert_eq!(color("cpu", algorithm, "here.csv").code, 0);
+        assert_eq!(
+            place.read("there.csv"),
+            place.read("here.csv"),
+            "{algorithm}"
+        );
+        let report: Value = serde_json::from_str(&there.stdout).unwrap();
+        assert_eq!(
+            (&report["backend"], &report["verified"]),
+            (&"gpu".into(), &true.into())
+        );
+    }
+    let refused = color("gpu", "dsatur", "none.csv");
+    assert_eq!(refused.code, 2);
+    assert!(
+        refused.stderr.contains("jones-plassmann"),
+        "{}",
+        refused.stderr
+    );
+}

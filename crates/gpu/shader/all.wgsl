@@ -1,0 +1,17 @@
+// Before the first round: nobody has a color and everybody is on the list.
+
+@group(0) @binding(2) var<storage, read_write> colors: array<u32>;
+
+@compute @workgroup_size(THREADS)
+fn main(
+    @builtin(workgroup_id) id: vec3<u32>,
+    @builtin(num_workgroups) count: vec3<u32>,
+    @builtin(local_invocation_index) thread: u32,
+) {
+    let v = workgroup_index(id, count) * THREADS + thread;
+    let exists = v < current.vertices;
+    if exists {
+        colors[v] = PENDING;
+    }
+    keep(exists, v, thread);
+}

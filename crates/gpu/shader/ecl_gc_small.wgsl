@@ -1,0 +1,62 @@
+// A pass of the second half of ECL-GC (Alabandi, Powers and Burtscher 2020): vertices of less than 32 neighbors.
+//
+// Shortcut 2 drops the edge to a neighbor with which no color is shared, and with it the largest color left; shortcut 1
+// colors who has a best color that no neighbor waited for can take. A palette is one word, which its owner alone
+// writes, and has one color more than there are neighbors to wait for, so the last of them leaves one color. Who sees
+// an old palette sees too many colors and waits. Cost: the edges that are waited for.
+
+@group(0) @binding(2) var<storage, read> offsets: array<u32>;
+@group(0) @binding(3) var<storage, read> higher: array<u32>;
+@group(0) @binding(4) var<storage, read_write> words: array<atomic<u32>>;
+@group(0) @binding(5) var<storage, read_write> waiting: array<u32>;
+@group(0) @binding(6) var<storage, read_write> colors: array<u32>;
+
+// Colors v if it can be; says whether.
+fn decides(v: u32) -> bool {
+    let begin = offsets[v];
+    var palette = atomicLoad(&words[v]);
+    var left = waiting[v];
+    // What the neighbors may still get.
+    var around = 0u;
+    for (var rest = left; rest != 0u; rest &= rest - 1u) {
+        let place = countTrailingZeros(rest);
+        let theirs = atomicLoad(&words[higher[begin + place]]);
+        around |= theirs;
+        if (palette & theirs) == 0u {
+            palette &= ~(1u << (31u - countLeadingZeros(palette)));
+            left &= ~(1u << place);
+        } else if countOneBits(theirs) == 1u {
+            palette &= ~theirs;
+            left &= ~(1u << place);
+        }
+    }
+    let color = countTrailingZeros(palette);
+    if left != 0u && ((around >> color) & 1u) == 0u {
+        palette = 1u << color;
+        left = 0u;
+    }
+    atomicStore(&words[v], palette);
+    waiting[v] = left;
+    if countOneBits(palette) != 1u {
+        return false;
+    }
+    colors[v] = color;
+    note_color(color);
+    return true;
+}
+
+@compute @workgroup_size(THREADS)
+fn main(
+    @builtin(workgroup_id) id: vec3<u32>,
+    @builtin(num_workgroups) count: vec3<u32>,
+    @builtin(local_invocation_index) thread: u32,
+) {
+    let i = workgroup_index(id, count) * THREADS + thread;
+    var v = 0u;
+    var stays = false;
+    if i < listed_count() {
+        v = listed(i);
+        stays = !decides(v);
+    }
+    keep(stays, v, thread);
+}

@@ -1,0 +1,34 @@
+// Between the halves of ECL-GC: vertices of less than 32 neighbors go on the list, with a palette in one word each.
+//
+// The palette of a decided vertex is its color; colors from 32 on are out of the reach of small vertices, so those of
+// large vertices that have one are empty.
+
+const LARGE: u32 = 32u;
+
+@group(0) @binding(2) var<storage, read> offsets: array<u32>;
+@group(0) @binding(3) var<storage, read> searches: array<Search>;
+@group(0) @binding(4) var<storage, read> colors: array<u32>;
+@group(0) @binding(5) var<storage, read_write> words: array<u32>;
+// The higher neighbors that a small vertex waits for, a bit for each place in its list.
+@group(0) @binding(6) var<storage, read_write> waiting: array<u32>;
+
+@compute @workgroup_size(THREADS)
+fn main(
+    @builtin(workgroup_id) id: vec3<u32>,
+    @builtin(num_workgroups) count: vec3<u32>,
+    @builtin(local_invocation_index) thread: u32,
+) {
+    let v = workgroup_index(id, count) * THREADS + thread;
+    var small = false;
+    if v < current.vertices {
+        small = offsets[v + 1u] - offsets[v] < LARGE;
+        if small {
+            let left = searches[v].left;
+            words[v] = 0xffffffffu >> (31u - left);
+            waiting[v] = (1u << left) - 1u;
+        } else {
+            words[v] = select(0u, 1u << (colors[v] & 31u), colors[v] < 32u);
+        }
+    }
+    keep(small, v, thread);
+}

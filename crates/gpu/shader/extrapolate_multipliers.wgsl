@@ -1,0 +1,29 @@
+// Chebyshev's leap of the multipliers. Twin: `Jacobi::extrapolate` of incise-xpbd.
+
+@group(0) @binding(0) var<storage, read_write> multipliers: array<vec2<f32>>;
+// Place -> the multipliers when this iteration began, and those when the previous one did.
+@group(0) @binding(2) var<storage, read_write> history: array<vec4<f32>>;
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(local_invocation_index) lane: u32,
+    @builtin(workgroup_id) id: vec3<u32>,
+    @builtin(num_workgroups) count: vec3<u32>,
+) {
+    let place = workgroup_index(id, count) * THREADS + lane;
+    if place >= min(arrayLength(&multipliers), arrayLength(&history)) {
+        return;
+    }
+    var multiplier = multipliers[place];
+    // A substep begins without multipliers.
+    var start = vec4(0.0);
+    if turn.iteration > 0u {
+        start = history[place];
+    }
+    if turn.weight > 0.0 {
+        multiplier = start.zw + (multiplier - start.zw) * turn.weight;
+        multipliers[place] = multiplier;
+    }
+    // Nothing but the tets changes them: the next iteration begins with these.
+    history[place] = vec4(multiplier, start.xy);
+}

@@ -1,0 +1,28 @@
+// The smallest color that none of a row of neighbors has.
+//
+// Looks for it in windows of 64 colors, so there is no limit to their number and nothing is stored; who includes this
+// says what `color_around` is. Cost: one walk over the row per window, mostly one.
+
+fn first_fit(begin: u32, end: u32) -> u32 {
+    var base = 0u;
+    var free = vec2<u32>(0u, 0u);
+    loop {
+        free = vec2<u32>(0xffffffffu, 0xffffffffu);
+        for (var i = begin; i < end; i++) {
+            let color = color_around(i) - base;
+            if color < 32u {
+                free.x &= ~(1u << color);
+            } else if color < 64u {
+                free.y &= ~(1u << (color - 32u));
+            }
+        }
+        if any(free != vec2<u32>(0u, 0u)) {
+            break;
+        }
+        base += 64u;
+    }
+    if free.x != 0u {
+        return base + countTrailingZeros(free.x);
+    }
+    return base + 32u + countTrailingZeros(free.y);
+}

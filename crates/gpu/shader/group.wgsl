@@ -1,0 +1,42 @@
+// One group of clusters, which share no particle: a thread for each, tet by tet (paper section 4.1). Twin:
+// `lanes::solve_block` of incise-xpbd.
+
+// Whether corrections are gathered elsewhere.
+override JACOBI: bool = false;
+
+@group(0) @binding(9) var<storage, read_write> corrections: array<vec4<f32>>;
+
+fn solve_group(group: u32, lane: u32) {
+    for (var k = 0u; k < settings.depth; k++) {
+        let place = (group * settings.depth + k) * THREADS + lane;
+        let corner = corners[place];
+        if corner.x == corner.y {
+            // The tets of a cluster are in its first places.
+            return;
+        }
+        let x = Corners(particles[corner.x], particles[corner.y], particles[corner.z], particles[corner.w]);
+        var before = x;
+        if DAMPED {
+            before = Corners(previous[corner.x], previous[corner.y], previous[corner.z], previous[corner.w]);
+        }
+        var multiplier = vec2(0.0);
+        if KEEPS {
+            multiplier = multipliers[place];
+        }
+        let moved = solve_tet(tet_at(place), x, before, JACOBI, &multiplier);
+        if KEEPS {
+            multipliers[place] = multiplier;
+        }
+        if JACOBI {
+            corrections[corner.x] += vec4(moved.x0.xyz - x.x0.xyz, 0.0);
+            corrections[corner.y] += vec4(moved.x1.xyz - x.x1.xyz, 0.0);
+            corrections[corner.z] += vec4(moved.x2.xyz - x.x2.xyz, 0.0);
+            corrections[corner.w] += vec4(moved.x3.xyz - x.x3.xyz, 0.0);
+        } else {
+            particles[corner.x] = moved.x0;
+            particles[corner.y] = moved.x1;
+            particles[corner.z] = moved.x2;
+            particles[corner.w] = moved.x3;
+        }
+    }
+}

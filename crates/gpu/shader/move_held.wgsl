@@ -1,0 +1,29 @@
+// Puts what handles hold rigidly where the handles are at the end of a substep. Twin: `Solver::move_held` of incise-xpbd.
+
+@group(0) @binding(0) var<uniform> settings: Settings;
+@group(0) @binding(2) var<storage, read_write> particles: array<vec4<f32>>;
+@group(0) @binding(3) var<storage, read> attachments: array<Attachment>;
+// Those at the start of the frame, then those at the end of each substep.
+@group(0) @binding(4) var<storage, read> poses: array<Pose>;
+// Particles that could not follow out of the range of numbers.
+@group(0) @binding(5) var<storage, read_write> repaired: atomic<u32>;
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(local_invocation_index) lane: u32,
+    @builtin(workgroup_id) id: vec3<u32>,
+    @builtin(num_workgroups) count: vec3<u32>,
+) {
+    let index = workgroup_index(id, count) * THREADS + lane;
+    if index >= settings.held {
+        return;
+    }
+    let attachment = attachments[index];
+    let row = (turn.substep + 1u) * settings.handles;
+    let x = at_pose(poses[row + attachment.handle], attachment.place);
+    if are_finite(x) {
+        particles[attachment.particle] = vec4(x, particles[attachment.particle].w);
+    } else {
+        atomicAdd(&repaired, 1u);
+    }
+}

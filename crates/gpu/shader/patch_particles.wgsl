@@ -1,0 +1,27 @@
+// Puts particles that a cut or an edit has made or changed where they belong.
+
+struct ParticlePatch {
+    particle: vec4<f32>,
+    velocity: vec3<f32>,
+    index: u32,
+}
+
+@group(0) @binding(0) var<uniform> part: Part;
+@group(0) @binding(1) var<storage, read> patches: array<ParticlePatch>;
+@group(0) @binding(2) var<storage, read_write> particles: array<vec4<f32>>;
+@group(0) @binding(3) var<storage, read_write> velocities: array<vec4<f32>>;
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(local_invocation_index) lane: u32,
+    @builtin(workgroup_id) id: vec3<u32>,
+    @builtin(num_workgroups) count: vec3<u32>,
+) {
+    let index = workgroup_index(id, count) * THREADS + lane;
+    if index >= part.count {
+        return;
+    }
+    let patch_ = patches[index];
+    particles[patch_.index] = patch_.particle;
+    velocities[patch_.index] = vec4(patch_.velocity, 0.0);
+}

@@ -1,0 +1,42 @@
+// What the settings of a step are to all kernels of the solver.
+
+struct Settings {
+    // What gravity adds to a velocity in a substep, in m/s.
+    gravity: vec3<f32>,
+    // The time of a substep in s, its square, and one over it.
+    time: f32,
+    time_squared: f32,
+    per_time: f32,
+    // Factor on each correction.
+    relaxation: f32,
+    // The number 1, and the slope from which on the constraint of volume is scaled down. Not written as literals: some
+    // compilers take sums with literals in another order.
+    one: f32,
+    steep: f32,
+    particles: u32,
+    // Places that a thread has for tets.
+    depth: u32,
+    // Colliders, handles, and what hangs on those rigidly or by a compliance.
+    obstacles: u32,
+    handles: u32,
+    held: u32,
+    hanging: u32,
+    unused: u32,
+    // l/mu, gamma and the damping time, where there is but one material; then 0, which compilers must not know.
+    material: vec4<f32>,
+}
+
+// What one dispatch works on: so many entries of a list, from one on.
+struct Part {
+    first: u32,
+    count: u32,
+}
+
+// By bits, since a compiler may assume that nothing is infinite.
+fn is_finite(x: f32) -> bool {
+    return (bitcast<u32>(x) & 0x7f800000u) != 0x7f800000u;
+}
+
+fn are_finite(x: vec3<f32>) -> bool {
+    return is_finite(x.x) && is_finite(x.y) && is_finite(x.z);
+}

@@ -1,0 +1,14 @@
+// One color: all its groups of clusters at once, a workgroup for each.
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(local_invocation_index) lane: u32,
+    @builtin(workgroup_id) id: vec3<u32>,
+    @builtin(num_workgroups) count: vec3<u32>,
+) {
+    let index = workgroup_index(id, count);
+    if index >= part.count {
+        return;
+    }
+    solve_group(lists[part.first + index], lane);
+}

@@ -1,0 +1,10 @@
+// Several colors of one group each, one after the other, in a single workgroup: a barrier inside of it is cheaper than a
+// dispatch.
+
+@compute @workgroup_size(64)
+fn main(@builtin(local_invocation_index) lane: u32) {
+    for (var index = 0u; index < part.count; index++) {
+        solve_group(lists[part.first + index], lane);
+        storageBarrier();
+    }
+}

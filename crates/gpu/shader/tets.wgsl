@@ -1,0 +1,41 @@
+// The tets on the device, and the bindings of the kernels that solve them.
+//
+// A place is where a tet's numbers are. Those of 64 places lie side by side, number by number, so that threads next to
+// each other read what is next to each other.
+
+// Whether there is but one material; whether multipliers are kept.
+override UNIFORM: bool = true;
+override KEEPS: bool = false;
+
+@group(0) @binding(0) var<uniform> settings: Settings;
+@group(0) @binding(1) var<uniform> part: Part;
+@group(0) @binding(2) var<storage, read_write> particles: array<vec4<f32>>;
+// Place -> corners; all 0 where there is no tet.
+@group(0) @binding(3) var<storage, read> corners: array<vec4<u32>>;
+@group(0) @binding(4) var<storage, read> rest: array<f32>;
+@group(0) @binding(5) var<storage, read> constants: array<vec4<f32>>;
+@group(0) @binding(6) var<storage, read> previous: array<vec4<f32>>;
+@group(0) @binding(7) var<storage, read_write> multipliers: array<vec2<f32>>;
+// The groups or tiles of the colors.
+@group(0) @binding(8) var<storage, read> lists: array<u32>;
+
+const NUMBERS: u32 = 16u;
+
+fn tet_at(place: u32) -> Tet {
+    let at = (place / THREADS) * (NUMBERS * THREADS) + place % THREADS;
+    var material = settings.material;
+    if !UNIFORM {
+        material = constants[place];
+    }
+    return Tet(
+        vec3(rest[at], rest[at + THREADS], rest[at + 2u * THREADS]),
+        vec3(rest[at + 3u * THREADS], rest[at + 4u * THREADS], rest[at + 5u * THREADS]),
+        vec3(rest[at + 6u * THREADS], rest[at + 7u * THREADS], rest[at + 8u * THREADS]),
+        vec3(rest[at + 9u * THREADS], rest[at + 10u * THREADS], rest[at + 11u * THREADS]),
+        vec3(rest[at + 12u * THREADS], rest[at + 13u * THREADS], rest[at + 14u * THREADS]),
+        rest[at + 15u * THREADS] * settings.time_squared,
+        material.x,
+        material.y,
+        material.z * settings.per_time,
+    );
+}

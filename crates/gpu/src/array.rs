@@ -1,0 +1,240 @@
+//! [`Array`]: numbers of one type in device memory, which grow, are patched and are read back.
+//!
+//! Device memory is asked for in powers of three halves, so growth costs a copy on the device now and then and no
+//! upload. Every byte that moves is counted. Cost: O(what is written or read).
+
+use std::marker::PhantomData;
+use std::sync::mpsc;
+
+use bytemuck::{AnyBitPattern, NoUninit};
+use wgpu::{Buffer, BufferUsages, SubmissionIndex};
+
+use crate::traffic::count;
+use crate::{GpuContext, GpuError};
+
+/// Bytes of the smallest buffer: a binding must not be empty.
+const SMALLEST: u64 = 256;
+
+/// A row of numbers on the device.
+#[derive(Debug)]
+pub(crate) struct Array<T> {
+    what: &'static str,
+    buffer: Buffer,
+    len: usize,
+    usage: BufferUsages,
+    of: PhantomData<T>,
+}
+
+impl<T: NoUninit + AnyBitPattern> Array<T> {
+    /// As many zeros.
+    pub(crate) fn zeros(
+        gpu: &GpuContext,
+        what: &'static str,
+        len: usize,
+    ) -> Result<Self, GpuError> {
+        Self::with_usage(gpu, what, len, BufferUsages::STORAGE)
+    }
+
+    /// The same for another use than as storage of kernels.
+    pub(crate) fn with_usage(
+        gpu: &GpuContext,
+        what: &'static str,
+        len: usize,
+        usage: BufferUsages,
+    ) -> Result<Self, GpuError> {
+        let usage = usage | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
+        let buffer = buffer(gpu, what, bytes::<T>(len), usage)?;
+        Ok(Self {
+            what,
+            buffer,
+            len,
+            usage,
+            of: PhantomData,
+        })
+    }
+
+    /// These values.
+    pub(crate) fn new(
+        gpu: &GpuContext,
+        what: &'static str,
+        values: &[T],
+    ) -> Result<Self, GpuError> {
+        let array = Self::zeros(gpu, what, values.len())?;
+        array.write(gpu, 0, values);
+        Ok(array)
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.len
+    }
+
+    pub(crate) fn buffer(&self) -> &Buffer {
+        &self.buffer
+    }
+
+    /// Overwrites values from a place on, before the next submit.
+    ///
+    /// # Panics
+    /// Past the end.
+    pub(crate) fn write(&self, gpu: &GpuContext, start: usize, values: &[T]) {
+        assert!(
+            start + values.len() <= self.len,
+            "{}: past the end",
+            self.what
+        );
+        if values.is_empty() {
+            return;
+        }
+        let data: &[u8] = bytemuck::cast_slice(values);
+        gpu.queue()
+            .write_buffer(&self.buffer, bytes::<T>(start), data);
+        count(&gpu.counters().uploaded_bytes, data.len() as u64);
+    }
+
+    /// Changes the length; what is there stays, and what is new is zero or anything that was cut off before.
+    pub(crate) fn resize(&mut self, gpu: &GpuContext, len: usize) -> Result<(), GpuError> {
+        let needed = bytes::<T>(len);
+        if needed > self.buffer.size() {
+            let limit = gpu.buffer_limit();
+            let roomy = (self.buffer.size() / 2 * 3).clamp(needed, limit.max(needed));
+            let larger = buffer(gpu, self.what, roomy, self.usage)?;
+            let mut encoder = gpu.encoder(self.what);
+            encoder.copy_buffer_to_buffer(&self.buffer, 0, &larger, 0, self.buffer.size());
+            gpu.submit(encoder)?;
+            self.buffer = larger;
+        }
+        self.len = len;
+        Ok(())
+    }
+
+    /// Replaces all values.
+    pub(crate) fn replace(&mut self, gpu: &GpuContext, values: &[T]) -> Result<(), GpuError> {
+        if bytes::<T>(values.len()) > self.buffer.size() {
+            let roomy = bytes::<T>(values.len() + values.len() / 2).min(gpu.buffer_limit());
+            let size = roomy.max(bytes::<T>(values.len()));
+            self.buffer = buffer(gpu, self.what, size, self.usage)?;
+        }
+        self.len = values.len();
+        self.write(gpu, 0, values);
+        Ok(())
+    }
+
+    /// Waits for the device and reads all values.
+    pub(crate) fn read(&self, gpu: &GpuContext) -> Result<Vec<T>, GpuError> {
+        self.read_first(gpu, self.len)
+    }
+
+    /// Waits for the device and reads the first values.
+    pub(crate) fn read_first(&self, gpu: &GpuContext, len: usize) -> Result<Vec<T>, GpuError> {
+        assert!(len <= self.len, "{}: past the end", self.what);
+        match len {
+            0 => Ok(Vec::new()),
+            _ => self.stage(gpu, len)?.collect(gpu),
+        }
+    }
+
+    /// Starts a copy of the first values that the host can wait for later.
+    pub(crate) fn stage(&self, gpu: &GpuContext, len: usize) -> Result<Staging<T>, GpuError> {
+        let size = bytes::<T>(len).next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT);
+        let usage = BufferUsages::MAP_READ | BufferUsages::COPY_DST;
+        let staging = buffer(gpu, self.what, size, usage)?;
+        let mut encoder = gpu.encoder(self.what);
+        encoder.copy_buffer_to_buffer(&self.buffer, 0, &staging, 0, size);
+        let submission = gpu.submit(encoder)?;
+        let (sender, receiver) = mpsc::channel();
+        staging.map_async(wgpu::MapMode::Read, .., move |result| {
+            // Nobody waits if the staging buffer was dropped.
+            let _ = sender.send(result.map_err(|error| error.to_string()));
+        });
+        Ok(Staging {
+            buffer: staging,
+            len,
+            submission,
+            receiver,
+            of: PhantomData,
+        })
+    }
+}
+
+/// A copy on its way to the host.
+#[derive(Debug)]
+pub(crate) struct Staging<T> {
+    buffer: Buffer,
+    len: usize,
+    submission: SubmissionIndex,
+    receiver: mpsc::Receiver<Result<(), String>>,
+    of: PhantomData<T>,
+}
+
+impl<T: NoUninit + AnyBitPattern> Staging<T> {
+    /// Waits for it.
+    pub(crate) fn collect(self, gpu: &GpuContext) -> Result<Vec<T>, GpuError> {
+        gpu.wait_for(self.submission.clone())?;
+        let mapped = self.receiver.recv();
+        self.values(gpu, mapped.map_err(|error| lost(&error))?)
+    }
+
+    /// The values if they have arrived; afterwards they are gone from here.
+    pub(crate) fn try_collect(&self, gpu: &GpuContext) -> Result<Option<Vec<T>>, GpuError> {
+        gpu.look()?;
+        match self.receiver.try_recv() {
+            Ok(mapped) => self.values(gpu, mapped).map(Some),
+            Err(mpsc::TryRecvError::Empty) => Ok(None),
+            Err(error) => Err(lost(&error)),
+        }
+    }
+
+    fn values(&self, gpu: &GpuContext, mapped: Result<(), String>) -> Result<Vec<T>, GpuError> {
+        mapped.map_err(|message| GpuError::Lost { message })?;
+        let view = self.buffer.slice(..).get_mapped_range();
+        let view = view.map_err(|error| lost(&error))?;
+        // The view has the alignment of bytes.
+        let data = &view[..usize::try_from(bytes::<T>(self.len)).unwrap_or(usize::MAX)];
+        let values = bytemuck::pod_collect_to_vec::<u8, T>(data);
+        count(&gpu.counters().readbacks, 1);
+        count(&gpu.counters().read_bytes, bytes::<T>(self.len));
+        drop(view);
+        self.buffer.unmap();
+        Ok(values)
+    }
+}
+
+fn lost(error: &dyn std::error::Error) -> GpuError {
+    GpuError::Lost {
+        message: error.to_string(),
+    }
+}
+
+fn bytes<T>(len: usize) -> u64 {
+    (len * size_of::<T>()) as u64
+}
+
+/// Makes a buffer, or says why not.
+fn buffer(
+    gpu: &GpuContext,
+    what: &'static str,
+    bytes: u64,
+    usage: BufferUsages,
+) -> Result<Buffer, GpuError> {
+    gpu.check()?;
+    let limit = gpu.buffer_limit();
+    if bytes > limit {
+        return Err(GpuError::TooLarge { what, bytes, limit });
+    }
+    let memory = gpu
+        .device()
+        .push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+    let buffer = gpu.device().create_buffer(&wgpu::BufferDescriptor {
+        label: Some(what),
+        size: bytes
+            .max(SMALLEST)
+            .next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT),
+        usage,
+        mapped_at_creation: false,
+    });
+    if pollster::block_on(memory.pop()).is_some() {
+        return Err(GpuError::OutOfMemory { what, bytes });
+    }
+    count(&gpu.counters().buffers, 1);
+    Ok(buffer)
+}

@@ -1,0 +1,89 @@
+//! ECL-GC in rounds: vertices of many neighbors first, then the others (Alabandi, Powers and Burtscher 2020).
+//!
+//! Twin of [`incise_coloring::ecl_gc`]. The original spins until all neighbors are done; here a pass is a round. The
+//! colors from 32 on, the many neighbors and the few go by the same rules as there. Cost: every pass looks at all edges
+//! of its undecided vertices.
+
+use super::kernels::{
+    ColoringKernels, ECL_GC_LARGE, ECL_GC_LARGE_START, ECL_GC_SMALL, ECL_GC_SMALL_START, HIGHER,
+};
+use super::rounds::{HEADER, Rounds, worklists};
+use super::scgc::SEARCH_WORDS;
+use super::{DeviceColoring, DeviceGraph};
+use crate::array::Array;
+use crate::{GpuContext, GpuError};
+
+/// Colors by ECL-GC.
+///
+/// The coloring is that of [`incise_coloring::ecl_gc`], bit for bit, and so that of [`scgc`](super::scgc()).
+///
+/// # Errors
+/// If the device is lost or has no room for the work arrays.
+///
+/// ```
+/// use incise_gpu::coloring::{ColoringKernels, DeviceGraph, ecl_gc};
+/// use incise_gpu::{GpuContext, GpuError, GpuOptions};
+/// use incise_graph::{ConstraintGraph, Incidence};
+///
+/// let gpu = match GpuContext::new(&GpuOptions::from_env()) {
+///     Err(GpuError::NoAdapter { .. }) => return Ok(()),
+///     other => other?,
+/// };
+/// let fan = Incidence::from_constraints(41, (1u32..41).map(|i| [0, i]))?;
+/// let fan = ConstraintGraph::from_incidence(&fan);
+/// let graph = DeviceGraph::new(&gpu, &fan)?;
+/// let coloring = ecl_gc(&gpu, &mut ColoringKernels::default(), &graph)?;
+/// assert_eq!(coloring.read(&gpu)?, incise_coloring::ecl_gc(&fan).coloring);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn ecl_gc(
+    gpu: &GpuContext,
+    kernels: &mut ColoringKernels,
+    graph: &DeviceGraph,
+) -> Result<DeviceColoring, GpuError> {
+    let vertices = graph.vertex_count();
+    if vertices == 0 {
+        return DeviceColoring::empty(gpu);
+    }
+    let array = Array::zeros(gpu, "colors", vertices)?;
+    let higher = kernels.array(gpu, "higher neighbors", graph.neighbors.len())?;
+    let searches = kernels.array(gpu, "searches", SEARCH_WORDS * vertices)?;
+    let palettes = kernels.array(gpu, "palettes", graph.palette_words())?;
+    let words = kernels.array(gpu, "words", vertices)?;
+    let waiting = kernels.array(gpu, "waiting", vertices)?;
+    let work = worklists(gpu, kernels, vertices)?;
+    let (parts, colors) = (graph.parts.buffer(), array.buffer());
+    let (offsets, neighbors) = (graph.offsets.buffer(), graph.neighbors.buffer());
+
+    let all = [
+        parts, &work, offsets, neighbors, &higher, &searches, &palettes,
+    ];
+    let start = [parts, &work, offsets, colors];
+    let pass = [parts, &work, offsets, &higher, &searches, &palettes, colors];
+    let large = Rounds {
+        algorithm: "ecl_gc",
+        vertices,
+        max_rounds: usize::MAX,
+        clear: vec![(&work, HEADER)],
+        first: vec![
+            kernels.bind(gpu, &HIGHER, &all)?,
+            kernels.bind(gpu, &ECL_GC_LARGE_START, &start)?,
+        ],
+        round: vec![kernels.bind(gpu, &ECL_GC_LARGE, &pass)?],
+    };
+    large.run(gpu, kernels, &graph.parts)?;
+
+    let start = [parts, &work, offsets, &searches, colors, &words, &waiting];
+    let pass = [parts, &work, offsets, &higher, &words, &waiting, colors];
+    let small = Rounds {
+        algorithm: "ecl_gc",
+        vertices,
+        max_rounds: usize::MAX,
+        // Rounds and colors go on.
+        clear: vec![],
+        first: vec![kernels.bind(gpu, &ECL_GC_SMALL_START, &start)?],
+        round: vec![kernels.bind(gpu, &ECL_GC_SMALL, &pass)?],
+    };
+    let work = small.run(gpu, kernels, &graph.parts)?;
+    Ok(work.into_coloring(array))
+}

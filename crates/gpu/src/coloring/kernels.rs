@@ -1,0 +1,315 @@
+//! [`ColoringKernels`]: what colorings keep from one to the next, and the list of all their shaders.
+//!
+//! Compiling a shader takes a driver up to a third of a second, so it happens once, when a kernel is first needed. Work
+//! arrays grow to the largest graph and stay.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use wgpu::{BindGroup, Buffer, BufferUsages};
+
+use super::rounds::PART;
+use crate::array::Array;
+use crate::kernel::{Kernel, Use};
+use crate::{GpuContext, GpuError};
+
+/// The text of a kernel and how it uses its buffers.
+#[derive(Debug)]
+pub(crate) struct Source {
+    pub(crate) name: &'static str,
+    pub(crate) parts: &'static [&'static str],
+    uses: &'static [Use],
+}
+
+/// Compiled kernels and work arrays of all colorings, for one device.
+///
+/// Keep it as long as the device: the first coloring of a kind compiles its kernels, all others find them. The arrays
+/// are as large as the largest input so far needs: for [`scgc`](super::scgc()) 24 bytes per vertex and a little more than 8
+/// per edge, for all algorithms together about 70 bytes per vertex.
+#[derive(Debug, Default)]
+pub struct ColoringKernels {
+    compiled: BTreeMap<&'static str, Arc<Kernel>>,
+    arrays: BTreeMap<&'static str, Array<u32>>,
+}
+
+/// A kernel with its buffers.
+#[derive(Debug)]
+pub(super) struct Bound {
+    pub(super) kernel: Arc<Kernel>,
+    pub(super) group: BindGroup,
+}
+
+impl ColoringKernels {
+    /// The kernel of a source with its buffers, compiled if it is not.
+    pub(super) fn bind(
+        &mut self,
+        gpu: &GpuContext,
+        source: &Source,
+        buffers: &[&Buffer],
+    ) -> Result<Bound, GpuError> {
+        let kernel = match self.compiled.get(source.name) {
+            Some(kernel) => Arc::clone(kernel),
+            None => {
+                let kernel = Kernel::new(gpu, source.name, source.parts, source.uses, &[])?;
+                let kernel = Arc::new(kernel);
+                self.compiled.insert(source.name, Arc::clone(&kernel));
+                kernel
+            }
+        };
+        let group = kernel.bind(gpu, buffers);
+        Ok(Bound { kernel, group })
+    }
+
+    /// A work array with room for so many numbers, which are anything.
+    pub(super) fn array(
+        &mut self,
+        gpu: &GpuContext,
+        what: &'static str,
+        len: usize,
+    ) -> Result<Buffer, GpuError> {
+        self.array_for(gpu, what, len, BufferUsages::STORAGE)
+    }
+
+    /// The same for other uses.
+    pub(super) fn array_for(
+        &mut self,
+        gpu: &GpuContext,
+        what: &'static str,
+        len: usize,
+        usage: BufferUsages,
+    ) -> Result<Buffer, GpuError> {
+        if let Some(array) = self.arrays.get_mut(what) {
+            if array.len() < len {
+                array.resize(gpu, len)?;
+            }
+            return Ok(array.buffer().clone());
+        }
+        let array = Array::with_usage(gpu, what, len, usage)?;
+        let buffer = array.buffer().clone();
+        self.arrays.insert(what, array);
+        Ok(buffer)
+    }
+
+    /// Waits for the device and reads the first numbers of a work array.
+    pub(super) fn read(
+        &self,
+        gpu: &GpuContext,
+        what: &'static str,
+        len: usize,
+    ) -> Result<Vec<u32>, GpuError> {
+        self.arrays[what].read_first(gpu, len)
+    }
+
+    /// Writes the first numbers of a work array.
+    pub(super) fn write(&self, gpu: &GpuContext, what: &'static str, values: &[u32]) {
+        self.arrays[what].write(gpu, 0, values);
+    }
+}
+
+macro_rules! text {
+    ($name:literal) => {
+        include_str!(concat!("../../shader/", $name, ".wgsl"))
+    };
+}
+
+/// A kernel: its name, the parts before its own text, and the uses of its buffers.
+macro_rules! source {
+    ($constant:ident, $name:literal, [$($part:literal),*], [$($usage:expr),*]) => {
+        pub(super) const $constant: Source = Source {
+            name: $name,
+            parts: &[$(text!($part),)* text!($name)],
+            uses: &[$($usage),*],
+        };
+    };
+}
+
+use Use::{Read, Uniform, Write};
+
+source!(
+    NEXT,
+    "next",
+    ["common", "grid", "round", "worklist"],
+    [PART, Write, Write]
+);
+source!(
+    ALL,
+    "all",
+    ["common", "round", "worklist"],
+    [PART, Write, Write]
+);
+source!(
+    JONES_PLASSMANN,
+    "jones_plassmann",
+    ["common", "round", "worklist", "priority", "first_fit"],
+    [PART, Write, Read, Read, Write, Write]
+);
+source!(
+    HIGHER,
+    "higher",
+    [
+        "common", "round", "worklist", "priority", "search", "palettes"
+    ],
+    [PART, Write, Read, Read, Write, Write, Write]
+);
+source!(
+    SCGC,
+    "scgc",
+    ["common", "round", "worklist", "search", "palettes"],
+    [PART, Write, Read, Read, Write, Write, Write, Write]
+);
+source!(
+    ECL_GC_LARGE_START,
+    "ecl_gc_large_start",
+    ["common", "round", "worklist"],
+    [PART, Write, Read, Write]
+);
+source!(
+    ECL_GC_LARGE,
+    "ecl_gc_large",
+    ["common", "round", "worklist", "search", "palettes"],
+    [PART, Write, Read, Read, Read, Write, Write]
+);
+source!(
+    ECL_GC_SMALL_START,
+    "ecl_gc_small_start",
+    ["common", "round", "worklist", "search"],
+    [PART, Write, Read, Read, Read, Write, Write]
+);
+source!(
+    ECL_GC_SMALL,
+    "ecl_gc_small",
+    ["common", "round", "worklist"],
+    [PART, Write, Read, Read, Write, Write, Write]
+);
+source!(
+    VIVACE_START,
+    "vivace_start",
+    ["common", "round", "worklist", "vivace_options", "palettes"],
+    [PART, Write, Uniform, Read, Write, Write]
+);
+source!(
+    VIVACE_PICK,
+    "vivace_pick",
+    [
+        "common",
+        "round",
+        "worklist",
+        "vivace_options",
+        "palettes",
+        "random"
+    ],
+    [PART, Write, Uniform, Read, Write, Write]
+);
+source!(
+    VIVACE_KEEP,
+    "vivace_keep",
+    ["common", "round", "worklist", "vivace_options"],
+    [PART, Write, Uniform, Read, Read, Read, Write]
+);
+source!(
+    VIVACE_RENEW,
+    "vivace_renew",
+    [
+        "common",
+        "round",
+        "worklist",
+        "vivace_options",
+        "palettes",
+        "first_fit"
+    ],
+    [PART, Write, Read, Read, Read, Read, Write]
+);
+source!(
+    WLC_START,
+    "wlc_start",
+    ["common", "grid", "round", "wlc_work"],
+    [PART, Write, Uniform, Write, Write, Write]
+);
+source!(
+    WLC_CHOOSE,
+    "wlc_choose",
+    ["common", "round", "wlc_work", "first_fit"],
+    [PART, Read, Read, Read, Write, Read]
+);
+source!(
+    WLC_LOSE,
+    "wlc_lose",
+    ["common", "round", "wlc_work"],
+    [PART, Read, Read, Read, Read, Write]
+);
+source!(
+    WLC_GATHER,
+    "wlc_gather",
+    ["common", "grid", "round", "wlc_work"],
+    [PART, Write, Write, Read, Write, Write]
+);
+source!(
+    LABELS_MARK,
+    "labels_mark",
+    ["common", "round", "labels"],
+    [PART, Write, Read]
+);
+source!(
+    LABELS_NUMBER,
+    "labels_number",
+    ["common", "round", "labels"],
+    [PART, Write]
+);
+source!(
+    LABELS_RENAME,
+    "labels_rename",
+    ["common", "round", "labels"],
+    [PART, Write, Write]
+);
+source!(
+    INCIDENCE_DEGREES,
+    "incidence_degrees",
+    ["common", "round", "worklist", "incidence"],
+    [PART, Write, Read, Read, Write]
+);
+source!(
+    SCGC_INCIDENCE,
+    "scgc_incidence",
+    [
+        "common",
+        "round",
+        "worklist",
+        "priority",
+        "incidence",
+        "waits"
+    ],
+    [PART, Write, Read, Read, Read, Write, Write, Write]
+);
+source!(
+    SCGC_INCIDENCE_WINDOW,
+    "scgc_incidence_window",
+    ["common", "round", "worklist", "waits"],
+    [PART, Write, Read, Write]
+);
+
+/// All of them.
+pub(crate) const SOURCES: &[Source] = &[
+    NEXT,
+    ALL,
+    JONES_PLASSMANN,
+    HIGHER,
+    SCGC,
+    ECL_GC_LARGE_START,
+    ECL_GC_LARGE,
+    ECL_GC_SMALL_START,
+    ECL_GC_SMALL,
+    VIVACE_START,
+    VIVACE_PICK,
+    VIVACE_KEEP,
+    VIVACE_RENEW,
+    WLC_START,
+    WLC_CHOOSE,
+    WLC_LOSE,
+    WLC_GATHER,
+    LABELS_MARK,
+    LABELS_NUMBER,
+    LABELS_RENAME,
+    INCIDENCE_DEGREES,
+    SCGC_INCIDENCE,
+    SCGC_INCIDENCE_WINDOW,
+];

@@ -1,0 +1,314 @@
+//! [`GpuContext`]: a device, its queue, and what went over the wire.
+//!
+//! One of them serves a process: kernels, solvers and renderers share it. The adapter is chosen here and not by wgpu's
+//! helpers, which panic when a wish cannot be met. Errors that a driver reports later (device lost, a refused command)
+//! are kept and returned by the next call that can return one; nothing panics.
+
+use std::sync::{Arc, Mutex};
+
+use pollster::block_on;
+use wgpu::{
+    Adapter, Backends, Device, DeviceType, Features, Limits, PollType, Queue, SubmissionIndex,
+};
+
+use crate::GpuError;
+use crate::traffic::{Counters, Traffic, count};
+
+/// Which adapter to take.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct GpuOptions {
+    /// A part of its name, in any case; `None` takes the first in the order discrete, integrated, virtual, software.
+    pub adapter: Option<String>,
+    /// The interfaces to ask; `None` asks Vulkan, Metal and Direct3D 12, as far as they are compiled in.
+    pub backends: Option<Backends>,
+}
+
+impl GpuOptions {
+    /// What the environment wishes: `WGPU_ADAPTER_NAME` and `WGPU_BACKEND` (`vulkan`, `metal`, `dx12`, `gl`, separated by
+    /// commas).
+    #[must_use]
+    pub fn from_env() -> Self {
+        let adapter = std::env::var("WGPU_ADAPTER_NAME").ok();
+        Self {
+            adapter: adapter.filter(|name| !name.is_empty()),
+            backends: Backends::from_env(),
+        }
+    }
+}
+
+/// What is known of an adapter.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct AdapterDescription {
+    /// Its name, as the driver gives it.
+    pub name: String,
+    /// The interface: `vulkan`, `metal`, `dx12`, `gl`.
+    pub backend: String,
+    /// The driver and its version.
+    pub driver: String,
+    /// Whether it is a processor that plays a GPU.
+    pub software: bool,
+}
+
+impl AdapterDescription {
+    fn of(info: &wgpu::AdapterInfo) -> Self {
+        Self {
+            name: info.name.clone(),
+            backend: info.backend.to_string(),
+            driver: format!("{} {}", info.driver, info.driver_info)
+                .trim()
+                .to_owned(),
+            software: info.device_type == DeviceType::Cpu,
+        }
+    }
+}
+
+/// What a driver reported when nobody could be told.
+type Report = Arc<Mutex<Option<GpuError>>>;
+
+/// A device with its queue.
+#[derive(Debug)]
+pub struct GpuContext {
+    device: Device,
+    queue: Queue,
+    description: AdapterDescription,
+    report: Report,
+    counters: Counters,
+}
+
+impl GpuContext {
+    /// Opens the adapter that answers the options best.
+    ///
+    /// Kernels keep to WebGPU's default limits, but for the size of buffers, of which all that there is is asked for.
+    ///
+    /// # Errors
+    /// [`GpuError::NoAdapter`] names the adapters that there are; [`GpuError::Refused`] what the driver said.
+    ///
+    /// # Example
+    /// ```
+    /// use incise_gpu::{GpuContext, GpuError, GpuOptions};
+    ///
+    /// match GpuContext::new(&GpuOptions::from_env()) {
+    ///     Ok(gpu) => println!("{}", gpu.adapter().name),
+    ///     Err(GpuError::NoAdapter { reason, .. }) => println!("none: {reason}"),
+    ///     Err(other) => return Err(other),
+    /// }
+    /// # Ok::<(), GpuError>(())
+    /// ```
+    pub fn new(options: &GpuOptions) -> Result<Self, GpuError> {
+        let adapter = choose(options)?;
+        let info = adapter.get_info();
+        let present = adapter.limits();
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("incise"),
+            required_features: adapter.features() & Features::TIMESTAMP_QUERY,
+            required_limits: Limits {
+                max_buffer_size: present.max_buffer_size,
+                max_storage_buffer_binding_size: present.max_storage_buffer_binding_size,
+                ..Limits::default()
+            },
+            memory_hints: wgpu::MemoryHints::Performance,
+            ..wgpu::DeviceDescriptor::default()
+        };
+        let opened = block_on(adapter.request_device(&descriptor));
+        let (device, queue) = opened.map_err(|error| GpuError::Refused {
+            adapter: info.name.clone(),
+            message: error.to_string(),
+        })?;
+        Ok(Self::from_device(device, queue))
+    }
+
+    /// Takes a device that somebody else has opened, a renderer above all: what is computed here can be drawn there
+    /// without a copy. It must allow WebGPU's default limits.
+    #[must_use]
+    pub fn from_device(device: Device, queue: Queue) -> Self {
+        let report = Report::default();
+        let uncaptured = Arc::clone(&report);
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            let message = error.to_string();
+            note(&uncaptured, GpuError::Command { message });
+        }));
+        let lost = Arc::clone(&report);
+        device.set_device_lost_callback(move |reason, message| {
+            let message = format!("{reason:?}: {message}");
+            note(&lost, GpuError::Lost { message });
+        });
+        Self {
+            description: AdapterDescription::of(&device.adapter_info()),
+            device,
+            queue,
+            report,
+            counters: Counters::default(),
+        }
+    }
+
+    /// The adapters that there are, in the order in which they are preferred.
+    #[must_use]
+    pub fn adapters(options: &GpuOptions) -> Vec<AdapterDescription> {
+        let adapters = enumerate(options);
+        adapters
+            .iter()
+            .map(|adapter| AdapterDescription::of(&adapter.get_info()))
+            .collect()
+    }
+
+    /// The adapter behind the device.
+    #[must_use]
+    pub fn adapter(&self) -> &AdapterDescription {
+        &self.description
+    }
+
+    /// The device, for renderers that share it.
+    #[must_use]
+    pub fn device(&self) -> &Device {
+        &self.device
+    }
+
+    /// The queue, for renderers that share it.
+    #[must_use]
+    pub fn queue(&self) -> &Queue {
+        &self.queue
+    }
+
+    /// Whether stages can be timed on the device.
+    #[must_use]
+    pub fn has_timestamps(&self) -> bool {
+        self.device.features().contains(Features::TIMESTAMP_QUERY)
+    }
+
+    /// The most bytes that a kernel can see of one buffer.
+    #[must_use]
+    pub fn buffer_limit(&self) -> u64 {
+        let limits = self.device.limits();
+        limits
+            .max_storage_buffer_binding_size
+            .min(limits.max_buffer_size)
+    }
+
+    /// What went to the device and came back since it was opened.
+    #[must_use]
+    pub fn traffic(&self) -> Traffic {
+        self.counters.read()
+    }
+
+    pub(crate) fn counters(&self) -> &Counters {
+        &self.counters
+    }
+
+    /// What the driver has reported since, if it did: the device is not to be trusted from then on.
+    ///
+    /// # Errors
+    /// The first report.
+    pub fn check(&self) -> Result<(), GpuError> {
+        let report = self
+            .report
+            .lock()
+            .unwrap_or_else(|poison| poison.into_inner());
+        report.clone().map_or(Ok(()), Err)
+    }
+
+    /// Hands commands over; returns what to wait for.
+    pub(crate) fn submit(
+        &self,
+        encoder: wgpu::CommandEncoder,
+    ) -> Result<SubmissionIndex, GpuError> {
+        let index = self.queue.submit([encoder.finish()]);
+        count(&self.counters.submits, 1);
+        self.check().map(|()| index)
+    }
+
+    pub(crate) fn encoder(&self, label: &str) -> wgpu::CommandEncoder {
+        let descriptor = wgpu::CommandEncoderDescriptor { label: Some(label) };
+        self.device.create_command_encoder(&descriptor)
+    }
+
+    /// Waits until the device has done all that it was told.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub fn wait(&self) -> Result<(), GpuError> {
+        self.poll(PollType::wait_indefinitely())
+    }
+
+    /// Waits until the device has done what was handed over with this, and all before it.
+    pub(crate) fn wait_for(&self, submission: SubmissionIndex) -> Result<(), GpuError> {
+        self.poll(PollType::Wait {
+            submission_index: Some(submission),
+            timeout: None,
+        })
+    }
+
+    /// Tells who waits for something that it is done, without waiting.
+    pub(crate) fn look(&self) -> Result<(), GpuError> {
+        self.poll(PollType::Poll)
+    }
+
+    fn poll(&self, how: PollType) -> Result<(), GpuError> {
+        let polled = self.device.poll(how);
+        self.check()?;
+        polled.map(|_| ()).map_err(|error| GpuError::Lost {
+            message: error.to_string(),
+        })
+    }
+}
+
+/// Keeps the first report: what follows mostly is its consequence.
+fn note(report: &Report, error: GpuError) {
+    let mut report = report.lock().unwrap_or_else(|poison| poison.into_inner());
+    // A lost device makes everything else fail, so that is what is told.
+    let replace = report.is_none() || matches!(error, GpuError::Lost { .. });
+    if replace {
+        *report = Some(error);
+    }
+}
+
+/// All adapters, best first.
+fn enumerate(options: &GpuOptions) -> Vec<Adapter> {
+    let backends = options
+        .backends
+        .unwrap_or(Backends::VULKAN | Backends::METAL | Backends::DX12);
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
+        backends,
+        // The sizes of indirect dispatches come from our own kernels, which keep them within limits; looking at each
+        // of them costs a dispatch more.
+        flags: wgpu::InstanceFlags::default()
+            .difference(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL)
+            .with_env(),
+        ..wgpu::InstanceDescriptor::new_without_display_handle()
+    });
+    let mut adapters = block_on(instance.enumerate_adapters(backends));
+    // Stable, so that two of a kind stay in the driver's order.
+    adapters.sort_by_key(|adapter| match adapter.get_info().device_type {
+        DeviceType::DiscreteGpu => 0,
+        DeviceType::IntegratedGpu => 1,
+        DeviceType::VirtualGpu => 2,
+        DeviceType::Other => 3,
+        DeviceType::Cpu => 4,
+    });
+    adapters
+}
+
+fn choose(options: &GpuOptions) -> Result<Adapter, GpuError> {
+    let adapters = enumerate(options);
+    let names: Vec<String> = adapters.iter().map(|a| a.get_info().name).collect();
+    let wish = options.adapter.as_ref().map(|name| name.to_lowercase());
+    let fits = |name: &String| {
+        wish.as_ref()
+            .is_none_or(|wish| name.to_lowercase().contains(wish))
+    };
+    let place = names.iter().position(fits);
+    let found = if names.is_empty() {
+        "none (is a driver installed?)".to_owned()
+    } else {
+        names.join(", ")
+    };
+    place
+        .and_then(|place| adapters.into_iter().nth(place))
+        .ok_or_else(|| GpuError::NoAdapter {
+            reason: match &options.adapter {
+                Some(name) => format!("no adapter has `{name}` in its name"),
+                None => "no adapter answers".to_owned(),
+            },
+            found,
+        })
+}

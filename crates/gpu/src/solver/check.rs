@@ -1,0 +1,185 @@
+//! [`GpuSolver::check`]: whether the device has what schedule, tets and masses say.
+//!
+//! Everything that is derived is read back and compared with what the host computes anew, tet by tet. Shares nothing with
+//! the code that sends patches but the numbers of a tet. Cost: reads all arrays, O(tets).
+
+use incise_graph::Schedule;
+
+use super::GpuSolver;
+use super::layout::{Form, THREADS};
+use super::numbers::NUMBERS;
+use super::tile::{TILE_NUMBERS, TILE_TETS};
+use crate::GpuError;
+
+/// What the device holds, read back.
+struct Copy {
+    particles: Vec<[f32; 4]>,
+    corners: Vec<[u32; 4]>,
+    rest: Vec<f32>,
+    constants: Vec<[f32; 4]>,
+    tiles: Vec<u32>,
+    lists: Vec<u32>,
+    parts: Vec<u32>,
+}
+
+impl GpuSolver {
+    /// Proves that what the next step with this schedule would solve is what schedule, tets and masses say, to the bit,
+    /// and that every cluster is solved once, in the order of its color. O(tets); for tests and on request.
+    ///
+    /// # Errors
+    /// [`GpuError::Inconsistent`] with the first difference, also if something was not yet [sent](GpuSolver::send).
+    pub fn check(&self, schedule: &Schedule) -> Result<(), GpuError> {
+        let (gpu, body) = (&*self.gpu, &self.body);
+        let copy = Copy {
+            particles: body.particles.read(gpu)?,
+            corners: body.corners.read(gpu)?,
+            rest: body.rest.read(gpu)?,
+            constants: body.constants.read(gpu)?,
+            tiles: body.tiles.read(gpu)?,
+            lists: body.colors.lists.array.read(gpu)?,
+            parts: body.colors.parts.array.read(gpu)?,
+        };
+        self.check_particles(&copy)?;
+        for color in 0..schedule.color_count() {
+            for &cluster in schedule.clusters(color) {
+                for &tet in schedule.constraints(cluster) {
+                    self.check_tet(tet, &copy)?;
+                }
+            }
+        }
+        self.check_order(schedule, &copy)
+    }
+
+    fn check_particles(&self, copy: &Copy) -> Result<(), GpuError> {
+        if copy.particles.len() != self.host.particle_count() {
+            return differs("the number of particles");
+        }
+        for (p, particle) in copy.particles.iter().enumerate() {
+            let ([.., weight], _) = self.host.particle_data(p);
+            if particle[3] != weight {
+                return differs(&format!("the mass of particle {p}"));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_tet(&self, tet: u32, copy: &Copy) -> Result<(), GpuError> {
+        let wrong = |what| differs(&format!("{what} of tet {tet}"));
+        let Some(place) = self.body.layout.place(tet as usize) else {
+            return wrong("the place");
+        };
+        let data = self.host.tet_data(tet);
+        let mut corners = copy.corners[place];
+        if self.form() == Form::Workgroups {
+            let list = place / TILE_TETS * TILE_NUMBERS + 2 + TILE_TETS;
+            corners = corners.map(|p| copy.tiles[list + p as usize]);
+        }
+        if corners != data.corners {
+            return wrong("the corners");
+        }
+        let start = place / THREADS * THREADS * NUMBERS + place % THREADS;
+        for (k, number) in data.rest.iter().enumerate() {
+            if copy.rest[start + k * THREADS].to_bits() != number.to_bits() {
+                return wrong("the rest shape");
+            }
+        }
+        if !self.host.is_uniform() && copy.constants[place][..3] != data.constants {
+            return wrong("the material");
+        }
+        Ok(())
+    }
+
+    /// Goes through the dispatches as the device does and looks who is solved when.
+    fn check_order(&self, schedule: &Schedule, copy: &Copy) -> Result<(), GpuError> {
+        // Colors without clusters have no dispatch.
+        let colors = (0..schedule.color_count()).filter(|&c| !schedule.clusters(c).is_empty());
+        let mut turn = vec![None; self.host.tet_count()];
+        for (place, color) in colors.enumerate() {
+            for tet in schedule.color_constraints(color) {
+                turn[tet as usize] = Some(place);
+            }
+        }
+        let mut now = 0;
+        for run in &self.body.colors.runs {
+            let at = run.offset as usize / size_of::<u32>();
+            let [first, count] = [copy.parts[at], copy.parts[at + 1]].map(|n| n as usize);
+            let groups = &copy.lists[first..first + count];
+            for groups in groups.chunks(if run.tail { 1 } else { count }) {
+                for place in groups.iter().flat_map(|&group| self.places(group, copy)) {
+                    let tet = self.body.layout.tet(place) as usize;
+                    if turn[tet].take() != Some(now) {
+                        return differs(&format!("when tet {tet} is solved"));
+                    }
+                }
+                now += 1;
+            }
+        }
+        match turn.iter().position(Option::is_some) {
+            Some(tet) => differs(&format!("that tet {tet} is not solved, which")),
+            None => self.check_steps(copy),
+        }
+    }
+
+    /// The places of a group that have a tet.
+    fn places(&self, group: u32, copy: &Copy) -> Vec<usize> {
+        let group = group as usize;
+        match self.form() {
+            Form::Threads => {
+                let places = self.body.layout.depth() * THREADS;
+                let all = group * places..(group + 1) * places;
+                all.filter(|&p| copy.corners[p][0] != copy.corners[p][1])
+                    .collect()
+            }
+            Form::Workgroups => {
+                let (steps, ends) = steps(group, copy);
+                let count = if steps == 0 {
+                    0
+                } else {
+                    ends[steps - 1] as usize
+                };
+                (group * TILE_TETS..group * TILE_TETS + count).collect()
+            }
+        }
+    }
+
+    /// Looks whether the tets of a step share a particle.
+    fn check_steps(&self, copy: &Copy) -> Result<(), GpuError> {
+        if self.form() == Form::Threads {
+            return Ok(());
+        }
+        let seats = &self.body.layout.seats;
+        for tile in 0..seats.seat_count() {
+            // What is said of a tile without cluster is old.
+            if u32::try_from(tile).is_ok_and(|seat| seats.cluster(seat).is_none()) {
+                continue;
+            }
+            let (steps, ends) = steps(tile, copy);
+            let mut start = 0;
+            for &end in &ends[..steps] {
+                let tets = tile * TILE_TETS + start..tile * TILE_TETS + end as usize;
+                let mut corners: Vec<u32> = copy.corners[tets].iter().flatten().copied().collect();
+                let count = corners.len();
+                corners.sort_unstable();
+                corners.dedup();
+                if corners.len() != count {
+                    return differs(&format!("a step of tile {tile}"));
+                }
+                start = end as usize;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The number of steps of a tile, and where they end.
+fn steps(tile: usize, copy: &Copy) -> (usize, &[u32]) {
+    let header = tile * TILE_NUMBERS;
+    let ends = &copy.tiles[header + 2..header + 2 + TILE_TETS];
+    (copy.tiles[header] as usize, ends)
+}
+
+fn differs(what: &str) -> Result<(), GpuError> {
+    Err(GpuError::Inconsistent {
+        what: what.to_owned(),
+    })
+}

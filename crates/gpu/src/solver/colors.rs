@@ -1,0 +1,170 @@
+//! [`Colors`]: the dispatches of a pass over the tets.
+//!
+//! A color is a dispatch of a workgroup for each of its groups. Colors of a single group that follow each other are one
+//! dispatch of one workgroup, which waits at a barrier between them: that is what the tail of a coloring is made of, and
+//! all of a small body. The lists leave every color room to grow, and only what differs from what the device has is sent.
+//!
+//! Cost: O(groups) on the host when they changed, uploads in pieces of 256 bytes.
+
+use incise_graph::Rows;
+
+use crate::array::Array;
+use crate::kernel::{Recorder, STRIDE};
+use crate::{GpuContext, GpuError};
+
+use super::kernels::Bound;
+use super::numbers::Part;
+
+/// Numbers that are compared and sent together.
+const PIECE: usize = 64;
+
+/// One dispatch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Run {
+    /// Where its part is in the buffer of parts, in bytes.
+    pub(crate) offset: u32,
+    /// Workgroups, if it is one color; several colors have one.
+    pub(crate) groups: usize,
+    /// Whether it is several colors.
+    pub(crate) tail: bool,
+}
+
+/// The dispatches of a pass.
+#[derive(Debug)]
+pub(crate) struct Colors {
+    pub(crate) runs: Vec<Run>,
+    /// The groups, color by color, then those of tails.
+    pub(crate) lists: Followed,
+    /// What each run works on, [`STRIDE`] bytes each.
+    pub(crate) parts: Followed,
+    /// Color -> room in the lists.
+    rooms: Vec<usize>,
+}
+
+impl Colors {
+    pub(crate) fn new(gpu: &GpuContext) -> Result<Self, GpuError> {
+        let (storage, uniform) = (wgpu::BufferUsages::STORAGE, wgpu::BufferUsages::UNIFORM);
+        Ok(Self {
+            runs: Vec::new(),
+            lists: Followed::new(gpu, "lists of groups", storage)?,
+            parts: Followed::new(gpu, "parts of dispatches", uniform)?,
+            rooms: Vec::new(),
+        })
+    }
+
+    /// Takes over the groups of all colors.
+    pub(crate) fn follow(
+        &mut self,
+        gpu: &GpuContext,
+        groups_of: &Rows<u32>,
+    ) -> Result<(), GpuError> {
+        let colors = groups_of.row_count();
+        self.rooms.resize(colors, 0);
+        let (mut lists, mut parts) = (Vec::new(), Vec::new());
+        self.runs.clear();
+        let mut alone: Vec<u32> = Vec::new();
+        let mut tails: Vec<(usize, Vec<u32>)> = Vec::new();
+        for color in 0..colors {
+            let groups = groups_of.row(color);
+            if self.rooms[color] < groups.len() {
+                self.rooms[color] = groups.len() + groups.len() / 2;
+            }
+            if groups.len() == 1 {
+                alone.push(groups[0]);
+            } else if !groups.is_empty() {
+                self.close(&mut alone, &mut tails, &mut parts);
+                self.runs.push(Run {
+                    offset: part(&mut parts, lists.len(), groups.len()),
+                    groups: groups.len(),
+                    tail: false,
+                });
+            }
+            let end = lists.len() + self.rooms[color];
+            lists.extend_from_slice(groups);
+            lists.resize(end, 0);
+        }
+        self.close(&mut alone, &mut tails, &mut parts);
+        for (at, groups) in tails {
+            parts[at] = index(lists.len());
+            lists.extend(groups);
+        }
+        self.lists.set(gpu, lists)?;
+        self.parts.set(gpu, parts)
+    }
+
+    /// Records a pass, with the kernel for one color and that for several.
+    pub(crate) fn run(&self, pass: &mut Recorder<'_>, one: &Bound, several: &Bound) {
+        for run in &self.runs {
+            let solve = if run.tail { several } else { one };
+            solve.run(pass, &[run.offset], run.groups);
+        }
+    }
+
+    /// Ends a row of colors of one group each.
+    fn close(
+        &mut self,
+        alone: &mut Vec<u32>,
+        tails: &mut Vec<(usize, Vec<u32>)>,
+        parts: &mut Vec<u32>,
+    ) {
+        if alone.is_empty() {
+            return;
+        }
+        let (at, groups) = (parts.len(), std::mem::take(alone));
+        self.runs.push(Run {
+            offset: part(parts, 0, groups.len()),
+            groups: 1,
+            tail: true,
+        });
+        tails.push((at, groups));
+    }
+}
+
+/// Appends a part; returns where it is, in bytes.
+fn part(parts: &mut Vec<u32>, first: usize, count: usize) -> u32 {
+    let offset = index(parts.len() * size_of::<u32>());
+    let part = Part {
+        first: index(first),
+        count: index(count),
+    };
+    parts.extend_from_slice(bytemuck::cast_slice(&[part]));
+    parts.resize((offset + STRIDE) as usize / size_of::<u32>(), 0);
+    offset
+}
+
+fn index(value: usize) -> u32 {
+    u32::try_from(value).expect("fewer than 2^32 groups")
+}
+
+/// Numbers on the device of which the host has a copy, so that only what differs is sent.
+#[derive(Debug)]
+pub(crate) struct Followed {
+    pub(crate) array: Array<u32>,
+    host: Vec<u32>,
+}
+
+impl Followed {
+    fn new(
+        gpu: &GpuContext,
+        what: &'static str,
+        usage: wgpu::BufferUsages,
+    ) -> Result<Self, GpuError> {
+        Ok(Self {
+            array: Array::with_usage(gpu, what, 0, usage)?,
+            host: Vec::new(),
+        })
+    }
+
+    fn set(&mut self, gpu: &GpuContext, values: Vec<u32>) -> Result<(), GpuError> {
+        let known = self.host.len();
+        self.array.resize(gpu, values.len())?;
+        for start in (0..values.len()).step_by(PIECE) {
+            let end = (start + PIECE).min(values.len());
+            if end > known || self.host[start..end] != values[start..end] {
+                self.array.write(gpu, start, &values[start..end]);
+            }
+        }
+        self.host = values;
+        Ok(())
+    }
+}

@@ -1,0 +1,374 @@
+//! [`Frame`]: a step as one pass of dispatches.
+//!
+//! Everything that differs from substep to substep is in buffers before the pass begins, so it needs no break. Twin:
+//! `Solver::substep` of incise-xpbd. Cost: recording a third of a microsecond a dispatch.
+
+use incise_xpbd::{Form as Solving, Solver, StepSettings};
+use wgpu::{Buffer, BufferUsages, SubmissionIndex};
+
+use super::body::Body;
+use super::handles::{self, Handles};
+use super::jacobi::{self, Jacobi};
+use super::kernels::{Bound, CLEAR, Kernels, PREDICT, UPDATE_VELOCITIES, Variant, solve};
+use super::layout::{Form, THREADS};
+use super::numbers::Settings;
+use super::obstacles::Obstacles;
+use super::scalars;
+use super::stages::{Clock, Stage::*, Track};
+use super::turns::{self, Turns};
+use crate::array::{Array, Staging};
+use crate::{GpuContext, GpuError};
+
+/// What a step needs beside the body.
+#[derive(Debug)]
+pub(crate) struct Frame {
+    settings: Array<Settings>,
+    sent: Option<Settings>,
+    /// If something asks for its turn.
+    turns: Option<Turns>,
+    /// If there are colliders.
+    obstacles: Option<Obstacles>,
+    /// If iterations are Jacobi's.
+    jacobi: Option<Jacobi>,
+    /// Positions before the constraints of the last substep; empty unless a step keeps them.
+    predicted: Array<[f32; 4]>,
+    /// Whether the last step kept what residuals need.
+    kept: bool,
+    /// If stages are timed.
+    clock: Option<Clock>,
+}
+
+/// What a step reads and writes beside that.
+#[derive(Debug)]
+pub(crate) struct Scene<'a> {
+    pub(crate) gpu: &'a GpuContext,
+    pub(crate) kernels: &'a mut Kernels,
+    pub(crate) body: &'a mut Body,
+    pub(crate) host: &'a Solver<f32>,
+    pub(crate) repaired: &'a Array<u32>,
+}
+
+impl Frame {
+    pub(crate) fn new(gpu: &GpuContext) -> Result<Self, GpuError> {
+        Ok(Self {
+            settings: Array::with_usage(gpu, "settings", 1, BufferUsages::UNIFORM)?,
+            sent: None,
+            turns: None,
+            obstacles: None,
+            jacobi: None,
+            predicted: Array::zeros(gpu, "predicted positions", 0)?,
+            kept: false,
+            clock: None,
+        })
+    }
+
+    /// Records a step and hands it over; returns what to wait for.
+    pub(crate) fn record(
+        &mut self,
+        scene: Scene<'_>,
+        settings: &StepSettings,
+        keep: bool,
+    ) -> Result<SubmissionIndex, GpuError> {
+        let Scene { gpu, host, .. } = scene;
+        let keeps = keep || settings.iterations > 1;
+        self.prepare(gpu, scene.body, host, settings, keeps)?;
+        if keep {
+            self.predicted.resize(gpu, host.particle_count())?;
+        }
+        self.kept = keep;
+        let passes = self.bind(
+            gpu,
+            scene.kernels,
+            scene.body,
+            host,
+            scene.repaired,
+            settings,
+            keeps,
+        )?;
+        let body = &*scene.body;
+        let mut track = Track::new(gpu, self.clock.as_mut());
+        let particles = host.particle_count().div_ceil(THREADS);
+        for substep in 0..settings.substeps {
+            let start = turns::offset(settings, substep, 0);
+            passes.predict.run(track.at(Predict), &[], particles);
+            if let Some(handles) = &passes.handles {
+                handles.move_held(track.at(Other), start);
+            }
+            if let Some(clear) = &passes.clear {
+                let words = 2 * body.layout.place_count();
+                clear.run(track.at(Other), &[], words.div_ceil(THREADS));
+            }
+            for scalars in &passes.scalars {
+                scalars.begin(track.at(Other));
+            }
+            if keep && substep + 1 == settings.substeps {
+                let bytes = (host.particle_count() * size_of::<[f32; 4]>()) as u64;
+                let (from, to) = (body.particles.buffer(), self.predicted.buffer());
+                let encoder = track.between_passes();
+                encoder.copy_buffer_to_buffer(from, 0, to, 0, bytes);
+            }
+            for iteration in 0..settings.iterations {
+                let turn = turns::offset(settings, substep, iteration);
+                body.colors
+                    .run(track.at(Solve), &passes.solve, &passes.tail);
+                if let Some(jacobi) = &passes.jacobi {
+                    jacobi.run(track.at(Solve), turn, particles);
+                }
+                if let Some(handles) = &passes.handles {
+                    handles.solve(track.at(Other), turn);
+                }
+                for scalars in &passes.scalars {
+                    scalars.solve(track.at(Other));
+                }
+                if let Some(project) = &passes.project {
+                    project.run(track.at(Other), &[turn], particles);
+                }
+            }
+            passes.update.run(track.at(Update), &[], particles);
+            if let Some(handles) = &passes.handles {
+                handles.update_held(track.at(Other));
+            }
+        }
+        track.submit()
+    }
+
+    /// Brings what the frame needs to the device, unless it is there.
+    fn prepare(
+        &mut self,
+        gpu: &GpuContext,
+        body: &mut Body,
+        host: &Solver<f32>,
+        settings: &StepSettings,
+        keeps: bool,
+    ) -> Result<(), GpuError> {
+        self.send_settings(gpu, body, host, settings);
+        if keeps {
+            body.multipliers.resize(gpu, body.layout.place_count())?;
+        }
+        Jacobi::prepare(&mut self.jacobi, gpu, body, host.particle_count(), settings)?;
+        Obstacles::follow(&mut self.obstacles, gpu, host, settings)?;
+        if let Some(handles) = &mut body.handles {
+            handles.prepare(gpu, host, settings)?;
+        }
+        if settings.iterations > 1 {
+            for scalars in body.distances.iter_mut().chain(&mut body.volumes) {
+                scalars.keep_multipliers(gpu)?;
+            }
+        }
+        let asks = self.obstacles.is_some() || body.handles.is_some() || self.jacobi.is_some();
+        Turns::follow(&mut self.turns, gpu, settings, asks)
+    }
+
+    /// Sends the settings if they are others.
+    fn send_settings(
+        &mut self,
+        gpu: &GpuContext,
+        body: &Body,
+        host: &Solver<f32>,
+        settings: &StepSettings,
+    ) {
+        let time = settings.substep_time();
+        let gravity = settings.gravity.unwrap_or_default() * time;
+        let mut material = [0.0; 4];
+        if host.is_uniform() && host.tet_count() > 0 {
+            material[..3].copy_from_slice(&host.tet_data(0).constants);
+        }
+        let depth = match body.layout.form {
+            Form::Threads => body.layout.depth(),
+            Form::Workgroups => 0,
+        };
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "the device computes in single precision"
+        )]
+        let values = Settings {
+            gravity: gravity.as_vec3().to_array(),
+            time: time as f32,
+            time_squared: (time * time) as f32,
+            per_time: (1.0 / time) as f32,
+            relaxation: settings.relaxation as f32,
+            one: 1.0,
+            steep: Solver::<f32>::STEEP as f32,
+            particles: index(host.particle_count()),
+            depth: index(depth),
+            obstacles: index(settings.colliders.len()),
+            handles: index(body.handles.as_ref().map_or(0, Handles::handle_count)),
+            held: index(body.handles.as_ref().map_or(0, Handles::held_count)),
+            hanging: index(body.handles.as_ref().map_or(0, Handles::hanging_count)),
+            unused: 0,
+            material,
+        };
+        if self.sent != Some(values) {
+            self.settings.write(gpu, 0, &[values]);
+            self.sent = Some(values);
+        }
+    }
+
+    /// What times stages, if somebody asked.
+    pub(crate) fn clock(&mut self) -> &mut Option<Clock> {
+        &mut self.clock
+    }
+
+    /// The settings of the last step, on the device.
+    pub(crate) fn settings(&self) -> &Buffer {
+        self.settings.buffer()
+    }
+
+    /// Bytes of what the step needs.
+    pub(crate) fn bytes(&self) -> u64 {
+        let turns = self.turns.as_ref().map_or(0, |turns| turns.buffer().size());
+        let obstacles = self.obstacles.as_ref().map_or(0, Obstacles::bytes);
+        let jacobi = self.jacobi.as_ref().map_or(0, Jacobi::bytes);
+        let always = self.settings.buffer().size() + self.predicted.buffer().size();
+        let clock = self.clock.as_ref().map_or(0, Clock::bytes);
+        always + turns + obstacles + jacobi + clock
+    }
+
+    /// Starts to read what residuals need, if the last step kept it.
+    #[expect(
+        clippy::type_complexity,
+        reason = "predicted positions and multipliers"
+    )]
+    pub(crate) fn stage_last_substep(
+        &self,
+        gpu: &GpuContext,
+        body: &Body,
+    ) -> Result<Option<(Staging<[f32; 4]>, Staging<[f32; 2]>)>, GpuError> {
+        if !self.kept {
+            return Ok(None);
+        }
+        let predicted = self.predicted.stage(gpu, self.predicted.len())?;
+        let multipliers = body.multipliers.stage(gpu, body.multipliers.len())?;
+        Ok(Some((predicted, multipliers)))
+    }
+}
+
+/// The buffers that what is not a tet may need.
+#[derive(Debug)]
+pub(crate) struct Shared<'a> {
+    pub(crate) settings: &'a Buffer,
+    pub(crate) turns: &'a Buffer,
+    pub(crate) particles: &'a Buffer,
+    pub(crate) previous: &'a Buffer,
+    pub(crate) velocities: &'a Buffer,
+    pub(crate) repaired: &'a Buffer,
+}
+
+/// The kernels of a step, in the order of a substep; those that it does not need are not there.
+#[derive(Debug)]
+struct Passes<'a> {
+    predict: Bound,
+    /// Where multipliers are kept.
+    clear: Option<Bound>,
+    solve: Bound,
+    tail: Bound,
+    project: Option<Bound>,
+    update: Bound,
+    jacobi: Option<jacobi::Passes>,
+    handles: Option<handles::Passes>,
+    /// Distances before volumes.
+    scalars: Vec<scalars::Passes<'a>>,
+}
+
+impl Frame {
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "the parts of a solver, borrowed one by one"
+    )]
+    fn bind<'a>(
+        &self,
+        gpu: &GpuContext,
+        kernels: &mut Kernels,
+        body: &'a Body,
+        host: &Solver<f32>,
+        repaired: &Array<u32>,
+        settings: &StepSettings,
+        keeps: bool,
+    ) -> Result<Passes<'a>, GpuError> {
+        let constants = self.settings.buffer();
+        let (particles, previous) = (body.particles.buffer(), body.previous.buffer());
+        let velocities = body.velocities.buffer();
+        let variant = Variant {
+            damped: host.is_damped(),
+            sequential: settings.form == Solving::Sequential,
+            keeps,
+            jacobi: self.jacobi.is_some(),
+            various: !host.is_uniform(),
+            tiled: false,
+        };
+        let last = match body.layout.form {
+            Form::Threads => body.corrections.buffer(),
+            Form::Workgroups => body.tiles.buffer(),
+        };
+        let tets = [
+            constants,
+            body.colors.parts.array.buffer(),
+            particles,
+            body.corners.buffer(),
+            body.rest.buffer(),
+            body.constants.buffer(),
+            previous,
+            body.multipliers.buffer(),
+            body.colors.lists.array.buffer(),
+            last,
+        ];
+        let (form, plain) = (body.layout.form, Variant::default());
+        let update = [
+            constants,
+            particles,
+            previous,
+            velocities,
+            repaired.buffer(),
+        ];
+        let turns = self.turns.as_ref().map(Turns::buffer);
+        let shared = turns.map(|turns| Shared {
+            settings: constants,
+            turns,
+            particles,
+            previous,
+            velocities,
+            repaired: repaired.buffer(),
+        });
+        let several = settings.iterations > 1;
+        let mut scalars = Vec::new();
+        for constraints in body.distances.iter().chain(&body.volumes) {
+            let buffers = [constants, particles, previous];
+            scalars.push(constraints.bind(gpu, kernels, buffers, several)?);
+        }
+        let mut bind =
+            |source, variant, buffers: &[&Buffer]| kernels.bind(gpu, source, variant, buffers);
+        Ok(Passes {
+            predict: bind(
+                &PREDICT,
+                plain,
+                &[constants, particles, previous, velocities],
+            )?,
+            clear: match keeps {
+                true => Some(bind(&CLEAR, plain, &[body.multipliers.buffer()])?),
+                false => None,
+            },
+            solve: bind(solve(form, false), variant, &tets)?,
+            tail: bind(solve(form, true), variant, &tets)?,
+            update: bind(&UPDATE_VELOCITIES, plain, &update)?,
+            project: match (&self.obstacles, &shared) {
+                (Some(obstacles), Some(shared)) => Some(obstacles.bind(gpu, kernels, shared)?),
+                _ => None,
+            },
+            handles: match (&body.handles, &shared) {
+                (Some(handles), Some(shared)) => Some(handles.bind(gpu, kernels, shared, several)?),
+                _ => None,
+            },
+            jacobi: match (&self.jacobi, &shared) {
+                (Some(jacobi), Some(shared)) => {
+                    Some(jacobi.bind(gpu, kernels, body, shared, keeps)?)
+                }
+                _ => None,
+            },
+            scalars,
+        })
+    }
+}
+
+fn index(value: usize) -> u32 {
+    u32::try_from(value).expect("particles and places are numbered by 32 bits")
+}

@@ -1,0 +1,123 @@
+//! [`Jacobi`]: what iterations need that correct all tets from the same positions, and their extrapolation.
+//!
+//! The kernels of the tets gather corrections color by color, so that every sum has one order and no two threads add to
+//! one particle at once; a pass over the particles then adds them. Chebyshev keeps where the previous iteration began,
+//! of positions and of multipliers, and its weights are in the turns. Only threads gather: a tile has its particles in
+//! workgroup memory, where a correction would be seen at once. Twin: `jacobi.rs` of incise-xpbd.
+//!
+//! Cost: a dispatch an iteration, with Chebyshev two; 16 bytes a particle, with Chebyshev 16 more and 16 a place.
+
+use incise_xpbd::{Method, StepSettings};
+use wgpu::Buffer;
+
+use super::body::Body;
+use super::frame::Shared;
+use super::kernels::{APPLY_CORRECTIONS, Bound, EXTRAPOLATE_MULTIPLIERS, Kernels, Variant};
+use super::layout::{Form, THREADS};
+use crate::array::Array;
+use crate::kernel::Recorder;
+use crate::{GpuContext, GpuError};
+
+/// Iterates that are kept.
+#[derive(Debug)]
+pub(crate) struct Jacobi {
+    extrapolating: bool,
+    /// Where the previous iteration began; empty without extrapolation.
+    before: Array<[f32; 4]>,
+    /// Place -> multipliers at the start of this iteration and of the one before; empty without extrapolation.
+    history: Array<[f32; 4]>,
+}
+
+impl Jacobi {
+    /// Makes room for what the settings ask for; nothing is kept for nothing.
+    pub(crate) fn prepare(
+        this: &mut Option<Self>,
+        gpu: &GpuContext,
+        body: &mut Body,
+        particles: usize,
+        settings: &StepSettings,
+    ) -> Result<(), GpuError> {
+        if settings.method == Method::GaussSeidel {
+            *this = None;
+            return Ok(());
+        }
+        if body.layout.form == Form::Workgroups {
+            return Err(GpuError::Unsupported {
+                what: "Jacobi iterations in workgroups (threads do them)",
+            });
+        }
+        body.corrections.resize(gpu, particles)?;
+        let jacobi = match this {
+            Some(jacobi) => jacobi,
+            None => this.insert(Self {
+                extrapolating: false,
+                before: Array::zeros(gpu, "iterates", 0)?,
+                history: Array::zeros(gpu, "multipliers of iterates", 0)?,
+            }),
+        };
+        jacobi.extrapolating = settings.method != Method::Jacobi;
+        if jacobi.extrapolating {
+            jacobi.before.resize(gpu, particles)?;
+            jacobi.history.resize(gpu, body.multipliers.len())?;
+        }
+        Ok(())
+    }
+
+    pub(crate) fn bind(
+        &self,
+        gpu: &GpuContext,
+        kernels: &mut Kernels,
+        body: &Body,
+        shared: &Shared<'_>,
+        keeps: bool,
+    ) -> Result<Passes, GpuError> {
+        let variant = Variant {
+            keeps: self.extrapolating,
+            ..Variant::default()
+        };
+        let buffers = [
+            shared.settings,
+            shared.turns,
+            shared.particles,
+            body.corrections.buffer(),
+            self.before.buffer(),
+        ];
+        let apply = kernels.bind(gpu, &APPLY_CORRECTIONS, variant, &buffers)?;
+        let mut extrapolate = None;
+        if self.extrapolating && keeps {
+            let buffers = [
+                body.multipliers.buffer(),
+                shared.turns,
+                self.history.buffer(),
+            ];
+            let plain = Variant::default();
+            let leap = kernels.bind(gpu, &EXTRAPOLATE_MULTIPLIERS, plain, &buffers)?;
+            extrapolate = Some((leap, self.history.len().div_ceil(THREADS)));
+        }
+        Ok(Passes { apply, extrapolate })
+    }
+
+    /// Bytes on the device.
+    pub(crate) fn bytes(&self) -> u64 {
+        let buffers = [self.before.buffer(), self.history.buffer()];
+        buffers.into_iter().map(Buffer::size).sum()
+    }
+}
+
+/// The kernels that end an iteration over the tets.
+#[derive(Debug)]
+pub(crate) struct Passes {
+    apply: Bound,
+    /// Where multipliers are kept and extrapolated.
+    extrapolate: Option<(Bound, usize)>,
+}
+
+impl Passes {
+    /// After the tets of the iteration whose turn is at `turn`; `particles` is how many workgroups these are.
+    pub(crate) fn run(&self, pass: &mut Recorder<'_>, turn: u32, particles: usize) {
+        self.apply.run(pass, &[turn], particles);
+        if let Some((leap, groups)) = &self.extrapolate {
+            leap.run(pass, &[turn], *groups);
+        }
+    }
+}

@@ -1,0 +1,463 @@
+//! The kernels of the solver, [`Variant`]: which of their branches are compiled, and [`Bound`]: one with its buffers.
+//!
+//! A scene without damping, without multipliers to keep, of one material, gets kernels that know nothing of them. A
+//! kernel is compiled when the first step needs it.
+
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+use std::sync::Arc;
+
+use wgpu::{BindGroup, Buffer};
+
+use super::layout::Form;
+use super::scalars::Kind;
+use crate::kernel::{Kernel, Recorder, Use};
+use crate::{GpuContext, GpuError};
+
+/// The text of a kernel and how it uses its buffers.
+#[derive(Debug)]
+pub(crate) struct Source {
+    pub(crate) name: &'static str,
+    pub(crate) parts: &'static [&'static str],
+    pub(crate) uses: &'static [Use],
+    /// The branches that it has.
+    flags: &'static [Flag],
+}
+
+/// A branch of kernels, compiled or not.
+#[derive(Clone, Copy, Debug)]
+enum Flag {
+    Damped,
+    Sequential,
+    Keeps,
+    Jacobi,
+    Uniform,
+    Tiled,
+}
+
+macro_rules! text {
+    ($($name:literal),*) => {
+        &[$(include_str!(concat!("../../shader/", $name, ".wgsl"))),*]
+    };
+}
+
+/// Bytes of a part, and of a turn.
+const PART: u64 = 8;
+const TURN: u64 = 16;
+
+/// What kernels that solve tets use.
+const TETS: &[Use] = &[
+    Use::Uniform,
+    Use::Part(PART),
+    Use::Write,
+    Use::Read,
+    Use::Read,
+    Use::Read,
+    Use::Read,
+    Use::Write,
+    Use::Read,
+    Use::Write,
+];
+
+/// The same with tiles to read instead of corrections to write.
+const TILES: &[Use] = &[
+    Use::Uniform,
+    Use::Part(PART),
+    Use::Write,
+    Use::Read,
+    Use::Read,
+    Use::Read,
+    Use::Read,
+    Use::Write,
+    Use::Read,
+    Use::Read,
+];
+
+const TETS_FLAGS: &[Flag] = &[
+    Flag::Damped,
+    Flag::Sequential,
+    Flag::Keeps,
+    Flag::Uniform,
+    Flag::Jacobi,
+];
+
+const TILES_FLAGS: &[Flag] = &[Flag::Damped, Flag::Sequential, Flag::Keeps, Flag::Uniform];
+
+pub(crate) const PREDICT: Source = Source {
+    name: "predict",
+    parts: text!("common", "settings", "predict"),
+    uses: &[Use::Uniform, Use::Write, Use::Write, Use::Write],
+    flags: &[],
+};
+
+pub(crate) const UPDATE_VELOCITIES: Source = Source {
+    name: "update_velocities",
+    parts: text!("common", "settings", "update_velocities"),
+    uses: &[Use::Uniform, Use::Write, Use::Read, Use::Write, Use::Write],
+    flags: &[],
+};
+
+const SOLVE_THREADS: Source = Source {
+    name: "solve_threads",
+    parts: text!(
+        "common",
+        "settings",
+        "tet",
+        "tets",
+        "group",
+        "solve_threads"
+    ),
+    uses: TETS,
+    flags: TETS_FLAGS,
+};
+
+const SOLVE_THREADS_TAIL: Source = Source {
+    name: "solve_threads_tail",
+    parts: text!(
+        "common",
+        "settings",
+        "tet",
+        "tets",
+        "group",
+        "solve_threads_tail"
+    ),
+    uses: TETS,
+    flags: TETS_FLAGS,
+};
+
+const SOLVE_WORKGROUPS: Source = Source {
+    name: "solve_workgroups",
+    parts: text!(
+        "common",
+        "settings",
+        "tet",
+        "tets",
+        "tile",
+        "solve_workgroups"
+    ),
+    uses: TILES,
+    flags: TILES_FLAGS,
+};
+
+const SOLVE_WORKGROUPS_TAIL: Source = Source {
+    name: "solve_workgroups_tail",
+    parts: text!(
+        "common",
+        "settings",
+        "tet",
+        "tets",
+        "tile",
+        "solve_workgroups_tail"
+    ),
+    uses: TILES,
+    flags: TILES_FLAGS,
+};
+
+pub(crate) const PATCH_TETS: Source = Source {
+    name: "patch_tets",
+    parts: text!("common", "settings", "patch_tets"),
+    uses: &[Use::Uniform, Use::Read, Use::Write, Use::Write, Use::Write],
+    flags: &[Flag::Uniform],
+};
+
+pub(crate) const PATCH_PARTICLES: Source = Source {
+    name: "patch_particles",
+    parts: text!("common", "settings", "patch_particles"),
+    uses: &[Use::Uniform, Use::Read, Use::Write, Use::Write],
+    flags: &[],
+};
+
+pub(crate) const CLEAR: Source = Source {
+    name: "clear",
+    parts: text!("common", "clear"),
+    uses: &[Use::Write],
+    flags: &[],
+};
+
+pub(crate) const PROJECT_TO_COLLIDERS: Source = Source {
+    name: "project_to_colliders",
+    parts: text!(
+        "common",
+        "settings",
+        "turn",
+        "direction",
+        "project_to_colliders"
+    ),
+    uses: &[
+        Use::Uniform,
+        Use::Part(TURN),
+        Use::Write,
+        Use::Read,
+        Use::Read,
+    ],
+    flags: &[],
+};
+
+pub(crate) const MOVE_HELD: Source = Source {
+    name: "move_held",
+    parts: text!("common", "settings", "turn", "attachments", "move_held"),
+    uses: &[
+        Use::Uniform,
+        Use::Part(TURN),
+        Use::Write,
+        Use::Read,
+        Use::Read,
+        Use::Write,
+    ],
+    flags: &[],
+};
+
+pub(crate) const SOLVE_ATTACHMENTS: Source = Source {
+    name: "solve_attachments",
+    parts: text!(
+        "common",
+        "settings",
+        "turn",
+        "attachments",
+        "solve_attachments"
+    ),
+    uses: &[
+        Use::Uniform,
+        Use::Part(TURN),
+        Use::Write,
+        Use::Read,
+        Use::Read,
+        Use::Read,
+        Use::Write,
+    ],
+    flags: &[Flag::Keeps],
+};
+
+pub(crate) const UPDATE_HELD: Source = Source {
+    name: "update_held",
+    parts: text!("common", "settings", "attachments", "update_held"),
+    uses: &[Use::Uniform, Use::Read, Use::Read, Use::Write, Use::Read],
+    flags: &[],
+};
+
+pub(crate) const APPLY_CORRECTIONS: Source = Source {
+    name: "apply_corrections",
+    parts: text!("common", "settings", "turn", "apply_corrections"),
+    uses: &[
+        Use::Uniform,
+        Use::Part(TURN),
+        Use::Write,
+        Use::Write,
+        Use::Write,
+    ],
+    flags: &[Flag::Keeps],
+};
+
+pub(crate) const EXTRAPOLATE_MULTIPLIERS: Source = Source {
+    name: "extrapolate_multipliers",
+    parts: text!("common", "turn", "extrapolate_multipliers"),
+    uses: &[Use::Write, Use::Part(TURN), Use::Write],
+    flags: &[],
+};
+
+pub(crate) const MEASURE_TETS: Source = Source {
+    name: "measure_tets",
+    parts: text!("common", "settings", "measure_tets"),
+    uses: &[
+        Use::Uniform,
+        Use::Uniform,
+        Use::Read,
+        Use::Read,
+        Use::Read,
+        Use::Read,
+        Use::Read,
+        Use::Write,
+    ],
+    flags: &[Flag::Uniform, Flag::Tiled],
+};
+
+pub(crate) const MEASURE_PARTICLES: Source = Source {
+    name: "measure_particles",
+    parts: text!("common", "settings", "measure_particles"),
+    uses: &[Use::Uniform, Use::Read, Use::Read, Use::Read, Use::Write],
+    flags: &[],
+};
+
+/// What kernels that solve constraints of one number use.
+const SCALARS: &[Use] = &[
+    Use::Uniform,
+    Use::Part(PART),
+    Use::Write,
+    Use::Read,
+    Use::Read,
+    Use::Read,
+    Use::Read,
+    Use::Write,
+    Use::Read,
+];
+
+const SOLVE_DISTANCES: Source = Source {
+    name: "solve_distances",
+    parts: text!(
+        "common",
+        "settings",
+        "direction",
+        "scalar",
+        "distance",
+        "solve_threads"
+    ),
+    uses: SCALARS,
+    flags: &[Flag::Damped, Flag::Keeps],
+};
+
+const SOLVE_DISTANCES_TAIL: Source = Source {
+    name: "solve_distances_tail",
+    parts: text!(
+        "common",
+        "settings",
+        "direction",
+        "scalar",
+        "distance",
+        "solve_threads_tail"
+    ),
+    uses: SCALARS,
+    flags: &[Flag::Damped, Flag::Keeps],
+};
+
+const SOLVE_VOLUMES: Source = Source {
+    name: "solve_volumes",
+    parts: text!("common", "settings", "scalar", "volume", "solve_threads"),
+    uses: SCALARS,
+    flags: &[Flag::Damped, Flag::Keeps],
+};
+
+const SOLVE_VOLUMES_TAIL: Source = Source {
+    name: "solve_volumes_tail",
+    parts: text!(
+        "common",
+        "settings",
+        "scalar",
+        "volume",
+        "solve_threads_tail"
+    ),
+    uses: SCALARS,
+    flags: &[Flag::Damped, Flag::Keeps],
+};
+
+/// The shaders of the solver.
+pub(crate) const SOURCES: &[Source] = &[
+    PREDICT,
+    UPDATE_VELOCITIES,
+    SOLVE_THREADS,
+    SOLVE_THREADS_TAIL,
+    SOLVE_WORKGROUPS,
+    SOLVE_WORKGROUPS_TAIL,
+    PATCH_TETS,
+    PATCH_PARTICLES,
+    CLEAR,
+    PROJECT_TO_COLLIDERS,
+    MOVE_HELD,
+    SOLVE_ATTACHMENTS,
+    UPDATE_HELD,
+    SOLVE_DISTANCES,
+    SOLVE_DISTANCES_TAIL,
+    SOLVE_VOLUMES,
+    SOLVE_VOLUMES_TAIL,
+    APPLY_CORRECTIONS,
+    EXTRAPOLATE_MULTIPLIERS,
+    MEASURE_TETS,
+    MEASURE_PARTICLES,
+];
+
+/// The kernel that solves colors, or a row of colors of one group each.
+pub(crate) fn solve(form: Form, tail: bool) -> &'static Source {
+    match (form, tail) {
+        (Form::Threads, false) => &SOLVE_THREADS,
+        (Form::Threads, true) => &SOLVE_THREADS_TAIL,
+        (Form::Workgroups, false) => &SOLVE_WORKGROUPS,
+        (Form::Workgroups, true) => &SOLVE_WORKGROUPS_TAIL,
+    }
+}
+
+/// The kernels that solve a color of constraints of one number, and a row of small colors.
+pub(crate) fn solve_scalars(kind: Kind) -> [&'static Source; 2] {
+    match kind {
+        Kind::Distance => [&SOLVE_DISTANCES, &SOLVE_DISTANCES_TAIL],
+        Kind::Volume => [&SOLVE_VOLUMES, &SOLVE_VOLUMES_TAIL],
+    }
+}
+
+/// Which branches of a kernel are compiled.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Variant {
+    pub(crate) damped: bool,
+    pub(crate) sequential: bool,
+    pub(crate) keeps: bool,
+    pub(crate) jacobi: bool,
+    /// Whether tets have materials of their own.
+    pub(crate) various: bool,
+    /// Whether corners are numbered within tiles.
+    pub(crate) tiled: bool,
+}
+
+impl Variant {
+    /// The override that a flag is in shaders, with its value.
+    fn value(self, flag: Flag) -> (&'static str, f64) {
+        let (name, on) = match flag {
+            Flag::Damped => ("DAMPED", self.damped),
+            Flag::Sequential => ("SEQUENTIAL", self.sequential),
+            Flag::Keeps => ("KEEPS", self.keeps),
+            Flag::Jacobi => ("JACOBI", self.jacobi),
+            Flag::Uniform => ("UNIFORM", !self.various),
+            Flag::Tiled => ("TILED", self.tiled),
+        };
+        (name, f64::from(u8::from(on)))
+    }
+}
+
+/// Compiled kernels.
+#[derive(Debug, Default)]
+pub(crate) struct Kernels {
+    compiled: BTreeMap<(&'static str, Variant), Arc<Kernel>>,
+}
+
+impl Kernels {
+    /// Compiles a kernel, unless it is compiled.
+    pub(crate) fn get(
+        &mut self,
+        gpu: &GpuContext,
+        source: &Source,
+        variant: Variant,
+    ) -> Result<Arc<Kernel>, GpuError> {
+        let kernel = match self.compiled.entry((source.name, variant)) {
+            Entry::Occupied(kernel) => kernel.into_mut(),
+            Entry::Vacant(place) => {
+                let constants: Vec<_> = source.flags.iter().map(|f| variant.value(*f)).collect();
+                let (name, parts, uses) = (source.name, source.parts, source.uses);
+                place.insert(Arc::new(Kernel::new(gpu, name, parts, uses, &constants)?))
+            }
+        };
+        Ok(Arc::clone(kernel))
+    }
+
+    /// Compiles a kernel, unless it is compiled, and binds it.
+    pub(crate) fn bind(
+        &mut self,
+        gpu: &GpuContext,
+        source: &Source,
+        variant: Variant,
+        buffers: &[&Buffer],
+    ) -> Result<Bound, GpuError> {
+        let kernel = self.get(gpu, source, variant)?;
+        let group = kernel.bind(gpu, buffers);
+        Ok(Bound { kernel, group })
+    }
+}
+
+/// A kernel with its buffers.
+#[derive(Debug)]
+pub(crate) struct Bound {
+    kernel: Arc<Kernel>,
+    group: BindGroup,
+}
+
+impl Bound {
+    pub(crate) fn run(&self, pass: &mut Recorder<'_>, offsets: &[u32], groups: usize) {
+        pass.dispatch(&self.kernel, &self.group, offsets, groups);
+    }
+}

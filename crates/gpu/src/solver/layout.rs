@@ -1,0 +1,304 @@
+//! [`Layout`]: which tet is in which place on the device, and what has to be sent there after a change.
+//!
+//! Two forms of the same schedule. [`Form::Threads`] is the paper's: a thread solves a cluster, tet after tet, 64
+//! clusters of a color a workgroup. [`Form::Workgroups`] takes clusters of up to 128 tets: a workgroup solves one, with
+//! its particles in workgroup memory and its tets in steps that share no particle, so that a small body needs few colors
+//! and thus few dispatches. Either way a cluster has a seat (`seats.rs`) and its tets the places of that seat.
+//!
+//! Cost: O(tets of changed clusters and changed tets), O(tets) for another schedule or other masses.
+
+use incise_graph::{ClusterId, Schedule};
+use incise_xpbd::{Changes, Solver};
+
+use super::numbers::TetPatch;
+use super::seats::{Moved, Seats};
+use super::tile::{TILE_TETS, Tile};
+use crate::GpuError;
+
+/// Threads of a workgroup, and tets whose numbers lie side by side.
+pub(crate) const THREADS: usize = 64;
+
+/// Nowhere.
+const NONE: u32 = u32::MAX;
+
+/// Who solves a cluster.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Form {
+    /// A thread, tet after tet (paper section 4.1).
+    #[default]
+    Threads,
+    /// A workgroup, its tets in steps: for clusters of up to 128 tets, of which [`Form::LARGE`] and more are worth it.
+    Workgroups,
+}
+
+impl Form {
+    /// The size of clusters, as a limit that a clustering was made with, from which on a workgroup is worth it.
+    pub const LARGE: usize = 33;
+
+    /// The form for clusters of at most so many tets.
+    #[must_use]
+    pub fn for_clusters_of(limit: usize) -> Self {
+        if limit < Self::LARGE {
+            Self::Threads
+        } else {
+            Self::Workgroups
+        }
+    }
+}
+
+/// Who is where.
+#[derive(Debug)]
+pub(crate) struct Layout {
+    pub(crate) form: Form,
+    /// Tets that a seat has places for.
+    depth: usize,
+    pub(crate) seats: Seats,
+    /// Seat -> tets in it.
+    filled: Vec<u32>,
+    /// Tet -> place.
+    places: Vec<u32>,
+    /// Place -> tet, in places that have one.
+    tets: Vec<u32>,
+}
+
+/// What has to be sent to the device.
+#[derive(Debug, Default)]
+pub(crate) struct Patch {
+    /// Whether nothing on the device is of use any more.
+    pub(crate) anew: bool,
+    /// No two of one place.
+    pub(crate) tets: Vec<TetPatch>,
+    /// Tiles by number.
+    pub(crate) tiles: Vec<(u32, Tile)>,
+    /// Whether colors have other groups.
+    pub(crate) regrouped: bool,
+}
+
+impl Layout {
+    pub(crate) fn new(form: Form) -> Self {
+        let width = match form {
+            Form::Threads => THREADS,
+            Form::Workgroups => 1,
+        };
+        Self {
+            form,
+            depth: 1,
+            seats: Seats::new(width),
+            filled: Vec::new(),
+            places: Vec::new(),
+            tets: Vec::new(),
+        }
+    }
+
+    /// Places on the device.
+    pub(crate) fn place_count(&self) -> usize {
+        self.seats.seat_count() * self.depth
+    }
+
+    /// Tets that the schedule solves.
+    pub(crate) fn tet_count(&self) -> usize {
+        self.filled.iter().map(|&tets| tets as usize).sum()
+    }
+
+    /// Rows of 64 places that a group has.
+    pub(crate) fn depth(&self) -> usize {
+        self.depth
+    }
+
+    /// The place of a tet, if the schedule solves it.
+    pub(crate) fn place(&self, tet: usize) -> Option<usize> {
+        let place = self.places.get(tet).copied();
+        place
+            .filter(|&place| place != NONE)
+            .map(|place| place as usize)
+    }
+
+    /// The tet in a place that has one.
+    pub(crate) fn tet(&self, place: usize) -> u32 {
+        self.tets[place]
+    }
+
+    /// Where the `k`-th tet of a seat is.
+    fn place_of(&self, seat: u32, k: usize) -> usize {
+        let seat = seat as usize;
+        match self.form {
+            Form::Threads => ((seat / THREADS) * self.depth + k) * THREADS + seat % THREADS,
+            Form::Workgroups => seat * self.depth + k,
+        }
+    }
+
+    /// Makes this the layout of a schedule over the tets of a solver, given what has changed there since.
+    ///
+    /// # Errors
+    /// If a cluster is larger than a tile.
+    pub(crate) fn follow(
+        &mut self,
+        schedule: &Schedule,
+        solver: &Solver<f32>,
+        changes: &Changes,
+    ) -> Result<Patch, GpuError> {
+        if changes.all_tets {
+            self.seats.forget();
+        }
+        let mut patch = Patch::default();
+        let mut moved = self.seats.follow(schedule);
+        if let Moved::Seats(seats) = &moved
+            && self.largest(seats, schedule)? > self.depth
+        {
+            self.seats.forget();
+            moved = self.seats.follow(schedule);
+        }
+        let seats = match moved {
+            Moved::All => {
+                patch.anew = true;
+                let seats: Vec<u32> = (0..index(self.seats.seat_count())).collect();
+                let largest = self.largest(&seats, schedule)?;
+                self.depth = match self.form {
+                    Form::Threads => largest.max(1),
+                    Form::Workgroups => TILE_TETS,
+                };
+                self.filled.clear();
+                self.places.clear();
+                seats
+            }
+            Moved::Seats(seats) => self.with_changed(seats, changes, solver, &mut patch),
+        };
+        patch.regrouped = patch.anew || !seats.is_empty();
+        self.filled.resize(self.seats.seat_count(), 0);
+        self.tets.resize(self.place_count(), NONE);
+        self.places
+            .resize(solver.tet_count().max(self.places.len()), NONE);
+        // All go before anybody comes: a tet may have changed its seat.
+        for &seat in &seats {
+            self.empty(seat);
+        }
+        for &seat in &seats {
+            self.fill(seat, schedule, solver, &mut patch);
+        }
+        Ok(patch)
+    }
+
+    /// The tets of the largest cluster in these seats.
+    fn largest(&mut self, seats: &[u32], schedule: &Schedule) -> Result<usize, GpuError> {
+        let clusters = seats.iter().filter_map(|&seat| self.seats.cluster(seat));
+        let sized = clusters.map(|cluster| (schedule.constraints(cluster).len(), cluster));
+        let (tets, cluster) = sized.max().unwrap_or((0, ClusterId(0)));
+        if self.form == Form::Workgroups && tets > TILE_TETS {
+            self.seats.forget();
+            return Err(GpuError::Block {
+                cluster: cluster.0,
+                tets,
+                limit: TILE_TETS,
+            });
+        }
+        Ok(tets)
+    }
+
+    /// Patches changed tets in their places; a tile with one is made anew.
+    fn with_changed(
+        &mut self,
+        mut seats: Vec<u32>,
+        changes: &Changes,
+        solver: &Solver<f32>,
+        patch: &mut Patch,
+    ) -> Vec<u32> {
+        let mut changed = changes.tets.clone();
+        changed.sort_unstable();
+        changed.dedup();
+        let known = seats.len();
+        for tet in changed {
+            let Some(place) = self.place(tet as usize) else {
+                continue;
+            };
+            let seat = index(match self.form {
+                Form::Threads => place / (self.depth * THREADS) * THREADS + place % THREADS,
+                Form::Workgroups => place / self.depth,
+            });
+            if seats[..known].binary_search(&seat).is_ok() {
+                continue;
+            }
+            match self.form {
+                // One that is gone is in no schedule, so its seat is among those.
+                Form::Threads => patch.tets.push(filled_in(place, tet, solver)),
+                Form::Workgroups => seats.push(seat),
+            }
+        }
+        seats.sort_unstable();
+        seats.dedup();
+        seats
+    }
+
+    /// Forgets where the tets of a seat were.
+    fn empty(&mut self, seat: u32) {
+        for k in 0..self.filled[seat as usize] as usize {
+            let place = self.place_of(seat, k);
+            let tet = &mut self.places[self.tets[place] as usize];
+            if *tet == index(place) {
+                *tet = NONE;
+            }
+        }
+    }
+
+    fn put(&mut self, tet: u32, place: usize) {
+        self.places[tet as usize] = index(place);
+        self.tets[place] = tet;
+    }
+
+    /// Fills a seat with the tets of its cluster, and clears the places behind them that had one.
+    fn fill(&mut self, seat: u32, schedule: &Schedule, solver: &Solver<f32>, patch: &mut Patch) {
+        let cluster = self.seats.cluster(seat);
+        let tets = cluster.map_or(&[][..], |cluster| schedule.constraints(cluster));
+        match self.form {
+            Form::Threads => {
+                for (k, &tet) in tets.iter().enumerate() {
+                    let place = self.place_of(seat, k);
+                    self.put(tet, place);
+                    patch.tets.push(filled_in(place, tet, solver));
+                }
+            }
+            Form::Workgroups if tets.is_empty() => {}
+            Form::Workgroups => {
+                let tile = Tile::new(tets, |tet| solver.tet_particles(tet as usize));
+                for (k, (tet, corners)) in tile.tets().enumerate() {
+                    let place = self.place_of(seat, k);
+                    self.put(tet, place);
+                    let filled = filled_in(place, tet, solver);
+                    patch.tets.push(TetPatch { corners, ..filled });
+                }
+                patch.tiles.push((seat, tile));
+            }
+        }
+        for k in tets.len()..self.filled[seat as usize] as usize {
+            patch.tets.push(TetPatch {
+                place: index(self.place_of(seat, k)),
+                ..TetPatch::default()
+            });
+        }
+        self.filled[seat as usize] = index(tets.len());
+    }
+}
+
+fn filled_in(place: usize, tet: u32, solver: &Solver<f32>) -> TetPatch {
+    let data = solver.tet_data(tet);
+    let [ratio, gamma, damping] = data.constants;
+    TetPatch {
+        place: index(place),
+        unused: [0; 3],
+        corners: data.corners,
+        rest: data.rest,
+        constants: [ratio, gamma, damping, slope(data.constants)],
+    }
+}
+
+/// What rounding of ratio and γ left of the slope of the elastic energy at rest, for those who measure it.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "the device computes in single precision"
+)]
+pub(crate) fn slope([ratio, gamma, _]: [f32; 3]) -> f32 {
+    (1.0 + f64::from(ratio) * (1.0 - f64::from(gamma))) as f32
+}
+
+fn index(value: usize) -> u32 {
+    u32::try_from(value).expect("fewer than 2^32 places")
+}

@@ -1,0 +1,340 @@
+//! [`GpuSolver`]: XPBD on the device.
+//!
+//! A [`Solver`] on the host stays where tets, masses, materials and what holds particles are edited; the device has a
+//! copy of all of it and the state. A step is recorded as one pass and handed over in one submit: predict, put what is
+//! held to its handles, solve color by color, pull at attachments, solve distances and volumes, collide, update
+//! velocities, substep by substep. What a scene does not have takes no memory and no dispatch. Nothing is read back:
+//! whoever wants to know something asks ([`GpuSolver::host`], [`GpuSolver::measure`]), and that waits for the device.
+//!
+//! Twin: `Solver::step` of incise-xpbd, with the same schedule in the form [`Form::Threads`]. Positions agree up to the
+//! rounding of sums, which compilers of shaders may take in another order or fuse.
+//! Cost: a dispatch a color and two or three a substep, one more for each other thing in the scene; uploads only of what
+//! edits changed and of handles and colliders that move.
+
+mod body;
+mod check;
+mod colors;
+mod frame;
+mod handles;
+mod jacobi;
+mod kernels;
+mod layout;
+mod measure;
+mod numbers;
+mod obstacles;
+mod readback;
+mod scalars;
+mod seats;
+#[cfg(test)]
+mod shaders;
+mod stages;
+mod tile;
+mod turns;
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use incise_graph::Schedule;
+use incise_xpbd::{Changes, Pose, Solver, StepSettings};
+use wgpu::SubmissionIndex;
+
+pub(crate) use kernels::SOURCES;
+pub use layout::Form;
+pub use measure::Measures;
+pub use readback::Readback;
+pub use stages::StageTimes;
+
+pub(crate) use numbers::{
+    Attachment, Part, ParticlePatch, ParticleSums, Settings, TetPatch, TetSums, Turn, Units,
+};
+
+use crate::array::Array;
+use crate::{GpuContext, GpuError};
+use body::Body;
+use frame::{Frame, Scene};
+use kernels::Kernels;
+use measure::Measuring;
+
+/// Frames that the device may have to do when another one is recorded.
+const FRAMES_IN_FLIGHT: usize = 2;
+
+/// A body that is solved on a device.
+///
+/// # Example
+/// A tet hangs from one corner.
+/// ```
+/// use std::sync::Arc;
+///
+/// use glam::DVec3;
+/// use incise_graph::{Clustering, ColorId, Coloring, Schedule};
+/// use incise_gpu::{Form, GpuContext, GpuError, GpuOptions, GpuSolver};
+/// use incise_xpbd::{Material, Solver, StepSettings};
+///
+/// let gpu = match GpuContext::new(&GpuOptions::from_env()) {
+///     Ok(gpu) => Arc::new(gpu),
+///     Err(GpuError::NoAdapter { .. }) => return Ok(()),
+///     Err(other) => return Err(other.into()),
+/// };
+/// let rest = [DVec3::ZERO, DVec3::Y, DVec3::X, DVec3::NEG_Z];
+/// let mut solver = Solver::<f32>::new(&rest);
+/// let rubber = Material { young_modulus: 1e5, poisson_ratio: 0.45, density: 1000.0, damping: 0.0 };
+/// solver.add_material(rubber)?;
+/// solver.push_tet([0, 1, 2, 3], rest, 0);
+/// (0..4).for_each(|p| solver.set_mass(p, 1000.0 / 6.0 / 4.0));
+/// solver.set_fixed(0, true);
+///
+/// let schedule = Schedule::new(&Clustering::none(1), &Coloring::new(vec![ColorId(0)]));
+/// let gravity = Some(DVec3::new(0.0, 0.0, -9.81));
+/// let settings = StepSettings { substeps: 4, gravity, ..StepSettings::new(0.016) };
+/// let mut device = GpuSolver::new(gpu, solver, Form::Threads)?;
+/// for _ in 0..10 {
+///     device.step(&schedule, &settings)?;
+/// }
+/// let solver = device.host()?;
+/// assert_eq!(solver.position(0), DVec3::ZERO);
+/// assert!(solver.position(1).z < -0.05);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct GpuSolver {
+    gpu: Arc<GpuContext>,
+    host: Solver<f32>,
+    /// Whether the device has gone on since the host saw its state.
+    ahead: bool,
+    kernels: Kernels,
+    body: Body,
+    frame: Frame,
+    repaired: Array<u32>,
+    /// Particles that the device put back, as far as the host knows.
+    known_repaired: u32,
+    /// If somebody has measured.
+    measuring: Option<Measuring>,
+    /// The last frames, oldest first.
+    in_flight: VecDeque<SubmissionIndex>,
+}
+
+impl GpuSolver {
+    /// Takes a solver to the device; what it has is sent with the first step.
+    ///
+    /// # Errors
+    /// If the device has no memory or refuses.
+    pub fn new(
+        gpu: Arc<GpuContext>,
+        mut solver: Solver<f32>,
+        form: Form,
+    ) -> Result<Self, GpuError> {
+        solver.track_changes();
+        Ok(Self {
+            body: Body::new(&gpu, form)?,
+            frame: Frame::new(&gpu)?,
+            repaired: Array::zeros(&gpu, "count of repairs", 1)?,
+            known_repaired: 0,
+            measuring: None,
+            in_flight: VecDeque::new(),
+            kernels: Kernels::default(),
+            ahead: false,
+            host: solver,
+            gpu,
+        })
+    }
+
+    /// The device.
+    #[must_use]
+    pub fn gpu(&self) -> &Arc<GpuContext> {
+        &self.gpu
+    }
+
+    /// Who solves a cluster.
+    #[must_use]
+    pub fn form(&self) -> Form {
+        self.body.layout.form
+    }
+
+    /// Advances by one frame of `settings.time_step`; returns when the commands are with the driver, not when they are
+    /// done. Waits first until the device is done with the frame before the last one, so that frames do not pile up.
+    ///
+    /// A schedule that was [updated](Schedule::update) since the last step is followed at the cost of what changed, as
+    /// are edits of the solver; another one is laid out anew.
+    ///
+    /// # Errors
+    /// If the settings do not pass [`StepSettings::check`]; if they ask for Jacobi or Chebyshev iterations in
+    /// [`Form::Workgroups`]; if a cluster is larger than the form allows; if the device is lost or out of memory.
+    ///
+    /// # Panics
+    /// If the schedule names a tet that does not exist.
+    ///
+    /// # Determinism
+    /// Bit-identical on the same device and driver.
+    pub fn step(&mut self, schedule: &Schedule, settings: &StepSettings) -> Result<(), GpuError> {
+        self.advance(schedule, settings, false)
+    }
+
+    /// The same, keeping what [`Solver::residuals`] needs of the last substep; [`GpuSolver::host`] then has it.
+    ///
+    /// # Errors
+    /// As [`GpuSolver::step`].
+    ///
+    /// # Panics
+    /// As [`GpuSolver::step`].
+    pub fn step_keeping_residuals(
+        &mut self,
+        schedule: &Schedule,
+        settings: &StepSettings,
+    ) -> Result<(), GpuError> {
+        self.advance(schedule, settings, true)
+    }
+
+    fn advance(
+        &mut self,
+        schedule: &Schedule,
+        settings: &StepSettings,
+        keep: bool,
+    ) -> Result<(), GpuError> {
+        let _span = tracing::debug_span!("gpu::step").entered();
+        settings.check()?;
+        // Who is faster than the device waits here, and not at the end of memory.
+        while self.in_flight.len() >= FRAMES_IN_FLIGHT {
+            let oldest = self.in_flight.pop_front();
+            oldest.map_or(Ok(()), |oldest| self.gpu.wait_for(oldest))?;
+        }
+        self.send(schedule)?;
+        let Self {
+            gpu,
+            host,
+            kernels,
+            body,
+            frame,
+            repaired,
+            ..
+        } = self;
+        let scene = Scene {
+            gpu,
+            kernels,
+            body,
+            host,
+            repaired,
+        };
+        let submission = frame.record(scene, settings, keep)?;
+        self.in_flight.push_back(submission);
+        self.ahead = true;
+        self.host.end_frame();
+        Ok(())
+    }
+
+    /// Sends what edits and the schedule have changed, as a step does first. Whoever wants to know what a cut costs calls
+    /// this before the step.
+    ///
+    /// # Errors
+    /// As [`GpuSolver::step`].
+    ///
+    /// # Panics
+    /// If the schedule names a tet that does not exist.
+    pub fn send(&mut self, schedule: &Schedule) -> Result<(), GpuError> {
+        if !self.ahead {
+            self.host.prepare_state();
+        }
+        let changes = self.host.take_changes();
+        let Self {
+            gpu,
+            host,
+            kernels,
+            body,
+            ..
+        } = self;
+        if let Some(measuring) = &mut self.measuring {
+            measuring.stale |= changes != Changes::default();
+        }
+        let followed = body.follow(gpu, kernels, host, schedule, &changes);
+        // What was not followed is not known any more. Edits wait for the device: it is not ahead of them.
+        if followed.is_err() && !self.ahead {
+            self.host.track_changes();
+        }
+        followed
+    }
+
+    /// The solver with the state of the device, which is waited for if it has gone on.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub fn host(&mut self) -> Result<&Solver<f32>, GpuError> {
+        self.read_back()?;
+        Ok(&self.host)
+    }
+
+    /// The same to edit; the next step sends what was changed.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub fn edit(&mut self) -> Result<&mut Solver<f32>, GpuError> {
+        self.read_back()?;
+        Ok(&mut self.host)
+    }
+
+    /// Says where a handle is at the end of the next frame, as [`Solver::move_handle`] does, without waiting for the
+    /// device.
+    ///
+    /// # Panics
+    /// If the handle does not exist, the pose is not finite or its rotation not of length 1.
+    pub fn move_handle(&mut self, handle: u32, pose: Pose) {
+        self.host.move_handle(handle, pose);
+    }
+
+    /// The solver as the host last saw it: topology, masses and materials are those of now, the state is an old one
+    /// unless [`GpuSolver::host`] was called since the last step.
+    #[must_use]
+    pub fn as_last_seen(&self) -> &Solver<f32> {
+        &self.host
+    }
+
+    fn read_back(&mut self) -> Result<(), GpuError> {
+        if !self.ahead {
+            return Ok(());
+        }
+        let _span = tracing::debug_span!("gpu::read_back").entered();
+        let count = self.host.particle_count();
+        let gpu = &*self.gpu;
+        let positions = self.body.particles.stage(gpu, count)?;
+        let velocities = self.body.velocities.stage(gpu, count)?;
+        let repaired = self.repaired.stage(gpu, 1)?;
+        let last = self.frame.stage_last_substep(gpu, &self.body)?;
+        let positions = positions.collect(gpu)?;
+        self.host.load_state(&positions, &velocities.collect(gpu)?);
+        self.known_repaired = repaired.collect(gpu)?[0];
+        if let Some((predicted, multipliers)) = last {
+            let (predicted, multipliers) = (predicted.collect(gpu)?, multipliers.collect(gpu)?);
+            let place = |tet| self.body.layout.place(tet);
+            let of_tet = |tet| place(tet).map_or([0.0; 2], |place| multipliers[place]);
+            let multipliers: Vec<_> = (0..self.host.tet_count()).map(of_tet).collect();
+            self.host.load_last_substep(&predicted, &multipliers);
+        }
+        self.ahead = false;
+        Ok(())
+    }
+
+    /// Particles that would have become infinite or NaN and were put back instead, counted once for each substep since
+    /// the beginning, up to the last call of [`GpuSolver::host`] or [`GpuSolver::measure`].
+    #[must_use]
+    pub fn repaired(&self) -> u32 {
+        self.known_repaired
+    }
+
+    /// The buffer of positions, for renderers: 16 bytes a particle, position relative to [`Solver::origin`] in m and
+    /// inverse mass. A cut may replace it by a larger one.
+    #[must_use]
+    pub fn positions(&self) -> &wgpu::Buffer {
+        self.body.particles.buffer()
+    }
+
+    /// Bytes of device memory.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let measuring = self.measuring.as_ref().map_or(0, Measuring::bytes);
+        self.body.bytes() + self.frame.bytes() + measuring
+    }
+
+    /// Dispatches of one pass over the tets.
+    #[must_use]
+    pub fn dispatches_per_pass(&self) -> usize {
+        self.body.colors.runs.len()
+    }
+}

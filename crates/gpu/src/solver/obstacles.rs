@@ -1,0 +1,77 @@
+//! [`Obstacles`]: the colliders of all substeps of a frame on the device.
+//!
+//! The host says where they are at the end of each substep, in its own precision; the kernel only asks what is nearest.
+//! They are sent in one piece, and only when they are others than those that are there: colliders at rest once. Cost: 80
+//! bytes a collider and substep.
+
+use incise_xpbd::{Solver, StepSettings};
+
+use super::frame::Shared;
+use super::kernels::{Bound, Kernels, PROJECT_TO_COLLIDERS, Variant};
+use crate::array::Array;
+use crate::{GpuContext, GpuError};
+
+/// The colliders of a frame.
+#[derive(Debug)]
+pub(crate) struct Obstacles {
+    array: Array<[f32; 20]>,
+    /// What the device has, and a place to put together what it should have.
+    sent: Vec<[f32; 20]>,
+    next: Vec<[f32; 20]>,
+}
+
+impl Obstacles {
+    /// Sends the colliders of a frame unless they are there; nothing is kept for none.
+    pub(crate) fn follow(
+        this: &mut Option<Self>,
+        gpu: &GpuContext,
+        host: &Solver<f32>,
+        settings: &StepSettings,
+    ) -> Result<(), GpuError> {
+        if settings.colliders.is_empty() {
+            *this = None;
+            return Ok(());
+        }
+        let obstacles = match this {
+            Some(obstacles) => obstacles,
+            None => this.insert(Self {
+                array: Array::zeros(gpu, "colliders", 0)?,
+                sent: Vec::new(),
+                next: Vec::new(),
+            }),
+        };
+        obstacles.next.clear();
+        for substep in 1..=settings.substeps {
+            let elapsed = f64::from(substep) * settings.substep_time();
+            let data = host.obstacle_data(settings, elapsed);
+            obstacles.next.extend(data);
+        }
+        if obstacles.next != obstacles.sent {
+            obstacles.array.replace(gpu, &obstacles.next)?;
+            std::mem::swap(&mut obstacles.next, &mut obstacles.sent);
+        }
+        Ok(())
+    }
+
+    /// The kernel that puts particles on their surface.
+    pub(crate) fn bind(
+        &self,
+        gpu: &GpuContext,
+        kernels: &mut Kernels,
+        shared: &Shared<'_>,
+    ) -> Result<Bound, GpuError> {
+        let buffers = [
+            shared.settings,
+            shared.turns,
+            shared.particles,
+            shared.previous,
+            self.array.buffer(),
+        ];
+        kernels.bind(gpu, &PROJECT_TO_COLLIDERS, Variant::default(), &buffers)
+    }
+
+    /// Bytes on the device.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.array.buffer().size()
+    }
+}

@@ -1,0 +1,211 @@
+//! [`Scalars`]: distance or volume constraints on the device.
+//!
+//! They lie in the order in which they are solved. Sixty-four clusters of a color are a group, as with tets, so the
+//! dispatches are made the same way: one for each color, small colors together. Whatever changes, all of them are sent
+//! again. Twin: `scalar.rs` of incise-xpbd. Cost: 32 bytes a constraint and 8 a cluster.
+
+use incise_graph::{Rows, Schedule};
+use incise_xpbd::Solver;
+use wgpu::Buffer;
+
+use super::colors::Colors;
+use super::kernels::{Bound, CLEAR, Kernels, Variant, solve_scalars};
+use super::layout::THREADS;
+use crate::array::Array;
+use crate::kernel::Recorder;
+use crate::{GpuContext, GpuError};
+
+/// What is constrained.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Distance,
+    Volume,
+}
+
+/// All constraints of a kind.
+#[derive(Debug)]
+pub(crate) struct Scalars {
+    kind: Kind,
+    damped: bool,
+    corners: Array<[u32; 4]>,
+    numbers: Array<[f32; 4]>,
+    /// The constraints of each cluster; from one to before the other.
+    ranges: Array<[u32; 2]>,
+    colors: Colors,
+    /// Empty with one iteration.
+    multipliers: Array<f32>,
+}
+
+impl Scalars {
+    fn new(gpu: &GpuContext, kind: Kind) -> Result<Self, GpuError> {
+        Ok(Self {
+            kind,
+            damped: false,
+            corners: Array::zeros(gpu, "particles of constraints", 0)?,
+            numbers: Array::zeros(gpu, "constraints", 0)?,
+            ranges: Array::zeros(gpu, "clusters of constraints", 0)?,
+            colors: Colors::new(gpu)?,
+            multipliers: Array::zeros(gpu, "multipliers of constraints", 0)?,
+        })
+    }
+
+    /// Takes over the constraints of a kind; nothing is kept for none.
+    pub(crate) fn follow(
+        this: &mut Option<Self>,
+        gpu: &GpuContext,
+        solver: &Solver<f32>,
+        kind: Kind,
+    ) -> Result<(), GpuError> {
+        let schedule = match kind {
+            Kind::Distance => solver.distance_schedule(),
+            Kind::Volume => solver.volume_schedule(),
+        };
+        let Some(schedule) = schedule else {
+            *this = None;
+            return Ok(());
+        };
+        let scalars = match this {
+            Some(scalars) => scalars,
+            None => this.insert(Self::new(gpu, kind)?),
+        };
+        scalars.send(gpu, solver, schedule)
+    }
+
+    fn send(
+        &mut self,
+        gpu: &GpuContext,
+        solver: &Solver<f32>,
+        schedule: &Schedule,
+    ) -> Result<(), GpuError> {
+        let constraints = schedule.constraint_count();
+        let mut corners = Vec::with_capacity(constraints);
+        let mut numbers = Vec::with_capacity(constraints);
+        let (mut ranges, mut groups) = (Vec::new(), Vec::new());
+        for color in 0..schedule.color_count() {
+            for clusters in schedule.clusters(color).chunks(THREADS) {
+                groups.push((color, index(ranges.len() / THREADS)));
+                for &cluster in clusters {
+                    let first = index(corners.len());
+                    for &constraint in schedule.constraints(cluster) {
+                        let (particles, values) = self.kind.data(solver, constraint);
+                        corners.push(particles);
+                        numbers.push(values);
+                    }
+                    ranges.push([first, index(corners.len())]);
+                }
+                ranges.resize(ranges.len().next_multiple_of(THREADS), [0; 2]);
+            }
+        }
+        self.damped = numbers.iter().any(|&[_, _, damping, _]| damping > 0.0);
+        self.corners.replace(gpu, &corners)?;
+        self.numbers.replace(gpu, &numbers)?;
+        self.ranges.replace(gpu, &ranges)?;
+        let mut rows = Rows::default();
+        rows.refill(schedule.color_count(), groups.into_iter());
+        self.colors.follow(gpu, &rows)
+    }
+
+    /// Makes room for multipliers.
+    pub(crate) fn keep_multipliers(&mut self, gpu: &GpuContext) -> Result<(), GpuError> {
+        self.multipliers.resize(gpu, self.corners.len())
+    }
+
+    pub(crate) fn bind<'a>(
+        &'a self,
+        gpu: &GpuContext,
+        kernels: &mut Kernels,
+        [settings, particles, previous]: [&Buffer; 3],
+        keeps: bool,
+    ) -> Result<Passes<'a>, GpuError> {
+        let variant = Variant {
+            damped: self.damped,
+            keeps,
+            ..Variant::default()
+        };
+        let buffers = [
+            settings,
+            self.colors.parts.array.buffer(),
+            particles,
+            previous,
+            self.corners.buffer(),
+            self.numbers.buffer(),
+            self.ranges.buffer(),
+            self.multipliers.buffer(),
+            self.colors.lists.array.buffer(),
+        ];
+        let [one, several] = solve_scalars(self.kind);
+        Ok(Passes {
+            colors: &self.colors,
+            one: kernels.bind(gpu, one, variant, &buffers)?,
+            several: kernels.bind(gpu, several, variant, &buffers)?,
+            clear: match keeps {
+                true => {
+                    let buffers = [self.multipliers.buffer()];
+                    let clear = kernels.bind(gpu, &CLEAR, Variant::default(), &buffers)?;
+                    Some((clear, self.multipliers.len().div_ceil(THREADS)))
+                }
+                false => None,
+            },
+        })
+    }
+
+    /// Bytes on the device.
+    pub(crate) fn bytes(&self) -> u64 {
+        let buffers = [
+            self.corners.buffer(),
+            self.numbers.buffer(),
+            self.ranges.buffer(),
+            self.multipliers.buffer(),
+            self.colors.lists.array.buffer(),
+            self.colors.parts.array.buffer(),
+        ];
+        buffers.into_iter().map(Buffer::size).sum()
+    }
+}
+
+impl Kind {
+    /// Particles and numbers of a constraint as `scalar.wgsl` wants them.
+    fn data(self, solver: &Solver<f32>, constraint: u32) -> ([u32; 4], [f32; 4]) {
+        match self {
+            Self::Distance => {
+                let data = solver.distance_data(constraint);
+                let [a, b] = data.particles;
+                let numbers = [data.length, data.compliance, data.damping, 0.0];
+                ([a, b, u32::from(data.only_when_longer), 0], numbers)
+            }
+            Self::Volume => {
+                let data = solver.volume_data(constraint);
+                let numbers = [data.per_six_volumes, data.compliance, data.damping, 0.0];
+                (data.particles, numbers)
+            }
+        }
+    }
+}
+
+/// The kernels of a kind.
+#[derive(Debug)]
+pub(crate) struct Passes<'a> {
+    colors: &'a Colors,
+    one: Bound,
+    several: Bound,
+    /// Where multipliers are kept.
+    clear: Option<(Bound, usize)>,
+}
+
+impl Passes<'_> {
+    /// At the start of a substep.
+    pub(crate) fn begin(&self, pass: &mut Recorder<'_>) {
+        if let Some((clear, groups)) = &self.clear {
+            clear.run(pass, &[], *groups);
+        }
+    }
+
+    /// In an iteration, after the attachments.
+    pub(crate) fn solve(&self, pass: &mut Recorder<'_>) {
+        self.colors.run(pass, &self.one, &self.several);
+    }
+}
+
+fn index(value: usize) -> u32 {
+    u32::try_from(value).expect("fewer than 2^32 constraints")
+}

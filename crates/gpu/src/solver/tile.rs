@@ -1,0 +1,138 @@
+//! [`Tile`]: a cluster as a workgroup solves it, its particles numbered within and its tets in steps.
+//!
+//! Tets of one step share no particle. First fit in ascending order, with a bit for each step at each particle: the same
+//! steps as `incise_coloring::color_within_clusters` gives. Cost: O(tets log tets).
+
+/// Most tets of a tile.
+pub(crate) const TILE_TETS: usize = 128;
+
+/// Most particles of a tile: those of tets that share none.
+pub(crate) const TILE_PARTICLES: usize = 4 * TILE_TETS;
+
+/// Numbers of a tile on the device: steps, particles, where each step ends, and the particles.
+pub(crate) const TILE_NUMBERS: usize = 2 + TILE_TETS + TILE_PARTICLES;
+
+/// A cluster as a workgroup solves it.
+#[derive(Debug)]
+pub(crate) struct Tile {
+    /// Ascending.
+    particles: Vec<u32>,
+    /// Tets and their corners in `particles`, step after step.
+    tets: Vec<(u32, [u32; 4])>,
+    /// Where each step ends.
+    ends: Vec<u32>,
+}
+
+impl Tile {
+    /// The tile of at most [`TILE_TETS`] tets, ascending.
+    pub(crate) fn new(tets: &[u32], corners: impl Fn(u32) -> [u32; 4]) -> Self {
+        debug_assert!(tets.len() <= TILE_TETS, "a tile holds the cluster");
+        let mut particles: Vec<u32> = tets.iter().flat_map(|&tet| corners(tet)).collect();
+        particles.sort_unstable();
+        particles.dedup();
+        let number = |p: u32| {
+            let found = particles.binary_search(&p);
+            index(found.expect("the particles of all tets are listed"))
+        };
+        // Each tet keeps one step from its neighbors, so there are no more steps than tets: a word holds them.
+        let mut taken = vec![0u128; particles.len()];
+        let mut steps = Vec::with_capacity(tets.len());
+        for &tet in tets {
+            let corners = corners(tet).map(number);
+            let union = corners.iter().fold(0, |all, &p| all | taken[p as usize]);
+            let step = union.trailing_ones();
+            for p in corners {
+                taken[p as usize] |= 1 << step;
+            }
+            steps.push((step, tet, corners));
+        }
+        steps.sort_unstable();
+        let mut ends = Vec::new();
+        for (k, &(step, ..)) in steps.iter().enumerate() {
+            ends.resize(step as usize + 1, 0);
+            ends[step as usize] = index(k + 1);
+        }
+        Self {
+            particles,
+            tets: steps
+                .into_iter()
+                .map(|(_, tet, corners)| (tet, corners))
+                .collect(),
+            ends,
+        }
+    }
+
+    /// The tets with their corners in the tile, in solving order.
+    pub(crate) fn tets(&self) -> impl Iterator<Item = (u32, [u32; 4])> + '_ {
+        self.tets.iter().copied()
+    }
+
+    /// What the device knows of it.
+    pub(crate) fn numbers(&self) -> [u32; TILE_NUMBERS] {
+        let mut numbers = [0; TILE_NUMBERS];
+        numbers[0] = index(self.ends.len());
+        numbers[1] = index(self.particles.len());
+        numbers[2..2 + self.ends.len()].copy_from_slice(&self.ends);
+        let particles = &mut numbers[2 + TILE_TETS..];
+        particles[..self.particles.len()].copy_from_slice(&self.particles);
+        numbers
+    }
+}
+
+fn index(value: usize) -> u32 {
+    u32::try_from(value).expect("a tile is small")
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn a_fan_needs_a_step_for_each_tet() {
+        let tets: Vec<u32> = (0..128).collect();
+        let tile = Tile::new(&tets, |t| [0, 3 * t + 1, 3 * t + 2, 3 * t + 3]);
+        assert_eq!(tile.ends, (1..=128).collect::<Vec<u32>>());
+        assert_eq!(tile.particles.len(), 3 * 128 + 1);
+    }
+
+    #[test]
+    fn tets_apart_need_one_step_and_all_particles() {
+        let tets: Vec<u32> = (0..128).collect();
+        let tile = Tile::new(&tets, |t| [0, 1, 2, 3].map(|k| 4 * t + k));
+        assert_eq!((tile.ends.len(), tile.particles.len()), (1, TILE_PARTICLES));
+    }
+
+    proptest! {
+        #[test]
+        fn steps_are_proper_and_hold_every_tet(
+            corners in prop::collection::vec(prop::array::uniform4(0..30u32), 0..128)
+        ) {
+            let corners: Vec<[u32; 4]> = corners
+                .into_iter()
+                .filter(|c| (0..4).all(|i| (0..i).all(|j| c[i] != c[j])))
+                .collect();
+            let tets: Vec<u32> = (0..index(corners.len())).map(|t| 2 * t).collect();
+            let tile = Tile::new(&tets, |t| corners[t as usize / 2]);
+            let mut all: Vec<u32> = tile.tets().map(|(tet, _)| tet).collect();
+            for (tet, local) in tile.tets() {
+                prop_assert_eq!(local.map(|p| tile.particles[p as usize]), corners[tet as usize / 2]);
+            }
+            let mut start = 0;
+            for &end in &tile.ends {
+                let mut step: Vec<u32> =
+                    tile.tets[start..end as usize].iter().flat_map(|(_, local)| *local).collect();
+                prop_assert!(!step.is_empty());
+                let count = step.len();
+                step.sort_unstable();
+                step.dedup();
+                prop_assert_eq!(step.len(), count);
+                start = end as usize;
+            }
+            prop_assert_eq!(start, tets.len());
+            all.sort_unstable();
+            prop_assert_eq!(all, tets);
+        }
+    }
+}

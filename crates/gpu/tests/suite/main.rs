@@ -1,0 +1,24 @@
+//! Tests of the kernels against their CPU twins, and of what moves between host and device.
+//!
+//! They need an adapter; Mesa's lavapipe, which is a processor, will do. Without one they skip with a line on stderr,
+//! unless `INCISE_REQUIRE_GPU` is set: then they fail.
+
+#![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
+#![allow(clippy::print_stderr, reason = "a test that is skipped says so")]
+
+mod colliders;
+mod coloring;
+mod device;
+mod edits;
+mod extremes;
+mod flight;
+mod handles;
+mod jacobi;
+mod measures;
+mod scalars;
+mod shaders;
+mod sizes;
+mod solver;
+mod stages;
+mod support;
+mod twin;

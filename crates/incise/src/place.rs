@@ -1,0 +1,137 @@
+//! [`Place`]: where a scene is computed.
+//!
+//! `cpu` is this process, `gpu` a device or an error, `auto` a device if there is a real one that does what the scene
+//! asks for, and else the processor, with the reason. A device that is a processor in disguise is slower than the
+//! processor itself, so only `gpu` takes it. Cost: opening a device takes some hundred milliseconds, once.
+
+#[cfg(feature = "gpu")]
+use std::sync::Arc;
+
+#[cfg(feature = "gpu")]
+use incise_gpu::{GpuContext, GpuOptions};
+use serde::{Deserialize, Serialize};
+
+use crate::limits::value;
+use crate::scene::{Method, Precision};
+use crate::{Error, Scene};
+
+/// Where a scene is to be computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Backend {
+    /// On the processor.
+    #[default]
+    Cpu,
+    /// On a GPU; an error if there is none or it cannot do what the scene asks for. Needs the feature `gpu`.
+    Gpu,
+    /// On a GPU if there is a real one that can, else on the processor.
+    Auto,
+}
+
+impl Backend {
+    pub(crate) fn is_cpu(&self) -> bool {
+        *self == Self::Cpu
+    }
+}
+
+/// Where a scene is computed.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Place {
+    #[cfg(feature = "gpu")]
+    pub(crate) gpu: Option<Arc<GpuContext>>,
+    /// What is to be said about the choice.
+    pub(crate) note: Option<String>,
+}
+
+impl Place {
+    /// Where the scene wants to be computed.
+    pub(crate) fn choose(scene: &Scene) -> Result<Self, Error> {
+        let backend = scene.solver.backend;
+        if backend.is_cpu() {
+            return Ok(Self::default());
+        }
+        if let Err(refused) = check(scene) {
+            return match backend {
+                Backend::Auto => Ok(Self::cpu(&refused.to_string())),
+                _ => Err(refused),
+            };
+        }
+        Self::open(backend)
+    }
+
+    fn cpu(reason: &str) -> Self {
+        Self {
+            #[cfg(feature = "gpu")]
+            gpu: None,
+            note: Some(format!("computed on the processor: {reason}")),
+        }
+    }
+
+    #[cfg(not(feature = "gpu"))]
+    fn open(backend: Backend) -> Result<Self, Error> {
+        match backend {
+            Backend::Gpu => Err(Error::NoGpuPath),
+            _ => Ok(Self::cpu("this build has no GPU path (feature `gpu`)")),
+        }
+    }
+
+    #[cfg(feature = "gpu")]
+    fn open(backend: Backend) -> Result<Self, Error> {
+        match GpuContext::new(&GpuOptions::from_env()) {
+            Ok(gpu) if backend == Backend::Auto && gpu.adapter().software => {
+                let name = &gpu.adapter().name;
+                Ok(Self::cpu(&format!("the only GPU is software ({name})")))
+            }
+            Ok(gpu) => Ok(Self::on(Arc::new(gpu))),
+            Err(error) if backend == Backend::Auto => Ok(Self::cpu(&error.to_string())),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    /// On a device that is open.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn on(gpu: Arc<GpuContext>) -> Self {
+        let adapter = gpu.adapter();
+        let note = format!("computed on {} ({})", adapter.name, adapter.backend);
+        Self {
+            note: Some(note),
+            gpu: Some(gpu),
+        }
+    }
+
+    /// Its name in a report.
+    pub(crate) fn name(&self) -> &'static str {
+        if self.is_device() { "gpu" } else { "cpu" }
+    }
+
+    /// Whether the state is elsewhere.
+    pub(crate) fn is_device(&self) -> bool {
+        #[cfg(feature = "gpu")]
+        return self.gpu.is_some();
+        #[cfg(not(feature = "gpu"))]
+        return false;
+    }
+}
+
+/// Refuses what a device does not do.
+pub(crate) fn check(scene: &Scene) -> Result<(), Error> {
+    let solver = &scene.solver;
+    if solver.precision == Precision::F64 {
+        return Err(value("solver.precision", "f64", "f32 on a GPU"));
+    }
+    if solver.method == Method::Descent {
+        let range = "gauss-seidel, jacobi or chebyshev on a GPU";
+        return Err(value("solver.method", "descent", range));
+    }
+    let method: incise_clustering::Method = solver.clustering.parse()?;
+    let limit = method.max_size().get();
+    if limit > 128 {
+        let range = "of at most 128 tets on a GPU";
+        return Err(value("solver.clustering", &solver.clustering, range));
+    }
+    if limit > 32 && solver.method != Method::GaussSeidel {
+        let range = "of at most 32 tets with this method on a GPU";
+        return Err(value("solver.clustering", &solver.clustering, range));
+    }
+    Ok(())
+}

@@ -1,0 +1,330 @@
+//! What a device that solves on its own needs of a [`Solver`]: tets and particles as plain numbers, what edits have
+//! changed since it last asked, and the way back of a state.
+//!
+//! The solver here stays the place where tets, masses and materials are edited; a GPU follows it as the layout of this
+//! crate does. Nothing of this costs a solver anything that nobody asked to keep track. Cost: a number an edit.
+
+use glam::DVec3;
+use incise_graph::Schedule;
+
+use crate::collider::Obstacle;
+use crate::lanes::STEEP;
+use crate::layout::{CONSTANTS, REST};
+use crate::{Pose, Real, Solver, StepSettings};
+
+/// A tet as a kernel wants it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TetData<R> {
+    /// Its particles.
+    pub corners: [u32; 4],
+    /// The gradients of the barycentric coordinates of corners 1 to 3 (9 numbers in 1/m, one gradient after the other);
+    /// `μV Σ w q qᵀ` over all corners with inverse mass w and gradient q (xx, yy, zz, and twice xy, xz, yz, in 1/s²);
+    /// `μV` in J.
+    pub rest: [R; REST],
+    /// `l/μ`, γ, and the damping time in s.
+    pub constants: [R; CONSTANTS],
+}
+
+/// What hangs a particle on a handle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AttachmentData {
+    /// The particle.
+    pub particle: u32,
+    /// The number of the handle.
+    pub handle: u32,
+    /// The place in the handle's frame in m.
+    pub place: DVec3,
+    /// In m/N; 0 is rigid.
+    pub compliance: f64,
+    /// Damping time in s.
+    pub damping: f64,
+}
+
+/// A distance constraint as a kernel wants it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DistanceData<R> {
+    /// Its particles.
+    pub particles: [u32; 2],
+    /// Their distance at rest in m.
+    pub length: R,
+    /// In m/N.
+    pub compliance: R,
+    /// Damping time in s.
+    pub damping: R,
+    /// Whether it acts only while the particles are farther apart.
+    pub only_when_longer: bool,
+}
+
+/// A volume constraint as a kernel wants it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VolumeData<R> {
+    /// Its particles.
+    pub particles: [u32; 4],
+    /// One over six times the volume at rest in 1/m³; 0 takes no part.
+    pub per_six_volumes: R,
+    /// Compliance over the volume at rest in 1/J.
+    pub compliance: R,
+    /// Damping time in s.
+    pub damping: R,
+}
+
+/// What edits have changed.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Changes {
+    /// Masses or materials have changed in a way of which nobody said what tets it touches: all are to be taken anew.
+    pub all_tets: bool,
+    /// Tets with other corners, another rest shape or corners of another mass, with repetitions; some may be gone since.
+    pub tets: Vec<u32>,
+    /// The origin has moved: all particles are to be taken anew.
+    pub all_particles: bool,
+    /// Particles that are new or have another position, velocity or mass, with repetitions; some may be gone since.
+    pub particles: Vec<u32>,
+    /// Whether particles were attached, let go or appended with an attachment.
+    pub attachments: bool,
+    /// Whether the distance constraints were replaced.
+    pub distances: bool,
+    /// Whether the volume constraints were replaced.
+    pub volumes: bool,
+}
+
+impl Changes {
+    /// Everything, for who begins.
+    #[must_use]
+    pub fn everything() -> Self {
+        Self {
+            all_tets: true,
+            all_particles: true,
+            attachments: true,
+            distances: true,
+            volumes: true,
+            ..Self::default()
+        }
+    }
+}
+
+impl<R: Real> Solver<R> {
+    /// From now on keeps track of changes; [`Solver::take_changes`] begins with everything.
+    pub fn track_changes(&mut self) {
+        self.changes = Some(Changes::everything());
+    }
+
+    /// Notes a change for who follows.
+    pub(crate) fn note(&mut self, change: impl FnOnce(&mut Changes)) {
+        if let Some(changes) = &mut self.changes {
+            change(changes);
+        }
+    }
+
+    /// Notes that the corners, the rest shape or the masses of a tet have changed.
+    pub(crate) fn note_tet(&mut self, tet: usize) {
+        self.layout.touch(tet);
+        self.note(|changes| changes.tets.push(number(tet)));
+    }
+
+    /// Notes that a particle is new or has another state or mass.
+    pub(crate) fn note_particle(&mut self, particle: usize) {
+        self.note(|changes| changes.particles.push(number(particle)));
+    }
+
+    /// What has changed since the last call; nothing unless [`Solver::track_changes`] was called.
+    ///
+    /// # Example
+    /// ```
+    /// # use glam::DVec3;
+    /// # use incise_xpbd::{Material, Solver};
+    /// # let rest = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+    /// # let mut solver = Solver::<f32>::new(&rest);
+    /// # let rubber = Material { young_modulus: 1e4, poisson_ratio: 0.4, density: 1e3, damping: 0.0 };
+    /// # solver.add_material(rubber)?;
+    /// # solver.push_tet([0, 1, 2, 3], rest, 0);
+    /// solver.track_changes();
+    /// assert!(solver.take_changes().all_tets);
+    /// solver.push_copy(3);
+    /// solver.relink_tet(0, [0, 1, 2, 4]);
+    /// let changes = solver.take_changes();
+    /// assert_eq!((changes.tets, changes.particles), (vec![0], vec![4]));
+    /// # Ok::<(), incise_xpbd::XpbdError>(())
+    /// ```
+    pub fn take_changes(&mut self) -> Changes {
+        self.changes
+            .as_mut()
+            .map(std::mem::take)
+            .unwrap_or_default()
+    }
+
+    /// A tet as a kernel wants it.
+    ///
+    /// # Panics
+    /// If the tet does not exist.
+    #[must_use]
+    pub fn tet_data(&self, tet: u32) -> TetData<R> {
+        let ingredients = self.ingredients(tet);
+        TetData {
+            corners: ingredients.tet.particles,
+            rest: ingredients.rest(),
+            constants: ingredients.constants,
+        }
+    }
+
+    /// The volume of a tet at rest in m³, negative if it is inverted there.
+    ///
+    /// # Panics
+    /// If the tet does not exist.
+    #[must_use]
+    pub fn rest_volume(&self, tet: usize) -> f64 {
+        self.volumes[tet]
+    }
+
+    /// Whether a tet takes part: one too flat to be represented does not.
+    ///
+    /// # Panics
+    /// If the tet does not exist.
+    #[must_use]
+    pub fn takes_part(&self, tet: usize) -> bool {
+        self.tets[tet].inverse_rest != [R::ZERO; 9]
+    }
+
+    /// Whether there is but one material, so that the constants of all tets are the same.
+    #[must_use]
+    pub fn is_uniform(&self) -> bool {
+        self.materials.len() < 2
+    }
+
+    /// Whether a material is damped.
+    #[must_use]
+    pub fn is_damped(&self) -> bool {
+        self.materials.iter().any(|m| m.damping > 0.0)
+    }
+
+    /// Position relative to [`Solver::origin`] in m and inverse mass in 1/kg, which is 0 for what is held; velocity in m/s.
+    ///
+    /// # Panics
+    /// If the particle does not exist.
+    #[must_use]
+    pub fn particle_data(&self, particle: usize) -> ([R; 4], [R; 3]) {
+        let data = R::read(&self.particles[particle]);
+        (data, R::components(self.velocities[particle]))
+    }
+
+    /// What a step of this solver does with its state before it begins: gives a body that has moved on a new origin, and
+    /// one on an exact line a little width; returns how many particles that moved.
+    pub fn prepare_state(&mut self) -> usize {
+        let origin = self.origin;
+        self.follow_body();
+        let unfolded = self.unfold();
+        if let Some(changes) = &mut self.changes {
+            changes.all_particles |= origin != self.origin || unfolded > 0;
+        }
+        unfolded
+    }
+
+    /// Takes over positions (the fourth number is ignored) and velocities that were computed elsewhere from this
+    /// solver's, relative to the same origin.
+    ///
+    /// # Panics
+    /// If there is not one of each for every particle.
+    pub fn load_state(&mut self, positions: &[[R; 4]], velocities: &[[R; 4]]) {
+        let count = self.particle_count();
+        assert_eq!((positions.len(), velocities.len()), (count, count));
+        for ((particle, x), (velocity, v)) in self
+            .particles
+            .iter()
+            .zip(positions)
+            .zip(self.velocities.iter_mut().zip(velocities))
+        {
+            let [.., weight] = R::read(particle);
+            R::write(particle, [x[0], x[1], x[2], weight]);
+            *velocity = R::vector(v[0], v[1], v[2]);
+        }
+    }
+
+    /// Takes over what [`Solver::residuals`] needs of a last substep that was made elsewhere: the positions before the
+    /// constraints were solved (the fourth number is ignored), and the two multipliers of each tet.
+    ///
+    /// # Panics
+    /// If there is not one of the first for every particle and one of the second for every tet.
+    pub fn load_last_substep(&mut self, predicted: &[[R; 4]], multipliers: &[[R; 2]]) {
+        assert_eq!(predicted.len(), self.particle_count());
+        assert_eq!(multipliers.len(), self.tet_count());
+        self.predicted.clear();
+        let vectors = predicted.iter().map(|x| R::vector(x[0], x[1], x[2]));
+        self.predicted.extend(vectors);
+        self.kept.clear();
+        self.kept.extend_from_slice(multipliers);
+    }
+
+    /// What hangs on handles, ascending by particle.
+    pub fn attachments(&self) -> impl ExactSizeIterator<Item = AttachmentData> + '_ {
+        self.attachments.list()
+    }
+
+    /// The poses of all handles at a fraction of the frame.
+    pub fn handle_poses(&self, fraction: f64) -> impl ExactSizeIterator<Item = Pose> + '_ {
+        self.attachments.poses(fraction)
+    }
+
+    /// A distance constraint as a kernel wants it.
+    ///
+    /// # Panics
+    /// If the constraint does not exist.
+    #[must_use]
+    pub fn distance_data(&self, constraint: u32) -> DistanceData<R> {
+        let distances = self.distances.as_ref();
+        distances.expect("there are distance constraints").list[constraint as usize].data()
+    }
+
+    /// The order in which distance constraints are solved, if there are any.
+    #[must_use]
+    pub fn distance_schedule(&self) -> Option<&Schedule> {
+        self.distances.as_ref().map(|distances| &distances.schedule)
+    }
+
+    /// A volume constraint as a kernel wants it.
+    ///
+    /// # Panics
+    /// If the constraint does not exist.
+    #[must_use]
+    pub fn volume_data(&self, constraint: u32) -> VolumeData<R> {
+        let volumes = self.volume_constraints.as_ref();
+        volumes.expect("there are volume constraints").list[constraint as usize].data()
+    }
+
+    /// The order in which volume constraints are solved, if there are any.
+    #[must_use]
+    pub fn volume_schedule(&self) -> Option<&Schedule> {
+        let volumes = self.volume_constraints.as_ref();
+        volumes.map(|volumes| &volumes.schedule)
+    }
+
+    /// Ends a frame that was computed elsewhere: the handles have arrived.
+    pub fn end_frame(&mut self) {
+        self.arrive();
+    }
+}
+
+impl Solver<f32> {
+    /// The norm of the derivative of det F (√3 at rest) up to which tets resist a change of volume as their material says;
+    /// from there on derivative, det F and γ are scaled down to it.
+    pub const STEEP: f64 = STEEP;
+
+    /// The colliders `elapsed` s after the start of the frame, at the end of a substep, relative to the origin, as 20
+    /// numbers each.
+    ///
+    /// The first is the kind: 0 plane, 1 capsule or sphere, 2 box; the second the friction; the fifth to seventh what it
+    /// moved in the substep. Of a plane follow the offset along the normal in the third place and the unit normal from the
+    /// ninth on; of a capsule the radius in the third, one over the squared length of the axis in the fourth (0 for a
+    /// sphere), and from the ninth on its start, its axis and the normal of points on the axis; of a box half its edges in
+    /// the third, fourth and eighth, and from the ninth on its center and its three axes.
+    pub fn obstacle_data<'a>(
+        &self,
+        settings: &'a StepSettings,
+        elapsed: f64,
+    ) -> impl Iterator<Item = [f32; 20]> + use<'a> {
+        Obstacle::<f32>::place(settings, elapsed, self.origin).map(|obstacle| obstacle.numbers())
+    }
+}
+
+fn number(index: usize) -> u32 {
+    u32::try_from(index).expect("particles and tets are numbered by 32 bits")
+}

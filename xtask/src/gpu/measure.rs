@@ -1,0 +1,131 @@
+//! Timing: medians and the fastest of many runs, the first left out, since it compiles kernels.
+//!
+//! A wait for a device costs more than a small frame, so what is short is repeated before somebody waits.
+
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+
+use incise::gpu::{GpuContext, GpuError};
+
+use super::report::Times;
+
+/// Time to fill before a wait, in ms, and most runs in it.
+const BATCH_MS: f64 = 50.0;
+const MOST: u32 = 20;
+
+impl Times {
+    /// Of several runs; 0 of none.
+    pub(crate) fn of(mut ms: Vec<f64>) -> Self {
+        ms.sort_by(f64::total_cmp);
+        Self {
+            median: ms.get(ms.len() / 2).copied().unwrap_or(0.0),
+            fastest: ms.first().copied().unwrap_or(0.0),
+        }
+    }
+}
+
+/// The middle of some values; 0 of none.
+pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> f64 {
+    Times::of(values.into_iter().collect()).median
+}
+
+/// Milliseconds since.
+pub(crate) fn ms_since(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1e3
+}
+
+/// Times a run that ends when its work is done; one more run before that is not counted.
+pub(crate) fn timed<T, E>(
+    repeats: u32,
+    mut run: impl FnMut() -> Result<T, E>,
+) -> Result<(T, Times), E> {
+    let mut result = run()?;
+    let mut ms = Vec::new();
+    for _ in 0..repeats {
+        let start = Instant::now();
+        result = run()?;
+        ms.push(ms_since(start));
+    }
+    Ok((result, Times::of(ms)))
+}
+
+/// Hands over what was written to buffers, and waits for all.
+pub(crate) fn flush(gpu: &GpuContext) -> Result<(), GpuError> {
+    gpu.queue().submit([]);
+    gpu.wait()
+}
+
+/// How many runs that take so long are made before a wait.
+pub(crate) fn batch(ms: f64) -> u32 {
+    (1..MOST)
+        .find(|&runs| f64::from(runs) * ms >= BATCH_MS)
+        .unwrap_or(MOST)
+}
+
+/// Today in universal time, as year, month and day.
+pub(crate) fn today() -> String {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    let days = since.map_or(0, |since| since.as_secs() / 86_400);
+    let (year, month, day) = date(days);
+    format!("{year}-{month:02}-{day:02}")
+}
+
+/// The date so many days after the first of January 1970.
+fn date(mut days: u64) -> (u64, u64, u64) {
+    let leap = |year: u64| {
+        year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400))
+    };
+    let mut year = 1970;
+    while days >= 365 + u64::from(leap(year)) {
+        days -= 365 + u64::from(leap(year));
+        year += 1;
+    }
+    let february = 28 + u64::from(leap(year));
+    let months = [31, february, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
+    let mut month = 1;
+    for length in months {
+        if days < length {
+            break;
+        }
+        days -= length;
+        month += 1;
+    }
+    (year, month, days + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_middle_and_the_fastest() {
+        let times = Times::of(vec![3.0, 1.0, 2.0, 9.0, 5.0]);
+        assert_eq!((times.median, times.fastest), (3.0, 1.0));
+        assert_eq!(median([]), 0.0);
+    }
+
+    #[test]
+    fn the_first_run_is_not_counted() {
+        let mut runs = 0;
+        let (last, _) = timed(3, || {
+            runs += 1;
+            Ok::<_, GpuError>(runs)
+        })
+        .unwrap();
+        assert_eq!(last, 4);
+    }
+
+    #[test]
+    fn short_runs_are_put_together() {
+        assert_eq!([1000.0, 50.0, 10.0, 0.0].map(batch), [1, 1, 5, 20]);
+    }
+
+    #[test]
+    fn dates() {
+        assert_eq!(date(0), (1970, 1, 1));
+        // `date -u -d @951782400`, and the days around the turn of a leap year.
+        assert_eq!(date(951_782_400 / 86_400), (2000, 2, 29));
+        assert_eq!(date(19_722), (2023, 12, 31));
+        assert_eq!(date(19_723 + 365), (2024, 12, 31));
+        assert_eq!(date(19_723 + 366), (2025, 1, 1));
+    }
+}
