@@ -1,6 +1,6 @@
 //! What the command line does with a GPU, and without one.
 
-use std::io::{Write, stderr};
+use std::io::Write;
 
 use serde_json::Value;
 
@@ -19,7 +19,7 @@ fn has_gpu(test: &str, stderr: &str, code: i32) -> bool {
     assert_eq!((code, stderr.lines().count()), (2, 1), "{stderr}");
     // Not by `eprintln`, which is shown for tests that fail only.
     let line = format!("SKIPPED {test}: {stderr}\n");
-    stderr().write_all(line.as_bytes()).unwrap();
+    std::io::stderr().write_all(line.as_bytes()).unwrap();
     false
 }
 
