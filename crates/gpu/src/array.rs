@@ -135,24 +135,60 @@ impl<T: NoUninit + AnyBitPattern> Array<T> {
 
     /// Starts a copy of the first values that the host can wait for later.
     pub(crate) fn stage(&self, gpu: &GpuContext, len: usize) -> Result<Staging<T>, GpuError> {
-        let size = bytes::<T>(len).next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT);
-        let usage = BufferUsages::MAP_READ | BufferUsages::COPY_DST;
-        let staging = buffer(gpu, self.what, size, usage)?;
         let mut encoder = gpu.encoder(self.what);
+        let copy = self.copy_out(gpu, &mut encoder, len)?;
+        Ok(copy.handed_over(&gpu.submit(encoder)?))
+    }
+
+    /// Records such a copy, so that several can be handed over together.
+    pub(crate) fn copy_out(
+        &self,
+        gpu: &GpuContext,
+        encoder: &mut wgpu::CommandEncoder,
+        len: usize,
+    ) -> Result<Copy<T>, GpuError> {
+        let size = aligned::<T>(len);
+        let staging = match gpu.spare(size) {
+            Some(spare) => spare,
+            None => {
+                let usage = BufferUsages::MAP_READ | BufferUsages::COPY_DST;
+                buffer(gpu, self.what, size, usage)?
+            }
+        };
         encoder.copy_buffer_to_buffer(&self.buffer, 0, &staging, 0, size);
-        let submission = gpu.submit(encoder)?;
-        let (sender, receiver) = mpsc::channel();
-        staging.map_async(wgpu::MapMode::Read, .., move |result| {
-            // Nobody waits if the staging buffer was dropped.
-            let _ = sender.send(result.map_err(|error| error.to_string()));
-        });
-        Ok(Staging {
+        Ok(Copy {
             buffer: staging,
             len,
-            submission,
-            receiver,
             of: PhantomData,
         })
+    }
+}
+
+/// A copy that was recorded.
+#[derive(Debug)]
+pub(crate) struct Copy<T> {
+    buffer: Buffer,
+    len: usize,
+    of: PhantomData<T>,
+}
+
+impl<T: NoUninit + AnyBitPattern> Copy<T> {
+    /// From now on it is on its way, with the commands of this submission.
+    pub(crate) fn handed_over(self, submission: &SubmissionIndex) -> Staging<T> {
+        let (sender, receiver) = mpsc::channel();
+        let wanted = ..aligned::<T>(self.len);
+        self.buffer
+            .map_async(wgpu::MapMode::Read, wanted, move |result| {
+                // Nobody waits if the staging buffer was dropped.
+                let _ = sender.send(result.map_err(|error| error.to_string()));
+            });
+        Staging {
+            buffer: self.buffer,
+            len: self.len,
+            submission: submission.clone(),
+            receiver,
+            of: PhantomData,
+        }
     }
 }
 
@@ -186,7 +222,10 @@ impl<T: NoUninit + AnyBitPattern> Staging<T> {
 
     fn values(&self, gpu: &GpuContext, mapped: Result<(), String>) -> Result<Vec<T>, GpuError> {
         mapped.map_err(|message| GpuError::Lost { message })?;
-        let view = self.buffer.slice(..).get_mapped_range();
+        let view = self
+            .buffer
+            .slice(..aligned::<T>(self.len))
+            .get_mapped_range();
         let view = view.map_err(|error| lost(&error))?;
         // The view has the alignment of bytes.
         let data = &view[..usize::try_from(bytes::<T>(self.len)).unwrap_or(usize::MAX)];
@@ -195,6 +234,7 @@ impl<T: NoUninit + AnyBitPattern> Staging<T> {
         count(&gpu.counters().read_bytes, bytes::<T>(self.len));
         drop(view);
         self.buffer.unmap();
+        gpu.keep(self.buffer.clone());
         Ok(values)
     }
 }
@@ -203,6 +243,11 @@ fn lost(error: &dyn std::error::Error) -> GpuError {
     GpuError::Lost {
         message: error.to_string(),
     }
+}
+
+/// Bytes that a copy has.
+fn aligned<T>(len: usize) -> u64 {
+    bytes::<T>(len).next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT)
 }
 
 fn bytes<T>(len: usize) -> u64 {

@@ -4,7 +4,7 @@
 //! helpers, which panic when a wish cannot be met. Errors that a driver reports later (device lost, a refused command)
 //! are kept and returned by the next call that can return one; nothing panics.
 
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use pollster::block_on;
 use wgpu::{
@@ -74,7 +74,12 @@ pub struct GpuContext {
     description: AdapterDescription,
     report: Report,
     counters: Counters,
+    /// Buffers that copies to the host have gone through: making one takes a driver longer than a copy.
+    spares: Mutex<Vec<wgpu::Buffer>>,
 }
+
+/// Most buffers that are kept.
+const SPARES: usize = 16;
 
 impl GpuContext {
     /// Opens the adapter that answers the options best.
@@ -139,6 +144,7 @@ impl GpuContext {
             queue,
             report,
             counters: Counters::default(),
+            spares: Mutex::default(),
         }
     }
 
@@ -200,10 +206,7 @@ impl GpuContext {
     /// # Errors
     /// The first report.
     pub fn check(&self) -> Result<(), GpuError> {
-        let report = self
-            .report
-            .lock()
-            .unwrap_or_else(|poison| poison.into_inner());
+        let report = self.report.lock().unwrap_or_else(PoisonError::into_inner);
         report.clone().map_or(Ok(()), Err)
     }
 
@@ -215,6 +218,23 @@ impl GpuContext {
         let index = self.queue.submit([encoder.finish()]);
         count(&self.counters.submits, 1);
         self.check().map(|()| index)
+    }
+
+    /// A buffer to copy so many bytes to the host through, if one is kept that is not far too large.
+    pub(crate) fn spare(&self, bytes: u64) -> Option<wgpu::Buffer> {
+        let mut spares = self.spares.lock().unwrap_or_else(PoisonError::into_inner);
+        let fits = |buffer: &wgpu::Buffer| (bytes..=4 * bytes.max(1024)).contains(&buffer.size());
+        let found = spares.iter().position(fits)?;
+        Some(spares.swap_remove(found))
+    }
+
+    /// Keeps such a buffer, unmapped, for the next copy.
+    pub(crate) fn keep(&self, buffer: wgpu::Buffer) {
+        let mut spares = self.spares.lock().unwrap_or_else(PoisonError::into_inner);
+        if spares.len() == SPARES {
+            spares.remove(0);
+        }
+        spares.push(buffer);
     }
 
     pub(crate) fn encoder(&self, label: &str) -> wgpu::CommandEncoder {
@@ -254,7 +274,7 @@ impl GpuContext {
 
 /// Keeps the first report: what follows mostly is its consequence.
 fn note(report: &Report, error: GpuError) {
-    let mut report = report.lock().unwrap_or_else(|poison| poison.into_inner());
+    let mut report = report.lock().unwrap_or_else(PoisonError::into_inner);
     // A lost device makes everything else fail, so that is what is told.
     let replace = report.is_none() || matches!(error, GpuError::Lost { .. });
     if replace {

@@ -16,7 +16,7 @@ use super::obstacles::Obstacles;
 use super::scalars;
 use super::stages::{Clock, Stage::*, Track};
 use super::turns::{self, Turns};
-use crate::array::{Array, Staging};
+use crate::array::{Array, Copy};
 use crate::{GpuContext, GpuError};
 
 /// What a step needs beside the body.
@@ -224,21 +224,25 @@ impl Frame {
         always + turns + obstacles + jacobi + clock
     }
 
-    /// Starts to read what residuals need, if the last step kept it.
+    /// Records copies of what residuals need, if the last step kept it.
     #[expect(
         clippy::type_complexity,
         reason = "predicted positions and multipliers"
     )]
-    pub(crate) fn stage_last_substep(
+    pub(crate) fn copy_last_substep(
         &self,
         gpu: &GpuContext,
+        encoder: &mut wgpu::CommandEncoder,
         body: &Body,
-    ) -> Result<Option<(Staging<[f32; 4]>, Staging<[f32; 2]>)>, GpuError> {
+    ) -> Result<Option<(Copy<[f32; 4]>, Copy<[f32; 2]>)>, GpuError> {
         if !self.kept {
             return Ok(None);
         }
-        let predicted = self.predicted.stage(gpu, self.predicted.len())?;
-        let multipliers = body.multipliers.stage(gpu, body.multipliers.len())?;
+        let predicted = self
+            .predicted
+            .copy_out(gpu, encoder, self.predicted.len())?;
+        let multipliers = &body.multipliers;
+        let multipliers = multipliers.copy_out(gpu, encoder, multipliers.len())?;
         Ok(Some((predicted, multipliers)))
     }
 }

@@ -302,10 +302,14 @@ impl GpuSolver {
         tets.run(&mut pass, &[], over_tets);
         of_particles.run(&mut pass, &[], over_particles);
         drop(pass);
-        gpu.submit(encoder)?;
-        let of_tets = measuring.tet_sums.stage(gpu, over_tets)?;
-        let of_particles = measuring.particle_sums.stage(gpu, over_particles)?;
-        let repaired = self.repaired.stage(gpu, 1)?;
+        let of_tets = measuring.tet_sums.copy_out(gpu, &mut encoder, over_tets)?;
+        let sums = &measuring.particle_sums;
+        let of_particles = sums.copy_out(gpu, &mut encoder, over_particles)?;
+        let repaired = self.repaired.copy_out(gpu, &mut encoder, 1)?;
+        let submission = gpu.submit(encoder)?;
+        let of_tets = of_tets.handed_over(&submission);
+        let of_particles = of_particles.handed_over(&submission);
+        let repaired = repaired.handed_over(&submission);
         let (of_tets, of_particles) = (of_tets.collect(gpu)?, of_particles.collect(gpu)?);
         self.known_repaired = repaired.collect(gpu)?[0];
         Ok(measuring.total(&of_tets, &of_particles, host.origin(), gravity))

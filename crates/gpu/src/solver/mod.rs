@@ -293,12 +293,25 @@ impl GpuSolver {
         let _span = tracing::debug_span!("gpu::read_back").entered();
         let count = self.host.particle_count();
         let gpu = &*self.gpu;
-        let positions = self.body.particles.stage(gpu, count)?;
-        let velocities = self.body.velocities.stage(gpu, count)?;
-        let repaired = self.repaired.stage(gpu, 1)?;
-        let last = self.frame.stage_last_substep(gpu, &self.body)?;
-        let positions = positions.collect(gpu)?;
-        self.host.load_state(&positions, &velocities.collect(gpu)?);
+        let mut encoder = gpu.encoder("read back");
+        let positions = self.body.particles.copy_out(gpu, &mut encoder, count)?;
+        let velocities = self.body.velocities.copy_out(gpu, &mut encoder, count)?;
+        let repaired = self.repaired.copy_out(gpu, &mut encoder, 1)?;
+        let last = self
+            .frame
+            .copy_last_substep(gpu, &mut encoder, &self.body)?;
+        let submission = gpu.submit(encoder)?;
+        let positions = positions.handed_over(&submission);
+        let velocities = velocities.handed_over(&submission);
+        let repaired = repaired.handed_over(&submission);
+        let last = last.map(|(predicted, multipliers)| {
+            (
+                predicted.handed_over(&submission),
+                multipliers.handed_over(&submission),
+            )
+        });
+        let (positions, velocities) = (positions.collect(gpu)?, velocities.collect(gpu)?);
+        self.host.load_state(&positions, &velocities);
         self.known_repaired = repaired.collect(gpu)?[0];
         if let Some((predicted, multipliers)) = last {
             let (predicted, multipliers) = (predicted.collect(gpu)?, multipliers.collect(gpu)?);

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::{DVec3, dvec3};
-use incise_gpu::{GpuContext, GpuError, GpuOptions, GpuSolver};
+use incise_gpu::{Form, GpuContext, GpuError, GpuOptions, GpuSolver};
 
 use crate::solver::{SOFT, body, schedules, settings, share};
 use crate::support::gpu;
@@ -110,4 +110,27 @@ fn a_lost_device_ends_the_waiting() {
     assert!(device.step(&schedule, &settings()).is_err_and(lost));
     assert!(device.begin_readback().is_err_and(lost));
     assert!(device.measure(None).is_err_and(lost));
+}
+
+/// A frame with a blade reads back every time.
+#[test]
+fn reading_back_is_one_submit_and_after_the_first_time_makes_no_buffer() {
+    let test = "reading_back_is_one_submit_and_after_the_first_time_makes_no_buffer";
+    let Some(gpu) = gpu(test) else { return };
+    let gpu = share(gpu);
+    let mesh = bar();
+    let (schedule, _) = schedules(&mesh, "serial:10");
+    let mut device = GpuSolver::new(Arc::clone(&gpu), body(&mesh, &[SOFT]), Form::Threads).unwrap();
+    let mut read = || {
+        device.step(&schedule, &settings()).unwrap();
+        let before = gpu.traffic();
+        device.host().unwrap();
+        gpu.traffic().since(before)
+    };
+    let first = read();
+    assert_eq!((first.submits, first.readbacks), (1, 3));
+    for _ in 0..3 {
+        let again = read();
+        assert_eq!((again.submits, again.readbacks, again.buffers), (1, 3, 0));
+    }
 }

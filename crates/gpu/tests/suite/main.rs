@@ -4,7 +4,6 @@
 //! unless `INCISE_REQUIRE_GPU` is set: then they fail.
 
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
-#![allow(clippy::print_stderr, reason = "a test that is skipped says so")]
 
 mod colliders;
 mod coloring;

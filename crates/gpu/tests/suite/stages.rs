@@ -9,7 +9,7 @@ use incise_mesh::generate::kuhn_box;
 use incise_xpbd::{Collider, Pose, Solver, StepSettings};
 
 use crate::solver::{SOFT, body, schedules, settings, share};
-use crate::support::gpu;
+use crate::support::{gpu, skip};
 use crate::twin::{FORMS, bar};
 
 /// A step with its times, which are held against the clock of the host. `passes` is how many the step may have.
@@ -35,7 +35,7 @@ fn stages_are_timed_and_nothing_changes() {
         return;
     };
     if !gpu.has_timestamps() {
-        eprintln!("SKIPPED stages_are_timed_and_nothing_changes: no timestamps");
+        skip("stages_are_timed_and_nothing_changes", "no timestamps");
         return;
     }
     let mesh = bar();
@@ -100,7 +100,7 @@ fn long_frames_take_several_query_sets() {
         return;
     };
     if !gpu.has_timestamps() {
-        eprintln!("SKIPPED long_frames_take_several_query_sets: no timestamps");
+        skip("long_frames_take_several_query_sets", "no timestamps");
         return;
     }
     let mesh = kuhn_box([1, 1, 1], DVec3::ONE);

@@ -1,5 +1,6 @@
 //! The device that all tests of this process share.
 
+use std::io::{Write, stderr};
 use std::sync::OnceLock;
 
 use incise_gpu::{GpuContext, GpuError, GpuOptions};
@@ -13,8 +14,14 @@ pub(crate) fn gpu(test: &str) -> Option<&'static GpuContext> {
         Err(error) => {
             let required = std::env::var_os("INCISE_REQUIRE_GPU").is_some();
             assert!(!required, "a GPU is required: {error}");
-            eprintln!("SKIPPED {test}: {error}");
+            skip(test, &error.to_string());
             None
         }
     }
+}
+
+/// Says that a test is skipped. Not by `eprintln`, which is shown for tests that fail only.
+pub(crate) fn skip(test: &str, why: &str) {
+    let line = format!("SKIPPED {test}: {why}\n");
+    stderr().write_all(line.as_bytes()).unwrap();
 }
