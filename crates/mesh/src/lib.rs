@@ -41,6 +41,7 @@ pub mod io;
 mod orientation;
 mod pieces;
 mod quality;
+mod repair;
 mod surface;
 mod tet_mesh;
 
@@ -51,6 +52,7 @@ pub use ids::{ParticleId, TetId};
 pub use orientation::orientation;
 pub use pieces::Pieces;
 pub use quality::{QualitySummary, TetQuality, tet_quality};
+pub use repair::{RepairOptions, RepairReport, Repaired, repair};
 pub use surface::Surface;
 pub use tet_mesh::{TetMesh, signed_volume};
 
