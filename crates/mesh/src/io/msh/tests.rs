@@ -1,0 +1,1 @@
+//! Small files by hand, broken ones, and random ones.
