@@ -29,7 +29,7 @@ use std::path::Path;
 pub use atomic::write_atomically;
 pub use fields::{Field, Fields, Values};
 pub use file::{MeshFile, NamedValues, OwnedValues};
-pub use msh::read_msh;
+pub use msh::{MshKind, read_msh, write_msh};
 pub use pvd::write_pvd;
 pub use tetgen::{read_tetgen, write_tetgen};
 pub use vtk::{read_vtk, write_vtk};

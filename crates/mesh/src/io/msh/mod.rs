@@ -21,6 +21,9 @@ mod read41;
 mod source;
 #[cfg(test)]
 mod tests;
+mod write;
+
+pub use write::{MshKind, write_msh};
 
 use std::fs;
 use std::path::Path;
