@@ -1,6 +1,9 @@
 //! Gmsh files as Gmsh and meshio write them, compared with the mesh they were made of.
 
-use incise_mesh::io;
+use incise_mesh::MeshError;
+use incise_mesh::generate::kuhn_box;
+use incise_mesh::glam::DVec3;
+use incise_mesh::io::{self, MeshFile, MshKind};
 
 use crate::given::folder;
 
@@ -31,4 +34,18 @@ fn the_mesh_survives_other_programs() {
             assert!(file.particles.is_empty() && file.tets.is_empty());
         }
     }
+}
+
+#[test]
+fn fields_and_regions_of_the_wrong_length_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.msh");
+    let mut file = MeshFile::from(kuhn_box([1, 1, 1], DVec3::ONE));
+    file.regions = vec![1];
+    for kind in [MshKind::Text41, MshKind::Binary22] {
+        let error = io::write_msh(&path, &file, kind).unwrap_err();
+        assert!(matches!(error, MeshError::FieldLength { found: 1, .. }));
+        assert!(!path.exists());
+    }
+    assert!(matches!(io::read_msh(&path), Err(MeshError::Io { .. })));
 }

@@ -85,7 +85,7 @@ pub(crate) fn parse_msh(bytes: &[u8], path: &Path) -> Result<MeshFile, MeshError
             b"NOD" => {
                 version = Some(Version::V1);
                 nodes = true;
-                read22::read_nodes(source, &mut content)?;
+                read22::read_nodes(source, &mut content, false)?;
             }
             b"ELM" => {
                 version = Some(Version::V1);
@@ -96,8 +96,12 @@ pub(crate) fn parse_msh(bytes: &[u8], path: &Path) -> Result<MeshFile, MeshError
                 nodes = true;
                 match needs(version)? {
                     Version::V41 => read41::read_nodes(source, &mut content)?,
-                    _ => read22::read_nodes(source, &mut content)?,
+                    _ => read22::read_nodes(source, &mut content, false)?,
                 }
+            }
+            b"ParametricNodes" if version == Some(Version::V2) => {
+                nodes = true;
+                read22::read_nodes(source, &mut content, true)?;
             }
             b"Elements" => {
                 elements = true;
@@ -142,9 +146,11 @@ fn read_format(source: &mut Source<'_>) -> Result<Version, MeshError> {
         b"2" | b"2.0" | b"2.1" | b"2.2" => Version::V2,
         b"4.1" => Version::V41,
         _ => {
+            // Gmsh writes 4.0 as 4.
+            let name = if word == b"4" { b"4.0" } else { word };
             return Err(source.error(format!(
                 "MSH version {} is not read: save the mesh as version 4.1 or 2.2",
-                show(word)
+                show(name)
             )));
         }
     };

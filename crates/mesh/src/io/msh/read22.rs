@@ -2,7 +2,8 @@
 //!
 //! Version 1 is a text: `$NOD` and `$ELM`, each element with its physical group, its entity and the number of its nodes.
 //! Version 2 has a list of tags for each element, of which the first is the physical group and the second the entity; in
-//! binary files elements stand in batches of one type. Linear.
+//! binary files elements stand in batches of one type. Gmsh also writes `$ParametricNodes` in place of `$Nodes`, which
+//! the manual does not mention. Linear.
 
 use glam::DVec3;
 
@@ -10,8 +11,12 @@ use super::content::{Content, Tet};
 use super::source::{Encoding, Source};
 use crate::MeshError;
 
-/// Section `$Nodes` or `$NOD`, after its name.
-pub(super) fn read_nodes(source: &mut Source<'_>, content: &mut Content) -> Result<(), MeshError> {
+/// Section `$Nodes` or `$NOD`, or `$ParametricNodes` if `parametric`, after its name.
+pub(super) fn read_nodes(
+    source: &mut Source<'_>,
+    content: &mut Content,
+    parametric: bool,
+) -> Result<(), MeshError> {
     let count: usize = source.number("the number of nodes")?;
     source.line();
     content.nodes.reserve(source.room_for(count, 8));
@@ -26,6 +31,15 @@ pub(super) fn read_nodes(source: &mut Source<'_>, content: &mut Content) -> Resu
             source.coordinate()?,
         ];
         content.positions.push(DVec3::from(position));
+        if parametric {
+            // Nodes on lines and surfaces have their parameters there.
+            let dimension = source.int("the dimension of an entity")?;
+            source.int("the number of an entity")?;
+            let parameters = if dimension == 3 { 0 } else { dimension };
+            for _ in 0..parameters {
+                source.double("a parameter of a node")?;
+            }
+        }
     }
     Ok(())
 }
