@@ -95,14 +95,14 @@ fn data_of_a_text() {
         (
             "ref 1 2 int",
             "ref 1 3 int",
-            "a.vtk:31: the array \"medit:ref\" has 3 values",
+            "a.vtk:33: the array \"medit:ref\" has 3 values",
         ),
         (
             "s double",
             "s triple",
-            "a.vtk:15: the data type \"triple\" is not known",
+            "a.vtk:16: the data type \"triple\" is not known",
         ),
-        ("1 nan", "1 none", "a.vtk:16: \"none\" is not a value"),
+        ("1 nan", "1 none", "a.vtk:17: \"none\" is not a value"),
     ] {
         let error = read(text.replacen(from, to, 1).as_bytes());
         let error = error.expect_err(to).to_string();
