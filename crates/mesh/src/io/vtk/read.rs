@@ -89,7 +89,7 @@ enum Target {
     Cells,
 }
 
-/// The number of elements that POINT_DATA or CELL_DATA announced, and where.
+/// The number of elements that `POINT_DATA` or `CELL_DATA` announced, and where.
 #[derive(Clone, Copy, Default)]
 struct Announced {
     count: usize,

@@ -65,8 +65,8 @@ pub(super) fn text(out: &mut dyn Write, file: &MeshFile) -> io::Result<()> {
     sections(
         out,
         file,
-        &mut |out, regions| regions.iter().try_for_each(|r| writeln!(out, "{r}")),
-        &mut |out, values| match values {
+        |out, regions| regions.iter().try_for_each(|r| writeln!(out, "{r}")),
+        |out, values| match values {
             OwnedValues::Scalars(values) => values.iter().try_for_each(|v| writeln!(out, "{v:?}")),
             OwnedValues::Vectors(values) => values
                 .iter()
@@ -105,13 +105,13 @@ pub(super) fn binary(out: &mut dyn Write, file: &MeshFile) -> io::Result<()> {
     sections(
         out,
         file,
-        &mut |out, regions| {
+        |out, regions| {
             for region in regions {
                 out.write_all(&region.to_be_bytes())?;
             }
             writeln!(out)
         },
-        &mut |out, values| {
+        |out, values| {
             let mut put = |v: &f64| out.write_all(&v.to_be_bytes());
             match values {
                 OwnedValues::Scalars(values) => values.iter().try_for_each(&mut put)?,
@@ -128,8 +128,8 @@ pub(super) fn binary(out: &mut dyn Write, file: &MeshFile) -> io::Result<()> {
 fn sections(
     out: &mut dyn Write,
     file: &MeshFile,
-    regions: &mut dyn FnMut(&mut dyn Write, &[i32]) -> io::Result<()>,
-    numbers: &mut dyn FnMut(&mut dyn Write, &OwnedValues) -> io::Result<()>,
+    regions: impl Fn(&mut dyn Write, &[i32]) -> io::Result<()>,
+    numbers: impl Fn(&mut dyn Write, &OwnedValues) -> io::Result<()>,
 ) -> io::Result<()> {
     let tets = file.mesh.tets.len();
     let has_regions = !file.regions.is_empty();
@@ -141,7 +141,7 @@ fn sections(
         writeln!(out, "{REGIONS} 1 {tets} int")?;
         regions(out, &file.regions)?;
     }
-    let mut arrays = |out: &mut dyn Write, fields: &[NamedValues], count: usize| {
+    let arrays = |out: &mut dyn Write, fields: &[NamedValues], count: usize| {
         for field in fields {
             let components = match field.values {
                 OwnedValues::Scalars(_) => 1,
