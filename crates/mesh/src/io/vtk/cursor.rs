@@ -212,7 +212,7 @@ impl<'b> Cursor<'b> {
             return match fault {
                 Some(i) => Err(self.error(
                     start + i * (bytes.len() / count),
-                    format!("a number is not {what}: it is negative"),
+                    format!("a number is not {what}: it is negative or no integer"),
                 )),
                 None => Ok(numbers.into_iter().flatten().collect()),
             };

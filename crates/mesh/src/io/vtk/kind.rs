@@ -89,7 +89,8 @@ impl Kind {
         })
     }
 
-    /// The first `count` numbers of the bytes as numbers from 0 on; `None` for what is negative or too large.
+    /// The first `count` numbers of the bytes as numbers from 0 on; `None` for what is negative, too large or no integer by its
+    /// type.
     pub(in crate::io) fn indices(
         self,
         bytes: &[u8],
@@ -98,6 +99,7 @@ impl Kind {
     ) -> Vec<Option<usize>> {
         self.numbers(bytes, count, big_endian, |bits| match self {
             Self::I8 | Self::I16 | Self::I32 | Self::I64 => usize::try_from(self.signed(bits)).ok(),
+            Self::F32 | Self::F64 => None,
             _ => usize::try_from(bits).ok(),
         })
     }

@@ -12,6 +12,7 @@
 //!
 //! Source: "VTK File Formats for VTK Version 4.2" (Kitware) and the 5.1 format as the VTK library writes it.
 
+mod arrays;
 mod cursor;
 pub(super) mod grid;
 pub(super) mod kind;

@@ -4,7 +4,8 @@
 //! length, that of a last shorter block or 0, and the compressed length of each. Header and data may be one base64 text
 //! or each their own with its padding, so padding is accepted at any group of four and decoding goes on behind it; the
 //! crate `base64` refuses that. How long the array must be is known from elsewhere and checked before anything is
-//! decompressed; `miniz_oxide` stops at a limit. Linear.
+//! decompressed; `miniz_oxide` stops at a limit. Memory is linear in the size of the file, but zlib can make a thousand
+//! bytes of one. Linear.
 //!
 //! Source: "VTK XML Formats" (Kitware); RFC 4648, section 4.
 
@@ -27,6 +28,14 @@ pub(super) enum Stream<'b> {
 }
 
 impl Stream<'_> {
+    /// The bytes of the file that have not been used.
+    pub(super) fn left(&self) -> usize {
+        match self {
+            Self::Raw(bytes) => bytes.len(),
+            Self::Base64(text, _) => text.len(),
+        }
+    }
+
     fn take(&mut self, size: usize) -> Result<Vec<u8>, String> {
         let missing =
             |left: usize| format!("{size} bytes expected but {left} left, get the complete file");
@@ -97,7 +106,6 @@ impl Stream<'_> {
         for _ in 0..blocks {
             lengths.push(self.number(storage)?);
         }
-        // The next bytes are a base64 text of their own.
         let mut data = Vec::new();
         for (i, length) in lengths.into_iter().enumerate() {
             let expected = if i < whole { block } else { last };

@@ -30,6 +30,7 @@ pub(crate) fn parse_vtu(bytes: &[u8], path: &Path) -> Result<MeshFile, MeshError
         piece: None,
         arrays: Vec::new(),
         appended: None,
+        used: std::cell::Cell::new(0),
     };
     document.walk(start)?;
     document.finish()
@@ -108,6 +109,8 @@ struct Document<'b> {
     arrays: Vec<Array>,
     /// Where the appended data start, and whether they are raw.
     appended: Option<(usize, bool)>,
+    /// The bytes of the appended data that arrays have used.
+    used: std::cell::Cell<usize>,
 }
 
 impl Document<'_> {
@@ -307,7 +310,7 @@ impl Document<'_> {
             Format::Appended(offset) => self.appended(array, *offset, size, storage)?,
         };
         of_bytes(kind, &bytes, storage.big_endian)
-            .ok_or_else(|| here("a number is negative".to_owned()))
+            .ok_or_else(|| here("a number is negative or no integer".to_owned()))
     }
 
     fn appended(
@@ -336,13 +339,20 @@ impl Document<'_> {
             true => Stream::Raw(data),
             false => Stream::Base64(data, Vec::new()),
         };
-        stream
-            .array(size, storage)
-            .map_err(|message| MeshError::ParseBytes {
-                path: self.place.path.to_owned(),
-                byte: start.saturating_add(offset).min(bytes.len()),
-                message: format!("array {:?}: {message}", array.name),
-            })
+        let error = |message: String| MeshError::ParseBytes {
+            path: self.place.path.to_owned(),
+            byte: start.saturating_add(offset).min(bytes.len()),
+            message: format!("array {:?}: {message}", array.name),
+        };
+        let decoded = stream.array(size, storage).map_err(error)?;
+        // Many arrays on the same bytes would need more memory than the file gives reason for.
+        self.used.set(self.used.get() + data.len() - stream.left());
+        if self.used.get() > bytes.len() - start {
+            return Err(error(
+                "it overlaps others, give each its own offset".to_owned(),
+            ));
+        }
+        Ok(decoded)
     }
 }
 

@@ -294,6 +294,19 @@ fn errors_of_a_text_name_the_line() {
 }
 
 #[test]
+fn points_of_cells_are_integers() {
+    for variant in Variant::all().filter(|variant| !variant.raw) {
+        let file = String::from_utf8(variant.file()).unwrap();
+        let bad = file.replacen("Int32\" Name=\"conn", "Float32\" Name=\"conn", 1);
+        let error = read(bad.as_bytes()).unwrap_err().to_string();
+        assert!(
+            error.contains("\"connectivity\": a number is negative or no integer"),
+            "{error}"
+        );
+    }
+}
+
+#[test]
 fn lengths_of_compressed_arrays_are_checked() {
     let variant = Variant {
         big: false,
@@ -319,6 +332,22 @@ fn lengths_of_compressed_arrays_are_checked() {
         );
         assert!(error.contains(expected), "{error}");
     }
+}
+
+#[test]
+fn bytes_that_several_arrays_share_are_refused() {
+    let variant = Variant {
+        big: false,
+        wide: false,
+        compressed: false,
+        appended: true,
+        raw: false,
+    };
+    let good = String::from_utf8_lossy(&variant.file()).into_owned();
+    let field = "<DataArray type=\"Float32\" NumberOfComponents=\"3\" Name=\"f\" format=\"appended\" offset=\"0\"/>";
+    let bad = good.replacen("<PointData>", &format!("<PointData>{}", field.repeat(9)), 1);
+    let error = read(bad.as_bytes()).unwrap_err().to_string();
+    assert!(error.contains("overlaps others"), "{error}");
 }
 
 #[test]
