@@ -130,11 +130,11 @@ impl Reader<'_> {
                     return Ok(());
                 }
                 b"POINT_DATA" => {
-                    self.of_particles = self.announced(word)?;
+                    self.of_particles = self.announced(word, self.of_particles)?;
                     self.target = Target::Particles;
                 }
                 b"CELL_DATA" => {
-                    self.of_cells = self.announced(word)?;
+                    self.of_cells = self.announced(word, self.of_cells)?;
                     self.target = Target::Cells;
                 }
                 b"METADATA" => {
@@ -153,8 +153,15 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn announced(&mut self, word: Word<'_>) -> Result<Announced, MeshError> {
+    fn announced(&mut self, word: Word<'_>, before: Announced) -> Result<Announced, MeshError> {
         let count = self.cursor.count("the number of elements with data")?;
+        if before.at.is_some() && before.count != count {
+            let message = format!(
+                "there are data of {count} elements but of {} before, give one for each",
+                before.count
+            );
+            return Err(self.cursor.error(word.at, message));
+        }
         Ok(Announced {
             count,
             at: Some(word.at),

@@ -111,6 +111,32 @@ fn data_of_a_text() {
 }
 
 #[test]
+fn data_are_of_all_elements() {
+    let start = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n0 0 0 1 0 0 0 1 0 0 0 1\n\
+        CELLS 2 8\n2 0 1\n4 0 1 2 3\nCELL_TYPES 2\n3 10\n";
+    let one = "CELL_DATA 1\nSCALARS a int\n7\n";
+    let two = "CELL_DATA 2\nSCALARS b int\n7 8\n";
+    let file = read(format!("{start}{two}{two}").as_bytes()).unwrap();
+    assert_eq!(file.tets.len(), 2);
+    for (data, expected) in [
+        (one.to_owned(), ":12: there are data of 1 cells but 2 cells"),
+        (
+            format!("{one}{two}"),
+            ":15: there are data of 2 elements but of 1 before",
+        ),
+        (
+            "POINT_DATA 3\n".to_owned(),
+            ":12: there are data of 3 points but 4 points",
+        ),
+    ] {
+        let error = read(format!("{start}{data}").as_bytes())
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains(expected), "{error} lacks {expected}");
+    }
+}
+
+#[test]
 fn errors_of_a_binary_file_name_the_byte() {
     let good = old_binary();
     let find = |what: &[u8]| good.windows(what.len()).position(|w| w == what).unwrap();
