@@ -6,9 +6,9 @@
 //! named as programs name regions becomes the regions; other data, tables and metadata are skipped. Orientation is kept
 //! as it is. Linear.
 //!
-//! The crate `vtkio` (0.7.0-rc2) reads the same, but panics or reserves memory without limit where the numbers of a
-//! compressed file are wrong (it multiplies and slices by them unchecked), and its errors name no place. So the reader
-//! is our own.
+//! The crate `vtkio` (0.7.0-rc2) has both the legacy and the XML formats, but it trusts the numbers in a compressed file:
+//! it slices and multiplies by them unchecked and reserves what they say. It takes a last block of length 0 for an empty
+//! one, and its errors name no place. So the reader is our own.
 //!
 //! Source: "VTK File Formats for VTK Version 4.2" (Kitware) and the 5.1 format as the VTK library writes it.
 
