@@ -17,6 +17,8 @@ mod fields;
 mod file;
 mod msh;
 mod pvd;
+#[cfg(test)]
+mod test_files;
 mod tetgen;
 mod text;
 mod vtk;
@@ -32,9 +34,9 @@ pub use file::{MeshFile, NamedValues, OwnedValues};
 pub use msh::{MshKind, read_msh, write_msh};
 pub use pvd::write_pvd;
 pub use tetgen::{read_tetgen, write_tetgen};
-pub use vtk::{read_vtk, write_vtk};
+pub use vtk::{read_vtk, read_vtk_file, write_vtk, write_vtk_binary, write_vtk_file};
 pub use vtp::write_vtp;
-pub use vtu::write_vtu;
+pub use vtu::{read_vtu, write_vtu, write_vtu_file};
 
 use crate::{MeshError, TetMesh};
 

@@ -146,11 +146,7 @@ impl<'t, I: Iterator<Item = &'t [u8]>> Row<'t, '_, I> {
             self.text
                 .error(line, format!("the line ends before {what}"))
         })?;
-        Ok(Word {
-            text,
-            line,
-            first: false,
-        })
+        Ok(Word { text, line })
     }
 
     fn count(&mut self, what: &str) -> Result<usize, MeshError> {

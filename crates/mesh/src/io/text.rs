@@ -18,8 +18,6 @@ pub(super) struct Text<'a> {
 pub(super) struct Word<'t> {
     pub(super) text: &'t [u8],
     pub(super) line: usize,
-    /// Whether it is the first word of its line.
-    pub(super) first: bool,
 }
 
 impl<'a> Text<'a> {
@@ -42,17 +40,6 @@ impl<'a> Text<'a> {
         lines
             .skip(from - 1)
             .map(|(i, line)| (i, line.strip_suffix(b"\r").unwrap_or(line)))
-    }
-
-    /// The words from the given line on.
-    pub(super) fn words(&self, from: usize) -> impl Iterator<Item = Word<'_>> {
-        self.lines(from).flat_map(|(line, text)| {
-            words_of(text).enumerate().map(move |(i, text)| Word {
-                text,
-                line,
-                first: i == 0,
-            })
-        })
     }
 
     /// How many elements to make room for: as many as announced, but no more than the file can hold.
