@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use incise_mesh::io;
 
 #[expect(clippy::print_stderr, reason = "a skipped test should be seen")]
-fn folder() -> Option<PathBuf> {
+pub(crate) fn folder() -> Option<PathBuf> {
     let shared = std::env::var_os("INCISE_SHARED").map(PathBuf::from);
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
     let folder = shared.unwrap_or(beside).join("meshes");

@@ -3,4 +3,5 @@
 mod faults;
 mod formats;
 mod given;
+mod medit;
 mod shapes;

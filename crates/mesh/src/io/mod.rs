@@ -15,6 +15,7 @@
 mod atomic;
 mod fields;
 mod file;
+mod medit;
 mod pvd;
 mod tetgen;
 mod text;
@@ -28,6 +29,7 @@ use std::path::Path;
 pub use atomic::write_atomically;
 pub use fields::{Field, Fields, Values};
 pub use file::{MeshFile, NamedValues, OwnedValues};
+pub use medit::{read_medit, write_medit};
 pub use pvd::write_pvd;
 pub use tetgen::{read_tetgen, write_tetgen};
 pub use vtk::{read_vtk, write_vtk};
