@@ -17,6 +17,7 @@ mod fields;
 mod file;
 mod medit;
 mod pvd;
+mod surfaces;
 mod tetgen;
 mod text;
 mod vtk;
@@ -31,6 +32,9 @@ pub use fields::{Field, Fields, Values};
 pub use file::{MeshFile, NamedValues, OwnedValues};
 pub use medit::{read_medit, write_medit};
 pub use pvd::write_pvd;
+pub use surfaces::{
+    PlyEncoding, TriangleSurface, read_surface, write_ply, write_stl_binary, write_surface,
+};
 pub use tetgen::{read_tetgen, write_tetgen};
 pub use vtk::{read_vtk, write_vtk};
 pub use vtp::write_vtp;
