@@ -35,7 +35,7 @@ pub use pvd::write_pvd;
 pub use surfaces::{
     PlyEncoding, TriangleSurface, read_surface, write_ply, write_stl_binary, write_surface,
 };
-pub use tetgen::{read_tetgen, write_tetgen};
+pub use tetgen::{read_tetgen, read_tetgen_file, write_tetgen, write_tetgen_file};
 pub use vtk::{read_vtk, write_vtk};
 pub use vtp::write_vtp;
 pub use vtu::write_vtu;
