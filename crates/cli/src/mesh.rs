@@ -89,11 +89,13 @@ pub(crate) fn mesh(command: &MeshCommand) -> Result<(), Failure> {
             input,
             output,
             repair: false,
-        } => Ok(io::write(output, &io::read(input)?)?),
+        } => Ok(io::write_file(output, &io::read_file(input)?)?),
         MeshCommand::Convert { input, output, .. } => {
-            let repaired = repair(&io::read(input)?, &RepairOptions::ALL);
-            io::write(output, &repaired.mesh)?;
-            print(repaired.report)
+            let file = io::read_file(input)?;
+            let repaired = repair(&file.mesh, &RepairOptions::ALL);
+            let report = repaired.report;
+            io::write_file(output, &file.repaired(repaired))?;
+            print(report)
         }
         MeshCommand::Generate {
             shape,

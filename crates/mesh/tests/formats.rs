@@ -263,7 +263,10 @@ fn tetgen_of_other_writers() {
 #[test]
 fn unknown_endings_name_the_known_ones() {
     let error = io::read("mesh.step").unwrap_err().to_string();
-    assert!(error.contains("mesh.step") && error.contains(".vtk, .node, .ele"));
+    assert!(
+        error.contains("mesh.step")
+            && error.contains(".vtk, .vtu, .msh, .node, .ele, .mesh, .meshb")
+    );
     assert!(
         io::write("mesh", &TetMesh::default())
             .unwrap_err()

@@ -2,6 +2,7 @@
 //!
 //! Works on bytes, so that a title in some old encoding is no obstacle. Linear.
 
+use std::borrow::Cow;
 use std::fs;
 use std::path::Path;
 
@@ -10,7 +11,7 @@ use crate::MeshError;
 /// A file in memory.
 pub(super) struct Text<'a> {
     path: &'a Path,
-    bytes: Vec<u8>,
+    bytes: Cow<'a, [u8]>,
 }
 
 /// A word and the line it stands on, counted from 1.
@@ -18,6 +19,8 @@ pub(super) struct Text<'a> {
 pub(super) struct Word<'t> {
     pub(super) text: &'t [u8],
     pub(super) line: usize,
+    /// Whether it is the first word of its line.
+    pub(super) first: bool,
 }
 
 impl<'a> Text<'a> {
@@ -27,7 +30,18 @@ impl<'a> Text<'a> {
             path: path.to_owned(),
             source,
         })?;
-        Ok(Self { path, bytes })
+        Ok(Self {
+            path,
+            bytes: bytes.into(),
+        })
+    }
+
+    /// A file that is in memory already.
+    pub(super) fn new(path: &'a Path, bytes: &'a [u8]) -> Self {
+        Self {
+            path,
+            bytes: bytes.into(),
+        }
     }
 
     /// The lines, with their numbers, from the given one on; line ends of all systems are understood.
@@ -40,6 +54,17 @@ impl<'a> Text<'a> {
         lines
             .skip(from - 1)
             .map(|(i, line)| (i, line.strip_suffix(b"\r").unwrap_or(line)))
+    }
+
+    /// The words from the given line on.
+    pub(super) fn words(&self, from: usize) -> impl Iterator<Item = Word<'_>> {
+        self.lines(from).flat_map(|(line, text)| {
+            words_of(text).enumerate().map(move |(i, text)| Word {
+                text,
+                line,
+                first: i == 0,
+            })
+        })
     }
 
     /// How many elements to make room for: as many as announced, but no more than the file can hold.
