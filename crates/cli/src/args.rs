@@ -117,9 +117,18 @@ pub(crate) enum MeshCommand {
     Info {
         /// The mesh.
         file: PathBuf,
-        /// Print one JSON object instead of a table.
+        /// Print one JSON object instead of tables.
         #[arg(long)]
         json: bool,
+        /// Young's modulus in Pa of the material whose substeps are told.
+        #[arg(long, value_name = "E", default_value_t = 1e5)]
+        young_modulus: f64,
+        /// Its mass density in kg/m³.
+        #[arg(long, value_name = "RHO", default_value_t = 1000.0)]
+        density: f64,
+        /// Time of a frame in s.
+        #[arg(long, value_name = "DT", default_value_t = 0.016)]
+        time_step: f64,
     },
     /// Read a mesh in one format and write it in another; formats go by file ending.
     #[command(after_help = "Example: incise mesh convert liver.node liver.vtu")]
@@ -128,6 +137,10 @@ pub(crate) enum MeshCommand {
         input: PathBuf,
         /// The file to write.
         output: PathBuf,
+        /// Merge particles at one place, remove degenerate and double tets, turn inverted ones, keep the largest piece
+        /// and the particles it uses; says what was done.
+        #[arg(long)]
+        repair: bool,
     },
     /// Generate a shape of longest side 1.
     #[command(after_help = "Example: incise mesh generate torus --tets 5000 torus.vtk")]

@@ -6,7 +6,7 @@ use anyhow::Context;
 use comfy_table::Table;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use incise::mesh::generate::{Shape, generate};
-use incise::mesh::{TetMesh, io};
+use incise::mesh::{RepairOptions, TetMesh, io, repair};
 use serde::Serialize;
 
 use crate::args::MeshCommand;
@@ -28,12 +28,75 @@ struct MeshReport {
     max_dihedral_degrees: f64,
     worst_radius_ratio: f64,
     max_tets_per_particle: usize,
+    /// Handles of all boundary surfaces; absent if they are no manifolds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    genus: Option<usize>,
+    /// That bring the kappa of every tet to 0.5.
+    substeps: f64,
+    /// Angles in classes of 10 degrees from 0 to 180.
+    dihedral_histogram: [usize; 18],
+    /// Tets in classes of a tenth from 0 to 1.
+    radius_ratio_histogram: [usize; 10],
+}
+
+/// The material and the frame whose substeps are told.
+struct Stiffness {
+    young_modulus: f64,
+    density: f64,
+    time_step: f64,
+}
+
+impl Stiffness {
+    /// The substeps of a frame that keep `E Δt² / (ρ h²)` at 0.5 or below for an altitude h in m.
+    fn substeps(&self, altitude: f64) -> f64 {
+        let speed = (self.young_modulus / (0.5 * self.density)).sqrt();
+        (self.time_step * speed / altitude).ceil().max(1.0)
+    }
+
+    fn check(&self) -> Result<(), Failure> {
+        for (name, value) in [
+            ("--young-modulus", self.young_modulus),
+            ("--density", self.density),
+            ("--time-step", self.time_step),
+        ] {
+            if !(value.is_finite() && value > 0.0) {
+                let message = format!("{name} is {value}: it must be positive and finite");
+                return Err(Failure::Input(anyhow::Error::msg(message)));
+            }
+        }
+        Ok(())
+    }
 }
 
 pub(crate) fn mesh(command: &MeshCommand) -> Result<(), Failure> {
     match command {
-        MeshCommand::Info { file, json } => info(file, *json),
-        MeshCommand::Convert { input, output } => Ok(io::write(output, &io::read(input)?)?),
+        MeshCommand::Info {
+            file,
+            json,
+            young_modulus,
+            density,
+            time_step,
+        } => {
+            let stiffness = Stiffness {
+                young_modulus: *young_modulus,
+                density: *density,
+                time_step: *time_step,
+            };
+            stiffness.check()?;
+            info(file, *json, &stiffness)
+        }
+        MeshCommand::Convert {
+            input,
+            output,
+            repair: false,
+        } => Ok(io::write_file(output, &io::read_file(input)?)?),
+        MeshCommand::Convert { input, output, .. } => {
+            let file = io::read_file(input)?;
+            let repaired = repair(&file.mesh, &RepairOptions::ALL);
+            let report = repaired.report;
+            io::write_file(output, &file.repaired(repaired))?;
+            print(report)
+        }
         MeshCommand::Generate {
             shape,
             tets,
@@ -45,23 +108,54 @@ pub(crate) fn mesh(command: &MeshCommand) -> Result<(), Failure> {
     }
 }
 
-fn info(file: &Path, json: bool) -> Result<(), Failure> {
+fn info(file: &Path, json: bool, stiffness: &Stiffness) -> Result<(), Failure> {
     let mesh = io::read(file)?;
     mesh.check()
         .with_context(|| file.display().to_string())
         .map_err(Failure::Input)?;
-    let report = report(file, &mesh);
+    let report = report(file, &mesh, stiffness);
     if json {
         let json = serde_json::to_string(&report).map_err(|error| Failure::Run(error.into()))?;
         print(json)?;
     } else {
         print(table(&report))?;
+        let angles = report.dihedral_histogram.iter().enumerate();
+        print(bars(
+            "dihedral angles",
+            angles.map(|(i, &n)| (format!("{}° to {}°", 10 * i, 10 * (i + 1)), n)),
+        ))?;
+        let ratios = report.radius_ratio_histogram.iter().enumerate();
+        print(bars(
+            "radius ratios",
+            ratios.map(|(i, &n)| (format!("0.{i} to {}.{}", (i + 1) / 10, (i + 1) % 10), n)),
+        ))?;
     }
     Ok(())
 }
 
-fn report(file: &Path, mesh: &TetMesh) -> MeshReport {
+/// Characters of the longest bar.
+const BAR: usize = 40;
+
+/// A histogram as bars, without the empty classes outside of all others.
+fn bars(title: &str, classes: impl Iterator<Item = (String, usize)>) -> Table {
+    let classes: Vec<_> = classes.collect();
+    let first = classes.iter().position(|(_, n)| *n > 0).unwrap_or(0);
+    let last = classes.iter().rposition(|(_, n)| *n > 0).unwrap_or(0);
+    let most = classes.iter().map(|(_, n)| *n).max().unwrap_or(0).max(1);
+    let mut table = Table::new();
+    table.load_style(UTF8_FULL_CONDENSED);
+    table.set_header([title, "number", ""]);
+    for (name, number) in &classes[first..=last] {
+        // Few are seen, too.
+        let length = (number * BAR).div_ceil(most);
+        table.add_row([name.clone(), number.to_string(), "█".repeat(length)]);
+    }
+    table
+}
+
+fn report(file: &Path, mesh: &TetMesh, stiffness: &Stiffness) -> MeshReport {
     let (quality, surface) = (mesh.quality(), mesh.surface());
+    let histograms = mesh.histograms();
     MeshReport {
         input: file.display().to_string(),
         tets: mesh.tets.len(),
@@ -75,6 +169,10 @@ fn report(file: &Path, mesh: &TetMesh) -> MeshReport {
         max_dihedral_degrees: quality.max_dihedral,
         worst_radius_ratio: quality.worst_radius_ratio,
         max_tets_per_particle: quality.max_tets_at_particle,
+        genus: surface.genus(),
+        substeps: stiffness.substeps(quality.min_altitude),
+        dihedral_histogram: histograms.dihedral,
+        radius_ratio_histogram: histograms.radius_ratio,
     }
 }
 
@@ -97,6 +195,9 @@ fn table(report: &MeshReport) -> Table {
             report.boundary_triangles, report.euler_characteristic
         ),
     );
+    if let Some(genus) = report.genus {
+        row("genus", genus.to_string());
+    }
     row("volume in m³", format!("{:.6}", report.volume));
     row(
         "smallest altitude in m",
@@ -117,5 +218,6 @@ fn table(report: &MeshReport) -> Table {
         "most tets at a particle",
         report.max_tets_per_particle.to_string(),
     );
+    row("substeps for the material", report.substeps.to_string());
     table
 }

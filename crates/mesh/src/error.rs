@@ -39,6 +39,17 @@ pub enum MeshError {
         message: String,
     },
 
+    /// The same for a file that has no lines.
+    #[error("{} at byte {byte}: {message}", path.display())]
+    ParseBytes {
+        /// The file.
+        path: PathBuf,
+        /// The byte, counted from 0.
+        byte: usize,
+        /// What was found and what was expected.
+        message: String,
+    },
+
     /// A file whose ending names no format that can be read or written.
     #[error("cannot tell the format of {}: use one of the endings {known}", path.display())]
     UnknownFormat {

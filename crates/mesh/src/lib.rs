@@ -36,21 +36,25 @@ mod check;
 mod error;
 mod faces;
 pub mod generate;
+mod histogram;
 mod ids;
 pub mod io;
 mod orientation;
 mod pieces;
 mod quality;
+mod repair;
 mod surface;
 mod tet_mesh;
 
 pub use check::{CheckReport, Fault};
 pub use error::MeshError;
 pub use glam;
+pub use histogram::QualityHistograms;
 pub use ids::{ParticleId, TetId};
 pub use orientation::orientation;
 pub use pieces::Pieces;
-pub use quality::{QualitySummary, TetQuality, tet_quality};
+pub use quality::{QualitySummary, TetQuality, dihedral_angles, tet_quality};
+pub use repair::{RepairOptions, RepairReport, Repaired, repair};
 pub use surface::Surface;
 pub use tet_mesh::{TetMesh, signed_volume};
 

@@ -113,18 +113,20 @@ impl Pieces {
     }
 }
 
-struct Sets {
+/// Disjoint sets of numbers.
+#[derive(Debug)]
+pub(crate) struct Sets {
     parents: Vec<u32>,
 }
 
 impl Sets {
-    fn new(count: usize) -> Self {
+    pub(crate) fn new(count: usize) -> Self {
         Self {
             parents: (0..count).map(|i| TetId::new(i).0).collect(),
         }
     }
 
-    fn root(&mut self, mut element: u32) -> u32 {
+    pub(crate) fn root(&mut self, mut element: u32) -> u32 {
         while self.parents[element as usize] != element {
             let parent = self.parents[element as usize];
             self.parents[element as usize] = self.parents[parent as usize];
@@ -133,7 +135,7 @@ impl Sets {
         element
     }
 
-    fn unite(&mut self, a: u32, b: u32) {
+    pub(crate) fn unite(&mut self, a: u32, b: u32) {
         let (a, b) = (self.root(a), self.root(b));
         self.parents[a.max(b) as usize] = a.min(b);
     }

@@ -55,18 +55,13 @@ pub struct QualitySummary {
 pub fn tet_quality(corners: [DVec3; 4]) -> TetQuality {
     let [a, b, c, d] = corners;
     let volume = signed_volume(corners);
-    let normals = outward_normals(corners);
-    let areas = normals.map(|n| n.length() / 2.0);
+    let areas = outward_normals(corners).map(|n| n.length() / 2.0);
     let largest_area = areas.into_iter().fold(0.0, f64::max);
 
     let (mut min_angle, mut max_angle) = (f64::INFINITY, 0.0);
-    for i in 0..4 {
-        for j in 0..i {
-            let (n, m) = (normals[i], normals[j]);
-            let angle = n.cross(m).length().atan2(-n.dot(m)).to_degrees();
-            min_angle = angle.min(min_angle);
-            max_angle = angle.max(max_angle);
-        }
+    for angle in dihedral_angles(corners) {
+        min_angle = angle.min(min_angle);
+        max_angle = angle.max(max_angle);
     }
 
     let inradius = 3.0 * volume / areas.iter().sum::<f64>();
@@ -85,6 +80,17 @@ pub fn tet_quality(corners: [DVec3; 4]) -> TetQuality {
             3.0 * inradius / circumcenter.length()
         },
     }
+}
+
+/// The six dihedral angles of a tet in degrees, 0 to 180; of an inverted one those of its mirror image.
+#[must_use]
+pub fn dihedral_angles(corners: [DVec3; 4]) -> [f64; 6] {
+    let normals = outward_normals(corners);
+    let pairs = [(1, 0), (2, 0), (2, 1), (3, 0), (3, 1), (3, 2)];
+    pairs.map(|(i, j)| {
+        let (n, m) = (normals[i], normals[j]);
+        n.cross(m).length().atan2(-n.dot(m)).to_degrees()
+    })
 }
 
 /// The outward normals of the faces opposite each corner, as long as twice the area.

@@ -5,6 +5,7 @@
 use glam::DVec3;
 
 use crate::faces::{by_face, outward_face, sorted_sides};
+use crate::pieces::Sets;
 use crate::{ParticleId, TetId, TetMesh};
 
 /// Triangles, counterclockwise when seen from outside, and the tet behind each.
@@ -116,6 +117,36 @@ impl Surface {
                 }
             }
         })
+    }
+
+    /// The number of handles of all its parts together: 0 for balls, also with voids, 1 for a torus. `None` unless
+    /// it is a manifold. O(n log n).
+    ///
+    /// # Example
+    /// ```
+    /// use incise_mesh::{generate::kuhn_box, glam::DVec3};
+    ///
+    /// let mut ring = kuhn_box([3, 3, 1], DVec3::ONE);
+    /// ring.tets.drain(24..30); // the cell in the middle
+    /// assert_eq!(ring.surface().genus(), Some(1));
+    /// ```
+    #[must_use]
+    pub fn genus(&self) -> Option<usize> {
+        if !self.is_manifold() {
+            return None;
+        }
+        let particles = self.triangles.iter().flatten().map(|p| p.index() + 1);
+        let mut sets = Sets::new(particles.max().unwrap_or(0));
+        for [a, b, c] in &self.triangles {
+            sets.unite(a.0, b.0);
+            sets.unite(a.0, c.0);
+        }
+        let mut roots: Vec<u32> = self.triangles.iter().map(|t| sets.root(t[0].0)).collect();
+        roots.sort_unstable();
+        roots.dedup();
+        // Each part has a characteristic of 2 less 2 for each handle.
+        let handles = 2 * isize::try_from(roots.len()).ok()? - self.euler_characteristic();
+        usize::try_from(handles / 2).ok()
     }
 
     /// Vertices - edges + triangles: 2 for each sphere-like part, 0 for each torus-like one.

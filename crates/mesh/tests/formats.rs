@@ -145,7 +145,7 @@ fn vtk_errors_name_the_line() {
     let cells = "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n";
     let good = format!("{HEADER}{POINTS}{cells}");
     for (from, to, expected) in [
-        ("ASCII", "BINARY", ":3: binary legacy VTK is not read yet"),
+        ("ASCII", "EBCDIC", ":3: ASCII or BINARY expected"),
         (
             "UNSTRUCTURED_GRID",
             "POLYDATA",
@@ -180,8 +180,13 @@ fn vtk_errors_name_the_line() {
         ("4 0 1 2 3", "3 0 1 2", ":10: the tet 0 has 3 points"),
         (
             "\n10\n",
-            "\n12\n",
+            "\n5\n",
             ":10: none of the 1 cells is a tetrahedron",
+        ),
+        (
+            "\n10\n",
+            "\n12\n",
+            ":10: the cell 0 is a hexahedron (cell type 12), only tets",
         ),
         (
             "CELLS 1 5",
@@ -258,7 +263,10 @@ fn tetgen_of_other_writers() {
 #[test]
 fn unknown_endings_name_the_known_ones() {
     let error = io::read("mesh.step").unwrap_err().to_string();
-    assert!(error.contains("mesh.step") && error.contains(".vtk, .node, .ele"));
+    assert!(
+        error.contains("mesh.step")
+            && error.contains(".vtk, .vtu, .msh, .node, .ele, .mesh, .meshb")
+    );
     assert!(
         io::write("mesh", &TetMesh::default())
             .unwrap_err()

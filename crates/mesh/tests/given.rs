@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use incise_mesh::io;
 
-fn folder() -> Option<PathBuf> {
+pub(crate) fn folder() -> Option<PathBuf> {
     let shared = std::env::var_os("INCISE_SHARED").map(PathBuf::from);
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
     let folder = shared.unwrap_or(beside).join("meshes");
@@ -80,18 +80,37 @@ fn the_same_mesh_from_different_programs() {
                 "{name}.{kind}"
             );
         }
+        // These keep the order of points and tets and every digit of the original.
         for kind in [
+            "gmsh.ascii.vtk",
             "gmsh.bin.vtk",
             "meshio.vtk42.bin.vtk",
+            "meshio.vtk51.ascii.vtk",
             "meshio.vtk51.bin.vtk",
+            "meshio.vtu",
         ] {
-            let error =
-                io::read(folder.join("formats").join(format!("{name}.{kind}"))).unwrap_err();
-            assert!(
-                error
-                    .to_string()
-                    .contains("binary legacy VTK is not read yet")
-            );
+            let path = folder.join("formats").join(format!("{name}.{kind}"));
+            let file = match kind.ends_with("vtu") {
+                true => io::read_vtu(path).unwrap(),
+                false => io::read_vtk_file(path).unwrap(),
+            };
+            assert_eq!(file.mesh.tets, original.tets, "{name}.{kind}");
+            assert_eq!(file.mesh.positions, original.positions, "{name}.{kind}");
         }
+        // TetGen's own order, as in its own files; these are oriented when read.
+        let formats = folder.join("formats");
+        let file = io::read_vtk_file(formats.join(format!("{name}.tetgen1.vtk"))).unwrap();
+        let mut oriented = file.mesh;
+        oriented.orient_positively();
+        let same = io::read(formats.join(format!("{name}.tetgen1.ele"))).unwrap();
+        assert_eq!(oriented.tets, same.tets, "{name}");
+        for (a, b) in oriented.positions.iter().zip(&same.positions) {
+            // Both are texts of 17 digits, which is exact.
+            assert_eq!(a, b, "{name}");
+        }
+        // Asked to count from 0, TetGen 1.5 counts the points in its VTK file from 1, which VTK does not know.
+        let error = io::read_vtk_file(formats.join(format!("{name}.tetgen0.vtk"))).unwrap_err();
+        let expected = format!("but there are {}, counted from 0", same.positions.len());
+        assert!(error.to_string().contains(&expected), "{error}");
     }
 }

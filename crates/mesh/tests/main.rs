@@ -3,4 +3,6 @@
 mod faults;
 mod formats;
 mod given;
+mod medit;
+mod msh;
 mod shapes;

@@ -209,10 +209,10 @@ fn meshes_with_a_mistake() {
             &["huge.vtk:"],
         ),
         ("empty.vtk", String::new(), &["empty.vtk:"]),
-        ("binary.vtk", binary, &["binary.vtk:3", "binary"]),
+        ("binary.vtk", binary, &["binary.vtk at byte", "ends early"]),
         ("words.vtk", "no mesh at all".into(), &["words.vtk:"]),
-        ("mesh.xyz", TET.into(), &["mesh.xyz", ".vtk, .node, .ele"]),
-        ("mesh", TET.into(), &["mesh", ".vtk, .node, .ele"]),
+        ("mesh.xyz", TET.into(), &["mesh.xyz", ".vtk, .vtu, .msh"]),
+        ("mesh", TET.into(), &["mesh", ".vtk, .vtu, .msh"]),
         (
             "alone.node",
             "4 3 0 0\n0 0 0 0\n1 1 0 0\n2 0 1 0\n3 0 0 1\n".into(),

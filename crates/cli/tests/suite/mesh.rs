@@ -5,7 +5,8 @@ use serde_json::Value;
 use crate::support::{Place, keys, names};
 
 const KEYS: &str = "input, tets, particles, pieces, boundary_triangles, euler_characteristic, volume, min_altitude, \
-                    min_dihedral_degrees, max_dihedral_degrees, worst_radius_ratio, max_tets_per_particle";
+                    min_dihedral_degrees, max_dihedral_degrees, worst_radius_ratio, max_tets_per_particle, genus, substeps, \
+                    dihedral_histogram, radius_ratio_histogram";
 
 fn info(place: &Place, file: &str) -> Value {
     serde_json::from_str(&place.good(&["mesh", "info", file, "--json"])).unwrap()
@@ -82,4 +83,111 @@ fn a_mesh_may_be_converted_in_place() {
     place.good(&["mesh", "convert", "box.vtk", "box.vtk"]);
     assert!(place.read("box.vtk") == before);
     assert_eq!(place.names("."), ["box.vtk"]);
+}
+
+#[test]
+fn what_a_mesh_is_like_is_shown_in_bars() {
+    let place = Place::with_mesh();
+    let out = place.good(&["mesh", "info", "box.vtk"]);
+    for part in ["genus", "substeps", "dihedral angles", "radius ratios", "█"] {
+        assert!(out.contains(part), "{part}: {out}");
+    }
+    let soft = info(&place, "box.vtk");
+    let stiff = [
+        "mesh",
+        "info",
+        "box.vtk",
+        "--json",
+        "--young-modulus",
+        "1e7",
+    ];
+    let stiff: Value = serde_json::from_str(&place.good(&stiff)).unwrap();
+    // Ten times the speed of sound.
+    let [soft, stiff] = [&soft, &stiff].map(|report| report["substeps"].as_f64().unwrap());
+    assert!(
+        (stiff / soft - 10.0).abs() < 1.0 + 10.0 / soft,
+        "{soft} {stiff}"
+    );
+    let refused = place.incise(&["mesh", "info", "box.vtk", "--density", "0"]);
+    assert_eq!(refused.code, 2);
+    assert!(
+        refused.stderr.contains("--density is 0"),
+        "{}",
+        refused.stderr
+    );
+}
+
+#[test]
+fn repairs_are_told_one_by_one() {
+    let place = Place::new();
+    place.good(&["mesh", "generate", "box", "--tets", "300", "box.node"]);
+    assert_eq!(
+        place.good(&["mesh", "convert", "box.node", "same.node", "--repair"]),
+        "nothing\n"
+    );
+    assert!(place.read("box.ele") == place.read("same.ele"));
+    // A tet twice; the reader turns what is inside out by itself.
+    let tets = place.read("box.ele");
+    let mut lines: Vec<String> = tets.lines().map(str::to_owned).collect();
+    let first = lines
+        .iter()
+        .position(|line| line.split_whitespace().count() == 5)
+        .unwrap();
+    let words: Vec<String> = lines[first].split_whitespace().map(str::to_owned).collect();
+    let count: usize = lines[..first]
+        .iter()
+        .rev()
+        .find_map(|line| line.split_whitespace().next()?.parse().ok())
+        .unwrap();
+    lines[first - 1] = lines[first - 1].replacen(&count.to_string(), &(count + 1).to_string(), 1);
+    lines.push(format!(
+        "{} {} {} {} {}",
+        count, words[2], words[1], words[3], words[4]
+    ));
+    place.write("broken.ele", lines.join("\n") + "\n");
+    place.write("broken.node", place.read("box.node"));
+    let out = place.good(&["mesh", "convert", "broken.node", "mended.vtk", "--repair"]);
+    assert!(
+        out.contains("1 tets removed that were there twice"),
+        "{out}"
+    );
+    place.good(&["mesh", "info", "mended.vtk"]);
+}
+
+/// Through all formats and back: the same tets, to the bit, with what belongs to them.
+#[test]
+fn regions_survive_a_round_through_the_formats() {
+    let place = Place::new();
+    place.good(&["mesh", "generate", "box", "--tets", "300", "a.vtk"]);
+    for pair in [
+        "a.vtk", "a.msh", "a.mesh", "a.meshb", "a.vtu", "a.node", "b.vtk",
+    ]
+    .windows(2)
+    {
+        place.good(&["mesh", "convert", pair[0], pair[1]]);
+    }
+    assert!(place.read("a.vtk") == place.read("b.vtk"));
+    let tetgen = place.read("a.ele");
+    let mut lines = tetgen.lines();
+    let first = lines.next().unwrap().replace(" 0", " 1");
+    let rows = lines
+        .filter(|line| line.split_whitespace().count() == 5)
+        .enumerate();
+    let rows: Vec<String> = rows
+        .map(|(i, line)| format!("{line} {}", 1 + i % 3))
+        .collect();
+    place.write("r.ele", format!("{first}\n{}\n", rows.join("\n")));
+    place.write("r.node", place.read("a.node"));
+    let formats = [
+        "r.node", "r.msh", "r.mesh", "r.meshb", "r.vtu", "r.vtk", "s.node",
+    ];
+    for pair in formats.windows(2) {
+        place.good(&["mesh", "convert", pair[0], pair[1]]);
+    }
+    assert!(
+        place
+            .read("r.ele")
+            .split_whitespace()
+            .eq(place.read("s.ele").split_whitespace())
+    );
 }

@@ -1,12 +1,15 @@
 //! Reading and writing meshes, the format chosen by the ending of the file name.
 //!
-//! | ending | format | read | write |
-//! |---|---|---|---|
-//! | `.vtk` | legacy VTK, ASCII, unstructured grid | yes | yes |
-//! | `.node`, `.ele` | TetGen, a pair of files | yes | yes |
-//! | `.vtu` | VTK XML unstructured grid with fields | | [`write()`], [`write_vtu`] |
-//! | `.vtp` | VTK XML surface with fields | | [`write_vtp`] |
-//! | `.pvd` | ParaView collection of time steps | | [`write_pvd`] |
+//! | ending | format | read | written | kept beside the tets |
+//! |---|---|---|---|---|
+//! | `.vtk` | legacy VTK 2.0 to 5.1, text and binary | yes | 4.2 text, 5.1 binary ([`write_vtk_binary`]) | regions, scalars, vectors |
+//! | `.vtu` | VTK XML unstructured grid: text, base64, appended, zlib | yes | text | regions, scalars, vectors |
+//! | `.msh` | Gmsh 1, 2 and 4.1, text and binary | yes | 4.1 and 2.2 ([`write_msh`]) | regions (physical groups), scalars, vectors |
+//! | `.node`, `.ele` | TetGen, a pair of files | yes | yes | regions, attributes, markers |
+//! | `.mesh`, `.meshb` | Medit, text and binary | yes | yes | regions (references) |
+//! | `.obj`, `.stl`, `.ply`, `.off` | triangle surfaces | [`read_surface`] | [`write_surface`] | |
+//! | `.vtp` | VTK XML surface with fields | | [`write_vtp`] | scalars, vectors |
+//! | `.pvd` | ParaView collection of time steps | | [`write_pvd`] | |
 //!
 //! Coordinates are written so that reading gives the same bits back. Readers trust no number in a file: they reserve no
 //! more memory than the file could fill, never panic, and name file and line of what is wrong. Every file is written
@@ -14,7 +17,13 @@
 
 mod atomic;
 mod fields;
+mod file;
+mod medit;
+mod msh;
 mod pvd;
+mod surfaces;
+#[cfg(test)]
+mod test_files;
 mod tetgen;
 mod text;
 mod vtk;
@@ -26,29 +35,56 @@ use std::path::Path;
 
 pub use atomic::write_atomically;
 pub use fields::{Field, Fields, Values};
+pub use file::{MeshFile, NamedValues, OwnedValues};
+pub use medit::{read_medit, write_medit};
+pub use msh::{MshKind, read_msh, write_msh};
 pub use pvd::write_pvd;
-pub use tetgen::{read_tetgen, write_tetgen};
-pub use vtk::{read_vtk, write_vtk};
+pub use surfaces::{
+    PlyEncoding, TriangleSurface, read_surface, write_ply, write_stl_binary, write_surface,
+};
+pub use tetgen::{read_tetgen, read_tetgen_file, write_tetgen, write_tetgen_file};
+pub use vtk::{read_vtk, read_vtk_file, write_vtk, write_vtk_binary, write_vtk_file};
 pub use vtp::write_vtp;
-pub use vtu::write_vtu;
+pub use vtu::{read_vtu, write_vtu, write_vtu_file};
 
 use crate::{MeshError, TetMesh};
 
-/// Reads a mesh from a `.vtk` file or a `.node`/`.ele` pair (either name will do).
+/// The endings of mesh files that are read and written.
+const KNOWN: &str = ".vtk, .vtu, .msh, .node, .ele, .mesh, .meshb";
+
+/// Reads a mesh with what its file says beside it, in the format that the ending names; of a `.node`/`.ele` pair either
+/// name will do.
 ///
-/// Particles that no tet uses are kept. The mesh has tets, existing corners and finite coordinates; whether it is sound
-/// in all other respects is for [`TetMesh::check`] to say.
+/// Particles that no tet uses are kept; cells that are no volumes are left out. The mesh has tets, existing corners and
+/// finite coordinates; whether it is sound in all other respects is for [`TetMesh::check`] to say.
 ///
 /// # Errors
-/// [`MeshError::UnknownFormat`] for another ending, [`MeshError::Io`] if the file cannot be read, [`MeshError::Parse`]
-/// if its content is wrong, [`MeshError::Empty`] if it has no cells.
+/// [`MeshError::UnknownFormat`] for another ending, [`MeshError::Io`] if the file cannot be read, [`MeshError::Parse`] or
+/// [`MeshError::ParseBytes`] if its content is wrong or has volumes other than tets, [`MeshError::Empty`] if it has no
+/// cells.
+pub fn read_file(path: impl AsRef<Path>) -> Result<MeshFile, MeshError> {
+    let path = path.as_ref();
+    match ending(path).as_str() {
+        "vtk" => read_vtk_file(path),
+        "vtu" => read_vtu(path),
+        "msh" => read_msh(path),
+        "node" | "ele" => read_tetgen_file(path),
+        "mesh" | "meshb" => read_medit(path),
+        _ => Err(unknown(path)),
+    }
+}
+
+/// The mesh alone of what [`read_file`] reads.
+///
+/// # Errors
+/// As [`read_file`].
 ///
 /// # Example
 /// ```
 /// use incise_mesh::{generate::kuhn_box, glam::DVec3, io};
 ///
 /// let folder = std::env::temp_dir();
-/// let path = folder.join(format!("incise-doc-{}.vtk", std::process::id()));
+/// let path = folder.join(format!("incise-doc-{}.msh", std::process::id()));
 /// let mesh = kuhn_box([2, 2, 2], DVec3::splat(0.1));
 /// io::write(&path, &mesh)?;
 /// assert_eq!(io::read(&path)?, mesh);
@@ -58,29 +94,50 @@ use crate::{MeshError, TetMesh};
 pub fn read(path: impl AsRef<Path>) -> Result<TetMesh, MeshError> {
     let path = path.as_ref();
     match ending(path).as_str() {
+        // Without looking at what else is in there.
         "vtk" => read_vtk(path),
         "node" | "ele" => read_tetgen(path),
-        _ => Err(MeshError::UnknownFormat {
-            path: path.to_owned(),
-            known: ".vtk, .node, .ele",
-        }),
+        _ => read_file(path).map(|file| file.mesh),
     }
 }
 
-/// Writes a mesh as `.vtk`, `.vtu` or a `.node`/`.ele` pair (either name will do). An existing file is replaced.
+/// Writes a mesh with what is to be kept beside it, as far as the format has a place for it; of a `.node`/`.ele` pair
+/// either name will do. An existing file is replaced.
 ///
 /// # Errors
-/// [`MeshError::UnknownFormat`] for another ending, [`MeshError::Io`] if the file cannot be written.
+/// [`MeshError::UnknownFormat`] for another ending, [`MeshError::FieldLength`] for values of the wrong number,
+/// [`MeshError::Io`] if the file cannot be written.
+pub fn write_file(path: impl AsRef<Path>, file: &MeshFile) -> Result<(), MeshError> {
+    let path = path.as_ref();
+    match ending(path).as_str() {
+        "vtk" if file.is_plain() => write_vtk(path, &file.mesh),
+        "vtk" => write_vtk_file(path, file),
+        "vtu" => write_vtu_file(path, file),
+        "msh" => write_msh(path, file, MshKind::default()),
+        "node" | "ele" => write_tetgen_file(path, file),
+        "mesh" | "meshb" => write_medit(path, file),
+        _ => Err(unknown(path)),
+    }
+}
+
+/// Writes a mesh with nothing beside it.
+///
+/// # Errors
+/// As [`write_file`].
 pub fn write(path: impl AsRef<Path>, mesh: &TetMesh) -> Result<(), MeshError> {
     let path = path.as_ref();
     match ending(path).as_str() {
         "vtk" => write_vtk(path, mesh),
         "node" | "ele" => write_tetgen(path, mesh),
         "vtu" => write_vtu(path, &mesh.positions, &mesh.tets, Fields::default()),
-        _ => Err(MeshError::UnknownFormat {
-            path: path.to_owned(),
-            known: ".vtk, .vtu, .node, .ele",
-        }),
+        _ => write_file(path, &MeshFile::from(mesh.clone())),
+    }
+}
+
+fn unknown(path: &Path) -> MeshError {
+    MeshError::UnknownFormat {
+        path: path.to_owned(),
+        known: KNOWN,
     }
 }
 

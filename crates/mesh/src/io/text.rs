@@ -2,6 +2,7 @@
 //!
 //! Works on bytes, so that a title in some old encoding is no obstacle. Linear.
 
+use std::borrow::Cow;
 use std::fs;
 use std::path::Path;
 
@@ -10,7 +11,7 @@ use crate::MeshError;
 /// A file in memory.
 pub(super) struct Text<'a> {
     path: &'a Path,
-    bytes: Vec<u8>,
+    bytes: Cow<'a, [u8]>,
 }
 
 /// A word and the line it stands on, counted from 1.
@@ -29,7 +30,18 @@ impl<'a> Text<'a> {
             path: path.to_owned(),
             source,
         })?;
-        Ok(Self { path, bytes })
+        Ok(Self {
+            path,
+            bytes: bytes.into(),
+        })
+    }
+
+    /// A file that is in memory already.
+    pub(super) fn new(path: &'a Path, bytes: &'a [u8]) -> Self {
+        Self {
+            path,
+            bytes: bytes.into(),
+        }
     }
 
     /// The lines, with their numbers, from the given one on; line ends of all systems are understood.

@@ -20,7 +20,7 @@ pub(super) fn open(out: &mut dyn Write, kind: &str) -> io::Result<()> {
     )
 }
 
-/// An array of integers; `kind` is `Int64` or `UInt8`.
+/// An array of integers; `kind` is `Int64`, `Int32` or `UInt8`.
 pub(super) fn integers<const N: usize>(
     out: &mut dyn Write,
     kind: &str,
@@ -48,6 +48,16 @@ pub(super) fn fields(
     pick: Option<&[usize]>,
 ) -> io::Result<()> {
     writeln!(out, "<{tag}>")?;
+    arrays(out, fields, pick)?;
+    writeln!(out, "</{tag}>")
+}
+
+/// The arrays of a section of fields.
+pub(super) fn arrays(
+    out: &mut dyn Write,
+    fields: &[Field<'_>],
+    pick: Option<&[usize]>,
+) -> io::Result<()> {
     for field in fields {
         match (field.values, pick) {
             (Values::Scalars(v), None) => scalars(out, field.name, v.iter().copied())?,
@@ -60,7 +70,7 @@ pub(super) fn fields(
             }
         }
     }
-    writeln!(out, "</{tag}>")
+    Ok(())
 }
 
 fn scalars(out: &mut dyn Write, name: &str, values: impl Iterator<Item = f64>) -> io::Result<()> {
@@ -102,7 +112,7 @@ fn array<const N: usize>(
     writeln!(out, "\n</DataArray>")
 }
 
-fn base64(out: &mut dyn Write, bytes: &[u8]) -> io::Result<()> {
+pub(super) fn base64(out: &mut dyn Write, bytes: &[u8]) -> io::Result<()> {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     for group in bytes.chunks(3) {
         let byte = |i: usize| u32::from(group.get(i).copied().unwrap_or(0));

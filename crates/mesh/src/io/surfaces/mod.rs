@@ -1,0 +1,113 @@
+//! Closed or open surfaces of triangles: `.obj`, `.stl`, `.ply`, `.off`.
+//!
+//! Readers of our own, because what a tetrahedralization needs is the same in all four: coordinates as doubles, corners
+//! within bounds, the line or byte of what is wrong, and memory bounded by the size of the file. Of the crates for these
+//! formats, `stl_io` keeps coordinates as `f32`, ASCII ones too; `tobj` names no line, splits a file into models that number
+//! their points anew, and has doubles as a feature of the whole build only; `ply-rs-bw` makes as many elements as a header
+//! announces when they have no properties, so that a file of 100 bytes fills the memory.
+//!
+//! Polygons become fans of triangles around their first corner, right for convex ones. Linear.
+
+mod obj;
+mod off;
+mod ply;
+mod stl;
+
+use std::fs;
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::write_atomically;
+use crate::{MeshError, ParticleId};
+
+pub use ply::{PlyEncoding, write_ply};
+pub use stl::write_stl_binary;
+
+/// Positions and triangles, as surface files have them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TriangleSurface {
+    /// Position of each particle, in meters, used by a triangle or not.
+    pub positions: Vec<DVec3>,
+    /// The corners of each triangle, counterclockwise when seen from outside.
+    pub triangles: Vec<[ParticleId; 3]>,
+}
+
+const KNOWN: &str = ".obj, .stl, .ply, .off";
+
+/// Reads a surface, the format chosen by the ending of the file name. Every form of a format is understood.
+///
+/// Points that no triangle uses are kept. STL has no points: equal corners, to the bit, become one.
+///
+/// # Errors
+/// [`MeshError::UnknownFormat`] for another ending, [`MeshError::Io`] if the file cannot be read, [`MeshError::Parse`]
+/// or [`MeshError::ParseBytes`] if its content is wrong or has no triangle.
+///
+/// # Example
+/// ```
+/// use incise_mesh::{generate::kuhn_box, glam::DVec3, io};
+///
+/// let path = std::env::temp_dir().join(format!("incise-doc-{}.off", std::process::id()));
+/// let mesh = kuhn_box([1, 1, 1], DVec3::splat(0.1));
+/// let surface = io::TriangleSurface {
+///     triangles: mesh.surface().triangles,
+///     positions: mesh.positions,
+/// };
+/// io::write_surface(&path, &surface)?;
+/// assert_eq!(io::read_surface(&path)?, surface);
+/// # std::fs::remove_file(path).ok();
+/// # Ok::<(), incise_mesh::MeshError>(())
+/// ```
+pub fn read_surface(path: impl AsRef<Path>) -> Result<TriangleSurface, MeshError> {
+    let path = path.as_ref();
+    let parse = match super::ending(path).as_str() {
+        "obj" => obj::parse_obj,
+        "stl" => stl::parse_stl,
+        "ply" => ply::parse_ply,
+        "off" => off::parse_off,
+        _ => return Err(unknown(path)),
+    };
+    let bytes = fs::read(path).map_err(|source| MeshError::Io {
+        action: "read",
+        path: path.to_owned(),
+        source,
+    })?;
+    parse(&bytes, path)
+}
+
+/// Writes a surface, the format chosen by the ending of the file name: `.obj`, `.off` and `.stl` as text, `.ply` as
+/// little-endian binary. All keep every bit of the coordinates, and all but `.stl` points without triangles.
+///
+/// # Errors
+/// [`MeshError::UnknownFormat`] for another ending, [`MeshError::Io`] if the file cannot be written.
+///
+/// # Panics
+/// For `.stl`, if a corner has no position.
+pub fn write_surface(path: impl AsRef<Path>, surface: &TriangleSurface) -> Result<(), MeshError> {
+    let path = path.as_ref();
+    let write = match super::ending(path).as_str() {
+        "obj" => obj::write,
+        "stl" => stl::write,
+        "ply" => return write_ply(path, surface, PlyEncoding::LittleEndian),
+        "off" => off::write,
+        _ => return Err(unknown(path)),
+    };
+    write_atomically(path, |out| write(out, surface))
+}
+
+fn unknown(path: &Path) -> MeshError {
+    MeshError::UnknownFormat {
+        path: path.to_owned(),
+        known: KNOWN,
+    }
+}
+
+/// Adds the triangles of a polygon; points and lines have none.
+fn fan(polygon: &[ParticleId], triangles: &mut Vec<[ParticleId; 3]>) {
+    if let [first, rest @ ..] = polygon {
+        triangles.extend(rest.windows(2).map(|edge| [*first, edge[0], edge[1]]));
+    }
+}
+
+#[cfg(test)]
+mod tests;

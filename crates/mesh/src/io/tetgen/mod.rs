@@ -1,0 +1,215 @@
+//! TetGen's pair of files: `.node` with the points and `.ele` with the tets.
+//!
+//! One item per line after a line with counts; `#` starts a comment; points are numbered from 0 or 1, which the first
+//! one tells. The mid-edge points of 10-point tets are skipped. TetGen's own tets are mirror images of ours, other
+//! programs write either kind, so that negative tets are turned on reading.
+//!
+//! Attributes have no names: they are called `attribute 1` and so on, and the markers of points `boundary marker`. The
+//! last attribute of tets is where TetGen puts the region: it is the region if it is a whole number for all. Linear.
+//!
+//! Source: H. Si, "TetGen User's Manual", file formats.
+
+mod rows;
+mod write;
+
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::text::Text;
+use super::{MeshFile, NamedValues, OwnedValues};
+use crate::{MeshError, ParticleId, TetMesh};
+use rows::rows;
+
+pub use write::{write_tetgen, write_tetgen_file};
+
+/// The name of the values that hold the boundary markers of points.
+const MARKER: &str = "boundary marker";
+
+/// The same numbers as integers, if all are.
+fn whole(values: &[f64]) -> Option<Vec<i32>> {
+    let integer = |value: &f64| {
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "compared with the original"
+        )]
+        let number = *value as i32;
+        (f64::from(number).to_bits() == value.to_bits()).then_some(number)
+    };
+    values.iter().map(integer).collect()
+}
+
+/// Reads the `.node` and `.ele` files with the stem of `path`; see [`read`](super::read). Tets are oriented positively.
+///
+/// # Errors
+/// As for [`read`](super::read).
+pub fn read_tetgen(path: impl AsRef<Path>) -> Result<TetMesh, MeshError> {
+    read_tetgen_file(path).map(|file| file.mesh)
+}
+
+/// The same with attributes, boundary markers and regions.
+///
+/// # Errors
+/// As for [`read`](super::read).
+///
+/// # Example
+/// ```
+/// use incise_mesh::{generate::kuhn_box, glam::DVec3, io};
+///
+/// let path = std::env::temp_dir().join(format!("incise-doc-file-{}.node", std::process::id()));
+/// let mut file = io::MeshFile::from(kuhn_box([2, 2, 2], DVec3::splat(0.1)));
+/// file.regions = (0..).take(file.mesh.tets.len()).collect();
+/// io::write_tetgen_file(&path, &file)?;
+/// assert_eq!(io::read_tetgen_file(&path)?, file);
+/// # std::fs::remove_file(path.with_extension("ele")).ok();
+/// # std::fs::remove_file(path).ok();
+/// # Ok::<(), incise_mesh::MeshError>(())
+/// ```
+pub fn read_tetgen_file(path: impl AsRef<Path>) -> Result<MeshFile, MeshError> {
+    let path = path.as_ref();
+    let (node_path, ele_path) = (path.with_extension("node"), path.with_extension("ele"));
+    let nodes = Text::read(&node_path)?;
+    parse_tetgen(&nodes, || Text::read(&ele_path))
+}
+
+/// The same for files that are read already, or will be.
+fn parse_tetgen<'a>(
+    nodes: &Text<'_>,
+    elements: impl FnOnce() -> Result<Text<'a>, MeshError>,
+) -> Result<MeshFile, MeshError> {
+    let (positions, particles, base) = read_nodes(nodes)?;
+    let (tets, mut attributes) = read_tets(&elements()?, base, positions.len())?;
+    if tets.is_empty() {
+        return Err(MeshError::Empty);
+    }
+    let regions = attributes.last().and_then(|last| whole(last));
+    if regions.is_some() {
+        attributes.pop();
+    }
+    let mut mesh = TetMesh { positions, tets };
+    mesh.orient_positively();
+    Ok(MeshFile {
+        mesh,
+        regions: regions.unwrap_or_default(),
+        particles,
+        tets: named(attributes),
+    })
+}
+
+/// Columns of attributes with the names they get.
+fn named(columns: Vec<Vec<f64>>) -> Vec<NamedValues> {
+    let values = (1..).zip(columns).map(|(i, column)| NamedValues {
+        name: format!("attribute {i}"),
+        values: OwnedValues::Scalars(column),
+    });
+    values.collect()
+}
+
+type Nodes = (Vec<DVec3>, Vec<NamedValues>, usize);
+
+fn read_nodes(text: &Text<'_>) -> Result<Nodes, MeshError> {
+    let mut rows = rows(text);
+    let mut header = rows
+        .next()
+        .ok_or_else(|| text.ends_early("the number of points"))?;
+    let count = header.count("the number of points")?;
+    let dimension = header.count("the dimension")?;
+    if dimension != 3 {
+        return Err(text.error(
+            header.line,
+            format!("the points have {dimension} coordinates instead of 3"),
+        ));
+    }
+    let attributes = header.count_or_0("the number of attributes")?;
+    let marked = match header.count_or_0("whether there are markers")? {
+        0 => false,
+        1 => true,
+        other => {
+            let message = format!("0 or 1 boundary markers expected, not {other}");
+            return Err(text.error(header.line, message));
+        }
+    };
+    let mut positions = Vec::with_capacity(text.room_for(count, 8));
+    let mut columns = Vec::new();
+    let mut markers = Vec::new();
+    let mut base = 0;
+    for i in 0..count {
+        let mut row = rows.next().ok_or_else(|| {
+            text.ends_early(&format!("{count} points announced but {i} found, more"))
+        })?;
+        let number = row.count("the number of a point")?;
+        if i == 0 && number == 1 {
+            base = 1;
+        }
+        if number != base + i {
+            let message = format!(
+                "point {} expected but {number} found, number them without gaps from 0 or 1",
+                base + i
+            );
+            return Err(text.error(row.line, message));
+        }
+        positions.push(DVec3::new(
+            row.coordinate()?,
+            row.coordinate()?,
+            row.coordinate()?,
+        ));
+        row.attributes(attributes, i, &mut columns)?;
+        if marked {
+            markers.push(f64::from(row.marker()?));
+        }
+    }
+    let mut particles = named(columns);
+    if !markers.is_empty() {
+        particles.push(NamedValues {
+            name: MARKER.to_owned(),
+            values: OwnedValues::Scalars(markers),
+        });
+    }
+    Ok((positions, particles, base))
+}
+
+type Elements = (Vec<[ParticleId; 4]>, Vec<Vec<f64>>);
+
+fn read_tets(text: &Text<'_>, base: usize, particles: usize) -> Result<Elements, MeshError> {
+    let mut rows = rows(text);
+    let mut header = rows
+        .next()
+        .ok_or_else(|| text.ends_early("the number of tets"))?;
+    let count = header.count("the number of tets")?;
+    let corners = header.count("the number of points of a tet")?;
+    if corners != 4 && corners != 10 {
+        return Err(text.error(
+            header.line,
+            format!("the tets have {corners} points instead of 4 or 10"),
+        ));
+    }
+    let attributes = header.count_or_0("the number of attributes")?;
+    let mut tets = Vec::with_capacity(text.room_for(count, 10));
+    let mut columns = Vec::new();
+    for i in 0..count {
+        let mut row = rows.next().ok_or_else(|| {
+            text.ends_early(&format!("{count} tets announced but {i} found, more"))
+        })?;
+        row.count("the number of a tet")?;
+        let mut tet = [ParticleId(0); 4];
+        for corner in &mut tet {
+            let number = row.count("a point of a tet")?;
+            if number < base || number - base >= particles {
+                let message = format!(
+                    "point {number} does not exist, there are {particles} counted from {base}"
+                );
+                return Err(text.error(row.line, message));
+            }
+            *corner = ParticleId::new(number - base);
+        }
+        for _ in 4..corners {
+            row.word("a point between")?;
+        }
+        row.attributes(attributes, i, &mut columns)?;
+        tets.push(tet);
+    }
+    Ok((tets, columns))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,86 @@
+//! The lines with content of a TetGen file, and the numbers on them. Linear.
+
+use super::super::text::{Text, Word, show, words_of};
+use crate::MeshError;
+
+/// A line with content.
+pub(super) struct Row<'t, 'a, I> {
+    text: &'t Text<'a>,
+    words: I,
+    pub(super) line: usize,
+}
+
+impl<'t, I: Iterator<Item = &'t [u8]>> Row<'t, '_, I> {
+    pub(super) fn word(&mut self, what: &str) -> Result<Word<'t>, MeshError> {
+        let line = self.line;
+        let text = self.words.next().ok_or_else(|| {
+            self.text
+                .error(line, format!("the line ends before {what}"))
+        })?;
+        Ok(Word {
+            text,
+            line,
+            first: false,
+        })
+    }
+
+    pub(super) fn count(&mut self, what: &str) -> Result<usize, MeshError> {
+        let word = self.word(what)?;
+        self.text.count(word, what)
+    }
+
+    /// The same where older files have nothing.
+    pub(super) fn count_or_0(&mut self, what: &str) -> Result<usize, MeshError> {
+        let line = self.line;
+        self.words.next().map_or(Ok(0), |text| {
+            let first = false;
+            self.text.count(Word { text, line, first }, what)
+        })
+    }
+
+    /// Adds the attributes of element `i` to their columns, which element 0 makes.
+    pub(super) fn attributes(
+        &mut self,
+        count: usize,
+        i: usize,
+        columns: &mut Vec<Vec<f64>>,
+    ) -> Result<(), MeshError> {
+        for k in 0..count {
+            let value: f64 = self.parsed("an attribute")?;
+            if i == 0 {
+                columns.push(Vec::new());
+            }
+            columns[k].push(value);
+        }
+        Ok(())
+    }
+
+    pub(super) fn marker(&mut self) -> Result<i32, MeshError> {
+        self.parsed("a boundary marker")
+    }
+
+    fn parsed<N: std::str::FromStr>(&mut self, what: &str) -> Result<N, MeshError> {
+        let word = self.word(what)?;
+        let number = str::from_utf8(word.text).ok().and_then(|w| w.parse().ok());
+        number.ok_or_else(|| {
+            let message = format!("{:?} is not {what}: a number expected", show(word.text));
+            self.text.error(word.line, message)
+        })
+    }
+
+    pub(super) fn coordinate(&mut self) -> Result<f64, MeshError> {
+        let word = self.word("a coordinate")?;
+        self.text.coordinate(word)
+    }
+}
+
+pub(super) fn rows<'t, 'a>(
+    text: &'t Text<'a>,
+) -> impl Iterator<Item = Row<'t, 'a, impl Iterator<Item = &'t [u8]>>> {
+    text.lines(1).filter_map(move |(line, content)| {
+        let content = content.split(|&b| b == b'#').next().unwrap_or_default();
+        let mut words = words_of(content).peekable();
+        words.peek()?;
+        Some(Row { text, words, line })
+    })
+}

@@ -1,0 +1,167 @@
+//! The bytes of a data array of an XML file: raw or in base64, compressed or not.
+//!
+//! An array starts with a header of whole numbers: its length in bytes, or, if compressed, the number of blocks, their
+//! length, that of a last shorter block or 0, and the compressed length of each. Header and data may be one base64 text
+//! or each their own with its padding, so padding is accepted at any group of four and decoding goes on behind it; the
+//! crate `base64` refuses that. How long the array must be is known from elsewhere and checked before anything is
+//! decompressed; `miniz_oxide` stops at a limit. Memory is linear in the size of the file, but zlib can make a thousand
+//! bytes of one. Linear.
+//!
+//! Source: "VTK XML Formats" (Kitware); RFC 4648, section 4.
+
+use miniz_oxide::inflate::decompress_to_vec_zlib_with_limit;
+
+/// How numbers are stored in the whole file.
+#[derive(Clone, Copy)]
+pub(super) struct Storage {
+    pub(super) big_endian: bool,
+    /// The bytes of a number in a header: 4 or 8.
+    pub(super) header: usize,
+    pub(super) compressed: bool,
+}
+
+/// Bytes that are read one after the other.
+pub(super) enum Stream<'b> {
+    Raw(&'b [u8]),
+    /// The text that is left, and what has been decoded but not taken.
+    Base64(&'b [u8], Vec<u8>),
+}
+
+impl Stream<'_> {
+    /// The bytes of the file that have not been used.
+    pub(super) fn left(&self) -> usize {
+        match self {
+            Self::Raw(bytes) => bytes.len(),
+            Self::Base64(text, _) => text.len(),
+        }
+    }
+
+    fn take(&mut self, size: usize) -> Result<Vec<u8>, String> {
+        let missing =
+            |left: usize| format!("{size} bytes expected but {left} left, get the complete file");
+        match self {
+            Self::Raw(bytes) => {
+                let (taken, rest) = bytes
+                    .split_at_checked(size)
+                    .ok_or_else(|| missing(bytes.len()))?;
+                *bytes = rest;
+                Ok(taken.to_vec())
+            }
+            Self::Base64(text, decoded) => {
+                let most = decoded.len() + text.len() / 4 * 3 + 3;
+                if size > most {
+                    return Err(missing(most));
+                }
+                decoded.reserve(size.saturating_sub(decoded.len()) + 3);
+                while decoded.len() < size {
+                    let group = next_group(text).ok_or_else(|| missing(decoded.len()))?;
+                    let (bytes, count) = decode(group).ok_or_else(|| {
+                        format!("{:?} is no base64", String::from_utf8_lossy(&group))
+                    })?;
+                    decoded.extend(&bytes[..count]);
+                }
+                let rest = decoded.split_off(size);
+                Ok(std::mem::replace(decoded, rest))
+            }
+        }
+    }
+
+    fn number(&mut self, storage: Storage) -> Result<usize, String> {
+        let bytes = self.take(storage.header)?;
+        let fold = |n: u64, &byte: &u8| n << 8 | u64::from(byte);
+        let number = if storage.big_endian {
+            bytes.iter().fold(0, fold)
+        } else {
+            bytes.iter().rev().fold(0, fold)
+        };
+        usize::try_from(number).map_err(|_| format!("the length {number} is too large"))
+    }
+
+    /// The bytes of an array that is to have so many of them.
+    pub(super) fn array(&mut self, size: usize, storage: Storage) -> Result<Vec<u8>, String> {
+        // Writers disagree on the header of an empty array, and there is nothing to read.
+        if size == 0 {
+            return Ok(Vec::new());
+        }
+        let wrong = |found: usize| {
+            format!(
+                "the array has {found} bytes instead of {size}, correct the header or the counts"
+            )
+        };
+        if !storage.compressed {
+            let found = self.number(storage)?;
+            if found != size {
+                return Err(wrong(found));
+            }
+            return self.take(size);
+        }
+        let blocks = self.number(storage)?;
+        let [block, last] = [self.number(storage)?, self.number(storage)?];
+        let whole = blocks.saturating_sub(usize::from(last > 0));
+        let found = whole.saturating_mul(block).saturating_add(last);
+        if found != size || blocks == 0 || last > block {
+            return Err(wrong(found));
+        }
+        let mut lengths = Vec::new();
+        for _ in 0..blocks {
+            lengths.push(self.number(storage)?);
+        }
+        let mut data = Vec::new();
+        for (i, length) in lengths.into_iter().enumerate() {
+            let expected = if i < whole { block } else { last };
+            let compressed = self.take(length)?;
+            let plain = decompress_to_vec_zlib_with_limit(&compressed, expected)
+                .map_err(|error| format!("the block {i} is damaged: {error}"))?;
+            if plain.len() != expected {
+                return Err(format!(
+                    "the block {i} has {} bytes instead of {expected}",
+                    plain.len()
+                ));
+            }
+            data.extend(plain);
+        }
+        Ok(data)
+    }
+}
+
+/// The next four digits, without blanks and line ends.
+fn next_group(text: &mut &[u8]) -> Option<[u8; 4]> {
+    let mut group = [0; 4];
+    let mut found = 0;
+    while found < 4 {
+        let (&byte, rest) = text.split_first()?;
+        *text = rest;
+        if !byte.is_ascii_whitespace() {
+            group[found] = byte;
+            found += 1;
+        }
+    }
+    Some(group)
+}
+
+/// Four digits as up to three bytes.
+fn decode(group: [u8; 4]) -> Option<([u8; 3], usize)> {
+    let padding = group
+        .iter()
+        .rev()
+        .take_while(|&&digit| digit == b'=')
+        .count();
+    if padding > 2 {
+        return None;
+    }
+    let mut bits = 0_u32;
+    for &digit in &group[..4 - padding] {
+        let value = match digit {
+            b'A'..=b'Z' => digit - b'A',
+            b'a'..=b'z' => digit - b'a' + 26,
+            b'0'..=b'9' => digit - b'0' + 52,
+            b'+' => 62,
+            b'/' => 63,
+            _ => return None,
+        };
+        bits = bits << 6 | u32::from(value);
+    }
+    bits <<= 6 * padding;
+    let [_, a, b, c] = bits.to_be_bytes();
+    Some(([a, b, c], 3 - padding))
+}
