@@ -220,7 +220,7 @@ impl<R: Real> Solver<R> {
     }
 
     /// Takes over positions (the fourth number is ignored) and velocities that were computed elsewhere from this
-    /// solver's, relative to the same origin.
+    /// solver's, relative to the same origin. What was kept for residuals of an earlier step is gone.
     ///
     /// # Panics
     /// If there is not one of each for every particle.
@@ -237,6 +237,8 @@ impl<R: Real> Solver<R> {
             R::write(particle, [x[0], x[1], x[2], weight]);
             *velocity = R::vector(v[0], v[1], v[2]);
         }
+        self.predicted.clear();
+        self.kept.clear();
     }
 
     /// Takes over what [`Solver::residuals`] needs of a last substep that was made elsewhere: the positions before the

@@ -51,6 +51,7 @@ mod distance;
 mod error;
 mod gauss_seidel;
 mod jacobi;
+mod kappa_limit;
 mod lanes;
 mod layout;
 mod material;
@@ -75,12 +76,13 @@ pub use descent::{
 pub use device::{AttachmentData, Changes, DistanceData, TetData, VolumeData};
 pub use distance::DistanceConstraint;
 pub use error::XpbdError;
+pub use kappa_limit::KappaLimit;
 pub use material::Material;
 pub use measure::{Energy, Softened, Volume};
 pub use real::Real;
 pub use residuals::Residuals;
 pub use settings::{Form, Method, StepSettings};
-pub use solver::{KappaLimit, Solver};
+pub use solver::Solver;
 pub use step::StepReport;
 pub use volume::VolumeConstraint;
 

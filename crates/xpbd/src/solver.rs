@@ -17,7 +17,7 @@ use crate::origin::frame_of;
 use crate::real::{finite, load, store};
 use crate::scalar::Constraints;
 use crate::volume::TetVolume;
-use crate::{Changes, Material, Real, XpbdError};
+use crate::{Changes, KappaLimit, Material, Real, XpbdError};
 
 /// The state of a simulation in one precision.
 ///
@@ -59,7 +59,7 @@ pub struct Solver<R: Real> {
     pub(crate) volumes: Vec<f64>,
     pub(crate) material_of: Vec<u16>,
     pub(crate) materials: Vec<Material>,
-    kappa_limit: Option<KappaLimit>,
+    pub(crate) kappa_limit: Option<KappaLimit>,
     /// What edits have changed, if somebody follows.
     pub(crate) changes: Option<Changes>,
     /// The tets in solving order.
@@ -78,15 +78,6 @@ pub struct Solver<R: Real> {
     pub(crate) attachments: Attachments<R>,
     pub(crate) distances: Option<Constraints<R, Distance<R>>>,
     pub(crate) volume_constraints: Option<Constraints<R, TetVolume<R>>>,
-}
-
-/// See [`Solver::limit_kappa`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct KappaLimit {
-    /// The largest kappa of a tet.
-    pub kappa: f64,
-    /// The time of a substep in s.
-    pub substep_time: f64,
 }
 
 impl<R: Real> Solver<R> {
@@ -254,15 +245,6 @@ impl<R: Real> Solver<R> {
             }
         }
         tet
-    }
-
-    /// From now on, softens every new tet whose [`Solver::kappa`] at `substep_time` would exceed `kappa`, so that it
-    /// just meets it; `None` ends this.
-    ///
-    /// Cutting leaves tets so small that no affordable substep follows their vibrations; unsoftened, they do not
-    /// vibrate but collapse and throw their neighbors about. What was softened: [`Solver::softened`].
-    pub fn limit_kappa(&mut self, limit: Option<KappaLimit>) {
-        self.kappa_limit = limit;
     }
 
     pub(crate) fn check_particles(&self, particles: [u32; 4]) {

@@ -1,0 +1,106 @@
+//! The state of a [`Simulation`]: where it is, what it is worth, and how it gets to whoever asks.
+//!
+//! On the processor it is here after each frame. On a device it stays there: reported sums are taken there, and only what
+//! needs every particle fetches it. Cost: a pass over what is reported; a wait for the device where it is asked.
+
+use std::time::Instant;
+
+use super::Simulation;
+use crate::Error;
+use crate::measure::{by_body, energy, kappa, max_speed, residual, softened, states, volume};
+use crate::report::{Milliseconds, milliseconds};
+use crate::scene::Quantity;
+
+impl Simulation {
+    /// Computes the quantities that this frame reports.
+    pub(super) fn measure(&mut self, ms: &mut Milliseconds) -> Result<(), Error> {
+        let kappa_too = self.wants(Quantity::Kappa);
+        if kappa_too || self.chooses() || self.sleeps() {
+            self.report.bodies = by_body(&mut self.groups, kappa_too);
+        }
+        if !self.report.frame.is_multiple_of(self.every) {
+            return Ok(());
+        }
+        let start = Instant::now();
+        let states = states(&mut self.groups, self.gravity, &self.quantities)?;
+        if self.place.is_device() {
+            let groups = self.groups.iter_mut();
+            self.report.repaired += groups.map(|group| group.solver.news()).sum::<usize>();
+            ms.readback += milliseconds(start.elapsed());
+        }
+        for quantity in &self.quantities {
+            let report = &mut self.report;
+            match quantity {
+                Quantity::Residual => report.residual = residual(&self.groups, self.gravity),
+                Quantity::Energy => report.energy = Some(energy(&states)),
+                Quantity::Volume => {
+                    let volume = volume(&states);
+                    report.volume = Some(volume.total);
+                    // Nothing may be left.
+                    let error = volume.total / volume.rest - 1.0;
+                    report.volume_error = Some(if volume.rest > 0.0 { error } else { 0.0 });
+                    report.min_volume_ratio = Some(volume.min_ratio);
+                    report.inverted_tets = Some(volume.inverted);
+                }
+                Quantity::Speed => report.max_speed = Some(max_speed(&states)),
+                Quantity::Kappa => {
+                    report.kappa = Some(kappa(&self.groups));
+                    report.softened = Some(softened(&self.groups));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes over state and positions; returns how many particles a device had to put back since the last time.
+    pub(super) fn fetch(&mut self, ms: &mut Milliseconds) -> Result<usize, Error> {
+        let start = Instant::now();
+        let mut repaired = 0;
+        for group in &mut self.groups {
+            repaired += group.solver.read_back()?;
+        }
+        if self.place.is_device() {
+            ms.readback += milliseconds(start.elapsed());
+        }
+        self.collect_positions();
+        Ok(repaired)
+    }
+
+    /// Makes [`Simulation::positions`] those of now, if the state is on a device: waits for it and fetches them.
+    /// Otherwise they are, and nothing happens.
+    ///
+    /// A frame does this by itself only if a stroke is due, since a blade has to know where the body is, or if it reports
+    /// residuals. Energies, volume and speed are summed up on the device.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub fn read_back(&mut self) -> Result<(), Error> {
+        if self.place.is_device() {
+            self.report.repaired += self.fetch(&mut Milliseconds::default())?;
+        }
+        Ok(())
+    }
+
+    /// What is to be said about where it is computed: the device, or why there is none; `None` if the scene asked for
+    /// the processor.
+    #[must_use]
+    pub fn backend_note(&self) -> Option<&str> {
+        self.place.note.as_deref()
+    }
+
+    /// The device solvers of the scene's groups of bodies, for renderers; none on the processor.
+    #[cfg(feature = "gpu")]
+    pub fn device_solvers(&self) -> impl Iterator<Item = &crate::gpu::GpuSolver> + '_ {
+        self.groups.iter().filter_map(|group| group.solver.device())
+    }
+
+    /// Takes over the positions of the solvers.
+    pub(super) fn collect_positions(&mut self) {
+        for group in &mut self.groups {
+            group.solver.positions(&mut group.positions);
+        }
+        if let Some(whole) = &mut self.whole {
+            whole.collect_positions(&self.groups);
+        }
+    }
+}
