@@ -21,7 +21,7 @@ use crate::group::Group;
 use crate::islands::islands;
 use crate::joined::Joined;
 use crate::limits::{self, value};
-use crate::measure::{by_body, energy, kappa, max_speed, residual, softened, states, volume};
+use crate::measure::{by_body, kappa, softened};
 use crate::method::settings;
 use crate::pieces::PieceNumbers;
 use crate::place::Place;
