@@ -10,9 +10,11 @@ mod search;
 mod shapes;
 mod stencil;
 mod stuffing;
+mod tetrahedralize;
 
 pub use grid::kuhn_box;
 pub use lattice::Lattice;
 pub use search::generate;
 pub use shapes::Shape;
 pub use stuffing::stuff;
+pub use tetrahedralize::tetrahedralize;
