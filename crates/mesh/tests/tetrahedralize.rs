@@ -306,11 +306,11 @@ fn surfaces_of_given_meshes() {
 }
 
 #[test]
-fn balls_that_touch_at_a_lattice_vertex_come_apart() {
+fn cones_that_touch_at_a_lattice_vertex_come_apart() {
     let lattice =
         Lattice::covering(DVec3::splat(-2.0), DVec3::splat(2.0), 0.5, DVec3::ZERO).unwrap();
-    let balls = |p: DVec3| (p - DVec3::X).length().min((p + DVec3::X).length()) - 1.0;
-    let mut mesh = stuff(&lattice, balls).unwrap();
+    let cones = |p: DVec3| (p.y.hypot(p.z) - 0.3 * p.x.abs()).max(p.x.abs() - 1.7);
+    let mut mesh = stuff(&lattice, cones).unwrap();
     assert_eq!((mesh.pieces().count, mesh.face_pieces().count), (1, 2));
     assert!(!mesh.surface().is_manifold());
     assert_eq!(mesh.split_pinches(), 1);
