@@ -309,7 +309,7 @@ fn surfaces_of_given_meshes() {
 fn cones_that_touch_at_a_lattice_vertex_come_apart() {
     let lattice =
         Lattice::covering(DVec3::splat(-2.0), DVec3::splat(2.0), 0.5, DVec3::ZERO).unwrap();
-    let cones = |p: DVec3| (p.y.hypot(p.z) - 0.3 * p.x.abs()).max(p.x.abs() - 1.7);
+    let cones = |p: DVec3| (p.y.hypot(p.z) - 0.5 * p.x.abs()).max(p.x.abs() - 1.7);
     let mut mesh = stuff(&lattice, cones).unwrap();
     assert_eq!((mesh.pieces().count, mesh.face_pieces().count), (1, 2));
     assert!(!mesh.surface().is_manifold());
