@@ -142,6 +142,23 @@ pub(crate) enum MeshCommand {
         #[arg(long)]
         repair: bool,
     },
+    /// Fill a closed triangle surface with tets.
+    #[command(
+        after_help = "Example: incise mesh tetrahedralize heart.stl heart.vtk --tets 20000\n\n\
+        Edges and corners are rounded to the size of a tet, and thinner parts are lost: the output says by how much."
+    )]
+    Tetrahedralize {
+        /// The surface: .obj, .stl, .ply or .off.
+        surface: PathBuf,
+        /// The mesh to write.
+        output: PathBuf,
+        /// Wanted number of tets; the result is within 2%.
+        #[arg(long, value_name = "N")]
+        tets: usize,
+        /// How often tets far inside may be doubled in size: more are left for the surface.
+        #[arg(long, value_name = "N", default_value_t = 0)]
+        levels: u32,
+    },
     /// Generate a shape of longest side 1.
     #[command(after_help = "Example: incise mesh generate torus --tets 5000 torus.vtk")]
     Generate {

@@ -5,8 +5,9 @@ use std::path::Path;
 use anyhow::Context;
 use comfy_table::Table;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
-use incise::mesh::generate::{Shape, generate};
-use incise::mesh::{RepairOptions, TetMesh, io, repair};
+use incise::mesh::generate::{Shape, generate, tetrahedralize};
+use incise::mesh::io::{self, TriangleSurface};
+use incise::mesh::{RepairOptions, Solid, TetMesh, repair};
 use serde::Serialize;
 
 use crate::args::MeshCommand;
@@ -97,6 +98,12 @@ pub(crate) fn mesh(command: &MeshCommand) -> Result<(), Failure> {
             io::write_file(output, &file.repaired(repaired))?;
             print(report)
         }
+        MeshCommand::Tetrahedralize {
+            surface,
+            output,
+            tets,
+            levels,
+        } => fill(surface, output, *tets, *levels),
         MeshCommand::Generate {
             shape,
             tets,
@@ -106,6 +113,59 @@ pub(crate) fn mesh(command: &MeshCommand) -> Result<(), Failure> {
             &generate(Shape::from_name(shape)?, *tets)?,
         )?),
     }
+}
+
+/// Fills a surface, and says how well the body fits it.
+fn fill(file: &Path, output: &Path, tets: usize, levels: u32) -> Result<(), Failure> {
+    let surface = io::read_surface(file)?;
+    let named = |error| {
+        let error = anyhow::Error::new(error).context(file.display().to_string());
+        Failure::Input(error)
+    };
+    let solid = Solid::new(&surface).map_err(named)?;
+    let mesh = tetrahedralize(&solid, tets, levels).map_err(named)?;
+    io::write(output, &mesh)?;
+    let boundary = TriangleSurface::from(&mesh);
+    let back = Solid::new(&boundary).map_err(named)?;
+    let prepared = solid.prepared();
+    for (count, what) in [
+        (
+            prepared.welded,
+            "points at the place of another were merged",
+        ),
+        (
+            prepared.degenerate,
+            "triangles with equal corners were left out",
+        ),
+        (
+            prepared.turned,
+            "triangles were turned to face as their neighbors",
+        ),
+    ] {
+        if count > 0 {
+            print(format!("{count} {what}"))?;
+        }
+    }
+    if prepared.inside_out {
+        print("the surface was inside out and was turned")?;
+    }
+    print(format!(
+        "{} tets, {} particles, {} pieces",
+        mesh.tets.len(),
+        mesh.positions.len(),
+        mesh.pieces().count
+    ))?;
+    print(format!(
+        "volume {:.6} m³, that of the surface is {:.6} m³",
+        mesh.total_volume(),
+        solid.volume()
+    ))?;
+    print(format!(
+        "the body reaches {:.3e} m beyond or short of the surface, the surface {:.3e} m from the body; a tet is {:.3e} m wide",
+        solid.farthest(&boundary),
+        back.farthest(&surface),
+        (12.0 * mesh.total_volume() / mesh.tets.len() as f64).cbrt()
+    ))
 }
 
 fn info(file: &Path, json: bool, stiffness: &Stiffness) -> Result<(), Failure> {

@@ -191,3 +191,77 @@ fn regions_survive_a_round_through_the_formats() {
             .eq(place.read("s.ele").split_whitespace())
     );
 }
+
+/// A cube of side 2 whose faces are turned outward.
+const CUBE: &str = "OFF\n8 6 0\n-1 -1 -1\n1 -1 -1\n1 1 -1\n-1 1 -1\n-1 -1 1\n1 -1 1\n1 1 1\n-1 1 1\n\
+    4 0 3 2 1\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n";
+
+#[test]
+fn a_surface_is_filled_and_the_fit_told() {
+    let place = Place::new();
+    place.write("cube.off", CUBE);
+    let told = place.good(&[
+        "mesh",
+        "tetrahedralize",
+        "cube.off",
+        "cube.vtk",
+        "--tets",
+        "5000",
+    ]);
+    assert!(
+        told.contains("that of the surface is 8.000000 m³"),
+        "{}",
+        told
+    );
+    let report = info(&place, "cube.vtk");
+    let tets = report["tets"].as_u64().unwrap();
+    assert!(tets.abs_diff(5_000) <= 100);
+    assert_eq!(
+        (report["pieces"].as_u64(), report["genus"].as_u64()),
+        (Some(1), Some(0))
+    );
+    // Its edges are rounded.
+    let volume = report["volume"].as_f64().unwrap();
+    assert!((7.7..8.0).contains(&volume), "{volume}");
+    assert!(report["min_dihedral_degrees"].as_f64().unwrap() > 9.3);
+}
+
+#[test]
+fn surfaces_that_cannot_be_filled_are_refused_in_a_sentence() {
+    let place = Place::new();
+    place.write(
+        "open.off",
+        CUBE.replace("8 6 0", "8 5 0").replace("4 3 0 4 7\n", ""),
+    );
+    place.write("cube.off", CUBE);
+    let bad = |arguments: &[&str]| {
+        let outcome = place.incise(arguments);
+        assert_eq!(outcome.code, 2, "{}", outcome.stderr);
+        assert_eq!(outcome.stderr.lines().count(), 1, "{}", outcome.stderr);
+        outcome.stderr
+    };
+    let open = bad(&[
+        "mesh",
+        "tetrahedralize",
+        "open.off",
+        "a.vtk",
+        "--tets",
+        "500",
+    ]);
+    assert!(
+        open.contains("open.off") && open.contains("has one triangle"),
+        "{open}"
+    );
+    let few = bad(&["mesh", "tetrahedralize", "cube.off", "a.vtk", "--tets", "5"]);
+    assert!(few.contains("ask for 100"), "{few}");
+    let format = bad(&[
+        "mesh",
+        "tetrahedralize",
+        "cube.step",
+        "a.vtk",
+        "--tets",
+        "500",
+    ]);
+    assert!(format.contains(".stl"), "{format}");
+    assert!(!place.path("a.vtk").exists());
+}
