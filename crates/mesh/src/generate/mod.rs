@@ -8,6 +8,7 @@ mod grid;
 mod lattice;
 mod search;
 mod shapes;
+mod solids;
 mod stencil;
 mod stuffing;
 

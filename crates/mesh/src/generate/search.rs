@@ -10,7 +10,8 @@
 
 use glam::{DMat3, DQuat, DVec3, dvec3};
 
-use super::{Lattice, Shape, stuff};
+use super::stuffing::Grid;
+use super::{Lattice, Shape};
 use crate::quality::outward_normals;
 use crate::{MeshError, TetId, TetMesh};
 
@@ -75,9 +76,11 @@ fn search(
     let mut spacing = cube_root(12.0 * shape.volume() / tets as f64);
     for _ in 0..SPACINGS {
         let lattice = Lattice::covering(-covered, covered, spacing, shift)?;
-        let mut mesh = stuff(&lattice, |p| shape.signed_distance(turn * p))?;
-        let count = mesh.tets.len();
+        let grid = Grid::new(&lattice, &|p| shape.signed_distance(turn * p))?;
+        let count = grid.tet_count();
         if 50 * count.abs_diff(tets) <= tets {
+            let mut mesh = grid.extract(count);
+            drop(grid);
             for position in &mut mesh.positions {
                 *position = turn * *position;
             }
@@ -99,11 +102,13 @@ fn search(
 
 /// Whether a mesh has the topology of the shape, which too coarse a lattice breaks, and good angles.
 fn is_faithful(mesh: &TetMesh, shape: Shape) -> bool {
+    if !(0..mesh.tets.len()).all(|t| has_good_angles(mesh.corners(TetId::new(t)))) {
+        return false;
+    }
     let surface = mesh.surface();
     surface.euler_characteristic() == shape.euler_characteristic()
         && surface.is_manifold()
-        && mesh.face_pieces().count == 1
-        && (0..mesh.tets.len()).all(|t| has_good_angles(mesh.corners(TetId::new(t))))
+        && mesh.face_pieces().count == shape.pieces()
 }
 
 /// Whether the dihedral angles keep the bounds, judged by their cosines, which are the same on all platforms.
