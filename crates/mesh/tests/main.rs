@@ -6,3 +6,4 @@ mod given;
 mod medit;
 mod msh;
 mod shapes;
+mod sizes;

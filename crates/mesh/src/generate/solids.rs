@@ -23,8 +23,8 @@ pub(super) fn liver(p: DVec3) -> f64 {
 
 /// The bunny: a body with haunches, a head with a snout, two ears and a tail.
 pub(super) fn bunny(p: DVec3) -> f64 {
-    const SCALE: f64 = 1.205;
-    const CENTER: DVec3 = dvec3(-0.005, 0.0, 0.2725);
+    const SCALE: f64 = 1.22;
+    const CENTER: DVec3 = dvec3(-0.005, 0.0, 0.28);
     let p = p * SCALE + CENTER;
     let p = dvec3(p.x, p.y.abs(), p.z);
     let part = |ends, radii| round_cone(p, ends, radii);
@@ -47,7 +47,7 @@ pub(super) fn bunny(p: DVec3) -> f64 {
     );
     let ear = part(
         [dvec3(0.28, 0.08, 0.46), dvec3(0.16, 0.15, 0.82)],
-        [0.07, 0.055],
+        [0.085, 0.07],
     );
     let tail = ball(p - dvec3(-0.47, 0.0, 0.0), 0.1);
 
@@ -168,7 +168,7 @@ pub(super) fn gear(p: DVec3) -> f64 {
 
 /// The shell: a ball around a void.
 pub(super) fn shell(p: DVec3) -> f64 {
-    (p.length() - 0.44).abs() - 0.06
+    (p.length() - 0.425).abs() - 0.075
 }
 
 /// The pair: a ball and a cube, apart.
