@@ -6,6 +6,7 @@
 mod distance;
 mod grid;
 mod lattice;
+mod neighbors;
 mod search;
 mod shapes;
 mod solids;

@@ -18,7 +18,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::lattice::{Lattice, root};
-use super::stencil::{Corner, Node, Side, fill, is_long};
+use super::neighbors::{NEIGHBORS, add, backward, direction, directions, steps};
+use super::stencil::{Corner, Node, Side, fill};
 use crate::{MeshError, ParticleId, TetMesh, signed_volume};
 
 /// A vertex moves onto a cut on a long edge nearer than this part of the edge (values of the paper).
@@ -96,37 +97,6 @@ struct Near {
     moved: u32,
     /// For an inside vertex, the first of its cuts. They come in the order of [`NEIGHBORS`].
     first: u32,
-}
-
-/// Offsets to the neighbors of any vertex in half spacings: 6 along long edges, 8 along short ones.
-const NEIGHBORS: [[i32; 3]; 14] = [
-    [-2, 0, 0],
-    [2, 0, 0],
-    [0, -2, 0],
-    [0, 2, 0],
-    [0, 0, -2],
-    [0, 0, 2],
-    [-1, -1, -1],
-    [1, -1, -1],
-    [-1, 1, -1],
-    [1, 1, -1],
-    [-1, -1, 1],
-    [1, -1, 1],
-    [-1, 1, 1],
-    [1, 1, 1],
-];
-
-/// The place of the way from one vertex to a neighbor in [`NEIGHBORS`].
-fn direction(from: Corner, to: Corner) -> usize {
-    let ahead = |axis: usize| usize::from(to.at[axis] > from.at[axis]);
-    if is_long(from, to) {
-        let axis = (0..2)
-            .find(|&axis| from.at[axis] != to.at[axis])
-            .unwrap_or(2);
-        2 * axis + ahead(axis)
-    } else {
-        6 + ahead(0) + 2 * ahead(1) + 4 * ahead(2)
-    }
 }
 
 impl Grid {
@@ -467,39 +437,6 @@ impl Output {
     }
 }
 
-/// Steps of the index to the neighbors of a corner and of a center of a cell, in the order of [`NEIGHBORS`].
-#[expect(clippy::cast_possible_wrap, reason = "at most 2^26 cells")]
-fn steps([nx, ny, _]: [usize; 3]) -> [[isize; 14]; 2] {
-    let strides = [1, nx, nx * ny].map(|stride| 2 * stride as isize);
-    [0, 1].map(|center| {
-        NEIGHBORS.map(|offset| {
-            // The cell of a neighbor is found by halving its coordinates, rounded down.
-            let cells: isize = (0..3)
-                .map(|axis| (offset[axis] + center).div_euclid(2) as isize * strides[axis])
-                .sum();
-            cells + (offset[0] + center).rem_euclid(2) as isize - center as isize
-        })
-    })
-}
-
-/// The set bits.
-fn directions(bits: u16) -> impl Iterator<Item = usize> {
-    (0..NEIGHBORS.len()).filter(move |direction| bits >> direction & 1 == 1)
-}
-
-/// The place of the opposite offset in [`NEIGHBORS`].
-fn backward(direction: usize) -> usize {
-    if direction < 6 {
-        direction ^ 1
-    } else {
-        19 - direction
-    }
-}
-
-fn add(a: [i32; 3], b: [i32; 3]) -> [i32; 3] {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
-}
-
 fn index(count: usize) -> u32 {
     u32::try_from(count).expect("a lattice of 2^26 cells has fewer than 2^32 edges")
 }
@@ -556,18 +493,6 @@ mod tests {
                 });
                 assert!(samples[0].1 == samples[1].1, "{shape} {spacing}");
                 assert!(samples[1].0 < samples[0].0, "{shape} {spacing}");
-            }
-        }
-    }
-
-    #[test]
-    fn ways_to_neighbors_fit_together() {
-        let steps = steps([7, 5, 9]);
-        for way in 0..NEIGHBORS.len() {
-            assert_eq!(NEIGHBORS[backward(way)], NEIGHBORS[way].map(|c| -c));
-            for parity in [0, 1] {
-                let far = if way < 6 { parity } else { 1 - parity };
-                assert_eq!(steps[parity][way], -steps[far][backward(way)]);
             }
         }
     }
