@@ -94,6 +94,10 @@ pub enum MeshError {
         largest: usize,
     },
 
+    /// A surface without an inside, or one that cannot be filled as asked.
+    #[error("the surface cannot be filled: {0}")]
+    Surface(String),
+
     /// A lattice that cannot be laid out.
     #[error("the lattice cannot be laid out: {0}")]
     Lattice(String),

@@ -41,8 +41,10 @@ mod ids;
 pub mod io;
 mod orientation;
 mod pieces;
+mod pinches;
 mod quality;
 mod repair;
+mod solid;
 mod surface;
 mod tet_mesh;
 
@@ -55,6 +57,7 @@ pub use orientation::orientation;
 pub use pieces::Pieces;
 pub use quality::{QualitySummary, TetQuality, dihedral_angles, tet_quality};
 pub use repair::{RepairOptions, RepairReport, Repaired, repair};
+pub use solid::{Prepared, Solid};
 pub use surface::Surface;
 pub use tet_mesh::{TetMesh, signed_volume};
 

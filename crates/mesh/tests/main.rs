@@ -7,3 +7,4 @@ mod medit;
 mod msh;
 mod shapes;
 mod sizes;
+mod tetrahedralize;

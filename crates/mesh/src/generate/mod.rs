@@ -12,9 +12,11 @@ mod shapes;
 mod solids;
 mod stencil;
 mod stuffing;
+mod tetrahedralize;
 
 pub use grid::kuhn_box;
 pub use lattice::Lattice;
 pub use search::generate;
 pub use shapes::Shape;
 pub use stuffing::stuff;
+pub use tetrahedralize::tetrahedralize;

@@ -48,9 +48,7 @@ const DIHEDRAL_COSINES: [f64; 2] = [-0.965_016, 0.982_613];
 pub fn generate(shape: Shape, tets: usize) -> Result<TetMesh, MeshError> {
     let smallest = shape.smallest_tet_count();
     if (smallest..=LARGEST).contains(&tets) {
-        // Sides of the shape are then far from all directions of the lattice.
-        let turned = DMat3::from_quat(DQuat::from_xyzw(1.0, 2.0, 3.0, 5.0).normalize());
-        for (turn, shifts) in [DMat3::IDENTITY, turned].into_iter().zip(SHIFTS) {
+        for (turn, shifts) in [DMat3::IDENTITY, turned()].into_iter().zip(SHIFTS) {
             if let Some(mesh) =
                 (0..shifts).find_map(|n| search(shape, tets, turn, shift(n)).transpose())
             {
@@ -125,8 +123,13 @@ fn has_good_angles(corners: [DVec3; 4]) -> bool {
     (0..4).all(|i| (0..i).all(|j| (low..=high).contains(&-normals[i].dot(normals[j]))))
 }
 
+/// A turn after which the sides of a box are far from all directions of the lattice.
+pub(super) fn turned() -> DMat3 {
+    DMat3::from_quat(DQuat::from_xyzw(1.0, 2.0, 3.0, 5.0).normalize())
+}
+
 /// The points of the additive sequence of Roberts (2018), which fills the unit cube evenly.
-fn shift(n: u32) -> DVec3 {
+pub(super) fn shift(n: u32) -> DVec3 {
     let n = f64::from(n) + 0.5;
     (n * dvec3(
         0.819_172_513_396_164_4,
@@ -137,7 +140,7 @@ fn shift(n: u32) -> DVec3 {
 }
 
 /// The cube root of a positive number by Newton's method, since the library function may differ between platforms.
-fn cube_root(x: f64) -> f64 {
+pub(super) fn cube_root(x: f64) -> f64 {
     let mut root = x.max(1.0);
     for _ in 0..64 {
         root -= (root - x / (root * root)) / 3.0;

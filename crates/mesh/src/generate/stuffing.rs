@@ -5,7 +5,7 @@
 //! point so near that slivers would follow is moved onto it, which removes the other cuts at its edges. Each lattice tet
 //! is then filled from the stencils of the module `stencil`.
 //!
-//! Whatever the function, faces match, every tet is positive, and the dihedral angles stay between 9.2 and 161.7 degrees.
+//! Whatever the function, faces match, every tet is positive, and the dihedral angles stay between 9.3 and 161.7 degrees.
 //! These bounds are not proved but found by trying all extremes of the stencils; they are not the 10.7 and 164.8 degrees
 //! that the paper proves, which smooth surfaces keep as a rule but not always. Features thinner than the spacing are
 //! lost, sharp edges are beveled.
@@ -513,7 +513,7 @@ mod tests {
             assert!(mesh.surface().is_closed());
             let quality = mesh.quality();
             assert!(
-                quality.min_dihedral > 9.2 && quality.max_dihedral < 161.7,
+                quality.min_dihedral > 9.3 && quality.max_dihedral < 161.7,
                 "{quality:?}"
             );
         }

@@ -1,0 +1,71 @@
+//! The distance of a point to the nearest triangle of a tree.
+//!
+//! Source: C. Ericson, "Real-Time Collision Detection", 2005, section 5.1.5 (the nearest point of a triangle by the
+//! regions of its corners and edges). Cost: O(log n) as a rule, O(n) for points as far from many triangles.
+
+use glam::DVec3;
+
+use super::tree::Tree;
+
+/// The distance to the nearest triangle, or `reach` if none is nearer.
+pub(super) fn distance_within(tree: &Tree, point: DVec3, reach: f64) -> f64 {
+    tree.nearest(point, reach * reach, |t| distance_squared(t, point))
+        .sqrt()
+}
+
+/// The squared distance of a point to a triangle, which may be a line or a point.
+fn distance_squared(&[a, b, c]: &[DVec3; 3], point: DVec3) -> f64 {
+    let (ab, ac, ap) = (b - a, c - a, point - a);
+    let normal = ab.cross(ac);
+    let area = normal.length_squared();
+    if area > 0.0 {
+        // Barycentric coordinates of the foot of the perpendicular, times the area.
+        let v = ap.cross(ac).dot(normal);
+        let w = ab.cross(ap).dot(normal);
+        if v >= 0.0 && w >= 0.0 && v + w <= area {
+            let height = ap.dot(normal);
+            return height * height / area;
+        }
+    }
+    [(a, b), (b, c), (c, a)]
+        .map(|(from, to)| to_segment(from, to, point))
+        .into_iter()
+        .fold(f64::INFINITY, f64::min)
+}
+
+fn to_segment(from: DVec3, to: DVec3, point: DVec3) -> f64 {
+    let along = to - from;
+    let length = along.length_squared();
+    let t = if length > 0.0 {
+        ((point - from).dot(along) / length).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
+    (from + t * along).distance_squared(point)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::dvec3;
+
+    use super::*;
+
+    #[test]
+    fn regions_of_a_triangle() {
+        let t = [DVec3::ZERO, dvec3(2.0, 0.0, 0.0), dvec3(0.0, 2.0, 0.0)];
+        for (point, expected) in [
+            (dvec3(0.5, 0.5, 3.0), 9.0),
+            (dvec3(-1.0, -1.0, 0.0), 2.0),
+            (dvec3(3.0, 0.0, 0.0), 1.0),
+            (dvec3(1.0, -2.0, 1.0), 5.0),
+            (dvec3(2.0, 2.0, 0.0), 2.0),
+        ] {
+            assert!(
+                (distance_squared(&t, point) - expected).abs() < 1e-14,
+                "{point}"
+            );
+        }
+        let line = [DVec3::ZERO, dvec3(1.0, 0.0, 0.0), dvec3(3.0, 0.0, 0.0)];
+        assert!((distance_squared(&line, dvec3(2.0, 1.0, 0.0)) - 1.0).abs() < 1e-15);
+    }
+}
