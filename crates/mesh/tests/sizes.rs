@@ -51,7 +51,7 @@ fn ten_bodies_of_a_million_tets() {
 }
 
 #[test]
-#[ignore = "half a minute and 2 GB: cargo test --release -p incise-mesh -- --ignored four_million"]
+#[ignore = "half a minute: cargo test --release -p incise-mesh -- --ignored four_million"]
 fn an_armadillo_of_four_million_tets() {
     assert_sound(Shape::Armadillo, 4_000_000);
 }
