@@ -11,8 +11,9 @@ override UNIFORM: bool = true;
 override TILED: bool = false;
 
 const NUMBERS: u32 = 16u;
-const TILE_TETS: u32 = 128u;
-const TILE_NUMBERS: u32 = 2u + TILE_TETS + 512u;
+// As in `tile.wgsl`.
+override TILE_TETS: u32 = 64u;
+override TILE_NUMBERS: u32 = 2u + 5u * TILE_TETS;
 
 struct Units {
     // Places for tets.

@@ -2,11 +2,11 @@
 // particle and are solved side by side; a barrier parts the steps. Twin: Gauss-Seidel in the order color of the cluster,
 // step, which is that of a schedule without clusters colored by both.
 
-// Most tets of a tile, and most particles.
-const TILE_TETS: u32 = 128u;
-const TILE_PARTICLES: u32 = 512u;
+// Most tets of a tile: 64, 128 or 256, and the particles of as many that share none.
+override TILE_TETS: u32 = 64u;
+override TILE_PARTICLES: u32 = 4u * TILE_TETS;
 // What a tile has in `tiles`: the number of its steps, that of its particles, where each step ends, and the particles.
-const TILE_NUMBERS: u32 = 2u + TILE_TETS + TILE_PARTICLES;
+override TILE_NUMBERS: u32 = 2u + 5u * TILE_TETS;
 
 @group(0) @binding(9) var<storage, read> tiles: array<u32>;
 

@@ -125,8 +125,8 @@ pub(crate) fn check(scene: &Scene) -> Result<(), Error> {
     }
     let method: incise_clustering::Method = solver.clustering.parse()?;
     let limit = method.max_size().get();
-    if limit > 128 {
-        let range = "of at most 128 tets on a GPU";
+    if limit > 256 {
+        let range = "of at most 256 tets on a GPU";
         return Err(value("solver.clustering", &solver.clustering, range));
     }
     if limit > 32 && solver.method != Method::GaussSeidel {

@@ -178,7 +178,7 @@ pub struct SolverSpec {
     /// Width of the numbers.
     pub precision: Precision,
     /// Where it is computed: `cpu`, `gpu` or `auto`. On a GPU clusters of up to 32 tets are a thread's work each, larger
-    /// ones, up to 128, that of a workgroup.
+    /// ones, up to 256, that of a workgroup.
     #[serde(skip_serializing_if = "Backend::is_cpu")]
     pub backend: Backend,
     /// Largest kappa of a tet, positive: stiffer ones, as cuts leave them, are softened to it. `inf` softens none.

@@ -31,11 +31,12 @@ pub(crate) struct Way {
     jacobi: Option<f64>,
 }
 
-pub(crate) const WAYS: [Way; 5] = [
+pub(crate) const WAYS: [Way; 6] = [
     Way::threads("thread, no clusters", "none"),
     Way::threads("cluster form, serial:10", "serial:10"),
     Way::workgroups("block form, pressure:64", "pressure:64"),
     Way::workgroups("block form, pressure:128", "pressure:128"),
+    Way::workgroups("block form, pressure:256", "pressure:256"),
     Way {
         jacobi: Some(0.1),
         ..Way::threads("Jacobi 0.1, serial:10", "serial:10")

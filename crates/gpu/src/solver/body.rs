@@ -13,7 +13,7 @@ use super::kernels::{Kernels, PATCH_PARTICLES, PATCH_TETS, Variant};
 use super::layout::{Form, Layout, THREADS};
 use super::numbers::{NUMBERS, Part, ParticlePatch, TetPatch};
 use super::scalars::{Kind, Scalars};
-use super::tile::TILE_NUMBERS;
+use super::tile::number_count;
 use crate::array::Array;
 use crate::kernel::Recorder;
 use crate::{GpuContext, GpuError};
@@ -106,10 +106,12 @@ impl Body {
         }
         if self.layout.form == Form::Workgroups {
             let tiles = self.layout.seats.seat_count();
-            self.tiles.resize(gpu, tiles * TILE_NUMBERS)?;
+            let room = self.layout.depth();
+            let numbers_of_tile = number_count(room);
+            self.tiles.resize(gpu, tiles * numbers_of_tile)?;
             for (tile, numbers) in &patch.tiles {
-                let start = *tile as usize * TILE_NUMBERS;
-                self.tiles.write(gpu, start, &numbers.numbers());
+                let start = *tile as usize * numbers_of_tile;
+                self.tiles.write(gpu, start, &numbers.numbers(room));
             }
         }
         for patches in patch.tets.chunks(PATCHES) {

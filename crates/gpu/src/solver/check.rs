@@ -8,7 +8,7 @@ use incise_graph::Schedule;
 use super::GpuSolver;
 use super::layout::{Form, THREADS};
 use super::numbers::NUMBERS;
-use super::tile::{TILE_NUMBERS, TILE_TETS};
+use super::tile::number_count;
 use crate::GpuError;
 
 /// What the device holds, read back.
@@ -71,7 +71,8 @@ impl GpuSolver {
         let data = self.host.tet_data(tet);
         let mut corners = copy.corners[place];
         if self.form() == Form::Workgroups {
-            let list = place / TILE_TETS * TILE_NUMBERS + 2 + TILE_TETS;
+            let room = self.body.layout.depth();
+            let list = place / room * number_count(room) + 2 + room;
             corners = corners.map(|p| copy.tiles[list + p as usize]);
         }
         if corners != data.corners {
@@ -131,13 +132,14 @@ impl GpuSolver {
                     .collect()
             }
             Form::Workgroups => {
-                let (steps, ends) = steps(group, copy);
+                let room = self.body.layout.depth();
+                let (steps, ends) = steps(group, room, copy);
                 let count = if steps == 0 {
                     0
                 } else {
                     ends[steps - 1] as usize
                 };
-                (group * TILE_TETS..group * TILE_TETS + count).collect()
+                (group * room..group * room + count).collect()
             }
         }
     }
@@ -148,15 +150,16 @@ impl GpuSolver {
             return Ok(());
         }
         let seats = &self.body.layout.seats;
+        let room = self.body.layout.depth();
         for tile in 0..seats.seat_count() {
             // What is said of a tile without cluster is old.
             if u32::try_from(tile).is_ok_and(|seat| seats.cluster(seat).is_none()) {
                 continue;
             }
-            let (steps, ends) = steps(tile, copy);
+            let (steps, ends) = steps(tile, room, copy);
             let mut start = 0;
             for &end in &ends[..steps] {
-                let tets = tile * TILE_TETS + start..tile * TILE_TETS + end as usize;
+                let tets = tile * room + start..tile * room + end as usize;
                 let mut corners: Vec<u32> = copy.corners[tets].iter().flatten().copied().collect();
                 let count = corners.len();
                 corners.sort_unstable();
@@ -172,9 +175,9 @@ impl GpuSolver {
 }
 
 /// The number of steps of a tile, and where they end.
-fn steps(tile: usize, copy: &Copy) -> (usize, &[u32]) {
-    let header = tile * TILE_NUMBERS;
-    let ends = &copy.tiles[header + 2..header + 2 + TILE_TETS];
+fn steps(tile: usize, room: usize, copy: &Copy) -> (usize, &[u32]) {
+    let header = tile * number_count(room);
+    let ends = &copy.tiles[header + 2..header + 2 + room];
     (copy.tiles[header] as usize, ends)
 }
 

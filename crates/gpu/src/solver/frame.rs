@@ -298,7 +298,7 @@ impl Frame {
             keeps,
             jacobi: self.jacobi.is_some(),
             various: !host.is_uniform(),
-            tiled: false,
+            tile: body.layout.tile(),
         };
         let last = match body.layout.form {
             Form::Threads => body.corrections.buffer(),

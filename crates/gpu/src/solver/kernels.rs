@@ -24,7 +24,7 @@ pub(crate) struct Source {
     flags: &'static [Flag],
 }
 
-/// A branch of kernels, compiled or not.
+/// What is fixed when a kernel is compiled: a branch that it has or not, or a size.
 #[derive(Clone, Copy, Debug)]
 enum Flag {
     Damped,
@@ -33,6 +33,7 @@ enum Flag {
     Jacobi,
     Uniform,
     Tiled,
+    TileTets,
 }
 
 macro_rules! text {
@@ -81,7 +82,13 @@ const TETS_FLAGS: &[Flag] = &[
     Flag::Jacobi,
 ];
 
-const TILES_FLAGS: &[Flag] = &[Flag::Damped, Flag::Sequential, Flag::Keeps, Flag::Uniform];
+const TILES_FLAGS: &[Flag] = &[
+    Flag::Damped,
+    Flag::Sequential,
+    Flag::Keeps,
+    Flag::Uniform,
+    Flag::TileTets,
+];
 
 pub(crate) const PREDICT: Source = Source {
     name: "predict",
@@ -268,7 +275,7 @@ pub(crate) const MEASURE_TETS: Source = Source {
         Use::Read,
         Use::Write,
     ],
-    flags: &[Flag::Uniform, Flag::Tiled],
+    flags: &[Flag::Uniform, Flag::Tiled, Flag::TileTets],
 };
 
 pub(crate) const MEASURE_PARTICLES: Source = Source {
@@ -391,8 +398,8 @@ pub(crate) struct Variant {
     pub(crate) jacobi: bool,
     /// Whether tets have materials of their own.
     pub(crate) various: bool,
-    /// Whether corners are numbered within tiles.
-    pub(crate) tiled: bool,
+    /// Tets of a tile; 0 if corners are not numbered within tiles.
+    pub(crate) tile: u32,
 }
 
 impl Variant {
@@ -404,7 +411,9 @@ impl Variant {
             Flag::Keeps => ("KEEPS", self.keeps),
             Flag::Jacobi => ("JACOBI", self.jacobi),
             Flag::Uniform => ("UNIFORM", !self.various),
-            Flag::Tiled => ("TILED", self.tiled),
+            Flag::Tiled => ("TILED", self.tile > 0),
+            // A size of 0 is none that a compiler may divide by, even where nobody does.
+            Flag::TileTets => return ("TILE_TETS", f64::from(self.tile.max(1))),
         };
         (name, f64::from(u8::from(on)))
     }

@@ -12,7 +12,7 @@ use incise_xpbd::{Changes, Solver};
 
 use super::numbers::TetPatch;
 use super::seats::{Moved, Seats};
-use super::tile::{TILE_TETS, Tile};
+use super::tile::{self, Tile};
 use crate::GpuError;
 
 /// Threads of a workgroup, and tets whose numbers lie side by side.
@@ -27,7 +27,8 @@ pub enum Form {
     /// A thread, tet after tet (paper section 4.1).
     #[default]
     Threads,
-    /// A workgroup, its tets in steps: for clusters of up to 128 tets, of which [`Form::LARGE`] and more are worth it.
+    /// A workgroup, its tets in steps: for clusters of up to 256 tets, of which [`Form::LARGE`] and more are worth it.
+    /// Tiles have room for 64, 128 or 256 tets, whatever the largest cluster needs.
     Workgroups,
 }
 
@@ -105,6 +106,14 @@ impl Layout {
         self.depth
     }
 
+    /// Tets that a tile has room for; 0 without tiles.
+    pub(crate) fn tile(&self) -> u32 {
+        match self.form {
+            Form::Threads => 0,
+            Form::Workgroups => index(self.depth),
+        }
+    }
+
     /// The place of a tet, if the schedule solves it.
     pub(crate) fn place(&self, tet: usize) -> Option<usize> {
         let place = self.places.get(tet).copied();
@@ -155,7 +164,7 @@ impl Layout {
                 let largest = self.largest(&seats, schedule)?;
                 self.depth = match self.form {
                     Form::Threads => largest.max(1),
-                    Form::Workgroups => TILE_TETS,
+                    Form::Workgroups => tile::room_for(largest),
                 };
                 self.filled.clear();
                 self.places.clear();
@@ -183,12 +192,12 @@ impl Layout {
         let clusters = seats.iter().filter_map(|&seat| self.seats.cluster(seat));
         let sized = clusters.map(|cluster| (schedule.constraints(cluster).len(), cluster));
         let (tets, cluster) = sized.max().unwrap_or((0, ClusterId(0)));
-        if self.form == Form::Workgroups && tets > TILE_TETS {
+        if self.form == Form::Workgroups && tets > tile::LARGEST {
             self.seats.forget();
             return Err(GpuError::Block {
                 cluster: cluster.0,
                 tets,
-                limit: TILE_TETS,
+                limit: tile::LARGEST,
             });
         }
         Ok(tets)

@@ -12,7 +12,7 @@ use wgpu::BufferUsages;
 
 use super::GpuSolver;
 use super::kernels::{MEASURE_PARTICLES, MEASURE_TETS, Variant};
-use super::layout::{Form, THREADS, slope};
+use super::layout::{THREADS, slope};
 use super::numbers::{ParticleSums, TetSums, Units};
 use crate::array::Array;
 use crate::kernel::Recorder;
@@ -271,7 +271,7 @@ impl GpuSolver {
         measuring.follow(gpu, host, places)?;
         let variant = Variant {
             various: !host.is_uniform(),
-            tiled: body.layout.form == Form::Workgroups,
+            tile: body.layout.tile(),
             ..Variant::default()
         };
         let (settings, particles) = (frame.settings(), body.particles.buffer());

@@ -3,14 +3,25 @@
 //! Tets of one step share no particle. First fit in ascending order, with a bit for each step at each particle: the same
 //! steps as `incise_coloring::color_within_clusters` gives. Cost: O(tets log tets).
 
-/// Most tets of a tile.
-pub(crate) const TILE_TETS: usize = 128;
+/// How many tets tiles may have room for. The particles of the largest, if its tets share none, fill the 16 KiB of
+/// workgroup memory that WebGPU promises.
+const ROOMS: [usize; 3] = [64, 128, 256];
 
-/// Most particles of a tile: those of tets that share none.
-pub(crate) const TILE_PARTICLES: usize = 4 * TILE_TETS;
+/// Most tets of a tile.
+pub(crate) const LARGEST: usize = ROOMS[2];
+
+/// The room of tiles for clusters of at most so many tets, at most [`LARGEST`].
+pub(crate) fn room_for(tets: usize) -> usize {
+    ROOMS
+        .into_iter()
+        .find(|&room| tets <= room)
+        .unwrap_or(LARGEST)
+}
 
 /// Numbers of a tile on the device: steps, particles, where each step ends, and the particles.
-pub(crate) const TILE_NUMBERS: usize = 2 + TILE_TETS + TILE_PARTICLES;
+pub(crate) fn number_count(room: usize) -> usize {
+    2 + room + 4 * room
+}
 
 /// A cluster as a workgroup solves it.
 #[derive(Debug)]
@@ -24,9 +35,9 @@ pub(crate) struct Tile {
 }
 
 impl Tile {
-    /// The tile of at most [`TILE_TETS`] tets, ascending.
+    /// The tile of at most [`LARGEST`] tets, ascending.
     pub(crate) fn new(tets: &[u32], corners: impl Fn(u32) -> [u32; 4]) -> Self {
-        debug_assert!(tets.len() <= TILE_TETS, "a tile holds the cluster");
+        debug_assert!(tets.len() <= LARGEST, "a tile holds the cluster");
         let mut particles: Vec<u32> = tets.iter().flat_map(|&tet| corners(tet)).collect();
         particles.sort_unstable();
         particles.dedup();
@@ -34,16 +45,25 @@ impl Tile {
             let found = particles.binary_search(&p);
             index(found.expect("the particles of all tets are listed"))
         };
-        // Each tet keeps one step from its neighbors, so there are no more steps than tets: a word holds them.
-        let mut taken = vec![0u128; particles.len()];
+        // Each tet keeps one step from its neighbors, so there are no more steps than tets: two words hold them.
+        let mut taken = vec![[0u128; LARGEST / 128]; particles.len()];
         let mut steps = Vec::with_capacity(tets.len());
         for &tet in tets {
             let corners = corners(tet).map(number);
-            let union = corners.iter().fold(0, |all, &p| all | taken[p as usize]);
-            let step = union.trailing_ones();
+            let free = (0..LARGEST)
+                .step_by(128)
+                .enumerate()
+                .find_map(|(word, first)| {
+                    let union = corners
+                        .iter()
+                        .fold(0, |all, &p| all | taken[p as usize][word]);
+                    (union != u128::MAX).then(|| (word, first, union.trailing_ones()))
+                });
+            let (word, first, bit) = free.expect("a tet has fewer neighbors than there are steps");
             for p in corners {
-                taken[p as usize] |= 1 << step;
+                taken[p as usize][word] |= 1 << bit;
             }
+            let step = index(first) + bit;
             steps.push((step, tet, corners));
         }
         steps.sort_unstable();
@@ -67,13 +87,13 @@ impl Tile {
         self.tets.iter().copied()
     }
 
-    /// What the device knows of it.
-    pub(crate) fn numbers(&self) -> [u32; TILE_NUMBERS] {
-        let mut numbers = [0; TILE_NUMBERS];
+    /// What the device knows of it, in a tile with room for so many tets.
+    pub(crate) fn numbers(&self, room: usize) -> Vec<u32> {
+        let mut numbers = vec![0; number_count(room)];
         numbers[0] = index(self.ends.len());
         numbers[1] = index(self.particles.len());
         numbers[2..2 + self.ends.len()].copy_from_slice(&self.ends);
-        let particles = &mut numbers[2 + TILE_TETS..];
+        let particles = &mut numbers[2 + room..];
         particles[..self.particles.len()].copy_from_slice(&self.particles);
         numbers
     }
@@ -91,23 +111,27 @@ mod tests {
 
     #[test]
     fn a_fan_needs_a_step_for_each_tet() {
-        let tets: Vec<u32> = (0..128).collect();
+        let tets: Vec<u32> = (0..256).collect();
         let tile = Tile::new(&tets, |t| [0, 3 * t + 1, 3 * t + 2, 3 * t + 3]);
-        assert_eq!(tile.ends, (1..=128).collect::<Vec<u32>>());
-        assert_eq!(tile.particles.len(), 3 * 128 + 1);
+        assert_eq!(tile.ends, (1..=256).collect::<Vec<u32>>());
+        assert_eq!(tile.particles.len(), 3 * 256 + 1);
     }
 
     #[test]
     fn tets_apart_need_one_step_and_all_particles() {
-        let tets: Vec<u32> = (0..128).collect();
-        let tile = Tile::new(&tets, |t| [0, 1, 2, 3].map(|k| 4 * t + k));
-        assert_eq!((tile.ends.len(), tile.particles.len()), (1, TILE_PARTICLES));
+        for room in ROOMS {
+            assert_eq!((room_for(room), room_for(room - 1)), (room, room));
+            let tets: Vec<u32> = (0..index(room)).collect();
+            let tile = Tile::new(&tets, |t| [0, 1, 2, 3].map(|k| 4 * t + k));
+            assert_eq!((tile.ends.len(), tile.particles.len()), (1, 4 * room));
+            assert_eq!(tile.numbers(room).len(), number_count(room));
+        }
     }
 
     proptest! {
         #[test]
         fn steps_are_proper_and_hold_every_tet(
-            corners in prop::collection::vec(prop::array::uniform4(0..30u32), 0..128)
+            corners in prop::collection::vec(prop::array::uniform4(0..30u32), 0..256)
         ) {
             let corners: Vec<[u32; 4]> = corners
                 .into_iter()

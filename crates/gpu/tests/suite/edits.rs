@@ -322,7 +322,7 @@ fn a_refused_step_loses_no_edits() {
         solver.replace_tet(7, solver.tet_particles(7), mesh.corners(TetId::new(8)));
     });
     // Of another body, refused for the size of its clusters.
-    let (other, _) = schedules(&kuhn_box([4, 4, 4], DVec3::ONE), "pressure:200");
+    let (other, _) = schedules(&kuhn_box([5, 5, 4], DVec3::ONE), "pressure:300");
     let error = twins.device.step(&other, &settings());
     assert!(matches!(error, Err(GpuError::Block { .. })));
     for _ in 0..3 {

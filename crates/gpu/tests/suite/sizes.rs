@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use incise_gpu::{Form, GpuSolver};
-use incise_graph::{Clustering, ColorId, Coloring, Incidence, Schedule};
+use incise_graph::{ClusterId, Clustering, ColorId, Coloring, Incidence, Schedule};
 use incise_xpbd::{Solver, StepSettings};
 use proptest::prelude::*;
 
@@ -92,22 +92,28 @@ fn threads_and_workgroups_of_all_sizes() {
     }
 }
 
+/// So many tets around particle 0 that share nothing else.
+fn fan(count: u32) -> (Vec<DVec3>, Vec<[u32; 4]>) {
+    let mut positions = vec![DVec3::ZERO];
+    for t in 0..count {
+        let angle = f64::from(t) * std::f64::consts::TAU / f64::from(count);
+        let (sin, cos) = angle.sin_cos();
+        let across = DVec3::new(-sin, cos, 0.0) * 0.02;
+        let out = DVec3::new(cos, sin, 0.0);
+        positions.extend([out - across, out + across, out + DVec3::Z * 0.3]);
+    }
+    let tets: Vec<[u32; 4]> = (0..count)
+        .map(|t| [0, 3 * t + 1, 3 * t + 2, 3 * t + 3])
+        .collect();
+    (positions, tets)
+}
+
 /// All tets on one particle: as many colors as tets, and all of them in one dispatch.
 #[test]
 fn a_fan_has_a_color_for_each_tet() {
     let test = "a_fan_has_a_color_for_each_tet";
     for count in [64u32, 360] {
-        let mut positions = vec![DVec3::ZERO];
-        for t in 0..count {
-            let angle = f64::from(t) * std::f64::consts::TAU / f64::from(count);
-            let (sin, cos) = angle.sin_cos();
-            let across = DVec3::new(-sin, cos, 0.0) * 0.02;
-            let out = DVec3::new(cos, sin, 0.0);
-            positions.extend([out - across, out + across, out + DVec3::Z * 0.3]);
-        }
-        let tets: Vec<[u32; 4]> = (0..count)
-            .map(|t| [0, 3 * t + 1, 3 * t + 2, 3 * t + 3])
-            .collect();
+        let (positions, tets) = fan(count);
         let colors: Vec<u32> = (0..count).collect();
         for form in [Form::Threads, Form::Workgroups] {
             compare(test, || solver(&positions, &tets, 1), &colors, form);
@@ -170,6 +176,32 @@ proptest! {
         let colors: Vec<u32> = coloring.colors().iter().map(|color| color.0).collect();
         for form in [Form::Threads, Form::Workgroups] {
             compare("random_bodies", || solver(&positions, &tets, pinned), &colors, form);
+        }
+    }
+}
+
+/// A fan of as many tets as a tile of each size holds, and one more: a step for each tet, in one tile.
+#[test]
+fn tiles_full_to_the_last_step() {
+    let Some(gpu) = gpu("tiles_full_to_the_last_step") else {
+        return;
+    };
+    for count in [63u32, 64, 65, 128, 129, 255, 256] {
+        let (positions, tets) = fan(count);
+        let together = Clustering::from_labels(vec![ClusterId(0); tets.len()]).unwrap();
+        let schedule = Schedule::new(&together, &Coloring::new(vec![ColorId(0)]));
+        let make = || solver(&positions, &tets, 1);
+        let (mut twin, mut device) = (
+            make(),
+            GpuSolver::new(share(gpu), make(), Form::Workgroups).unwrap(),
+        );
+        twin.step(&schedule, &settings()).unwrap();
+        device.step(&schedule, &settings()).unwrap();
+        device.check(&schedule).unwrap();
+        let host = device.host().unwrap();
+        for p in 0..twin.particle_count() {
+            let far = host.position(p).distance(twin.position(p));
+            assert!(far < 1e-5, "{count} tets: particle {p} is {far} off");
         }
     }
 }

@@ -309,12 +309,12 @@ fn a_cluster_that_is_too_large_for_a_tile_is_an_error() {
     let Some(gpu) = gpu("a_cluster_that_is_too_large_for_a_tile_is_an_error") else {
         return;
     };
-    let mesh = kuhn_box([4, 4, 4], DVec3::ONE);
-    let (schedule, _) = schedules(&mesh, "pressure:200");
+    let mesh = kuhn_box([5, 5, 4], DVec3::ONE);
+    let (schedule, _) = schedules(&mesh, "pressure:300");
     let mut device = GpuSolver::new(share(gpu), body(&mesh, &[SOFT]), Form::Workgroups).unwrap();
     let error = device.step(&schedule, &settings()).unwrap_err();
     assert!(
-        matches!(error, incise_gpu::GpuError::Block { limit: 128, .. }),
+        matches!(error, incise_gpu::GpuError::Block { limit: 256, .. }),
         "{error}"
     );
 }
@@ -339,7 +339,9 @@ fn lavapipe_gives_the_same_bits() {
     for materials in [&[SOFT][..], &[SOFT, stiff]] {
         for (method, form) in [
             ("serial:10", Form::Threads),
+            ("pressure:64", Form::Workgroups),
             ("pressure:128", Form::Workgroups),
+            ("pressure:256", Form::Workgroups),
         ] {
             for solving in [Solving::Block, Solving::Sequential] {
                 let settings = StepSettings {

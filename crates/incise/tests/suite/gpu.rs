@@ -235,7 +235,7 @@ fn a_report_fetches_what_it_needs() {
 fn what_a_device_does_not_do_is_refused_and_auto_goes_elsewhere() {
     let mut doubled = scene(200, "serial:10");
     doubled.solver.precision = Precision::F64;
-    let large = scene(200, "pressure:200");
+    let large = scene(200, "pressure:300");
     for (mut scene, field) in [(doubled, "solver.precision"), (large, "solver.clustering")] {
         scene.solver.backend = Backend::Gpu;
         let error = Simulation::new(&scene).unwrap_err();
