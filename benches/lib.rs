@@ -26,8 +26,8 @@ pub const BLADE_STEP: f64 = 0.05;
 /// Where a mesh comes from.
 #[derive(Clone, Debug)]
 pub enum Source {
-    /// The generated liver with about this many tets: irregular degrees, as bodies have.
-    Liver(usize),
+    /// A generated shape with about this many tets: irregular degrees, as bodies have.
+    Shape(Shape, usize),
     /// A Kuhn grid with this many cells a side: all inner degrees equal, the friendliest case there is.
     Grid(usize),
     /// A mesh file.
@@ -42,7 +42,7 @@ impl Source {
     #[must_use]
     pub fn mesh(&self) -> TetMesh {
         match self {
-            Self::Liver(tets) => generate(Shape::Liver, *tets).unwrap(),
+            Self::Shape(shape, tets) => generate(*shape, *tets).unwrap(),
             Self::Grid(cells) => kuhn_box([*cells; 3], DVec3::ONE),
             Self::File(path) => io::read(path).unwrap(),
         }
@@ -160,8 +160,8 @@ pub fn run_with(
             case: &case,
         });
     };
-    measure(Case::new("liver-11k", Source::Liver(11_000)));
-    measure(Case::new("liver-50k", Source::Liver(50_000)));
+    measure(Case::new("liver-11k", Source::Shape(Shape::Liver, 11_000)));
+    measure(Case::new("liver-50k", Source::Shape(Shape::Liver, 50_000)));
     measure(Case::new("grid-10k", Source::Grid(12)));
     if !std::env::args().any(|argument| argument == "--test") {
         for (name, source) in large {

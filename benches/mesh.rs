@@ -1,17 +1,53 @@
 //! Meshes: generating, checking, their surface and pieces, and VTK files (on the disk of the temporary folder).
+//!
+//! Ten bodies are generated at sizes up to a million tets. Nothing else is measured on these.
 
 // The same reason as in the library.
 #![expect(clippy::unwrap_used, reason = "benches stop at the first surprise")]
 
+use incise::mesh::generate::Shape;
 use incise::mesh::io;
 use incise_benches::Source;
 
+const BODIES: [Shape; 10] = [
+    Shape::Liver,
+    Shape::Bunny,
+    Shape::Armadillo,
+    Shape::Torus,
+    Shape::Gear,
+    Shape::Shell,
+    Shape::Plate,
+    Shape::Sphere,
+    Shape::Beam,
+    Shape::Pair,
+];
+
+const SIZES: [(&str, usize); 4] = [
+    ("5k", 5_000),
+    ("50k", 50_000),
+    ("500k", 500_000),
+    ("1M", 1_000_000),
+];
+
 fn main() {
     let folder = tempfile::tempdir().unwrap();
-    incise_benches::run("mesh", |bench| {
+    let mut bodies = Vec::new();
+    for (size, tets) in SIZES {
+        bodies.extend(
+            BODIES.map(|shape| (format!("body-{shape}-{size}"), Source::Shape(shape, tets))),
+        );
+    }
+    let bodies: Vec<_> = bodies
+        .iter()
+        .map(|(name, source)| (name.as_str(), source.clone()))
+        .collect();
+    incise_benches::run_with("mesh", &bodies, |bench| {
         let case = bench.case;
         if !matches!(case.source, Source::File(_)) {
             bench.measure("generate", |b| b.iter(|| case.source.mesh()));
+        }
+        if case.name.starts_with("body-") {
+            return;
         }
         bench.measure("check", |b| b.iter(|| case.mesh.check_report()));
         bench.measure("surface", |b| b.iter(|| case.mesh.surface()));

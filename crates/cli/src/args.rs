@@ -162,7 +162,7 @@ pub(crate) enum MeshCommand {
     /// Generate a shape of longest side 1.
     #[command(after_help = "Example: incise mesh generate torus --tets 5000 torus.vtk")]
     Generate {
-        /// box, beam, sphere, torus, plate or liver.
+        /// box, beam, sphere, torus, plate, liver, bunny, armadillo, gear, shell or pair.
         shape: String,
         /// Wanted number of tets; the result is within 2%.
         #[arg(long, value_name = "N")]

@@ -280,7 +280,7 @@ pub struct BodySpec {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ShapeSpec {
-    /// `box`, `beam`, `sphere`, `torus`, `liver` or `plate`.
+    /// `box`, `beam`, `sphere`, `torus`, `plate`, `liver`, `bunny`, `armadillo`, `gear`, `shell` or `pair`.
     pub kind: String,
     /// Wanted number of tets; the result is within 2%.
     pub tets: usize,

@@ -6,7 +6,7 @@
 //!
 //! Source: R. E. Tarjan and J. van Leeuwen, "Worst-case Analysis of Set Union Algorithms", 1984.
 
-use crate::faces::{by_face, sorted_sides};
+use crate::faces::{Side, by_face, sorted_sides};
 use crate::{TetId, TetMesh};
 
 /// The piece each tet belongs to.
@@ -56,8 +56,13 @@ impl TetMesh {
     /// From 2³⁰ tets on.
     #[must_use]
     pub fn face_pieces(&self) -> Pieces {
+        self.face_pieces_of(&sorted_sides(&self.tets, |_| true))
+    }
+
+    /// The pieces connected by faces, from the sorted sides of all tets.
+    pub(crate) fn face_pieces_of(&self, sides: &[Side]) -> Pieces {
         let mut sets = Sets::new(self.tets.len());
-        for face in by_face(&sorted_sides(&self.tets, |_| true)) {
+        for face in by_face(sides) {
             for pair in face.windows(2) {
                 sets.unite(pair[0].tet().0, pair[1].tet().0);
             }

@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 
-use crate::faces::{by_face, outward_face, sorted_sides};
+use crate::faces::{Side, by_face, outward_face, sorted_sides};
 use crate::pieces::Sets;
 use crate::{ParticleId, TetId, TetMesh};
 
@@ -37,8 +37,12 @@ impl TetMesh {
     /// ```
     #[must_use]
     pub fn surface(&self) -> Surface {
-        let sides = sorted_sides(&self.tets, |_| true);
-        let mut boundary: Vec<u32> = by_face(&sides)
+        self.surface_of(&sorted_sides(&self.tets, |_| true))
+    }
+
+    /// The boundary, from the sorted sides of all tets.
+    pub(crate) fn surface_of(&self, sides: &[Side]) -> Surface {
+        let mut boundary: Vec<u32> = by_face(sides)
             .filter(|sides| sides.len() == 1)
             .map(|sides| sides[0].place())
             .collect();

@@ -6,4 +6,5 @@ mod given;
 mod medit;
 mod msh;
 mod shapes;
+mod sizes;
 mod tetrahedralize;

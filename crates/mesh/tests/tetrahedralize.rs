@@ -97,7 +97,7 @@ fn overlapping_shells_and_holes() {
     assert_eq!(shell.winding_number(DVec3::ZERO), 0);
     assert_eq!(shell.winding_number(dvec3(0.4, 0.0, 0.0)), 1);
     assert!((shell.volume() / one - 7.0 / 8.0).abs() < 1e-12);
-    let body = tetrahedralize(&shell, 5_000).unwrap();
+    let body = tetrahedralize(&shell, 5_000, 0).unwrap();
     body.check().unwrap();
     assert_eq!(body.surface().euler_characteristic(), 4);
     assert!(body.surface().is_manifold());
@@ -183,7 +183,7 @@ fn what_has_no_inside_is_refused_by_its_first_edge() {
 
     let solid = Solid::new(&cube()).unwrap();
     for tets in [0, 99, 5_000_000] {
-        let refused = tetrahedralize(&solid, tets).unwrap_err().to_string();
+        let refused = tetrahedralize(&solid, tets, 0).unwrap_err().to_string();
         assert!(refused.contains("ask for 100 to 4000000"), "{refused}");
     }
 }
@@ -269,7 +269,7 @@ fn shapes_are_filled_anew() {
     for shape in [Shape::Liver, Shape::Torus, Shape::Beam] {
         let surface = TriangleSurface::from(&generate(shape, 2_000).unwrap());
         let solid = Solid::new(&surface).unwrap();
-        let mesh = tetrahedralize(&solid, 5_000).unwrap();
+        let mesh = tetrahedralize(&solid, 5_000, 0).unwrap();
         fills(&solid, &mesh, 5_000, lost);
         assert!(missed(&solid, &surface, &mesh) < 1.0, "{shape}");
         let euler = mesh.surface().euler_characteristic();
@@ -292,7 +292,7 @@ fn surfaces_of_given_meshes() {
         let given = io::read(folder.join(name).with_extension("vtk")).unwrap();
         let surface = TriangleSurface::from(&given);
         let solid = Solid::new(&surface).unwrap();
-        let mesh = tetrahedralize(&solid, tets).unwrap();
+        let mesh = tetrahedralize(&solid, tets, 0).unwrap();
         fills(&solid, &mesh, tets, 0.02);
         let missed = missed(&solid, &surface, &mesh);
         assert!(
@@ -318,4 +318,16 @@ fn cones_that_touch_at_a_lattice_vertex_come_apart() {
     assert!(mesh.surface().is_manifold());
     mesh.check().unwrap();
     assert_eq!(mesh.split_pinches(), 0);
+}
+
+#[test]
+fn a_graded_inside_leaves_more_tets_for_the_surface() {
+    let surface = TriangleSurface::from(&generate(Shape::Sphere, 4_000).unwrap());
+    let solid = Solid::new(&surface).unwrap();
+    let [uniform, graded] = [0, 4].map(|levels| tetrahedralize(&solid, 60_000, levels).unwrap());
+    for mesh in [&uniform, &graded] {
+        fills(&solid, mesh, 60_000, 0.02);
+    }
+    let triangles = |mesh: &TetMesh| mesh.surface().triangles.len();
+    assert!(triangles(&graded) > triangles(&uniform) * 5 / 4);
 }

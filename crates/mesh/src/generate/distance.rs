@@ -27,6 +27,23 @@ pub(super) fn ellipsoid(p: DVec3, center: DVec3, radii: DVec3) -> f64 {
     (((p - center) / radii).length() - 1.0) * radii.min_element()
 }
 
+/// A ball that moves from one end to the other while its radius changes evenly. Exact.
+///
+/// The nearest ball on the way is where the line to its center leans by the slope of the radius, unless that lies beyond
+/// an end; the ends must be farther apart than their radii differ.
+pub(super) fn round_cone(p: DVec3, [from, to]: [DVec3; 2], [first, last]: [f64; 2]) -> f64 {
+    let axis = to - from;
+    let length = axis.length();
+    let along = (p - from).dot(axis) / length;
+    let aside = ((p - from).length_squared() - along * along)
+        .max(0.0)
+        .sqrt();
+    let slope = (first - last) / length;
+    let center = (along - aside * slope / (1.0 - slope * slope).sqrt()).clamp(0.0, length);
+    let lead = along - center;
+    (lead * lead + aside * aside).sqrt() - (first - slope * center)
+}
+
 /// The union of two solids with the crease between them filled over a width of about `k`.
 pub(super) fn smooth_union(a: f64, b: f64, k: f64) -> f64 {
     let overlap = (k - (a - b).abs()).max(0.0);
@@ -35,5 +52,10 @@ pub(super) fn smooth_union(a: f64, b: f64, k: f64) -> f64 {
 
 /// The first solid without the second, the new edge rounded over a width of about `k`.
 pub(super) fn smooth_difference(a: f64, b: f64, k: f64) -> f64 {
-    -smooth_union(-a, b, k)
+    smooth_intersection(a, -b, k)
+}
+
+/// What two solids share, the new edge rounded over a width of about `k`.
+pub(super) fn smooth_intersection(a: f64, b: f64, k: f64) -> f64 {
+    -smooth_union(-a, -b, k)
 }

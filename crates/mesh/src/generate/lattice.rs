@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use crate::MeshError;
 
-/// Cells a lattice may have: the tables then take about 5 GiB.
+/// Cells a lattice may have: the tables then take about 2 GiB.
 const MAX_CELLS: usize = 1 << 26;
 
 /// Cubic cells whose corners and centers are the vertices of a body-centered cubic lattice.

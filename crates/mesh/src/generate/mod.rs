@@ -4,10 +4,13 @@
 //! same bits on every platform.
 
 mod distance;
+mod doubled;
 mod grid;
 mod lattice;
+mod neighbors;
 mod search;
 mod shapes;
+mod solids;
 mod stencil;
 mod stuffing;
 mod tetrahedralize;
@@ -16,5 +19,5 @@ pub use grid::kuhn_box;
 pub use lattice::Lattice;
 pub use search::generate;
 pub use shapes::Shape;
-pub use stuffing::stuff;
+pub use stuffing::{stuff, stuff_graded};
 pub use tetrahedralize::tetrahedralize;

@@ -4,29 +4,31 @@
 //! wanted number of tets comes out, and filled by the stencils of the module `stencil`. Edges and corners come out beveled
 //! over about a spacing, and parts thinner than that are lost or torn: every point of the result lies within a spacing of
 //! the surface, but not the other way around. A curved surface loses volume, as its chords lie inside. Dihedral angles
-//! keep the bound of [`stuff`] whatever the surface. Where the body would touch itself at a single particle it is taken
+//! keep the bound of [`stuff`](super::stuff) whatever the surface. Where the body would touch itself at a single particle it is taken
 //! apart there; where it still touches itself along an edge, another place of the lattice is tried.
 //!
 //! Cost: some three to ten stuffings, each two samples a cell of the box around the surface at O(log n) for n triangles.
 
 use glam::{DMat3, DVec3};
 
-use super::search::{cube_root, shift, turned};
-use super::{Lattice, stuff};
+use super::search::{Wanted, cube_root, find_grid, shift, turned};
 use crate::io::TriangleSurface;
 use crate::{MeshError, Solid, TetMesh};
 
+/// The distance that is told from far, in cube roots of the volume of a tet.
+const REACH: f64 = 16.0;
 /// Places of the lattice that are tried, along the axes and turned.
 const SHIFTS: u32 = 6;
-/// Spacings that are tried with one.
-const SPACINGS: u32 = 16;
 /// The fewest and most tets that can be asked for.
 const TETS: std::ops::RangeInclusive<usize> = 100..=4_000_000;
 
 /// Fills a solid with `tets` tets to within 2 %.
 ///
+/// `levels` says how often cells far enough inside may be doubled: 0 makes all tets alike, and each level more takes
+/// tets from the inside for finer ones at the surface, see [`stuff_graded`](super::stuff_graded).
+///
 /// The mesh is sound ([`TetMesh::check`]) and its boundary a closed manifold. All dihedral angles lie between 9.3 and
-/// 161.7 degrees, see [`stuff`]. Pieces and handles are those of the solid as far as the spacing resolves them. The same
+/// 161.7 degrees, see [`stuff`](super::stuff). Pieces and handles are those of the solid as far as the spacing resolves them. The same
 /// bits come out on every platform.
 ///
 /// # Errors
@@ -42,13 +44,13 @@ const TETS: std::ops::RangeInclusive<usize> = 100..=4_000_000;
 /// let liver = generate(Shape::Liver, 3_000)?;
 /// let surface = TriangleSurface { triangles: liver.surface().triangles, positions: liver.positions };
 /// let solid = Solid::new(&surface)?;
-/// let mesh = tetrahedralize(&solid, 8_000)?;
+/// let mesh = tetrahedralize(&solid, 8_000, 0)?;
 /// assert!(mesh.tets.len().abs_diff(8_000) <= 160);
 /// assert!(mesh.surface().is_manifold());
 /// assert!((mesh.total_volume() / solid.volume() - 1.0).abs() < 0.02);
 /// # Ok::<(), incise_mesh::MeshError>(())
 /// ```
-pub fn tetrahedralize(solid: &Solid, tets: usize) -> Result<TetMesh, MeshError> {
+pub fn tetrahedralize(solid: &Solid, tets: usize, levels: u32) -> Result<TetMesh, MeshError> {
     if !TETS.contains(&tets) {
         return Err(MeshError::Surface(format!(
             "{tets} tets were asked for, ask for {} to {}",
@@ -59,7 +61,7 @@ pub fn tetrahedralize(solid: &Solid, tets: usize) -> Result<TetMesh, MeshError> 
     let mut touching = false;
     for turn in [DMat3::IDENTITY, turned()] {
         for n in 0..SHIFTS {
-            match search(solid, tets, turn, shift(n))? {
+            match search(solid, tets, levels, turn, shift(n))? {
                 Found::Body(mesh) => return Ok(mesh),
                 Found::TouchesItself => touching = true,
                 Found::Nothing => {}
@@ -89,40 +91,36 @@ enum Found {
     Nothing,
 }
 
-/// Looks for a spacing that gives the wanted number of tets on a lattice turned and shifted in a given way.
-fn search(solid: &Solid, tets: usize, turn: DMat3, shift: DVec3) -> Result<Found, MeshError> {
+/// Fills the solid on a lattice turned and shifted in a given way.
+fn search(
+    solid: &Solid,
+    tets: usize,
+    levels: u32,
+    turn: DMat3,
+    shift: DVec3,
+) -> Result<Found, MeshError> {
     let center = solid.low().midpoint(solid.high());
     // The box around the solid as seen along the axes of the lattice.
     let half = turn.transpose().abs() * (0.5 * (solid.high() - solid.low()));
     let place = |p: DVec3| center + turn * p;
-    let (mut fine, mut coarse) = (0.0, f64::INFINITY);
-    let mut spacing = cube_root(12.0 * solid.volume() / tets as f64);
-    for _ in 0..SPACINGS {
-        let lattice = Lattice::covering(-half, half, spacing, shift)?;
-        // Edges of the lattice are no longer than a spacing, so no sample farther away matters.
-        let distance = |p| solid.signed_distance_within(place(p), 1.5 * spacing);
-        let mut mesh = stuff(&lattice, distance)?;
-        let count = mesh.tets.len();
-        if 50 * count.abs_diff(tets) <= tets {
-            mesh.positions.iter_mut().for_each(|p| *p = place(*p));
-            mesh.split_pinches();
-            return Ok(if mesh.surface().is_manifold() {
-                Found::Body(mesh)
-            } else {
-                Found::TouchesItself
-            });
-        }
-        *(if count > tets { &mut fine } else { &mut coarse }) = spacing;
-        if coarse - fine < 1e-4 * spacing {
-            break;
-        }
-        let ratio = count.max(1) as f64 / tets as f64;
-        let guess = spacing * cube_root(ratio).clamp(0.5, 2.0);
-        spacing = if fine < guess && guess < coarse {
-            guess
-        } else {
-            0.5 * (fine + coarse)
-        };
-    }
-    Ok(Found::Nothing)
+    let wanted = Wanted {
+        tets,
+        volume: solid.volume(),
+        levels,
+    };
+    // Knowing more of the distance saves samples, but takes longer to find out.
+    let reach = REACH * cube_root(solid.volume() / tets as f64);
+    let distance = |p| solid.signed_distance_within(place(p), reach);
+    let Some((grid, count)) = find_grid(half, shift, &wanted, &distance)? else {
+        return Ok(Found::Nothing);
+    };
+    let mut mesh = grid.extract(count);
+    drop(grid);
+    mesh.positions.iter_mut().for_each(|p| *p = place(*p));
+    mesh.split_pinches();
+    Ok(if mesh.surface().is_manifold() {
+        Found::Body(mesh)
+    } else {
+        Found::TouchesItself
+    })
 }

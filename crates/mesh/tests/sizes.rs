@@ -1,0 +1,57 @@
+//! Ten bodies of 5,000 to 4,000,000 tets are sound: a sweep over shapes and sizes.
+
+use incise_mesh::generate::Shape;
+
+use crate::shapes::assert_sound;
+
+/// Organic, thin-limbed, of genus 1, with a void, flat, convex, long, and of two pieces.
+const BODIES: [Shape; 10] = [
+    Shape::Liver,
+    Shape::Bunny,
+    Shape::Armadillo,
+    Shape::Torus,
+    Shape::Gear,
+    Shape::Shell,
+    Shape::Plate,
+    Shape::Sphere,
+    Shape::Beam,
+    Shape::Pair,
+];
+
+#[test]
+fn ten_bodies_of_5_000_tets() {
+    for shape in BODIES {
+        assert_sound(shape, 5_000);
+    }
+}
+
+#[test]
+fn bodies_of_50_000_tets() {
+    for shape in [Shape::Bunny, Shape::Gear, Shape::Shell, Shape::Pair] {
+        assert_sound(shape, 50_000);
+    }
+}
+
+#[test]
+#[ignore = "ten seconds in release: cargo test --release -p incise-mesh -- --ignored ten_bodies_of_50"]
+fn ten_bodies_of_50_000_and_of_500_000_tets() {
+    for tets in [50_000, 500_000] {
+        for shape in BODIES {
+            assert_sound(shape, tets);
+        }
+    }
+}
+
+#[test]
+#[ignore = "fifteen seconds in release: cargo test --release -p incise-mesh -- --ignored a_million"]
+fn ten_bodies_of_a_million_tets() {
+    for shape in BODIES {
+        assert_sound(shape, 1_000_000);
+    }
+}
+
+#[test]
+#[ignore = "ten seconds in release: cargo test --release -p incise-mesh -- --ignored four_million"]
+fn an_armadillo_of_four_million_tets() {
+    assert_sound(Shape::Armadillo, 4_000_000);
+}
