@@ -3,14 +3,17 @@
 //! Only `+`, `-`, `*`, `/`, square root, minimum, maximum and absolute value are used, so that the same call gives the
 //! same bits on every platform.
 
+mod delaunay;
 mod distance;
 mod grid;
 mod lattice;
+mod random;
 mod search;
 mod shapes;
 mod stencil;
 mod stuffing;
 
+pub use delaunay::delaunay;
 pub use grid::kuhn_box;
 pub use lattice::Lattice;
 pub use search::generate;
