@@ -5,7 +5,9 @@
 
 mod delaunay;
 mod distance;
+mod fans;
 mod grid;
+mod irregular;
 mod lattice;
 mod random;
 mod search;
@@ -14,7 +16,9 @@ mod stencil;
 mod stuffing;
 
 pub use delaunay::delaunay;
+pub use fans::{copies, fan, star};
 pub use grid::kuhn_box;
+pub use irregular::irregular;
 pub use lattice::Lattice;
 pub use search::generate;
 pub use shapes::Shape;
