@@ -47,16 +47,16 @@ fn assert_promises(mesh: &TetMesh, shape: Shape, tets: usize) {
         50 * count.abs_diff(tets) <= tets,
         "{shape}: {count} for {tets}"
     );
-    mesh.check().unwrap();
+    mesh.check().expect("sound");
     assert_eq!((mesh.pieces().count, mesh.face_pieces().count), (1, 1));
     let surface = mesh.surface();
     assert!(surface.is_manifold());
     assert_eq!(surface.euler_characteristic(), shape.euler_characteristic());
     let quality = mesh.quality();
     assert!(
-        quality.min_dihedral > 11.5
-            && quality.max_dihedral < 168.5
-            && quality.worst_radius_ratio > 0.0999,
+        quality.min_dihedral > 14.4
+            && quality.max_dihedral < 165.6
+            && quality.worst_radius_ratio > 0.124,
         "{shape} {tets}: {quality:?}"
     );
     let mut used = vec![false; mesh.positions.len()];
@@ -76,25 +76,38 @@ fn all_shapes_and_sizes() {
     }
 }
 
+/// A row of the table in the docs of the module, and its bounds.
+#[expect(clippy::print_stderr, reason = "the table is made from it")]
+fn assert_irregular(shape: Shape, tets: usize) {
+    let mesh = irregular(shape, tets, 1).expect("in range");
+    assert_promises(&mesh, shape, tets);
+    let (mean, largest, degree, most) = irregularity(&mesh);
+    let quality = mesh.quality();
+    eprintln!(
+        "| {shape} | {} | {mean:.1}, {largest} | {degree:.1}, {most} | {:.1} to {:.1} | {:.3} |",
+        mesh.tets.len(),
+        quality.min_dihedral,
+        quality.max_dihedral,
+        quality.worst_radius_ratio
+    );
+    assert!((38..=54).contains(&largest), "{shape} {tets}: {largest}");
+    assert!((63.0..75.0).contains(&degree), "{shape} {tets}: {degree}");
+}
+
 #[test]
 fn as_irregular_as_other_meshes() {
-    eprintln!("shape tets: tets/particle mean max, degree mean max, dihedral, radius ratio");
-    for tets in [5_000, 28_000, 120_000] {
+    for tets in [5_000, 28_000] {
         for shape in [Shape::Sphere, Shape::Liver, Shape::Torus] {
-            let mesh = irregular(shape, tets, 1).unwrap();
-            assert_promises(&mesh, shape, tets);
-            let (mean, largest, degree, most) = irregularity(&mesh);
-            let quality = mesh.quality();
-            eprintln!(
-                "| {shape} | {} | {mean:.1}, {largest} | {degree:.1}, {most} | {:.2}..{:.1} | {:.3} |",
-                mesh.tets.len(),
-                quality.min_dihedral,
-                quality.max_dihedral,
-                quality.worst_radius_ratio
-            );
-            assert!((36..=56).contains(&largest), "{shape} {tets}: {largest}");
-            assert!((62.0..77.0).contains(&degree), "{shape} {tets}: {degree}");
+            assert_irregular(shape, tets);
         }
+    }
+}
+
+#[test]
+#[ignore = "takes several seconds without optimization"]
+fn large_and_as_irregular_as_other_meshes() {
+    for shape in [Shape::Sphere, Shape::Liver, Shape::Torus] {
+        assert_irregular(shape, 120_000);
     }
 }
 
@@ -114,7 +127,7 @@ fn the_seed_decides() {
             (h ^ n).wrapping_mul(0x0100_0000_01b3).rotate_left(23)
         })
     };
-    assert_eq!(bits(&a), 0, "{:#x}", bits(&a));
+    assert_eq!(bits(&a), 0x36b5_e0f5_d77e_d343, "{:#x}", bits(&a));
 }
 
 #[test]

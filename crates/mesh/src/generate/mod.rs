@@ -1,4 +1,5 @@
-//! Meshes from formulas: boxes on a grid, and smooth solids filled by isosurface stuffing.
+//! Meshes from formulas: boxes on a grid, smooth solids filled by isosurface stuffing, irregular ones by Delaunay
+//! tetrahedralization, and bodies with known answers.
 //!
 //! Only `+`, `-`, `*`, `/`, square root, minimum, maximum and absolute value are used, so that the same call gives the
 //! same bits on every platform.

@@ -267,3 +267,58 @@ fn index(count: usize) -> u32 {
         .filter(|&count| count < 1 << 30)
         .expect("fewer than 2^30 tets")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::generate::{fan, kuhn_box};
+    use crate::signed_volume;
+
+    #[test]
+    fn rings_and_stars_are_complete() {
+        let body = Body::new(fan(7));
+        let (mut ring, mut star) = (Ring::default(), Vec::new());
+        assert!(body.ring(3, [0, 1], &mut ring));
+        assert_eq!(ring.tets, [3, 4, 5, 6, 0, 1, 2]);
+        assert_eq!(ring.particles, [5, 6, 7, 8, 2, 3, 4]);
+        assert!(body.ring(3, [1, 0], &mut ring));
+        assert_eq!(ring.tets, [3, 2, 1, 0, 6, 5, 4]);
+        assert!(!body.ring(3, [0, 2], &mut ring));
+        body.star(1, &mut star);
+        star.sort_unstable();
+        assert_eq!(star, [0, 1, 2, 3, 4, 5, 6]);
+        assert!(body.on_surface.iter().all(|&on| on));
+    }
+
+    #[test]
+    fn edges_are_removed_and_faces_put_back() {
+        // Three tets around an edge are two on a face.
+        let mut body = Body::new(fan(3));
+        body.replace(&[0, 1, 2], &[[2, 3, 4, 1], [2, 4, 3, 0]]);
+        assert!(
+            (0..body.end())
+                .filter_map(|t| body.tet(t))
+                .all(|t| signed_volume(body.corners(t)) > 0.0)
+        );
+        let live: Vec<u32> = (0..body.end()).filter(|&t| body.tet(t).is_some()).collect();
+        body.replace(&live, &[[0, 1, 2, 3], [0, 1, 3, 4], [0, 1, 4, 2]]);
+        let mut mesh = body.into_mesh();
+        mesh.tets[1..].sort_unstable();
+        assert_eq!(mesh.positions, fan(3).positions);
+        assert_eq!(mesh.tets.len(), 3);
+        mesh.check().expect("sound");
+    }
+
+    #[test]
+    fn a_mesh_comes_out_as_it_went_in() {
+        let mesh = kuhn_box([3, 2, 2], DVec3::ONE);
+        let out = Body::new(mesh.clone()).into_mesh();
+        assert_eq!(out.positions, mesh.positions);
+        let sorted = |mesh: &TetMesh| {
+            let mut tets = mesh.tets.clone();
+            tets.sort_unstable();
+            tets
+        };
+        assert_eq!(sorted(&out), sorted(&mesh));
+    }
+}

@@ -1,7 +1,29 @@
 //! Irregular bodies: Delaunay meshes of random points, whose particles have as unequal numbers of tets as in meshes of
 //! other mesh generators.
 //!
-//! Lattice meshes have nearly equal numbers everywhere, which hides what makes coloring and clustering hard.
+//! Lattice meshes have nearly equal numbers everywhere (24 in stuffed ones), which hides what makes coloring and
+//! clustering hard. Here points are strewn over the surface and the inside of a solid (module `sample`) and joined
+//! ([`delaunay`]), the tets inside are kept (`carve`), and slivers are removed by local changes (`improve`). The number of
+//! tets is met by repeating that with other spacings and other points.
+//!
+//! Measured with seed 1 by the tests `as_irregular_as_other_meshes` and, for the last rows, the ignored
+//! `large_and_as_irregular_as_other_meshes`. For comparison, TetGen's meshes of a ball with 6,846, 27,755 and
+//! 118,411 tets have at most 42 to 44 tets at a particle, a mean degree of 65.3, 69.7 and 73.2, and smallest dihedral
+//! angles of 8 degrees. The degree of a tet is the number of tets it shares a particle with.
+//!
+//! | shape | tets | tets at a particle: mean, most | degree: mean, most | dihedral angles | radius ratio |
+//! |---|---|---|---|---|---|
+//! | sphere | 4,973 | 19.8, 40 | 67.0, 100 | 14.5 to 157.7 | 0.142 |
+//! | liver | 4,945 | 19.1, 42 | 65.8, 111 | 14.5 to 161.0 | 0.127 |
+//! | torus | 4,922 | 17.9, 44 | 64.3, 109 | 14.5 to 162.3 | 0.127 |
+//! | sphere | 27,986 | 22.1, 44 | 71.7, 111 | 14.5 to 159.1 | 0.129 |
+//! | liver | 27,955 | 21.6, 42 | 71.0, 110 | 14.5 to 161.5 | 0.128 |
+//! | torus | 27,953 | 20.8, 44 | 69.8, 111 | 14.5 to 161.8 | 0.126 |
+//! | sphere | 119,584 | 23.3, 48 | 74.1, 112 | 14.5 to 160.6 | 0.130 |
+//! | liver | 119,881 | 23.0, 50 | 73.8, 118 | 14.5 to 161.3 | 0.125 |
+//! | torus | 119,531 | 22.5, 48 | 72.9, 118 | 14.5 to 160.7 | 0.125 |
+//!
+//! Cost: linear in the number of tets, to the logarithm of sorting: 120,000 tets take one to three attempts of about half a second.
 
 mod body;
 mod carve;
@@ -19,11 +41,11 @@ use super::delaunay::{delaunay, morton_keys};
 use super::random::hash;
 use crate::{MeshError, TetId, TetMesh};
 
-/// The smallest sine of a dihedral angle, and half the smallest radius ratio times four: see [`irregular`].
-const QUALITY: f64 = 0.2;
-/// Passes over the bad tets; a dozen is the most that was seen to be used.
+/// The lower bound of the sines of dihedral angles, which is that of 14.47 degrees, and of twice the radius ratio.
+const QUALITY: f64 = 0.25;
+/// Passes over the bad tets before an attempt is given up.
 const PASSES: u64 = 40;
-/// Meshes that are made before giving up; small ones hit their number by chance.
+/// Attempts before giving up; small meshes meet their number by chance.
 const ATTEMPTS: u64 = 400;
 /// The largest number of tets that can be asked for.
 const LARGEST: usize = 1_000_000;
@@ -31,12 +53,13 @@ const LARGEST: usize = 1_000_000;
 /// A mesh of the shape with `tets` tets to within 2 %, as irregular as those of other mesh generators.
 ///
 /// The mesh is sound ([`TetMesh::check`]), a single piece also by faces, with a manifold surface of the shape's topology.
-/// All dihedral angles lie between 11.5 and 168.5 degrees, all radius ratios above 0.1. Particles come along a
-/// space-filling curve, tets by their lowest particle. Another `seed` gives another mesh of the same kind. Deterministic
+/// All dihedral angles lie between 14.4 and 165.6 degrees, all radius ratios above 0.124. Particles come along a
+/// space-filling curve, tets by their lowest particle. Sharp edges and corners of the shape stay sharp but for the spacing. Another `seed` gives another mesh of the same kind. Deterministic
 /// on all platforms.
 ///
 /// # Errors
-/// [`MeshError::TetCount`] for fewer than [`Shape::smallest_tet_count`] or more than a million tets.
+/// [`MeshError::TetCount`] for fewer than [`Shape::smallest_tet_count`] or more than a million tets, or when no attempt
+/// meets all promises.
 ///
 /// # Example
 /// ```
@@ -45,7 +68,7 @@ const LARGEST: usize = 1_000_000;
 /// let mesh = irregular(Shape::Torus, 2_000, 1)?;
 /// assert!(mesh.tets.len().abs_diff(2_000) <= 40);
 /// mesh.check()?;
-/// assert!(mesh.quality().min_dihedral > 11.5);
+/// assert!(mesh.quality().min_dihedral > 14.4);
 /// # Ok::<(), incise_mesh::MeshError>(())
 /// ```
 pub fn irregular(shape: Shape, tets: usize, seed: u64) -> Result<TetMesh, MeshError> {

@@ -17,11 +17,11 @@ use crate::generate::{Lattice, Shape};
 /// No entry in a list.
 const NONE: u32 = u32::MAX;
 /// Largest move of a lattice point along each axis, in spacings.
-const JITTER: f64 = 0.37;
+const JITTER: f64 = 0.33;
 /// Smallest distance between surface points, in spacings.
-const APART: f64 = 0.7;
+const APART: f64 = 0.65;
 /// Smallest distance of inner points from the surface, and from its points, in spacings.
-const DEPTH: f64 = 0.35;
+const DEPTH: f64 = 0.4;
 const FROM_SURFACE_POINTS: f64 = 0.6;
 /// Candidates for surface points along a spacing.
 const CANDIDATES: f64 = 3.0;
@@ -64,7 +64,7 @@ fn candidates(shape: Shape, spacing: f64, seed: u64) -> Result<Vec<DVec3>, MeshE
     for cell in 0..nx * ny * nz {
         let at = DVec3::from_array([cell % nx, cell / nx % ny, cell / nx / ny].map(|c| c as f64));
         let p = lattice.origin + fine * (at + 0.5 * in_cube(seed.wrapping_add(2), cell as u64));
-        if shape.signed_distance(p).abs() < 1.5 * fine
+        if shape.signed_distance(p).abs() < 2.5 * fine
             && let Some(p) = project(shape, p, spacing)
         {
             let random = hash(seed.wrapping_add(3), cell as u64);
@@ -178,5 +178,50 @@ impl Grid {
             }
         }
         false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn surface_points_are_on_the_surface_and_apart_without_gaps() {
+        for shape in Shape::ALL {
+            let spacing = 0.1;
+            let points = sample(shape, spacing, 5).expect("a lattice");
+            let on = |p: DVec3| shape.signed_distance(p).abs() < 1e-8;
+            let surface: Vec<DVec3> = points.iter().copied().filter(|&p| on(p)).collect();
+            for (n, p) in surface.iter().enumerate() {
+                assert!(
+                    surface[..n]
+                        .iter()
+                        .all(|q| q.distance(*p) >= APART * spacing)
+                );
+            }
+            for p in &points[surface.len()..] {
+                assert!(shape.signed_distance(*p) < 0.0);
+                let near = FROM_SURFACE_POINTS * spacing;
+                assert!(surface.iter().all(|q| q.distance(*p) >= near));
+            }
+            // Other places on the surface have a point near; the candidates are a third of a spacing apart.
+            for n in 0..500 {
+                let from = in_cube(9, n) * shape.half_extent();
+                if let Some(p) = project(shape, from, 1.0) {
+                    let nearest = surface.iter().map(|q| q.distance(p)).fold(1.0, f64::min);
+                    assert!(nearest < (APART + 0.5) * spacing, "{shape}: {nearest}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn corners_are_kept() {
+        let points = sample(Shape::Box, 0.2, 1).expect("a lattice");
+        for corner in 0..8 {
+            let side = |axis: u32| f64::from(corner >> axis & 1) - 0.5;
+            let corner = DVec3::new(side(0), side(1), side(2));
+            assert!(points.iter().any(|p| p.distance(corner) < 1e-6), "{corner}");
+        }
     }
 }
