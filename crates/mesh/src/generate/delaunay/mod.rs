@@ -4,8 +4,8 @@
 //! (module `order`). Expected cost: O(n log n) for points spread evenly, some microseconds a point; the output, and so
 //! the cost, is quadratic for the worst point sets, such as two skew lines.
 //!
-//! Own code, since no library fits: of the crates, `simple_delaunay_lib` promises nothing for degenerate points,
-//! `rita` builds a C++ library, and `delaunay`, for any dimension, brings more than fifty packages.
+//! Own code, since no library fits: of the crates, `simple_delaunay_lib` leaves undocumented what becomes of degenerate
+//! points, `rita` builds a C++ library, and `delaunay`, for any dimension, brings more than fifty packages.
 
 mod cells;
 mod order;
