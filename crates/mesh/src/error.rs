@@ -98,6 +98,10 @@ pub enum MeshError {
     #[error("the surface cannot be filled: {0}")]
     Surface(String),
 
+    /// Points that cannot be tetrahedralized.
+    #[error("the points cannot be filled with tetrahedra: {0}")]
+    Points(String),
+
     /// A lattice that cannot be laid out.
     #[error("the lattice cannot be laid out: {0}")]
     Lattice(String),

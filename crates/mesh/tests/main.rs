@@ -3,6 +3,7 @@
 mod faults;
 mod formats;
 mod given;
+mod irregular;
 mod medit;
 mod msh;
 mod shapes;
