@@ -42,7 +42,7 @@ const DIHEDRAL_COSINES: [f64; 2] = [-0.965_016, 0.982_613];
 ///
 /// let mesh = generate(Shape::Liver, 2_000)?;
 /// assert!(mesh.tets.len().abs_diff(2_000) <= 40);
-/// assert_eq!(mesh.face_pieces_of(&sides).count, 1);
+/// assert_eq!(mesh.face_pieces().count, 1);
 /// # Ok::<(), incise_mesh::MeshError>(())
 /// ```
 pub fn generate(shape: Shape, tets: usize) -> Result<TetMesh, MeshError> {
