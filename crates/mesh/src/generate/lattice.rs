@@ -80,6 +80,33 @@ impl Lattice {
                 ))
             })
     }
+
+    /// The number of cells along an axis.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_possible_wrap,
+        reason = "at most 2^26 cells"
+    )]
+    pub(super) fn limit(&self, axis: usize) -> i32 {
+        self.cells[axis] as i32
+    }
+
+    /// The coordinates of a vertex in half spacings. Vertex `2 c` is the low corner of cell `c`, `2 c + 1` its center.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_possible_wrap,
+        reason = "at most 2^26 cells"
+    )]
+    pub(super) fn coordinates(&self, vertex: usize) -> [i32; 3] {
+        let cell = vertex / 2;
+        let [nx, ny, _] = self.cells;
+        [cell % nx, cell / nx % ny, cell / nx / ny].map(|c| 2 * c as i32 + (vertex % 2) as i32)
+    }
+
+    /// Where a vertex with these coordinates in half spacings lies.
+    pub(super) fn position(&self, at: [i32; 3]) -> DVec3 {
+        self.origin + 0.5 * self.spacing * DVec3::from_array(at.map(f64::from))
+    }
 }
 
 /// Where the function is zero on the edge between an inside and an outside vertex, to about 1e-6 of its values there.

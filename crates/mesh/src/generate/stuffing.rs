@@ -212,8 +212,8 @@ impl Grid {
         vertex: usize,
         distance: &impl Fn(DVec3) -> f64,
     ) -> Result<(Side, f64), MeshError> {
-        let at = self.coordinates(vertex);
-        let position = self.lattice_position(at);
+        let at = self.lattice.coordinates(vertex);
+        let position = self.lattice.position(at);
         let value = distance(position);
         if !value.is_finite() {
             return Err(MeshError::Lattice(format!(
@@ -221,7 +221,7 @@ impl Grid {
             )));
         }
         // Vertices in the outermost layer lack neighbors.
-        let rim = (0..3).any(|axis| !(2..2 * self.limit(axis) - 2).contains(&at[axis]));
+        let rim = (0..3).any(|axis| !(2..2 * self.lattice.limit(axis) - 2).contains(&at[axis]));
         if rim && value <= 0.0 {
             let message = format!(
                 "the region reaches its rim at {position}, use a lattice with a cell to spare"
@@ -261,8 +261,8 @@ impl Grid {
             .map(|(vertex, direction)| {
                 let inside = vertex as usize;
                 let outside = self.neighbor(inside, direction);
-                let at = self.coordinates(inside);
-                let ends = [at, add(at, NEIGHBORS[direction])].map(|at| self.lattice_position(at));
+                let at = self.lattice.coordinates(inside);
+                let ends = [at, add(at, NEIGHBORS[direction])].map(|at| self.lattice.position(at));
                 root(ends, [values[inside], values[outside]], distance)
             })
             .collect();
@@ -293,8 +293,8 @@ impl Grid {
                 vertex, opposite, ..
             } = self.near[place];
             let vertex = vertex as usize;
-            let at = self.coordinates(vertex);
-            let position = self.lattice_position(at);
+            let at = self.lattice.coordinates(vertex);
+            let position = self.lattice.position(at);
             let mut nearest = (f64::INFINITY, NONE);
             for direction in directions(opposite) {
                 let neighbor = self.neighbor(vertex, direction);
@@ -397,7 +397,7 @@ impl Grid {
                 if ![center, above].iter().chain(&ring).any(inside) {
                     continue;
                 }
-                let at = self.coordinates(center);
+                let at = self.lattice.coordinates(center);
                 let corner = |way: usize, vertex| self.corner(add(at, NEIGHBORS[way]), vertex);
                 let [below, above] = [self.corner(at, center), corner(next, above)];
                 for i in 0..4 {
@@ -419,36 +419,12 @@ impl Grid {
         2 * (x + nx * (y + ny * z)) + (at[0] & 1) as usize
     }
 
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_possible_wrap,
-        reason = "at most 2^26 cells"
-    )]
-    fn limit(&self, axis: usize) -> i32 {
-        self.lattice.cells[axis] as i32
-    }
-
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_possible_wrap,
-        reason = "at most 2^26 cells"
-    )]
-    fn coordinates(&self, vertex: usize) -> [i32; 3] {
-        let cell = vertex / 2;
-        let [nx, ny, _] = self.lattice.cells;
-        [cell % nx, cell / nx % ny, cell / nx / ny].map(|c| 2 * c as i32 + (vertex % 2) as i32)
-    }
-
     fn corner(&self, at: [i32; 3], vertex: usize) -> Corner {
         Corner {
             vertex,
             at,
             side: self.sides[vertex],
         }
-    }
-
-    fn lattice_position(&self, at: [i32; 3]) -> DVec3 {
-        self.lattice.origin + 0.5 * self.lattice.spacing * DVec3::from_array(at.map(f64::from))
     }
 }
 
@@ -476,7 +452,7 @@ impl Output {
                     place => grid.near[place as usize].moved,
                 };
                 let position = match moved {
-                    NONE => grid.lattice_position(corner.at),
+                    NONE => grid.lattice.position(corner.at),
                     cut => grid.cuts[cut as usize],
                 };
                 (&mut self.vertices[corner.vertex], position)
