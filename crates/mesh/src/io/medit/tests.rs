@@ -1,5 +1,7 @@
 //! Both forms: what goes in comes out, other writers are read, broken files are refused.
 
+use std::fs;
+
 use proptest::prelude::*;
 
 use super::*;

@@ -25,13 +25,12 @@ mod write;
 
 pub use write::{MshKind, write_msh};
 
-use std::fs;
 use std::path::Path;
 
 use self::content::Content;
 use self::source::{Encoding, Source};
 use super::MeshFile;
-use super::text::show;
+use super::text::{load, show};
 use crate::MeshError;
 
 /// Reads the tets of a Gmsh file, versions 1, 2 and 4.1, text or binary, with regions and fields.
@@ -40,12 +39,7 @@ use crate::MeshError;
 /// As for [`read`](super::read); [`MeshError::ParseBytes`] for what is wrong in a binary file.
 pub fn read_msh(path: impl AsRef<Path>) -> Result<MeshFile, MeshError> {
     let path = path.as_ref();
-    let bytes = fs::read(path).map_err(|source| MeshError::Io {
-        action: "read",
-        path: path.to_owned(),
-        source,
-    })?;
-    parse_msh(&bytes, path)
+    parse_msh(&load(path)?, path)
 }
 
 /// The versions that are read.

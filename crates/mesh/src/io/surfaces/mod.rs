@@ -13,12 +13,12 @@ mod off;
 mod ply;
 mod stl;
 
-use std::fs;
 use std::path::Path;
 
 use glam::DVec3;
 
-use super::write_atomically;
+use super::text::load;
+use super::{ending, unknown, write_atomically};
 use crate::{MeshError, ParticleId};
 
 pub use ply::{PlyEncoding, write_ply};
@@ -60,19 +60,39 @@ const KNOWN: &str = ".obj, .stl, .ply, .off";
 /// ```
 pub fn read_surface(path: impl AsRef<Path>) -> Result<TriangleSurface, MeshError> {
     let path = path.as_ref();
-    let parse = match super::ending(path).as_str() {
+    let parse = parser(path)?;
+    parse(&load(path)?, path)
+}
+
+/// Reads a surface that is in memory: the content of a file in an archive or from a network. The ending of `path` names
+/// the format, and errors name the path; it need not exist.
+///
+/// # Errors
+/// As [`read_surface`], but [`MeshError::Io`].
+///
+/// # Example
+/// ```
+/// use incise_mesh::io;
+///
+/// let bytes = b"OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+/// assert_eq!(io::parse_surface("a.off", bytes)?.triangles.len(), 1);
+/// # Ok::<(), incise_mesh::MeshError>(())
+/// ```
+pub fn parse_surface(path: impl AsRef<Path>, bytes: &[u8]) -> Result<TriangleSurface, MeshError> {
+    let path = path.as_ref();
+    parser(path)?(bytes, path)
+}
+
+type Parser = fn(&[u8], &Path) -> Result<TriangleSurface, MeshError>;
+
+fn parser(path: &Path) -> Result<Parser, MeshError> {
+    Ok(match ending(path).as_str() {
         "obj" => obj::parse_obj,
         "stl" => stl::parse_stl,
         "ply" => ply::parse_ply,
         "off" => off::parse_off,
-        _ => return Err(unknown(path)),
-    };
-    let bytes = fs::read(path).map_err(|source| MeshError::Io {
-        action: "read",
-        path: path.to_owned(),
-        source,
-    })?;
-    parse(&bytes, path)
+        _ => return Err(unknown(path, KNOWN)),
+    })
 }
 
 /// Writes a surface, the format chosen by the ending of the file name: `.obj`, `.off` and `.stl` as text, `.ply` as
@@ -85,21 +105,14 @@ pub fn read_surface(path: impl AsRef<Path>) -> Result<TriangleSurface, MeshError
 /// For `.stl`, if a corner has no position.
 pub fn write_surface(path: impl AsRef<Path>, surface: &TriangleSurface) -> Result<(), MeshError> {
     let path = path.as_ref();
-    let write = match super::ending(path).as_str() {
+    let write = match ending(path).as_str() {
         "obj" => obj::write,
         "stl" => stl::write,
         "ply" => return write_ply(path, surface, PlyEncoding::LittleEndian),
         "off" => off::write,
-        _ => return Err(unknown(path)),
+        _ => return Err(unknown(path, KNOWN)),
     };
     write_atomically(path, |out| write(out, surface))
-}
-
-fn unknown(path: &Path) -> MeshError {
-    MeshError::UnknownFormat {
-        path: path.to_owned(),
-        known: KNOWN,
-    }
 }
 
 /// Adds the triangles of a polygon; points and lines have none.

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::super::text::{Text, Word, show, words_of};
+use super::super::text::{Text, Word, show, without_comment, words_of};
 use super::{TriangleSurface, fan};
 use crate::{MeshError, ParticleId};
 
@@ -34,14 +34,10 @@ pub(crate) fn parse_obj(bytes: &[u8], path: &Path) -> Result<TriangleSurface, Me
     let mut last_line = 1;
     for (line, content) in text.lines(1) {
         last_line = line;
-        let content = content.split(|&b| b == b'#').next().unwrap_or_default();
+        let content = without_comment(content);
         let content = content.trim_ascii_end();
         let continued = content.strip_suffix(b"\\");
-        words.extend(words_of(continued.unwrap_or(content)).map(|text| Word {
-            text,
-            line,
-            first: false,
-        }));
+        words.extend(words_of(continued.unwrap_or(content)).map(|text| Word::new(text, line)));
         if continued.is_some() {
             continue;
         }

@@ -1,6 +1,6 @@
 //! The lines with content of a TetGen file, and the numbers on them. Linear.
 
-use super::super::text::{Text, Word, show, words_of};
+use super::super::text::{Text, Word, show, without_comment, words_of};
 use crate::MeshError;
 
 /// A line with content.
@@ -17,11 +17,7 @@ impl<'t, I: Iterator<Item = &'t [u8]>> Row<'t, '_, I> {
             self.text
                 .error(line, format!("the line ends before {what}"))
         })?;
-        Ok(Word {
-            text,
-            line,
-            first: false,
-        })
+        Ok(Word::new(text, line))
     }
 
     pub(super) fn count(&mut self, what: &str) -> Result<usize, MeshError> {
@@ -32,10 +28,9 @@ impl<'t, I: Iterator<Item = &'t [u8]>> Row<'t, '_, I> {
     /// The same where older files have nothing.
     pub(super) fn count_or_0(&mut self, what: &str) -> Result<usize, MeshError> {
         let line = self.line;
-        self.words.next().map_or(Ok(0), |text| {
-            let first = false;
-            self.text.count(Word { text, line, first }, what)
-        })
+        self.words
+            .next()
+            .map_or(Ok(0), |text| self.text.count(Word::new(text, line), what))
     }
 
     /// Adds the attributes of element `i` to their columns, which element 0 makes.
@@ -78,8 +73,7 @@ pub(super) fn rows<'t, 'a>(
     text: &'t Text<'a>,
 ) -> impl Iterator<Item = Row<'t, 'a, impl Iterator<Item = &'t [u8]>>> {
     text.lines(1).filter_map(move |(line, content)| {
-        let content = content.split(|&b| b == b'#').next().unwrap_or_default();
-        let mut words = words_of(content).peekable();
+        let mut words = words_of(without_comment(content)).peekable();
         words.peek()?;
         Some(Row { text, words, line })
     })

@@ -6,10 +6,7 @@ use super::*;
 use crate::generate::kuhn_box;
 
 fn parse(nodes: &str, elements: &str) -> Result<MeshFile, MeshError> {
-    let text = Text::new(Path::new("a.node"), nodes.as_bytes());
-    parse_tetgen(&text, || {
-        Ok(Text::new(Path::new("a.ele"), elements.as_bytes()))
-    })
+    parse_tetgen("a.node", nodes.as_bytes(), elements.as_bytes())
 }
 
 fn scalars(name: &str, values: &[f64]) -> NamedValues {

@@ -4,7 +4,7 @@ use std::fmt::{self, Display};
 use std::path::Path;
 
 use super::super::{MeshFile, NamedValues, OwnedValues, write_atomically};
-use super::{MARKER, whole};
+use super::{MARKER, all_whole};
 use crate::{MeshError, TetMesh};
 
 /// Writes `.node` and `.ele` files with the stem of `path`, numbered from 0, with coordinates that keep every bit.
@@ -41,7 +41,7 @@ fn write_pair(
 ) -> Result<(), MeshError> {
     let scalars = |values: &NamedValues| matches!(values.values, OwnedValues::Scalars(_));
     let markers = particles.iter().find_map(|values| match &values.values {
-        OwnedValues::Scalars(scalars) if values.name == MARKER => whole(scalars),
+        OwnedValues::Scalars(scalars) if values.name == MARKER => all_whole(scalars),
         _ => None,
     });
     let of_particles: Vec<_> = particles

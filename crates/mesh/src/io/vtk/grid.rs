@@ -8,6 +8,7 @@
 
 use glam::DVec3;
 
+use crate::io::fields::whole;
 use crate::io::{MeshFile, NamedValues, OwnedValues};
 use crate::{MeshError, ParticleId, TetMesh};
 
@@ -135,16 +136,6 @@ fn take_regions(fields: &mut Vec<NamedValues>) -> Vec<i32> {
         }
     }
     Vec::new()
-}
-
-fn whole(value: f64) -> Option<i32> {
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "the cast saturates, and a value that changed is no whole number of 32 bits"
-    )]
-    let number = value as i32;
-    // By bits, so that -0 does not lose its sign.
-    (f64::from(number).to_bits() == value.to_bits()).then_some(number)
 }
 
 fn volume_name(kind: usize) -> &'static str {

@@ -72,11 +72,6 @@ pub(super) fn header<'t>(
                 });
             }
             [b"element", name, count] => {
-                let word = Word {
-                    text: count,
-                    line,
-                    first: false,
-                };
                 if [&b"vertex"[..], b"face"].contains(&name)
                     && elements.iter().any(|element| element.name == name)
                 {
@@ -85,7 +80,7 @@ pub(super) fn header<'t>(
                 elements.push(Element {
                     name,
                     line,
-                    count: text.count(word, "the number of elements")?,
+                    count: text.count(Word::new(count, line), "the number of elements")?,
                     properties: Vec::new(),
                 });
             }

@@ -2,6 +2,7 @@
 
 mod errors;
 
+use std::fs;
 use std::io::{self, Write};
 
 use proptest::prelude::*;
