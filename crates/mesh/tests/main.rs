@@ -4,5 +4,6 @@ mod faults;
 mod formats;
 mod given;
 mod medit;
+mod memory;
 mod msh;
 mod shapes;

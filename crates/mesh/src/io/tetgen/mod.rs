@@ -5,7 +5,8 @@
 //! programs write either kind, so that negative tets are turned on reading.
 //!
 //! Attributes have no names: they are called `attribute 1` and so on, and the markers of points `boundary marker`. The
-//! last attribute of tets is where TetGen puts the region: it is the region if it is a whole number for all. Linear.
+//! last attribute of tets is where TetGen puts the region: it is the region if it is a whole number for all. There may be
+//! 256 attributes at most. Linear.
 //!
 //! Source: H. Si, "TetGen User's Manual", file formats.
 
@@ -129,7 +130,7 @@ fn read_nodes(text: &Text<'_>) -> Result<Nodes, MeshError> {
             format!("the points have {dimension} coordinates instead of 3"),
         ));
     }
-    let attributes = header.count_or_0("the number of attributes")?;
+    let mut columns = header.columns(count)?;
     let marked = match header.count_or_0("whether there are markers")? {
         0 => false,
         1 => true,
@@ -139,7 +140,6 @@ fn read_nodes(text: &Text<'_>) -> Result<Nodes, MeshError> {
         }
     };
     let mut positions = Vec::with_capacity(text.room_for(count, 8));
-    let mut columns = Vec::new();
     let mut markers = Vec::new();
     let mut base = 0;
     for i in 0..count {
@@ -162,7 +162,7 @@ fn read_nodes(text: &Text<'_>) -> Result<Nodes, MeshError> {
             row.coordinate()?,
             row.coordinate()?,
         ));
-        row.attributes(attributes, i, &mut columns)?;
+        row.attributes(&mut columns)?;
         if marked {
             markers.push(f64::from(row.marker()?));
         }
@@ -192,9 +192,8 @@ fn read_tets(text: &Text<'_>, base: usize, particles: usize) -> Result<Elements,
             format!("the tets have {corners} points instead of 4 or 10"),
         ));
     }
-    let attributes = header.count_or_0("the number of attributes")?;
+    let mut columns = header.columns(count)?;
     let mut tets = Vec::with_capacity(text.room_for(count, 10));
-    let mut columns = Vec::new();
     for i in 0..count {
         let mut row = rows.next().ok_or_else(|| {
             text.ends_early(&format!("{count} tets announced but {i} found, more"))
@@ -214,7 +213,7 @@ fn read_tets(text: &Text<'_>, base: usize, particles: usize) -> Result<Elements,
         for _ in 4..corners {
             row.word("a point between")?;
         }
-        row.attributes(attributes, i, &mut columns)?;
+        row.attributes(&mut columns)?;
         tets.push(tet);
     }
     Ok((tets, columns))

@@ -57,6 +57,11 @@ fn errors_name_the_line() {
         (
             "4 3 2 1",
             "4 3 99999999999999 1",
+            "a.node:2: 99999999999999 attributes announced, 256 at most",
+        ),
+        (
+            "4 3 2 1",
+            "4 3 4 1",
             "a.node:3: the line ends before an attribute",
         ),
         (

@@ -118,6 +118,10 @@ pub(crate) fn parse_ply(bytes: &[u8], path: &Path) -> Result<TriangleSurface, Me
         if element.properties.is_empty() {
             continue;
         }
+        if element.name == b"vertex" {
+            let room = body.room_for(element);
+            surface.positions.reserve_exact(room);
+        }
         for _ in 0..element.count {
             let mut position = DVec3::ZERO;
             for property in &element.properties {
