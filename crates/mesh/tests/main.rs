@@ -6,4 +6,5 @@ mod given;
 mod medit;
 mod memory;
 mod msh;
+mod round_trips;
 mod shapes;
