@@ -4,6 +4,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::generate::kuhn_box;
+use crate::io::test_files::{cut, sample};
 
 fn parse(nodes: &str, elements: &str) -> Result<MeshFile, MeshError> {
     parse_tetgen("a.node", nodes.as_bytes(), elements.as_bytes())
@@ -94,6 +95,32 @@ fn errors_name_the_line() {
         let error = parse(NODES, to).expect_err(to).to_string();
         assert!(error.contains(expected), "{error} lacks {expected}");
     }
+}
+
+#[test]
+fn parts_of_either_file_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.node");
+    write_tetgen_file(&path, &sample()).unwrap();
+    let [nodes, elements] = ["node", "ele"].map(|e| std::fs::read(path.with_extension(e)).unwrap());
+    let whole = parse_tetgen("a", &nodes, &elements).unwrap();
+    // A file that ends within its last word is complete for all one can see: one value is another.
+    let last_word = |file: &[u8]| {
+        let text = file.trim_ascii_end();
+        1 + text.iter().rposition(u8::is_ascii_whitespace).unwrap()
+    };
+    let read = |part: &[u8]| parse_tetgen("a", part, &elements);
+    cut(&nodes, read, |end, part| {
+        let (same, i) = (&whole.mesh.positions, whole.mesh.positions.len() - 1);
+        end > last_word(&nodes)
+            && part.mesh.positions[..i] == same[..i]
+            && part.regions == whole.regions
+    });
+    let read = |part: &[u8]| parse_tetgen("a", &nodes, part);
+    cut(&elements, read, |end, part| {
+        end > last_word(&elements) && part.mesh == whole.mesh && part.tets == whole.tets
+    });
+    assert!(parse_tetgen("a", b"", &elements).is_err());
 }
 
 proptest! {
