@@ -51,7 +51,8 @@ const PLY: &str = "ply\nformat ascii 1.0\ncomment c\nelement vertex 3\nproperty 
     property float z\nproperty list uchar int more\nelement edge 1\nproperty int a\nelement face 1\n\
     property list uint8 int32 vertex_index\nend_header\n0 0 0 0\n1 0 0 1 7\n0 1 0 0\n3\n3 0 1 2\n";
 
-const OFF: &str = "COFF 3 2 0\n0 0 0 1 1 1 1\n1 0 0 1 1 1 1 # c\n0 1 0 1 1 1 1\n2 0 1\n3 0 1 2 0.5 0.5\n";
+const OFF: &str =
+    "COFF 3 2 0\n0 0 0 1 1 1 1\n1 0 0 1 1 1 1 # c\n0 1 0 1 1 1 1\n2 0 1\n3 0 1 2 0.5 0.5\n";
 
 fn main() -> Result<(), MeshError> {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus");
@@ -74,7 +75,9 @@ fn main() -> Result<(), MeshError> {
     io::write_file(path("vtu", "fields.vtu"), &file)?;
     put("vtu", "appended.vtu", VTU.as_bytes());
     put("vtu", "zlib.vtu", VTU_ZLIB.as_bytes());
-    let raw = VTU.replace("base64", "raw").replace("AQAAAAo=", "\u{1}\0\0\0\n");
+    let raw = VTU
+        .replace("base64", "raw")
+        .replace("AQAAAAo=", "\u{1}\0\0\0\n");
     put("vtu", "raw.vtu", raw.as_bytes());
 
     for (name, kind) in [
@@ -105,10 +108,7 @@ fn main() -> Result<(), MeshError> {
         1 10 1\n1 1 2 3 4 1 1 1 1 1 1 -7\n";
     put("tetgen", "ten", ten.as_bytes());
 
-    let surface = io::TriangleSurface {
-        triangles: file.mesh.surface().triangles,
-        positions: file.mesh.positions,
-    };
+    let surface = io::TriangleSurface::boundary_of(&file.mesh);
     for target in ["obj", "stl", "ply", "off"] {
         io::write_surface(path(target, &format!("box.{target}")), &surface)?;
     }

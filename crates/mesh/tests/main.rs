@@ -3,6 +3,7 @@
 mod faults;
 mod formats;
 mod given;
+mod gltf;
 mod medit;
 mod memory;
 mod msh;

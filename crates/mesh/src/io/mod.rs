@@ -8,6 +8,7 @@
 //! | `.node`, `.ele` | TetGen, a pair of files | yes | yes | regions, attributes, markers |
 //! | `.mesh`, `.meshb` | Medit, text and binary | yes | yes | regions (references) |
 //! | `.obj`, `.stl`, `.ply`, `.off` | triangle surfaces | [`read_surface`] | [`write_surface`] | |
+//! | `.glb`, `.gltf` | glTF 2.0 surface for viewers | | [`write_surface`], rounded to floats | normals |
 //! | `.vtp` | VTK XML surface with fields | | [`write_vtp`] | scalars, vectors |
 //! | `.pvd` | ParaView collection of time steps | | [`write_pvd`] | |
 //!
@@ -31,6 +32,7 @@ mod surfaces;
 mod test_files;
 mod tetgen;
 mod text;
+mod used;
 mod vtk;
 mod vtp;
 mod vtu;

@@ -1,4 +1,4 @@
-//! Closed or open surfaces of triangles: `.obj`, `.stl`, `.ply`, `.off`.
+//! Closed or open surfaces of triangles: `.obj`, `.stl`, `.ply`, `.off`, and for viewers `.glb` and `.gltf`.
 //!
 //! Readers of our own, because what a tetrahedralization needs is the same in all four: coordinates as doubles, corners
 //! within bounds, the line or byte of what is wrong, and memory bounded by the size of the file. Of the crates for these
@@ -8,6 +8,7 @@
 //!
 //! Polygons become fans of triangles around their first corner, right for convex ones. Linear.
 
+mod gltf;
 mod obj;
 mod off;
 mod ply;
@@ -19,7 +20,7 @@ use glam::DVec3;
 
 use super::text::load;
 use super::{ending, unknown, write_atomically};
-use crate::{MeshError, ParticleId};
+use crate::{MeshError, ParticleId, TetMesh};
 
 pub use ply::{PlyEncoding, write_ply};
 pub use stl::write_stl_binary;
@@ -33,7 +34,33 @@ pub struct TriangleSurface {
     pub triangles: Vec<[ParticleId; 3]>,
 }
 
+impl TriangleSurface {
+    /// The boundary of a mesh, with all its particles.
+    ///
+    /// # Panics
+    /// From 2³⁰ tets on.
+    ///
+    /// # Example
+    /// ```
+    /// use incise_mesh::{generate::kuhn_box, glam::DVec3, io};
+    ///
+    /// let mesh = kuhn_box([2, 2, 2], DVec3::splat(0.1));
+    /// let path = std::env::temp_dir().join(format!("incise-doc-{}.glb", std::process::id()));
+    /// io::write_surface(&path, &io::TriangleSurface::boundary_of(&mesh))?;
+    /// # std::fs::remove_file(path).ok();
+    /// # Ok::<(), incise_mesh::MeshError>(())
+    /// ```
+    #[must_use]
+    pub fn boundary_of(mesh: &TetMesh) -> Self {
+        Self {
+            positions: mesh.positions.clone(),
+            triangles: mesh.surface().triangles,
+        }
+    }
+}
+
 const KNOWN: &str = ".obj, .stl, .ply, .off";
+const KNOWN_TO_WRITERS: &str = ".obj, .stl, .ply, .off, .glb, .gltf";
 
 /// Reads a surface, the format chosen by the ending of the file name. Every form of a format is understood.
 ///
@@ -49,10 +76,7 @@ const KNOWN: &str = ".obj, .stl, .ply, .off";
 ///
 /// let path = std::env::temp_dir().join(format!("incise-doc-{}.off", std::process::id()));
 /// let mesh = kuhn_box([1, 1, 1], DVec3::splat(0.1));
-/// let surface = io::TriangleSurface {
-///     triangles: mesh.surface().triangles,
-///     positions: mesh.positions,
-/// };
+/// let surface = io::TriangleSurface::boundary_of(&mesh);
 /// io::write_surface(&path, &surface)?;
 /// assert_eq!(io::read_surface(&path)?, surface);
 /// # std::fs::remove_file(path).ok();
@@ -98,11 +122,15 @@ fn parser(path: &Path) -> Result<Parser, MeshError> {
 /// Writes a surface, the format chosen by the ending of the file name: `.obj`, `.off` and `.stl` as text, `.ply` as
 /// little-endian binary. All keep every bit of the coordinates, and all but `.stl` points without triangles.
 ///
+/// For viewers there are `.glb` (binary) and `.gltf` (the same as text), which have normals, too, but are not read: their
+/// coordinates are rounded to floats.
+///
 /// # Errors
-/// [`MeshError::UnknownFormat`] for another ending, [`MeshError::Io`] if the file cannot be written.
+/// [`MeshError::UnknownFormat`] for another ending, [`MeshError::Io`] if the file cannot be written, or, for `.glb` and
+/// `.gltf`, if there are no triangles, a coordinate is too large for a float, or the file would have 4 GiB.
 ///
 /// # Panics
-/// For `.stl`, if a corner has no position.
+/// For `.stl`, `.glb` and `.gltf`, if a corner has no position.
 pub fn write_surface(path: impl AsRef<Path>, surface: &TriangleSurface) -> Result<(), MeshError> {
     let path = path.as_ref();
     let write = match ending(path).as_str() {
@@ -110,7 +138,9 @@ pub fn write_surface(path: impl AsRef<Path>, surface: &TriangleSurface) -> Resul
         "stl" => stl::write,
         "ply" => return write_ply(path, surface, PlyEncoding::LittleEndian),
         "off" => off::write,
-        _ => return Err(unknown(path, KNOWN)),
+        "glb" => gltf::write_glb,
+        "gltf" => gltf::write_gltf,
+        _ => return Err(unknown(path, KNOWN_TO_WRITERS)),
     };
     write_atomically(path, |out| write(out, surface))
 }
