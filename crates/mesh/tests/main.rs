@@ -6,6 +6,7 @@ mod given;
 mod gltf;
 mod medit;
 mod memory;
+mod meshio;
 mod msh;
 mod round_trips;
 mod shapes;
