@@ -4,6 +4,7 @@ use std::fs;
 
 use incise_mesh::generate::kuhn_box;
 use incise_mesh::glam::{DVec3, dvec3};
+use incise_mesh::io::{MeshFile, MshKind};
 use incise_mesh::{MeshError, ParticleId, TetMesh, io, orientation};
 use proptest::prelude::*;
 
@@ -215,4 +216,18 @@ fn fields_of_the_wrong_length_are_refused() {
         error.to_string(),
         "field \"speed\" has 7 values but 8 are needed: give one for each element"
     );
+}
+
+#[test]
+fn regions_of_the_wrong_length_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.msh");
+    let mut file = MeshFile::from(kuhn_box([1, 1, 1], DVec3::ONE));
+    file.regions = vec![1];
+    for kind in [MshKind::Text41, MshKind::Binary22] {
+        let error = io::write_msh(&path, &file, kind).unwrap_err();
+        assert!(matches!(error, MeshError::FieldLength { found: 1, .. }));
+        assert!(!path.exists());
+    }
+    assert!(matches!(io::read_msh(&path), Err(MeshError::Io { .. })));
 }
