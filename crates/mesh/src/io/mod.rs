@@ -3,11 +3,11 @@
 //! | ending | format | read | written | kept beside the tets |
 //! |---|---|---|---|---|
 //! | `.vtk` | legacy VTK 2.0 to 5.1, text and binary | yes | 4.2 text, 5.1 binary ([`write_vtk_binary`]) | regions, scalars, vectors |
-//! | `.vtu` | VTK XML unstructured grid: text, base64, appended, zlib | yes | text | regions, scalars, vectors |
-//! | `.msh` | Gmsh 1, 2 and 4.1, text and binary | yes | 4.1 and 2.2 ([`write_msh`]) | regions (physical groups), scalars, vectors |
-//! | `.node`, `.ele` | TetGen, a pair of files | yes | yes | regions, attributes, markers |
-//! | `.mesh`, `.meshb` | Medit, text and binary | yes | yes | regions (references) |
-//! | `.obj`, `.stl`, `.ply`, `.off` | triangle surfaces | [`read_surface`] | [`write_surface`] | |
+//! | `.vtu` | VTK XML unstructured grid: text, base64, appended, zlib | yes | base64 | regions, scalars, vectors |
+//! | `.msh` | Gmsh 1, 2 and 4.1, text and binary | yes | 4.1 and 2.2 ([`write_msh`]) | regions (physical groups, without their names), scalars, vectors |
+//! | `.node`, `.ele` | TetGen, a pair of files | yes | yes | regions, up to 256 attributes, markers |
+//! | `.mesh`, `.meshb` | Medit, text and binary | yes | yes | regions (references), references of points |
+//! | `.obj`, `.off`, `.ply`, `.stl` | triangle surfaces | [`read_surface`] | [`write_surface`], [`write_ply`], [`write_stl_binary`] | |
 //! | `.glb`, `.gltf` | glTF 2.0 surface for viewers | | [`write_surface`], rounded to floats | normals |
 //! | `.vtp` | VTK XML surface with fields | | [`write_vtp`] | scalars, vectors |
 //! | `.pvd` | ParaView collection of time steps | | [`write_pvd`] | |

@@ -6,9 +6,11 @@
 //!
 //! Regions are the physical groups of the tets (0 for a tet in none; the first one of several), or, where no tet is in
 //! one, the elementary entities. A single entity 1 without a group, which Gmsh writes for want of anything else, is no
-//! region at all. `$NodeData` and `$ElementData` with 1 or 3 components are fields; each time step is one; elements
-//! without a value have NaN. Orientation is kept as it is. Cost: O(n log n), for the numbers of nodes may have gaps and
-//! be in any order.
+//! region at all. The names of groups (`$PhysicalNames`) are not kept: no other format has a place for them.
+//!
+//! `$NodeData` and `$ElementData` with 1 or 3 components are fields; each time step is one; elements without a value have
+//! NaN, and a file is refused that needs more than four times its size for them. Orientation is kept as it is. Cost:
+//! O(n log n), for the numbers of nodes may have gaps and be in any order.
 //!
 //! Source: the Gmsh reference manual, sections "MSH file format", "MSH file format version 2" and "version 1" (Geuzaine
 //! and Remacle).
