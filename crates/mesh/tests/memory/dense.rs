@@ -238,8 +238,9 @@ pub(super) fn dense() -> Vec<(&'static str, &'static str, Vec<u8>)> {
         "tetgen",
         "many attributes",
         format!(
-            "1 3 256 0\n1 0 0 0{}\n\0{n} 4 256\n{}",
+            "1 3 256 0\n1 0 0 0{}\n\0{} 4 256\n{}",
             " 1".repeat(256),
+            n / 10,
             format!("1 1 1 1 1{}\n", " 1".repeat(256)).repeat(n / 10)
         )
         .into(),
@@ -279,7 +280,7 @@ pub(super) fn dense() -> Vec<(&'static str, &'static str, Vec<u8>)> {
     for i in 0..n {
         stl.extend([0; 12]);
         for c in 0..9_u16 {
-            stl.extend(f32::to_le_bytes(i as f32 + f32::from(c)));
+            stl.extend(f32::to_le_bytes((9 * i) as f32 + f32::from(c)));
         }
         stl.extend([0; 2]);
     }

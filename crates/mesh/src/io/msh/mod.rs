@@ -9,7 +9,7 @@
 //! region at all. The names of groups (`$PhysicalNames`) are not kept: no other format has a place for them.
 //!
 //! `$NodeData` and `$ElementData` with 1 or 3 components are fields; each time step is one; elements without a value have
-//! NaN, and a file is refused that needs more than four times its size for them. Orientation is kept as it is. Cost:
+//! NaN, and a file is refused that needs more than eight times its size for them. Orientation is kept as it is. Cost:
 //! O(n log n), for the numbers of nodes may have gaps and be in any order.
 //!
 //! Source: the Gmsh reference manual, sections "MSH file format", "MSH file format version 2" and "version 1" (Geuzaine

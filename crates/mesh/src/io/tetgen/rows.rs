@@ -4,7 +4,7 @@ use super::super::text::{Text, Word, show, without_comment, words_of};
 use crate::MeshError;
 
 /// Each attribute becomes a field with a name, which takes far more memory than the two bytes of a number.
-const MOST_ATTRIBUTES: usize = 256;
+pub(super) const MOST_ATTRIBUTES: usize = 256;
 
 /// A line with content.
 pub(super) struct Row<'t, 'a, I> {

@@ -98,6 +98,22 @@ fn errors_name_the_line() {
 }
 
 #[test]
+fn no_more_attributes_are_written_than_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.node");
+    let mut file = sample();
+    file.tets = vec![scalars("a", &[0.5; 6]); 255];
+    write_tetgen_file(&path, &file).unwrap();
+    assert_eq!(read_tetgen_file(&path).unwrap().tets.len(), 255);
+    file.tets.push(scalars("a", &[0.5; 6]));
+    let error = write_tetgen_file(&path, &file).unwrap_err().to_string();
+    assert!(
+        error.contains("257 attributes are more than the 256"),
+        "{error}"
+    );
+}
+
+#[test]
 fn parts_of_either_file_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.node");
