@@ -258,3 +258,23 @@ fn names_with_line_ends_are_refused() {
     let error = write_content(&mut Vec::new(), &file, MshKind::default()).unwrap_err();
     assert!(error.to_string().contains("has a line end"));
 }
+
+#[test]
+fn sparse_data_are_filled_up_to_a_limit() {
+    let data = "$NodeData\n0\n0\n3\n0\n3\n1\n9 1 2 3\n$EndNodeData\n";
+    // Each section fills in the three numbers of three nodes, for 45 bytes of its own.
+    let sections = |count: usize| format!("{TEXT_1}{}", data.repeat(count));
+    assert_eq!(parse(sections(20)).unwrap().particles.len(), 20);
+    // Here the nodes are 100: each section asks for 297 numbers.
+    let nodes: String = (10..106).map(|i| format!("{i} 0 0 0\n")).collect();
+    let many = |count: usize| {
+        let text = sections(count).replace("$NOD\n4\n", "$NOD\n100\n");
+        text.replace("$ENDNOD", &format!("{nodes}$ENDNOD"))
+    };
+    assert_eq!(parse(many(2)).unwrap().particles.len(), 2);
+    let error = parse(many(20)).unwrap_err().to_string();
+    assert!(
+        error.contains("have values for few of the nodes"),
+        "{error}"
+    );
+}
