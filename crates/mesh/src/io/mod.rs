@@ -16,10 +16,9 @@
 //! more memory than the file could fill, never panic, and name file and line of what is wrong. Every file is written
 //! beside its final name and renamed when complete. Time and memory are linear in the size of the file.
 //!
-//! Reading takes at most ten times the size of a usual file as memory, and 20 times that of any file but for three kinds:
-//! 64 times for fields of single bits in binary `.vtk`, since each becomes a double; 40 times for polygons of `.ply` whose
-//! corners have a byte each; and for a compressed `.vtu` what its counts and its blocks agree upon and hold, where zlib can
-//! make 1032 bytes of one, and then five times that.
+//! Reading takes at most ten times the size of a usual file as memory, and 20 times that of any file but for two kinds: 64
+//! times for fields of single bits in VTK files, since each becomes a double; and for a compressed `.vtu` what its counts
+//! and its blocks agree upon and hold, where zlib can make 1032 bytes of one, and then five times that for doubles.
 
 mod atomic;
 mod fields;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::{BITS, BYTE_CORNERS};
+use super::BITS;
 
 /// Files in which every byte stands for as much as it can.
 pub(super) fn dense() -> Vec<(&'static str, &'static str, Vec<u8>)> {
@@ -300,14 +300,26 @@ pub(super) fn dense() -> Vec<(&'static str, &'static str, Vec<u8>)> {
     binary.extend([0; 3]);
     binary.extend(count(20 * n));
     binary.extend(vec![0; 20 * n]);
-    add("ply", BYTE_CORNERS, binary);
+    add("ply", "one polygon", binary);
     let mut binary = ply("binary_little_endian", 1, n);
     binary.extend([0; 3]);
     for _ in 0..n {
         binary.extend(count(60));
         binary.extend([0; 60]);
     }
-    add("ply", BYTE_CORNERS, binary);
+    add("ply", "polygons", binary);
+    let mut binary = ply("binary_big_endian", 1, n);
+    let short = binary
+        .windows(5)
+        .position(|w| w == b"uchar")
+        .expect("it is there");
+    binary.splice(short..short + 5, *b"ushort");
+    binary.extend([0; 3]);
+    for _ in 0..n {
+        binary.extend([0, 0, 0, 60]);
+        binary.extend([0; 120]);
+    }
+    add("ply", "polygons of two bytes", binary);
     add(
         "ply",
         "header",

@@ -65,6 +65,14 @@ impl<'b, I: Iterator<Item = Word<'b>>> Body<'b, '_, I> {
         element.count.min(left.checked_div(least).unwrap_or(0))
     }
 
+    /// The most values of a type that the rest of the file can hold.
+    pub(super) fn most_values(&self, kind: Type) -> usize {
+        match self {
+            Body::Ascii { text, .. } => text.room_for(usize::MAX, 2),
+            Body::Binary { bytes, at, .. } => (bytes.len() - at) / kind.bytes(),
+        }
+    }
+
     /// The next value as a whole number from 0 on.
     pub(super) fn natural(&mut self, kind: Type, what: &str) -> Result<u32, MeshError> {
         let number = self.number(kind, what)?;
