@@ -95,16 +95,16 @@ pub(super) fn dense() -> Vec<(&'static str, &'static str, Vec<u8>)> {
     );
     add("vtu", "text", vtu(n, n, &grid, b"</VTKFile>"));
     let small = "<Points><DataArray type=\"Float32\" NumberOfComponents=\"3\">0 0 0</DataArray></Points><Cells><DataArray type=\"Int32\" Name=\"connectivity\">0 0 0 0</DataArray><DataArray type=\"Int32\" Name=\"offsets\">4</DataArray><DataArray type=\"UInt8\" Name=\"types\">10</DataArray></Cells>";
-    add(
-        "vtu",
-        "many arrays",
-        vtu(
-            1,
-            1,
-            &format!("{small}<PointData>{}</PointData>", "<DataArray/>".repeat(n)),
-            b"</VTKFile>",
-        ),
-    );
+    // So many that a list of them has just grown.
+    for (what, section) in [
+        ("many arrays of values", "PointData"),
+        ("many arrays of points", "Points"),
+        ("many arrays of cells", "Cells"),
+    ] {
+        let arrays = "<DataArray/>".repeat((1 << 14) + 1);
+        let data = format!("{small}<{section}>{arrays}</{section}>");
+        add("vtu", what, vtu(1, 1, &data, b"</VTKFile>"));
+    }
     add(
         "vtu",
         "many fields",

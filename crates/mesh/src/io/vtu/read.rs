@@ -83,6 +83,9 @@ impl Section {
     }
 }
 
+/// The names of the arrays of cells.
+const CELL_ARRAYS: [&str; 3] = ["offsets", "connectivity", "types"];
+
 /// A data array that has not been decoded.
 struct Array {
     section: Section,
@@ -121,8 +124,8 @@ impl Document<'_> {
         let mut section = None;
         // How many elements are open inside an array, itself included: text belongs to it at 1.
         let mut depth = 0_usize;
-        // Whether that array is of interest.
-        let mut kept = false;
+        // Whether that array is of interest, and whether there was one of points.
+        let (mut kept, mut has_points) = (false, false);
         loop {
             let position = |reader: &quick_xml::Reader<&[u8]>| {
                 usize::try_from(reader.buffer_position())
@@ -148,9 +151,12 @@ impl Document<'_> {
                         kept = false;
                         if let Some(section) = section {
                             let array = array(&Element { element, place, at }, section)?;
-                            // Strings and the like: such an element takes less in the file than here.
-                            let field = matches!(section, Section::PointData | Section::CellData);
-                            kept = !field || array.kind.is_some();
+                            // An array takes more here than in the file, so that those of no use are left out.
+                            kept = match section {
+                                Section::Points => !std::mem::replace(&mut has_points, true),
+                                Section::Cells => CELL_ARRAYS.contains(&array.name.as_str()),
+                                Section::PointData | Section::CellData => array.kind.is_some(),
+                            };
                             if kept {
                                 self.arrays.push(array);
                             }
