@@ -19,8 +19,8 @@ use glam::DVec3;
 
 pub(crate) use read::parse_vtu;
 
+use super::text::load;
 use super::vtk::grid::REGIONS;
-use super::vtk::load;
 use super::{Fields, MeshFile, NamedValues, write_atomically, xml};
 use crate::{MeshError, ParticleId};
 
