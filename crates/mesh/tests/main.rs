@@ -3,10 +3,8 @@
 mod faults;
 mod formats;
 mod given;
-mod irregular;
-mod medit;
-mod msh;
 mod gltf;
+mod irregular;
 mod memory;
 mod meshio;
 mod round_trips;
