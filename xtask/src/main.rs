@@ -4,6 +4,7 @@
 
 mod coloring;
 mod cutting;
+mod experiment;
 mod gpu;
 mod models;
 mod soak;
