@@ -6,6 +6,7 @@ mod coloring;
 mod cutting;
 mod experiment;
 mod gpu;
+mod lean;
 mod models;
 mod soak;
 mod solver;
@@ -32,6 +33,11 @@ enum Command {
     Cutting(cutting::CuttingArguments),
     /// Check the kernels on a GPU, time colorings, iterations and frames there, and write a page and JSON.
     GpuSweep(gpu::GpuArguments),
+    /// What a scene pays for what it does not use: instructions, bytes, dispatches.
+    Lean(lean::LeanArguments),
+    /// What `lean` runs under valgrind.
+    #[command(hide = true)]
+    LeanProbe(lean::ProbeArguments),
     /// Compare the methods of the solver: what they cost and what they are worth.
     Solver(solver::SolverArguments),
     /// Make random strokes by the thousand and check everything after each.
@@ -47,6 +53,8 @@ fn main() -> anyhow::Result<()> {
         Command::Coloring(arguments) => coloring::coloring(&arguments),
         Command::Cutting(arguments) => cutting::cutting(&arguments),
         Command::GpuSweep(arguments) => gpu::sweep(&arguments),
+        Command::Lean(arguments) => lean::lean(&arguments),
+        Command::LeanProbe(arguments) => lean::probe(&arguments),
         Command::Solver(arguments) => solver::solver(&arguments),
         Command::SoakCut(arguments) => soak::soak(&arguments),
         Command::Sweep(arguments) => sweep::sweep(&arguments),

@@ -84,15 +84,15 @@ fn parse(text: &str) -> anyhow::Result<Counts> {
             if std::mem::take(&mut of_call) {
                 continue;
             }
-            let mut numbers = line.split_whitespace().skip(1).map(str::parse::<u64>);
-            let mut of = |wanted: &str| -> anyhow::Result<u64> {
+            let numbers = line.split_whitespace().skip(1).map(str::parse::<u64>);
+            let of = |wanted: &str| -> anyhow::Result<u64> {
                 // Trailing zeros are left out.
                 let place = events.iter().position(|&event| event == wanted);
                 let Some(place) = place else { return Ok(0) };
                 Ok(numbers.clone().nth(place).transpose()?.unwrap_or(0))
             };
             let (instructions, branches) = (of("Ir")?, of("Bc")?);
-            numbers.next().context("a cost line without costs")??;
+            numbers.clone().next().context("a cost line without costs")??;
             let Some(function) = &function else {
                 bail!("costs before the first function");
             };

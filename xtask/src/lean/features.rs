@@ -40,7 +40,7 @@ pub(crate) struct Case {
     pub(crate) base: &'static str,
     /// What is there, in words.
     pub(crate) what: &'static str,
-    change: fn(&mut Scene),
+    pub(crate) change: fn(&mut Scene),
 }
 
 impl Case {
