@@ -8,6 +8,7 @@ mod experiment;
 mod gpu;
 mod lean;
 mod models;
+mod peers;
 mod soak;
 mod solver;
 mod sweep;
@@ -38,6 +39,8 @@ enum Command {
     /// What `lean` runs under valgrind.
     #[command(hide = true)]
     LeanProbe(lean::ProbeArguments),
+    /// Our solver next to other systems on the same mesh, each in turns with ours.
+    Peers(peers::PeersArguments),
     /// Compare the methods of the solver: what they cost and what they are worth.
     Solver(solver::SolverArguments),
     /// Make random strokes by the thousand and check everything after each.
@@ -55,6 +58,7 @@ fn main() -> anyhow::Result<()> {
         Command::GpuSweep(arguments) => gpu::sweep(&arguments),
         Command::Lean(arguments) => lean::lean(&arguments),
         Command::LeanProbe(arguments) => lean::probe(&arguments),
+        Command::Peers(arguments) => peers::peers(&arguments),
         Command::Solver(arguments) => solver::solver(&arguments),
         Command::SoakCut(arguments) => soak::soak(&arguments),
         Command::Sweep(arguments) => sweep::sweep(&arguments),
