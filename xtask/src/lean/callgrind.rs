@@ -47,7 +47,11 @@ pub(crate) fn count(arguments: &[&str], folder: &Path) -> anyhow::Result<Counts>
     let file = folder.join("callgrind.out");
     let program = std::env::current_exe()?;
     let output = Command::new("valgrind")
-        .args(["--tool=callgrind", "--branch-sim=yes", "--compress-strings=no"])
+        .args([
+            "--tool=callgrind",
+            "--branch-sim=yes",
+            "--compress-strings=no",
+        ])
         .args(["--compress-pos=no", "--quiet"])
         .arg(format!("--toggle-collect=*{COUNTED}*"))
         .arg(format!("--callgrind-out-file={}", file.display()))
@@ -92,7 +96,10 @@ fn parse(text: &str) -> anyhow::Result<Counts> {
                 Ok(numbers.clone().nth(place).transpose()?.unwrap_or(0))
             };
             let (instructions, branches) = (of("Ir")?, of("Bc")?);
-            numbers.clone().next().context("a cost line without costs")??;
+            numbers
+                .clone()
+                .next()
+                .context("a cost line without costs")??;
             let Some(function) = &function else {
                 bail!("costs before the first function");
             };

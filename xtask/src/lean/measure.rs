@@ -74,7 +74,7 @@ pub(crate) fn measure(
     scene: &Scene,
     way: Way,
     valgrind: bool,
-    gpu: &Gpu,
+    gpu: Option<&Gpu>,
 ) -> anyhow::Result<Measured> {
     let simulation = Simulation::new(scene)?;
     let (tets, particles) = match way {
@@ -90,7 +90,7 @@ pub(crate) fn measure(
         true => Some(instructions(scene, way, folder.path())?),
         false => None,
     };
-    let device = match (way, gpu.context()) {
+    let device = match (way, gpu.and_then(Gpu::context)) {
         (Way::Facade, Some(gpu)) => traffic(scene, &gpu)?,
         _ => None,
     };
@@ -176,7 +176,10 @@ pub(crate) fn traffic(scene: &Scene, gpu: &Arc<GpuContext>) -> anyhow::Result<Op
     gpu.wait()?;
     let told = gpu.traffic().since(before);
     Ok(Some(Device {
-        bytes: simulation.device_solvers().map(|solver| solver.bytes()).sum(),
+        bytes: simulation
+            .device_solvers()
+            .map(|solver| solver.bytes())
+            .sum(),
         dispatches: told.dispatches,
         passes: told.passes,
         submits: told.submits,

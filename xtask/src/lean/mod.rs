@@ -16,8 +16,8 @@ use serde::{Deserialize, Serialize};
 use crate::experiment::{Cell, Experiment, ExperimentArguments};
 use features::{BARE, Case, State, cases};
 use measure::{Gpu, Measured, measure};
-pub(crate) use probe::{ProbeArguments, probe};
 use probe::Way;
+pub(crate) use probe::{ProbeArguments, probe};
 
 #[derive(Debug, Args)]
 pub(crate) struct LeanArguments {
@@ -68,13 +68,15 @@ pub(crate) fn lean(arguments: &LeanArguments) -> anyhow::Result<()> {
 
 fn experiment(quick: bool, valgrind: &Option<String>) -> Experiment<Row> {
     // Quick: the smallest that still tells a constant from a pass.
-    let tets: &'static [usize] = if quick { &[200, 400] } else { &[1500, 6000] };
+    let tets: &'static [usize] = if quick { &[200, 400] } else { &[800, 3200] };
     let gpu = Gpu::default();
     let mut cells = Vec::new();
     let cases = cases();
     let bare = cases[0];
     let all = BY_HAND.map(|(way, what)| (Case { what, ..bare }, way));
-    let all = all.into_iter().chain(cases.into_iter().map(|case| (case, Way::Facade)));
+    let all = all
+        .into_iter()
+        .chain(cases.into_iter().map(|case| (case, Way::Facade)));
     for (case, way) in all {
         let (gpu, valgrind) = (gpu.clone(), valgrind.clone());
         let feature = match way {
@@ -86,10 +88,12 @@ fn experiment(quick: bool, valgrind: &Option<String>) -> Experiment<Row> {
             Way::Hand | Way::Empty => format!("by-{feature}"),
         };
         cells.push(Cell::new(id, move || {
-            let count = valgrind.is_some() && (!quick || of_a_quick_run(&case));
+            let whole = !quick || of_a_quick_run(&case);
+            let count = valgrind.is_some() && whole;
+            let gpu = whole.then_some(&gpu);
             let measured = tets
                 .iter()
-                .map(|&tets| measure(&case.scene(tets), way, count, &gpu));
+                .map(|&tets| measure(&case.scene(tets), way, count, gpu));
             Ok(Row {
                 feature: feature.to_owned(),
                 state: case.state.name().to_owned(),
@@ -107,7 +111,7 @@ fn experiment(quick: bool, valgrind: &Option<String>) -> Experiment<Row> {
     }
 }
 
-/// Whether a quick run counts the instructions of this one.
+/// Whether a quick run counts the instructions of this one, and asks a device; bytes are counted of all.
 fn of_a_quick_run(case: &Case) -> bool {
     case.state == State::Base || ["gravity", "handle"].contains(&case.feature)
 }

@@ -2,9 +2,10 @@
 
 use anyhow::Context;
 
+use super::Row;
+use super::callgrind::Counts;
 use super::features::{BARE, State};
 use super::measure::{Device, FRAMES, Measured};
-use super::Row;
 use crate::experiment::{Page, Part, Table};
 
 /// Features and the modules that are theirs alone: what of a bare frame is in those is paid by who declared nothing.
@@ -37,6 +38,9 @@ const MODULES: [(&str, &[&str]); 12] = [
     ("bodies on a line", &["xpbd::unfold"]),
 ];
 
+/// The function of the facade that has a pass: what a frame is for.
+const POSITIONS: &str = "AnySolver::positions";
+
 const INTRODUCTION: &str = "\
 What a scene pays for what it does not use, what it declares without use, and what is at work. The scene is a beam that \
 floats at rest, in 2 substeps of 1 iteration; nothing acts on it, nothing is held, reported or limited.
@@ -45,17 +49,21 @@ floats at rest, in 2 substeps of 1 iteration; nothing acts on it, nothing is hel
 The bare scene is held against a loop by hand over the same mesh and schedule: `incise_xpbd::Solver::step` and a copy of \
 the positions. That loop has never heard of scenes, strokes, pieces, reports, sleep, handles as a scene has them. What \
 the scene takes more must be a constant, the same for every size of mesh: then no undeclared feature has a pass over \
-particles or tets. Second, the solver's own step without a body: all that it asks about undeclared constraints, which \
-is once a substep or frame, is in there, and is an upper bound. Third, the instructions of a bare frame by function, \
-summed over the modules that belong to one feature alone.
+particles or tets. This holds for branches to the digit; for instructions the compiler blurs it, since it makes one copy \
+of the solver for the facade and another for the loop by hand, which differ by some instructions a particle. Second, \
+the solver's own step without a body: all that it asks about undeclared constraints, which is once a substep or a frame, \
+is in there, and it is an upper bound. Third, the instructions of a bare frame by function, summed over the modules that \
+belong to one feature alone; what the compiler has inlined elsewhere is in the first two only.
 
-What these miss: a branch for a feature within the loops over particles and tets that both loops share. By reading, \
-there are three, once for each block of 8 or 16 tets and the same every time: whether multipliers are kept, whether \
-corrections are collected (Jacobi), whether there are several materials. And each particle is asked whether it is fixed, \
-and whether there is gravity.
+What these miss: a branch within the loops over particles and tets, which both loops share. By reading: three for each \
+block of 4 to 16 tets, the same every time (whether multipliers are kept, whether corrections are collected as Jacobi \
+does, whether materials differ); for each particle, whether it is held, and whether there is gravity. And bytes that the \
+solver holds whatever a scene declares: a byte a particle for being fixed, two a tet for its material, eight a tet for \
+its volume at rest. One pass a frame is for what nobody declares: the bounding box, by which a body that moves far away \
+keeps its precision. Any simulation can be cut at any time, so each keeps neighbors, boundary and pieces of its mesh.
 
-Instructions are Callgrind's, on one thread, mean of 4 frames after the first 3; they include what is \
-computed with AVX 2 at most. Bytes are those held on the heap, capacity included. They are no times: a pass over memory \
+Instructions are Callgrind's, on one thread, mean of 4 frames after the first 3; on a processor as valgrind \
+shows it, with AVX 2 at most. Bytes are those held on the heap, capacity included. They are no times: a pass over memory \
 costs more than its instructions.";
 
 pub(crate) fn page(rows: &[Row]) -> anyhow::Result<Page> {
@@ -72,11 +80,16 @@ pub(crate) fn page(rows: &[Row]) -> anyhow::Result<Page> {
     let (bare, hand, empty) = (find(BARE)?, find("hand")?, find("empty")?);
     parts.push(Part::Table(undeclared(bare, hand, empty)));
     parts.push(Part::Table(modules(bare)));
-    let mut declared = vec![
+    let declared = [
         declared_table("Declared and idle", rows, State::Idle),
         declared_table("Declared and at work", rows, State::Used),
     ];
-    parts.extend(declared.drain(..).map(|table| table.map(Part::Table)).collect::<Result<Vec<_>, _>>()?);
+    parts.extend(
+        declared
+            .into_iter()
+            .map(|table| table.map(Part::Table))
+            .collect::<Result<Vec<_>, _>>()?,
+    );
     parts.push(Part::Table(device_table(rows)?));
     Ok(Page {
         title: "What a scene pays for what it does not use".to_owned(),
@@ -134,7 +147,12 @@ fn undeclared(bare: &Row, hand: &Row, empty: &Row) -> Table {
         push(
             bare,
             "of that ready for cuts",
-            ["".into(), "".into(), "".into(), bare.memory.ready_to_cut.to_string()],
+            [
+                "".into(),
+                "".into(),
+                "".into(),
+                bare.memory.ready_to_cut.to_string(),
+            ],
         );
     }
     if let Some(empty) = empty.sizes.first() {
@@ -151,14 +169,27 @@ fn modules(bare: &Row) -> Table {
         "Instructions of a bare frame in functions of features that it does not declare",
         header,
     );
-    for (feature, parts) in MODULES {
-        let mut row = vec![feature.to_owned()];
+    let mut push = |name: &str, of: &dyn Fn(&Counts) -> u64| {
+        let mut row = vec![name.to_owned()];
         row.extend(bare.sizes.iter().map(|m| {
             let counted = m.counts.as_ref();
-            show(counted.map(|counts| counts.of(parts) as f64 / f64::from(FRAMES)))
+            show(counted.map(|counts| of(counts) as f64 / f64::from(FRAMES)))
         }));
         table.push(row);
+    };
+    for (feature, parts) in MODULES {
+        push(feature, &|counts| counts.of(parts));
     }
+    push(
+        "the whole facade but for the copy of positions",
+        &|counts| counts.of(&["incise::"]) - counts.of(&[POSITIONS]),
+    );
+    push("clocks for the report's times", &|counts| {
+        counts.of(&["Timespec", "clock_gettime", "time::Instant"])
+    });
+    push("for comparison: the copy of positions", &|counts| {
+        counts.of(&[POSITIONS])
+    });
     table
 }
 
@@ -193,7 +224,9 @@ fn declared_table(caption: &str, rows: &[Row], state: State) -> anyhow::Result<T
             continue;
         };
         let more = minus(instructions(here), instructions(base));
-        let part = more.zip(instructions(base)).map(|(more, all)| 100.0 * more / all);
+        let part = more
+            .zip(instructions(base))
+            .map(|(more, all)| 100.0 * more / all);
         // Between the sizes: a constant falls out.
         let slope = match differences[..] {
             [(small, small_base), .., (large, large_base)] => {
@@ -228,7 +261,15 @@ fn device_table(rows: &[Row]) -> anyhow::Result<Table> {
     let mut table = Table::new(
         "On a GPU: a bare frame, and what a frame of others is told more, at the larger size",
         [
-            "feature", "", "dispatches", "passes", "submits", "bytes sent", "reads", "bytes read", "bytes held",
+            "feature",
+            "state",
+            "dispatches",
+            "passes",
+            "submits",
+            "bytes sent",
+            "reads",
+            "bytes read",
+            "bytes held",
         ],
     );
     for row in rows {
@@ -253,7 +294,11 @@ fn device_table(rows: &[Row]) -> anyhow::Result<Table> {
         let more = of(device).into_iter().zip(before);
         line.extend(more.map(|(here, base)| {
             let each = (here as f64 - base as f64) / f64::from(FRAMES);
-            if each == each.round() { format!("{each:.0}") } else { format!("{each:.2}") }
+            if each == each.round() {
+                format!("{each:.0}")
+            } else {
+                format!("{each:.2}")
+            }
         }));
         let held = device.bytes as i64 - base.map_or(0, |base| base.bytes as i64);
         line.push(held.to_string());

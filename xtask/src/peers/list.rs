@@ -12,6 +12,8 @@ pub(super) struct Peer {
     pub(super) caveat: &'static str,
     /// Its own; ours is measured in the same.
     pub(super) precision: Precision,
+    /// Whether its first run compiles for minutes.
+    pub(super) compiles: bool,
     pub(super) program: Program,
 }
 
@@ -37,6 +39,7 @@ pub(super) const PEERS: &[Peer] = &[
         what: "XPBD, stable neo-Hookean, block form; a scalar C++ kernel",
         caveat: SCALAR,
         precision: Precision::F32,
+        compiles: false,
         program: Program::Cpp("ref_xpbd"),
     },
     Peer {
@@ -44,6 +47,7 @@ pub(super) const PEERS: &[Peer] = &[
         what: "XPBD, stable neo-Hookean, block form; a scalar C++ kernel",
         caveat: SCALAR,
         precision: Precision::F64,
+        compiles: false,
         program: Program::Cpp("ref_xpbd"),
     },
     Peer {
@@ -52,6 +56,7 @@ pub(super) const PEERS: &[Peer] = &[
         caveat: "the same energy and form; each step looks for contacts of one vertex, which is in its frame, not in its \
             iteration",
         precision: Precision::F64,
+        compiles: false,
         program: Program::Python {
             module: "pbatoolkit",
             script: "bench_pbat_xpbd.py",
@@ -63,6 +68,7 @@ pub(super) const PEERS: &[Peer] = &[
         what: "the same in the clusters of the paper (pbatoolkit)",
         caveat: "as above; clusters by its own method, which also colors",
         precision: Precision::F64,
+        compiles: false,
         program: Program::Python {
             module: "pbatoolkit",
             script: "bench_pbat_xpbd.py",
@@ -75,6 +81,7 @@ pub(super) const PEERS: &[Peer] = &[
         caveat: "another energy, one multiplier a tet instead of two; where its version takes no gravity from the \
             script, the beam does not fall",
         precision: Precision::F64,
+        compiles: false,
         program: Program::Python {
             module: "pypbd",
             script: "bench_pypbd.py",
@@ -87,6 +94,7 @@ pub(super) const PEERS: &[Peer] = &[
         caveat: "another method: a sweep solves each particle's 3 x 3 system, and visits each tet four times; what an \
             iteration is worth differs",
         precision: Precision::F32,
+        compiles: true,
         program: Program::Python {
             module: "newton",
             script: "bench_newton.py",
@@ -99,6 +107,7 @@ pub(super) const PEERS: &[Peer] = &[
         caveat: "not Gauss-Seidel: corrections are averaged, and more iterations are needed; watch whether its tip is \
             anywhere near the others'",
         precision: Precision::F32,
+        compiles: true,
         program: Program::Python {
             module: "newton",
             script: "bench_newton.py",

@@ -43,7 +43,12 @@ fn in_precision<R: Real>(cells: [usize; 3], frames: u32) -> anyhow::Result<Ours>
         density: 1000.0,
         damping: 0.0,
     };
-    let held = mesh.positions.iter().map(|x| x.x).fold(f64::INFINITY, f64::min) + 1e-9;
+    let held = mesh
+        .positions
+        .iter()
+        .map(|x| x.x)
+        .fold(f64::INFINITY, f64::min)
+        + 1e-9;
     let mut solver = body::<R>(&mesh, rubber, |x| x.x < held)?;
     let schedule = schedule(&mesh, "serial:10")?;
     let substep = StepSettings {

@@ -51,7 +51,10 @@ mod tests {
         assert_eq!((a.tip, a.version, a.note), (Some(-1e-3), None, None));
         let more = "gravity not set: no such name\n{\"peer\": \"b\", \"version\": \"2\", \"tets\": 6, \"precision\": \"f64\", \"colors\": 3, \"ms_per_iter\": 2.0, \"finite\": true, \"one\": {\"wall_min\": 1}}";
         let b = result(&format!("{text}{more}")).unwrap();
-        assert_eq!((b.peer.as_str(), b.ms_per_iter, b.colors), ("b", 2.0, Some(3)));
+        assert_eq!(
+            (b.peer.as_str(), b.ms_per_iter, b.colors),
+            ("b", 2.0, Some(3))
+        );
         assert!(b.note.is_some());
     }
 
@@ -62,7 +65,8 @@ mod tests {
         assert!(result("{\"peer\": \"a\"}").is_err());
         // Infinity and NaN are no JSON.
         assert!(
-            result("{\"peer\":\"a\",\"tets\":6,\"precision\":\"f32\",\"ms_per_iter\":NaN}").is_err()
+            result("{\"peer\":\"a\",\"tets\":6,\"precision\":\"f32\",\"ms_per_iter\":NaN}")
+                .is_err()
         );
     }
 }

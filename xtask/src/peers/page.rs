@@ -35,14 +35,22 @@ pub(super) fn page(rows: &[Row]) -> anyhow::Result<Page> {
             "tip in m",
         ],
     );
-    let mut what = Table::new("What is compared", ["system", "solves", "not the same as ours in", "note"]);
+    let mut what = Table::new(
+        "What is compared",
+        ["system", "solves", "not the same as ours in", "note"],
+    );
     for row in rows {
         let peer = PEERS.iter().find(|peer| peer.id == row.id);
         let Some(peer) = peer else { continue };
         if let Some(line) = line(peer, row) {
             times.push(line);
         }
-        what.push([peer.id.to_owned(), peer.what.to_owned(), peer.caveat.to_owned(), note(row)]);
+        what.push([
+            peer.id.to_owned(),
+            peer.what.to_owned(),
+            peer.caveat.to_owned(),
+            note(row),
+        ]);
     }
     let mut parts = vec![Part::Text(INTRODUCTION.to_owned())];
     if times.rows.is_empty() {
@@ -60,9 +68,8 @@ pub(super) fn page(rows: &[Row]) -> anyhow::Result<Page> {
 fn note(row: &Row) -> String {
     let last = row.rounds.last().map(|round| &round.peer);
     let said = last.and_then(|peer| peer.note.clone());
-    let lost = last.is_some_and(|peer| {
-        peer.finite == Some(false) || peer.max_abs.is_some_and(|x| x > 2.0)
-    });
+    let lost = last
+        .is_some_and(|peer| peer.finite == Some(false) || peer.max_abs.is_some_and(|x| x > 2.0));
     let lost = lost.then(|| "the beam has left its place: unstable at this substep".to_owned());
     let missing = row.missing.as_ref().map(|why| format!("not run: {why}"));
     let all = [missing, said, lost].into_iter().flatten();
@@ -79,14 +86,21 @@ fn line(peer: &Peer, row: &Row) -> Option<[String; 13]> {
     let our_iteration = of(|round| Some(round.ours.ms_per_iter));
     let frame = of(|round| round.peer.ms_frame_20sub_1it);
     let our_frame = of(|round| Some(round.ours.ms_frame));
-    let ms = |values: &Option<Vec<f64>>| values.as_deref().map_or("-".to_owned(), |v| format!("{:.3}", least(v)));
-    let per_tet = iteration.as_deref().map(|v| least(v) * 1e6 / last.tets as f64);
+    let ms = |values: &Option<Vec<f64>>| {
+        values
+            .as_deref()
+            .map_or("-".to_owned(), |v| format!("{:.3}", least(v)))
+    };
+    let per_tet = iteration
+        .as_deref()
+        .map(|v| least(v) * 1e6 / last.tets as f64);
     Some([
         peer.id.to_owned(),
         last.version.clone().unwrap_or_else(|| "-".to_owned()),
         last.precision.clone(),
         last.tets.to_string(),
-        last.colors.map_or("-".to_owned(), |colors| colors.to_string()),
+        last.colors
+            .map_or("-".to_owned(), |colors| colors.to_string()),
         ms(&iteration),
         per_tet.map_or("-".to_owned(), |ns| format!("{ns:.1}")),
         ms(&our_iteration),
@@ -157,7 +171,9 @@ mod tests {
                 _ => None,
             })
             .collect();
-        let [times, what] = tables[..] else { panic!("two tables") };
+        let [times, what] = tables[..] else {
+            panic!("two tables")
+        };
         assert_eq!(times.rows.len(), 1);
         assert_eq!(times.rows[0][6], "40.0");
         assert_eq!(times.rows[0][8], "4.0 (3.0 to 4.0)");
