@@ -4,9 +4,11 @@ use std::sync::Arc;
 
 use incise::gpu::{GpuContext, GpuOptions};
 
+use super::callgrind::Counts;
 use super::features::cases;
 use super::measure::{Memory, memory, traffic};
 use super::*;
+use crate::experiment::Part;
 
 fn case(feature: &str, state: State) -> Case {
     let mut cases = cases().into_iter();
@@ -101,4 +103,63 @@ fn a_device_is_told_only_what_a_scene_declares() {
         assert_eq!(told(case(feature, state)), bare, "{feature}");
     }
     assert_eq!(told(case("ground", State::Idle)).dispatches, 2 * 4 * frames);
+}
+
+/// A scene of a thousand particles, or two, whose frames take `each` instructions a particle and `once` more.
+fn row(feature: &str, state: State, each: u64, once: u64) -> Row {
+    let size = |particles: usize| Measured {
+        tets: 4 * particles,
+        particles,
+        memory: Memory {
+            bytes: 100,
+            ready_to_cut: 10,
+            allocations: 0,
+        },
+        counts: Some(Counts {
+            instructions: u64::from(measure::FRAMES) * (each * particles as u64 + once),
+            ..Counts::default()
+        }),
+        device: None,
+    };
+    Row {
+        feature: feature.to_owned(),
+        state: state.name().to_owned(),
+        base: BARE.to_owned(),
+        what: String::new(),
+        valgrind: Some("valgrind-0".to_owned()),
+        sizes: vec![size(1000), size(2000)],
+    }
+}
+
+/// Constants are told from passes; without valgrind there are gaps and no figures.
+#[test]
+fn the_page_tells_a_constant_from_a_pass() {
+    let mut rows = vec![
+        row("hand", State::Base, 50, 0),
+        row("empty", State::Base, 0, 7),
+        row(BARE, State::Base, 50, 30),
+        row("sleep", State::Idle, 50, 42),
+        row("gravity", State::Used, 58, 30),
+    ];
+    let cells = |rows: &[Row], name: &str| {
+        let parts = page::page(rows).unwrap().parts;
+        let tables = parts.into_iter().filter_map(|part| match part {
+            Part::Table(table) => Some(table.rows),
+            _ => None,
+        });
+        let mut lines = tables.flatten();
+        lines
+            .find(|line| line.iter().any(|cell| cell == name))
+            .unwrap()
+    };
+    assert_eq!(cells(&rows, "scene, more than by hand")[3], "30");
+    let idle = page::declared_table("", &rows, State::Idle).unwrap();
+    assert_eq!(idle.rows[0][2..6], ["12", "0.012", "0", "0.00"]);
+    let used = page::declared_table("", &rows, State::Used).unwrap();
+    assert_eq!(used.rows[0][2..6], ["16000", "15.995", "0", "8.00"]);
+    for row in &mut rows {
+        row.valgrind = None;
+        row.sizes.iter_mut().for_each(|size| size.counts = None);
+    }
+    assert_eq!(cells(&rows, "scene, more than by hand")[3], "-");
 }
