@@ -307,7 +307,7 @@ pub(crate) fn cases() -> Vec<Case> {
             });
         }),
         case("iterations", Used, "2 a substep", |s| {
-            s.solver.iterations = 2
+            s.solver.iterations = 2;
         }),
         case("relaxation", Used, "0.9", |s| s.solver.relaxation = 0.9),
         case("double precision", Used, "f64", |s| {

@@ -14,7 +14,7 @@ use clap::Args;
 use serde::{Deserialize, Serialize};
 
 use crate::experiment::{Cell, Experiment, ExperimentArguments};
-use features::{BARE, Case, State, cases};
+use features::{Case, State, cases};
 use measure::{Gpu, Measured, measure};
 use probe::Way;
 pub(crate) use probe::{ProbeArguments, probe};

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use incise::gpu::{GpuContext, GpuOptions};
 
 use super::callgrind::Counts;
-use super::features::cases;
+use super::features::{BARE, cases};
 use super::measure::{Memory, memory, traffic};
 use super::*;
 use crate::experiment::Part;
