@@ -79,7 +79,7 @@ pub(super) const PEERS: &[Peer] = &[
         id: "pypbd",
         what: "XPBD, St. Venant-Kirchhoff energy as one constraint a tet (pyPBD)",
         caveat: "another energy, one multiplier a tet instead of two; where its version takes no gravity from the \
-            script, the beam does not fall",
+            script, it moves by its own default",
         precision: Precision::F64,
         compiles: false,
         program: Program::Python {
