@@ -34,7 +34,9 @@ pub(super) fn result(text: &str) -> anyhow::Result<PeerResult> {
     let mut result: PeerResult =
         serde_json::from_str(line).with_context(|| format!("no result: {line}"))?;
     if text.contains("gravity not set") {
-        result.note = Some("the script could not set gravity in this version: it has its own default".to_owned());
+        result.note = Some(
+            "the script could not set gravity in this version: it has its own default".to_owned(),
+        );
     }
     Ok(result)
 }
