@@ -6,7 +6,9 @@ mod coloring;
 mod cutting;
 mod experiment;
 mod gpu;
+mod lean;
 mod models;
+mod peers;
 mod soak;
 mod solver;
 mod sweep;
@@ -31,7 +33,7 @@ struct Arguments {
 type Run = fn(&ExperimentArguments) -> anyhow::Result<()>;
 
 /// All experiments by the names of their pages, in the order in which `all` runs them.
-const EXPERIMENTS: &[(&str, Run)] = &[];
+const EXPERIMENTS: &[(&str, Run)] = &[("lean", lean::run), ("peers", peers::run)];
 
 #[derive(Debug, Subcommand)]
 enum Command {
@@ -45,6 +47,13 @@ enum Command {
     GpuSweep(gpu::GpuArguments),
     /// Gather what runs with --shard have measured, and write the pages.
     Merge(MergeArguments),
+    /// What a scene pays for what it does not use: instructions, bytes, dispatches.
+    Lean(lean::LeanArguments),
+    /// What `lean` runs under valgrind.
+    #[command(hide = true)]
+    LeanProbe(lean::ProbeArguments),
+    /// Our solver next to other systems on the same mesh, each in turns with ours.
+    Peers(peers::PeersArguments),
     /// Compare the methods of the solver: what they cost and what they are worth.
     Solver(solver::SolverArguments),
     /// Make random strokes by the thousand and check everything after each.
@@ -64,6 +73,9 @@ fn main() -> anyhow::Result<()> {
         Command::Merge(arguments) => experiment::merge(&arguments)?
             .iter()
             .try_for_each(|(name, of_this)| named(name)?(of_this)),
+        Command::Lean(arguments) => lean::lean(&arguments),
+        Command::LeanProbe(arguments) => lean::probe(&arguments),
+        Command::Peers(arguments) => peers::peers(&arguments),
         Command::Solver(arguments) => solver::solver(&arguments),
         Command::SoakCut(arguments) => soak::soak(&arguments),
         Command::Sweep(arguments) => sweep::sweep(&arguments),

@@ -36,7 +36,7 @@ pub(crate) struct Layout<R> {
     revision: Option<u64>,
     /// Lanes of a block.
     pub(crate) lanes: usize,
-    /// Whether there is but one material.
+    /// Whether all tets have the same constants.
     uniform: bool,
     /// Color -> groups.
     colors: Rows<u32>,
@@ -53,9 +53,9 @@ pub(crate) struct Layout<R> {
     tets: Vec<u32>,
     /// Block, number, lane: what a tet is at rest.
     pub(crate) rest: Vec<R>,
-    /// Block, number, lane: the material. Empty if there is but one, which is `constant` then.
+    /// Block, number, lane: the material. Empty if all have the same, which is `constant` then.
     pub(crate) constants: Vec<R>,
-    /// The material if there is but one.
+    /// The material if all have the same.
     pub(crate) constant: [R; CONSTANTS],
     /// Tet -> block and lane.
     places: Vec<u32>,

@@ -48,13 +48,20 @@ impl<R: Real> TetConstraint<R> {
         let sound = volume > 0.0 && entries.into_iter().all(|v| R::from_f64(v).is_finite());
         // A tet too flat to be represented takes no part: without stiffness it leaves its corners to its neighbors.
         let entry = |v: f64| if sound { R::from_f64(v) } else { R::ZERO };
+        let [ratio, gamma] = Self::constants(material);
         Self {
             particles,
             inverse_rest: std::array::from_fn(|i| entry(rows[i / 3][i % 3])),
             stiffness: entry(stiffness),
-            ratio: R::from_f64(material.volume_stiffness() / material.mu()),
-            gamma: R::from_f64(material.gamma()),
+            ratio,
+            gamma,
         }
+    }
+
+    /// What all tets of a material have in common: `l/μ` and `γ`.
+    pub(crate) fn constants(material: &Material) -> [R; 2] {
+        let ratio = material.volume_stiffness() / material.mu();
+        [ratio, material.gamma()].map(R::from_f64)
     }
 
     /// The same tet in double precision, for measurements.

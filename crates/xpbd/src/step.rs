@@ -16,8 +16,9 @@ use crate::gauss_seidel;
 use crate::jacobi::Jacobi;
 use crate::lanes::Pass;
 use crate::layout::{Ingredients, Layout};
+use crate::neo_hookean::TetConstraint;
 use crate::real::{finite, load, store, weight};
-use crate::{Method, Real, Solver, StepSettings, XpbdError};
+use crate::{Material, Method, Real, Solver, StepSettings, XpbdError};
 
 /// Particles a thread takes at a time.
 pub(crate) const PARALLEL_PARTICLES: usize = 4096;
@@ -221,8 +222,19 @@ impl<R: Real> Solver<R> {
 
     fn bring_up(&self, layout: &mut Layout<R>, schedule: &Schedule) {
         let lanes = gauss_seidel::lanes::<R>(self.level);
-        let uniform = self.materials.len() < 2;
+        let uniform = self.has_one_set_of_constants();
         layout.follow(schedule, lanes, uniform, |t| self.ingredients(t));
+    }
+
+    /// Whether all materials are one to the layout: their densities do not matter to it, nor, but for rounding, their
+    /// Young's moduli.
+    pub(crate) fn has_one_set_of_constants(&self) -> bool {
+        let constants = |material: &Material| {
+            let [ratio, gamma] = TetConstraint::<R>::constants(material);
+            [ratio, gamma, R::from_f64(material.damping)]
+        };
+        let mut pairs = self.materials.windows(2);
+        pairs.all(|pair| constants(&pair[0]) == constants(&pair[1]))
     }
 
     /// What the layout needs of a tet.
@@ -325,5 +337,43 @@ impl<R: Real> Solver<R> {
                 repaired
             })
             .sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use crate::{Material, Solver};
+
+    /// A second material that the kernel cannot tell from the first takes no room in the layout.
+    #[test]
+    fn materials_are_told_apart_by_what_the_kernel_needs() {
+        let rubber = Material {
+            young_modulus: 1e4,
+            poisson_ratio: 0.45,
+            density: 1e3,
+            damping: 0.0,
+        };
+        let with = |second: Material| {
+            let mut solver = Solver::<f32>::new(&[DVec3::ZERO]);
+            solver.add_material(rubber).unwrap();
+            solver.add_material(second).unwrap();
+            solver.has_one_set_of_constants()
+        };
+        assert!(with(rubber));
+        assert!(with(Material {
+            young_modulus: 2e4,
+            density: 2e3,
+            ..rubber
+        }));
+        assert!(!with(Material {
+            poisson_ratio: 0.4,
+            ..rubber
+        }));
+        assert!(!with(Material {
+            damping: 0.1,
+            ..rubber
+        }));
     }
 }

@@ -16,8 +16,8 @@ use super::{CONSTANTS, Group, Ingredients, Layout, NONE, REST, Usage, index};
 use crate::Real;
 
 impl<R: Real> Layout<R> {
-    /// Makes this the layout of a schedule; returns how many tets were filled in. `uniform` says that there is but one
-    /// material.
+    /// Makes this the layout of a schedule; returns how many tets were filled in. `uniform` says that all tets have the
+    /// same constants.
     pub(crate) fn follow(
         &mut self,
         schedule: &Schedule,

@@ -1,0 +1,370 @@
+//! The scenes: a bare one, and for each feature that one with it declared and idle, and declared and used.
+//!
+//! The bare scene is a beam of soft material that floats at rest, in two substeps of one iteration: no forces, nothing
+//! held, nothing reported, no limit of kappa. A case names the scene that it is compared with: mostly the bare one; what
+//! only makes sense together with something else is compared with that alone.
+
+use incise::Scene;
+use incise::scene::{
+    BodySpec, ColliderSpec, EndSpec, Form, GroundSpec, HandleSpec, LinkSpec, Method, Precision,
+    Quantity, ReclusterSpec, Region, ReportSpec, ShapeSpec, SleepSpec, StrokeSpec, Substeps,
+};
+
+/// What of a feature a scene has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum State {
+    /// What others are compared with.
+    Base,
+    /// Declared, but nothing there is for it to do.
+    Idle,
+    /// Declared and at work.
+    Used,
+}
+
+impl State {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Base => "base",
+            Self::Idle => "idle",
+            Self::Used => "used",
+        }
+    }
+}
+
+/// A scene of the comparison.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Case {
+    pub(crate) feature: &'static str,
+    pub(crate) state: State,
+    /// The feature of the base that it is compared with.
+    pub(crate) base: &'static str,
+    /// What is there, in words.
+    pub(crate) what: &'static str,
+    pub(crate) change: fn(&mut Scene),
+}
+
+impl Case {
+    /// Unique among the cases.
+    pub(crate) fn id(&self) -> String {
+        format!("{}-{}", self.feature.replace(' ', "-"), self.state.name())
+    }
+
+    pub(crate) fn scene(&self, tets: usize) -> Scene {
+        let mut scene = bare(tets);
+        (self.change)(&mut scene);
+        scene
+    }
+}
+
+/// The name of the base that has nothing.
+pub(crate) const BARE: &str = "bare";
+
+fn bare(tets: usize) -> Scene {
+    let mut scene = Scene::default();
+    scene.solver.substeps = Substeps::Fixed(2);
+    scene.solver.kappa_limit = f64::INFINITY;
+    scene.body.push(beam(tets, 0.0));
+    scene
+}
+
+/// A beam of length 1 along x, with its middle at a height.
+fn beam(tets: usize, height: f64) -> BodySpec {
+    BodySpec {
+        mesh: None,
+        shape: Some(ShapeSpec {
+            kind: "beam".to_owned(),
+            tets,
+        }),
+        scale: 1.0,
+        position: [0.0, 0.0, height],
+        young_modulus: 1e4,
+        poisson_ratio: 0.45,
+        density: 1000.0,
+        damping: 0.0,
+        volume_compliance: None,
+        substeps: None,
+        fixed: Vec::new(),
+    }
+}
+
+/// What is never reached.
+const FAR: f64 = 1e3;
+/// A frame that never comes.
+const LATE: u64 = 1_000_000;
+/// The end of the beam.
+const END: Region = Region::HalfSpace {
+    point: [-0.49, 0.0, 0.0],
+    normal: [-1.0, 0.0, 0.0],
+};
+
+fn handle(frames: [u64; 2], way: f64, compliance: f64) -> HandleSpec {
+    HandleSpec {
+        body: 0,
+        holds: vec![END],
+        frames,
+        path: vec![[0.0; 3], [way, 0.0, 0.0]],
+        turn: None,
+        compliance,
+    }
+}
+
+fn ball(at: f64, velocity: f64) -> ColliderSpec {
+    ColliderSpec::Sphere {
+        center: [0.0, 0.0, at],
+        radius: 0.2,
+        friction: 0.3,
+        velocity: [velocity, 0.0, 0.0],
+    }
+}
+
+fn link(only_when_longer: bool, length: Option<f64>) -> LinkSpec {
+    let end = |x| EndSpec {
+        body: 0,
+        point: [x, 0.125, 0.125],
+    };
+    LinkSpec {
+        from: end(-0.5),
+        to: end(0.5),
+        length,
+        compliance: 0.0,
+        only_when_longer,
+    }
+}
+
+/// Two beams, one above the other, held together by a rod.
+fn two_linked(scene: &mut Scene) {
+    let mut second = scene.body[0].clone();
+    second.position = [0.0, 0.0, 0.5];
+    scene.body.push(second);
+    scene.link.push(LinkSpec {
+        from: EndSpec {
+            body: 0,
+            point: [0.0, 0.0, 0.125],
+        },
+        to: EndSpec {
+            body: 1,
+            point: [0.0, 0.0, 0.375],
+        },
+        length: None,
+        compliance: 0.0,
+        only_when_longer: false,
+    });
+}
+
+fn plane(snap: f64) -> StrokeSpec {
+    StrokeSpec::Plane {
+        frame: LATE,
+        point: [0.013, 0.0, 0.0],
+        normal: [1.0, 0.0, 0.0],
+        snap,
+    }
+}
+
+/// A blade that moves beside the beam.
+fn blade(frames: [u64; 2]) -> StrokeSpec {
+    StrokeSpec::Sweep {
+        frames,
+        blade: vec![[0.0, 2.0, -1.0], [0.0, 2.0, 1.0]],
+        path: vec![[0.0; 3], [0.0, 1.0, 0.0]],
+        snap: 0.1,
+    }
+}
+
+fn report(quantity: Quantity, every: u64) -> ReportSpec {
+    ReportSpec {
+        every,
+        quantities: vec![quantity],
+    }
+}
+
+/// All scenes, bases first.
+pub(crate) fn cases() -> Vec<Case> {
+    use State::{Base, Idle, Used};
+    let case = |feature, state, what, change: fn(&mut Scene)| Case {
+        feature,
+        state,
+        base: BARE,
+        what,
+        change,
+    };
+    let with = |base, case| Case { base, ..case };
+    vec![
+        case(BARE, Base, "a floating beam", |_| ()),
+        case("two linked bodies", Base, "of one material", two_linked),
+        case("gravity", Idle, "zero", |s| {
+            s.world.gravity = Some([0.0; 3]);
+        }),
+        case("gravity", Used, "9.81 m/s²", |s| {
+            s.world.gravity = Some([0.0, 0.0, -9.81]);
+        }),
+        case("ground", Idle, "far below", |s| {
+            s.world.ground = Some(GroundSpec {
+                height: -FAR,
+                friction: 0.5,
+            });
+        }),
+        case("ground", Used, "in the lowest layer of the beam", |s| {
+            s.world.ground = Some(GroundSpec {
+                height: -0.1249,
+                friction: 0.5,
+            });
+        }),
+        case("collider", Idle, "a ball far away", |s| {
+            s.collider.push(ball(FAR, 0.0));
+        }),
+        case("collider", Used, "a ball in contact", |s| {
+            s.collider.push(ball(0.324, 0.0));
+        }),
+        case("moving collider", Used, "a ball that moves far away", |s| {
+            s.collider.push(ball(FAR, 1.0));
+        }),
+        case("fixed particles", Idle, "a region without particles", |s| {
+            s.body[0].fixed.push(Region::Particles(Vec::new()));
+        }),
+        case("fixed particles", Used, "one end", |s| {
+            s.body[0].fixed.push(END);
+        }),
+        case("handle", Idle, "one end, not yet moving", |s| {
+            s.handle.push(handle([LATE, LATE + 1], 0.1, 0.0));
+        }),
+        case("handle", Used, "one end, moving", |s| {
+            s.handle.push(handle([0, 1000], 0.01, 0.0));
+        }),
+        case("soft handle", Used, "one end, moving", |s| {
+            s.handle.push(handle([0, 1000], 0.01, 1e-4));
+        }),
+        case("link", Idle, "a slack thread", |s| {
+            s.link.push(link(true, Some(2.0)));
+        }),
+        case("link", Used, "a rod", |s| s.link.push(link(false, None))),
+        case("volume constraints", Used, "one a tet", |s| {
+            s.body[0].volume_compliance = Some(1e-7);
+        }),
+        case("damping", Used, "0.01 s", |s| s.body[0].damping = 0.01),
+        with(
+            "two linked bodies",
+            case("other stiffness", Used, "a second Young's modulus", |s| {
+                two_linked(s);
+                s.body[1].young_modulus *= 2.0;
+            }),
+        ),
+        with(
+            "two linked bodies",
+            case("other material", Used, "a second Poisson's ratio", |s| {
+                two_linked(s);
+                s.body[1].poisson_ratio = 0.3;
+            }),
+        ),
+        case("plane stroke", Idle, "not due, snapping off", |s| {
+            s.stroke.push(plane(0.0));
+        }),
+        with(
+            "plane stroke",
+            case("snapping", Idle, "of a plane that is not due", |s| {
+                s.stroke.push(plane(0.1));
+            }),
+        ),
+        case("blade", Idle, "not due", |s| {
+            s.stroke.push(blade([LATE, LATE + 9]));
+        }),
+        case("blade", Used, "moving beside the beam", |s| {
+            s.stroke.push(blade([0, 1000]));
+        }),
+        case("report residual", Idle, "in frame 0 only", |s| {
+            s.report = report(Quantity::Residual, LATE);
+        }),
+        case("report residual", Used, "every frame", |s| {
+            s.report = report(Quantity::Residual, 1);
+        }),
+        case("report energy", Idle, "in frame 0 only", |s| {
+            s.report = report(Quantity::Energy, LATE);
+        }),
+        case("report energy", Used, "every frame", |s| {
+            s.report = report(Quantity::Energy, 1);
+        }),
+        case("report volume", Idle, "in frame 0 only", |s| {
+            s.report = report(Quantity::Volume, LATE);
+        }),
+        case("report volume", Used, "every frame", |s| {
+            s.report = report(Quantity::Volume, 1);
+        }),
+        case("report speed", Used, "every frame", |s| {
+            s.report = report(Quantity::Speed, 1);
+        }),
+        case("report kappa", Used, "every frame", |s| {
+            s.report = report(Quantity::Kappa, 1);
+        }),
+        case("sleep", Idle, "awake, at rest for 1000 s", |s| {
+            s.solver.sleep = Some(SleepSpec {
+                speed: 1e-3,
+                time: 1000.0,
+            });
+        }),
+        case("sleep", Used, "asleep after a frame", |s| {
+            s.solver.sleep = Some(SleepSpec {
+                speed: 1e-3,
+                time: 1e-3,
+            });
+        }),
+        case("iterations", Used, "2 a substep", |s| {
+            s.solver.iterations = 2;
+        }),
+        case("relaxation", Used, "0.9", |s| s.solver.relaxation = 0.9),
+        case("double precision", Used, "f64", |s| {
+            s.solver.precision = Precision::F64;
+        }),
+        case("sequential form", Used, "as in the paper", |s| {
+            s.solver.form = Form::Sequential;
+        }),
+        case("jacobi", Used, "1 iteration", |s| {
+            s.solver.method = Method::Jacobi;
+            s.solver.relaxation = 0.1;
+        }),
+        case("chebyshev", Used, "1 iteration", |s| {
+            s.solver.method = Method::Chebyshev;
+            s.solver.relaxation = 0.1;
+        }),
+        case("kappa limit", Idle, "1e9, nobody is softened", |s| {
+            s.solver.kappa_limit = 1e9;
+        }),
+        case("kappa limit", Used, "1e-6, all are softened", |s| {
+            s.solver.kappa_limit = 1e-6;
+        }),
+        case("substeps auto", Used, "which takes 2 as well", |s| {
+            s.solver.substeps = Substeps::Auto;
+            s.solver.max_substeps = 2;
+            s.body[0].young_modulus = 1e8;
+        }),
+        case("recluster", Idle, "nothing is worn", |s| {
+            s.solver.recluster = Some(ReclusterSpec {
+                wear: 1.25,
+                frames: std::num::NonZeroU32::MIN,
+            });
+        }),
+        case("no merging", Used, "clusters of cut tets stay apart", |s| {
+            s.solver.merge_clusters = false;
+        }),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Each case has another id, its base is there, and its scene is not that of its base.
+    #[test]
+    fn cases_are_told_apart() {
+        let cases = cases();
+        let mut ids: Vec<_> = cases.iter().map(Case::id).collect();
+        ids.sort();
+        ids.dedup();
+        assert_eq!(ids.len(), cases.len());
+        for case in &cases {
+            let first = cases.iter().find(|other| other.feature == case.base);
+            let base = first.expect("the base is a case").scene(100);
+            if case.state != State::Base {
+                assert_ne!(case.scene(100), base, "{}", case.id());
+            }
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! `cargo xtask lean`: what a scene pays for what it does not use.
+//!
+//! Each feature is declared in an otherwise bare scene, once with nothing to do and once at work, in two sizes, and the
+//! differences to the bare scene are listed: instructions, branches, bytes, and what a GPU is told. The bare scene itself
+//! is held against a loop by hand over the solver alone, which has never heard of any feature of the facade.
+
+mod callgrind;
+mod features;
+mod measure;
+mod page;
+mod probe;
+
+use clap::Args;
+use serde::{Deserialize, Serialize};
+
+use crate::experiment::{Cell, Experiment, ExperimentArguments};
+use features::{Case, State, cases};
+use measure::{Gpu, Measured, measure};
+use probe::Way;
+pub(crate) use probe::{ProbeArguments, probe};
+
+#[derive(Debug, Args)]
+pub(crate) struct LeanArguments {
+    #[command(flatten)]
+    experiment: ExperimentArguments,
+    /// Leave out what valgrind counts.
+    #[arg(long)]
+    no_valgrind: bool,
+}
+
+/// A scene in all sizes.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct Row {
+    feature: String,
+    state: String,
+    /// The feature whose base this is compared with.
+    base: String,
+    what: String,
+    /// What counted instructions, if anything did.
+    valgrind: Option<String>,
+    /// By ascending size.
+    sizes: Vec<Measured>,
+}
+
+/// The bare scene by hand, and by hand without a body.
+const BY_HAND: [(Way, &str); 2] = [
+    (Way::Hand, "the solver alone"),
+    (Way::Empty, "the solver alone, without a body"),
+];
+
+#[expect(
+    clippy::print_stderr,
+    reason = "whoever waits for a page wants to know at once what will be missing from it"
+)]
+pub(crate) fn lean(arguments: &LeanArguments) -> anyhow::Result<()> {
+    let valgrind = match arguments.no_valgrind {
+        true => None,
+        false => callgrind::version(),
+    };
+    if valgrind.is_none() && !arguments.no_valgrind {
+        eprintln!(
+            "valgrind is not installed (Debian: apt-get install valgrind): instructions are not counted, only bytes, \
+             allocations and what a GPU is told"
+        );
+    }
+    experiment(arguments.experiment.quick, &valgrind).run(&arguments.experiment)
+}
+
+/// As one of all experiments.
+pub(crate) fn run(arguments: &ExperimentArguments) -> anyhow::Result<()> {
+    lean(&LeanArguments {
+        experiment: arguments.clone(),
+        no_valgrind: false,
+    })
+}
+
+fn experiment(quick: bool, valgrind: &Option<String>) -> Experiment<Row> {
+    // Quick: the smallest that still tells a constant from a pass.
+    let tets: &'static [usize] = if quick { &[200, 400] } else { &[800, 3200] };
+    let gpu = Gpu::default();
+    let mut cells = Vec::new();
+    let cases = cases();
+    let bare = cases[0];
+    let all = BY_HAND.map(|(way, what)| (Case { what, ..bare }, way));
+    let all = all
+        .into_iter()
+        .chain(cases.into_iter().map(|case| (case, Way::Facade)));
+    for (case, way) in all {
+        let (gpu, valgrind) = (gpu.clone(), valgrind.clone());
+        let feature = match way {
+            Way::Facade => case.feature,
+            Way::Hand | Way::Empty => way.name(),
+        };
+        let id = match way {
+            Way::Facade => case.id(),
+            Way::Hand | Way::Empty => format!("by-{feature}"),
+        };
+        cells.push(Cell::new(id, move || {
+            let whole = !quick || of_a_quick_run(&case);
+            let count = valgrind.is_some() && whole;
+            let gpu = whole.then_some(&gpu);
+            let measured = tets
+                .iter()
+                .map(|&tets| measure(&case.scene(tets), way, count, gpu));
+            Ok(Row {
+                feature: feature.to_owned(),
+                state: case.state.name().to_owned(),
+                base: case.base.to_owned(),
+                what: case.what.to_owned(),
+                valgrind: valgrind.clone(),
+                sizes: measured.collect::<anyhow::Result<_>>()?,
+            })
+        }));
+    }
+    Experiment {
+        name: "lean",
+        cells,
+        page: page::page,
+    }
+}
+
+/// Whether a quick run counts the instructions of this one, and asks a device; bytes are counted of all.
+fn of_a_quick_run(case: &Case) -> bool {
+    case.state == State::Base || ["gravity", "handle"].contains(&case.feature)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,334 @@
+//! The page: what is not declared, what is declared and idle, what is at work.
+
+use anyhow::Context;
+
+use super::Row;
+use super::callgrind::Counts;
+use super::features::{BARE, State};
+use super::measure::{Device, FRAMES, Measured};
+use crate::experiment::{Page, Part, Table};
+
+/// Features and the modules that are theirs alone: what of a bare frame is in those is paid by who declared nothing.
+const MODULES: [(&str, &[&str]); 12] = [
+    ("handles", &["xpbd::attachment", "incise::handle"]),
+    ("links", &["xpbd::distance", "incise::link"]),
+    ("volume constraints", &["xpbd::volume", "incise::volume"]),
+    ("colliders, ground", &["xpbd::collider", "incise::collider"]),
+    ("Jacobi, Chebyshev", &["xpbd::jacobi"]),
+    ("descent", &["xpbd::descent", "incise::descent"]),
+    (
+        "strokes, pieces",
+        &["incise::strokes", "incise::pieces", "incise_cutting"],
+    ),
+    (
+        "clusters, colors, reclustering",
+        &[
+            "incise::plan",
+            "incise::recluster",
+            "incise_clustering",
+            "incise_coloring",
+        ],
+    ),
+    (
+        "reports",
+        &["incise::measure", "xpbd::measure", "xpbd::residuals"],
+    ),
+    ("sleep", &["incise::sleep"]),
+    ("bodies far from the origin", &["xpbd::origin"]),
+    ("bodies on a line", &["xpbd::unfold"]),
+];
+
+/// The function of the facade that has a pass: what a frame is for.
+const POSITIONS: &str = "AnySolver::positions";
+
+const INTRODUCTION: &str = "\
+What a scene pays for what it does not use, what it declares without use, and what is at work. The scene is a beam that \
+floats at rest, in 2 substeps of 1 iteration; nothing acts on it, nothing is held, reported or limited.
+
+*Undeclared* cannot be measured by leaving a key out: that is the bare scene itself. Three things are measured instead. \
+The bare scene is held against a loop by hand over the same mesh and schedule: `incise_xpbd::Solver::step` and a copy of \
+the positions. That loop has never heard of scenes, strokes, pieces, reports, sleep, handles as a scene has them. What \
+the scene takes more must be a constant, the same for every size of mesh: then no undeclared feature has a pass over \
+particles or tets. This holds for branches to the digit; for instructions the compiler blurs it, since it makes one copy \
+of the solver for the facade and another for the loop by hand, which differ by some instructions a particle. Second, \
+the solver's own step without a body: all that it asks about undeclared constraints, which is once a substep or a frame, \
+is in there, and it is an upper bound. Third, the instructions of a bare frame by function, summed over the modules that \
+belong to one feature alone; what the compiler has inlined elsewhere is in the first two only.
+
+What these miss: a branch within the loops over particles and tets, which both loops share. By reading: three for each \
+block of 4 to 16 tets, the same every time (whether multipliers are kept, whether corrections are collected as Jacobi \
+does, whether materials differ); for each particle, whether it is held, and whether there is gravity. And bytes that the \
+solver holds whatever a scene declares: a byte a particle for being fixed, two a tet for its material, eight a tet for \
+its volume at rest. One pass a frame is for what nobody declares: the bounding box, by which a body that moves far away \
+keeps its precision. Any simulation can be cut at any time, so each keeps neighbors, boundary and pieces of its mesh, and \
+clusters and colors that can follow.
+
+Instructions are Callgrind's, on one thread, mean of 4 frames after the first 3; on a processor as valgrind \
+shows it, with AVX 2 at most. Bytes are those held on the heap, capacity included. They are no times: a pass over memory \
+costs more than its instructions.";
+
+pub(crate) fn page(rows: &[Row]) -> anyhow::Result<Page> {
+    let mut parts = vec![Part::Text(INTRODUCTION.to_owned())];
+    let valgrind = rows.iter().find_map(|row| row.valgrind.as_deref());
+    parts.push(Part::Text(match valgrind {
+        Some(version) => format!("Instructions counted by {version}."),
+        None => "Valgrind was not there, so no instructions were counted.".to_owned(),
+    }));
+    let find = |feature: &str| {
+        let row = rows.iter().find(|row| row.feature == feature);
+        row.with_context(|| format!("{feature} was not measured"))
+    };
+    let (bare, hand, empty) = (find(BARE)?, find("hand")?, find("empty")?);
+    parts.push(Part::Table(undeclared(bare, hand, empty)));
+    parts.push(Part::Table(modules(bare)));
+    let declared = [
+        declared_table("Declared and idle", rows, State::Idle),
+        declared_table("Declared and at work", rows, State::Used),
+    ];
+    parts.extend(
+        declared
+            .into_iter()
+            .map(|table| table.map(Part::Table))
+            .collect::<Result<Vec<_>, _>>()?,
+    );
+    parts.push(Part::Table(device_table(rows)?));
+    Ok(Page {
+        title: "What a scene pays for what it does not use".to_owned(),
+        parts,
+    })
+}
+
+/// The bare scene beside the loops by hand.
+fn undeclared(bare: &Row, hand: &Row, empty: &Row) -> Table {
+    let mut table = Table::new(
+        "Nothing declared",
+        [
+            "tets",
+            "particles",
+            "",
+            "instructions a frame",
+            "branches a frame",
+            "allocations a frame",
+            "bytes",
+        ],
+    );
+    let mut push = |of: &Measured, name: &str, values: [String; 4]| {
+        let [instructions, branches, allocations, bytes] = values;
+        table.push([
+            of.tets.to_string(),
+            of.particles.to_string(),
+            name.to_owned(),
+            instructions,
+            branches,
+            allocations,
+            bytes,
+        ]);
+    };
+    let all = |m: &Measured| {
+        [
+            show(instructions(m)),
+            show(branches(m)),
+            per_frame(m.memory.allocations),
+            m.memory.bytes.to_string(),
+        ]
+    };
+    for (bare, hand) in bare.sizes.iter().zip(&hand.sizes) {
+        push(bare, "scene", all(bare));
+        push(hand, "by hand", all(hand));
+        push(
+            bare,
+            "scene, more than by hand",
+            [
+                show(minus(instructions(bare), instructions(hand))),
+                show(minus(branches(bare), branches(hand))),
+                (bare.memory.allocations as i64 - hand.memory.allocations as i64).to_string(),
+                (bare.memory.bytes - hand.memory.bytes).to_string(),
+            ],
+        );
+        push(
+            bare,
+            "of that, neighbors, boundary and pieces",
+            [
+                "".into(),
+                "".into(),
+                "".into(),
+                bare.memory.ready_to_cut.to_string(),
+            ],
+        );
+    }
+    if let Some(empty) = empty.sizes.first() {
+        push(empty, "by hand, without a body", all(empty));
+    }
+    table
+}
+
+/// The instructions of a bare frame in modules of features that are not declared.
+fn modules(bare: &Row) -> Table {
+    let mut header = vec!["feature".to_owned()];
+    header.extend(bare.sizes.iter().map(|m| format!("{} tets", m.tets)));
+    let mut table = Table::new(
+        "Instructions of a bare frame in functions of features that it does not declare",
+        header,
+    );
+    let mut push = |name: &str, of: &dyn Fn(&Counts) -> u64| {
+        let mut row = vec![name.to_owned()];
+        row.extend(bare.sizes.iter().map(|m| {
+            let counted = m.counts.as_ref();
+            show(counted.map(|counts| of(counts) as f64 / f64::from(FRAMES)))
+        }));
+        table.push(row);
+    };
+    for (feature, parts) in MODULES {
+        push(feature, &|counts| counts.of(parts));
+    }
+    push(
+        "the whole facade but for the copy of positions",
+        &|counts| counts.of(&["incise::"]) - counts.of(&[POSITIONS]),
+    );
+    push("clocks for the report's times", &|counts| {
+        counts.of(&["Timespec", "clock_gettime", "time::Instant"])
+    });
+    push("for comparison: the copy of positions", &|counts| {
+        counts.of(&[POSITIONS])
+    });
+    table
+}
+
+/// A scene beside its base, in every size.
+fn pairs<'a>(
+    rows: &'a [Row],
+    row: &'a Row,
+) -> anyhow::Result<impl Iterator<Item = (&'a Measured, &'a Measured)>> {
+    let base = rows.iter().find(|base| base.feature == row.base);
+    let base = base.with_context(|| format!("{} was not measured", row.base))?;
+    Ok(row.sizes.iter().zip(&base.sizes))
+}
+
+pub(super) fn declared_table(caption: &str, rows: &[Row], state: State) -> anyhow::Result<Table> {
+    let mut table = Table::new(
+        format!("{caption}: what a frame takes more than its base's, at the larger size"),
+        [
+            "feature",
+            "what",
+            "instructions",
+            "in % of the base's",
+            "branches",
+            "instructions a particle more",
+            "allocations",
+            "bytes",
+            "bytes a particle",
+        ],
+    );
+    for row in rows.iter().filter(|row| row.state == state.name()) {
+        let differences: Vec<_> = pairs(rows, row)?.collect();
+        let Some(&(here, base)) = differences.last() else {
+            continue;
+        };
+        let more = minus(instructions(here), instructions(base));
+        let part = more
+            .zip(instructions(base))
+            .map(|(more, all)| 100.0 * more / all);
+        // Between the sizes: a constant falls out.
+        let slope = match differences[..] {
+            [(small, small_base), .., (large, large_base)] => {
+                let more = |a, b| minus(instructions(a), instructions(b));
+                let particles = large.particles as f64 - small.particles as f64;
+                minus(more(large, large_base), more(small, small_base)).map(|d| d / particles)
+            }
+            _ => None,
+        };
+        let bytes = here.memory.bytes - base.memory.bytes;
+        let name = match row.base.as_str() {
+            BARE => row.feature.clone(),
+            base => format!("{} (beside {base})", row.feature),
+        };
+        table.push([
+            name,
+            row.what.clone(),
+            show(more),
+            part.map_or("-".to_owned(), |part| format!("{part:.3}")),
+            show(minus(branches(here), branches(base))),
+            slope.map_or("-".to_owned(), |slope| format!("{slope:.2}")),
+            (here.memory.allocations as i64 - base.memory.allocations as i64).to_string(),
+            bytes.to_string(),
+            format!("{:.1}", bytes as f64 / here.particles as f64),
+        ]);
+    }
+    Ok(table)
+}
+
+/// What a device is told.
+fn device_table(rows: &[Row]) -> anyhow::Result<Table> {
+    let mut table = Table::new(
+        "On a GPU: a bare frame, and what a frame of others is told more, at the larger size",
+        [
+            "feature",
+            "state",
+            "dispatches",
+            "passes",
+            "submits",
+            "bytes sent",
+            "reads",
+            "bytes read",
+            "bytes held",
+        ],
+    );
+    for row in rows {
+        let Some((here, base)) = pairs(rows, row)?.last() else {
+            continue;
+        };
+        let Some(device) = here.device else { continue };
+        let of = |device: Device| {
+            [
+                device.dispatches,
+                device.passes,
+                device.submits,
+                device.uploaded,
+                device.readbacks,
+                device.read,
+            ]
+        };
+        let is_base = row.state == State::Base.name();
+        let base = base.device.filter(|_| !is_base);
+        let mut line = vec![row.feature.clone(), row.state.clone()];
+        let before = base.map_or([0; 6], of);
+        let more = of(device).into_iter().zip(before);
+        line.extend(more.map(|(here, base)| {
+            let each = (here as f64 - base as f64) / f64::from(FRAMES);
+            if each == each.round() {
+                format!("{each:.0}")
+            } else {
+                format!("{each:.2}")
+            }
+        }));
+        let held = device.bytes as i64 - base.map_or(0, |base| base.bytes as i64);
+        line.push(held.to_string());
+        table.push(line);
+    }
+    if table.rows.is_empty() {
+        table.push(["no device"].into_iter().chain(["-"; 8]));
+    }
+    Ok(table)
+}
+
+fn instructions(measured: &Measured) -> Option<f64> {
+    let counts = measured.counts.as_ref()?;
+    Some(counts.instructions as f64 / f64::from(FRAMES))
+}
+
+fn branches(measured: &Measured) -> Option<f64> {
+    let counts = measured.counts.as_ref()?;
+    Some(counts.branches as f64 / f64::from(FRAMES))
+}
+
+fn minus(a: Option<f64>, b: Option<f64>) -> Option<f64> {
+    Some(a? - b?)
+}
+
+fn show(value: Option<f64>) -> String {
+    value.map_or("-".to_owned(), |value| format!("{value:.0}"))
+}
+
+fn per_frame(count: u64) -> String {
+    (count as f64 / f64::from(FRAMES)).to_string()
+}
