@@ -7,6 +7,7 @@ mod cutting;
 mod experiment;
 mod gpu;
 mod models;
+mod paper;
 mod soak;
 mod solver;
 mod sweep;
@@ -32,6 +33,8 @@ enum Command {
     Cutting(cutting::CuttingArguments),
     /// Check the kernels on a GPU, time colorings, iterations and frames there, and write a page and JSON.
     GpuSweep(gpu::GpuArguments),
+    /// Repeat the tables and figures of the paper, its numbers and ours side by side.
+    Paper(paper::PaperArguments),
     /// Compare the methods of the solver: what they cost and what they are worth.
     Solver(solver::SolverArguments),
     /// Make random strokes by the thousand and check everything after each.
@@ -47,6 +50,7 @@ fn main() -> anyhow::Result<()> {
         Command::Coloring(arguments) => coloring::coloring(&arguments),
         Command::Cutting(arguments) => cutting::cutting(&arguments),
         Command::GpuSweep(arguments) => gpu::sweep(&arguments),
+        Command::Paper(arguments) => paper::paper(&arguments),
         Command::Solver(arguments) => solver::solver(&arguments),
         Command::SoakCut(arguments) => soak::soak(&arguments),
         Command::Sweep(arguments) => sweep::sweep(&arguments),

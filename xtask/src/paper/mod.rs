@@ -1,0 +1,77 @@
+//! `cargo xtask paper`: the tables and figures of the paper, its numbers and ours side by side.
+//!
+//! One module per table or figure, each an experiment of the common frame. The paper's numbers are data in `printed`, its
+//! bodies stand in `body`. Where the paper leaves open what it means, every reading is run and the page says so.
+
+mod body;
+mod colorings;
+mod compared;
+mod fig9;
+mod painter;
+mod printed;
+mod scene;
+mod table1;
+mod table2;
+#[cfg(test)]
+mod tests;
+
+use clap::{Args, ValueEnum};
+
+use crate::experiment::{Backend, ExperimentArguments};
+
+#[derive(Debug, Args)]
+pub(crate) struct PaperArguments {
+    /// Which table or figure.
+    #[arg(value_enum)]
+    what: What,
+    #[command(flatten)]
+    experiment: ExperimentArguments,
+}
+
+/// A table or figure of the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum What {
+    /// Serial neighbor clustering and Greedy K-Neighbor.
+    Table1,
+    /// Colors, their distribution and times by algorithm.
+    Table2,
+    /// Pictures of colored bodies, and their colors.
+    Fig9,
+    /// All of these.
+    All,
+}
+
+/// The name of the experiment begins with this.
+const PREFIX: &str = "paper-";
+
+pub(crate) fn paper(arguments: &PaperArguments) -> anyhow::Result<()> {
+    run(arguments.what, &arguments.experiment)
+}
+
+/// Runs the experiment whose pages have this name, if it is one of the paper's; whether it is.
+pub(crate) fn by_name(name: &str, arguments: &ExperimentArguments) -> anyhow::Result<bool> {
+    let what = name
+        .strip_prefix(PREFIX)
+        .map(|what| What::from_str(what, true));
+    let Some(Ok(what)) = what else {
+        return Ok(false);
+    };
+    run(what, arguments)?;
+    Ok(true)
+}
+
+fn run(what: What, arguments: &ExperimentArguments) -> anyhow::Result<()> {
+    anyhow::ensure!(
+        arguments.backend == Backend::Cpu,
+        "the paper's tables are measured on the processor only; `cargo xtask gpu-sweep` has colorings and frames on a GPU"
+    );
+    match what {
+        What::Table1 => table1::experiment(arguments).run(arguments),
+        What::Table2 => table2::experiment(arguments).run(arguments),
+        What::Fig9 => fig9::experiment(arguments).run(arguments),
+        What::All => What::value_variants()
+            .iter()
+            .filter(|&&what| what != What::All)
+            .try_for_each(|&what| run(what, arguments)),
+    }
+}
