@@ -236,5 +236,9 @@ impl Trial {
 }
 
 pub(super) fn norm(forces: &[DVec3]) -> f64 {
-    forces.iter().map(|f| f.length_squared()).sum::<f64>().sqrt()
+    forces
+        .iter()
+        .map(|f| f.length_squared())
+        .sum::<f64>()
+        .sqrt()
 }

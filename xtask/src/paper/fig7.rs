@@ -25,7 +25,11 @@ pub(super) fn experiment(arguments: &ExperimentArguments) -> Experiment<Row> {
             let id = format!("{}-{}", setup.id(), solving.id());
             cells.push(Cell::new(id, move || {
                 let trial = Trial::new(setup, solving, &arguments)?;
-                let counts: &[u32] = if arguments.quick { &QUICK_COUNTS } else { &COUNTS };
+                let counts: &[u32] = if arguments.quick {
+                    &QUICK_COUNTS
+                } else {
+                    &COUNTS
+                };
                 let points = counts.iter().map(|&count| trial.point(count));
                 Ok(Row {
                     setup,
@@ -51,8 +55,10 @@ fn page(rows: &[Row]) -> anyhow::Result<Page> {
     )];
     for setup in Setup::ALL {
         let of_this: Vec<&Row> = rows.iter().filter(|row| row.setup == setup).collect();
-        let quantities: [(&str, fn(&Point) -> f64); 2] =
-            [("dual residual", |p| p.dual), ("force, relative", |p| p.force)];
+        let quantities: [(&str, fn(&Point) -> f64); 2] = [
+            ("dual residual", |p| p.dual),
+            ("force, relative", |p| p.force),
+        ];
         for (what, value) in quantities {
             let series = of_this.iter().map(|row| Series {
                 name: row.solving.words(),

@@ -4,14 +4,23 @@
 //! bodies stand in `body`. Where the paper leaves open what it means, every reading is run and the page says so.
 
 mod body;
+mod claims;
 mod colorings;
 mod compared;
+mod convergence;
+mod fig10;
+mod fig11;
+mod fig4;
+mod fig6;
+mod fig7;
+mod fig8;
 mod fig9;
 mod painter;
 mod printed;
 mod scene;
 mod table1;
 mod table2;
+mod table3;
 #[cfg(test)]
 mod tests;
 
@@ -35,8 +44,24 @@ enum What {
     Table1,
     /// Colors, their distribution and times by algorithm.
     Table2,
+    /// Iterations and milliseconds to a residual.
+    Table3,
+    /// Time to color and colors by algorithm and size.
+    Fig4,
+    /// Pictures of bodies that are cut.
+    Fig6,
+    /// Residuals over 500 iterations.
+    Fig7,
+    /// Colors and times of frames while cutting.
+    Fig8,
     /// Pictures of colored bodies, and their colors.
     Fig9,
+    /// Power density spectra of the residual.
+    Fig10,
+    /// The time of a frame by stages.
+    Fig11,
+    /// What the paper claims, and whether it was found; takes what the others have measured.
+    Claims,
     /// All of these.
     All,
 }
@@ -68,6 +93,14 @@ fn run(what: What, arguments: &ExperimentArguments) -> anyhow::Result<()> {
     match what {
         What::Table1 => table1::experiment(arguments).run(arguments),
         What::Table2 => table2::experiment(arguments).run(arguments),
+        What::Table3 => table3::experiment(arguments).run(arguments),
+        What::Fig4 => fig4::experiment(arguments).run(arguments),
+        What::Fig6 => fig6::experiment(arguments).run(arguments),
+        What::Fig7 => fig7::experiment(arguments).run(arguments),
+        What::Fig8 => fig8::experiment(arguments).run(arguments),
+        What::Fig10 => fig10::experiment(arguments).run(arguments),
+        What::Claims => claims::experiment(arguments).run(arguments),
+        What::Fig11 => fig11::experiment(arguments).run(arguments),
         What::Fig9 => fig9::experiment(arguments).run(arguments),
         What::All => What::value_variants()
             .iter()

@@ -205,10 +205,3 @@ pub(super) const FIGURE_4: [(&str, usize); 9] = [
     ("sphere_28k", 27_792),
     ("sphere_118k", 118_202),
 ];
-
-/// The rows of Figure 8 from top to bottom by its caption and that of Figure 6, and the frames of each.
-pub(super) const FIGURE_8: [(&str, u64); 3] = [
-    ("liver_11k", 220),
-    ("bunny_19k", 180),
-    ("armadillo_55k", 280),
-];

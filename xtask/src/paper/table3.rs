@@ -51,7 +51,11 @@ fn measure(setup: Setup, solving: Solving, arguments: &ExperimentArguments) -> a
     let trial = Trial::new(setup, solving, arguments)?;
     let cap = if arguments.quick { QUICK_CAP } else { CAP };
     // Where a step is well-posed, what has not come after a few thousand will not come.
-    let cap = if setup == Setup::WellPosed { cap.min(4096) } else { cap };
+    let cap = if setup == Setup::WellPosed {
+        cap.min(4096)
+    } else {
+        cap
+    };
     let mut points = Vec::new();
     let powers = (0..13).map(|k| 1 << k).filter(|&count| count < cap);
     for iterations in powers.chain([cap]) {
@@ -84,7 +88,11 @@ fn first(
         return Ok(None);
     };
     let mut best = points[place];
-    let mut below = if place == 0 { 0 } else { points[place - 1].iterations };
+    let mut below = if place == 0 {
+        0
+    } else {
+        points[place - 1].iterations
+    };
     while best.iterations - below > 1 + best.iterations / 20 {
         let point = trial.point(below + (best.iterations - below) / 2)?;
         if reached(&point) {
@@ -133,10 +141,17 @@ fn page(rows: &[Row]) -> anyhow::Result<Page> {
             };
             let reached = |paper: Option<f64>, ours: Option<f64>| match ours {
                 Some(ours) => compared(paper, ours),
-                None => [paper.map_or_else(String::new, number), never.clone(), String::new()],
+                None => [
+                    paper.map_or_else(String::new, number),
+                    never.clone(),
+                    String::new(),
+                ],
             };
             let dual = row.dual;
-            cells.extend(reached(paper.map(|p| p.iterations), dual.map(|p| f64::from(p.iterations))));
+            cells.extend(reached(
+                paper.map(|p| p.iterations),
+                dual.map(|p| f64::from(p.iterations)),
+            ));
             cells.extend(reached(paper.map(|p| p.ms), dual.map(|p| p.ms)));
             let each = last.map_or(f64::NAN, |p| p.ms / f64::from(p.iterations));
             cells.extend(compared(paper.map(|p| p.ms / p.iterations), each));
