@@ -32,8 +32,12 @@ pub(super) fn number(value: f64) -> String {
         format!("{value:.1}")
     } else if size >= 1.0 {
         format!("{value:.2}")
-    } else {
+    } else if size >= 0.1 {
         format!("{value:.3}")
+    } else if size >= 0.01 {
+        format!("{value:.4}")
+    } else {
+        format!("{value:.5}")
     }
 }
 
@@ -47,12 +51,6 @@ pub(super) fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
     if count > 0.0 { sum / count } else { 0.0 }
 }
 
-/// The middle one, 0 of nothing.
-pub(super) fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -62,8 +60,8 @@ mod tests {
         assert_eq!(compared(Some(50.0), 25.0), ["50", "25", "0.500"]);
         assert_eq!(compared(None, 1234.5), ["", "1234", ""]);
         assert_eq!(
-            compared(Some(79084.0), 7.9084),
-            ["79084", "7.91", "1.00e-4"]
+            compared(Some(79084.0), 0.79084),
+            ["79084", "0.791", "1.00e-5"]
         );
     }
 }

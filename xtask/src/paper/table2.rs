@@ -99,12 +99,15 @@ fn measure(name: &str, reading: Reading, arguments: &ExperimentArguments) -> any
     let mut simulation = Simulation::with_threads(&scene, 1)?;
     let mut clusters = cluster(clustering.parse::<Method>()?, &incidence(&mesh)?);
     let mut cut = Vec::new();
+    let mut taken = false;
     for frame in 0..FRAMES + 2 {
         let report = simulation.step()?;
         if report.cut.is_some() {
             cut.push(report.ms.cut);
         }
-        if reading == Reading::Cut && frame == FRAMES / 2 {
+        // Halfway, or as soon as the blade has met a body that it only meets later.
+        if reading == Reading::Cut && !taken && frame >= FRAMES / 2 && !cut.is_empty() {
+            taken = true;
             mesh = simulation.mesh().clone();
             clusters = occupied(&simulation.clustering())?;
         }
