@@ -157,7 +157,7 @@ fn direction(n: usize) -> DVec3 {
 
 fn page(rows: &[Row]) -> anyhow::Result<Page> {
     let mut parts = vec![Part::Text(
-        "The step of Table 3 (see there), in both sizes. The paper does not say of which sequence its spectrum is, so there are \
+        "The step of Table 3 (see there), in all three setups. The paper does not say of which sequence its spectrum is, so there are \
          two: the force out of balance over space, `|Σ f exp(2πi k·x)|² / N` with the rest positions, the mean over 64 \
          directions, by waves on the length of the body; and over the numbers of the particles. Both as a part of the mean \
          square force at the start: 1 is where a step begins. Methods that diverged are left out where they did."

@@ -48,7 +48,7 @@ pub(super) fn experiment(arguments: &ExperimentArguments) -> Experiment<Row> {
 
 fn page(rows: &[Row]) -> anyhow::Result<Page> {
     let mut parts = vec![Part::Text(
-        "The step of Table 3 (see there), in both sizes, up to the paper's 500 iterations of the first frame; each point is a \
+        "The step of Table 3 (see there), in all three setups, up to the paper's 500 iterations of the first frame; each point is a \
          run of its own. The paper does not say which norm it plots: first what XPBD iterates on, `‖C + α̃ λ‖`, then the force \
          out of balance as a part of that at the start. Points beyond 1e12 are left out of the plots and are in the table."
             .to_owned(),

@@ -51,7 +51,7 @@ fn measure(setup: Setup, solving: Solving, arguments: &ExperimentArguments) -> a
     let trial = Trial::new(setup, solving, arguments)?;
     let cap = if arguments.quick { QUICK_CAP } else { CAP };
     // Where a step is well-posed, what has not come after a few thousand will not come.
-    let cap = if setup == Setup::WellPosed {
+    let cap = if setup != Setup::Organ {
         cap.min(4096)
     } else {
         cap
@@ -106,7 +106,7 @@ fn first(
 
 fn page(rows: &[Row]) -> anyhow::Result<Page> {
     let mut parts = vec![Part::Text(format!(
-        "One step of 16 ms of the liver (E = 1e7 Pa, Poisson's ratio 0.49, 1000 kg/m³, no damping), let go at twice its size; \
+        "One step of 16 ms of the liver (E = 1e7 Pa, Poisson's ratio 0.49, 1000 kg/m³, no damping), let go at twice its size and at 1.1 times; \
          double precision, one thread, the paper's form of the constraints, relaxation 0.8 for Gauss-Seidel and 0.1 for the \
          others, Chebyshev with spectral radius 0.99. Density, size, the norm of the residual and that radius are not in the \
          paper.\n\n\
@@ -115,7 +115,8 @@ fn page(rows: &[Row]) -> anyhow::Result<Page> {
          its own, at powers of two up to 4096 and at the cap, then by bisection to 5 percent; a cell says \"not in N\" \
          where the cap N did not suffice, and \"diverged\" where a residual passed 1e100. Residuals of iterated XPBD do not \
          fall monotonically, so a count is the first that was found. XPBD drops a part of the equations, so its \
-         force does not go to zero."
+         force does not go to zero; and what is stretched far is softened by the solver, while residuals go by the material, so \
+         at twice its size the dual residual does not go to zero either."
     ))];
     for setup in Setup::ALL {
         let mut head = vec!["method".to_owned()];
