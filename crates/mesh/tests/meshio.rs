@@ -149,6 +149,8 @@ fn files_read_the_same() {
     list.add("binary.vtk", "tetra", "points", vtk);
     io::write_file(path("fields.vtu"), &file).unwrap();
     list.add("fields.vtu", "tetra", "points", vtk);
+    io::write_vtu_compressed(path("zlib.vtu"), &file).unwrap();
+    list.add("zlib.vtu", "tetra", "points", vtk);
     io::write(path("plain.vtu"), mesh).unwrap();
     list.add("plain.vtu", "tetra", "points", "");
     for (name, kind) in [

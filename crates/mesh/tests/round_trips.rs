@@ -70,7 +70,7 @@ type Write = fn(&Path, &MeshFile) -> Result<(), MeshError>;
 type Survivor = fn(&MeshFile) -> MeshFile;
 
 /// All forms of meshes that are written, and what of a file survives in each.
-const FORMS: [(&str, Write, Survivor); 11] = [
+const FORMS: [(&str, Write, Survivor); 12] = [
     (
         "a.vtk",
         |path, file| io::write_file(path, file),
@@ -85,6 +85,11 @@ const FORMS: [(&str, Write, Survivor); 11] = [
     (
         "a.vtu",
         |path, file| io::write_file(path, file),
+        Clone::clone,
+    ),
+    (
+        "b.vtu",
+        |path, file| io::write_vtu_compressed(path, file),
         Clone::clone,
     ),
     (

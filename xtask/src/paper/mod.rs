@@ -26,7 +26,7 @@ mod tests;
 
 use clap::{Args, ValueEnum};
 
-use crate::experiment::{Backend, ExperimentArguments};
+use crate::experiment::ExperimentArguments;
 
 #[derive(Debug, Args)]
 pub(crate) struct PaperArguments {
@@ -39,7 +39,7 @@ pub(crate) struct PaperArguments {
 
 /// A table or figure of the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum What {
+pub(crate) enum What {
     /// Serial neighbor clustering and Greedy K-Neighbor.
     Table1,
     /// Colors, their distribution and times by algorithm.
@@ -66,30 +66,15 @@ enum What {
     All,
 }
 
-/// The name of the experiment begins with this.
+/// The names of the experiments begin with this.
 const PREFIX: &str = "paper-";
 
 pub(crate) fn paper(arguments: &PaperArguments) -> anyhow::Result<()> {
     run(arguments.what, &arguments.experiment)
 }
 
-/// Runs the experiment whose pages have this name, if it is one of the paper's; whether it is.
-pub(crate) fn by_name(name: &str, arguments: &ExperimentArguments) -> anyhow::Result<bool> {
-    let what = name
-        .strip_prefix(PREFIX)
-        .map(|what| What::from_str(what, true));
-    let Some(Ok(what)) = what else {
-        return Ok(false);
-    };
-    run(what, arguments)?;
-    Ok(true)
-}
-
-fn run(what: What, arguments: &ExperimentArguments) -> anyhow::Result<()> {
-    anyhow::ensure!(
-        arguments.backend == Backend::Cpu,
-        "the paper's tables are measured on the processor only; `cargo xtask gpu-sweep` has colorings and frames on a GPU"
-    );
+/// Runs the experiment of a table or figure, on the processor whatever the backend: none of it is done on both.
+pub(crate) fn run(what: What, arguments: &ExperimentArguments) -> anyhow::Result<()> {
     match what {
         What::Table1 => table1::experiment(arguments).run(arguments),
         What::Table2 => table2::experiment(arguments).run(arguments),

@@ -202,10 +202,9 @@ fn everything_is_made_and_claims_take_what_is_there() {
     }
     // From the cells alone, the page is the same.
     std::fs::remove_dir_all(folder.0.out.join("meshes")).unwrap();
-    assert!(super::by_name("paper-claims", &folder.0).unwrap());
+    crate::named("paper-claims").unwrap()(&folder.0).unwrap();
     assert_eq!(folder.page("paper-claims"), claims);
     assert!(!folder.0.out.join("meshes").exists());
-    assert!(!super::by_name("trade", &folder.0).unwrap());
 }
 
 /// The force whose spectrum is drawn is the one whose norm the solver reports.

@@ -3,7 +3,7 @@
 //! | ending | format | read | written | kept beside the tets |
 //! |---|---|---|---|---|
 //! | `.vtk` | legacy VTK 2.0 to 5.1, text and binary | yes | 4.2 text, 5.1 binary ([`write_vtk_binary`]) | regions, scalars, vectors |
-//! | `.vtu` | VTK XML unstructured grid: text, base64, appended, zlib | yes | base64 | regions, scalars, vectors |
+//! | `.vtu` | VTK XML unstructured grid: text, base64, appended, zlib | yes | base64; appended with zlib ([`write_vtu_compressed`]) | regions, scalars, vectors |
 //! | `.msh` | Gmsh 1, 2 and 4.1, text and binary | yes | 4.1 and 2.2 ([`write_msh`]) | regions (physical groups, without their names), scalars, vectors |
 //! | `.node`, `.ele` | TetGen, a pair of files | yes | yes | regions, up to 256 attributes, markers |
 //! | `.mesh`, `.meshb` | Medit, text and binary | yes | yes | regions (references), references of points |
@@ -52,7 +52,7 @@ pub use surfaces::{
 pub use tetgen::{parse_tetgen, read_tetgen, read_tetgen_file, write_tetgen, write_tetgen_file};
 pub use vtk::{read_vtk, read_vtk_file, write_vtk, write_vtk_binary, write_vtk_file};
 pub use vtp::write_vtp;
-pub use vtu::{read_vtu, write_vtu, write_vtu_file};
+pub use vtu::{read_vtu, write_vtu, write_vtu_compressed, write_vtu_file};
 
 use crate::{MeshError, TetMesh};
 

@@ -7,6 +7,7 @@
 //!
 //! Source: "VTK XML Formats" (Kitware). Linear.
 
+mod compressed;
 mod data;
 mod read;
 #[cfg(test)]
@@ -17,6 +18,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
+pub use compressed::write_vtu_compressed;
 pub(crate) use read::parse_vtu;
 
 use super::text::load;
