@@ -215,7 +215,7 @@ fn colorings(rows: &[Evidence]) -> Vec<Claim> {
     let slow: Vec<bool> = slower.iter().map(|&ratio| ratio >= 2.0).collect();
     vec![
         faster(
-            "SCGC colors 10 to 20 % faster than ECL-GC (sections 4.1, 5.1)",
+            "SCGC colors 10 to 20 % faster than ECL-GC (4.1, 5.1); ECL-GC here looks at all waiting neighbors in each pass",
             "ecl-gc",
         ),
         faster(
