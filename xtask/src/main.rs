@@ -8,6 +8,7 @@ mod experiment;
 mod gpu;
 mod lean;
 mod models;
+mod paper;
 mod peers;
 mod soak;
 mod solver;
@@ -33,7 +34,43 @@ struct Arguments {
 type Run = fn(&ExperimentArguments) -> anyhow::Result<()>;
 
 /// All experiments by the names of their pages, in the order in which `all` runs them.
-const EXPERIMENTS: &[(&str, Run)] = &[("lean", lean::run), ("peers", peers::run)];
+const EXPERIMENTS: &[(&str, Run)] = &[
+    ("paper-table1", |arguments| {
+        paper::run(paper::What::Table1, arguments)
+    }),
+    ("paper-table2", |arguments| {
+        paper::run(paper::What::Table2, arguments)
+    }),
+    ("paper-table3", |arguments| {
+        paper::run(paper::What::Table3, arguments)
+    }),
+    ("paper-fig4", |arguments| {
+        paper::run(paper::What::Fig4, arguments)
+    }),
+    ("paper-fig6", |arguments| {
+        paper::run(paper::What::Fig6, arguments)
+    }),
+    ("paper-fig7", |arguments| {
+        paper::run(paper::What::Fig7, arguments)
+    }),
+    ("paper-fig8", |arguments| {
+        paper::run(paper::What::Fig8, arguments)
+    }),
+    ("paper-fig9", |arguments| {
+        paper::run(paper::What::Fig9, arguments)
+    }),
+    ("paper-fig10", |arguments| {
+        paper::run(paper::What::Fig10, arguments)
+    }),
+    ("paper-fig11", |arguments| {
+        paper::run(paper::What::Fig11, arguments)
+    }),
+    ("paper-claims", |arguments| {
+        paper::run(paper::What::Claims, arguments)
+    }),
+    ("lean", lean::run),
+    ("peers", peers::run),
+];
 
 #[derive(Debug, Subcommand)]
 enum Command {
@@ -45,6 +82,8 @@ enum Command {
     Cutting(cutting::CuttingArguments),
     /// Check the kernels on a GPU, time colorings, iterations and frames there, and write a page and JSON.
     GpuSweep(gpu::GpuArguments),
+    /// Repeat the tables and figures of the paper, its numbers and ours side by side.
+    Paper(paper::PaperArguments),
     /// Gather what runs with --shard have measured, and write the pages.
     Merge(MergeArguments),
     /// What a scene pays for what it does not use: instructions, bytes, dispatches.
@@ -70,6 +109,7 @@ fn main() -> anyhow::Result<()> {
         Command::Coloring(arguments) => coloring::coloring(&arguments),
         Command::Cutting(arguments) => cutting::cutting(&arguments),
         Command::GpuSweep(arguments) => gpu::sweep(&arguments),
+        Command::Paper(arguments) => paper::paper(&arguments),
         Command::Merge(arguments) => experiment::merge(&arguments)?
             .iter()
             .try_for_each(|(name, of_this)| named(name)?(of_this)),

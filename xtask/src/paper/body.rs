@@ -1,0 +1,87 @@
+//! The bodies of the paper: meshes of a folder, or generated stand-ins of the same shapes and sizes.
+//!
+//! A stand-in is irregular, with the spread of valences that meshes of TetGen have: on a lattice, colorings and
+//! clusterings behave differently. It is written to a file once, so that scenes can name it, too.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, ensure};
+use incise::graph::Incidence;
+use incise::mesh::generate::{Shape, irregular};
+use incise::mesh::{TetMesh, io};
+
+use crate::experiment::ExperimentArguments;
+
+/// A body by the name of its file, the shape that stands for it and its number of tets in the paper.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Body {
+    pub(super) name: &'static str,
+    shape: Shape,
+    tets: usize,
+    quick_tets: usize,
+}
+
+const fn body(name: &'static str, shape: Shape, tets: usize, quick_tets: usize) -> Body {
+    Body {
+        name,
+        shape,
+        tets,
+        quick_tets,
+    }
+}
+
+/// By name. Those of `--quick` differ in size as little as the shapes allow.
+const BODIES: [Body; 10] = [
+    body("liver_5k", Shape::Liver, 4705, 1000),
+    body("liver_11k", Shape::Liver, 11_367, 1500),
+    body("liver_89k", Shape::Liver, 88_958, 3000),
+    body("bunny_19k", Shape::Bunny, 19_379, 2000),
+    body("armadillo_55k", Shape::Armadillo, 54_985, 3000),
+    body("armadillo_121k", Shape::Armadillo, 121_190, 4000),
+    body("armadillo_227k", Shape::Armadillo, 226_840, 5000),
+    body("sphere_7k", Shape::Sphere, 6851, 1000),
+    body("sphere_28k", Shape::Sphere, 27_792, 1500),
+    body("sphere_118k", Shape::Sphere, 118_202, 2000),
+];
+
+impl Body {
+    pub(super) fn named(name: &str) -> anyhow::Result<Self> {
+        let body = BODIES.into_iter().find(|body| body.name == name);
+        body.with_context(|| format!("the paper has no body {name}"))
+    }
+
+    /// The file of its mesh: that of the folder of models, or a generated one under `--out`.
+    pub(super) fn file(&self, arguments: &ExperimentArguments) -> anyhow::Result<PathBuf> {
+        if let Some(folder) = &arguments.models {
+            let path = folder.join(format!("{}.vtk", self.name));
+            if path.exists() {
+                return Ok(std::path::absolute(path)?);
+            }
+        }
+        let tets = if arguments.quick {
+            self.quick_tets
+        } else {
+            self.tets
+        };
+        let folder = arguments.out.join("meshes");
+        std::fs::create_dir_all(&folder)?;
+        let path = folder.join(format!("{}-of-{tets}.vtk", self.shape));
+        if !path.exists() {
+            io::write(&path, &irregular(self.shape, tets, 1)?)?;
+        }
+        Ok(std::path::absolute(path)?)
+    }
+
+    pub(super) fn mesh(&self, arguments: &ExperimentArguments) -> anyhow::Result<TetMesh> {
+        let path = self.file(arguments)?;
+        let mesh = io::read(&path).with_context(|| path.display().to_string())?;
+        ensure!(!mesh.tets.is_empty(), "{} has no tets", path.display());
+        Ok(mesh)
+    }
+}
+
+/// The particles of the tets of a mesh.
+pub(super) fn incidence(mesh: &TetMesh) -> anyhow::Result<Incidence> {
+    let tets = mesh.tets.iter().copied();
+    Ok(Incidence::from_constraints(mesh.positions.len(), tets)?)
+}

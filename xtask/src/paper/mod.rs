@@ -1,0 +1,95 @@
+//! `cargo xtask paper`: the tables and figures of the paper, its numbers and ours side by side.
+//!
+//! One module per table or figure, each an experiment of the common frame. The paper's numbers are data in `printed`, its
+//! bodies stand in `body`. Where the paper leaves open what it means, every reading is run and the page says so.
+
+mod body;
+mod claims;
+mod colorings;
+mod compared;
+mod convergence;
+mod fig10;
+mod fig11;
+mod fig4;
+mod fig6;
+mod fig7;
+mod fig8;
+mod fig9;
+mod painter;
+mod printed;
+mod scene;
+mod table1;
+mod table2;
+mod table3;
+#[cfg(test)]
+mod tests;
+
+use clap::{Args, ValueEnum};
+
+use crate::experiment::ExperimentArguments;
+
+#[derive(Debug, Args)]
+pub(crate) struct PaperArguments {
+    /// Which table or figure.
+    #[arg(value_enum)]
+    what: What,
+    #[command(flatten)]
+    experiment: ExperimentArguments,
+}
+
+/// A table or figure of the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum What {
+    /// Serial neighbor clustering and Greedy K-Neighbor.
+    Table1,
+    /// Colors, their distribution and times by algorithm.
+    Table2,
+    /// Iterations and milliseconds to a residual.
+    Table3,
+    /// Time to color and colors by algorithm and size.
+    Fig4,
+    /// Pictures of bodies that are cut.
+    Fig6,
+    /// Residuals over 500 iterations.
+    Fig7,
+    /// Colors and times of frames while cutting.
+    Fig8,
+    /// Pictures of colored bodies, and their colors.
+    Fig9,
+    /// Power density spectra of the residual.
+    Fig10,
+    /// The time of a frame by stages.
+    Fig11,
+    /// What the paper claims, and whether it was found; takes what the others have measured.
+    Claims,
+    /// All of these.
+    All,
+}
+
+/// The names of the experiments begin with this.
+const PREFIX: &str = "paper-";
+
+pub(crate) fn paper(arguments: &PaperArguments) -> anyhow::Result<()> {
+    run(arguments.what, &arguments.experiment)
+}
+
+/// Runs the experiment of a table or figure, on the processor whatever the backend: none of it is done on both.
+pub(crate) fn run(what: What, arguments: &ExperimentArguments) -> anyhow::Result<()> {
+    match what {
+        What::Table1 => table1::experiment(arguments).run(arguments),
+        What::Table2 => table2::experiment(arguments).run(arguments),
+        What::Table3 => table3::experiment(arguments).run(arguments),
+        What::Fig4 => fig4::experiment(arguments).run(arguments),
+        What::Fig6 => fig6::experiment(arguments).run(arguments),
+        What::Fig7 => fig7::experiment(arguments).run(arguments),
+        What::Fig8 => fig8::experiment(arguments).run(arguments),
+        What::Fig10 => fig10::experiment(arguments).run(arguments),
+        What::Claims => claims::experiment(arguments).run(arguments),
+        What::Fig11 => fig11::experiment(arguments).run(arguments),
+        What::Fig9 => fig9::experiment(arguments).run(arguments),
+        What::All => What::value_variants()
+            .iter()
+            .filter(|&&what| what != What::All)
+            .try_for_each(|&what| run(what, arguments)),
+    }
+}

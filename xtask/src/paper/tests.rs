@@ -1,0 +1,246 @@
+//! The quick pages: they can be made, have the paper's rows, and what does not depend on the machine is what it is.
+
+use std::path::PathBuf;
+
+use incise::coloring::{Order, greedy};
+use incise::graph::Clustering;
+use serde::de::DeserializeOwned;
+
+use super::body::{Body, incidence};
+use super::colorings::{ALGORITHMS, Problem, occupied};
+use super::convergence::{Setup, Solving, TIME_STEP, Trial, norm};
+use super::{What, printed, run};
+use crate::experiment::{Backend, ExperimentArguments};
+
+/// Of a folder of its own, removed at the end.
+struct Folder(ExperimentArguments);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let id = std::process::id();
+        let out = std::env::temp_dir().join(format!("incise-paper-{name}-{id}"));
+        Self(ExperimentArguments {
+            quick: true,
+            models: None,
+            backend: Backend::Cpu,
+            out,
+            shard: None,
+        })
+    }
+
+    fn page(&self, name: &str) -> String {
+        std::fs::read_to_string(self.0.out.join(format!("{name}.md"))).unwrap()
+    }
+
+    fn rows<R: DeserializeOwned>(&self, name: &str) -> Vec<R> {
+        let path: PathBuf = self.0.out.join(format!("{name}.json"));
+        serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        // What cannot be removed from a folder of temporary files does no harm.
+        let _ = std::fs::remove_dir_all(&self.0.out);
+    }
+}
+
+/// The cells of the rows of a page that begin with these.
+fn cells(page: &str, first: &[&str]) -> Vec<Vec<String>> {
+    let rows = page.lines().filter_map(|line| line.strip_prefix('|'));
+    let rows = rows.map(|row| row.split('|').map(|cell| cell.trim().to_owned()).collect());
+    rows.filter(|row: &Vec<String>| row.iter().zip(first).all(|(cell, word)| cell == word))
+        .collect()
+}
+
+/// Ratio of the two cells before it, as far as three digits tell.
+fn is_ratio(row: &[String], place: usize) -> bool {
+    let number = |i: usize| row[i].parse::<f64>().unwrap();
+    let expected = number(place - 1) / number(place - 2);
+    // Each of the three is rounded at the third digit, ratios below 1 to a thousandth.
+    (number(place) / expected - 1.0).abs() < 0.02 || (number(place) - expected).abs() < 1e-3
+}
+
+#[test]
+fn table_1_has_the_papers_rows() {
+    let folder = Folder::new("table1");
+    run(What::Table1, &folder.0).unwrap();
+    let page = folder.page("paper-table1");
+    for paper in &printed::TABLE_1 {
+        let rows = cells(&page, &[&paper.size.to_string(), paper.method]);
+        let [row] = &rows[..] else { panic!("{rows:?}") };
+        // Size, method, largest; clusters and colors with their ratios.
+        assert_eq!(row[3], paper.clusters.to_string());
+        assert_eq!(row[6], paper.colors.to_string());
+        assert!(is_ratio(row, 5) && is_ratio(row, 8), "{row:?}");
+    }
+    let mesh = Body::named("liver_11k").unwrap().mesh(&folder.0).unwrap();
+    let incidence = incidence(&mesh).unwrap();
+    for row in folder.rows::<super::table1::Row>("paper-table1") {
+        for method in ["greedy-k", "serial", "pressure"] {
+            let found = row.of(method).unwrap();
+            let method = format!("{method}:{}", row.size).parse().unwrap();
+            let clustering = incise::clustering::cluster(method, &incidence);
+            let clusters = incidence.quotient(&clustering);
+            assert_eq!(found.clusters, clustering.occupied());
+            assert!(found.largest <= row.size as usize);
+            // SCGC is greedy in its order, whatever its shortcuts.
+            let colors = greedy(&clusters, Order::LargestFirst).color_count();
+            assert_eq!(found.colors, colors);
+            assert!(found.bound <= found.colors);
+        }
+        // The same algorithm from particles and by the graph.
+        let counts = ["serial", "graph-serial"].map(|name| row.of(name).unwrap().clusters);
+        assert_eq!(counts[0], counts[1]);
+    }
+}
+
+#[test]
+fn table_2_has_the_papers_rows_in_all_readings() {
+    let folder = Folder::new("table2");
+    run(What::Table2, &folder.0).unwrap();
+    let page = folder.page("paper-table2");
+    for model in &printed::TABLE_2 {
+        for paper in &model.rows {
+            // Two tables in each of three readings.
+            let rows = cells(&page, &[model.body, paper.algorithm]);
+            assert_eq!(rows.len(), 6, "{rows:?}");
+            for row in rows.iter().step_by(2) {
+                assert_eq!(row[9], paper.colors.to_string());
+                assert!(
+                    [4, 7, 11, 17].iter().all(|&place| is_ratio(row, place)),
+                    "{row:?}"
+                );
+            }
+            for row in rows.iter().skip(1).step_by(2) {
+                assert_eq!(row[2], model.cut_ms.to_string());
+                assert!(
+                    [4, 7, 10, 13].iter().all(|&place| is_ratio(row, place)),
+                    "{row:?}"
+                );
+            }
+        }
+    }
+    let rows: Vec<super::table2::Row> = folder.rows("paper-table2");
+    assert_eq!(rows.len(), 12);
+    for row in &rows {
+        let named: Vec<&str> = row.colored.iter().map(|c| c.algorithm.as_str()).collect();
+        assert_eq!(named, ALGORITHMS);
+        assert!(row.colored.iter().all(|c| c.colors >= row.bound));
+        // ECL-GC, SCGC with and without its third shortcut and greedy are one coloring.
+        let same = ["ecl-gc", "scgc", "scgc:12", "greedy"].map(|name| {
+            let c = row.of(name).unwrap();
+            (c.colors, c.range, c.std, c.chi2, c.tets)
+        });
+        assert!(same.iter().all(|c| *c == same[0]), "{same:?}");
+    }
+    // A body at rest has as many tets in both readings; a cut one more, and more clusters.
+    for of_body in rows.chunks(3) {
+        assert_eq!(of_body[0].tets, of_body[1].tets);
+        assert!(of_body[2].tets > of_body[1].tets);
+        assert!(of_body[2].clusters > of_body[1].clusters);
+    }
+}
+
+#[test]
+fn figure_9_is_pictured() {
+    let folder = Folder::new("fig9");
+    run(What::Fig9, &folder.0).unwrap();
+    let page = folder.page("paper-fig9");
+    for paper in &printed::FIGURE_9 {
+        for (algorithm, colors) in printed::FIGURE_9_ALGORITHMS.iter().zip(paper.colors) {
+            let rows = cells(&page, &[paper.body, "serial:10", algorithm]);
+            let [row] = &rows[..] else { panic!("{rows:?}") };
+            assert_eq!(row[10], colors.to_string());
+            assert!(
+                [5, 8, 12].iter().all(|&place| is_ratio(row, place)),
+                "{row:?}"
+            );
+        }
+    }
+    let drawings = printed::FIGURE_9.len() * printed::FIGURE_9_ALGORITHMS.len();
+    for i in 1..=drawings {
+        let svg = std::fs::read_to_string(folder.0.out.join(format!("paper-fig9-{i}.svg")));
+        assert!(svg.unwrap().matches("<path").count() > 100);
+    }
+}
+
+/// All in one, and again without measuring anything.
+#[test]
+fn everything_is_made_and_claims_take_what_is_there() {
+    let folder = Folder::new("all");
+    run(What::All, &folder.0).unwrap();
+    let table3 = folder.page("paper-table3");
+    for paper in &printed::TABLE_3 {
+        let rows = cells(&table3, &[]);
+        let count = paper.iterations.to_string();
+        // Once for each setup.
+        assert_eq!(
+            rows.iter().filter(|row| row[1] == count).count(),
+            Setup::ALL.len()
+        );
+    }
+    let fig4 = folder.page("paper-fig4");
+    for (name, tets) in printed::FIGURE_4 {
+        assert_eq!(cells(&fig4, &[name, &tets.to_string()]).len(), 2);
+    }
+    let claims = folder.page("paper-claims");
+    for claim in [
+        "SCGC has the fewest colors (5.1)",
+        "SCGC and ECL-GC find the same colors and distribution (Table 2)",
+        "clustering lowers the number of colors (5.1)",
+    ] {
+        let rows = cells(&claims, &[claim]);
+        assert_eq!(rows.len(), 1, "{claim}");
+    }
+    // The same colors are a theorem, on whatever mesh.
+    let same = "SCGC and ECL-GC find the same colors and distribution (Table 2)";
+    assert_eq!(cells(&claims, &[same])[0][1], "confirmed");
+    for name in ["fig6", "fig7", "fig8", "fig10", "fig11"] {
+        let page = folder.page(&format!("paper-{name}"));
+        assert!(!page.contains("NaN"), "{page}");
+    }
+    // From the cells alone, the page is the same.
+    std::fs::remove_dir_all(folder.0.out.join("meshes")).unwrap();
+    crate::named("paper-claims").unwrap()(&folder.0).unwrap();
+    assert_eq!(folder.page("paper-claims"), claims);
+    assert!(!folder.0.out.join("meshes").exists());
+}
+
+/// The force whose spectrum is drawn is the one whose norm the solver reports.
+#[test]
+fn forces_have_the_norm_that_the_solver_reports() {
+    let folder = Folder::new("forces");
+    for solving in [Solving::GaussSeidel(5), Solving::Jacobi] {
+        let trial = Trial::new(Setup::Gentle, solving, &folder.0).unwrap();
+        let (solver, _) = trial.step(3).unwrap();
+        let reported = solver.residuals(TIME_STEP).unwrap().force;
+        let ratio = norm(&trial.forces(&solver).unwrap()) / reported;
+        // Two implementations in double precision; forces cancel to a tenth of their parts.
+        assert!((ratio - 1.0).abs() < 1e-9, "{ratio}");
+    }
+}
+
+/// Colors of a mesh with a known answer: the tets of a fan are all in each other's way.
+#[test]
+fn colors_of_a_clique() {
+    let fan: Vec<[u32; 4]> = (0..9)
+        .map(|i| [0, 3 * i + 1, 3 * i + 2, 3 * i + 3])
+        .collect();
+    let incidence = incise::graph::Incidence::from_constraints(28, fan).unwrap();
+    let problem = Problem::new(&incidence, Clustering::none(9));
+    for (coloring, _) in problem.colorings(&ALGORITHMS).unwrap() {
+        assert_eq!(coloring.color_count(), 9);
+    }
+    // Clusters that have lost all members need no color.
+    let mut clustering = Clustering::none(9);
+    let last = clustering.labels()[8];
+    clustering.remove(0);
+    clustering.assign(0, last);
+    let clustering = occupied(&clustering).unwrap();
+    assert_eq!((clustering.cluster_count(), clustering.occupied()), (8, 8));
+    let problem = Problem::new(&incidence, clustering);
+    for (coloring, _) in problem.colorings(&["scgc", "auto"]).unwrap() {
+        assert_eq!(coloring.color_count(), 8);
+    }
+}
