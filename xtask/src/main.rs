@@ -9,6 +9,7 @@ mod gpu;
 mod models;
 mod soak;
 mod solver;
+mod stability;
 mod sweep;
 mod wear;
 
@@ -36,6 +37,8 @@ enum Command {
     Solver(solver::SolverArguments),
     /// Make random strokes by the thousand and check everything after each.
     SoakCut(soak::SoakArguments),
+    /// What becomes of bodies in extreme states, materials, steps and cuts: a matrix, and why what does not recover does not.
+    Stability(experiment::ExperimentArguments),
     /// Cut meshes, check everything and write a table.
     Sweep(sweep::SweepArguments),
     /// Cut a mesh many times in small strokes, and see what becomes of clusters, colors and the time to solve.
@@ -49,6 +52,7 @@ fn main() -> anyhow::Result<()> {
         Command::GpuSweep(arguments) => gpu::sweep(&arguments),
         Command::Solver(arguments) => solver::solver(&arguments),
         Command::SoakCut(arguments) => soak::soak(&arguments),
+        Command::Stability(arguments) => stability::stability(&arguments),
         Command::Sweep(arguments) => sweep::sweep(&arguments),
         Command::Wear(arguments) => wear::wear(&arguments),
     }
