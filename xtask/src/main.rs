@@ -32,7 +32,7 @@ struct Arguments {
 type Run = fn(&ExperimentArguments) -> anyhow::Result<()>;
 
 /// All experiments by the names of their pages, in the order in which `all` runs them.
-const EXPERIMENTS: &[(&str, Run)] = &[];
+const EXPERIMENTS: &[(&str, Run)] = &[("stability", stability::stability)];
 
 #[derive(Debug, Subcommand)]
 enum Command {
@@ -51,7 +51,7 @@ enum Command {
     /// Make random strokes by the thousand and check everything after each.
     SoakCut(soak::SoakArguments),
     /// What becomes of bodies in extreme states, materials, steps and cuts: a matrix, and why what does not recover does not.
-    Stability(experiment::ExperimentArguments),
+    Stability(ExperimentArguments),
     /// Cut meshes, check everything and write a table.
     Sweep(sweep::SweepArguments),
     /// Cut a mesh many times in small strokes, and see what becomes of clusters, colors and the time to solve.

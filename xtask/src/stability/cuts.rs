@@ -1,6 +1,6 @@
 //! The rows of the matrix that are about cutting: scenes with strokes, everything recomputed and compared after each.
 //!
-//! The body is a beam of E = 1e4 Pa, held at one end, over a ground for what comes off. A body that has grown threefold is
+//! The body is a beam of E = 1e4 Pa, held at one end over a ground for what comes off, or free without one. A body that has grown threefold is
 //! replaced by a fresh one. Strokes are made without snapping, which leaves whatever slivers come.
 
 use std::sync::Arc;
@@ -72,7 +72,8 @@ impl Cut {
         scene.report.quantities = vec![Quantity::Energy, Quantity::Volume, Quantity::Kappa];
         let gravity = if self == Self::FastBody { 1e2 } else { 9.81 };
         scene.world.gravity = Some([0.0, 0.0, -gravity]);
-        scene.world.ground = Some(GroundSpec {
+        // What falls past the blade falls on, and is not crushed.
+        scene.world.ground = (self != Self::FastBody).then_some(GroundSpec {
             height: -1.0,
             friction: 0.5,
         });

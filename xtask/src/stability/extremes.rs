@@ -36,7 +36,7 @@ pub(crate) struct Extreme {
     /// Downward, in m/s²; 0 is none.
     gravity: f64,
     /// Simulated, in s.
-    time: f64,
+    pub(crate) time: f64,
     place: Place,
 }
 
@@ -57,7 +57,7 @@ pub(crate) fn extremes(quick: bool) -> anyhow::Result<Vec<Extreme>> {
         held: true,
         time_step: FRAME,
         gravity: GRAVITY,
-        time: if quick { 0.5 } else { 2.0 },
+        time: if quick { 0.5 } else { 1.0 },
         place: |_, x| x,
     };
     let mut extremes = vec![plain.clone()];

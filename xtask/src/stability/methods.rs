@@ -1,6 +1,6 @@
 //! The columns of the matrix: methods with the settings that they are looked at with, precisions, backends.
 //!
-//! All but *substeps* take a frame in one step of twenty iterations, which is what a user does who knows nothing of kappa
+//! All but *substeps* take a frame in one step of twenty iterations (five with corrections), which is what a user does who knows nothing of kappa
 //! and what the paper does. *Substeps* is what `substeps = "auto"` does: as many as bring kappa to 0.5, at most 200, and
 //! tets that are still too stiff softened to kappa 1.
 
@@ -19,6 +19,8 @@ const KAPPA_LIMIT: f64 = 1.0;
 const MOST_SUBSTEPS: f64 = 200.0;
 /// Iterations of a frame, or sweeps.
 const ITERATIONS: u32 = 20;
+/// Rounds of a sweep and a correction.
+const ROUNDS: u32 = 5;
 
 /// How a frame is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -36,7 +38,7 @@ pub(crate) enum Method {
     Chebyshev,
     /// 20 sweeps.
     Descent,
-    /// 20 sweeps, each with a correction of the whole body.
+    /// 5 sweeps, each with a correction of the whole body.
     Corrected,
 }
 
@@ -61,6 +63,15 @@ impl Method {
     /// Whether it is a way through constraints, which kappa limits, and which a device can go as well.
     pub(crate) fn is_xpbd(self) -> bool {
         !matches!(self, Descent | Corrected)
+    }
+
+    /// Iterations, sweeps or rounds of a substep.
+    fn iterations(self) -> u32 {
+        match self {
+            ByKappa => 1,
+            Corrected => ROUNDS,
+            _ => ITERATIONS,
+        }
     }
 
     /// Substeps of a frame for a body with that kappa at the frame's time.
@@ -88,7 +99,7 @@ impl Method {
     pub(crate) fn recipe(self, time_step: f64, substeps: u32, gravity: Option<DVec3>) -> Recipe {
         let settings = StepSettings {
             substeps,
-            iterations: if self == ByKappa { 1 } else { ITERATIONS },
+            iterations: self.iterations(),
             method: match self {
                 Jacobi => XpbdMethod::Jacobi,
                 Chebyshev => XpbdMethod::Chebyshev {
@@ -112,7 +123,7 @@ impl Method {
         };
         let descent = |settings| DescentSettings {
             step: settings,
-            ..DescentSettings::new(time_step, ITERATIONS)
+            ..DescentSettings::new(time_step, self.iterations())
         };
         match self {
             Descent => Recipe::Descent(descent(settings)),
@@ -140,10 +151,11 @@ impl Method {
             Paper => SolverSpec::paper(method),
             _ => SolverSpec::of(method),
         };
-        (spec.substeps, spec.iterations) = match self {
-            ByKappa => (Substeps::Auto, 1),
-            _ => (Substeps::Fixed(1), ITERATIONS),
+        spec.substeps = match self {
+            ByKappa => Substeps::Auto,
+            _ => Substeps::Fixed(1),
         };
+        spec.iterations = self.iterations();
         debug_assert_eq!(self == Paper, spec.form == SceneForm::Sequential);
         spec.time_step = 1.0 / 60.0;
         spec.coarse = self == Corrected;

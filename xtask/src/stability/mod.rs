@@ -84,3 +84,6 @@ fn open(device: &Device, backend: Backend) -> anyhow::Result<Option<&Arc<GpuCont
     let gpu = Arc::new(GpuContext::new(&GpuOptions::from_env())?);
     Ok(Some(device.get_or_init(|| gpu)))
 }
+
+#[cfg(test)]
+mod tests;

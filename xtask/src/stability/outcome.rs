@@ -66,7 +66,7 @@ pub(crate) enum Verdict {
     /// More than a few tets.
     Inverted,
     /// More energy than there was.
-    Rings,
+    Gains,
     Repaired,
     FewInverted,
     /// The volume.
@@ -88,7 +88,7 @@ impl Verdict {
     pub(crate) fn color(self) -> Color {
         match self {
             Self::NotFinite | Self::Collapsed | Self::Frozen | Self::Inverted => Color::Red,
-            Self::Rings | Self::Repaired | Self::FewInverted | Self::Off | Self::Bent => {
+            Self::Gains | Self::Repaired | Self::FewInverted | Self::Off | Self::Bent => {
                 Color::Yellow
             }
             Self::Fine => Color::Green,
@@ -109,7 +109,7 @@ impl Outcome {
         } else if self.inverted as f64 > FEW * self.tets as f64 {
             Verdict::Inverted
         } else if self.energy_rise > ENERGY_TOLERANCE {
-            Verdict::Rings
+            Verdict::Gains
         } else if self.repaired > 0 {
             Verdict::Repaired
         } else if self.inverted > 0 {
@@ -130,7 +130,7 @@ impl Outcome {
             Verdict::Collapsed => format!("collapsed {}", ratio(self.volume)),
             Verdict::Frozen => "frozen".to_owned(),
             Verdict::Inverted | Verdict::FewInverted => format!("{} inverted", self.inverted),
-            Verdict::Rings => format!("rings {:.0e}", self.energy_rise),
+            Verdict::Gains => format!("energy {:.0e}", self.energy_rise),
             Verdict::Repaired => format!("{} repaired", self.repaired),
             Verdict::Off => format!("volume {}", ratio(self.volume)),
             Verdict::Bent => {

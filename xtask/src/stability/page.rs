@@ -14,10 +14,10 @@ are scenes with a softer beam (E = 1e4 Pa), in which everything is recomputed an
 *substeps* is XPBD in block form by as many substeps of one iteration as bring kappa to 0.5, at most 200, tets that are \
 still too stiff softened to kappa 1, as in scenes. All others take a frame in one step of 20 iterations: *block*, XPBD in \
 block form; *paper*, one constraint of a tet after the other, relaxation 0.8, clusters of 10; *Jacobi* and *Chebyshev* \
-(spectral radius 0.9) with relaxation 0.1; *descent*, 20 sweeps; *corrected*, a correction of the whole body after each.
+(spectral radius 0.9) with relaxation 0.1; *descent*, 20 sweeps; *corrected*, 5 sweeps, a correction of the whole body after each.
 
 After every frame positions, velocities, energies and volumes are looked at. Green: in shape. Yellow: `3 inverted`, tets \
-that are, at most 2 %; `volume 1.07`, over that at rest; `rings 3e1`, energy rose so many times above what there was to \
+that are, at most 2 %; `volume 1.07`, over that at rest; `energy 3e1`, it rose so many times above what there was to \
 begin with (elastic energy, and the work of gravity over the length of the body); `bent 20 %`, root of the mean squared \
 distance from the shape at rest, up to a rigid motion, over the length of the body; `7 repaired`, particles that would \
 not have been finite and were put back. Red: more tets inverted; `collapsed 0.2`, less than half the volume or more than \
