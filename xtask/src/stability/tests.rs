@@ -63,7 +63,6 @@ fn substeps_by_kappa_hold_a_body_together() {
         let kept = [
             "rest",
             "plane",
-            "line",
             "mirrored",
             "scrambled",
             "stretched",
