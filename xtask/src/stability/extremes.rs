@@ -16,7 +16,7 @@ const GRAVITY: f64 = 9.81;
 /// In s.
 const FRAME: f64 = 1.0 / 60.0;
 /// The most frames of a run.
-const MOST_FRAMES: f64 = 2000.0;
+const MOST_FRAMES: f64 = 1000.0;
 
 /// Where a particle is put at the start.
 type Place = fn(&mut Noise, DVec3) -> DVec3;
@@ -219,7 +219,7 @@ impl Extreme {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "there are from 1 to 2000 frames"
+        reason = "there are from 1 to 1000 frames"
     )]
     pub(crate) fn frames(&self) -> usize {
         (self.time / self.time_step).round().clamp(1.0, MOST_FRAMES) as usize
