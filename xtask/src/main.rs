@@ -12,6 +12,7 @@ mod paper;
 mod peers;
 mod soak;
 mod solver;
+mod stability;
 mod sweep;
 mod wear;
 
@@ -68,6 +69,7 @@ const EXPERIMENTS: &[(&str, Run)] = &[
     ("paper-claims", |arguments| {
         paper::run(paper::What::Claims, arguments)
     }),
+    ("stability", stability::stability),
     ("lean", lean::run),
     ("peers", peers::run),
 ];
@@ -97,6 +99,8 @@ enum Command {
     Solver(solver::SolverArguments),
     /// Make random strokes by the thousand and check everything after each.
     SoakCut(soak::SoakArguments),
+    /// What becomes of bodies in extreme states, materials, steps and cuts: a matrix, and why what does not recover does not.
+    Stability(ExperimentArguments),
     /// Cut meshes, check everything and write a table.
     Sweep(sweep::SweepArguments),
     /// Cut a mesh many times in small strokes, and see what becomes of clusters, colors and the time to solve.
@@ -118,6 +122,7 @@ fn main() -> anyhow::Result<()> {
         Command::Peers(arguments) => peers::peers(&arguments),
         Command::Solver(arguments) => solver::solver(&arguments),
         Command::SoakCut(arguments) => soak::soak(&arguments),
+        Command::Stability(arguments) => stability::stability(&arguments),
         Command::Sweep(arguments) => sweep::sweep(&arguments),
         Command::Wear(arguments) => wear::wear(&arguments),
     }

@@ -1,0 +1,252 @@
+//! The rows of the matrix that are about cutting: scenes with strokes, everything recomputed and compared after each.
+//!
+//! The body is a beam of E = 1e4 Pa, held at one end over a ground for what comes off, or free without one. A body that has grown threefold is
+//! replaced by a fresh one. Strokes are made without snapping, which leaves whatever slivers come.
+
+use std::sync::Arc;
+
+use anyhow::{Context, ensure};
+use incise::gpu::GpuContext;
+use incise::mesh::glam::DVec3;
+use incise::scene::{BodySpec, GroundSpec, Quantity, Region, ShapeSpec, StrokeSpec};
+use incise::{Scene, Simulation};
+
+use super::extremes::Noise;
+use super::methods::Column;
+use super::outcome::Outcome;
+
+/// A way to cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Cut {
+    /// A stroke at random in every frame.
+    Strokes,
+    /// A blade that is through the body within a frame.
+    FastBlade,
+    /// A blade that moves by a hundredth of an edge a frame.
+    SlowBlade,
+    /// A body that falls past a blade that hardly moves.
+    FastBody,
+}
+
+impl Cut {
+    pub(crate) const ALL: [Self; 4] = [
+        Self::Strokes,
+        Self::FastBlade,
+        Self::SlowBlade,
+        Self::FastBody,
+    ];
+
+    pub(crate) fn id(self) -> &'static str {
+        match self {
+            Self::Strokes => "cut-strokes",
+            Self::FastBlade => "cut-fast-blade",
+            Self::SlowBlade => "cut-slow-blade",
+            Self::FastBody => "cut-fast-body",
+        }
+    }
+
+    pub(crate) fn name(self, quick: bool) -> String {
+        match self {
+            Self::Strokes => format!("{} random strokes without snapping", self.frames(quick)),
+            Self::FastBlade => "a blade through the body within a frame".to_owned(),
+            Self::SlowBlade => "a blade of 1/100 edge a frame".to_owned(),
+            Self::FastBody => "a body that falls past a blade".to_owned(),
+        }
+    }
+
+    fn frames(self, quick: bool) -> u64 {
+        match (self, quick) {
+            (Self::Strokes, false) => 1000,
+            (Self::Strokes, true) => 25,
+            (Self::SlowBlade, false) => 500,
+            (Self::FastBlade | Self::FastBody, false) => 120,
+            (_, true) => 30,
+        }
+    }
+
+    fn scene(self, column: Column, quick: bool) -> Scene {
+        let mut scene = Scene {
+            solver: column.method.spec(column),
+            ..Scene::default()
+        };
+        scene.report.quantities = vec![Quantity::Energy, Quantity::Volume, Quantity::Kappa];
+        let gravity = if self == Self::FastBody { 1e2 } else { 9.81 };
+        scene.world.gravity = Some([0.0, 0.0, -gravity]);
+        // What falls past the blade falls on, and is not crushed.
+        scene.world.ground = (self != Self::FastBody).then_some(GroundSpec {
+            height: -1.0,
+            friction: 0.5,
+        });
+        let held = Region::HalfSpace {
+            point: [-0.45, 0.0, 0.0],
+            normal: [-1.0, 0.0, 0.0],
+        };
+        scene.body.push(BodySpec {
+            mesh: None,
+            shape: Some(ShapeSpec {
+                kind: "beam".to_owned(),
+                tets: if quick { 300 } else { 1500 },
+            }),
+            scale: 1.0,
+            position: [0.0; 3],
+            young_modulus: 1e4,
+            poisson_ratio: 0.45,
+            density: 1000.0,
+            damping: 0.0,
+            volume_compliance: None,
+            substeps: None,
+            fixed: if self == Self::FastBody {
+                Vec::new()
+            } else {
+                vec![held]
+            },
+        });
+        let last = self.frames(quick) - 1;
+        let blade = |height: f64| vec![[0.02, -1.0, height], [0.03, 1.0, height]];
+        let sweep = |frames, blade, way: f64| StrokeSpec::Sweep {
+            frames,
+            blade,
+            path: vec![[0.0; 3], [0.0, 0.0, way]],
+            snap: 0.0,
+        };
+        scene.stroke = match self {
+            Self::Strokes => Vec::new(),
+            Self::FastBlade => vec![sweep([2, 3], blade(1.0), -3.0)],
+            // From inside, since it would be long in coming.
+            Self::SlowBlade => vec![sweep([2, last], blade(-0.1), -6e-4 * last as f64)],
+            Self::FastBody => vec![sweep([2, last], blade(-0.4), 1e-3)],
+        };
+        scene
+    }
+}
+
+/// What becomes of a body that is cut.
+pub(crate) fn run(
+    cut: Cut,
+    column: Column,
+    gpu: Option<&Arc<GpuContext>>,
+    quick: bool,
+) -> anyhow::Result<Outcome> {
+    let scene = cut.scene(column, quick);
+    let fresh = || match gpu.filter(|_| column.gpu) {
+        Some(gpu) => Simulation::on_device(&scene, gpu.clone()),
+        None => Simulation::new(&scene),
+    };
+    let mut simulation = fresh()?;
+    let (at_start, mut noise) = (simulation.mesh().tets.len(), Noise(29));
+    let mut watch = Watch::new(column);
+    for frame in 0..cut.frames(quick) {
+        if cut == Cut::Strokes {
+            if simulation.mesh().tets.len() > 3 * at_start {
+                simulation = fresh()?;
+                watch.unit = None;
+            }
+            let stroke = random_stroke(&simulation, &mut noise);
+            simulation.cut(stroke)?;
+        }
+        let what = || format!("{cut:?}, {column:?}, frame {frame}");
+        simulation.step().with_context(what)?;
+        if simulation.report().cut.is_some() {
+            simulation.check().with_context(what)?;
+        }
+        if column.gpu {
+            simulation.read_back()?;
+        }
+        if !watch.look(&simulation).with_context(what)? {
+            break;
+        }
+    }
+    Ok(watch.outcome)
+}
+
+/// A rectangle half an edge to three edges large at a random particle, now.
+fn random_stroke(simulation: &Simulation, noise: &mut Noise) -> StrokeSpec {
+    let positions = simulation.positions();
+    let share = 0.5 * (noise.scalar() + 1.0) * positions.len() as f64;
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a part of the number of particles, rounded down"
+    )]
+    let center = positions[(share as usize).min(positions.len() - 1)];
+    let size = 0.06 * (1.75 + 1.25 * noise.scalar());
+    let u = noise.vector().normalize_or(DVec3::X);
+    let v = noise
+        .vector()
+        .cross(u)
+        .normalize_or(u.any_orthonormal_vector());
+    StrokeSpec::Rectangle {
+        frame: simulation.report().frame + u64::from(simulation.report().time_s > 0.0),
+        center: center.to_array(),
+        half_u: (u * size).to_array(),
+        half_v: (v * size).to_array(),
+        snap: 0.0,
+    }
+}
+
+/// Looks at a scene after every frame.
+struct Watch {
+    outcome: Outcome,
+    /// The energy at the start of the present body, and what energies are told in.
+    unit: Option<[f64; 2]>,
+}
+
+impl Watch {
+    fn new(column: Column) -> Self {
+        Self {
+            unit: None,
+            outcome: Outcome {
+                column,
+                substeps: 1,
+                kappa: 0.0,
+                frames: 0,
+                not_finite: None,
+                energy_rise: 0.0,
+                distance: None,
+                in_shape_from: None,
+                tets: 0,
+                inverted: 0,
+                volume: 0.0,
+                momentum_drift: None,
+                repaired: 0,
+                softened: 0,
+                frozen: false,
+            },
+        }
+    }
+
+    /// Notes what the body is; `false` if it is not finite.
+    fn look(&mut self, simulation: &Simulation) -> anyhow::Result<bool> {
+        let (report, outcome) = (simulation.report(), &mut self.outcome);
+        outcome.frames += 1;
+        outcome.repaired += report.repaired;
+        outcome.tets = report.tets;
+        let energy = report.energy.context("no energy was reported")?;
+        let sum = energy.kinetic + energy.elastic + energy.gravity;
+        let volume = report.volume_error.context("no volume was reported")?;
+        let kappa = report.kappa.context("no kappa was reported")?;
+        ensure!(
+            report.particles == simulation.positions().len(),
+            "another number of particles"
+        );
+        let finite = simulation.positions().iter().all(|x| x.is_finite())
+            && [sum, volume, kappa].iter().all(|n| n.is_finite());
+        if !finite {
+            outcome.not_finite = Some(outcome.frames);
+            return Ok(false);
+        }
+        let [start, unit] = *self.unit.get_or_insert_with(|| {
+            // A beam of 62.5 kg and 1 m.
+            [sum, 62.5 * 9.81]
+        });
+        outcome.energy_rise = outcome.energy_rise.max((sum - start) / unit);
+        outcome.volume = 1.0 + volume;
+        outcome.inverted = report.inverted_tets.unwrap_or(0);
+        outcome.kappa = outcome.kappa.max(kappa);
+        let softened = report.softened.map_or(0, |softened| softened.tets);
+        outcome.softened = outcome.softened.max(softened);
+        let substeps = report.bodies.iter().map(|body| body.substeps).max();
+        outcome.substeps = substeps.unwrap_or(outcome.substeps);
+        Ok(true)
+    }
+}

@@ -1,0 +1,218 @@
+//! The columns of the matrix: methods with the settings that they are looked at with, precisions, backends.
+//!
+//! All but *substeps* take a frame in one step of twenty iterations (five with corrections), which is what a user does who knows nothing of kappa
+//! and what the paper does. *Substeps* is what `substeps = "auto"` does: as many as bring kappa to 0.5, at most 200, and
+//! tets that are still too stiff softened to kappa 1.
+
+use incise::mesh::glam::DVec3;
+use incise::scene::{self, Form as SceneForm, SolverSpec, Substeps};
+use incise::xpbd::{DescentSettings, Form, KappaLimit, Method as XpbdMethod, StepSettings};
+use serde::{Deserialize, Serialize};
+
+use crate::solver::runner::Recipe;
+
+/// Above this a substep of one iteration is not accurate.
+const KAPPA: f64 = 0.5;
+/// The largest kappa of a tet where stiffer ones are softened, as in scenes.
+const KAPPA_LIMIT: f64 = 1.0;
+/// The most substeps of a frame.
+const MOST_SUBSTEPS: f64 = 200.0;
+/// Iterations of a frame, or sweeps.
+const ITERATIONS: u32 = 20;
+/// Rounds of a sweep and a correction.
+const ROUNDS: u32 = 5;
+
+/// How a frame is computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Method {
+    /// XPBD in block form, one iteration a substep, substeps by kappa.
+    Substeps,
+    /// XPBD in block form, one step of 20 iterations.
+    Block,
+    /// The paper's: one constraint of a tet after the other, clusters of 10, relaxation 0.8.
+    Paper,
+    /// Relaxation 0.1.
+    Jacobi,
+    /// Relaxation 0.1, spectral radius 0.9.
+    Chebyshev,
+    /// 20 sweeps.
+    Descent,
+    /// 5 sweeps, each with a correction of the whole body.
+    Corrected,
+}
+
+use Method::{Block, Chebyshev, Corrected, Descent, Jacobi, Paper, Substeps as ByKappa};
+
+impl Method {
+    pub(crate) const ALL: [Self; 7] =
+        [ByKappa, Block, Paper, Jacobi, Chebyshev, Descent, Corrected];
+
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            ByKappa => "substeps",
+            Block => "block",
+            Paper => "paper",
+            Jacobi => "Jacobi",
+            Chebyshev => "Chebyshev",
+            Descent => "descent",
+            Corrected => "corrected",
+        }
+    }
+
+    /// Whether it is a way through constraints, which kappa limits, and which a device can go as well.
+    pub(crate) fn is_xpbd(self) -> bool {
+        !matches!(self, Descent | Corrected)
+    }
+
+    /// Iterations, sweeps or rounds of a substep.
+    fn iterations(self) -> u32 {
+        match self {
+            ByKappa => 1,
+            Corrected => ROUNDS,
+            _ => ITERATIONS,
+        }
+    }
+
+    /// Substeps of a frame for a body with that kappa at the frame's time.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "there are from 1 to 200 substeps"
+    )]
+    pub(crate) fn substeps(self, kappa: f64) -> u32 {
+        match self {
+            ByKappa => (kappa / KAPPA).sqrt().ceil().clamp(1.0, MOST_SUBSTEPS) as u32,
+            _ => 1,
+        }
+    }
+
+    /// The limit to which a body is softened.
+    pub(crate) fn limit(self, substep_time: f64) -> Option<KappaLimit> {
+        (self == ByKappa).then_some(KappaLimit {
+            kappa: KAPPA_LIMIT,
+            substep_time,
+        })
+    }
+
+    /// The settings of a solver.
+    pub(crate) fn recipe(self, time_step: f64, substeps: u32, gravity: Option<DVec3>) -> Recipe {
+        let settings = StepSettings {
+            substeps,
+            iterations: self.iterations(),
+            method: match self {
+                Jacobi => XpbdMethod::Jacobi,
+                Chebyshev => XpbdMethod::Chebyshev {
+                    spectral_radius: 0.9,
+                    delay: 10,
+                },
+                _ => XpbdMethod::GaussSeidel,
+            },
+            form: if self == Paper {
+                Form::Sequential
+            } else {
+                Form::Block
+            },
+            relaxation: match self {
+                Paper => 0.8,
+                Jacobi | Chebyshev => 0.1,
+                _ => 1.0,
+            },
+            gravity,
+            ..StepSettings::new(time_step)
+        };
+        let descent = |settings| DescentSettings {
+            step: settings,
+            ..DescentSettings::new(time_step, self.iterations())
+        };
+        match self {
+            Descent => Recipe::Descent(descent(settings)),
+            Corrected => Recipe::Corrected(descent(settings)),
+            Paper => Recipe::Xpbd {
+                clustering: "serial:10",
+                settings,
+            },
+            _ => Recipe::Xpbd {
+                clustering: "none",
+                settings,
+            },
+        }
+    }
+
+    /// The settings of a scene, with all defaults that a scene has: above all, what a cut leaves too stiff is softened.
+    pub(crate) fn spec(self, column: Column) -> SolverSpec {
+        let method = match self {
+            ByKappa | Block | Paper => scene::Method::GaussSeidel,
+            Jacobi => scene::Method::Jacobi,
+            Chebyshev => scene::Method::Chebyshev,
+            Descent | Corrected => scene::Method::Descent,
+        };
+        let mut spec = match self {
+            Paper => SolverSpec::paper(method),
+            _ => SolverSpec::of(method),
+        };
+        spec.substeps = match self {
+            ByKappa => Substeps::Auto,
+            _ => Substeps::Fixed(1),
+        };
+        spec.iterations = self.iterations();
+        debug_assert_eq!(self == Paper, spec.form == SceneForm::Sequential);
+        spec.time_step = 1.0 / 60.0;
+        spec.coarse = self == Corrected;
+        spec.precision = match column.precision {
+            Precision::F32 => scene::Precision::F32,
+            Precision::F64 => scene::Precision::F64,
+        };
+        spec
+    }
+}
+
+/// Width of the numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Precision {
+    F32,
+    F64,
+}
+
+/// What a body is moved by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Column {
+    pub(crate) method: Method,
+    pub(crate) precision: Precision,
+    /// On a device, in place of the processor.
+    pub(crate) gpu: bool,
+}
+
+impl Column {
+    /// Every method in both precisions, and on a device what a device does.
+    pub(crate) fn all(gpu: bool) -> Vec<Self> {
+        let mut columns = Vec::new();
+        for method in Method::ALL {
+            for precision in [Precision::F32, Precision::F64] {
+                columns.push(Self {
+                    method,
+                    precision,
+                    gpu: false,
+                });
+            }
+            if gpu && method.is_xpbd() {
+                columns.push(Self {
+                    method,
+                    precision: Precision::F32,
+                    gpu: true,
+                });
+            }
+        }
+        columns
+    }
+
+    /// The second line of its head.
+    pub(crate) fn place(self) -> &'static str {
+        match (self.gpu, self.precision) {
+            (true, _) => "GPU",
+            (false, Precision::F32) => "f32",
+            (false, Precision::F64) => "f64",
+        }
+    }
+}

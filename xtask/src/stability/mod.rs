@@ -1,0 +1,89 @@
+//! `cargo xtask stability`: what becomes of bodies in extreme states, materials, steps and cuts, by method, precision and
+//! backend.
+//!
+//! The matrix is about shape and finiteness, not about accuracy: nothing may be infinite or NaN, ever, and what does not
+//! come back to its shape is explained. Rows: `extremes` and `cuts`; columns: `methods`.
+
+mod cuts;
+mod explain;
+mod extremes;
+mod methods;
+mod outcome;
+mod page;
+mod picture;
+mod rigid;
+mod run;
+
+use std::cell::OnceCell;
+use std::rc::Rc;
+use std::sync::Arc;
+
+use incise::gpu::{GpuContext, GpuOptions};
+use rayon::prelude::*;
+
+use crate::experiment::{Backend, Cell, Experiment, ExperimentArguments};
+use cuts::Cut;
+use methods::Column;
+use outcome::Row;
+
+/// The columns of a row are measured side by side, since nothing is timed.
+pub(crate) fn stability(arguments: &ExperimentArguments) -> anyhow::Result<()> {
+    experiment(arguments.quick, arguments.backend)?.run(arguments)
+}
+
+/// A device that is opened by the first cell that needs it.
+type Device = Rc<OnceCell<Arc<GpuContext>>>;
+
+fn experiment(quick: bool, backend: Backend) -> anyhow::Result<Experiment<Row>> {
+    let columns = Column::all(backend == Backend::Gpu);
+    let device = Device::default();
+    let mut cells = Vec::new();
+    for extreme in extremes::extremes(quick)? {
+        let (columns, device) = (columns.clone(), device.clone());
+        cells.push(Cell::new(extreme.id.clone(), move || {
+            let gpu = open(&device, backend)?;
+            let outcomes = columns.par_iter();
+            let outcomes = outcomes.map(|&column| run::run(&extreme, column, gpu));
+            Ok(Row {
+                id: extreme.id.clone(),
+                name: extreme.name.clone(),
+                is_state: extreme.gravity().is_none(),
+                outcomes: outcomes.collect::<anyhow::Result<_>>()?,
+            })
+        }));
+    }
+    for cut in Cut::ALL {
+        let (columns, device) = (columns.clone(), device.clone());
+        cells.push(Cell::new(cut.id(), move || {
+            let gpu = open(&device, backend)?;
+            let outcomes = columns.par_iter();
+            let outcomes = outcomes.map(|&column| cuts::run(cut, column, gpu, quick));
+            Ok(Row {
+                id: cut.id().to_owned(),
+                name: cut.name(quick),
+                is_state: false,
+                outcomes: outcomes.collect::<anyhow::Result<_>>()?,
+            })
+        }));
+    }
+    Ok(Experiment {
+        name: "stability",
+        cells,
+        page: page::page,
+    })
+}
+
+/// The device of all cells, if there is to be one.
+fn open(device: &Device, backend: Backend) -> anyhow::Result<Option<&Arc<GpuContext>>> {
+    if backend == Backend::Cpu {
+        return Ok(None);
+    }
+    if let Some(gpu) = device.get() {
+        return Ok(Some(gpu));
+    }
+    let gpu = Arc::new(GpuContext::new(&GpuOptions::from_env())?);
+    Ok(Some(device.get_or_init(|| gpu)))
+}
+
+#[cfg(test)]
+mod tests;

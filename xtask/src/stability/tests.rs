@@ -1,0 +1,162 @@
+//! The quick matrix, all of it: what must hold of every cell, whatever the numbers.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use incise::gpu::{GpuContext, GpuOptions};
+
+use super::methods::{Column, Method, Precision};
+use super::outcome::{Outcome, Row, Verdict};
+use super::{experiment, explain, extremes, page, picture, run};
+use crate::experiment::{Backend, Part};
+
+fn quick() -> Vec<Row> {
+    let experiment = experiment(true, Backend::Cpu).unwrap();
+    let ids: BTreeSet<&str> = experiment.cells.iter().map(|c| c.id.as_str()).collect();
+    assert_eq!(ids.len(), experiment.cells.len());
+    let cells = experiment.cells.iter();
+    cells.map(|cell| (cell.measure)().unwrap()).collect()
+}
+
+#[test]
+fn the_quick_matrix_is_finite_explained_and_shown() {
+    let rows = quick();
+    for row in &rows {
+        assert_eq!(row.outcomes.len(), 2 * Method::ALL.len(), "{}", row.id);
+        for outcome in &row.outcomes {
+            assert_eq!(outcome.not_finite, None, "{}: {outcome:?}", row.id);
+            if outcome.verdict(row.is_state) != Verdict::Fine {
+                let explained = explain::explain(row, outcome).is_some();
+                assert!(explained, "nobody knows why: {}: {outcome:?}", row.id);
+            }
+            // Constraints keep momentum but for rounding, measured: 1e-5. Descent keeps it as far as it converges.
+            let drift = outcome.momentum_drift.unwrap_or(0.0);
+            let xpbd = outcome.column.method.is_xpbd();
+            assert!(!xpbd || drift < 1e-3, "{}: {outcome:?}", row.id);
+        }
+    }
+    // Numbers come back to the last digit but one; what is said of them is the same.
+    let written = serde_json::to_string(&rows).unwrap();
+    let again: Vec<Row> = serde_json::from_str(&written).unwrap();
+    assert_eq!(picture::draw(&again), picture::draw(&rows));
+    let page = page::page(&rows).unwrap();
+    let in_words = page.parts.iter().find_map(|part| match part {
+        Part::Table(table) if table.caption == "In words" => Some(table),
+        _ => None,
+    });
+    let shown: Vec<&str> = in_words
+        .unwrap()
+        .rows
+        .iter()
+        .map(|row| row[0].as_str())
+        .collect();
+    let names: Vec<&str> = rows.iter().map(|row| row.name.as_str()).collect();
+    assert_eq!(shown, names);
+    let boxes = picture::draw(&rows).matches("<rect").count();
+    assert_eq!(boxes, 1 + rows.len() * 2 * Method::ALL.len());
+}
+
+/// What substeps by kappa are there for: no state of a body that is held, no Poisson's ratio, no distance from the origin
+/// breaks a body.
+#[test]
+fn substeps_by_kappa_hold_a_body_together() {
+    for extreme in extremes::extremes(true).unwrap() {
+        let kept = [
+            "rest",
+            "plane",
+            "mirrored",
+            "scrambled",
+            "stretched",
+            "poisson",
+            "far",
+        ];
+        if !kept.iter().any(|id| extreme.id.starts_with(id)) {
+            continue;
+        }
+        for precision in [Precision::F32, Precision::F64] {
+            let column = Column {
+                method: Method::Substeps,
+                precision,
+                gpu: false,
+            };
+            let outcome = run::run(&extreme, column, None).unwrap();
+            assert_eq!(outcome.inverted, 0, "{}", extreme.id);
+            assert!(outcome.in_shape_from.is_some(), "{}", extreme.id);
+        }
+    }
+}
+
+/// A device goes through the same extremes; one frame, as software devices are slow.
+#[test]
+fn a_device_is_watched_as_well() {
+    let Ok(gpu) = GpuContext::new(&GpuOptions::from_env()) else {
+        return; // A machine without one.
+    };
+    let gpu = Arc::new(gpu);
+    let mut extremes = extremes::extremes(true).unwrap();
+    extremes.retain(|e| ["scrambled-held", "young-1e12"].contains(&e.id.as_str()));
+    assert_eq!(extremes.len(), 2);
+    for extreme in &mut extremes {
+        extreme.time = extreme.time_step;
+        for method in [Method::Paper, Method::Jacobi] {
+            let column = Column {
+                method,
+                precision: Precision::F32,
+                gpu: true,
+            };
+            let outcome = run::run(extreme, column, Some(&gpu)).unwrap();
+            assert_eq!((outcome.frames, outcome.not_finite), (1, None));
+            assert!(!outcome.frozen);
+        }
+    }
+}
+
+fn fine() -> Outcome {
+    Outcome {
+        column: Column {
+            method: Method::Block,
+            precision: Precision::F64,
+            gpu: false,
+        },
+        substeps: 1,
+        kappa: 0.5,
+        frames: 10,
+        not_finite: None,
+        energy_rise: 0.0,
+        distance: Some(0.01),
+        in_shape_from: Some(0.1),
+        tets: 100,
+        inverted: 0,
+        volume: 1.01,
+        momentum_drift: None,
+        repaired: 0,
+        softened: 0,
+        frozen: false,
+    }
+}
+
+/// The worst comes first, and each is told apart.
+#[test]
+fn verdicts_name_the_worst() {
+    let verdict = |change: &dyn Fn(&mut Outcome)| {
+        let mut outcome = fine();
+        change(&mut outcome);
+        outcome.verdict(true)
+    };
+    assert_eq!(fine().verdict(true), Verdict::Fine);
+    assert_eq!(verdict(&|o| o.distance = Some(0.5)), Verdict::Bent);
+    assert_eq!(verdict(&|o| o.volume = 1.06), Verdict::Off);
+    assert_eq!(verdict(&|o| o.volume = -0.9), Verdict::Collapsed);
+    assert_eq!(verdict(&|o| o.inverted = 2), Verdict::FewInverted);
+    assert_eq!(verdict(&|o| o.inverted = 3), Verdict::Inverted);
+    assert_eq!(verdict(&|o| o.energy_rise = 1.5), Verdict::Gains);
+    assert_eq!(verdict(&|o| o.repaired = 1), Verdict::Repaired);
+    let all = |o: &mut Outcome| {
+        (o.not_finite, o.volume, o.frozen) = (Some(3), 0.0, true);
+    };
+    assert_eq!(verdict(&all), Verdict::NotFinite);
+    let mut bent = fine();
+    bent.distance = Some(0.5);
+    assert_eq!(bent.verdict(false), Verdict::Fine);
+    assert_eq!(bent.words(true), "bent 50 %");
+}
