@@ -71,7 +71,7 @@ const EXPERIMENTS: &[(&str, Run)] = &[
     }),
     ("stability", stability::stability),
     ("lean", lean::run),
-    ("peers", peers::run),
+    ("peers", peers::usual),
 ];
 
 #[derive(Debug, Subcommand)]

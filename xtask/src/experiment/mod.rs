@@ -20,7 +20,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-pub(crate) use arguments::{Backend, ExperimentArguments, Shard};
+pub(crate) use arguments::{Backend, ExperimentArguments};
 use machine::Machine;
 pub(crate) use merge::{MergeArguments, merge};
 pub(crate) use page::{Page, Part, Table};

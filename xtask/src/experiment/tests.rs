@@ -4,6 +4,7 @@ use std::cell::Cell as Counter;
 use std::path::PathBuf;
 use std::rc::Rc;
 
+use super::arguments::Shard;
 use super::*;
 
 fn arguments(out: PathBuf, shard: Option<&str>) -> ExperimentArguments {

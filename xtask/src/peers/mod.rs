@@ -82,7 +82,7 @@ const QUICK: Extent = Extent {
 
 /// As one of all experiments, where the scripts are at the usual place.
 #[expect(clippy::print_stderr, reason = "says what is left out")]
-pub(crate) fn run(arguments: &ExperimentArguments) -> anyhow::Result<()> {
+pub(crate) fn usual(arguments: &ExperimentArguments) -> anyhow::Result<()> {
     let peers = PathBuf::from(FOLDER);
     if !peers.join("scene.py").is_file() {
         eprintln!("peers: left out, {FOLDER} has no scripts that run other systems");
