@@ -4,6 +4,7 @@
 
 mod coloring;
 mod cutting;
+mod experiment;
 mod gpu;
 mod models;
 mod soak;
@@ -11,9 +12,12 @@ mod solver;
 mod sweep;
 mod wear;
 
+use anyhow::Context;
 use clap::{Parser, Subcommand};
 use comfy_table::presets::ASCII_MARKDOWN;
 use comfy_table::{Row, Table};
+
+use experiment::{ExperimentArguments, MergeArguments};
 
 /// Sweeps over incise.
 #[derive(Debug, Parser)]
@@ -23,14 +27,24 @@ struct Arguments {
     command: Command,
 }
 
+/// Runs an experiment.
+type Run = fn(&ExperimentArguments) -> anyhow::Result<()>;
+
+/// All experiments by the names of their pages, in the order in which `all` runs them.
+const EXPERIMENTS: &[(&str, Run)] = &[];
+
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Run all experiments, and write a page of each and one of all.
+    All(ExperimentArguments),
     /// Cluster and color meshes in every way there is, and write tables.
     Coloring(coloring::ColoringArguments),
     /// What a cut costs by stage and size of the mesh, and what snapping trades.
     Cutting(cutting::CuttingArguments),
     /// Check the kernels on a GPU, time colorings, iterations and frames there, and write a page and JSON.
     GpuSweep(gpu::GpuArguments),
+    /// Gather what runs with --shard have measured, and write the pages.
+    Merge(MergeArguments),
     /// Compare the methods of the solver: what they cost and what they are worth.
     Solver(solver::SolverArguments),
     /// Make random strokes by the thousand and check everything after each.
@@ -43,14 +57,26 @@ enum Command {
 
 fn main() -> anyhow::Result<()> {
     match Arguments::parse().command {
+        Command::All(arguments) => EXPERIMENTS.iter().try_for_each(|(_, run)| run(&arguments)),
         Command::Coloring(arguments) => coloring::coloring(&arguments),
         Command::Cutting(arguments) => cutting::cutting(&arguments),
         Command::GpuSweep(arguments) => gpu::sweep(&arguments),
+        Command::Merge(arguments) => experiment::merge(&arguments)?
+            .iter()
+            .try_for_each(|(name, of_this)| named(name)?(of_this)),
         Command::Solver(arguments) => solver::solver(&arguments),
         Command::SoakCut(arguments) => soak::soak(&arguments),
         Command::Sweep(arguments) => sweep::sweep(&arguments),
         Command::Wear(arguments) => wear::wear(&arguments),
     }
+}
+
+/// The experiment whose page has a name.
+fn named(name: &str) -> anyhow::Result<Run> {
+    let found = EXPERIMENTS.iter().find(|(known, _)| *known == name);
+    found
+        .map(|(_, run)| *run)
+        .with_context(|| format!("there is no experiment {name:?}"))
 }
 
 /// An empty table in Markdown.

@@ -130,7 +130,8 @@ pub(crate) enum MeshCommand {
         #[arg(long, value_name = "DT", default_value_t = 0.016)]
         time_step: f64,
     },
-    /// Read a mesh in one format and write it in another; formats go by file ending.
+    /// Read a mesh in one format and write it in another; formats go by file ending. Endings of surfaces (.obj, .stl, .ply,
+    /// .off, .glb, .gltf) get its boundary.
     #[command(after_help = "Example: incise mesh convert liver.node liver.vtu")]
     Convert {
         /// The mesh to read.

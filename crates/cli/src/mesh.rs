@@ -89,14 +89,21 @@ pub(crate) fn mesh(command: &MeshCommand) -> Result<(), Failure> {
         MeshCommand::Convert {
             input,
             output,
-            repair: false,
-        } => Ok(io::write_file(output, &io::read_file(input)?)?),
-        MeshCommand::Convert { input, output, .. } => {
-            let file = io::read_file(input)?;
-            let repaired = repair(&file.mesh, &RepairOptions::ALL);
-            let report = repaired.report;
-            io::write_file(output, &file.repaired(repaired))?;
-            print(report)
+            repair: wanted,
+        } => {
+            let mut file = io::read_file(input)?;
+            let mut report = None;
+            if *wanted {
+                let repaired = repair(&file.mesh, &RepairOptions::ALL);
+                report = Some(repaired.report);
+                file = file.repaired(repaired);
+            }
+            if io::is_surface(output) {
+                io::write_surface(output, &TriangleSurface::boundary_of(&file.mesh))?;
+            } else {
+                io::write_file(output, &file)?;
+            }
+            report.map_or(Ok(()), print)
         }
         MeshCommand::Tetrahedralize {
             surface,
@@ -125,7 +132,7 @@ fn fill(file: &Path, output: &Path, tets: usize, levels: u32) -> Result<(), Fail
     let solid = Solid::new(&surface).map_err(named)?;
     let mesh = tetrahedralize(&solid, tets, levels).map_err(named)?;
     io::write(output, &mesh)?;
-    let boundary = TriangleSurface::from(&mesh);
+    let boundary = TriangleSurface::boundary_of(&mesh);
     let back = Solid::new(&boundary).map_err(named)?;
     let prepared = solid.prepared();
     for (count, what) in [
@@ -150,7 +157,7 @@ fn fill(file: &Path, output: &Path, tets: usize, levels: u32) -> Result<(), Fail
         print("the surface was inside out and was turned")?;
     }
     print(format!(
-        "{} tets, {} particles, {} pieces",
+        "tets {}, particles {}, pieces {}",
         mesh.tets.len(),
         mesh.positions.len(),
         mesh.pieces().count

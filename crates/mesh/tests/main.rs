@@ -3,9 +3,11 @@
 mod faults;
 mod formats;
 mod given;
+mod gltf;
 mod irregular;
-mod medit;
-mod msh;
+mod memory;
+mod meshio;
+mod round_trips;
 mod shapes;
 mod sizes;
 mod tetrahedralize;

@@ -13,7 +13,7 @@ use incise_mesh::{MeshError, ParticleId, Solid, TetMesh};
 use proptest::prelude::*;
 
 fn cube() -> TriangleSurface {
-    TriangleSurface::from(&kuhn_box([2, 3, 1], DVec3::splat(0.5)))
+    TriangleSurface::boundary_of(&kuhn_box([2, 3, 1], DVec3::splat(0.5)))
 }
 
 /// Both surfaces, as one.
@@ -81,7 +81,7 @@ fn points_in_planes_and_on_lines_of_the_surface_are_on_the_right_side() {
 
 #[test]
 fn overlapping_shells_and_holes() {
-    let ball = TriangleSurface::from(&generate(Shape::Sphere, 500).unwrap());
+    let ball = TriangleSurface::boundary_of(&generate(Shape::Sphere, 500).unwrap());
     let overlapping = together(ball.clone(), &moved(ball.clone(), dvec3(0.5, 0.0, 0.0)));
     let solid = Solid::new(&overlapping).unwrap();
     assert_eq!(solid.winding_number(dvec3(0.25, 0.0, 0.0)), 2);
@@ -200,7 +200,7 @@ proptest! {
     ) {
         let mut surface = TriangleSurface::default();
         for offset in offsets {
-            let mut part = TriangleSurface::from(&generate(Shape::Sphere, 200).unwrap());
+            let mut part = TriangleSurface::boundary_of(&generate(Shape::Sphere, 200).unwrap());
             // Pulled through the other side, so that the shell meets itself.
             part.positions[3] += DVec3::from_array(pull);
             surface = together(surface, &moved(part, DVec3::from_array(offset)));
@@ -218,7 +218,7 @@ proptest! {
 
     #[test]
     fn distances_are_those_of_all_triangles(points in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 16)) {
-        let surface = TriangleSurface::from(&generate(Shape::Torus, 500).unwrap());
+        let surface = TriangleSurface::boundary_of(&generate(Shape::Torus, 500).unwrap());
         let solid = Solid::new(&surface).unwrap();
         // Each triangle alone, closed by its back.
         let alone: Vec<Solid> = surface.triangles.iter().map(|&t| {
@@ -247,7 +247,7 @@ fn fills(solid: &Solid, mesh: &TetMesh, tets: usize, lost: f64) {
     );
     let volume = mesh.total_volume() / solid.volume();
     assert!((volume - 1.0).abs() < lost, "{volume}");
-    let surface = TriangleSurface::from(mesh);
+    let surface = TriangleSurface::boundary_of(mesh);
     let spacing = (12.0 * solid.volume() / tets as f64).cbrt();
     let out = solid.farthest(&surface) / spacing;
     assert!(out < 1.0, "{out} spacings from the input");
@@ -256,7 +256,7 @@ fn fills(solid: &Solid, mesh: &TetMesh, tets: usize, lost: f64) {
 /// How far the input lies from the body, in spacings.
 fn missed(solid: &Solid, surface: &TriangleSurface, mesh: &TetMesh) -> f64 {
     let spacing = (12.0 * solid.volume() / mesh.tets.len() as f64).cbrt();
-    Solid::new(&TriangleSurface::from(mesh))
+    Solid::new(&TriangleSurface::boundary_of(mesh))
         .unwrap()
         .farthest(surface)
         / spacing
@@ -267,7 +267,7 @@ fn shapes_are_filled_anew() {
     // Beveled edges, and chords that lie inside a curved surface, cost volume on so coarse a lattice.
     let lost = 0.03;
     for shape in [Shape::Liver, Shape::Torus, Shape::Beam] {
-        let surface = TriangleSurface::from(&generate(shape, 2_000).unwrap());
+        let surface = TriangleSurface::boundary_of(&generate(shape, 2_000).unwrap());
         let solid = Solid::new(&surface).unwrap();
         let mesh = tetrahedralize(&solid, 5_000, 0).unwrap();
         fills(&solid, &mesh, 5_000, lost);
@@ -290,7 +290,7 @@ fn surfaces_of_given_meshes() {
         ("armadillo_55k", 110_000, false),
     ] {
         let given = io::read(folder.join(name).with_extension("vtk")).unwrap();
-        let surface = TriangleSurface::from(&given);
+        let surface = TriangleSurface::boundary_of(&given);
         let solid = Solid::new(&surface).unwrap();
         let mesh = tetrahedralize(&solid, tets, 0).unwrap();
         fills(&solid, &mesh, tets, 0.02);
@@ -322,7 +322,7 @@ fn cones_that_touch_at_a_lattice_vertex_come_apart() {
 
 #[test]
 fn a_graded_inside_leaves_more_tets_for_the_surface() {
-    let surface = TriangleSurface::from(&generate(Shape::Sphere, 4_000).unwrap());
+    let surface = TriangleSurface::boundary_of(&generate(Shape::Sphere, 4_000).unwrap());
     let solid = Solid::new(&surface).unwrap();
     let [uniform, graded] = [0, 4].map(|levels| tetrahedralize(&solid, 60_000, levels).unwrap());
     for mesh in [&uniform, &graded] {

@@ -9,7 +9,7 @@ mod checks;
 mod coloring;
 mod frame;
 mod iteration;
-mod measure;
+pub(crate) mod measure;
 mod memory;
 mod page;
 mod recoloring;

@@ -270,3 +270,24 @@ fn surfaces_that_cannot_be_filled_are_refused_in_a_sentence() {
     assert!(format.contains(".stl"), "{format}");
     assert!(!place.path("a.vtk").exists());
 }
+
+#[test]
+fn the_boundary_of_a_body_is_written_as_a_surface_and_filled_again() {
+    let place = Place::with_mesh();
+    place.good(&["mesh", "convert", "box.vtk", "box.stl"]);
+    place.good(&["mesh", "convert", "box.vtk", "box.glb"]);
+    assert!(place.path("box.glb").exists());
+    let told = place.good(&[
+        "mesh",
+        "tetrahedralize",
+        "box.stl",
+        "again.msh",
+        "--tets",
+        "600",
+        "--levels",
+        "2",
+    ]);
+    assert!(told.contains("pieces 1"), "{told}");
+    let report = info(&place, "again.msh");
+    assert!(report["tets"].as_u64().unwrap().abs_diff(600) <= 12);
+}

@@ -12,7 +12,6 @@
 use glam::{DMat3, DVec3};
 
 use super::search::{Wanted, cube_root, find_grid, shift, turned};
-use crate::io::TriangleSurface;
 use crate::{MeshError, Solid, TetMesh};
 
 /// The distance that is told from far, in cube roots of the volume of a tet.
@@ -73,16 +72,6 @@ pub fn tetrahedralize(solid: &Solid, tets: usize, levels: u32) -> Result<TetMesh
     } else {
         format!("no spacing gives {tets} tets to within 2 %, ask for another number")
     }))
-}
-
-/// The boundary of a mesh as a surface of its own, with the particles of the mesh.
-impl From<&TetMesh> for TriangleSurface {
-    fn from(mesh: &TetMesh) -> Self {
-        Self {
-            triangles: mesh.surface().triangles,
-            positions: mesh.positions.clone(),
-        }
-    }
 }
 
 enum Found {

@@ -31,6 +31,16 @@ pub struct Fields<'a> {
     pub cells: &'a [Field<'a>],
 }
 
+/// A number as an integer of 32 bits if it is one; -0, which has a sign to lose, is none.
+pub(super) fn whole(value: f64) -> Option<i32> {
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "the cast saturates, and a value that changed is no whole number of 32 bits"
+    )]
+    let number = value as i32;
+    (f64::from(number).to_bits() == value.to_bits()).then_some(number)
+}
+
 impl Fields<'_> {
     /// Refuses fields of the wrong length.
     pub(super) fn check(&self, particles: usize, cells: usize) -> Result<(), MeshError> {

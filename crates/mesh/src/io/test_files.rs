@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use super::{MeshFile, NamedValues, OwnedValues};
 use crate::generate::kuhn_box;
-use crate::{ParticleId, TetMesh};
+use crate::{MeshError, ParticleId, TetMesh};
 
 /// A small mesh with everything.
 pub(super) fn sample() -> MeshFile {
@@ -64,6 +64,27 @@ pub(super) fn mesh_file() -> impl Strategy<Value = MeshFile> {
                 tets: of_tets,
             })
     })
+}
+
+/// Reads all parts of a file that start where it does. A part must be an error that names the place, or is `accepted` with
+/// its length.
+#[track_caller]
+pub(super) fn cut<T>(
+    whole: &[u8],
+    read: impl Fn(&[u8]) -> Result<T, MeshError>,
+    mut accepted: impl FnMut(usize, T) -> bool,
+) {
+    for length in 0..whole.len() {
+        match read(&whole[..length]) {
+            Err(MeshError::Parse { .. } | MeshError::ParseBytes { .. }) => {}
+            Err(error) => panic!("{length} of {} bytes: {error}", whole.len()),
+            Ok(part) => assert!(
+                accepted(length, part),
+                "{length} of {} bytes are taken for a file",
+                whole.len()
+            ),
+        }
+    }
 }
 
 /// Equal, and -0 is not 0.

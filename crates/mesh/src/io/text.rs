@@ -2,16 +2,24 @@
 //!
 //! Works on bytes, so that a title in some old encoding is no obstacle. Linear.
 
-use std::borrow::Cow;
 use std::fs;
 use std::path::Path;
 
 use crate::MeshError;
 
+/// The content of a file, binary or text.
+pub(super) fn load(path: &Path) -> Result<Vec<u8>, MeshError> {
+    fs::read(path).map_err(|source| MeshError::Io {
+        action: "read",
+        path: path.to_owned(),
+        source,
+    })
+}
+
 /// A file in memory.
 pub(super) struct Text<'a> {
     path: &'a Path,
-    bytes: Cow<'a, [u8]>,
+    bytes: &'a [u8],
 }
 
 /// A word and the line it stands on, counted from 1.
@@ -23,25 +31,17 @@ pub(super) struct Word<'t> {
     pub(super) first: bool,
 }
 
-impl<'a> Text<'a> {
-    pub(super) fn read(path: &'a Path) -> Result<Self, MeshError> {
-        let bytes = fs::read(path).map_err(|source| MeshError::Io {
-            action: "read",
-            path: path.to_owned(),
-            source,
-        })?;
-        Ok(Self {
-            path,
-            bytes: bytes.into(),
-        })
+impl<'t> Word<'t> {
+    /// A word of which it does not matter where on its line it stands.
+    pub(super) fn new(text: &'t [u8], line: usize) -> Self {
+        let first = false;
+        Self { text, line, first }
     }
+}
 
-    /// A file that is in memory already.
+impl<'a> Text<'a> {
     pub(super) fn new(path: &'a Path, bytes: &'a [u8]) -> Self {
-        Self {
-            path,
-            bytes: bytes.into(),
-        }
+        Self { path, bytes }
     }
 
     /// The lines, with their numbers, from the given one on; line ends of all systems are understood.
@@ -130,6 +130,11 @@ impl<'a> Text<'a> {
             )),
         }
     }
+}
+
+/// A line up to its comment, which `#` starts.
+pub(super) fn without_comment(line: &[u8]) -> &[u8] {
+    line.split(|&b| b == b'#').next().unwrap_or_default()
 }
 
 /// The words of one line.

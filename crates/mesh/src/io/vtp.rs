@@ -7,6 +7,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
+use super::used::Used;
 use super::{Fields, write_atomically, xml};
 use crate::{MeshError, Surface};
 
@@ -38,13 +39,10 @@ pub fn write_vtp(
 ) -> Result<(), MeshError> {
     let triangles = &surface.triangles;
     fields.check(positions.len(), triangles.len())?;
-    let mut used: Vec<usize> = triangles.iter().flatten().map(|p| p.index()).collect();
-    used.sort_unstable();
-    used.dedup();
-    let mut places = vec![0_i64; positions.len()];
-    for (place, &particle) in (0..).zip(&used) {
-        places[particle] = place;
-    }
+    let Used {
+        particles: used,
+        places,
+    } = Used::new(triangles, positions.len());
     write_atomically(path, |out| {
         xml::open(out, "PolyData")?;
         writeln!(out, "<PolyData>")?;
@@ -61,7 +59,7 @@ pub fn write_vtp(
         let corners = triangles
             .iter()
             .flatten()
-            .map(|p| places[p.index()].to_le_bytes());
+            .map(|p| i64::from(places[p.index()]).to_le_bytes());
         xml::integers(out, "Int64", "connectivity", corners)?;
         xml::integers(
             out,

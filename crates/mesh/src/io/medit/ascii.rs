@@ -6,7 +6,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::super::text::{Text, Word, show, words_of};
+use super::super::text::{Text, Word, show, without_comment, words_of};
 use super::{Contents, OTHER_VOLUMES, point_references, reference};
 use crate::{MeshError, ParticleId};
 
@@ -38,12 +38,7 @@ pub(super) fn write(out: &mut dyn Write, file: &MeshFile) -> io::Result<()> {
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<MeshFile, MeshError> {
     let text = Text::new(path, bytes);
     let words = text.lines(1).flat_map(|(line, content)| {
-        let content = content.split(|&b| b == b'#').next().unwrap_or_default();
-        words_of(content).map(move |text| Word {
-            text,
-            line,
-            first: false,
-        })
+        words_of(without_comment(content)).map(move |text| Word::new(text, line))
     });
     let mut reader = Reader {
         text: &text,

@@ -11,11 +11,12 @@
 mod ascii;
 mod binary;
 
-use std::fs;
 use std::path::Path;
 
 use glam::DVec3;
 
+use super::fields::whole;
+use super::text::load;
 use super::{MeshFile, NamedValues, OwnedValues, write_atomically};
 use crate::{MeshError, ParticleId, TetMesh};
 
@@ -64,12 +65,7 @@ const OTHER_VOLUMES: [(&str, i32); 15] = [
 /// ```
 pub fn read_medit(path: impl AsRef<Path>) -> Result<MeshFile, MeshError> {
     let path = path.as_ref();
-    let bytes = fs::read(path).map_err(|source| MeshError::Io {
-        action: "read",
-        path: path.to_owned(),
-        source,
-    })?;
-    parse_medit(&bytes, path)
+    parse_medit(&load(path)?, path)
 }
 
 /// The same for a file in memory.
@@ -94,9 +90,7 @@ pub(crate) fn parse_medit(bytes: &[u8], path: &Path) -> Result<MeshFile, MeshErr
 pub fn write_medit(path: impl AsRef<Path>, file: &MeshFile) -> Result<(), MeshError> {
     file.check()?;
     let path = path.as_ref();
-    let binary = path
-        .extension()
-        .is_some_and(|ending| ending.eq_ignore_ascii_case("meshb"));
+    let binary = super::ending(path) == "meshb";
     write_atomically(path, |out| {
         if binary {
             binary::write(out, file, binary::lowest_version(&file.mesh))
@@ -172,15 +166,7 @@ fn point_references(file: &MeshFile) -> Option<Vec<i32>> {
     let OwnedValues::Scalars(values) = &values.values else {
         return None;
     };
-    let whole = |&value: &f64| {
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "compared with the original"
-        )]
-        let number = value as i32;
-        (f64::from(number).to_bits() == value.to_bits()).then_some(number)
-    };
-    values.iter().map(whole).collect()
+    values.iter().map(|&value| whole(value)).collect()
 }
 
 /// The reference of element `i`: 0 where there are none.

@@ -120,11 +120,17 @@ impl Content {
                 "two tetrahedra have the number {tag}, so that its values belong to neither, renumber them"
             )));
         }
+        // Data of a few elements become fields of all: a file of many such sections would fill the memory. One number is
+        // allowed for each byte of the file.
+        let mut allowed = source.len();
         for data in self.data {
-            if data.of_nodes {
-                file.particles.extend(data.resolve(&nodes, source)?);
+            let of_nodes = data.of_nodes;
+            let numbers = if of_nodes { &nodes } else { &elements };
+            let field = data.resolve(numbers, &mut allowed, source)?;
+            if of_nodes {
+                file.particles.extend(field);
             } else {
-                file.tets.extend(data.resolve(&elements, source)?);
+                file.tets.extend(field);
             }
         }
         Ok(file)
@@ -153,16 +159,18 @@ impl Content {
 }
 
 impl Data {
-    /// The values in the order of the mesh, NaN where there are none; nothing if there is no value at all.
+    /// The values in the order of the mesh, NaN where there are none; nothing if there is no value at all. No more than
+    /// the allowed number of NaN are filled in, which is lowered by it.
     fn resolve(
         self,
         numbers: &Numbers,
+        allowed: &mut usize,
         source: &Source<'_>,
     ) -> Result<Option<NamedValues>, MeshError> {
-        let mut found = Vec::with_capacity(self.tags.len());
-        for (i, &(tag, place)) in self.tags.iter().enumerate() {
+        let mut found = 0;
+        for &(tag, place) in &self.tags {
             match numbers.index(tag) {
-                Some(index) => found.push((i, index)),
+                Some(_) => found += 1,
                 None if self.of_nodes => {
                     let message = format!(
                         "the data {:?} has a value for node {tag}, which does not exist, correct it",
@@ -174,20 +182,31 @@ impl Data {
                 None => {}
             }
         }
-        if found.is_empty() {
+        if found == 0 {
             return Ok(None);
         }
         let count = numbers.0.len();
+        let missing = count.saturating_sub(found) * self.components;
+        *allowed = allowed.checked_sub(missing).ok_or_else(|| {
+            source.error(format!(
+                "the data {:?} and others have values for few of the nodes or elements, give one for each",
+                self.name
+            ))
+        })?;
+        let tags = self.tags.iter().map(|&(tag, _)| numbers.index(tag));
         let values = if self.components == 1 {
             let mut values = vec![f64::NAN; count];
-            for (i, index) in found {
-                values[index] = self.values[i];
+            for (index, &value) in tags.zip(&self.values) {
+                index.into_iter().for_each(|index| values[index] = value);
             }
             OwnedValues::Scalars(values)
         } else {
             let mut values = vec![DVec3::NAN; count];
-            for (i, index) in found {
-                values[index] = DVec3::from_slice(&self.values[3 * i..]);
+            let (triples, _) = self.values.as_chunks::<3>();
+            for (index, &value) in tags.zip(triples) {
+                index
+                    .into_iter()
+                    .for_each(|index| values[index] = value.into());
             }
             OwnedValues::Vectors(values)
         };

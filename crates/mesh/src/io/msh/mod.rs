@@ -6,9 +6,11 @@
 //!
 //! Regions are the physical groups of the tets (0 for a tet in none; the first one of several), or, where no tet is in
 //! one, the elementary entities. A single entity 1 without a group, which Gmsh writes for want of anything else, is no
-//! region at all. `$NodeData` and `$ElementData` with 1 or 3 components are fields; each time step is one; elements
-//! without a value have NaN. Orientation is kept as it is. Cost: O(n log n), for the numbers of nodes may have gaps and
-//! be in any order.
+//! region at all. The names of groups (`$PhysicalNames`) are not kept: no other format has a place for them.
+//!
+//! `$NodeData` and `$ElementData` with 1 or 3 components are fields; each time step is one; elements without a value have
+//! NaN, and a file is refused that needs more than eight times its size for them. Orientation is kept as it is. Cost:
+//! O(n log n), for the numbers of nodes may have gaps and be in any order.
 //!
 //! Source: the Gmsh reference manual, sections "MSH file format", "MSH file format version 2" and "version 1" (Geuzaine
 //! and Remacle).
@@ -25,13 +27,12 @@ mod write;
 
 pub use write::{MshKind, write_msh};
 
-use std::fs;
 use std::path::Path;
 
 use self::content::Content;
 use self::source::{Encoding, Source};
 use super::MeshFile;
-use super::text::show;
+use super::text::{load, show};
 use crate::MeshError;
 
 /// Reads the tets of a Gmsh file, versions 1, 2 and 4.1, text or binary, with regions and fields.
@@ -40,12 +41,7 @@ use crate::MeshError;
 /// As for [`read`](super::read); [`MeshError::ParseBytes`] for what is wrong in a binary file.
 pub fn read_msh(path: impl AsRef<Path>) -> Result<MeshFile, MeshError> {
     let path = path.as_ref();
-    let bytes = fs::read(path).map_err(|source| MeshError::Io {
-        action: "read",
-        path: path.to_owned(),
-        source,
-    })?;
-    parse_msh(&bytes, path)
+    parse_msh(&load(path)?, path)
 }
 
 /// The versions that are read.

@@ -44,6 +44,11 @@ impl<'a> Source<'a> {
         }
     }
 
+    /// The bytes of the file.
+    pub(super) const fn len(&self) -> usize {
+        self.bytes.len()
+    }
+
     /// Where the item read last starts.
     pub(super) const fn place(&self) -> usize {
         self.item

@@ -7,9 +7,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use glam::DVec3;
-
-use super::super::text::{Text, Word, show, words_of};
+use super::super::text::{Text, Word, show, without_comment, words_of};
 use super::{TriangleSurface, fan};
 use crate::{MeshError, ParticleId};
 
@@ -24,44 +22,44 @@ pub(super) fn write(out: &mut dyn Write, surface: &TriangleSurface) -> io::Resul
     Ok(())
 }
 
+/// What the line being read says; a line without words says nothing.
+#[derive(Clone, Copy, PartialEq)]
+enum Statement {
+    None,
+    Point,
+    Face,
+    Other,
+}
+
 pub(crate) fn parse_obj(bytes: &[u8], path: &Path) -> Result<TriangleSurface, MeshError> {
     let text = Text::new(path, bytes);
     let mut surface = TriangleSurface::default();
     // The largest corner and its line: points may come after the polygons.
     let mut largest: Option<(ParticleId, usize)> = None;
-    let mut words = Vec::new();
+    let mut statement = Statement::None;
+    let mut coordinates = [0.0; 3];
+    // How many words the statement has after the keyword.
+    let mut length = 0;
     let mut polygon = Vec::new();
     let mut last_line = 1;
     for (line, content) in text.lines(1) {
         last_line = line;
-        let content = content.split(|&b| b == b'#').next().unwrap_or_default();
+        let content = without_comment(content);
         let content = content.trim_ascii_end();
         let continued = content.strip_suffix(b"\\");
-        words.extend(words_of(continued.unwrap_or(content)).map(|text| Word {
-            text,
-            line,
-            first: false,
-        }));
-        if continued.is_some() {
-            continue;
-        }
-        match words.first().map(|word: &Word<'_>| word.text) {
-            Some(b"v") => {
-                let [_, x, y, z, ..] = words[..] else {
-                    return Err(text.error(line, "a point has less than 3 coordinates"));
-                };
-                surface.positions.push(DVec3::new(
-                    text.coordinate(x)?,
-                    text.coordinate(y)?,
-                    text.coordinate(z)?,
-                ));
-            }
-            Some(b"f") => {
-                if words.len() < 4 {
-                    return Err(text.error(line, "a face has less than 3 corners"));
+        for word in words_of(continued.unwrap_or(content)).map(|text| Word::new(text, line)) {
+            match statement {
+                Statement::None => {
+                    statement = match word.text {
+                        b"v" => Statement::Point,
+                        b"f" => Statement::Face,
+                        _ => Statement::Other,
+                    };
+                    continue;
                 }
-                polygon.clear();
-                for &word in &words[1..] {
+                // A weight or a color may follow.
+                Statement::Point if length < 3 => coordinates[length] = text.coordinate(word)?,
+                Statement::Face => {
                     let corner = corner(word, surface.positions.len()).ok_or_else(|| {
                         let message = format!(
                             "{:?} is no corner: a number of a point expected, there are {} so far, from 1",
@@ -75,13 +73,29 @@ pub(crate) fn parse_obj(bytes: &[u8], path: &Path) -> Result<TriangleSurface, Me
                     }
                     polygon.push(corner);
                 }
-                fan(&polygon, &mut surface.triangles);
+                Statement::Point | Statement::Other => {}
             }
-            _ => {}
+            length += 1;
         }
-        words.clear();
+        if continued.is_some() {
+            continue;
+        }
+        match statement {
+            Statement::Point if length < 3 => {
+                return Err(text.error(line, "a point has less than 3 coordinates"));
+            }
+            Statement::Point => surface.positions.push(coordinates.into()),
+            Statement::Face if length < 3 => {
+                return Err(text.error(line, "a face has less than 3 corners"));
+            }
+            Statement::Face => fan(&polygon, &mut surface.triangles),
+            Statement::None | Statement::Other => {}
+        }
+        statement = Statement::None;
+        length = 0;
+        polygon.clear();
     }
-    if !words.is_empty() {
+    if statement != Statement::None {
         return Err(text.ends_early("the rest of a continued line"));
     }
     match largest {

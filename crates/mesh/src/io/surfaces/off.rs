@@ -9,7 +9,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::super::text::{Text, Word, show, words_of};
+use super::super::text::{Text, Word, show, without_comment, words_of};
 use super::{TriangleSurface, fan};
 use crate::{MeshError, ParticleId};
 
@@ -28,8 +28,7 @@ pub(super) fn write(out: &mut dyn Write, surface: &TriangleSurface) -> io::Resul
 pub(crate) fn parse_off(bytes: &[u8], path: &Path) -> Result<TriangleSurface, MeshError> {
     let text = Text::new(path, bytes);
     let mut rows = text.lines(1).filter_map(|(line, content)| {
-        let content = content.split(|&b| b == b'#').next().unwrap_or_default();
-        let content = content.trim_ascii();
+        let content = without_comment(content).trim_ascii();
         (!content.is_empty()).then_some(Row {
             text: &text,
             content,
@@ -106,11 +105,7 @@ impl<'t> Row<'t, '_> {
             return Err(self.text.error(self.line, message));
         };
         self.content = self.content.trim_ascii_start()[word.len()..].trim_ascii_start();
-        Ok(Word {
-            text: word,
-            line: self.line,
-            first: false,
-        })
+        Ok(Word::new(word, self.line))
     }
 
     fn count(&mut self, what: &str) -> Result<usize, MeshError> {

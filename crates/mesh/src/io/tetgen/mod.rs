@@ -5,7 +5,8 @@
 //! programs write either kind, so that negative tets are turned on reading.
 //!
 //! Attributes have no names: they are called `attribute 1` and so on, and the markers of points `boundary marker`. The
-//! last attribute of tets is where TetGen puts the region: it is the region if it is a whole number for all. Linear.
+//! last attribute of tets is where TetGen puts the region: it is the region if it is a whole number for all. There may be
+//! 256 attributes at most. Linear.
 //!
 //! Source: H. Si, "TetGen User's Manual", file formats.
 
@@ -16,7 +17,8 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::text::Text;
+use super::fields::whole;
+use super::text::{Text, load};
 use super::{MeshFile, NamedValues, OwnedValues};
 use crate::{MeshError, ParticleId, TetMesh};
 use rows::rows;
@@ -27,16 +29,8 @@ pub use write::{write_tetgen, write_tetgen_file};
 const MARKER: &str = "boundary marker";
 
 /// The same numbers as integers, if all are.
-fn whole(values: &[f64]) -> Option<Vec<i32>> {
-    let integer = |value: &f64| {
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "compared with the original"
-        )]
-        let number = *value as i32;
-        (f64::from(number).to_bits() == value.to_bits()).then_some(number)
-    };
-    values.iter().map(integer).collect()
+fn all_whole(values: &[f64]) -> Option<Vec<i32>> {
+    values.iter().map(|&value| whole(value)).collect()
 }
 
 /// Reads the `.node` and `.ele` files with the stem of `path`; see [`read`](super::read). Tets are oriented positively.
@@ -67,22 +61,38 @@ pub fn read_tetgen(path: impl AsRef<Path>) -> Result<TetMesh, MeshError> {
 /// ```
 pub fn read_tetgen_file(path: impl AsRef<Path>) -> Result<MeshFile, MeshError> {
     let path = path.as_ref();
-    let (node_path, ele_path) = (path.with_extension("node"), path.with_extension("ele"));
-    let nodes = Text::read(&node_path)?;
-    parse_tetgen(&nodes, || Text::read(&ele_path))
+    let [nodes, elements] = ["node", "ele"].map(|ending| load(&path.with_extension(ending)));
+    parse_tetgen(path, &nodes?, &elements?)
 }
 
-/// The same for files that are read already, or will be.
-fn parse_tetgen<'a>(
-    nodes: &Text<'_>,
-    elements: impl FnOnce() -> Result<Text<'a>, MeshError>,
+/// The same for files that are in memory; errors name `path` with the ending `.node` or `.ele`.
+///
+/// # Errors
+/// As for [`parse_file`](super::parse_file).
+///
+/// # Example
+/// ```
+/// use incise_mesh::io;
+///
+/// let nodes = b"4 3 0 0\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n";
+/// let file = io::parse_tetgen("a.node", nodes, b"1 4 0\n1 1 2 3 4\n")?;
+/// assert_eq!(file.mesh.total_volume(), 1.0 / 6.0);
+/// # Ok::<(), incise_mesh::MeshError>(())
+/// ```
+pub fn parse_tetgen(
+    path: impl AsRef<Path>,
+    nodes: &[u8],
+    elements: &[u8],
 ) -> Result<MeshFile, MeshError> {
-    let (positions, particles, base) = read_nodes(nodes)?;
-    let (tets, mut attributes) = read_tets(&elements()?, base, positions.len())?;
+    let path = path.as_ref();
+    let (node_path, ele_path) = (path.with_extension("node"), path.with_extension("ele"));
+    let (positions, particles, base) = read_nodes(&Text::new(&node_path, nodes))?;
+    let elements = Text::new(&ele_path, elements);
+    let (tets, mut attributes) = read_tets(&elements, base, positions.len())?;
     if tets.is_empty() {
         return Err(MeshError::Empty);
     }
-    let regions = attributes.last().and_then(|last| whole(last));
+    let regions = attributes.last().and_then(|last| all_whole(last));
     if regions.is_some() {
         attributes.pop();
     }
@@ -120,7 +130,7 @@ fn read_nodes(text: &Text<'_>) -> Result<Nodes, MeshError> {
             format!("the points have {dimension} coordinates instead of 3"),
         ));
     }
-    let attributes = header.count_or_0("the number of attributes")?;
+    let mut columns = header.columns(count)?;
     let marked = match header.count_or_0("whether there are markers")? {
         0 => false,
         1 => true,
@@ -130,7 +140,6 @@ fn read_nodes(text: &Text<'_>) -> Result<Nodes, MeshError> {
         }
     };
     let mut positions = Vec::with_capacity(text.room_for(count, 8));
-    let mut columns = Vec::new();
     let mut markers = Vec::new();
     let mut base = 0;
     for i in 0..count {
@@ -153,7 +162,7 @@ fn read_nodes(text: &Text<'_>) -> Result<Nodes, MeshError> {
             row.coordinate()?,
             row.coordinate()?,
         ));
-        row.attributes(attributes, i, &mut columns)?;
+        row.attributes(&mut columns)?;
         if marked {
             markers.push(f64::from(row.marker()?));
         }
@@ -183,9 +192,8 @@ fn read_tets(text: &Text<'_>, base: usize, particles: usize) -> Result<Elements,
             format!("the tets have {corners} points instead of 4 or 10"),
         ));
     }
-    let attributes = header.count_or_0("the number of attributes")?;
+    let mut columns = header.columns(count)?;
     let mut tets = Vec::with_capacity(text.room_for(count, 10));
-    let mut columns = Vec::new();
     for i in 0..count {
         let mut row = rows.next().ok_or_else(|| {
             text.ends_early(&format!("{count} tets announced but {i} found, more"))
@@ -205,7 +213,7 @@ fn read_tets(text: &Text<'_>, base: usize, particles: usize) -> Result<Elements,
         for _ in 4..corners {
             row.word("a point between")?;
         }
-        row.attributes(attributes, i, &mut columns)?;
+        row.attributes(&mut columns)?;
         tets.push(tet);
     }
     Ok((tets, columns))

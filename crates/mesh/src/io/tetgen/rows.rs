@@ -1,7 +1,10 @@
 //! The lines with content of a TetGen file, and the numbers on them. Linear.
 
-use super::super::text::{Text, Word, show, words_of};
+use super::super::text::{Text, Word, show, without_comment, words_of};
 use crate::MeshError;
+
+/// Each attribute becomes a field with a name, which takes far more memory than the two bytes of a number.
+pub(super) const MOST_ATTRIBUTES: usize = 256;
 
 /// A line with content.
 pub(super) struct Row<'t, 'a, I> {
@@ -17,11 +20,7 @@ impl<'t, I: Iterator<Item = &'t [u8]>> Row<'t, '_, I> {
             self.text
                 .error(line, format!("the line ends before {what}"))
         })?;
-        Ok(Word {
-            text,
-            line,
-            first: false,
-        })
+        Ok(Word::new(text, line))
     }
 
     pub(super) fn count(&mut self, what: &str) -> Result<usize, MeshError> {
@@ -32,25 +31,27 @@ impl<'t, I: Iterator<Item = &'t [u8]>> Row<'t, '_, I> {
     /// The same where older files have nothing.
     pub(super) fn count_or_0(&mut self, what: &str) -> Result<usize, MeshError> {
         let line = self.line;
-        self.words.next().map_or(Ok(0), |text| {
-            let first = false;
-            self.text.count(Word { text, line, first }, what)
-        })
+        self.words
+            .next()
+            .map_or(Ok(0), |text| self.text.count(Word::new(text, line), what))
     }
 
-    /// Adds the attributes of element `i` to their columns, which element 0 makes.
-    pub(super) fn attributes(
-        &mut self,
-        count: usize,
-        i: usize,
-        columns: &mut Vec<Vec<f64>>,
-    ) -> Result<(), MeshError> {
-        for k in 0..count {
-            let value: f64 = self.parsed("an attribute")?;
-            if i == 0 {
-                columns.push(Vec::new());
-            }
-            columns[k].push(value);
+    /// The number of attributes of each element, for so many elements, and a column for each attribute.
+    pub(super) fn columns(&mut self, elements: usize) -> Result<Vec<Vec<f64>>, MeshError> {
+        let count = self.count_or_0("the number of attributes")?;
+        if count > MOST_ATTRIBUTES {
+            let message =
+                format!("{count} attributes announced, {MOST_ATTRIBUTES} at most are read");
+            return Err(self.text.error(self.line, message));
+        }
+        let room = self.text.room_for(elements, 2 * count.max(1));
+        Ok((0..count).map(|_| Vec::with_capacity(room)).collect())
+    }
+
+    /// Adds the attributes of an element to their columns.
+    pub(super) fn attributes(&mut self, columns: &mut [Vec<f64>]) -> Result<(), MeshError> {
+        for column in columns {
+            column.push(self.parsed("an attribute")?);
         }
         Ok(())
     }
@@ -78,8 +79,7 @@ pub(super) fn rows<'t, 'a>(
     text: &'t Text<'a>,
 ) -> impl Iterator<Item = Row<'t, 'a, impl Iterator<Item = &'t [u8]>>> {
     text.lines(1).filter_map(move |(line, content)| {
-        let content = content.split(|&b| b == b'#').next().unwrap_or_default();
-        let mut words = words_of(content).peekable();
+        let mut words = words_of(without_comment(content)).peekable();
         words.peek()?;
         Some(Row { text, words, line })
     })

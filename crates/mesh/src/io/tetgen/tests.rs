@@ -4,12 +4,10 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::generate::kuhn_box;
+use crate::io::test_files::{cut, sample};
 
 fn parse(nodes: &str, elements: &str) -> Result<MeshFile, MeshError> {
-    let text = Text::new(Path::new("a.node"), nodes.as_bytes());
-    parse_tetgen(&text, || {
-        Ok(Text::new(Path::new("a.ele"), elements.as_bytes()))
-    })
+    parse_tetgen("a.node", nodes.as_bytes(), elements.as_bytes())
 }
 
 fn scalars(name: &str, values: &[f64]) -> NamedValues {
@@ -60,6 +58,11 @@ fn errors_name_the_line() {
         (
             "4 3 2 1",
             "4 3 99999999999999 1",
+            "a.node:2: 99999999999999 attributes announced, 256 at most",
+        ),
+        (
+            "4 3 2 1",
+            "4 3 4 1",
             "a.node:3: the line ends before an attribute",
         ),
         (
@@ -92,6 +95,48 @@ fn errors_name_the_line() {
         let error = parse(NODES, to).expect_err(to).to_string();
         assert!(error.contains(expected), "{error} lacks {expected}");
     }
+}
+
+#[test]
+fn no_more_attributes_are_written_than_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.node");
+    let mut file = sample();
+    file.tets = vec![scalars("a", &[0.5; 6]); 255];
+    write_tetgen_file(&path, &file).unwrap();
+    assert_eq!(read_tetgen_file(&path).unwrap().tets.len(), 255);
+    file.tets.push(scalars("a", &[0.5; 6]));
+    let error = write_tetgen_file(&path, &file).unwrap_err().to_string();
+    assert!(
+        error.contains("257 attributes are more than the 256"),
+        "{error}"
+    );
+}
+
+#[test]
+fn parts_of_either_file_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.node");
+    write_tetgen_file(&path, &sample()).unwrap();
+    let [nodes, elements] = ["node", "ele"].map(|e| std::fs::read(path.with_extension(e)).unwrap());
+    let whole = parse_tetgen("a", &nodes, &elements).unwrap();
+    // A file that ends within its last word is complete for all one can see: one value is another.
+    let last_word = |file: &[u8]| {
+        let text = file.trim_ascii_end();
+        1 + text.iter().rposition(u8::is_ascii_whitespace).unwrap()
+    };
+    let read = |part: &[u8]| parse_tetgen("a", part, &elements);
+    cut(&nodes, read, |end, part| {
+        let (same, i) = (&whole.mesh.positions, whole.mesh.positions.len() - 1);
+        end > last_word(&nodes)
+            && part.mesh.positions[..i] == same[..i]
+            && part.regions == whole.regions
+    });
+    let read = |part: &[u8]| parse_tetgen("a", &nodes, part);
+    cut(&elements, read, |end, part| {
+        end > last_word(&elements) && part.mesh == whole.mesh && part.tets == whole.tets
+    });
+    assert!(parse_tetgen("a", b"", &elements).is_err());
 }
 
 proptest! {

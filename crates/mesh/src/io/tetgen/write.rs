@@ -1,10 +1,12 @@
 //! Writing: a line for each element, as it is numbered. Linear.
 
 use std::fmt::{self, Display};
+use std::io;
 use std::path::Path;
 
 use super::super::{MeshFile, NamedValues, OwnedValues, write_atomically};
-use super::{MARKER, whole};
+use super::rows::MOST_ATTRIBUTES;
+use super::{MARKER, all_whole};
 use crate::{MeshError, TetMesh};
 
 /// Writes `.node` and `.ele` files with the stem of `path`, numbered from 0, with coordinates that keep every bit.
@@ -20,7 +22,7 @@ pub fn write_tetgen(path: impl AsRef<Path>, mesh: &TetMesh) -> Result<(), MeshEr
 ///
 /// # Errors
 /// [`MeshError::FieldLength`] if regions or values are not one for each element, [`MeshError::Io`] if a file cannot be
-/// written.
+/// written or has more than 256 attributes.
 pub fn write_tetgen_file(path: impl AsRef<Path>, file: &MeshFile) -> Result<(), MeshError> {
     file.check()?;
     write_pair(
@@ -41,7 +43,7 @@ fn write_pair(
 ) -> Result<(), MeshError> {
     let scalars = |values: &NamedValues| matches!(values.values, OwnedValues::Scalars(_));
     let markers = particles.iter().find_map(|values| match &values.values {
-        OwnedValues::Scalars(scalars) if values.name == MARKER => whole(scalars),
+        OwnedValues::Scalars(scalars) if values.name == MARKER => all_whole(scalars),
         _ => None,
     });
     let of_particles: Vec<_> = particles
@@ -49,6 +51,18 @@ fn write_pair(
         .filter(|values| scalars(values) && !(markers.is_some() && values.name == MARKER))
         .collect();
     let of_tets: Vec<_> = tets.iter().filter(|values| scalars(values)).collect();
+    let most = of_particles
+        .len()
+        .max(of_tets.len() + usize::from(!regions.is_empty()));
+    if most > MOST_ATTRIBUTES {
+        let message =
+            format!("{most} attributes are more than the {MOST_ATTRIBUTES} that are read");
+        return Err(MeshError::Io {
+            action: "write",
+            path: path.to_owned(),
+            source: io::Error::new(io::ErrorKind::InvalidInput, message),
+        });
+    }
     write_atomically(path.with_extension("node"), |file| {
         let (points, attributes) = (mesh.positions.len(), of_particles.len());
         writeln!(

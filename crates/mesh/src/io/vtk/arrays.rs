@@ -2,7 +2,7 @@
 //!
 //! Arrays of one or three components are kept; the others are read to know where the next one starts. Linear.
 
-use super::cursor::Word;
+use super::cursor::{Wanted, Word};
 use super::grid::named_values;
 use super::kind::Kind;
 use super::read::{Reader, Target};
@@ -22,7 +22,12 @@ impl Reader<'_> {
         let count = components
             .zip(tuples)
             .and_then(|(components, tuples)| components.checked_mul(tuples));
-        let values = self.cursor.reals(kind, count, "value", false)?;
+        let kept = self.target != Target::None && matches!(components, Some(1 | 3));
+        let wanted = match name {
+            Some(_) if kept => Wanted::Any,
+            _ => Wanted::Not,
+        };
+        let values = self.cursor.reals(kind, count, "value", wanted)?;
         if let (Some(name), Some(components)) = (name, components) {
             let values = named_values(decoded(name), components, values);
             match self.target {
@@ -45,6 +50,13 @@ impl Reader<'_> {
     pub(super) fn field(&mut self) -> Result<(), MeshError> {
         self.cursor.expect("the name of the field data")?;
         let arrays = self.cursor.count("the number of arrays")?;
+        // An array takes 12 bytes at least.
+        let room = arrays.min((self.cursor.bytes.len() - self.cursor.at) / 12);
+        match self.target {
+            Target::None => {}
+            Target::Particles => self.grid.particles.reserve(room),
+            Target::Cells => self.grid.cells.reserve(room),
+        }
         let mut read = 0;
         while read < arrays {
             let name = self.cursor.expect("an array of the field data")?;

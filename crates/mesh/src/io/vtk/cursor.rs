@@ -23,6 +23,17 @@ impl Word<'_> {
     }
 }
 
+/// What is to be done with numbers.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Wanted {
+    /// They are kept if all are finite, else an error.
+    Finite,
+    /// They are kept as they are.
+    Any,
+    /// They are passed over.
+    Not,
+}
+
 pub(super) struct Cursor<'b> {
     pub(super) path: &'b Path,
     pub(super) bytes: &'b [u8],
@@ -151,22 +162,27 @@ impl<'b> Cursor<'b> {
         Ok(taken)
     }
 
-    /// Room for so many words: no more than the rest of the file can hold.
-    fn room<T>(&self, count: usize) -> Vec<T> {
-        Vec::with_capacity(count.min(self.rest().len() / 2 + 1))
+    /// How many numbers to make room for: as many as announced, but no more than the rest of the file can hold.
+    pub(super) fn room_for(&self, announced: usize) -> usize {
+        let least_bytes = if self.binary { 4 } else { 2 };
+        announced.min(self.rest().len() / least_bytes + 1)
     }
 
-    /// An array of numbers, all finite if asked for. In a binary file the cursor is at the start of the data.
+    /// An array of numbers, none where they are not wanted. In a binary file the cursor is at the start of the data.
     pub(super) fn reals(
         &mut self,
         kind: Kind,
         count: Option<usize>,
         what: &str,
-        finite: bool,
+        wanted: Wanted,
     ) -> Result<Vec<f64>, MeshError> {
+        let finite = wanted == Wanted::Finite;
         let start = self.at;
         if self.binary {
             let bytes = self.take(count.and_then(|count| kind.bytes(count)), what)?;
+            if wanted == Wanted::Not {
+                return Ok(Vec::new());
+            }
             let values = kind.reals(bytes, count.unwrap_or(0), true);
             if finite && let Some(i) = values.iter().position(|value| !value.is_finite()) {
                 let at = start + i * (bytes.len() / values.len());
@@ -177,7 +193,10 @@ impl<'b> Cursor<'b> {
         }
         let count =
             count.ok_or_else(|| self.error(start, format!("too many {what}s announced")))?;
-        let mut values = self.room(count);
+        let mut values = Vec::new();
+        if wanted != Wanted::Not {
+            values.reserve_exact(self.room_for(count));
+        }
         for i in 0..count {
             let Some(word) = self.word() else {
                 let missing = format!("{count} numbers ({what}) announced but {i} found, more");
@@ -192,7 +211,9 @@ impl<'b> Cursor<'b> {
                 let message = format!("the {what} {} is not finite, correct it", show(word.text));
                 return Err(self.error(word.at, message));
             }
-            values.push(value);
+            if wanted != Wanted::Not {
+                values.push(value);
+            }
         }
         Ok(values)
     }
@@ -207,17 +228,14 @@ impl<'b> Cursor<'b> {
         let start = self.at;
         if self.binary {
             let bytes = self.take(kind.bytes(count), what)?;
-            let numbers = kind.indices(bytes, count, true);
-            let fault = numbers.iter().position(Option::is_none);
-            return match fault {
-                Some(i) => Err(self.error(
+            return kind.indices(bytes, count, true).map_err(|i| {
+                self.error(
                     start + i * (bytes.len() / count),
                     format!("a number is not {what}: it is negative or no integer"),
-                )),
-                None => Ok(numbers.into_iter().flatten().collect()),
-            };
+                )
+            });
         }
-        let mut numbers = self.room(count);
+        let mut numbers = Vec::with_capacity(self.room_for(count));
         for i in 0..count {
             let Some(word) = self.word() else {
                 let missing = format!("{count} numbers ({what}) announced but {i} found, more");

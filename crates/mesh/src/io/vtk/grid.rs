@@ -8,6 +8,7 @@
 
 use glam::DVec3;
 
+use crate::io::fields::whole;
 use crate::io::{MeshFile, NamedValues, OwnedValues};
 use crate::{MeshError, ParticleId, TetMesh};
 
@@ -43,17 +44,20 @@ impl Grid {
     /// The tets. There is one type and one value for each cell and one value for each point.
     ///
     /// # Errors
-    /// [`MeshError::Empty`] without cells, else what `error` makes of a cell and what is wrong with it.
+    /// [`MeshError::Empty`] without cells, else what `error` makes of a cell, the number of points of the cells before it
+    /// and what is wrong with it.
     pub(in crate::io) fn into_file(
         self,
-        error: impl Fn(usize, String) -> MeshError,
+        error: impl Fn(usize, usize, String) -> MeshError,
     ) -> Result<MeshFile, MeshError> {
+        let error = |cell: usize, message| error(cell, self.offsets[cell], message);
         if self.types.is_empty() {
             return Err(MeshError::Empty);
         }
-        let mut tets = Vec::with_capacity(self.types.len());
-        let mut taken = Vec::with_capacity(self.types.len());
-        for (cell, &kind) in self.types.iter().enumerate() {
+        let is_tet = |&(_, &kind): &(usize, &usize)| kind == TETRA;
+        let cells = || self.types.iter().enumerate();
+        let mut tets = Vec::with_capacity(cells().filter(is_tet).count());
+        for (cell, &kind) in cells() {
             let points = &self.points[self.offsets[cell]..self.offsets[cell + 1]];
             match kind {
                 // A text that was cut may end in the type 1 for 10.
@@ -67,7 +71,6 @@ impl Grid {
                 TETRA => {
                     let tet = tet(cell, points, self.positions.len());
                     tets.push(tet.map_err(|message| error(cell, message))?);
-                    taken.push(cell);
                 }
                 // Points, lines and faces, straight, quadratic and of higher order.
                 0..10 | 21..=23 | 28 | 30 | 34..=36 | 68..=70 | 75..=77 => {}
@@ -88,7 +91,8 @@ impl Grid {
             return Err(error(0, message));
         }
         let mut of_tets = self.cells;
-        if taken.len() < self.types.len() {
+        if tets.len() < self.types.len() && !of_tets.is_empty() {
+            let taken: Vec<usize> = cells().filter(is_tet).map(|(cell, _)| cell).collect();
             for field in &mut of_tets {
                 match &mut field.values {
                     OwnedValues::Scalars(v) => *v = taken.iter().map(|&cell| v[cell]).collect(),
@@ -135,16 +139,6 @@ fn take_regions(fields: &mut Vec<NamedValues>) -> Vec<i32> {
         }
     }
     Vec::new()
-}
-
-fn whole(value: f64) -> Option<i32> {
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "the cast saturates, and a value that changed is no whole number of 32 bits"
-    )]
-    let number = value as i32;
-    // By bits, so that -0 does not lose its sign.
-    (f64::from(number).to_bits() == value.to_bits()).then_some(number)
 }
 
 fn volume_name(kind: usize) -> &'static str {

@@ -81,27 +81,36 @@ impl Kind {
 
     /// The first `count` numbers of the bytes as doubles.
     pub(in crate::io) fn reals(self, bytes: &[u8], count: usize, big_endian: bool) -> Vec<f64> {
-        self.numbers(bytes, count, big_endian, |bits| match self {
+        let real = |bits| match self {
             Self::F32 => f64::from(f32::from_bits(low(bits))),
             Self::F64 => f64::from_bits(bits),
             Self::Bit | Self::U8 | Self::U16 | Self::U32 | Self::U64 => bits as f64,
             Self::I8 | Self::I16 | Self::I32 | Self::I64 => self.signed(bits) as f64,
-        })
+        };
+        self.numbers(bytes, count, big_endian).map(real).collect()
     }
 
-    /// The first `count` numbers of the bytes as numbers from 0 on; `None` for what is negative, too large or no integer by its
-    /// type.
+    /// The first `count` numbers of the bytes as numbers from 0 on.
+    ///
+    /// # Errors
+    /// The place of the first one that is negative, too large or no integer by its type.
     pub(in crate::io) fn indices(
         self,
         bytes: &[u8],
         count: usize,
         big_endian: bool,
-    ) -> Vec<Option<usize>> {
-        self.numbers(bytes, count, big_endian, |bits| match self {
+    ) -> Result<Vec<usize>, usize> {
+        let index = |bits| match self {
             Self::I8 | Self::I16 | Self::I32 | Self::I64 => usize::try_from(self.signed(bits)).ok(),
             Self::F32 | Self::F64 => None,
             _ => usize::try_from(bits).ok(),
-        })
+        };
+        // Not `collect`, which would start small and grow: the bytes are there, so there is room for all.
+        let mut indices = Vec::with_capacity(count);
+        for (i, bits) in self.numbers(bytes, count, big_endian).enumerate() {
+            indices.push(index(bits).ok_or(i)?);
+        }
+        Ok(indices)
     }
 
     fn signed(self, bits: u64) -> i64 {
@@ -109,31 +118,28 @@ impl Kind {
         (bits << unused).cast_signed() >> unused
     }
 
-    /// The bits of each number, in the lowest places, made into something.
-    fn numbers<T>(
+    /// The bits of each number, in the lowest places. There are bytes for all.
+    fn numbers(
         self,
         bytes: &[u8],
         count: usize,
         big_endian: bool,
-        make: impl Fn(u64) -> T,
-    ) -> Vec<T> {
-        if self == Self::Bit {
-            let bit = |i: usize| u64::from(bytes[i / 8] >> (7 - i % 8) & 1);
-            return (0..count).map(|i| make(bit(i))).collect();
-        }
+    ) -> impl ExactSizeIterator<Item = u64> {
         let size = self.size();
-        let number = |chunk: &[u8]| {
+        (0..count).map(move |i| {
+            if self == Self::Bit {
+                return u64::from(bytes[i / 8] >> (7 - i % 8) & 1);
+            }
+            let number = &bytes[i * size..][..size];
             let mut padded = [0; 8];
             if big_endian {
-                padded[8 - size..].copy_from_slice(chunk);
+                padded[8 - size..].copy_from_slice(number);
                 u64::from_be_bytes(padded)
             } else {
-                padded[..size].copy_from_slice(chunk);
+                padded[..size].copy_from_slice(number);
                 u64::from_le_bytes(padded)
             }
-        };
-        let chunks = bytes.chunks_exact(size).take(count);
-        chunks.map(|chunk| make(number(chunk))).collect()
+        })
     }
 }
 

@@ -21,13 +21,13 @@ mod read;
 mod tests;
 mod write;
 
-use std::fs;
 use std::path::Path;
 
 pub(crate) use read::{parse_vtk, parse_vtk_mesh};
 pub use write::{write_vtk, write_vtk_binary, write_vtk_file};
 
 use super::MeshFile;
+use super::text::load;
 use crate::{MeshError, TetMesh};
 
 /// Reads the tets of a legacy VTK file; see [`read`](super::read). Point and cell data are not looked at.
@@ -63,12 +63,4 @@ pub fn read_vtk(path: impl AsRef<Path>) -> Result<TetMesh, MeshError> {
 pub fn read_vtk_file(path: impl AsRef<Path>) -> Result<MeshFile, MeshError> {
     let path = path.as_ref();
     parse_vtk(&load(path)?, path)
-}
-
-pub(super) fn load(path: &Path) -> Result<Vec<u8>, MeshError> {
-    fs::read(path).map_err(|source| MeshError::Io {
-        action: "read",
-        path: path.to_owned(),
-        source,
-    })
 }

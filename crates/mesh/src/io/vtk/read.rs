@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use super::cursor::{Cursor, Word};
+use super::cursor::{Cursor, Wanted, Word};
 use super::grid::{Grid, positions};
 use super::kind::Kind;
 use crate::io::MeshFile;
@@ -33,7 +33,7 @@ fn parse(bytes: &[u8], path: &Path, with_data: bool) -> Result<MeshFile, MeshErr
     let mut reader = Reader {
         cursor,
         grid: Grid::default(),
-        places: Places::Cells(Vec::new()),
+        places: Places::Cells(0),
         has: [false; 3],
         target: Target::None,
         of_particles: Announced::default(),
@@ -98,8 +98,8 @@ pub(super) struct Announced {
 
 /// Where the cells are in the file.
 enum Places {
-    /// Where each one starts.
-    Cells(Vec<usize>),
+    /// Where their list starts, in which each has its number of points before it.
+    Cells(usize),
     /// Where the list of all their points starts, of numbers of a type.
     Connectivity(usize, Kind),
 }
@@ -189,7 +189,7 @@ impl Reader<'_> {
         self.start_data();
         let values = self
             .cursor
-            .reals(kind, count.checked_mul(3), "coordinate", true)?;
+            .reals(kind, count.checked_mul(3), "coordinate", Wanted::Finite)?;
         self.grid.positions = positions(&values);
         self.has[0] = true;
         Ok(())
@@ -205,8 +205,13 @@ impl Reader<'_> {
         if self.cursor.peek().is_some_and(|word| word.is("OFFSETS")) {
             return self.cells_with_offsets(count, size);
         }
+        self.places = Places::Cells(self.cursor.at);
+        // A list of so many numbers has one for each cell and one for each point of a cell.
+        let numbers = self.cursor.room_for(size);
+        let cells = count.min(numbers);
+        self.grid.offsets.reserve_exact(cells + 1);
+        self.grid.points.reserve_exact(numbers - cells);
         self.grid.offsets.push(0);
-        let mut places = Vec::new();
         for i in 0..count {
             let start = self.next_place();
             let Some(corners) = self.cell_number("the number of points of a cell")? else {
@@ -227,9 +232,7 @@ impl Reader<'_> {
                 self.grid.points.push(point);
             }
             self.grid.offsets.push(self.grid.points.len());
-            places.push(start);
         }
-        self.places = Places::Cells(places);
         Ok(())
     }
 
@@ -298,22 +301,21 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn cell_error(&self, offsets: &[usize], cell: usize, message: String) -> MeshError {
-        let at = match &self.places {
-            Places::Cells(places) => places.get(cell).copied().unwrap_or(0),
-            Places::Connectivity(start, kind) => {
-                let before = offsets.get(cell).copied().unwrap_or(0);
-                let mut words = Cursor {
-                    at: *start,
-                    ..self.cursor
-                };
-                if words.binary {
-                    start + kind.bytes(before).unwrap_or(0)
-                } else {
-                    let word = (0..=before).map_while(|_| words.word()).last();
-                    word.map_or(*start, |word| word.at)
-                }
-            }
+    /// An error at a cell, before which there are so many points of cells.
+    fn cell_error(&self, cell: usize, points_before: usize, message: String) -> MeshError {
+        let (start, kind, before) = match self.places {
+            Places::Cells(start) => (start, Kind::I32, cell + points_before),
+            Places::Connectivity(start, kind) => (start, kind, points_before),
+        };
+        let mut words = Cursor {
+            at: start,
+            ..self.cursor
+        };
+        let at = if words.binary {
+            start + kind.bytes(before).unwrap_or(0)
+        } else {
+            let word = (0..=before).map_while(|_| words.word()).last();
+            word.map_or(start, |word| word.at)
         };
         self.cursor.error(at, message)
     }
@@ -331,7 +333,9 @@ impl Reader<'_> {
                 "there are {cells} cells but {} cell types, give one for each",
                 grid.types.len()
             );
-            return Err(self.cell_error(&grid.offsets, cells.saturating_sub(1), message));
+            let last = cells.saturating_sub(1);
+            let before = grid.offsets.get(last).copied().unwrap_or(0);
+            return Err(self.cell_error(last, before, message));
         }
         for (announced, elements, what) in [
             (self.of_particles, grid.positions.len(), "points"),
@@ -348,7 +352,6 @@ impl Reader<'_> {
             }
         }
         let grid = std::mem::take(&mut self.grid);
-        let offsets = grid.offsets.clone();
-        grid.into_file(|cell, message| self.cell_error(&offsets, cell, message))
+        grid.into_file(|cell, points_before, message| self.cell_error(cell, points_before, message))
     }
 }

@@ -65,6 +65,7 @@ pub(super) fn text(out: &mut dyn Write, file: &MeshFile) -> io::Result<()> {
     sections(
         out,
         file,
+        "int",
         |out, regions| regions.iter().try_for_each(|r| writeln!(out, "{r}")),
         |out, values| match values {
             OwnedValues::Scalars(values) => values.iter().try_for_each(|v| writeln!(out, "{v:?}")),
@@ -105,9 +106,11 @@ pub(super) fn binary(out: &mut dyn Write, file: &MeshFile) -> io::Result<()> {
     sections(
         out,
         file,
+        // Not `int`, which has four bytes but eight to meshio.
+        "vtktypeint64",
         |out, regions| {
-            for region in regions {
-                out.write_all(&region.to_be_bytes())?;
+            for &region in regions {
+                out.write_all(&i64::from(region).to_be_bytes())?;
             }
             writeln!(out)
         },
@@ -124,10 +127,11 @@ pub(super) fn binary(out: &mut dyn Write, file: &MeshFile) -> io::Result<()> {
     )
 }
 
-/// The point and cell data, with the numbers of regions and of fields as the given functions write them.
+/// The point and cell data, with the numbers of regions (of that type) and of fields as the given functions write them.
 fn sections(
     out: &mut dyn Write,
     file: &MeshFile,
+    region_type: &str,
     regions: impl Fn(&mut dyn Write, &[i32]) -> io::Result<()>,
     numbers: impl Fn(&mut dyn Write, &OwnedValues) -> io::Result<()>,
 ) -> io::Result<()> {
@@ -138,7 +142,7 @@ fn sections(
         writeln!(out, "CELL_DATA {tets}\nFIELD FieldData {of_tets}")?;
     }
     if has_regions {
-        writeln!(out, "{REGIONS} 1 {tets} int")?;
+        writeln!(out, "{REGIONS} 1 {tets} {region_type}")?;
         regions(out, &file.regions)?;
     }
     let arrays = |out: &mut dyn Write, fields: &[NamedValues], count: usize| {

@@ -7,6 +7,7 @@
 //!
 //! Source: "VTK XML Formats" (Kitware). Linear.
 
+mod compressed;
 mod data;
 mod read;
 #[cfg(test)]
@@ -17,10 +18,11 @@ use std::path::Path;
 
 use glam::DVec3;
 
+pub use compressed::write_vtu_compressed;
 pub(crate) use read::parse_vtu;
 
+use super::text::load;
 use super::vtk::grid::REGIONS;
-use super::vtk::load;
 use super::{Fields, MeshFile, NamedValues, write_atomically, xml};
 use crate::{MeshError, ParticleId};
 

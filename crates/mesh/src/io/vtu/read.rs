@@ -83,6 +83,9 @@ impl Section {
     }
 }
 
+/// The names of the arrays of cells.
+const CELL_ARRAYS: [&str; 3] = ["offsets", "connectivity", "types"];
+
 /// A data array that has not been decoded.
 struct Array {
     section: Section,
@@ -121,6 +124,8 @@ impl Document<'_> {
         let mut section = None;
         // How many elements are open inside an array, itself included: text belongs to it at 1.
         let mut depth = 0_usize;
+        // Whether that array is of interest, and whether there was one of points.
+        let (mut kept, mut has_points) = (false, false);
         loop {
             let position = |reader: &quick_xml::Reader<&[u8]>| {
                 usize::try_from(reader.buffer_position())
@@ -143,9 +148,18 @@ impl Document<'_> {
                     }
                     "DataArray" | "Array" => {
                         depth = 1;
+                        kept = false;
                         if let Some(section) = section {
                             let array = array(&Element { element, place, at }, section)?;
-                            self.arrays.push(array);
+                            // An array takes more here than in the file, so that those of no use are left out.
+                            kept = match section {
+                                Section::Points => !std::mem::replace(&mut has_points, true),
+                                Section::Cells => CELL_ARRAYS.contains(&array.name.as_str()),
+                                Section::PointData | Section::CellData => array.kind.is_some(),
+                            };
+                            if kept {
+                                self.arrays.push(array);
+                            }
                         }
                     }
                     name => section = Section::named(name).or(section),
@@ -160,8 +174,8 @@ impl Document<'_> {
                         return Ok(());
                     }
                 }
-                Event::Text(text) if depth == 1 && section.is_some() => self.text(text.as_bytes()),
-                Event::CData(text) if depth == 1 && section.is_some() => self.text(text.as_bytes()),
+                Event::Text(text) if depth == 1 && kept => self.text(text.as_bytes()),
+                Event::CData(text) if depth == 1 && kept => self.text(text.as_bytes()),
                 Event::Eof => return Err(place.ends_early("</VTKFile>")),
                 _ => {}
             }
@@ -227,14 +241,14 @@ impl Document<'_> {
             particles: self.fields(Section::PointData, points)?,
             cells: self.fields(Section::CellData, cells)?,
         };
-        grid.into_file(|_, message| place.error(connectivity.at, message))
+        grid.into_file(|_, _, message| place.error(connectivity.at, message))
     }
 
     fn fields(&self, section: Section, count: usize) -> Result<Vec<NamedValues>, MeshError> {
         let mut fields = Vec::new();
         for array in self.arrays.iter().filter(|a| a.section == section) {
-            // Strings, tensors and the like have no place in a mesh file.
-            if array.kind.is_some() && matches!(array.components, 1 | 3) {
+            // Tensors and the like have no place in a mesh file.
+            if matches!(array.components, 1 | 3) {
                 let values = self.reals(array, count.checked_mul(array.components))?;
                 fields.extend(named_values(array.name.clone(), array.components, values));
             }
@@ -257,10 +271,7 @@ impl Document<'_> {
             array,
             count,
             |word| str::from_utf8(word).ok()?.parse().ok(),
-            |kind, bytes, big_endian| {
-                let numbers = kind.indices(bytes, count, big_endian);
-                numbers.into_iter().collect()
-            },
+            |kind, bytes, big_endian| kind.indices(bytes, count, big_endian).ok(),
         )
     }
 

@@ -7,6 +7,7 @@ use crate::MeshError;
 use crate::generate::kuhn_box;
 use crate::io::MeshFile;
 use crate::io::msh::write::{MshKind, write_content};
+use crate::io::test_files::cut;
 
 #[test]
 fn errors_name_the_line() {
@@ -226,26 +227,27 @@ fn every_prefix_errs_up_to_the_last_section() {
     for (bytes, file) in texts.into_iter().chain(files) {
         // Without the last line end the file is complete still.
         let complete = bytes.len() - 1;
-        for length in 0..complete {
-            assert!(parse(&bytes[..length]).is_err(), "{length}");
-        }
-        assert_eq!(parse(&bytes[..complete]).unwrap(), file);
+        cut(
+            &bytes,
+            |part| parse(part),
+            |end, part| end == complete && part == file,
+        );
     }
     // Sections of data may be missing, but are not read by halves.
     for kind in KINDS {
         let bytes = written(&full, kind);
-        let good = (0..bytes.len()).filter(|&length| {
-            parse(&bytes[..length]).is_ok_and(|file| {
-                assert_eq!(file.mesh, full.mesh);
-                assert!(
-                    bytes[..length].trim_ascii_end().ends_with(b"s")
-                        || bytes[..length].trim_ascii_end().ends_with(b"Data")
-                );
-                true
-            })
-        });
+        let mut good = 0;
+        cut(
+            &bytes,
+            |part| parse(part),
+            |length, part| {
+                good += 1;
+                let end = bytes[..length].trim_ascii_end();
+                part.mesh == full.mesh && (end.ends_with(b"s") || end.ends_with(b"Data"))
+            },
+        );
         // With and without the line end after the elements and each of four fields, but for the whole file.
-        assert_eq!(good.count(), 9);
+        assert_eq!(good, 9);
     }
 }
 
@@ -255,4 +257,24 @@ fn names_with_line_ends_are_refused() {
     file.tets[0].name = "a\nb".to_owned();
     let error = write_content(&mut Vec::new(), &file, MshKind::default()).unwrap_err();
     assert!(error.to_string().contains("has a line end"));
+}
+
+#[test]
+fn sparse_data_are_filled_up_to_a_limit() {
+    let data = "$NodeData\n0\n0\n3\n0\n3\n1\n9 1 2 3\n$EndNodeData\n";
+    // Each section fills in the three numbers of three nodes, for 45 bytes of its own.
+    let sections = |count: usize| format!("{TEXT_1}{}", data.repeat(count));
+    assert_eq!(parse(sections(20)).unwrap().particles.len(), 20);
+    // Here the nodes are 100: each section asks for 297 numbers.
+    let nodes: String = (10..106).map(|i| format!("{i} 0 0 0\n")).collect();
+    let many = |count: usize| {
+        let text = sections(count).replace("$NOD\n4\n", "$NOD\n100\n");
+        text.replace("$ENDNOD", &format!("{nodes}$ENDNOD"))
+    };
+    assert_eq!(parse(many(2)).unwrap().particles.len(), 2);
+    let error = parse(many(20)).unwrap_err().to_string();
+    assert!(
+        error.contains("have values for few of the nodes"),
+        "{error}"
+    );
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::super::super::text::{Text, Word, show};
-use super::header::Type;
+use super::header::{Element, Type};
 use crate::MeshError;
 
 /// What follows the header.
@@ -47,6 +47,29 @@ impl<'b, I: Iterator<Item = Word<'b>>> Body<'b, '_, I> {
                 Type::F32 => f32::from_le_bytes(self.take(what)?).into(),
                 Type::F64 => f64::from_le_bytes(self.take(what)?),
             }),
+        }
+    }
+
+    /// How many elements to make room for: as many as announced, but no more than the rest of the file can hold.
+    pub(super) fn room_for(&self, element: &Element<'_>) -> usize {
+        let numbers = || {
+            element
+                .properties
+                .iter()
+                .map(|p| p.count.unwrap_or(p.value))
+        };
+        let (left, least) = match self {
+            Body::Ascii { text, .. } => return text.room_for(element.count, 2 * numbers().count()),
+            Body::Binary { bytes, at, .. } => (bytes.len() - at, numbers().map(Type::bytes).sum()),
+        };
+        element.count.min(left.checked_div(least).unwrap_or(0))
+    }
+
+    /// The most values of a type that the rest of the file can hold.
+    pub(super) fn most_values(&self, kind: Type) -> usize {
+        match self {
+            Body::Ascii { text, .. } => text.room_for(usize::MAX, 2),
+            Body::Binary { bytes, at, .. } => (bytes.len() - at) / kind.bytes(),
         }
     }
 

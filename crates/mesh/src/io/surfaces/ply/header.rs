@@ -16,6 +16,17 @@ pub(super) enum Type {
     F64,
 }
 
+impl Type {
+    pub(super) fn bytes(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+}
+
 pub(super) struct Property<'t> {
     pub(super) name: &'t [u8],
     /// The type of the number of values, of a list.
@@ -72,11 +83,6 @@ pub(super) fn header<'t>(
                 });
             }
             [b"element", name, count] => {
-                let word = Word {
-                    text: count,
-                    line,
-                    first: false,
-                };
                 if [&b"vertex"[..], b"face"].contains(&name)
                     && elements.iter().any(|element| element.name == name)
                 {
@@ -85,7 +91,7 @@ pub(super) fn header<'t>(
                 elements.push(Element {
                     name,
                     line,
-                    count: text.count(word, "the number of elements")?,
+                    count: text.count(Word::new(count, line), "the number of elements")?,
                     properties: Vec::new(),
                 });
             }

@@ -118,6 +118,20 @@ pub(crate) fn parse_ply(bytes: &[u8], path: &Path) -> Result<TriangleSurface, Me
         if element.properties.is_empty() {
             continue;
         }
+        if element.name == b"vertex" {
+            let room = body.room_for(element);
+            surface.positions.reserve_exact(room);
+        }
+        if element.name == b"face"
+            && let Some(property) = element.properties.iter().find(|p| is_corners(p))
+        {
+            // Polygons may have a triangle of 12 bytes for each byte. A list that grows is two lists for a while, which
+            // would be too much.
+            if encoding != PlyEncoding::Ascii && property.value.bytes() < 4 {
+                let room = body.most_values(property.value);
+                surface.triangles.reserve_exact(room);
+            }
+        }
         for _ in 0..element.count {
             let mut position = DVec3::ZERO;
             for property in &element.properties {
@@ -127,6 +141,10 @@ pub(crate) fn parse_ply(bytes: &[u8], path: &Path) -> Result<TriangleSurface, Me
                     None => 1,
                 };
                 let corners = element.name == b"face" && is_corners(property);
+                if corners {
+                    let most = body.most_values(property.value);
+                    list.reserve(most.min(count as usize));
+                }
                 for _ in 0..count {
                     if corners {
                         let corner = ParticleId(body.natural(property.value, "a corner")?);

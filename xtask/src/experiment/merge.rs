@@ -1,0 +1,85 @@
+//! `cargo xtask merge`: gathers the cells that several runs measured, and writes the pages.
+//!
+//! The cells of an experiment that are then all there need no measuring: running its command with the same folder writes
+//! its page. Cells that are missing in all folders are measured by that.
+
+use std::fs;
+use std::path::PathBuf;
+
+use anyhow::{Context, bail, ensure};
+use clap::Args;
+
+use super::ExperimentArguments;
+use super::arguments::Setup;
+
+#[derive(Debug, Args)]
+pub(crate) struct MergeArguments {
+    /// The folder to gather in.
+    out: PathBuf,
+    /// What runs with `--shard` were given as `--out`.
+    #[arg(required = true)]
+    from: Vec<PathBuf>,
+}
+
+#[cfg(test)]
+impl MergeArguments {
+    pub(super) const fn of(out: PathBuf, from: Vec<PathBuf>) -> Self {
+        Self { out, from }
+    }
+}
+
+/// Copies all cells to one folder; the experiments they are of, with the arguments that make their pages.
+pub(crate) fn merge(
+    arguments: &MergeArguments,
+) -> anyhow::Result<Vec<(String, ExperimentArguments)>> {
+    let mut experiments: Vec<(String, ExperimentArguments)> = Vec::new();
+    for from in &arguments.from {
+        let cells = from.join("cells");
+        let entries =
+            fs::read_dir(&cells).with_context(|| format!("{} holds no cells", from.display()))?;
+        for entry in entries {
+            let folder = entry?.path();
+            let name = folder
+                .file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned();
+            let setup: Setup = serde_json::from_str(
+                &fs::read_to_string(folder.join("setup.json"))
+                    .with_context(|| folder.display().to_string())?,
+            )?;
+            let to = arguments.out.join("cells").join(&name);
+            fs::create_dir_all(&to)?;
+            let of_this = ExperimentArguments {
+                quick: setup.quick,
+                models: setup.models,
+                backend: setup.backend,
+                out: arguments.out.clone(),
+                shard: None,
+            };
+            of_this.agree_with(&to.join("setup.json"))?;
+            for file in fs::read_dir(&folder)? {
+                let file = file?.path();
+                let target = to.join(file.file_name().unwrap_or_default());
+                if target.exists() {
+                    ensure!(
+                        target.ends_with("setup.json") || fs::read(&file)? == fs::read(&target)?,
+                        "{} and {} are two results of one cell, remove one",
+                        file.display(),
+                        target.display()
+                    );
+                } else {
+                    fs::copy(&file, &target)?;
+                }
+            }
+            if !experiments.iter().any(|(known, _)| *known == name) {
+                experiments.push((name, of_this));
+            }
+        }
+    }
+    if experiments.is_empty() {
+        bail!("there are no cells in these folders");
+    }
+    experiments.sort_by(|a, b| a.0.cmp(&b.0));
+    Ok(experiments)
+}

@@ -1,0 +1,209 @@
+//! [`Plot`]: curves and points over two axes, drawn as SVG by the crate `plotters`.
+
+use anyhow::anyhow;
+use plotters::coord::Shift;
+use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
+use plotters::prelude::*;
+
+/// Curves over two axes.
+#[derive(Debug)]
+pub(crate) struct Plot {
+    pub(crate) title: String,
+    pub(crate) x: Axis,
+    pub(crate) y: Axis,
+    pub(crate) series: Vec<Series>,
+}
+
+#[derive(Debug)]
+pub(crate) struct Axis {
+    pub(crate) label: String,
+    /// Whether equal ways are equal ratios. Values that are not positive are then left out.
+    pub(crate) log: bool,
+}
+
+impl Axis {
+    pub(crate) fn linear(label: impl Into<String>) -> Self {
+        Self {
+            label: label.into(),
+            log: false,
+        }
+    }
+
+    pub(crate) fn log(label: impl Into<String>) -> Self {
+        Self {
+            label: label.into(),
+            log: true,
+        }
+    }
+}
+
+#[derive(Debug)]
+pub(crate) struct Series {
+    pub(crate) name: String,
+    pub(crate) points: Vec<(f64, f64)>,
+    /// Words beside the points, or none.
+    pub(crate) labels: Vec<String>,
+    pub(crate) style: Style,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Style {
+    Line,
+    Points,
+    Both,
+}
+
+const SIZE: (u32, u32) = (800, 480);
+/// Eight colors that people who see colors differently tell apart (Okabe and Ito 2008), black last.
+const COLORS: [RGBColor; 8] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(150, 140, 20),
+    RGBColor(0, 0, 0),
+];
+
+impl Plot {
+    /// As a drawing.
+    pub(super) fn svg(&self) -> anyhow::Result<String> {
+        let mut svg = String::new();
+        {
+            let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+            root.fill(&WHITE).map_err(|e| anyhow!("{e}"))?;
+            let x = self.range(0);
+            let y = self.range(1);
+            let drawn = match (self.x.log, self.y.log) {
+                (false, false) => self.draw(&root, x.0..x.1, y.0..y.1),
+                (true, false) => self.draw(&root, (x.0..x.1).log_scale(), y.0..y.1),
+                (false, true) => self.draw(&root, x.0..x.1, (y.0..y.1).log_scale()),
+                (true, true) => self.draw(&root, (x.0..x.1).log_scale(), (y.0..y.1).log_scale()),
+            };
+            drawn.map_err(|e| anyhow!("the plot {:?}: {e}", self.title))?;
+            root.present().map_err(|e| anyhow!("{e}"))?;
+        }
+        Ok(svg)
+    }
+
+    fn axis(&self, which: usize) -> &Axis {
+        [&self.x, &self.y][which]
+    }
+
+    /// Whether a point can be drawn.
+    fn shows(&self, point: (f64, f64)) -> bool {
+        [point.0, point.1]
+            .iter()
+            .enumerate()
+            .all(|(which, &v)| v.is_finite() && (!self.axis(which).log || v > 0.0))
+    }
+
+    /// What the points span along an axis, and some more.
+    fn range(&self, which: usize) -> (f64, f64) {
+        let points = self.series.iter().flat_map(|series| &series.points);
+        let values = points
+            .filter(|&&point| self.shows(point))
+            .map(|&(x, y)| [x, y][which]);
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+            (low.min(v), high.max(v))
+        });
+        if self.axis(which).log {
+            if low > high {
+                return (0.1, 10.0);
+            }
+            return (low / 1.3, high * 1.3);
+        }
+        if low > high {
+            return (0.0, 1.0);
+        }
+        // From zero where that is near.
+        let low = if low > 0.0 && low < 0.5 * high {
+            0.0
+        } else {
+            low
+        };
+        let more = 0.05 * (high - low).max(1e-3 * high.abs()).max(1e-12);
+        (if low == 0.0 { 0.0 } else { low - more }, high + more)
+    }
+
+    fn draw<X, Y>(
+        &self,
+        root: &DrawingArea<SVGBackend<'_>, Shift>,
+        x: X,
+        y: Y,
+    ) -> Result<(), Box<dyn std::error::Error>>
+    where
+        X: AsRangedCoord<Value = f64>,
+        Y: AsRangedCoord<Value = f64>,
+        X::CoordDescType: ValueFormatter<f64>,
+        Y::CoordDescType: ValueFormatter<f64>,
+    {
+        let failed = |e: DrawingAreaErrorKind<_>| e.to_string();
+        let mut chart = ChartBuilder::on(root)
+            .caption(&self.title, ("sans-serif", 18))
+            .margin(12)
+            .x_label_area_size(44)
+            .y_label_area_size(72)
+            .build_cartesian_2d(x, y)
+            .map_err(failed)?;
+        chart
+            .configure_mesh()
+            .light_line_style(BLACK.mix(0.06))
+            .bold_line_style(BLACK.mix(0.15))
+            .x_desc(&self.x.label)
+            .y_desc(&self.y.label)
+            .x_label_formatter(&|v| number(*v))
+            .y_label_formatter(&|v| number(*v))
+            .draw()
+            .map_err(failed)?;
+        for (series, &color) in self.series.iter().zip(COLORS.iter().cycle()) {
+            let points = || series.points.iter().copied().filter(|&p| self.shows(p));
+            if series.style != Style::Points {
+                chart
+                    .draw_series(LineSeries::new(points(), color.stroke_width(2)))
+                    .map_err(failed)?;
+            }
+            if series.style != Style::Line {
+                let dots = points().map(|p| Circle::new(p, 3, color.filled()));
+                chart.draw_series(dots).map_err(failed)?;
+            }
+            let labelled = series.points.iter().zip(&series.labels);
+            let words = labelled
+                .filter(|(p, _)| self.shows(**p))
+                .map(|(&p, label)| {
+                    EmptyElement::at(p)
+                        + Text::new(label.clone(), (5, -12), ("sans-serif", 11).into_font())
+                });
+            chart.draw_series(words).map_err(failed)?;
+            // The key, by an element that is not seen.
+            chart
+                .draw_series(std::iter::empty::<Circle<(f64, f64), i32>>())
+                .map_err(failed)?
+                .label(&series.name)
+                .legend(move |(x, y)| {
+                    PathElement::new(vec![(x, y), (x + 16, y)], color.stroke_width(3))
+                });
+        }
+        chart
+            .configure_series_labels()
+            .background_style(WHITE.mix(0.8))
+            .border_style(BLACK.mix(0.2))
+            .label_font(("sans-serif", 12))
+            .draw()
+            .map_err(failed)?;
+        Ok(())
+    }
+}
+
+/// A number at an axis.
+fn number(v: f64) -> String {
+    if v != 0.0 && !(1e-3..1e5).contains(&v.abs()) {
+        format!("{v:.0e}")
+    } else if v.abs() >= 10.0 || v == v.round() {
+        format!("{v:.0}")
+    } else {
+        let digits = if v.abs() < 0.1 { 3 } else { 2 };
+        format!("{v:.digits$}")
+    }
+}

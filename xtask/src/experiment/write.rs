@@ -1,0 +1,90 @@
+//! Writes pages: Markdown with its plots as files beside it, all rows as JSON, and one HTML page of all in a folder.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+use anyhow::Context;
+use pulldown_cmark::{Options, Parser, html};
+use serde::Serialize;
+
+use super::machine::Machine;
+use super::page::{Page, Part};
+
+/// Writes the page of an experiment and the page of all.
+pub(super) fn write<R: Serialize>(
+    out: &Path,
+    name: &str,
+    page: &Page,
+    machines: &[Machine],
+    rows: &[R],
+) -> anyhow::Result<()> {
+    let command: Vec<String> = std::env::args().skip(1).collect();
+    let mut text = format!("# {}\n\n`cargo xtask {}`", page.title, command.join(" "));
+    for machine in machines {
+        write!(text, "; {}", machine.describe())?;
+    }
+    text += ".\n";
+    let mut drawings = 0;
+    for part in &page.parts {
+        text += "\n";
+        match part {
+            Part::Text(markdown) => text += markdown.trim_end(),
+            Part::Table(table) => text += &table.markdown(),
+            Part::Plot(_) | Part::Picture { .. } => {
+                let (caption, svg) = match part {
+                    Part::Plot(plot) => (&plot.title, plot.svg()?),
+                    Part::Picture { caption, svg } => (caption, svg.clone()),
+                    _ => continue,
+                };
+                drawings += 1;
+                let file = format!("{name}-{drawings}.svg");
+                replace(&out.join(&file), &svg)?;
+                write!(text, "![{caption}]({file})")?;
+            }
+        }
+        text += "\n";
+    }
+    replace(&out.join(format!("{name}.md")), &text)?;
+    replace(
+        &out.join(format!("{name}.json")),
+        &serde_json::to_string_pretty(rows)?,
+    )?;
+    index(out)
+}
+
+/// One page of all pages of a folder.
+fn index(out: &Path) -> anyhow::Result<()> {
+    let mut names: Vec<_> = fs::read_dir(out)?
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .filter(|path| path.extension().is_some_and(|ending| ending == "md"))
+        .collect();
+    names.sort();
+    let mut body = String::new();
+    for path in names {
+        let text = fs::read_to_string(&path)?;
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        write!(body, "<section id=\"{name}\">\n")?;
+        html::push_html(&mut body, Parser::new_ext(&text, Options::ENABLE_TABLES));
+        body += "</section>\n";
+    }
+    let head = "<meta charset=\"utf-8\"><title>incise: experiments</title><style>\
+        body { font-family: sans-serif; max-width: 70em; margin: 2em auto; padding: 0 1em; line-height: 1.4 }\
+        table { border-collapse: collapse; font-size: 0.85em; display: block; overflow-x: auto }\
+        td, th { border: 1px solid #ccc; padding: 0.2em 0.5em; text-align: left }\
+        img { max-width: 100% } section { border-top: 2px solid #444; margin-top: 3em }</style>";
+    replace(
+        &out.join("index.html"),
+        &format!(
+            "<!doctype html>\n<html lang=\"en\"><head>{head}</head><body>\n{body}</body></html>\n"
+        ),
+    )
+}
+
+/// Writes a file beside its final name and renames it when it is complete.
+pub(super) fn replace(path: &Path, text: &str) -> anyhow::Result<()> {
+    let beside = path.with_extension("part");
+    fs::write(&beside, text)
+        .and_then(|()| fs::rename(&beside, path))
+        .with_context(|| format!("cannot write {}", path.display()))
+}
