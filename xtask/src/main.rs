@@ -10,6 +10,7 @@ mod models;
 mod soak;
 mod solver;
 mod sweep;
+mod trade;
 mod wear;
 
 use anyhow::Context;
@@ -31,7 +32,7 @@ struct Arguments {
 type Run = fn(&ExperimentArguments) -> anyhow::Result<()>;
 
 /// All experiments by the names of their pages, in the order in which `all` runs them.
-const EXPERIMENTS: &[(&str, Run)] = &[];
+const EXPERIMENTS: &[(&str, Run)] = &[("trade", trade::trade)];
 
 #[derive(Debug, Subcommand)]
 enum Command {
@@ -51,6 +52,8 @@ enum Command {
     SoakCut(soak::SoakArguments),
     /// Cut meshes, check everything and write a table.
     Sweep(sweep::SweepArguments),
+    /// What accuracy costs: errors against Newton's method beside times, for every knob of the solver.
+    Trade(ExperimentArguments),
     /// Cut a mesh many times in small strokes, and see what becomes of clusters, colors and the time to solve.
     Wear(wear::WearArguments),
 }
@@ -67,6 +70,7 @@ fn main() -> anyhow::Result<()> {
         Command::Solver(arguments) => solver::solver(&arguments),
         Command::SoakCut(arguments) => soak::soak(&arguments),
         Command::Sweep(arguments) => sweep::sweep(&arguments),
+        Command::Trade(arguments) => trade::trade(&arguments),
         Command::Wear(arguments) => wear::wear(&arguments),
     }
 }

@@ -11,8 +11,8 @@ use rayon::prelude::*;
 
 use super::beam::{FRAME, GRAVITY};
 use super::body::mixed_body;
+use super::digits;
 use super::runner::{Recipe, Runner};
-use super::trade::digits;
 use crate::table;
 
 /// Above this a substep of one iteration is not accurate.

@@ -19,7 +19,7 @@ mod reference;
 pub use candidates::{accurate_substeps, candidates, name, solver_table};
 pub use motion::{Deviation, Motion};
 pub use pareto::non_dominated;
-pub use reference::{Reference, ReferenceKind, with};
+pub use reference::{Reference, ReferenceKind, newton_motion, with};
 
 use serde::Serialize;
 
@@ -129,9 +129,17 @@ pub struct Advice {
 /// # Errors
 /// [`Error::Value`] for a question out of its range, and as [`Simulation::new`] for the scene.
 pub fn advise(scene: &Scene, question: &Question) -> Result<Advice, Error> {
-    let Question { budget_ms, frames, threads } = *question;
+    let Question {
+        budget_ms,
+        frames,
+        threads,
+    } = *question;
     if !(budget_ms > 0.0 && budget_ms.is_finite()) {
-        return Err(crate::limits::value("budget-ms", budget_ms, "positive and finite"));
+        return Err(crate::limits::value(
+            "budget-ms",
+            budget_ms,
+            "positive and finite",
+        ));
     }
     if frames == 0 {
         return Err(crate::limits::value("frames", frames, "at least 1"));
@@ -144,8 +152,15 @@ pub fn advise(scene: &Scene, question: &Question) -> Result<Advice, Error> {
     let (mut kept, mut left_out) = (Vec::new(), Vec::new());
     for (i, spec) in specs.iter().enumerate() {
         // What the scene has is run as it is: its bodies may have substeps of their own.
-        let run = if i == 0 { scene.clone() } else { with(scene, spec) };
-        let run = Scene { report: crate::scene::ReportSpec::default(), ..run };
+        let run = if i == 0 {
+            scene.clone()
+        } else {
+            with(scene, spec)
+        };
+        let run = Scene {
+            report: crate::scene::ReportSpec::default(),
+            ..run
+        };
         match Motion::of(&run, frames.min(2), threads) {
             Ok(probe) if i == 0 || probe.ms_per_frame() <= FAR * budget_ms => kept.push((i, run)),
             Ok(probe) => left_out.push(format!("{} ({:.3} ms)", name(spec), probe.ms_per_frame())),
@@ -177,8 +192,10 @@ pub fn advise(scene: &Scene, question: &Question) -> Result<Advice, Error> {
     }
     measured.sort_by(|a, b| a.ms.total_cmp(&b.ms));
     let floor = reference.left.largest;
-    let points: Vec<[f64; 2]> =
-        measured.iter().map(|m| [m.ms, m.error.largest.max(floor)]).collect();
+    let points: Vec<[f64; 2]> = measured
+        .iter()
+        .map(|m| [m.ms, m.error.largest.max(floor)])
+        .collect();
     let front = non_dominated(&points);
     for &i in &front {
         measured[i].non_dominated = true;
@@ -228,7 +245,10 @@ fn reference_of(
 /// of all. A front rises in time and falls in error.
 fn pick(points: &[[f64; 2]], front: &[usize], budget: f64) -> (Option<usize>, Option<usize>) {
     let meets = front.partition_point(|&i| points[i][0] <= budget);
-    (meets.checked_sub(1).map(|last| front[last]), front.get(meets).copied())
+    (
+        meets.checked_sub(1).map(|last| front[last]),
+        front.get(meets).copied(),
+    )
 }
 
 #[cfg(test)]

@@ -60,7 +60,10 @@ impl Motion {
             simulation.read_back()?;
             let ms = milliseconds(start.elapsed());
             let positions = simulation.positions();
-            motion.push(&positions[..particles], volume(simulation.mesh(), positions));
+            motion.push(
+                &positions[..particles],
+                volume(simulation.mesh(), positions),
+            );
             motion.ms.push(ms);
         }
         Ok(motion)
@@ -68,8 +71,14 @@ impl Motion {
 
     /// Of no frames.
     pub(super) fn still(mesh: &TetMesh) -> Self {
-        let low = mesh.positions.iter().fold(DVec3::INFINITY, |a, x| a.min(*x));
-        let high = mesh.positions.iter().fold(DVec3::NEG_INFINITY, |a, x| a.max(*x));
+        let low = mesh
+            .positions
+            .iter()
+            .fold(DVec3::INFINITY, |a, x| a.min(*x));
+        let high = mesh
+            .positions
+            .iter()
+            .fold(DVec3::NEG_INFINITY, |a, x| a.max(*x));
         Self {
             size: (high - low).max_element(),
             positions: Vec::new(),
@@ -109,12 +118,16 @@ impl Motion {
     #[must_use]
     pub fn deviation(&self, from: &Self) -> Deviation {
         assert!(
-            self.positions.len() == from.positions.len() && self.volumes.len() == from.volumes.len(),
+            self.positions.len() == from.positions.len()
+                && self.volumes.len() == from.volumes.len(),
             "motions of the same particles over the same frames are compared"
         );
         let frames = self.volumes.len().max(1);
         let particles = (self.positions.len() / frames).max(1);
-        let pairs = self.positions.chunks(particles).zip(from.positions.chunks(particles));
+        let pairs = self
+            .positions
+            .chunks(particles)
+            .zip(from.positions.chunks(particles));
         let percent = |part: f64| (100.0 * part).min(f64::MAX);
         let distance = |(a, b): (&[DVec3], &[DVec3])| {
             let squares = a.iter().zip(b).map(|(x, y)| x.distance_squared(*y));
@@ -147,7 +160,16 @@ impl Motion {
 
 /// The volume of a mesh at some positions, as a part of that at rest; 1 if nothing is left.
 pub(super) fn volume(mesh: &TetMesh, positions: &[DVec3]) -> f64 {
-    let now = mesh.tets.iter().map(|tet| signed_volume(tet.map(|p| positions[p.index()])));
-    let rest: f64 = (0..mesh.tets.len()).map(|t| mesh.volume(TetId::new(t))).sum();
-    if rest > 0.0 { now.sum::<f64>() / rest } else { 1.0 }
+    let now = mesh
+        .tets
+        .iter()
+        .map(|tet| signed_volume(tet.map(|p| positions[p.index()])));
+    let rest: f64 = (0..mesh.tets.len())
+        .map(|t| mesh.volume(TetId::new(t)))
+        .sum();
+    if rest > 0.0 {
+        now.sum::<f64>() / rest
+    } else {
+        1.0
+    }
 }

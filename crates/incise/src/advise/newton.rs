@@ -78,7 +78,10 @@ impl Newton {
         let mut simulation = Simulation::with_threads(&scene, 1)?;
         let particles = simulation.positions().len();
         simulation.cut_now()?;
-        let parts = simulation.groups().iter().map(|group| Part::new(&scene, group));
+        let parts = simulation
+            .groups()
+            .iter()
+            .map(|group| Part::new(&scene, group));
         Ok(Self {
             parts: parts.collect::<Result<_, _>>()?,
             simulation,
@@ -92,10 +95,18 @@ impl Newton {
     pub(super) fn motion(&self, frames: u32, steps: u32) -> Result<Motion, ReferenceError> {
         let mesh = self.simulation.mesh();
         let mut motion = Motion::still(mesh);
-        let mut bodies = self.parts.iter().map(Part::body).collect::<Result<Vec<_>, _>>()?;
+        let mut bodies = self
+            .parts
+            .iter()
+            .map(Part::body)
+            .collect::<Result<Vec<_>, _>>()?;
         let mut positions = mesh.positions.clone();
         for frame in 0..u64::from(frames) {
-            let all = self.parts.iter().zip(self.simulation.groups()).zip(&mut bodies);
+            let all = self
+                .parts
+                .iter()
+                .zip(self.simulation.groups())
+                .zip(&mut bodies);
             for (g, ((part, group), body)) in all.enumerate() {
                 let poses: Vec<[Pose; 2]> = group
                     .handles

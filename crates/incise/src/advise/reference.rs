@@ -12,8 +12,8 @@ use serde::Serialize;
 
 use super::motion::{Deviation, Motion};
 use super::newton::{Newton, obstacle};
-use crate::scene::{Backend, Method, Precision, Scene, SolverSpec, Substeps};
 use crate::Error;
+use crate::scene::{Backend, Method, Precision, Scene, SolverSpec, Substeps};
 
 /// Where a reference comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -52,23 +52,21 @@ impl Reference {
     /// [`Error::Advise`] if the scene has something that the reference does not know or a step cannot be solved; as
     /// [`crate::Simulation::new`].
     pub fn newton(scene: &Scene, frames: u32, steps: u32) -> Result<Self, Error> {
-        if let Some(what) = obstacle(scene) {
-            return Err(Error::Advise(format!(
-                "the reference by Newton's method cannot do this scene: it has {what}"
-            )));
-        }
-        let newton = Newton::new(scene)?;
+        let newton = newton(scene)?;
         let steps = [1, 2, 4].map(|n| n * steps.max(1));
-        let run = |n| {
-            let motion = newton.motion(frames, n);
-            motion.map_err(|error| Error::Advise(format!("the reference fails: {error}")))
-        };
-        let [a, b, c] = [run(steps[0])?, run(steps[1])?, run(steps[2])?];
+        let [a, b, c] = steps.map(|n| run(&newton, frames, n));
+        let (a, b, c) = (a?, b?, c?);
         let coarse = a.combined(-1.0, &b, 2.0);
         let fine = b.combined(-1.0, &c, 2.0);
         let limit = coarse.combined(-1.0 / 3.0, &fine, 4.0 / 3.0);
         let left = fine.deviation(&limit);
-        Ok(Self::of(ReferenceKind::Newton, steps, [&a, &b, &c], limit, left))
+        Ok(Self::of(
+            ReferenceKind::Newton,
+            steps,
+            [&a, &b, &c],
+            limit,
+            left,
+        ))
     }
 
     /// By the solver itself with `substeps`, twice and four times as many substeps a frame, all bodies with the same.
@@ -89,9 +87,16 @@ impl Reference {
             };
             Motion::of(&with(scene, &solver), frames, None)
         };
-        let [a, b, c] = [run(steps[0])?, run(steps[1])?, run(steps[2])?];
+        let [a, b, c] = steps.map(run);
+        let (a, b, c) = (a?, b?, c?);
         let (limit, left) = (c.clone(), b.deviation(&c));
-        Ok(Self::of(ReferenceKind::Xpbd, steps, [&a, &b, &c], limit, left))
+        Ok(Self::of(
+            ReferenceKind::Xpbd,
+            steps,
+            [&a, &b, &c],
+            limit,
+            left,
+        ))
     }
 
     fn of(
@@ -113,6 +118,28 @@ impl Reference {
             order,
         }
     }
+}
+
+/// The motion of a scene by implicit Euler and Newton's method with `steps` steps a frame.
+///
+/// # Errors
+/// As [`Reference::newton`].
+pub fn newton_motion(scene: &Scene, frames: u32, steps: u32) -> Result<Motion, Error> {
+    run(&newton(scene)?, frames, steps)
+}
+
+fn newton(scene: &Scene) -> Result<Newton, Error> {
+    if let Some(what) = obstacle(scene) {
+        return Err(Error::Advise(format!(
+            "the reference by Newton's method cannot do this scene: it has {what}"
+        )));
+    }
+    Newton::new(scene)
+}
+
+fn run(newton: &Newton, frames: u32, steps: u32) -> Result<Motion, Error> {
+    let motion = newton.motion(frames, steps.max(1));
+    motion.map_err(|error| Error::Advise(format!("the reference fails: {error}")))
 }
 
 /// The scene with other settings for all bodies, reporting nothing but times.
