@@ -2,9 +2,7 @@
 
 use incise::graph::Schedule;
 use incise::mesh::TetMesh;
-use incise::xpbd::{
-    Correction, CorrectionSettings, DescentSettings, Real, Solver, Stars, StepSettings,
-};
+use incise::xpbd::{DescentSettings, Real, Solver, Stars, StepSettings};
 
 use super::body::{schedule, stars};
 
@@ -16,18 +14,6 @@ pub(crate) enum Recipe {
         settings: StepSettings,
     },
     Descent(DescentSettings),
-    /// Descent with a coarse correction after each sweep.
-    Corrected(DescentSettings),
-}
-
-impl Recipe {
-    /// The time of a substep in s.
-    pub(crate) fn substep_time(&self) -> f64 {
-        match self {
-            Self::Xpbd { settings, .. } => settings.substep_time(),
-            Self::Descent(settings) | Self::Corrected(settings) => settings.step.substep_time(),
-        }
-    }
 }
 
 /// A body that moves by a recipe.
@@ -40,19 +26,14 @@ pub(crate) struct Runner<R: Real> {
 /// What a recipe has to prepare.
 enum Tools<R: Real> {
     Schedule(Schedule),
-    Stars(Box<Stars<R>>, Option<Box<Correction<R>>>),
+    Stars(Box<Stars<R>>),
 }
 
 impl<R: Real> Runner<R> {
     pub(crate) fn new(solver: Solver<R>, mesh: &TetMesh, recipe: &Recipe) -> anyhow::Result<Self> {
         let tools = match recipe {
             Recipe::Xpbd { clustering, .. } => Tools::Schedule(schedule(mesh, clustering)?),
-            Recipe::Descent(_) => Tools::Stars(Box::new(stars(&solver)?), None),
-            Recipe::Corrected(_) => {
-                let stars = stars(&solver)?;
-                let correction = Correction::new(&stars, CorrectionSettings::default())?;
-                Tools::Stars(Box::new(stars), Some(Box::new(correction)))
-            }
+            Recipe::Descent(_) => Tools::Stars(Box::new(stars(&solver)?)),
         };
         Ok(Self {
             solver,
@@ -68,17 +49,9 @@ impl<R: Real> Runner<R> {
             (Recipe::Xpbd { settings, .. }, Tools::Schedule(schedule)) => {
                 solver.step(schedule, settings)?.repaired
             }
-            (
-                Recipe::Descent(settings) | Recipe::Corrected(settings),
-                Tools::Stars(stars, correction),
-            ) => match correction {
-                Some(correction) => {
-                    solver
-                        .descend_corrected(stars, correction, settings)?
-                        .repaired
-                }
-                None => solver.descend(stars, settings)?.repaired,
-            },
+            (Recipe::Descent(settings), Tools::Stars(stars)) => {
+                solver.descend(stars, settings)?.repaired
+            }
             _ => unreachable!("the tools are made for the recipe"),
         };
         Ok(repaired)

@@ -98,6 +98,12 @@ impl Motion {
         self.ms.iter().sum::<f64>() / self.ms.len().max(1) as f64
     }
 
+    /// The time of the fastest frame in ms.
+    #[must_use]
+    pub fn fastest_ms(&self) -> f64 {
+        self.ms.iter().copied().reduce(f64::min).unwrap_or(0.0)
+    }
+
     /// The time of the slowest frame in ms.
     #[must_use]
     pub fn slowest_ms(&self) -> f64 {
