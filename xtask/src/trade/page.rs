@@ -112,9 +112,13 @@ pub(super) fn sentence(rows: &[SceneRow], exchange: &ExchangeRow) -> Option<Stri
     }
     let mut text = format!("- {}:", exchange.what);
     if let Some([low, median, high]) = spread(&mut errors) {
-        let verb = if median > 1.0 { "raises" } else { "lowers" };
+        let verb = match median {
+            ..0.98 => "lowers the error to",
+            ..1.02 => "leaves the error at",
+            _ => "raises the error to",
+        };
         text += &format!(
-            " {verb} the error to {} times ({} to {})",
+            " {verb} {} times ({} to {})",
             digits(median),
             digits(low),
             digits(high)

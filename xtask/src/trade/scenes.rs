@@ -51,7 +51,8 @@ impl Kind {
     pub(super) fn title(self) -> String {
         match self {
             Self::HangingBeam(ratio) => {
-                format!("Hanging beam of E = 1e6 Pa and Poisson's ratio 0.{ratio}, held at one end")
+                let ratio = f64::from(ratio) / 1000.0;
+                format!("Hanging beam of E = 1e6 Pa and Poisson's ratio {ratio}, held at one end")
             }
             Self::TwistedBar => {
                 "Bar of E = 3e5 Pa, twisted by 90 degrees by a handle, no gravity".to_owned()
