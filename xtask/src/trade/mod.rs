@@ -97,11 +97,11 @@ fn measure(kind: Kind, folder: &Path, quick: bool, gpu: bool) -> anyhow::Result<
     let scene = kind.scene(folder, quick)?;
     let frames = frames(quick);
     let substeps = accurate_substeps(&scene)?;
-    let reference = Reference::newton(&scene, frames, if quick { 2 } else { 8 })?;
+    let reference = Reference::newton(&scene, frames, if quick { 2 } else { 4 })?;
     let settings = settings(substeps, gpu);
     let mut motions: Vec<Option<Motion>> = vec![None; settings.all.len()];
     let mut refused = vec![None; settings.all.len()];
-    for _ in 0..if quick { 1 } else { 4 } {
+    for _ in 0..if quick { 1 } else { 3 } {
         for (i, (_, spec)) in settings.all.iter().enumerate() {
             if refused[i].is_some() {
                 continue;
@@ -173,7 +173,7 @@ fn large(scene: &Scene, frames: u32, quick: bool) -> anyhow::Result<Vec<LargeRow
         let motion = |spec| Motion::of(&with(scene, &spec), frames, Some(1));
         let xpbd = motion(large_step(iterations))?;
         // Rounds of descent are dear, and few are enough. Scenes with links cannot be run with it.
-        let descent = if iterations <= 64 && scene.link.is_empty() {
+        let descent = if iterations <= 16 && scene.link.is_empty() {
             Some(motion(large_descent(iterations))?.deviation(&newton))
         } else {
             None

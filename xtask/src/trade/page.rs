@@ -35,7 +35,7 @@ be, in % of the longest side of the body; *largest* is the largest of all frames
 error of the volume is the largest of all frames, in % of the volume at rest. Where particles should be is the solution \
 of the same tets (what the mesh does wrong does not count) by Newton's method with sparse Cholesky factorizations in \
 double precision, implicit Euler at three step sizes, extrapolated to small steps. Times are of whole frames of 1/60 s on \
-one thread, or on a GPU with the way back of the positions; settings take turns for four rounds, and each frame counts \
+one thread, or on a GPU with the way back of the positions; settings take turns for three rounds, and each frame counts \
 with its fastest time. A press is a prescribed motion of held particles and a cut is made before anything moves, as the \
 reference knows no contacts and no later cuts; the layers are two bodies stitched together by links, for the reference \
 one body.";
