@@ -10,7 +10,7 @@ const BEAM: &str = r#"
 [world]
 gravity = [0.0, 0.0, -9.81]
 [[body]]
-shape = { kind = "beam", tets = 100 }
+shape = { kind = "beam", tets = 250 }
 young_modulus = 1e4
 poisson_ratio = 0.3
 fixed = [{ half_space = { point = [-0.4, 0.0, 0.0], normal = [-1.0, 0.0, 0.0] } }]

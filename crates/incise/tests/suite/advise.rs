@@ -16,7 +16,7 @@ const BEAM: &str = r#"
 [world]
 gravity = [0.0, 0.0, -9.81]
 [[body]]
-shape = { kind = "beam", tets = 100 }
+shape = { kind = "beam", tets = 250 }
 young_modulus = 1e4
 poisson_ratio = 0.3
 fixed = [{ half_space = { point = [-0.4, 0.0, 0.0], normal = [-1.0, 0.0, 0.0] } }]
@@ -79,8 +79,9 @@ fn handles_move_the_reference_as_they_say() {
     let scene = scene(&text);
     let rest = incise::Simulation::with_threads(&scene, 1)
         .unwrap()
-        .positions()
-        .to_vec();
+        .mesh()
+        .positions
+        .clone();
     let motion = newton_motion(&scene, 2, 3).unwrap();
     let turned = DQuat::from_rotation_x(40f64.to_radians());
     let center = DVec3::new(0.0, 0.1, 0.0);
@@ -128,8 +129,9 @@ fn stitched_layers_move_as_one_body() {
     let start = |scene| {
         incise::Simulation::with_threads(scene, 1)
             .unwrap()
-            .positions()
-            .to_vec()
+            .mesh()
+            .positions
+            .clone()
     };
     let (one_start, two_start) = (start(&one), start(&two));
     assert!(two_start.len() > one_start.len());
@@ -159,8 +161,9 @@ fn the_reference_is_given_the_cut_mesh() {
     let (middle, half) = extent(&scene);
     let rest = incise::Simulation::with_threads(&scene, 1)
         .unwrap()
-        .positions()
-        .to_vec();
+        .mesh()
+        .positions
+        .clone();
     let end = rest
         .iter()
         .position(|x| x.x > middle.x + 0.9 * half.x)
@@ -179,7 +182,7 @@ fn what_the_reference_does_not_know_is_named() {
     for (more, what) in [
         ("[world.ground]\nheight = -1.0\n", "a ground"),
         (
-            "[[body]]\nshape = { kind = \"box\", tets = 100 }\ndamping = 0.1\n",
+            "[[body]]\nshape = { kind = \"box\", tets = 300 }\ndamping = 0.1\n",
             "damping",
         ),
         (
