@@ -114,7 +114,7 @@ pub struct Advice {
 ///     [world]
 ///     gravity = [0.0, 0.0, -9.81]
 ///     [[body]]
-///     shape = { kind = "beam", tets = 100 }
+///     shape = { kind = "beam", tets = 250 }
 ///     fixed = [{ half_space = { point = [-0.45, 0.0, 0.0], normal = [-1.0, 0.0, 0.0] } }]
 ///     "#,
 /// )?;
