@@ -14,6 +14,7 @@ mod soak;
 mod solver;
 mod stability;
 mod sweep;
+mod trade;
 mod wear;
 
 use anyhow::Context;
@@ -69,6 +70,7 @@ const EXPERIMENTS: &[(&str, Run)] = &[
     ("paper-claims", |arguments| {
         paper::run(paper::What::Claims, arguments)
     }),
+    ("trade", trade::trade),
     ("stability", stability::stability),
     ("lean", lean::run),
     ("peers", peers::usual),
@@ -103,6 +105,8 @@ enum Command {
     Stability(ExperimentArguments),
     /// Cut meshes, check everything and write a table.
     Sweep(sweep::SweepArguments),
+    /// What accuracy costs: errors against Newton's method beside times, for every knob of the solver.
+    Trade(ExperimentArguments),
     /// Cut a mesh many times in small strokes, and see what becomes of clusters, colors and the time to solve.
     Wear(wear::WearArguments),
 }
@@ -124,6 +128,7 @@ fn main() -> anyhow::Result<()> {
         Command::SoakCut(arguments) => soak::soak(&arguments),
         Command::Stability(arguments) => stability::stability(&arguments),
         Command::Sweep(arguments) => sweep::sweep(&arguments),
+        Command::Trade(arguments) => trade::trade(&arguments),
         Command::Wear(arguments) => wear::wear(&arguments),
     }
 }

@@ -23,6 +23,8 @@ pub(crate) struct Arguments {
 pub(crate) enum Command {
     /// Simulate a scene and write what happens.
     Run(RunArguments),
+    /// Measure which settings of the solver are the most accurate within a time budget, on this machine.
+    Advise(AdviseArguments),
     /// Cluster and color the constraints of a mesh or the vertices of a graph.
     Color(ColorArguments),
     /// Look at, convert and generate meshes.
@@ -73,6 +75,28 @@ pub(crate) struct RunArguments {
     /// Print nothing but errors.
     #[arg(long)]
     pub(crate) quiet: bool,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "Example: incise advise scene.toml --budget-ms 8\n\n\
+    Errors are distances from a converged motion of the same scene: by Newton's method where the scene has nothing that \
+    the reference does not know (contacts, damping, springs, cuts after frame 0), otherwise by the solver itself at a \
+    fine substep. The output says which, how much of its own error is left, and gives the [solver] table to paste in.")]
+pub(crate) struct AdviseArguments {
+    /// The scene file; without one, the built-in liver.
+    pub(crate) scene: Option<PathBuf>,
+    /// Time of a frame in ms that may be spent.
+    #[arg(long, value_name = "X")]
+    pub(crate) budget_ms: f64,
+    /// Number of frames that are measured, from the first on. More take longer and see more of the scene.
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub(crate) frames: u32,
+    /// Number of threads, at most 1024 [default: one for each core].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(crate) threads: Option<u16>,
+    /// Print one JSON object instead of words.
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Args)]

@@ -75,18 +75,23 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<(), Failure> {
     Ok(())
 }
 
+/// The scene of a file, or the built-in one.
+pub(crate) fn load(path: Option<&Path>) -> Result<Scene, Failure> {
+    let Some(path) = path else {
+        return Ok(Scene::built_in());
+    };
+    Scene::load(path).map_err(|error| match error {
+        // The others name the file themselves.
+        Error::Parse { .. } => {
+            Failure::Input(anyhow::Error::from(error).context(path.display().to_string()))
+        }
+        _ => error.into(),
+    })
+}
+
 /// The scene as asked for, with what the command line changes.
 fn scene(arguments: &RunArguments) -> Result<Scene, Failure> {
-    let mut scene = match &arguments.scene {
-        None => Scene::built_in(),
-        Some(path) => Scene::load(path).map_err(|error| match error {
-            // The others name the file themselves.
-            Error::Parse { .. } => {
-                Failure::Input(anyhow::Error::from(error).context(path.display().to_string()))
-            }
-            _ => error.into(),
-        })?,
-    };
+    let mut scene = load(arguments.scene.as_deref())?;
     if let Some(mesh) = &arguments.mesh {
         let body = scene.body.first_mut();
         let body =

@@ -79,6 +79,10 @@ pub enum Error {
     #[cfg(feature = "gpu")]
     #[error(transparent)]
     Gpu(#[from] incise_gpu::GpuError),
+    /// Settings could not be compared.
+    #[cfg(feature = "advise")]
+    #[error("{0}")]
+    Advise(String),
     /// The threads could not be started.
     #[error("cannot start {threads} threads: {message}")]
     Threads {

@@ -35,7 +35,7 @@ pub(crate) struct Group {
     pub(crate) plan: Plan,
     /// Its colliders are where they are at the start of the next frame.
     pub(crate) settings: StepSettings,
-    handles: Vec<Handle>,
+    pub(crate) handles: Vec<Handle>,
     volumes: Option<Volumes>,
     /// The present positions.
     pub(crate) positions: Vec<DVec3>,

@@ -58,7 +58,7 @@ pub(crate) struct Handle {
     /// The particles it holds, as numbered in their group of bodies.
     particles: Vec<usize>,
     /// Its number in the solver.
-    number: u32,
+    pub(crate) number: u32,
 }
 
 impl Handle {
@@ -143,7 +143,7 @@ impl Handle {
     }
 
     /// Where the handle is at the start of a frame.
-    fn pose(&self, frame: u64) -> Pose {
+    pub(crate) fn pose(&self, frame: u64) -> Pose {
         let [first, last] = self.spec.frames;
         let elapsed = (frame.clamp(first, last) - first) as f64 / (last - first) as f64;
         let rotation = self.spec.turn.map_or(DQuat::IDENTITY, |turn| {

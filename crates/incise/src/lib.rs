@@ -20,6 +20,8 @@
 //! # Ok::<(), incise::Error>(())
 //! ```
 
+#[cfg(feature = "advise")]
+pub mod advise;
 mod backend;
 mod body;
 mod collider;

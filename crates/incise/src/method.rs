@@ -122,7 +122,7 @@ pub(crate) fn descent(settings: &StepSettings) -> DescentSettings {
 }
 
 /// Refuses what descent would silently leave out.
-fn check_descent(scene: &Scene) -> Result<(), Error> {
+pub(crate) fn check_descent(scene: &Scene) -> Result<(), Error> {
     if scene.solver.form != Form::Block {
         return Err(refused("solver.form", "sequential", "block where"));
     }

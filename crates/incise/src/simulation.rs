@@ -177,6 +177,27 @@ impl Simulation {
         Ok(simulation)
     }
 
+    /// Carries out the strokes of the frame to come, and nothing else.
+    #[cfg(feature = "advise")]
+    pub(crate) fn cut_now(&mut self) -> Result<(), Error> {
+        self.carry_out_strokes(&mut Vec::new(), &mut Milliseconds::default())?;
+        Ok(())
+    }
+
+    #[cfg(feature = "advise")]
+    pub(crate) fn groups(&self) -> &[Group] {
+        &self.groups
+    }
+
+    /// The number in the whole of a particle of a group.
+    #[cfg(feature = "advise")]
+    pub(crate) fn particle(&self, group: usize, particle: usize) -> usize {
+        match &self.whole {
+            Some(whole) => whole.particle(group, particle),
+            None => particle,
+        }
+    }
+
     /// Adds a stroke. A plane whose frame has come cuts at the start of the next step.
     ///
     /// # Errors

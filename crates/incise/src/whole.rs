@@ -165,6 +165,12 @@ impl Whole {
         whole.moved.sort_unstable_by_key(|moved| moved.to);
     }
 
+    /// The number of a group's particle.
+    #[cfg(feature = "advise")]
+    pub(crate) fn particle(&self, group: usize, particle: usize) -> usize {
+        self.numbers[group].particles[particle].index()
+    }
+
     /// Takes over the groups' positions.
     pub(crate) fn collect_positions(&mut self, groups: &[Group]) {
         for (numbers, group) in self.numbers.iter().zip(groups) {

@@ -3,14 +3,16 @@
 mod beam;
 pub(crate) mod body;
 mod convergence;
+mod digits;
 mod rest;
 pub(crate) mod runner;
 mod speed;
-mod trade;
 
 use std::path::PathBuf;
 
 use clap::Args;
+
+pub(crate) use digits::digits;
 
 #[derive(Debug, Args)]
 pub(crate) struct SolverArguments {
@@ -33,8 +35,8 @@ pub(crate) struct SolverArguments {
 enum Part {
     /// Iterations and milliseconds to a residual, by method.
     Convergence,
-    /// Errors of a falling beam beside milliseconds per frame, and its error at rest by kappa.
-    Trade,
+    /// The error of a beam at rest by kappa. For errors in motion: `cargo xtask trade`.
+    Rest,
     /// Nanoseconds a tet, on one thread and on two.
     Speed,
 }
@@ -59,8 +61,8 @@ fn tables(arguments: &SolverArguments) -> anyhow::Result<String> {
         let mesh = body::liver(arguments.models.as_deref(), arguments.quick)?;
         parts.push(convergence::convergence(&mesh, arguments.quick)?);
     }
-    if wanted(Part::Trade) {
-        parts.push(trade::trade(arguments.quick)?);
+    if wanted(Part::Rest) {
+        parts.push(rest::at_rest(arguments.quick)?);
     }
     if wanted(Part::Speed) {
         let mesh = body::liver(arguments.models.as_deref(), arguments.quick)?;
@@ -115,30 +117,10 @@ mod tests {
         }
     }
 
-    /// The small beam is already that of which the claims are made: substeps buy accuracy, large steps iterated do not,
-    /// and descent with a correction is as accurate as Newton's method.
-    #[test]
-    fn substeps_buy_accuracy() {
-        let text = quick(Part::Trade);
-        let error = |name| row(&text, name)[5].parse::<f64>().unwrap();
-        // Measured: 3.1, 1.6, 0.77 %; first order in the substep.
-        let errors = ["XPBD, 5 x 1", "XPBD, 10 x 1", "XPBD, 20 x 1"].map(error);
-        assert!(
-            errors[1] < 0.7 * errors[0] && errors[2] < 0.7 * errors[1],
-            "{errors:?}"
-        );
-        // Measured: 369 %.
-        assert!(error("XPBD, 1 x 20") > 20.0 * errors[2]);
-        // Measured: 11.7 % both, to the tolerance of the descent, which is a hundredth of a percent.
-        let difference = error("corrected descent to 1e-4, substeps 1")
-            - error("Newton, implicit Euler, steps 1");
-        assert!(difference.abs() <= 0.1, "{difference}");
-    }
-
     /// Measured: 5.6 % at kappa 1/2, half of it at 1/4.
     #[test]
     fn the_error_at_rest_follows_kappa() {
-        let text = quick(Part::Trade);
+        let text = quick(Part::Rest);
         let error = |name| row(&text, name)[3].parse::<f64>().unwrap();
         let halved = error("1/4") / error("1/2");
         assert!((halved - 0.5).abs() < 0.1, "{halved}");

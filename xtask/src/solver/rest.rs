@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::beam::{Beam, FRAME, GRAVITY, RATE};
 use super::body::schedule;
-use super::trade::digits;
+use super::digits;
 use crate::table;
 
 const RATIOS: [f64; 6] = [0.0, 0.3, 0.4, 0.45, 0.49, 0.499];

@@ -20,16 +20,6 @@ pub(crate) enum Recipe {
     Corrected(DescentSettings),
 }
 
-impl Recipe {
-    /// The time of a substep in s.
-    pub(crate) fn substep_time(&self) -> f64 {
-        match self {
-            Self::Xpbd { settings, .. } => settings.substep_time(),
-            Self::Descent(settings) | Self::Corrected(settings) => settings.step.substep_time(),
-        }
-    }
-}
-
 /// A body that moves by a recipe.
 pub(crate) struct Runner<R: Real> {
     pub(crate) solver: Solver<R>,

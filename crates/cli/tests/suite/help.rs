@@ -8,6 +8,7 @@ fn every_help_has_an_example() {
     for command in [
         &[][..],
         &["run"],
+        &["advise"],
         &["color"],
         &["mesh"],
         &["mesh", "info"],

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 
+mod advise;
 mod bad_arguments;
 mod bad_graphs;
 mod bad_input;

@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 
+#[cfg(feature = "advise")]
+mod advise;
 mod bodies;
 mod conservation;
 mod constraints;

@@ -1,0 +1,154 @@
+//! `incise advise`: the most accurate settings of a scene's solver that meet a time budget on this machine.
+
+use comfy_table::Table;
+use comfy_table::presets::UTF8_FULL_CONDENSED;
+use incise::advise::{Advice, Against, Measured, Question, ReferenceKind};
+
+use crate::args::AdviseArguments;
+use crate::failure::Failure;
+use crate::print::print;
+use crate::run::load;
+
+pub(crate) fn advise(arguments: &AdviseArguments) -> Result<(), Failure> {
+    let scene = load(arguments.scene.as_deref())?;
+    let question = Question {
+        budget_ms: arguments.budget_ms,
+        frames: arguments.frames,
+        threads: arguments.threads.map(usize::from),
+    };
+    let advice = incise::advise::advise(&scene, &question)?;
+    if arguments.json {
+        let json = serde_json::to_string(&advice).map_err(|error| Failure::Run(error.into()))?;
+        return print(json);
+    }
+    print(reference(&advice))?;
+    print(table(&advice))?;
+    for left_out in &advice.left_out {
+        print(format_args!("not measured: {left_out}"))?;
+    }
+    if scene.body.iter().any(|body| body.substeps.is_some()) {
+        print("the settings are for all bodies: remove `substeps` from each [[body]]")?;
+    }
+    let last = scene.frames_needed();
+    if last > u64::from(advice.frames) {
+        print(format_args!(
+            "strokes and handles act until frame {last}: --frames {last} measures all of them"
+        ))?;
+    }
+    print(words(&advice))
+}
+
+/// What errors are measured against.
+fn reference(advice: &Advice) -> String {
+    let Against {
+        kind,
+        why_not_newton,
+        steps: [a, b, c],
+        order,
+        left,
+    } = &advice.reference;
+    let mut text = format!(
+        "{} tets, {} frames; errors are measured against ",
+        advice.tets, advice.frames
+    );
+    text += &match kind {
+        ReferenceKind::Newton => {
+            format!("Newton's method with {a}, {b} and {c} steps a frame, extrapolated")
+        }
+        ReferenceKind::Xpbd => format!(
+            "the solver itself in double precision with {c} substeps a frame, after {a} and {b}"
+        ),
+    };
+    if let Some(order) = order {
+        text += &format!(" (order {order:.1})");
+    }
+    text += &format!(
+        ", whose own error is about {} % of the positions and {} % of the volume",
+        digits(left.largest),
+        digits(left.volume)
+    );
+    if let Some(why) = why_not_newton {
+        text += &format!("\nnot Newton's method: {why}");
+    }
+    text
+}
+
+fn table(advice: &Advice) -> Table {
+    let mut table = Table::new();
+    table.load_style(UTF8_FULL_CONDENSED);
+    table.set_header([
+        "setting",
+        "ms a frame",
+        "slowest frame",
+        "error in % of the size",
+        "at the end",
+        "of the volume in %",
+        "",
+    ]);
+    for (i, row) in advice.measured.iter().enumerate() {
+        let mut notes = Vec::new();
+        if row.of_the_scene {
+            notes.push("the scene's");
+        }
+        if advice.best == Some(i) {
+            notes.push("best in budget");
+        } else if row.non_dominated {
+            notes.push("not dominated");
+        }
+        let error = row.error;
+        let numbers = [
+            row.ms,
+            row.slowest_ms,
+            error.largest,
+            error.end,
+            error.volume,
+        ];
+        let mut cells = vec![row.name.clone()];
+        cells.extend(numbers.map(digits));
+        cells.push(notes.join(", "));
+        table.add_row(cells);
+    }
+    table
+}
+
+/// The answer in words, with lines to paste in.
+fn words(advice: &Advice) -> String {
+    let budget = advice.budget_ms;
+    let row = |i: Option<usize>| i.and_then(|i| advice.measured.get(i));
+    let what = |m: &Measured| {
+        format!(
+            "{}: {} ms a frame, error {} % (volume {} %)",
+            m.name,
+            digits(m.ms),
+            digits(m.error.largest),
+            digits(m.error.volume)
+        )
+    };
+    match (row(advice.best), row(advice.next)) {
+        (Some(best), next) => {
+            let mut text = format!("\nwithin {budget} ms: {}\n\n{}", what(best), best.solver);
+            text += &match next {
+                Some(next) => format!("\nmore accurate: {}", what(next)),
+                None => "\nnothing that was measured is more accurate".to_owned(),
+            };
+            text
+        }
+        (None, Some(fastest)) => format!(
+            "\nno setting that was measured meets {budget} ms; the fastest is {}\n\n{}\na smaller mesh or a GPU would be faster",
+            what(fastest),
+            fastest.solver
+        ),
+        (None, None) => format!("\nno setting that was measured meets {budget} ms"),
+    }
+}
+
+/// Two or three digits.
+fn digits(value: f64) -> String {
+    match value.abs() {
+        ..0.001 => format!("{value:.1e}"),
+        ..0.1 => format!("{value:.4}"),
+        ..10.0 => format!("{value:.2}"),
+        ..1e5 => format!("{value:.0}"),
+        _ => format!("{value:.1e}"),
+    }
+}

@@ -1,0 +1,121 @@
+//! `incise advise`: what it answers, what it refuses. Times are never looked at, only what they were sorted by.
+
+use serde_json::Value;
+
+use crate::bad_input::{place, refused_in_a_sentence};
+use crate::support::Place;
+
+/// A small beam that Newton's method can do.
+const BEAM: &str = r#"
+[world]
+gravity = [0.0, 0.0, -9.81]
+[[body]]
+shape = { kind = "beam", tets = 250 }
+young_modulus = 1e4
+poisson_ratio = 0.3
+fixed = [{ half_space = { point = [-0.4, 0.0, 0.0], normal = [-1.0, 0.0, 0.0] } }]
+"#;
+
+fn ask(place: &Place, arguments: &[&str]) -> Value {
+    let text = place.good(
+        &[
+            &["advise", "scene.toml", "--json", "--frames", "3"],
+            arguments,
+        ]
+        .concat(),
+    );
+    serde_json::from_str(&text).unwrap()
+}
+
+fn beam() -> Place {
+    let place = Place::new();
+    place.write("scene.toml", BEAM);
+    place
+}
+
+/// The best is the most accurate within the budget, to what is left of the reference's error, and its lines run.
+#[test]
+fn the_best_setting_is_measured_and_can_be_pasted_in() {
+    let place = beam();
+    let advice = ask(&place, &["--budget-ms", "10000"]);
+    assert_eq!(advice["reference"]["kind"], "newton");
+    assert_eq!(advice["reference"]["why_not_newton"], Value::Null);
+    let left = advice["reference"]["left"]["largest"].as_f64().unwrap();
+    let rows = advice["measured"].as_array().unwrap();
+    let best = &rows[usize::try_from(advice["best"].as_u64().unwrap()).unwrap()];
+    let error = |row: &Value| row["error"]["largest"].as_f64().unwrap().max(left);
+    assert!(rows.len() > 15, "{}", rows.len());
+    assert!(rows.iter().all(|row| error(best) <= error(row)), "{advice}");
+    assert_eq!(advice["next"], Value::Null);
+    assert_eq!(
+        rows.iter()
+            .filter(|row| row["of_the_scene"] == true)
+            .count(),
+        1
+    );
+    let lines = best["solver"].as_str().unwrap();
+    place.write("scene.toml", format!("{BEAM}{lines}"));
+    place.good(&["run", "scene.toml", "--frames", "1", "--quiet"]);
+}
+
+#[test]
+fn it_says_so_if_nothing_meets_the_budget() {
+    let place = beam();
+    let advice = ask(&place, &["--budget-ms", "1e-9"]);
+    assert_eq!(advice["best"], Value::Null);
+    assert!(advice["next"].is_u64(), "{advice}");
+    let text = place.good(&[
+        "advise",
+        "scene.toml",
+        "--frames",
+        "2",
+        "--budget-ms",
+        "1e-9",
+    ]);
+    assert!(
+        text.contains("no setting that was measured meets"),
+        "{text}"
+    );
+    assert!(text.contains("[solver]"), "{text}");
+}
+
+/// What the reference does not know is named, and the solver is measured against itself.
+#[test]
+fn scenes_that_newton_cannot_do_are_measured_against_the_solver() {
+    for (more, why) in [
+        ("[world.ground]\nheight = -1.0\n", "a ground"),
+        (
+            "[[stroke]]\nkind = \"plane\"\nframe = 1\npoint = [0, 0, 0]\nnormal = [1, 0, 0]\n",
+            "strokes after frame 0",
+        ),
+    ] {
+        let place = Place::new();
+        place.write("scene.toml", format!("{BEAM}{more}"));
+        let advice = ask(&place, &["--budget-ms", "1000"]);
+        assert_eq!(advice["reference"]["kind"], "xpbd");
+        let reason = advice["reference"]["why_not_newton"].as_str().unwrap();
+        assert!(reason.contains(why), "{reason}");
+    }
+}
+
+#[test]
+fn bad_questions_are_refused() {
+    let place = place();
+    refused_in_a_sentence(
+        &place,
+        &["advise", "scene.toml", "--budget-ms", "0"],
+        &["budget-ms is 0", "positive"],
+    );
+    refused_in_a_sentence(
+        &place,
+        &["advise", "none.toml", "--budget-ms", "5"],
+        &["none.toml"],
+    );
+    for arguments in [
+        &["advise", "scene.toml"][..],
+        &["advise", "scene.toml", "--budget-ms", "soon"],
+        &["advise", "scene.toml", "--budget-ms", "5", "--frames", "0"],
+    ] {
+        assert_eq!(place.incise(arguments).code, 2, "{arguments:?}");
+    }
+}

@@ -1,0 +1,197 @@
+//! [`candidates`]: the settings that are worth a measurement for a scene; their names and their lines of TOML.
+//!
+//! They are multiples of the substeps that bring kappa to 0.5, so that they fit the scene whatever its size, stiffness
+//! and time step. Relaxation, Jacobi and Chebyshev are left out: wherever they were measured (`cargo xtask trade`),
+//! Gauss-Seidel with relaxation 1 was as fast and more accurate.
+
+use crate::method::check_descent;
+use crate::scene::{Form, Method, Precision, Scene, SolverSpec, Substeps};
+use crate::{Error, Simulation};
+
+use super::reference::with;
+
+/// The substeps that `auto` wants for a scene, without its cap: the most of all its bodies.
+///
+/// # Errors
+/// As [`Simulation::new`].
+pub fn accurate_substeps(scene: &Scene) -> Result<u32, Error> {
+    let solver = SolverSpec {
+        substeps: Substeps::Auto,
+        max_substeps: 100_000,
+        time_step: scene.solver.time_step,
+        ..SolverSpec::default()
+    };
+    let simulation = Simulation::with_threads(&with(scene, &solver), 1)?;
+    let bodies = simulation.report().bodies.iter();
+    Ok(bodies.map(|body| body.substeps).max().unwrap_or(1))
+}
+
+/// Settings from coarse to fine around `substeps`, which is what [`accurate_substeps`] says. What a scene's `[solver]`
+/// says of clusters, colors, sleep, softening and the backend is kept.
+#[must_use]
+pub fn candidates(scene: &Scene, substeps: u32) -> Vec<SolverSpec> {
+    let of = |method| SolverSpec {
+        preset: None,
+        kappa_limit: match method {
+            Method::Descent => f64::INFINITY,
+            _ => scene.solver.kappa_limit,
+        },
+        form: Form::Block,
+        relaxation: SolverSpec::of(method).relaxation,
+        coarse: false,
+        precision: Precision::F32,
+        method,
+        ..scene.solver.clone()
+    };
+    let mut all = Vec::new();
+    let mut add = |spec: SolverSpec| {
+        if !all.contains(&spec) {
+            all.push(spec);
+        }
+    };
+    let mut add_passes = |precision, eighths: &[u32], iterations| {
+        for part in eighths {
+            add(SolverSpec {
+                substeps: Substeps::Fixed((substeps.saturating_mul(*part)).div_ceil(8)),
+                iterations,
+                precision,
+                ..of(Method::GaussSeidel)
+            });
+        }
+    };
+    add_passes(Precision::F32, &[1, 2, 4, 8, 16, 32, 64], 1);
+    add_passes(Precision::F64, &[16, 32, 64], 1);
+    add_passes(Precision::F32, &[8, 16, 32], 4);
+    if check_descent(scene).is_ok() {
+        for (substeps, iterations) in [(1, 20), (1, 100), (4, 20)] {
+            add(SolverSpec {
+                substeps: Substeps::Fixed(substeps),
+                iterations,
+                ..of(Method::Descent)
+            });
+        }
+        for substeps in [1, 2, 4, 8] {
+            add(SolverSpec {
+                substeps: Substeps::Fixed(substeps),
+                iterations: 4,
+                coarse: true,
+                precision: Precision::F64,
+                ..of(Method::Descent)
+            });
+        }
+    }
+    all
+}
+
+/// A short name: method, substeps x iterations, width, and whatever is not the default of the method.
+///
+/// ```
+/// use incise::{Scene, advise::name};
+///
+/// let scene = Scene::from_toml("[solver]\nsubsteps = 20\nrelaxation = 0.8")?;
+/// assert_eq!(name(&scene.solver), "gauss-seidel 20 x 1 f32, relaxation 0.8");
+/// # Ok::<(), incise::Error>(())
+/// ```
+#[must_use]
+pub fn name(spec: &SolverSpec) -> String {
+    let defaults = SolverSpec::of(spec.method);
+    let method = match spec.method {
+        Method::GaussSeidel => "gauss-seidel",
+        Method::Jacobi => "jacobi",
+        Method::Chebyshev => "chebyshev",
+        Method::Descent if spec.coarse => "descent with coarse correction",
+        Method::Descent => "descent",
+    };
+    let substeps = match spec.substeps {
+        Substeps::Fixed(n) => n.to_string(),
+        Substeps::Auto => "auto".to_owned(),
+    };
+    let width = spec.precision.name();
+    let mut name = format!("{method} {substeps} x {} {width}", spec.iterations);
+    if spec.relaxation != defaults.relaxation {
+        name += &format!(", relaxation {}", spec.relaxation);
+    }
+    if spec.method == Method::Chebyshev && spec.spectral_radius != defaults.spectral_radius {
+        name += &format!(", spectral radius {}", spec.spectral_radius);
+    }
+    if spec.form == Form::Sequential {
+        name += ", sequential";
+    }
+    if spec.clustering != defaults.clustering {
+        name += &format!(", {}", spec.clustering);
+    }
+    if spec.kappa_limit != defaults.kappa_limit {
+        name += &format!(", kappa limit {}", spec.kappa_limit);
+    }
+    if spec.backend != defaults.backend {
+        name += match spec.backend {
+            crate::scene::Backend::Gpu => ", gpu",
+            _ => ", backend auto",
+        };
+    }
+    name
+}
+
+/// The `[solver]` table of a scene with these settings, without what is the default of the method.
+///
+/// # Errors
+/// [`Error::Parse`] if the settings cannot be written, which does not happen to those that can be read.
+pub fn solver_table(spec: &SolverSpec) -> Result<String, Error> {
+    let failed = |error: toml::ser::Error| Error::Parse {
+        line: None,
+        message: error.to_string(),
+    };
+    let defaults = toml::Table::try_from(SolverSpec::of(spec.method)).map_err(failed)?;
+    let mut keys = toml::Table::try_from(spec).map_err(failed)?;
+    let always = ["method", "substeps", "iterations", "precision"];
+    keys.retain(|key, value| {
+        always.iter().any(|known| *known == key) || defaults.get(key) != Some(value)
+    });
+    Ok(format!("[solver]\n{keys}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_of_a_candidate_reads_back_as_it() {
+        let mut scene = Scene::built_in();
+        scene.body[0].damping = 0.0;
+        for limit in [1.0, f64::INFINITY] {
+            scene.solver.kappa_limit = limit;
+            let all = candidates(&scene, 30);
+            assert!(all.iter().any(|spec| spec.coarse));
+            for spec in all {
+                let table = solver_table(&spec).unwrap();
+                assert_eq!(Scene::from_toml(&table).unwrap().solver, spec, "{table}");
+            }
+        }
+    }
+
+    /// No setting is measured twice, each has a name of its own, and what descent would refuse is not proposed.
+    #[test]
+    fn candidates_differ() {
+        for substeps in [1, 2, 7, 30] {
+            let all = candidates(&Scene::built_in(), substeps);
+            let mut names: Vec<String> = all.iter().map(name).collect();
+            names.sort();
+            let count = names.len();
+            names.dedup();
+            assert_eq!(names.len(), count);
+            assert!(all.iter().all(|spec| spec.method == Method::GaussSeidel));
+        }
+    }
+
+    /// The beam of 1/16 m cells (altitude 1/16 m over the square root of 3 at the least) wants what kappa says.
+    #[test]
+    fn substeps_bring_kappa_to_a_half() {
+        let mut scene = Scene::built_in();
+        let substeps = accurate_substeps(&scene).unwrap();
+        for (substeps, accurate) in [(substeps, true), (substeps - 1, false)] {
+            scene.solver.substeps = substeps.into();
+            let kappa = Simulation::with_threads(&scene, 1).unwrap().kappa();
+            assert_eq!(kappa <= 0.5, accurate, "{substeps}: {kappa}");
+        }
+    }
+}

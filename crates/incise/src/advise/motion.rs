@@ -1,0 +1,181 @@
+//! [`Motion`]: where a scene's particles are after each frame and how long that took; [`Deviation`]: how far two motions
+//! are apart.
+//!
+//! Motions are compared at the particles that the scene starts with: cuts change no number, and what they add depends on
+//! where the body is when it is cut. Cost: a copy of the positions and a pass over the tets after each frame, which is
+//! not counted as time of the frame.
+
+use std::time::Instant;
+
+use glam::DVec3;
+use incise_mesh::{TetId, TetMesh, signed_volume};
+use serde::{Deserialize, Serialize};
+
+use crate::report::milliseconds;
+use crate::{Error, Scene, Simulation};
+
+/// A scene's motion over some frames.
+#[derive(Clone, Debug)]
+pub struct Motion {
+    /// The longest side of the box around all particles at rest, in m.
+    pub size: f64,
+    /// The positions of the compared particles in m, frame by frame.
+    pub positions: Vec<DVec3>,
+    /// The volume after each frame, as a part of that at rest.
+    pub volumes: Vec<f64>,
+    /// What each frame took in ms; empty for a limit that no run has reached.
+    pub ms: Vec<f64>,
+}
+
+/// How far a motion is from another one, in %.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Deviation {
+    /// Of the positions, the largest of all frames: the root mean square distance of the particles, as a part of the
+    /// size of what moves.
+    pub largest: f64,
+    /// The same in the last frame.
+    pub end: f64,
+    /// Of the volume, the largest of all frames, as a part of that at rest.
+    pub volume: f64,
+}
+
+impl Motion {
+    /// Runs a scene for some frames, on `threads` threads or on rayon's pool.
+    ///
+    /// A frame's time is that of [`Simulation::step`] and [`Simulation::read_back`]: on a device it includes the way
+    /// back of the positions.
+    ///
+    /// # Errors
+    /// If the scene or one of its strokes is refused.
+    pub fn of(scene: &Scene, frames: u32, threads: Option<usize>) -> Result<Self, Error> {
+        let mut simulation = match threads {
+            Some(threads) => Simulation::with_threads(scene, threads)?,
+            None => Simulation::new(scene)?,
+        };
+        let mut motion = Self::still(simulation.mesh());
+        let particles = simulation.positions().len();
+        for _ in 0..frames {
+            let start = Instant::now();
+            simulation.step()?;
+            simulation.read_back()?;
+            let ms = milliseconds(start.elapsed());
+            let positions = simulation.positions();
+            motion.push(
+                &positions[..particles],
+                volume(simulation.mesh(), positions),
+            );
+            motion.ms.push(ms);
+        }
+        Ok(motion)
+    }
+
+    /// Of no frames.
+    pub(super) fn still(mesh: &TetMesh) -> Self {
+        let low = mesh
+            .positions
+            .iter()
+            .fold(DVec3::INFINITY, |a, x| a.min(*x));
+        let high = mesh
+            .positions
+            .iter()
+            .fold(DVec3::NEG_INFINITY, |a, x| a.max(*x));
+        Self {
+            size: (high - low).max_element(),
+            positions: Vec::new(),
+            volumes: Vec::new(),
+            ms: Vec::new(),
+        }
+    }
+
+    pub(super) fn push(&mut self, positions: &[DVec3], volume: f64) {
+        self.positions.extend_from_slice(positions);
+        self.volumes.push(volume);
+    }
+
+    /// The mean time of a frame in ms; 0 if nothing was timed.
+    #[must_use]
+    pub fn ms_per_frame(&self) -> f64 {
+        self.ms.iter().sum::<f64>() / self.ms.len().max(1) as f64
+    }
+
+    /// The time of the fastest frame in ms.
+    #[must_use]
+    pub fn fastest_ms(&self) -> f64 {
+        self.ms.iter().copied().reduce(f64::min).unwrap_or(0.0)
+    }
+
+    /// The time of the slowest frame in ms.
+    #[must_use]
+    pub fn slowest_ms(&self) -> f64 {
+        self.ms.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// Keeps for each frame the shorter time, of another run of the same scene.
+    pub fn keep_fastest(&mut self, other: &Self) {
+        for (ms, &again) in self.ms.iter_mut().zip(&other.ms) {
+            *ms = ms.min(again);
+        }
+    }
+
+    /// How far it is from what it should be. Whatever diverged is finite here, too.
+    ///
+    /// # Panics
+    /// If the motions are not of the same particles and frames.
+    #[must_use]
+    pub fn deviation(&self, from: &Self) -> Deviation {
+        assert!(
+            self.positions.len() == from.positions.len()
+                && self.volumes.len() == from.volumes.len(),
+            "motions of the same particles over the same frames are compared"
+        );
+        let frames = self.volumes.len().max(1);
+        let particles = (self.positions.len() / frames).max(1);
+        let pairs = self
+            .positions
+            .chunks(particles)
+            .zip(from.positions.chunks(particles));
+        let percent = |part: f64| (100.0 * part).min(f64::MAX);
+        let distance = |(a, b): (&[DVec3], &[DVec3])| {
+            let squares = a.iter().zip(b).map(|(x, y)| x.distance_squared(*y));
+            percent((squares.sum::<f64>() / particles as f64).sqrt() / from.size)
+        };
+        let volumes = self.volumes.iter().zip(&from.volumes);
+        let mut deviation = Deviation {
+            volume: volumes.fold(0.0, |most, (v, w)| f64::max(most, percent((v - w).abs()))),
+            ..Deviation::default()
+        };
+        for distance in pairs.map(distance) {
+            deviation.largest = deviation.largest.max(distance);
+            deviation.end = distance;
+        }
+        deviation
+    }
+
+    /// A linear combination; it has taken no time.
+    pub(super) fn combined(&self, a: f64, other: &Self, b: f64) -> Self {
+        let positions = self.positions.iter().zip(&other.positions);
+        let volumes = self.volumes.iter().zip(&other.volumes);
+        Self {
+            size: self.size,
+            positions: positions.map(|(x, y)| *x * a + *y * b).collect(),
+            volumes: volumes.map(|(v, w)| v * a + w * b).collect(),
+            ms: Vec::new(),
+        }
+    }
+}
+
+/// The volume of a mesh at some positions, as a part of that at rest; 1 if nothing is left.
+pub(super) fn volume(mesh: &TetMesh, positions: &[DVec3]) -> f64 {
+    let now = mesh
+        .tets
+        .iter()
+        .map(|tet| signed_volume(tet.map(|p| positions[p.index()])));
+    let rest: f64 = (0..mesh.tets.len())
+        .map(|t| mesh.volume(TetId::new(t)))
+        .sum();
+    if rest > 0.0 {
+        now.sum::<f64>() / rest
+    } else {
+        1.0
+    }
+}

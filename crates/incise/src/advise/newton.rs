@@ -1,0 +1,212 @@
+//! [`Newton`]: a scene by implicit Euler and Newton's method, as far as it has only what the reference knows.
+//!
+//! The reference of `incise-reference` knows tets, fixed particles and gravity. A rigid handle is a fixed particle that
+//! is moved, along the same way within a frame as in the solver. Strokes of frame 0 act before anything has moved, so
+//! the body is given to the reference as they leave it. A link of no length and no compliance makes two particles one.
+//! Everything else (obstacles, damping, springs, later strokes) it does not know, and says so.
+//!
+//! Source: `incise-reference`. Cost: some sparse factorizations a step.
+
+use glam::DVec3;
+use incise_reference::{Body, Material, ReferenceError};
+use incise_xpbd::Pose;
+
+use super::motion::{Motion, volume};
+use crate::backend::{AnySolver, each};
+use crate::group::Group;
+use crate::{Error, Scene, Simulation};
+
+/// A scene that the reference can do.
+#[derive(Debug)]
+pub(super) struct Newton {
+    simulation: Simulation,
+    parts: Vec<Part>,
+    time_step: f64,
+    gravity: DVec3,
+    /// How many particles there are before all cuts.
+    particles: usize,
+}
+
+/// A group of bodies as the reference sees it.
+#[derive(Debug)]
+struct Part {
+    mesh_at_rest: Vec<DVec3>,
+    tets: Vec<[u32; 4]>,
+    materials: Vec<Material>,
+    fixed: Vec<bool>,
+    /// For each particle that of the reference's body: less than its number where links have made two of them one.
+    seat: Vec<u32>,
+    /// What is moved: the handle, the particle and its place in the handle's frame.
+    held: Vec<(usize, usize, DVec3)>,
+}
+
+/// What keeps a scene from the reference, in words that complete "the scene has".
+pub(super) fn obstacle(scene: &Scene) -> Option<&'static str> {
+    let links = |f: fn(&crate::scene::LinkSpec) -> bool| scene.link.iter().any(f);
+    let later = |stroke: &crate::scene::StrokeSpec| stroke.last_frame() > 0;
+    [
+        (scene.world.ground.is_some(), "a ground"),
+        (!scene.collider.is_empty(), "colliders"),
+        (scene.stroke.iter().any(later), "strokes after frame 0"),
+        (scene.body.iter().any(|b| b.damping > 0.0), "damping"),
+        (
+            scene.body.iter().any(|b| b.volume_compliance.is_some()),
+            "volume constraints",
+        ),
+        (
+            scene.handle.iter().any(|h| h.compliance > 0.0),
+            "soft handles",
+        ),
+        (
+            links(|l| l.compliance > 0.0 || l.length.is_some_and(|l| l > 0.0)),
+            "links that are not stitches of no length",
+        ),
+    ]
+    .into_iter()
+    .find_map(|(there, what)| there.then_some(what))
+}
+
+impl Newton {
+    /// Prepares a scene without obstacles.
+    pub(super) fn new(scene: &Scene) -> Result<Self, Error> {
+        let mut scene = scene.clone();
+        scene.solver = crate::scene::SolverSpec {
+            time_step: scene.solver.time_step,
+            precision: crate::scene::Precision::F64,
+            ..crate::scene::SolverSpec::default()
+        };
+        let mut simulation = Simulation::with_threads(&scene, 1)?;
+        let particles = simulation.positions().len();
+        simulation.cut_now()?;
+        let parts = simulation
+            .groups()
+            .iter()
+            .map(|group| Part::new(&scene, group));
+        Ok(Self {
+            parts: parts.collect::<Result<_, _>>()?,
+            simulation,
+            time_step: scene.solver.time_step,
+            gravity: DVec3::from_array(scene.world.gravity.unwrap_or_default()),
+            particles,
+        })
+    }
+
+    /// The motion over some frames of `steps` steps each.
+    pub(super) fn motion(&self, frames: u32, steps: u32) -> Result<Motion, ReferenceError> {
+        let mesh = self.simulation.mesh();
+        let mut motion = Motion::still(mesh);
+        let mut bodies = self
+            .parts
+            .iter()
+            .map(Part::body)
+            .collect::<Result<Vec<_>, _>>()?;
+        let mut positions = mesh.positions.clone();
+        for frame in 0..u64::from(frames) {
+            let all = self
+                .parts
+                .iter()
+                .zip(self.simulation.groups())
+                .zip(&mut bodies);
+            for (g, ((part, group), body)) in all.enumerate() {
+                let poses: Vec<[Pose; 2]> = group
+                    .handles
+                    .iter()
+                    .map(|handle| [frame, frame + 1].map(|f| handle.pose(f)))
+                    .collect();
+                for step in 1..=steps {
+                    let fraction = f64::from(step) / f64::from(steps);
+                    for &(handle, p, place) in &part.held {
+                        let [from, to] = &poses[handle];
+                        body.positions[part.seat[p] as usize] =
+                            from.toward(to, fraction).apply(place);
+                    }
+                    body.step(self.time_step / f64::from(steps), self.gravity)?;
+                }
+                for (p, &seat) in part.seat.iter().enumerate() {
+                    positions[self.simulation.particle(g, p)] = body.positions[seat as usize];
+                }
+            }
+            motion.push(&positions[..self.particles], volume(mesh, &positions));
+        }
+        Ok(motion)
+    }
+}
+
+impl Part {
+    fn new(scene: &Scene, group: &Group) -> Result<Self, Error> {
+        let mesh = group.cuttable.mesh();
+        let count = mesh.positions.len();
+        each!(&group.solver, solver => {
+            let materials = (0..mesh.tets.len()).map(|t| {
+                let body = &scene.body[group.bodies[usize::from(solver.material_of(t))]];
+                Material {
+                    young_modulus: body.young_modulus,
+                    poisson_ratio: body.poisson_ratio,
+                    density: body.density,
+                }
+            });
+            let mut seat = seats(&group.solver, count);
+            let mut at_rest = Vec::new();
+            let mut fixed: Vec<bool> = Vec::new();
+            let mut held = Vec::new();
+            for p in 0..count {
+                let root = seat[p] as usize;
+                if root < p {
+                    seat[p] = seat[root];
+                } else {
+                    seat[p] = u32::try_from(at_rest.len()).expect("no more than there are particles");
+                    at_rest.push(mesh.positions[p]);
+                    fixed.push(false);
+                }
+                let seat = seat[p] as usize;
+                fixed[seat] |= solver.is_fixed(p);
+                if let Some(number) = solver.handle_of(p).filter(|_| !solver.is_fixed(p)) {
+                    let handle = group.handles.iter().position(|h| h.number == number);
+                    let handle = handle.expect("handles of a group hold its particles");
+                    let pose = group.handles[handle].pose(0);
+                    let place = pose.rotation.inverse() * (mesh.positions[p] - pose.position);
+                    fixed[seat] = true;
+                    held.push((handle, p, place));
+                }
+            }
+            let corners = |tet: &[incise_mesh::ParticleId; 4]| tet.map(|p| seat[p.index()]);
+            Ok(Self {
+                tets: mesh.tets.iter().map(corners).collect(),
+                materials: materials.collect(),
+                mesh_at_rest: at_rest,
+                fixed,
+                held,
+                seat,
+            })
+        })
+    }
+
+    fn body(&self) -> Result<Body, ReferenceError> {
+        let mut body = Body::new(&self.mesh_at_rest, &self.tets, |t| self.materials[t])?;
+        body.fixed.clone_from(&self.fixed);
+        Ok(body)
+    }
+}
+
+/// For each particle the lowest one that links tie it to.
+fn seats(solver: &AnySolver, particles: usize) -> Vec<u32> {
+    let mut seat: Vec<u32> = (0..).take(particles).collect();
+    let pairs: Vec<[u32; 2]> = each!(solver, solver => {
+        let links = solver.distance_schedule().map_or(0, |schedule| schedule.constraint_count());
+        (0..).take(links).map(|link| solver.distance_data(link).particles).collect()
+    });
+    // Lower numbers travel along the links until none moves: stitches make short chains.
+    loop {
+        let mut moved = false;
+        for &[a, b] in &pairs {
+            let lowest = seat[a as usize].min(seat[b as usize]);
+            for p in [a, b] {
+                moved |= seat[p as usize] != lowest;
+                seat[p as usize] = lowest;
+            }
+        }
+        if !moved {
+            return seat;
+        }
+    }
+}

@@ -1,0 +1,192 @@
+//! `cargo xtask trade`: what accuracy costs, scene by scene and knob by knob.
+//!
+//! Errors are distances from a converged solution of the same tets, by Newton's method in double precision, whose own
+//! error is stated; times are those of whole frames on one thread. The machinery is that of `incise advise`
+//! ([`incise::advise`]), so a user's scene is measured as these are.
+
+mod page;
+mod scenes;
+mod settings;
+#[cfg(test)]
+mod tests;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::anyhow;
+use incise::Scene;
+use incise::advise::{Deviation, Motion, Reference, accurate_substeps, name, newton_motion, with};
+use serde::{Deserialize, Serialize};
+
+use crate::experiment::{Backend, Cell, Experiment, ExperimentArguments};
+use scenes::{Kind, frames};
+use settings::{large_descent, large_step, settings};
+
+/// All that was measured of a scene.
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) struct SceneRow {
+    title: String,
+    tets: usize,
+    frames: u32,
+    /// The substeps that bring kappa to 0.5.
+    substeps: u32,
+    reference: ReferenceRow,
+    settings: Vec<SettingRow>,
+    /// Settings that the scene cannot be run with, and why.
+    refused: Vec<String>,
+    exchanges: Vec<ExchangeRow>,
+    /// One step a frame, iterated: the distance from the same step by Newton's method.
+    large: Vec<LargeRow>,
+}
+
+/// How well the reference is known.
+#[derive(Debug, Serialize, Deserialize)]
+struct ReferenceRow {
+    steps: [u32; 3],
+    errors: [Deviation; 3],
+    order: f64,
+    left: Deviation,
+}
+
+/// A setting: what it costs and what it is worth.
+#[derive(Debug, Serialize, Deserialize)]
+struct SettingRow {
+    curve: String,
+    name: String,
+    ms: f64,
+    error: Deviation,
+}
+
+/// Two settings of a scene that differ in one knob.
+#[derive(Debug, Serialize, Deserialize)]
+struct ExchangeRow {
+    knob: String,
+    what: String,
+    from: String,
+    to: String,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+struct LargeRow {
+    iterations: u32,
+    /// In %; of XPBD, and of descent with coarse correction where the scene allows that.
+    xpbd: Deviation,
+    descent: Option<Deviation>,
+}
+
+pub(crate) fn trade(arguments: &ExperimentArguments) -> anyhow::Result<()> {
+    experiment(arguments)?.run(arguments)
+}
+
+fn experiment(arguments: &ExperimentArguments) -> anyhow::Result<Experiment<SceneRow>> {
+    let folder = arguments.out.join("trade-scenes");
+    fs::create_dir_all(&folder)?;
+    let (quick, gpu) = (arguments.quick, arguments.backend == Backend::Gpu);
+    let cells = Kind::ALL.map(|kind| {
+        let folder: PathBuf = folder.clone();
+        Cell::new(kind.id(), move || measure(kind, &folder, quick, gpu))
+    });
+    Ok(Experiment {
+        name: "trade",
+        cells: cells.into(),
+        page: page::page,
+    })
+}
+
+fn measure(kind: Kind, folder: &Path, quick: bool, gpu: bool) -> anyhow::Result<SceneRow> {
+    let scene = kind.scene(folder, quick)?;
+    let frames = frames(quick);
+    let substeps = accurate_substeps(&scene)?;
+    let reference = Reference::newton(&scene, frames, if quick { 2 } else { 4 })?;
+    let settings = settings(substeps, gpu);
+    let mut motions: Vec<Option<Motion>> = vec![None; settings.all.len()];
+    let mut refused = vec![None; settings.all.len()];
+    for _ in 0..if quick { 1 } else { 3 } {
+        for (i, (_, spec)) in settings.all.iter().enumerate() {
+            if refused[i].is_some() {
+                continue;
+            }
+            match (
+                Motion::of(&with(&scene, spec), frames, Some(1)),
+                &mut motions[i],
+            ) {
+                (Ok(again), Some(motion)) => motion.keep_fastest(&again),
+                (Ok(motion), first) => *first = Some(motion),
+                (Err(error), _) => refused[i] = Some(format!("{}: {error}", name(spec))),
+            }
+        }
+    }
+    let rows = settings
+        .all
+        .iter()
+        .zip(&motions)
+        .filter_map(|((curve, spec), motion)| {
+            let motion = motion.as_ref()?;
+            Some(SettingRow {
+                curve: (*curve).to_owned(),
+                name: name(spec),
+                ms: motion.ms_per_frame(),
+                error: motion.deviation(&reference.motion),
+            })
+        });
+    let rows: Vec<SettingRow> = rows.collect();
+    let exchanges = settings.exchanges.iter().map(|exchange| ExchangeRow {
+        knob: exchange.knob.to_owned(),
+        what: exchange.what.to_owned(),
+        from: name(&exchange.from),
+        to: name(&exchange.to),
+    });
+    Ok(SceneRow {
+        title: kind.title(),
+        tets: tets(&scene)?,
+        frames,
+        substeps,
+        reference: ReferenceRow {
+            steps: reference.steps,
+            errors: reference.errors,
+            order: reference.order,
+            left: reference.left,
+        },
+        exchanges: exchanges.collect(),
+        settings: rows,
+        refused: refused.into_iter().flatten().collect(),
+        large: large(&scene, frames, quick)?,
+    })
+}
+
+fn tets(scene: &Scene) -> anyhow::Result<usize> {
+    Ok(incise::Simulation::with_threads(scene, 1)?
+        .mesh()
+        .tets
+        .len())
+}
+
+/// How far one step a frame, iterated, is from the same step by Newton's method.
+fn large(scene: &Scene, frames: u32, quick: bool) -> anyhow::Result<Vec<LargeRow>> {
+    let newton = newton_motion(scene, frames, 1)?;
+    let counts: &[u32] = if quick {
+        &[1, 16, 256]
+    } else {
+        &[1, 4, 16, 64, 256, 1024]
+    };
+    let row = |&iterations: &u32| {
+        let motion = |spec| Motion::of(&with(scene, &spec), frames, Some(1));
+        let xpbd = motion(large_step(iterations))?;
+        // Rounds of descent are dear, and few are enough. Scenes with links cannot be run with it.
+        let descent = if iterations <= 16 && scene.link.is_empty() {
+            Some(motion(large_descent(iterations))?.deviation(&newton))
+        } else {
+            None
+        };
+        Ok(LargeRow {
+            iterations,
+            xpbd: xpbd.deviation(&newton),
+            descent,
+        })
+    };
+    let rows = counts
+        .iter()
+        .map(row)
+        .collect::<Result<Vec<_>, incise::Error>>();
+    rows.map_err(|error| anyhow!(error))
+}

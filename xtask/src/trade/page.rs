@@ -1,0 +1,319 @@
+//! The page of `cargo xtask trade`, made of the rows alone: sentences by knob, and for each scene a plot, the settings
+//! that no other one dominates, and all of them.
+
+use incise::advise::non_dominated;
+
+use super::{ExchangeRow, SceneRow, SettingRow};
+use crate::experiment::{Axis, Page, Part, Plot, Series, Style, Table};
+use crate::solver::digits;
+
+/// Errors of more than this, in % of the body's size, are no motion that anybody wants; they are not drawn.
+const USELESS: f64 = 100.0;
+
+pub(super) fn page(rows: &[SceneRow]) -> anyhow::Result<Page> {
+    let mut parts = vec![Part::Text(INTRODUCTION.to_owned()), references(rows)];
+    parts.push(Part::Text(format!(
+        "## What each knob buys\n\nBy all scenes: the median, and in brackets the smallest and the largest. n is the number of substeps that brings kappa to 0.5 (`substeps = \"auto\"`). Errors of {USELESS} % and more count as lost.\n\n{}\n",
+        knobs(rows).join("\n")
+    )));
+    parts.push(Part::Text("## One large step, iterated".to_owned()));
+    parts.push(Part::Text(large_step(rows)));
+    for row in rows.iter().filter(|row| !row.large.is_empty()) {
+        parts.push(Part::Plot(large_plot(row)));
+    }
+    for row in rows {
+        scene(row, &mut parts);
+    }
+    Ok(Page {
+        title: "Speed and accuracy".to_owned(),
+        parts,
+    })
+}
+
+const INTRODUCTION: &str = "Errors of positions are root mean square distances of all particles from where they should \
+be, in % of the longest side of the body; *largest* is the largest of all frames, *at the end* that of the last one. The \
+error of the volume is the largest of all frames, in % of the volume at rest. Where particles should be is the solution \
+of the same tets (what the mesh does wrong does not count) by Newton's method with sparse Cholesky factorizations in \
+double precision, implicit Euler at three step sizes, extrapolated to small steps. Times are of whole frames of 1/60 s on \
+one thread, or on a GPU with the way back of the positions; settings take turns for three rounds, and each frame counts \
+with its fastest time. A press is a prescribed motion of held particles and a cut is made before anything moves, as the \
+reference knows no contacts and no later cuts; the layers are two bodies stitched together by links, for the reference \
+one body.";
+
+/// What is known of the references.
+fn references(rows: &[SceneRow]) -> Part {
+    let mut table = Table::new(
+        "The references: what may be left of their own error, and the order at which implicit Euler converges to them",
+        [
+            "scene",
+            "tets",
+            "n",
+            "steps a frame",
+            "errors of the three runs in %",
+            "order",
+            "left, positions in %",
+            "left, volume in %",
+        ],
+    );
+    for row in rows {
+        let reference = &row.reference;
+        table.push([
+            row.title.clone(),
+            row.tets.to_string(),
+            row.substeps.to_string(),
+            reference.steps.map(|n| n.to_string()).join(", "),
+            reference.errors.map(|e| digits(e.largest)).join(", "),
+            digits(reference.order),
+            digits(reference.left.largest),
+            digits(reference.left.volume),
+        ]);
+    }
+    Part::Table(table)
+}
+
+/// A sentence for each exchange, in the order of the first scene, with a heading for each knob.
+fn knobs(rows: &[SceneRow]) -> Vec<String> {
+    let mut sentences: Vec<String> = Vec::new();
+    let mut last = "";
+    for exchange in rows.first().map_or(&[][..], |row| &row.exchanges) {
+        let Some(sentence) = sentence(rows, exchange) else {
+            continue;
+        };
+        if last != exchange.knob {
+            sentences.push(format!("\n**{}**\n", exchange.knob));
+            last = &exchange.knob;
+        }
+        sentences.push(sentence);
+    }
+    sentences
+}
+
+/// What turning a knob does in all scenes; `None` if no scene has both settings.
+pub(super) fn sentence(rows: &[SceneRow], exchange: &ExchangeRow) -> Option<String> {
+    let (mut errors, mut times) = (Vec::new(), Vec::new());
+    let (mut lost, mut saved) = (0, 0);
+    for row in rows {
+        let same = row
+            .exchanges
+            .iter()
+            .find(|other| other.what == exchange.what);
+        let ends = same.and_then(|e| Some((find(row, &e.from)?, find(row, &e.to)?)));
+        let Some((from, to)) = ends else { continue };
+        times.push(to.ms / from.ms);
+        match (from.error.largest < USELESS, to.error.largest < USELESS) {
+            (true, true) => errors.push(to.error.largest / from.error.largest),
+            (true, false) => lost += 1,
+            (false, true) => saved += 1,
+            (false, false) => {}
+        }
+    }
+    if times.is_empty() {
+        return None;
+    }
+    let mut text = format!("- {}:", exchange.what);
+    if let Some([low, median, high]) = spread(&mut errors) {
+        let verb = match median {
+            ..0.98 => "lowers the error to",
+            ..1.02 => "leaves the error at",
+            _ => "raises the error to",
+        };
+        text += &format!(
+            " {verb} {} times ({} to {})",
+            digits(median),
+            digits(low),
+            digits(high)
+        );
+    } else {
+        text += " no scene has a usable motion before and after";
+    }
+    if let Some([low, median, high]) = spread(&mut times) {
+        text += &format!(
+            ", for {} times the time ({} to {})",
+            digits(median),
+            digits(low),
+            digits(high)
+        );
+    }
+    if lost > 0 {
+        text += &format!("; {lost} of {} scenes are lost", times.len());
+    }
+    if saved > 0 {
+        text += &format!("; {saved} of {} scenes are saved", times.len());
+    }
+    Some(text + ".")
+}
+
+fn find<'a>(row: &'a SceneRow, name: &str) -> Option<&'a SettingRow> {
+    row.settings.iter().find(|setting| setting.name == name)
+}
+
+/// Smallest, median, largest.
+fn spread(values: &mut [f64]) -> Option<[f64; 3]> {
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    let middle = |n: usize| 0.5 * (values[(n - 1) / 2] + values[n / 2]);
+    (n > 0).then(|| [values[0], middle(n), values[n - 1]])
+}
+
+/// What became of one step a frame, by its last rows.
+fn large_step(rows: &[SceneRow]) -> String {
+    let mut text = "XPBD drops a part of the equations of motion, so with one substep a frame its iterations do not lead to \
+        the solution of that step; descent with coarse correction solves the same step. Distances from the solution of \
+        the step by Newton's method, double precision, nothing softened:\n\n"
+        .to_owned();
+    for row in rows {
+        let Some(last) = row.large.last() else {
+            continue;
+        };
+        let first = &row.large[0];
+        let descent = row
+            .large
+            .iter()
+            .rev()
+            .find_map(|l| Some((l.iterations, l.descent?)));
+        text += &format!(
+            "- {}: XPBD is {} % off after {} iteration and {} % after {}",
+            row.title,
+            digits(first.xpbd.largest),
+            first.iterations,
+            digits(last.xpbd.largest),
+            last.iterations
+        );
+        if let Some((rounds, descent)) = descent {
+            text += &format!(
+                "; descent is {} % off after {rounds} rounds",
+                digits(descent.largest)
+            );
+        }
+        text += ".\n";
+    }
+    text
+}
+
+fn large_plot(row: &SceneRow) -> Plot {
+    let points = |error: fn(&super::LargeRow) -> Option<f64>| {
+        let points = row.large.iter();
+        points
+            .filter_map(|l| Some((f64::from(l.iterations), error(l)?)))
+            .collect()
+    };
+    let series = |name: &str, points| Series {
+        name: name.to_owned(),
+        points,
+        labels: Vec::new(),
+        style: Style::Both,
+    };
+    let mut all = vec![series("XPBD", points(|l| Some(l.xpbd.largest)))];
+    let descent: Vec<_> = points(|l| Some(l.descent?.largest));
+    if !descent.is_empty() {
+        all.push(series("descent with coarse correction", descent));
+    }
+    Plot {
+        title: format!("{}: one step a frame", row.title),
+        x: Axis::log("iterations"),
+        y: Axis::log("distance from the step by Newton's method in %"),
+        series: all,
+    }
+}
+
+fn scene(row: &SceneRow, parts: &mut Vec<Part>) {
+    parts.push(Part::Text(format!("## {}", row.title)));
+    let front = front(row);
+    parts.push(Part::Plot(plot(row, &front)));
+    let mut table = Table::new(
+        format!(
+            "Settings that no other one dominates ({} tets, {} frames, n = {})",
+            row.tets, row.frames, row.substeps
+        ),
+        HEADER,
+    );
+    for &i in &front {
+        table.push(cells(&row.settings[i]));
+    }
+    parts.push(Part::Table(table));
+    let mut table = Table::new("All settings", HEADER);
+    for setting in &row.settings {
+        table.push(cells(setting));
+    }
+    parts.push(Part::Table(table));
+    if !row.refused.is_empty() {
+        let refused = row.refused.join("\n- ");
+        parts.push(Part::Text(format!(
+            "This scene cannot be run with:\n\n- {refused}\n"
+        )));
+    }
+}
+
+/// Errors below what is left of the reference's are no better than that.
+pub(super) fn front(row: &SceneRow) -> Vec<usize> {
+    let floor = row.reference.left.largest;
+    let point = |s: &SettingRow| [s.ms, s.error.largest.max(floor)];
+    let points: Vec<[f64; 2]> = row.settings.iter().map(point).collect();
+    non_dominated(&points)
+}
+
+const HEADER: [&str; 5] = [
+    "setting",
+    "ms a frame",
+    "error, largest, in %",
+    "at the end",
+    "of the volume",
+];
+
+fn cells(setting: &SettingRow) -> [String; 5] {
+    let error = setting.error;
+    [
+        setting.name.clone(),
+        digits(setting.ms),
+        digits(error.largest),
+        digits(error.end),
+        digits(error.volume),
+    ]
+}
+
+fn plot(row: &SceneRow, front: &[usize]) -> Plot {
+    let drawn = |s: &&SettingRow| s.error.largest < USELESS;
+    let point = |s: &SettingRow| (s.ms, s.error.largest);
+    let mut curves: Vec<&str> = Vec::new();
+    for setting in &row.settings {
+        if !curves.contains(&setting.curve.as_str()) {
+            curves.push(&setting.curve);
+        }
+    }
+    let useful = |&&i: &&usize| row.settings[i].error.largest < USELESS;
+    let front: Vec<&SettingRow> = front
+        .iter()
+        .filter(useful)
+        .map(|&i| &row.settings[i])
+        .collect();
+    let mut series = vec![Series {
+        name: "not dominated".to_owned(),
+        points: front.iter().map(|s| point(s)).collect(),
+        labels: front.iter().map(|s| s.name.clone()).collect(),
+        style: Style::Both,
+    }];
+    for curve in curves {
+        let points = row
+            .settings
+            .iter()
+            .filter(|s| s.curve == curve)
+            .filter(drawn);
+        series.push(Series {
+            name: curve.to_owned(),
+            points: points.map(point).collect(),
+            labels: Vec::new(),
+            style: if curve.starts_with("substeps") {
+                Style::Both
+            } else {
+                Style::Points
+            },
+        });
+    }
+    series.retain(|series| !series.points.is_empty());
+    Plot {
+        title: row.title.clone(),
+        x: Axis::log("ms a frame"),
+        y: Axis::log("largest error of positions in % of the size"),
+        series,
+    }
+}

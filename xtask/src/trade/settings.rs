@@ -1,0 +1,306 @@
+//! The settings that are measured for every scene, and the pairs of them that differ in one knob.
+//!
+//! Around the default with `n` substeps, the number that brings kappa to 0.5: each knob alone, and substeps with each
+//! method.
+
+use incise::scene::{Backend, Form, Method, Precision, SolverSpec, Substeps};
+
+/// The settings that are compared, with the knob that each turns: the curve it belongs to.
+pub(super) struct Settings {
+    pub(super) all: Vec<(&'static str, SolverSpec)>,
+    pub(super) exchanges: Vec<Exchange>,
+}
+
+/// Two settings that differ in one knob.
+pub(super) struct Exchange {
+    pub(super) knob: &'static str,
+    /// What is done, as the start of a sentence.
+    pub(super) what: &'static str,
+    pub(super) from: SolverSpec,
+    pub(super) to: SolverSpec,
+}
+
+pub(super) fn settings(substeps: u32, gpu: bool) -> Settings {
+    let of = |method, eighths: u32, iterations| SolverSpec {
+        time_step: 1.0 / 60.0,
+        substeps: Substeps::Fixed((substeps * eighths).div_ceil(8)),
+        iterations,
+        ..SolverSpec::of(method)
+    };
+    let xpbd = |eighths, iterations| of(Method::GaussSeidel, eighths, iterations);
+    let double = |spec: SolverSpec| SolverSpec {
+        precision: Precision::F64,
+        ..spec
+    };
+    let clustered = |name: &str| SolverSpec {
+        clustering: name.to_owned(),
+        ..xpbd(8, 1)
+    };
+    let relaxed = |relaxation| SolverSpec {
+        relaxation,
+        ..xpbd(8, 1)
+    };
+    let sequential = |eighths| SolverSpec {
+        form: Form::Sequential,
+        ..xpbd(eighths, 1)
+    };
+    let jacobi = |eighths, iterations, relaxation| SolverSpec {
+        relaxation,
+        ..of(Method::Jacobi, eighths, iterations)
+    };
+    let chebyshev = |eighths, iterations| SolverSpec {
+        spectral_radius: 0.9,
+        ..of(Method::Chebyshev, eighths, iterations)
+    };
+    let descent = |substeps: u32, iterations, relaxation| SolverSpec {
+        substeps: Substeps::Fixed(substeps),
+        relaxation,
+        ..of(Method::Descent, 8, iterations)
+    };
+    let coarse = |substeps: u32| SolverSpec {
+        coarse: true,
+        ..double(descent(substeps, 4, 1.0))
+    };
+    let unsoftened = |spec: SolverSpec| SolverSpec {
+        kappa_limit: f64::INFINITY,
+        ..spec
+    };
+    let on_gpu = |eighths| SolverSpec {
+        backend: Backend::Gpu,
+        ..xpbd(eighths, 1)
+    };
+
+    let mut all: Vec<(&'static str, SolverSpec)> = Vec::new();
+    let mut add = |curve, specs: Vec<SolverSpec>| {
+        for spec in specs {
+            if !all.iter().any(|(_, known)| *known == spec) {
+                all.push((curve, spec));
+            }
+        }
+    };
+    let counts = [1, 2, 4, 8, 16, 32, 64];
+    add(
+        "substeps, f32",
+        counts.iter().map(|&e| xpbd(e, 1)).collect(),
+    );
+    let counts = [4, 8, 16, 32, 64, 128];
+    add(
+        "substeps, f64",
+        counts.iter().map(|&e| double(xpbd(e, 1))).collect(),
+    );
+    let counts = [(8, 2), (8, 4), (8, 16), (16, 2), (16, 4), (32, 4)];
+    add(
+        "iterations",
+        counts.iter().map(|&(e, i)| xpbd(e, i)).collect(),
+    );
+    add("relaxation", [0.5, 0.8, 0.9, 1.1, 1.3].map(relaxed).into());
+    let clusterings = [
+        "none",
+        "serial:5",
+        "serial:20",
+        "serial:30",
+        "greedy-k:10",
+        "pressure:10",
+    ];
+    add("clusters", clusterings.map(clustered).into());
+    add("the paper's form", [8, 32, 64].map(sequential).into());
+    add(
+        "jacobi",
+        vec![
+            jacobi(32, 1, 1.0),
+            jacobi(64, 1, 1.0),
+            jacobi(8, 4, 0.1),
+            jacobi(8, 20, 0.1),
+        ],
+    );
+    add(
+        "chebyshev",
+        vec![chebyshev(8, 12), chebyshev(8, 20), chebyshev(16, 20)],
+    );
+    add(
+        "descent",
+        vec![
+            descent(1, 20, 1.0),
+            descent(1, 100, 1.0),
+            descent(1, 100, 1.9),
+            descent(4, 20, 1.0),
+            descent(4, 100, 1.9),
+        ],
+    );
+    add(
+        "descent, coarse correction, f64",
+        [1, 2, 4, 8].map(coarse).into(),
+    );
+    add(
+        "not softened",
+        [2, 4, 8].map(|e| unsoftened(xpbd(e, 1))).into(),
+    );
+    if gpu {
+        add("gpu", [4, 8, 16, 32].map(on_gpu).into());
+    }
+
+    let exchange = |knob, what, from: &SolverSpec, to: &SolverSpec| Exchange {
+        knob,
+        what,
+        from: from.clone(),
+        to: to.clone(),
+    };
+    let mut exchanges = vec![
+        exchange(
+            "substeps",
+            "Doubling the substeps from n/2 to n",
+            &xpbd(4, 1),
+            &xpbd(8, 1),
+        ),
+        exchange(
+            "substeps",
+            "Doubling the substeps from n to 2 n",
+            &xpbd(8, 1),
+            &xpbd(16, 1),
+        ),
+        exchange(
+            "substeps",
+            "Doubling the substeps from 2 n to 4 n",
+            &xpbd(16, 1),
+            &xpbd(32, 1),
+        ),
+        exchange(
+            "substeps",
+            "Doubling the substeps from 4 n to 8 n",
+            &xpbd(32, 1),
+            &xpbd(64, 1),
+        ),
+        exchange(
+            "iterations",
+            "Going from 1 to 2 iterations at n substeps",
+            &xpbd(8, 1),
+            &xpbd(8, 2),
+        ),
+        exchange(
+            "iterations",
+            "Going from 1 to 4 iterations at n substeps",
+            &xpbd(8, 1),
+            &xpbd(8, 4),
+        ),
+        exchange(
+            "iterations",
+            "Taking n substeps of 4 iterations in place of 4 n of 1",
+            &xpbd(32, 1),
+            &xpbd(8, 4),
+        ),
+        exchange(
+            "relaxation",
+            "Lowering the relaxation from 1 to 0.8",
+            &xpbd(8, 1),
+            &relaxed(0.8),
+        ),
+        exchange(
+            "relaxation",
+            "Raising the relaxation from 1 to 1.1",
+            &xpbd(8, 1),
+            &relaxed(1.1),
+        ),
+        exchange(
+            "clusters",
+            "Clusters of 10 in place of none",
+            &clustered("none"),
+            &xpbd(8, 1),
+        ),
+        exchange(
+            "clusters",
+            "Clusters of 30 in place of 10",
+            &xpbd(8, 1),
+            &clustered("serial:30"),
+        ),
+        exchange(
+            "clusters",
+            "Clusters by pressure in place of serial ones",
+            &xpbd(8, 1),
+            &clustered("pressure:10"),
+        ),
+        exchange(
+            "form",
+            "The paper's form in place of the block form",
+            &xpbd(8, 1),
+            &sequential(8),
+        ),
+        exchange(
+            "precision",
+            "Double precision at n substeps",
+            &xpbd(8, 1),
+            &double(xpbd(8, 1)),
+        ),
+        exchange(
+            "precision",
+            "Double precision at 8 n substeps",
+            &xpbd(64, 1),
+            &double(xpbd(64, 1)),
+        ),
+        exchange(
+            "softening",
+            "Not softening above kappa 1 at n/2 substeps",
+            &xpbd(4, 1),
+            &unsoftened(xpbd(4, 1)),
+        ),
+        exchange(
+            "method",
+            "Jacobi (relaxation 1) in place of Gauss-Seidel at 8 n substeps",
+            &xpbd(64, 1),
+            &jacobi(64, 1, 1.0),
+        ),
+        exchange(
+            "method",
+            "Chebyshev with 20 iterations in place of Gauss-Seidel with 1",
+            &xpbd(8, 1),
+            &chebyshev(8, 20),
+        ),
+        exchange(
+            "method",
+            "Descent, 1 step of 100 sweeps, in place of Gauss-Seidel at n substeps",
+            &xpbd(8, 1),
+            &descent(1, 100, 1.9),
+        ),
+        exchange(
+            "method",
+            "Descent with coarse correction in 4 steps in place of Gauss-Seidel at n substeps",
+            &xpbd(8, 1),
+            &coarse(4),
+        ),
+        exchange(
+            "method",
+            "Doubling the steps of descent with coarse correction from 4 to 8",
+            &coarse(4),
+            &coarse(8),
+        ),
+    ];
+    if gpu {
+        exchanges.push(exchange(
+            "backend",
+            "The GPU in place of a thread of the processor",
+            &xpbd(8, 1),
+            &on_gpu(8),
+        ));
+    }
+    Settings { all, exchanges }
+}
+
+/// One substep of as many iterations, neither softened nor in single precision: nothing but the iteration is tested.
+pub(super) fn large_step(iterations: u32) -> SolverSpec {
+    SolverSpec {
+        time_step: 1.0 / 60.0,
+        substeps: Substeps::Fixed(1),
+        iterations,
+        precision: Precision::F64,
+        kappa_limit: f64::INFINITY,
+        ..SolverSpec::of(Method::GaussSeidel)
+    }
+}
+
+/// The same step by descent, each sweep with a coarse correction.
+pub(super) fn large_descent(iterations: u32) -> SolverSpec {
+    SolverSpec {
+        method: Method::Descent,
+        coarse: true,
+        ..large_step(iterations)
+    }
+}
