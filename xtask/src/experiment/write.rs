@@ -64,7 +64,7 @@ fn index(out: &Path) -> anyhow::Result<()> {
     for path in names {
         let text = fs::read_to_string(&path)?;
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
-        write!(body, "<section id=\"{name}\">\n")?;
+        writeln!(body, "<section id=\"{name}\">")?;
         html::push_html(&mut body, Parser::new_ext(&text, Options::ENABLE_TABLES));
         body += "</section>\n";
     }

@@ -155,6 +155,9 @@ fn direction(n: usize) -> DVec3 {
     DVec3::new(radius * angle.cos(), radius * angle.sin(), z)
 }
 
+/// One of the spectra.
+type Pick = fn(&Spectra) -> &Vec<(f64, f64)>;
+
 fn page(rows: &[Row]) -> anyhow::Result<Page> {
     let mut parts = vec![Part::Text(
         "The step of Table 3 (see there), in all three setups. The paper does not say of which sequence its spectrum is, so there are \
@@ -178,7 +181,7 @@ fn page(rows: &[Row]) -> anyhow::Result<Page> {
                 continue;
             };
             let iterations = first.iterations;
-            let quantities: [(&str, &str, fn(&Spectra) -> &Vec<(f64, f64)>); 2] = [
+            let quantities: [(&str, &str, Pick); 2] = [
                 ("space", "waves on the length of the body", |s| &s.space),
                 ("numbers", "cycles a particle", |s| &s.index),
             ];

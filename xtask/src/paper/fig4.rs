@@ -89,6 +89,9 @@ fn measure(
     })
 }
 
+/// What is plotted of a coloring.
+type Quantity = fn(&Colored) -> f64;
+
 fn page(rows: &[Row]) -> anyhow::Result<Page> {
     let mut parts = vec![Part::Text(
         "Figure 4 prints no numbers, only curves; here are ours in its plots. One thread, the shortest of up to three times in \
@@ -101,7 +104,7 @@ fn page(rows: &[Row]) -> anyhow::Result<Page> {
             .iter()
             .filter(|row| row.clustering == clustering)
             .collect();
-        let quantities: [(&str, bool, fn(&Colored) -> f64); 2] = [
+        let quantities: [(&str, bool, Quantity); 2] = [
             ("ms to color", true, |c| c.ms),
             ("colors", false, |c| c.colors as f64),
         ];

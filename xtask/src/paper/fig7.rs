@@ -46,6 +46,9 @@ pub(super) fn experiment(arguments: &ExperimentArguments) -> Experiment<Row> {
     }
 }
 
+/// What is plotted of a point.
+type Quantity = fn(&Point) -> f64;
+
 fn page(rows: &[Row]) -> anyhow::Result<Page> {
     let mut parts = vec![Part::Text(
         "The step of Table 3 (see there), in all three setups, up to the paper's 500 iterations of the first frame; each point is a \
@@ -55,7 +58,7 @@ fn page(rows: &[Row]) -> anyhow::Result<Page> {
     )];
     for setup in Setup::ALL {
         let of_this: Vec<&Row> = rows.iter().filter(|row| row.setup == setup).collect();
-        let quantities: [(&str, fn(&Point) -> f64); 2] = [
+        let quantities: [(&str, Quantity); 2] = [
             ("dual residual", |p| p.dual),
             ("force, relative", |p| p.force),
         ];

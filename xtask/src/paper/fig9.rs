@@ -124,7 +124,7 @@ fn page(rows: &[Row]) -> anyhow::Result<Page> {
             };
             let place = printed::FIGURE_9_ALGORITHMS
                 .iter()
-                .position(|name| known(&name));
+                .position(known);
             let mut cells = vec![
                 row.body.clone(),
                 row.clustering.clone(),

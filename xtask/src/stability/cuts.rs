@@ -235,10 +235,10 @@ impl Watch {
             outcome.not_finite = Some(outcome.frames);
             return Ok(false);
         }
-        let [start, unit] = *self.unit.get_or_insert_with(|| {
+        let [start, unit] = *self.unit.get_or_insert(
             // A beam of 62.5 kg and 1 m.
-            [sum, 62.5 * 9.81]
-        });
+            [sum, 62.5 * 9.81],
+        );
         outcome.energy_rise = outcome.energy_rise.max((sum - start) / unit);
         outcome.volume = 1.0 + volume;
         outcome.inverted = report.inverted_tets.unwrap_or(0);

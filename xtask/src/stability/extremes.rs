@@ -99,7 +99,7 @@ pub(crate) fn extremes(quick: bool) -> anyhow::Result<Vec<Extreme>> {
     for ratio in [1e-6, 1e-3, 1e3, 1e6] {
         let name = format!("far half of {ratio:e} times the mass");
         add(format!("mass-{ratio:e}"), name, &|e| {
-            e.density_ratio = ratio
+            e.density_ratio = ratio;
         });
     }
     add("far".to_owned(), "1e4 m from the origin".to_owned(), &|e| {
@@ -123,7 +123,7 @@ pub(crate) fn extremes(quick: bool) -> anyhow::Result<Vec<Extreme>> {
         let mesh = with_sliver(&plain.mesh, thickness)?;
         let name = format!("a sliver of {thickness:e} of its volume");
         add(format!("sliver-{thickness:e}"), name, &|e| {
-            e.mesh = mesh.clone()
+            e.mesh = mesh.clone();
         });
     }
     add(

@@ -144,9 +144,7 @@ pub fn solver_table(spec: &SolverSpec) -> Result<String, Error> {
     let defaults = toml::Table::try_from(SolverSpec::of(spec.method)).map_err(failed)?;
     let mut keys = toml::Table::try_from(spec).map_err(failed)?;
     let always = ["method", "substeps", "iterations", "precision"];
-    keys.retain(|key, value| {
-        always.iter().any(|known| *known == key) || defaults.get(key) != Some(value)
-    });
+    keys.retain(|key, value| always.contains(&key) || defaults.get(key) != Some(value));
     Ok(format!("[solver]\n{keys}"))
 }
 

@@ -100,7 +100,7 @@ fn stitched_layers_move_as_one_body() {
     let [whole, layer] = [([4, 2, 2], size), ([4, 2, 1], DVec3::new(1.0, 0.25, 0.125))]
         .map(|(cells, size)| kuhn_box(cells, size));
     for (name, mesh) in [("whole.vtk", &whole), ("layer.vtk", &layer)] {
-        io::write(&folder.path().join(name), mesh).unwrap();
+        io::write(folder.path().join(name), mesh).unwrap();
     }
     let body = |name: &str, z: f64| {
         let path = folder.path().join(name);
