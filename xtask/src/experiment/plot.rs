@@ -53,9 +53,11 @@ pub(crate) enum Style {
     Both,
 }
 
-const SIZE: (u32, u32) = (800, 480);
-/// Eight colors that people who see colors differently tell apart (Okabe and Ito 2008), black last.
-const COLORS: [RGBColor; 8] = [
+const SIZE: (u32, u32) = (960, 480);
+/// Pixels at the right that the key takes.
+const KEY: u32 = 210;
+/// Eight colors that people who see colors differently tell apart (Okabe and Ito 2008), then some more.
+const COLORS: [RGBColor; 12] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
@@ -64,6 +66,10 @@ const COLORS: [RGBColor; 8] = [
     RGBColor(86, 180, 233),
     RGBColor(150, 140, 20),
     RGBColor(0, 0, 0),
+    RGBColor(140, 86, 75),
+    RGBColor(90, 90, 200),
+    RGBColor(120, 190, 60),
+    RGBColor(150, 150, 150),
 ];
 
 impl Plot {
@@ -127,6 +133,22 @@ impl Plot {
         (if low == 0.0 { 0.0 } else { low - more }, high + more)
     }
 
+    /// The names of the curves, beside the plot.
+    fn key(
+        &self,
+        root: &DrawingArea<SVGBackend<'_>, Shift>,
+    ) -> Result<(), DrawingAreaErrorKind<std::io::Error>> {
+        let left = i32::try_from(SIZE.0 - KEY).unwrap_or(0) + 8;
+        let named = self.series.iter().zip(COLORS.iter().cycle());
+        for ((series, &color), y) in named.zip((48..).step_by(18)) {
+            let corners = [(left, y - 2), (left + 16, y + 2)];
+            root.draw(&Rectangle::new(corners, color.filled()))?;
+            let font = ("sans-serif", FONT + 1).into_font();
+            root.draw(&Text::new(series.name.clone(), (left + 22, y - 6), font))?;
+        }
+        Ok(())
+    }
+
     fn draw<X, Y>(
         &self,
         root: &DrawingArea<SVGBackend<'_>, Shift>,
@@ -143,6 +165,7 @@ impl Plot {
         let mut chart = ChartBuilder::on(root)
             .caption(&self.title, ("sans-serif", 18))
             .margin(12)
+            .margin_right(KEY)
             .x_label_area_size(44)
             .y_label_area_size(72)
             .build_cartesian_2d(x, y)
@@ -157,6 +180,7 @@ impl Plot {
             .y_label_formatter(&|v| number(*v))
             .draw()
             .map_err(failed)?;
+        let mut words = Words::default();
         for (series, &color) in self.series.iter().zip(COLORS.iter().cycle()) {
             let points = || series.points.iter().copied().filter(|&p| self.shows(p));
             if series.style != Style::Points {
@@ -169,30 +193,42 @@ impl Plot {
                 chart.draw_series(dots).map_err(failed)?;
             }
             let labelled = series.points.iter().zip(&series.labels);
-            let words = labelled
-                .filter(|(p, _)| self.shows(**p))
-                .map(|(&p, label)| {
-                    EmptyElement::at(p)
-                        + Text::new(label.clone(), (5, -12), ("sans-serif", 11).into_font())
-                });
-            chart.draw_series(words).map_err(failed)?;
-            // The key, by an element that is not seen.
-            chart
-                .draw_series(std::iter::empty::<Circle<(f64, f64), i32>>())
-                .map_err(failed)?
-                .label(&series.name)
-                .legend(move |(x, y)| {
-                    PathElement::new(vec![(x, y), (x + 16, y)], color.stroke_width(3))
-                });
+            for (&point, label) in labelled.filter(|(p, _)| self.shows(**p)) {
+                let at = chart.backend_coord(&point);
+                if let Some(free) = words.place(at, label) {
+                    let font = ("sans-serif", FONT).into_font();
+                    root.draw(&Text::new(label.clone(), free, font))
+                        .map_err(failed)?;
+                }
+            }
         }
-        chart
-            .configure_series_labels()
-            .background_style(WHITE.mix(0.8))
-            .border_style(BLACK.mix(0.2))
-            .label_font(("sans-serif", 12))
-            .draw()
-            .map_err(failed)?;
+        self.key(root).map_err(failed)?;
         Ok(())
+    }
+}
+
+/// Height of words in pixels.
+const FONT: i32 = 11;
+
+/// Where words stand, so that none is written over another.
+#[derive(Default)]
+struct Words(Vec<[i32; 4]>);
+
+impl Words {
+    /// A free place for words at a point, above it or below; none where both are taken.
+    fn place(&mut self, (x, y): (i32, i32), label: &str) -> Option<(i32, i32)> {
+        let width = i32::try_from(label.chars().count()).unwrap_or(i32::MAX / 8) * 6;
+        let places = [(x + 5, y - 13), (x + 5, y + 4)];
+        let free = places.into_iter().find(|&(x, y)| {
+            let clear = |&[left, right, top, bottom]: &[i32; 4]| {
+                x >= right || x + width <= left || y >= bottom || y + FONT <= top
+            };
+            self.0.iter().all(clear)
+        });
+        if let Some((x, y)) = free {
+            self.0.push([x, x + width, y, y + FONT]);
+        }
+        free
     }
 }
 
@@ -205,5 +241,25 @@ fn number(v: f64) -> String {
     } else {
         let digits = if v.abs() < 0.1 { 3 } else { 2 };
         format!("{v:.digits$}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_stand_above_below_or_not_at_all() {
+        let mut words = Words::default();
+        assert_eq!(words.place((100, 100), "four"), Some((105, 87)));
+        assert_eq!(words.place((110, 100), "four"), Some((115, 104)));
+        assert_eq!(words.place((112, 100), "four"), None);
+        assert_eq!(words.place((140, 100), "four"), Some((145, 87)));
+    }
+
+    #[test]
+    fn numbers_at_axes_are_short() {
+        let words = [0.0, 0.05, 0.5, 2.0, 12.3, 1e-7, 2e6].map(number);
+        assert_eq!(words, ["0", "0.050", "0.50", "2", "12", "1e-7", "2e6"]);
     }
 }

@@ -122,9 +122,7 @@ fn page(rows: &[Row]) -> anyhow::Result<Page> {
             let known = |name: &&str| {
                 name == algorithm || algorithm.starts_with("greedy") && **name == *"greedy"
             };
-            let place = printed::FIGURE_9_ALGORITHMS
-                .iter()
-                .position(known);
+            let place = printed::FIGURE_9_ALGORITHMS.iter().position(known);
             let mut cells = vec![
                 row.body.clone(),
                 row.clustering.clone(),
