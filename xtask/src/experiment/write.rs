@@ -19,8 +19,8 @@ pub(super) fn write<R: Serialize>(
     machines: &[Machine],
     rows: &[R],
 ) -> anyhow::Result<()> {
-    let command: Vec<String> = std::env::args().skip(1).collect();
-    let mut text = format!("# {}\n\n`cargo xtask {}`", page.title, command.join(" "));
+    let command = command(std::env::args().skip(1));
+    let mut text = format!("# {}\n\n`cargo xtask {command}`", page.title);
     for machine in machines {
         write!(text, "; {}", machine.describe())?;
     }
@@ -51,6 +51,24 @@ pub(super) fn write<R: Serialize>(
         &serde_json::to_string_pretty(rows)?,
     )?;
     index(out)
+}
+
+/// The command as anybody would give it: without the folder that it writes to, and with names in place of other paths.
+fn command(mut words: impl Iterator<Item = String>) -> String {
+    let mut command = Vec::new();
+    while let Some(word) = words.next() {
+        match word.as_str() {
+            "--out" => {
+                words.next();
+            }
+            "--models" | "--peers" | "--python" => {
+                words.next();
+                command.push(format!("{word} {}", word[2..].to_uppercase()));
+            }
+            _ => command.push(word),
+        }
+    }
+    command.join(" ")
 }
 
 /// One page of all pages of a folder.
@@ -87,4 +105,18 @@ pub(super) fn replace(path: &Path, text: &str) -> anyhow::Result<()> {
     fs::write(&beside, text)
         .and_then(|()| fs::rename(&beside, path))
         .with_context(|| format!("cannot write {}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::command;
+
+    #[test]
+    fn commands_name_no_place_on_this_machine() {
+        let words = "paper all --models /data/meshes --out /tmp/x --quick".split(' ');
+        assert_eq!(
+            command(words.map(str::to_owned)),
+            "paper all --models MODELS --quick"
+        );
+    }
 }
