@@ -26,7 +26,7 @@ mod tests;
 
 use clap::{Args, ValueEnum};
 
-use crate::experiment::ExperimentArguments;
+use crate::experiment::{Backend, ExperimentArguments};
 
 #[derive(Debug, Args)]
 pub(crate) struct PaperArguments {
@@ -70,10 +70,15 @@ pub(crate) enum What {
 const PREFIX: &str = "paper-";
 
 pub(crate) fn paper(arguments: &PaperArguments) -> anyhow::Result<()> {
+    anyhow::ensure!(
+        arguments.experiment.backend == Backend::Cpu,
+        "the paper's tables and figures are measured on the processor; for colorings, iterations and frames on a GPU see cargo \
+         xtask gpu-sweep"
+    );
     run(arguments.what, &arguments.experiment)
 }
 
-/// Runs the experiment of a table or figure, on the processor whatever the backend: none of it is done on both.
+/// Runs the experiment of a table or figure, on the processor also where others of `all` run on a GPU.
 pub(crate) fn run(what: What, arguments: &ExperimentArguments) -> anyhow::Result<()> {
     match what {
         What::Table1 => table1::experiment(arguments).run(arguments),
