@@ -116,6 +116,13 @@ impl Sum {
         self.value = sum;
     }
 
+    /// Takes away what another sum holds, with what it has beyond the digits of one number: of a large piece that goes,
+    /// these count for a small one that stays.
+    fn take(&mut self, other: Self) {
+        self.add(-other.value);
+        self.add(-other.error);
+    }
+
     fn total(self) -> f64 {
         self.value + self.error
     }
@@ -253,7 +260,7 @@ impl PieceTracker {
             }
             let rest = &mut self.pieces[from as usize];
             rest.tets -= part.len();
-            rest.volume.add(-volume.total());
+            rest.volume.take(volume);
             self.pieces.push(Record {
                 parent: Some(from),
                 tets: part.len(),
