@@ -62,8 +62,10 @@ const TABLE: &[Explanation] = &[
         methods: &[Descent, Corrected],
         verdicts: &[Inverted, FewInverted, Off, Gains],
         kappa: 0.0,
-        text: "Descent does not soften slivers; those that were turned over by a stroke's step may stay so, in a local \
-            minimum.",
+        text: "Descent does not soften slivers: those that were turned over by a stroke's step may stay so, in a local \
+            minimum. In single precision, where the last digit of a position is more than the height of the thinnest, what \
+            rounding leaves of their energy may grow without end, though not to infinity; in double precision the same \
+            strokes leave a body in shape.",
     },
     Explanation {
         extremes: &[""],
