@@ -256,7 +256,7 @@ pub(super) fn settings(substeps: u32, gpu: bool) -> Settings {
         ),
         exchange(
             "method",
-            "Descent, 1 step of 100 sweeps, in place of Gauss-Seidel at n substeps",
+            "Descent, 1 step of 100 sweeps with relaxation 1.9, in place of Gauss-Seidel at n substeps",
             &xpbd(8, 1),
             &descent(1, 100, 1.9),
         ),
