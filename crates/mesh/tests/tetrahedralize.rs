@@ -299,6 +299,7 @@ fn surfaces_of_given_meshes() {
             missed < if whole { 1.0 } else { 2.5 },
             "{name}: {missed} spacings"
         );
+        assert_eq!(mesh.pieces().count, 1, "{name}");
         if whole {
             assert_eq!(mesh.surface().euler_characteristic(), 2, "{name}");
         }
@@ -330,4 +331,25 @@ fn a_graded_inside_leaves_more_tets_for_the_surface() {
     }
     let triangles = |mesh: &TetMesh| mesh.surface().triangles.len();
     assert!(triangles(&graded) > triangles(&uniform) * 5 / 4);
+}
+
+#[test]
+fn shells_are_counted_and_what_tears_everywhere_has_the_fewest_pieces() {
+    // Two balls joined by a rod a twentieth as thick.
+    let dumbbell = |p: DVec3| {
+        let balls = (p - DVec3::X).length().min((p + DVec3::X).length()) - 0.5;
+        balls.min((p.y.hypot(p.z) - 0.025).max(p.x.abs() - 1.0))
+    };
+    let half = dvec3(1.6, 0.6, 0.6);
+    let fine = Lattice::covering(-half, half, 0.015, DVec3::splat(0.3)).unwrap();
+    let surface = TriangleSurface::boundary_of(&stuff(&fine, dumbbell).unwrap());
+    let solid = Solid::new(&surface).unwrap();
+    assert_eq!(solid.prepared().shells, 1);
+    let coarse = tetrahedralize(&solid, 2_000, 0).unwrap();
+    assert_eq!(coarse.pieces().count, 2);
+    assert!(coarse.surface().is_manifold());
+
+    let ball = TriangleSurface::boundary_of(&generate(Shape::Sphere, 300).unwrap());
+    let two = together(ball.clone(), &moved(ball, DVec3::X * 2.0));
+    assert_eq!(Solid::new(&two).unwrap().prepared().shells, 2);
 }

@@ -5,9 +5,10 @@
 //! over about a spacing, and parts thinner than that are lost or torn: every point of the result lies within a spacing of
 //! the surface, but not the other way around. A curved surface loses volume, as its chords lie inside. Dihedral angles
 //! keep the bound of [`stuff`](super::stuff) whatever the surface. Where the body would touch itself at a single particle it is taken
-//! apart there; where it still touches itself along an edge, another place of the lattice is tried.
+//! apart there; where it still touches itself along an edge, or falls into more pieces than the surface has shells, another
+//! place of the lattice is tried.
 //!
-//! Cost: some three to ten stuffings, each two samples a cell of the box around the surface at O(log n) for n triangles.
+//! Cost: some three to ten stuffings, six times as many where thin parts tear, each two samples a cell of the box around the surface at O(log n) for n triangles.
 
 use glam::{DMat3, DVec3};
 
@@ -59,12 +60,25 @@ pub fn tetrahedralize(solid: &Solid, tets: usize, levels: u32) -> Result<TetMesh
     }
     let mut touching = false;
     for turn in [DMat3::IDENTITY, turned()] {
+        // Where thin parts tear, others may on a lattice that lies elsewhere; the first with the fewest pieces is kept.
+        let mut torn: Option<(usize, TetMesh)> = None;
         for n in 0..SHIFTS {
             match search(solid, tets, levels, turn, shift(n))? {
-                Found::Body(mesh) => return Ok(mesh),
+                Found::Body(mesh) => {
+                    let pieces = mesh.pieces().count;
+                    if pieces <= solid.prepared().shells {
+                        return Ok(mesh);
+                    }
+                    if torn.as_ref().is_none_or(|(fewest, _)| pieces < *fewest) {
+                        torn = Some((pieces, mesh));
+                    }
+                }
                 Found::TouchesItself => touching = true,
                 Found::Nothing => {}
             }
+        }
+        if let Some((_, mesh)) = torn {
+            return Ok(mesh);
         }
     }
     Err(MeshError::Surface(if touching {

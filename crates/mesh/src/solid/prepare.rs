@@ -9,6 +9,7 @@
 use glam::DVec3;
 
 use crate::io::TriangleSurface;
+use crate::pieces::Sets;
 use crate::{MeshError, ParticleId};
 
 /// What was put right in a surface to take it as the boundary of a solid.
@@ -23,6 +24,8 @@ pub struct Prepared {
     pub turned: usize,
     /// Whether all were turned then, since they enclosed a negative volume.
     pub inside_out: bool,
+    /// Parts of the surface that share no point: a cavity is one, too.
+    pub shells: usize,
 }
 
 /// The corners of all triangles, in a consistent orientation that encloses a positive volume.
@@ -56,6 +59,7 @@ pub(super) fn prepare(surface: &TriangleSurface) -> Result<(Prepared, Vec<[DVec3
     if triangles.len() >= 1 << 31 {
         return fault(format!("{} triangles are more than 2^31", triangles.len()));
     }
+    prepared.shells = shells(&triangles, positions.len());
     if first_unmatched(&triangles).is_some() {
         prepared.turned = orient(&mut triangles);
     }
@@ -96,6 +100,19 @@ fn weld(positions: &[DVec3]) -> Vec<u32> {
         }
     }
     same
+}
+
+/// How many sets of triangles share points.
+fn shells(triangles: &[[u32; 3]], points: usize) -> usize {
+    let mut sets = Sets::new(points);
+    for &[a, b, c] in triangles {
+        sets.unite(a, b);
+        sets.unite(b, c);
+    }
+    let mut roots: Vec<u32> = triangles.iter().map(|t| sets.root(t[0])).collect();
+    roots.sort_unstable();
+    roots.dedup();
+    roots.len()
 }
 
 fn directed_edges([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
