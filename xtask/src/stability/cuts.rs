@@ -195,23 +195,7 @@ impl Watch {
     fn new(column: Column) -> Self {
         Self {
             unit: None,
-            outcome: Outcome {
-                column,
-                substeps: 1,
-                kappa: 0.0,
-                frames: 0,
-                not_finite: None,
-                energy_rise: 0.0,
-                distance: None,
-                in_shape_from: None,
-                tets: 0,
-                inverted: 0,
-                volume: 0.0,
-                momentum_drift: None,
-                repaired: 0,
-                softened: 0,
-                frozen: false,
-            },
+            outcome: Outcome::new(column),
         }
     }
 

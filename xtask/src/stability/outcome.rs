@@ -47,6 +47,29 @@ pub(crate) struct Outcome {
     pub(crate) frozen: bool,
 }
 
+impl Outcome {
+    /// Of a body of which nothing is known yet.
+    pub(crate) fn new(column: Column) -> Self {
+        Self {
+            column,
+            substeps: 1,
+            kappa: 0.0,
+            frames: 0,
+            not_finite: None,
+            energy_rise: 0.0,
+            distance: None,
+            in_shape_from: None,
+            tets: 0,
+            inverted: 0,
+            volume: 0.0,
+            momentum_drift: None,
+            repaired: 0,
+            softened: 0,
+            frozen: false,
+        }
+    }
+}
+
 /// The share of the volume by which it may differ.
 pub(crate) const VOLUME_TOLERANCE: f64 = 0.05;
 /// More tets than this share inverted are no more a few.

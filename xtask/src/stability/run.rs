@@ -112,21 +112,10 @@ impl<'a> Watch<'a> {
             unit: (energy.elastic + work).max(f64::MIN_POSITIVE),
             momentum: [0.0; 2],
             outcome: Outcome {
-                column,
-                substeps: 1,
-                kappa: 0.0,
-                frames: 0,
-                not_finite: None,
-                energy_rise: 0.0,
-                distance: None,
-                in_shape_from: None,
                 tets: solver.tet_count(),
-                inverted: 0,
-                volume: 0.0,
-                momentum_drift: None,
-                repaired: 0,
                 softened: solver.softened().tets,
                 frozen: true,
+                ..Outcome::new(column)
             },
         }
     }
