@@ -1,0 +1,68 @@
+// Half spaces: a patch of each plane with a grid that fades into the background. Twin: `plane` in shading.rs.
+
+const TABLE = vec3<f32>(0.62, 0.635, 0.66);
+const TABLE_LINE = vec3<f32>(0.30, 0.32, 0.36);
+
+struct Patch {
+    // w: the radius.
+    @location(0) center: vec4<f32>,
+    // Along the grid, of length 1; w: where the lines begin.
+    @location(1) u: vec4<f32>,
+    @location(2) v: vec4<f32>,
+    // Distance of lines, opacity, 1 if it bears the impressions.
+    @location(3) numbers: vec4<f32>,
+}
+
+struct Seen {
+    @builtin(position) clip: vec4<f32>,
+    @location(0) @interpolate(flat) center: vec4<f32>,
+    @location(1) @interpolate(flat) u: vec4<f32>,
+    @location(2) @interpolate(flat) v: vec4<f32>,
+    @location(3) @interpolate(flat) numbers: vec4<f32>,
+}
+
+@vertex
+fn vertex(@builtin(vertex_index) index: u32, grid: Patch) -> Seen {
+    // Corners 0 1 2, 2 1 3.
+    let second = select(index - 2u, 2u, index == 3u);
+    let corner = select(index, select(second, 1u, index == 4u), index > 2u);
+    let x = select(-1.0, 1.0, (corner & 1u) == 1u);
+    let y = select(-1.0, 1.0, (corner & 2u) == 2u);
+    let place = grid.center.xyz + (grid.u.xyz * x + grid.v.xyz * y) * grid.center.w;
+    return Seen(view.clip * vec4<f32>(place, 1.0), grid.center, grid.u, grid.v, grid.numbers);
+}
+
+// How much of a pixel the lines across an axis cover.
+fn line(axis: vec4<f32>, spacing: f32, place: vec3<f32>, right: vec3<f32>, down: vec3<f32>) -> f32 {
+    let at = (dot(place, axis.xyz) + axis.w) / spacing;
+    let width = (abs(dot(right, axis.xyz)) + abs(dot(down, axis.xyz))) / spacing;
+    let distance = abs(at - floor(at + 0.5));
+    return (1.0 - smoothstep(0.4 * width, 1.3 * width, distance)) * (1.0 - smoothstep(0.08, 0.45, width));
+}
+
+@fragment
+fn fragment(seen: Seen) -> @location(0) vec4<f32> {
+    let ray = ray_through(seen.clip.xy);
+    let normal = cross(seen.u.xyz, seen.v.xyz);
+    let slope = dot(ray, normal);
+    let depth = dot(seen.center.xyz, normal) / slope;
+    let place = ray * depth;
+    let away = length(place - seen.center.xyz) / seen.center.w;
+    if !(depth > 0.0 && away < 1.0) {
+        discard;
+    }
+    let fade = 1.0 - smoothstep(0.25, 1.0, away);
+    let step_right = view.right.xyz * (2.0 * view.right.w / view.size.x);
+    let step_down = view.up.xyz * (-2.0 * view.up.w / view.size.y);
+    let right = (step_right - ray * (dot(step_right, normal) / slope)) * depth;
+    let down = (step_down - ray * (dot(step_down, normal) / slope)) * depth;
+    let lines = max(
+        line(seen.u, seen.numbers.x, place, right, down),
+        line(seen.v, seen.numbers.x, place, right, down),
+    );
+    let shadow = 0.0;
+    let color = mix(TABLE, TABLE_LINE, 0.55 * lines) * (1.0 - 0.62 * shadow);
+    let opacity = seen.numbers.y;
+    let cover = opacity + (1.0 - opacity) * max(0.8 * shadow, 0.35 * lines);
+    return vec4<f32>(color, cover * fade);
+}

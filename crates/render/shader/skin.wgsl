@@ -1,0 +1,94 @@
+// The skin of bodies, from the solver's own positions: each corner looks up its triangle.
+//
+// Normals are sums of normals.wgsl in fixed point. Edges of triangles are drawn in the same pass: each corner knows its
+// distance in pixels from the edge across, which is interpolated on the screen (J. Bærentzen et al., "Single-pass
+// wireframe rendering", 2006).
+
+// Relative to the origin of their part, in m; w: of no interest here.
+@group(0) @binding(1) var<storage, read> positions: array<vec4<f32>>;
+// The particle; its part, and in the highest bit whether a cut laid it bare.
+@group(0) @binding(2) var<storage, read> vertices: array<vec2<u32>>;
+// Three vertices each.
+@group(0) @binding(3) var<storage, read> triangles: array<u32>;
+// The origins of parts relative to the eye.
+@group(0) @binding(4) var<storage, read> parts: array<vec4<f32>>;
+// Three numbers a vertex.
+@group(0) @binding(5) var<storage, read> sums: array<i32>;
+// A word a triangle.
+@group(0) @binding(6) var<storage, read> colors: array<u32>;
+
+const CUT: u32 = 0x80000000u;
+
+struct Seen {
+    @builtin(position) clip: vec4<f32>,
+    @location(0) @interpolate(perspective, centroid) place: vec3<f32>,
+    @location(1) @interpolate(perspective, centroid) normal: vec3<f32>,
+    @location(2) @interpolate(flat) face: vec3<f32>,
+    // w: the gloss, negative for what a cut laid bare.
+    @location(3) @interpolate(flat) base: vec4<f32>,
+    @location(4) @interpolate(linear, centroid) distances: vec3<f32>,
+}
+
+fn place_of(vertex: u32) -> vec3<f32> {
+    let found = vertices[vertex];
+    return positions[found.x].xyz + parts[found.y & ~CUT].xyz;
+}
+
+// Distances in pixels of the corners from the edges across; far away if a corner is not in front of the eye.
+fn heights(a: vec4<f32>, b: vec4<f32>, c: vec4<f32>) -> vec3<f32> {
+    if min(a.z, min(b.z, c.z)) <= 0.0 {
+        return vec3<f32>(1e6);
+    }
+    let scale = 0.5 * view.size;
+    let pa = a.xy / a.w * scale;
+    let pb = b.xy / b.w * scale;
+    let pc = c.xy / c.w * scale;
+    let area = abs((pb.x - pa.x) * (pc.y - pa.y) - (pb.y - pa.y) * (pc.x - pa.x));
+    let edges = vec3<f32>(distance(pb, pc), distance(pc, pa), distance(pa, pb));
+    return area / max(edges, vec3<f32>(1e-6));
+}
+
+@vertex
+fn vertex(@builtin(vertex_index) index: u32) -> Seen {
+    let triangle = index / 3u;
+    let corner = index % 3u;
+    let corners = vec3<u32>(triangles[3u * triangle], triangles[3u * triangle + 1u], triangles[3u * triangle + 2u]);
+    let a = place_of(corners.x);
+    let b = place_of(corners.y);
+    let c = place_of(corners.z);
+    let mine = corners[corner];
+    var seen: Seen;
+    seen.place = place_of(mine);
+    seen.clip = view.clip * vec4<f32>(seen.place, 1.0);
+    seen.face = direction(cross(direction(b - a), direction(c - a)));
+    seen.normal = direction(vec3<f32>(f32(sums[3u * mine]), f32(sums[3u * mine + 1u]), f32(sums[3u * mine + 2u])));
+    let cut = (vertices[mine].y & CUT) != 0u;
+    var word = 0u;
+    if (view.flags & 4u) != 0u {
+        word = colors[triangle];
+    }
+    let base = skin_base(word, cut);
+    seen.base = vec4<f32>(base.xyz, select(base.w, -base.w, cut));
+    seen.distances = vec3<f32>(1e6);
+    if (view.flags & 1u) != 0u {
+        let one = view.clip * vec4<f32>(a, 1.0);
+        let two = view.clip * vec4<f32>(b, 1.0);
+        let three = view.clip * vec4<f32>(c, 1.0);
+        let all = heights(one, two, three);
+        if all.x < 1e6 {
+            seen.distances = select(vec3<f32>(0.0), all, vec3<u32>(0u, 1u, 2u) == vec3<u32>(corner));
+        }
+    }
+    return seen;
+}
+
+@fragment
+fn fragment(seen: Seen) -> @location(0) vec4<f32> {
+    let smoothly = (view.flags & 2u) != 0u;
+    let normal = skin_normal(seen.normal, seen.face, seen.base.w < 0.0, smoothly);
+    let color = shade(seen.base.xyz, abs(seen.base.w), seen.place, normal, seen.face);
+    if (view.flags & 1u) != 0u {
+        return vec4<f32>(wire(color, max(seen.distances, vec3<f32>(0.0))), 1.0);
+    }
+    return vec4<f32>(color, 1.0);
+}

@@ -1,0 +1,208 @@
+//! [`Camera`]: from where a scene is seen.
+//!
+//! It looks at a target from a distance, in a direction given by two angles; z is up. All that the renderers and whoever
+//! picks with a mouse need follows from these five numbers: axes, rays, projections. In double precision throughout, so
+//! that bodies far from the origin of the world are seen as well as others.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use glam::{DMat4, DVec3, DVec4};
+
+/// How close to straight up or down a camera may look, in radians.
+const POLE: f64 = 0.01;
+/// Distances stay within these, in m.
+const NEAREST: f64 = 1e-6;
+const FARTHEST: f64 = 1e9;
+/// The nearest and the farthest that is drawn, in distances to the target.
+const NEAR: f64 = 1e-2;
+const FAR: f64 = 1e2;
+
+/// From where a scene is seen. Lengths are in m, angles in radians.
+///
+/// # Example
+/// ```
+/// use glam::DVec3;
+/// use incise_render::Camera;
+///
+/// let mut camera = Camera::fit(DVec3::ZERO, DVec3::ONE);
+/// camera.orbit(0.5, 0.1);
+/// let size = [640.0, 480.0];
+/// let at = camera.project(DVec3::splat(0.5), size).expect("in front of the eye");
+/// assert!((at.x - 320.0).abs() < 1e-9 && (at.y - 240.0).abs() < 1e-9); // the middle of the picture
+/// let (origin, direction) = camera.ray([at.x, at.y], size);
+/// assert!((origin + direction * at.z - DVec3::splat(0.5)).length() < 1e-9);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// The point in the middle of the picture.
+    pub target: DVec3,
+    /// From the eye to the target, positive.
+    pub distance: f64,
+    /// Of the eye seen from the target, against the clock seen from above; 0 is on the side of x.
+    pub azimuth: f64,
+    /// Of the eye above the target, within a right angle.
+    pub elevation: f64,
+    /// From the lower to the upper edge of the picture, from 0 to π.
+    pub field_of_view: f64,
+}
+
+impl Camera {
+    /// The three-quarter view that shows all of a box, in any picture that is at least as wide as it is high. A box that
+    /// is a point is seen from 1 m.
+    #[must_use]
+    pub fn fit(low: DVec3, high: DVec3) -> Self {
+        let mut camera = Self {
+            target: (low + high) * 0.5,
+            distance: 1.0,
+            azimuth: -60_f64.to_radians(),
+            elevation: 22_f64.to_radians(),
+            field_of_view: 28_f64.to_radians(),
+        };
+        camera.fit_distance(low, high);
+        camera
+    }
+
+    /// Goes as close to its target as still shows all of a box, whatever the direction: for a camera that was turned
+    /// after [`Camera::fit`].
+    pub fn fit_distance(&mut self, low: DVec3, high: DVec3) {
+        let tangent = (self.field_of_view * 0.5).tan();
+        let (forward, right, up) = (self.forward(), self.right(), self.up());
+        let mut distance: f64 = 0.0;
+        for corner in corners(low, high) {
+            let from_target = corner - self.target;
+            let aside = right.dot(from_target).abs().max(up.dot(from_target).abs());
+            distance = distance.max(aside * 1.08 / tangent - forward.dot(from_target));
+        }
+        if distance > 0.0 && distance.is_finite() {
+            self.distance = distance.clamp(NEAREST, FARTHEST);
+        }
+    }
+
+    /// Turns the eye around the target, in radians. It is held off the poles, where right and left are not known.
+    pub fn orbit(&mut self, right: f64, up: f64) {
+        if right.is_finite() {
+            self.azimuth = (self.azimuth + right % TAU + PI).rem_euclid(TAU) - PI;
+        }
+        if up.is_finite() {
+            let highest = FRAC_PI_2 - POLE;
+            self.elevation = (self.elevation + up).clamp(-highest, highest);
+        }
+    }
+
+    /// Shifts the picture's content by fractions of the picture's height at the distance of the target: to the right and
+    /// up, the camera going the other way.
+    pub fn pan(&mut self, right: f64, up: f64) {
+        let height = 2.0 * self.distance * (self.field_of_view * 0.5).tan();
+        let shift = (self.right() * right + self.up() * up) * height;
+        let target = self.target - shift;
+        if target.is_finite() {
+            self.target = target;
+        }
+    }
+
+    /// Multiplies the distance: below 1 comes closer. What is no positive number changes nothing, and the distance stays
+    /// between a micrometer and a million kilometers.
+    pub fn zoom(&mut self, factor: f64) {
+        if factor > 0.0 {
+            self.distance = (self.distance * factor).clamp(NEAREST, FARTHEST);
+        }
+    }
+
+    /// Where the eye is.
+    #[must_use]
+    pub fn eye(&self) -> DVec3 {
+        self.target - self.forward() * self.distance
+    }
+
+    /// Where it looks, of length 1.
+    #[must_use]
+    pub fn forward(&self) -> DVec3 {
+        let (sin, cos) = self.elevation.sin_cos();
+        -DVec3::new(cos * self.azimuth.cos(), cos * self.azimuth.sin(), sin)
+    }
+
+    /// To the right in the picture, horizontal and of length 1.
+    #[must_use]
+    pub fn right(&self) -> DVec3 {
+        DVec3::new(-self.azimuth.sin(), self.azimuth.cos(), 0.0)
+    }
+
+    /// Up in the picture, of length 1.
+    #[must_use]
+    pub fn up(&self) -> DVec3 {
+        self.right().cross(self.forward())
+    }
+
+    /// From points in the world to the clip space of wgpu: x to the right, y up, depth from 0 to 1. `aspect` is width over
+    /// height. What is nearer than a hundredth of the distance to the target or farther than a hundred of them is not
+    /// seen.
+    #[must_use]
+    pub fn view_projection(&self, aspect: f64) -> DMat4 {
+        let eye = self.eye();
+        self.projection(aspect) * DMat4::from_translation(-eye)
+    }
+
+    /// The same for points relative to the eye.
+    pub(crate) fn projection(&self, aspect: f64) -> DMat4 {
+        let (right, up, back) = (self.right(), self.up(), -self.forward());
+        let row = |axis: DVec3| axis.extend(0.0);
+        let view = DMat4::from_cols(row(right), row(up), row(back), DVec4::W).transpose();
+        let [near, far] = self.depths();
+        let slope = 1.0 / (self.field_of_view * 0.5).tan();
+        let depth = far / (near - far);
+        let projection = DMat4::from_cols(
+            DVec4::new(slope / aspect, 0.0, 0.0, 0.0),
+            DVec4::new(0.0, slope, 0.0, 0.0),
+            DVec4::new(0.0, 0.0, depth, -1.0),
+            DVec4::new(0.0, 0.0, depth * near, 0.0),
+        );
+        projection * view
+    }
+
+    /// The distances along the view of the nearest and the farthest that is drawn.
+    pub(crate) fn depths(&self) -> [f64; 2] {
+        [self.distance * NEAR, self.distance * FAR]
+    }
+
+    /// Where a point is seen in a picture of `size` pixels: pixels from its upper left corner, to the right and down, and
+    /// the distance from the eye along [`Camera::forward`] in m. `None` for what is not in front of the eye.
+    #[must_use]
+    pub fn project(&self, point: DVec3, size: [f64; 2]) -> Option<DVec3> {
+        let from_eye = point - self.eye();
+        let depth = self.forward().dot(from_eye);
+        if depth <= 0.0 {
+            return None;
+        }
+        let pixels = self.pixels_per_slope(size) / depth;
+        let x = size[0] * 0.5 + self.right().dot(from_eye) * pixels;
+        let y = size[1] * 0.5 - self.up().dot(from_eye) * pixels;
+        Some(DVec3::new(x, y, depth))
+    }
+
+    /// The ray through a place in a picture, in pixels from its upper left corner: the eye and a direction of length 1.
+    #[must_use]
+    pub fn ray(&self, pixel: [f64; 2], size: [f64; 2]) -> (DVec3, DVec3) {
+        let pixels = self.pixels_per_slope(size);
+        let x = (pixel[0] - size[0] * 0.5) / pixels;
+        let y = (size[1] * 0.5 - pixel[1]) / pixels;
+        let direction = self.forward() + self.right() * x + self.up() * y;
+        (self.eye(), direction.normalize())
+    }
+
+    /// Pixels of a slope of 1.
+    fn pixels_per_slope(&self, size: [f64; 2]) -> f64 {
+        size[1] * 0.5 / (self.field_of_view * 0.5).tan()
+    }
+}
+
+/// The corners of a box.
+pub(crate) fn corners(low: DVec3, high: DVec3) -> [DVec3; 8] {
+    std::array::from_fn(|i| {
+        let pick = |bit: usize, low: f64, high: f64| if i >> bit & 1 == 0 { low } else { high };
+        DVec3::new(
+            pick(0, low.x, high.x),
+            pick(1, low.y, high.y),
+            pick(2, low.z, high.z),
+        )
+    })
+}

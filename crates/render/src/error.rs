@@ -1,0 +1,98 @@
+//! [`RenderError`]: why a picture or a film could not be made, and what to do about it.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+/// Why something could not be drawn or written.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum RenderError {
+    /// A picture of a size that cannot be drawn.
+    #[error("a picture of {width} x {height} pixels: {range}")]
+    Size {
+        /// Pixels across.
+        width: u32,
+        /// Pixels down.
+        height: u32,
+        /// What is allowed.
+        range: String,
+    },
+    /// A name that means no coloring.
+    #[error("unknown coloring '{given}': known are {known}", known = crate::ColorBy::KNOWN)]
+    UnknownColoring {
+        /// What was given.
+        given: String,
+    },
+    /// Residuals are to be shown, and none were given.
+    #[error("colors by residual need a residual of each tet")]
+    NoResiduals,
+    /// As many residuals as tets were expected.
+    #[error("{given} residuals were given for {tets} tets")]
+    Residuals {
+        /// How many were given.
+        given: usize,
+        /// How many tets there are.
+        tets: usize,
+    },
+    /// A film in a format that is not written.
+    #[error("{}: unknown ending: films are written as {known}", .path.display())]
+    UnknownFilm {
+        /// The file.
+        path: PathBuf,
+        /// The endings that are.
+        known: &'static str,
+    },
+    /// A film whose pictures are shown for a time that it cannot say.
+    #[error("a film with {given} s a picture: from 0.01 s to 10 s can be written")]
+    FrameTime {
+        /// What was asked for.
+        given: f64,
+    },
+    /// A picture that does not fit into its film.
+    #[error(
+        "a picture of {width} x {height} pixels in a film of {film_width} x {film_height} pixels"
+    )]
+    OtherSize {
+        /// Pixels across.
+        width: u32,
+        /// Pixels down.
+        height: u32,
+        /// Those of the film.
+        film_width: u32,
+        /// Those of the film.
+        film_height: u32,
+    },
+    /// A film without a picture.
+    #[error("{}: a film needs a picture", .path.display())]
+    EmptyFilm {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A file could not be read or written.
+    #[error("cannot {action} {}: {source}", .path.display())]
+    Io {
+        /// What was tried: `read` or `write`.
+        action: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// Why it failed.
+        source: std::io::Error,
+    },
+    /// The simulation could not say where its particles are.
+    #[error(transparent)]
+    Simulation(#[from] incise::Error),
+    /// The device cannot draw, or is lost.
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    Gpu(#[from] incise::gpu::GpuError),
+    /// The device lacks what drawing needs.
+    #[cfg(feature = "gpu")]
+    #[error("the GPU {adapter} cannot draw: {reason}")]
+    Unable {
+        /// The adapter's name.
+        adapter: String,
+        /// What it lacks.
+        reason: String,
+    },
+}

@@ -1,0 +1,92 @@
+//! [`Buffer`]: numbers in device memory that are replaced as a whole.
+
+use std::marker::PhantomData;
+
+use bytemuck::NoUninit;
+use incise::gpu::wgpu::{self, BufferUsages};
+use incise::gpu::{GpuContext, GpuError};
+
+/// A row of numbers that grows when it has to, by half more than is needed.
+#[derive(Debug)]
+pub(super) struct Buffer<T> {
+    what: &'static str,
+    usage: BufferUsages,
+    buffer: wgpu::Buffer,
+    len: usize,
+    of: PhantomData<T>,
+}
+
+impl<T: NoUninit> Buffer<T> {
+    /// An empty one.
+    pub(super) fn new(
+        gpu: &GpuContext,
+        what: &'static str,
+        usage: BufferUsages,
+    ) -> Result<Self, GpuError> {
+        let usage = usage | BufferUsages::COPY_DST;
+        Ok(Self {
+            what,
+            usage,
+            // No binding may be empty, and the largest element has a few dozen bytes.
+            buffer: create(gpu, what, usage, 256)?,
+            len: 0,
+            of: PhantomData,
+        })
+    }
+
+    /// Replaces all values.
+    pub(super) fn replace(&mut self, gpu: &GpuContext, values: &[T]) -> Result<(), GpuError> {
+        self.resize(gpu, values.len())?;
+        if !values.is_empty() {
+            let bytes = bytemuck::cast_slice(values);
+            gpu.queue().write_buffer(&self.buffer, 0, bytes);
+        }
+        Ok(())
+    }
+
+    /// Makes room for as many values; what was there is lost if there was none.
+    pub(super) fn resize(&mut self, gpu: &GpuContext, len: usize) -> Result<(), GpuError> {
+        let bytes = (len * size_of::<T>()) as u64;
+        if bytes > self.buffer.size() {
+            let roomy = (bytes + bytes / 2).next_multiple_of(4);
+            let size = roomy.min(gpu.buffer_limit()).max(bytes);
+            self.buffer = create(gpu, self.what, self.usage, size)?;
+        }
+        self.len = len;
+        Ok(())
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.len
+    }
+
+    pub(super) fn raw(&self) -> &wgpu::Buffer {
+        &self.buffer
+    }
+}
+
+/// Makes a buffer, or says why not.
+pub(super) fn create(
+    gpu: &GpuContext,
+    what: &'static str,
+    usage: BufferUsages,
+    bytes: u64,
+) -> Result<wgpu::Buffer, GpuError> {
+    gpu.check()?;
+    let limit = gpu.buffer_limit();
+    if bytes > limit {
+        return Err(GpuError::TooLarge { what, bytes, limit });
+    }
+    let device = gpu.device();
+    let memory = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(what),
+        size: bytes.next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT),
+        usage,
+        mapped_at_creation: false,
+    });
+    match pollster::block_on(memory.pop()) {
+        Some(_) => Err(GpuError::OutOfMemory { what, bytes }),
+        None => Ok(buffer),
+    }
+}

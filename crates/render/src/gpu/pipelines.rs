@@ -1,0 +1,242 @@
+//! [`Pipelines`]: all shaders compiled, each with the state that it draws with.
+
+use incise::gpu::wgpu::{self, VertexAttribute, VertexFormat, VertexStepMode};
+use incise::gpu::{GpuContext, GpuError};
+
+use super::shaders::shaders;
+use super::target::{COLOR, DEPTH, SAMPLES};
+use crate::RenderError;
+
+/// What is drawn with, in the order in which it is.
+#[derive(Debug)]
+pub(super) struct Pipelines {
+    pub(super) normals: wgpu::ComputePipeline,
+    pub(super) background: wgpu::RenderPipeline,
+    pub(super) skin: wgpu::RenderPipeline,
+    pub(super) props: wgpu::RenderPipeline,
+    pub(super) plane: wgpu::RenderPipeline,
+}
+
+/// How something is drawn.
+struct How<'a> {
+    name: &'a str,
+    /// One element and its rows of numbers, if vertices come from a buffer.
+    vertices: Option<(VertexStepMode, &'a [VertexFormat])>,
+    depth_write: bool,
+    depth_compare: wgpu::CompareFunction,
+    blend: Option<wgpu::BlendState>,
+}
+
+impl Pipelines {
+    /// # Errors
+    /// If the device refuses one of them.
+    pub(super) fn new(gpu: &GpuContext) -> Result<Self, RenderError> {
+        let device = gpu.device();
+        // A device that lacks something says so here and not in everybody's report.
+        let refused = device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let pipelines = Self {
+            normals: computed(gpu, "normals"),
+            background: drawn(
+                gpu,
+                &How {
+                    name: "background",
+                    vertices: None,
+                    depth_write: false,
+                    depth_compare: wgpu::CompareFunction::Always,
+                    blend: None,
+                },
+            ),
+            skin: drawn(
+                gpu,
+                &How {
+                    name: "skin",
+                    vertices: None,
+                    depth_write: true,
+                    depth_compare: wgpu::CompareFunction::Less,
+                    blend: None,
+                },
+            ),
+            props: drawn(
+                gpu,
+                &How {
+                    name: "props",
+                    vertices: Some((
+                        VertexStepMode::Vertex,
+                        &[
+                            VertexFormat::Float32x3,
+                            VertexFormat::Float32x3,
+                            VertexFormat::Unorm8x4,
+                        ],
+                    )),
+                    depth_write: true,
+                    depth_compare: wgpu::CompareFunction::Less,
+                    blend: None,
+                },
+            ),
+            plane: drawn(
+                gpu,
+                &How {
+                    name: "plane",
+                    vertices: Some((VertexStepMode::Instance, &[VertexFormat::Float32x4; 4])),
+                    depth_write: false,
+                    depth_compare: wgpu::CompareFunction::Less,
+                    blend: Some(wgpu::BlendState {
+                        color: wgpu::BlendComponent {
+                            src_factor: wgpu::BlendFactor::SrcAlpha,
+                            dst_factor: wgpu::BlendFactor::OneMinusSrcAlpha,
+                            operation: wgpu::BlendOperation::Add,
+                        },
+                        // Pictures are opaque.
+                        alpha: wgpu::BlendComponent {
+                            src_factor: wgpu::BlendFactor::Zero,
+                            dst_factor: wgpu::BlendFactor::One,
+                            operation: wgpu::BlendOperation::Add,
+                        },
+                    }),
+                },
+            ),
+        };
+        match pollster::block_on(refused.pop()) {
+            Some(error) => Err(RenderError::Unable {
+                adapter: gpu.adapter().name.clone(),
+                reason: one_line(&error.to_string()),
+            }),
+            None => Ok(pipelines),
+        }
+    }
+
+    /// Binds buffers to a pipeline in the order of the shader's numbers.
+    pub(super) fn bind(
+        gpu: &GpuContext,
+        layout: &wgpu::BindGroupLayout,
+        buffers: &[&wgpu::Buffer],
+    ) -> wgpu::BindGroup {
+        let entries: Vec<_> = (0..)
+            .zip(buffers)
+            .map(|(binding, buffer)| wgpu::BindGroupEntry {
+                binding,
+                resource: buffer.as_entire_binding(),
+            })
+            .collect();
+        gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout,
+            entries: &entries,
+        })
+    }
+}
+
+/// A report of several lines as one.
+fn one_line(message: &str) -> String {
+    let lines = message.lines().map(str::trim);
+    let lines: Vec<_> = lines.filter(|line| !line.is_empty()).collect();
+    lines.join(" ")
+}
+
+fn module(gpu: &GpuContext, name: &str) -> wgpu::ShaderModule {
+    let source = shaders().into_iter().find(|shader| shader.name == name);
+    let source = source.map(|shader| shader.source).unwrap_or_default();
+    gpu.device()
+        .create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(name),
+            source: wgpu::ShaderSource::Wgsl(source.into()),
+        })
+}
+
+fn computed(gpu: &GpuContext, name: &str) -> wgpu::ComputePipeline {
+    gpu.device()
+        .create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(name),
+            layout: None,
+            module: &module(gpu, name),
+            entry_point: Some("main"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            cache: None,
+        })
+}
+
+fn drawn(gpu: &GpuContext, how: &How<'_>) -> wgpu::RenderPipeline {
+    let module = module(gpu, how.name);
+    let mut attributes = Vec::new();
+    let mut stride = 0;
+    let formats = how.vertices.map_or(&[] as &[_], |(_, formats)| formats);
+    for (shader_location, &format) in (0..).zip(formats) {
+        attributes.push(VertexAttribute {
+            format,
+            offset: stride,
+            shader_location,
+        });
+        stride += format.size();
+    }
+    let layout = how.vertices.map(|(step_mode, _)| wgpu::VertexBufferLayout {
+        array_stride: stride,
+        step_mode,
+        attributes: &attributes,
+    });
+    let buffers = if layout.is_some() { &[layout][..] } else { &[] };
+    gpu.device()
+        .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some(how.name),
+            layout: None,
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: Some("vertex"),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                buffers,
+            },
+            // Nothing is culled: through an open cut the inside is seen.
+            primitive: wgpu::PrimitiveState::default(),
+            depth_stencil: Some(wgpu::DepthStencilState {
+                format: DEPTH,
+                depth_write_enabled: Some(how.depth_write),
+                depth_compare: Some(how.depth_compare),
+                stencil: wgpu::StencilState::default(),
+                bias: wgpu::DepthBiasState::default(),
+            }),
+            multisample: wgpu::MultisampleState {
+                count: SAMPLES,
+                ..wgpu::MultisampleState::default()
+            },
+            fragment: Some(wgpu::FragmentState {
+                module: &module,
+                entry_point: Some("fragment"),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                targets: &[Some(wgpu::ColorTargetState {
+                    format: COLOR,
+                    blend: how.blend,
+                    write_mask: wgpu::ColorWrites::ALL,
+                })],
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
+}
+
+/// Whether the device grants what the shaders use.
+///
+/// # Errors
+/// If it does not, with what is missing.
+pub(super) fn require(gpu: &GpuContext) -> Result<(), RenderError> {
+    let limits = gpu.device().limits();
+    let needs = [
+        (
+            "storage buffers in a vertex shader",
+            limits.max_storage_buffers_per_shader_stage,
+            6,
+        ),
+        (
+            "threads in a workgroup",
+            limits.max_compute_invocations_per_workgroup,
+            64,
+        ),
+    ];
+    for (what, granted, needed) in needs {
+        if granted < needed {
+            return Err(RenderError::Unable {
+                adapter: gpu.adapter().name.clone(),
+                reason: format!("it grants {granted} {what}, and {needed} are needed"),
+            });
+        }
+    }
+    gpu.check().map_err(|error: GpuError| error.into())
+}

@@ -1,0 +1,114 @@
+//! [`Target`]: the textures that a picture is drawn into, and the way of its pixels to the host.
+
+use std::sync::mpsc;
+
+use incise::gpu::wgpu::{self, TextureFormat, TextureUsages};
+use incise::gpu::{GpuContext, GpuError};
+
+use super::buffer;
+use crate::{Picture, RenderError};
+
+pub(super) const COLOR: TextureFormat = TextureFormat::Rgba8UnormSrgb;
+pub(super) const DEPTH: TextureFormat = TextureFormat::Depth32Float;
+/// Samples of a pixel.
+pub(super) const SAMPLES: u32 = 4;
+
+/// Textures of one size.
+#[derive(Debug)]
+pub(super) struct Target {
+    pub(super) size: [u32; 2],
+    pub(super) samples: wgpu::TextureView,
+    pub(super) depth: wgpu::TextureView,
+    pub(super) resolved: wgpu::TextureView,
+    texture: wgpu::Texture,
+}
+
+impl Target {
+    pub(super) fn new(gpu: &GpuContext, size: [u32; 2]) -> Result<Self, RenderError> {
+        let device = gpu.device();
+        let memory = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let texture = |label, format, sample_count, usage| {
+            device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(label),
+                size: extent(size),
+                mip_level_count: 1,
+                sample_count,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage,
+                view_formats: &[],
+            })
+        };
+        let drawn = TextureUsages::RENDER_ATTACHMENT;
+        let samples = texture("samples", COLOR, SAMPLES, drawn);
+        let depth = texture("depth", DEPTH, SAMPLES, drawn);
+        let shown = drawn | TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_SRC;
+        let resolved = texture("picture", COLOR, 1, shown);
+        if pollster::block_on(memory.pop()).is_some() {
+            let bytes = u64::from(size[0]) * u64::from(size[1]) * u64::from(8 * SAMPLES + 4);
+            let what = "a picture";
+            return Err(GpuError::OutOfMemory { what, bytes }.into());
+        }
+        let view =
+            |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
+        Ok(Self {
+            size,
+            samples: view(&samples),
+            depth: view(&depth),
+            resolved: view(&resolved),
+            texture: resolved,
+        })
+    }
+
+    /// Waits for the picture and reads it.
+    pub(super) fn read(&self, gpu: &GpuContext) -> Result<Picture, RenderError> {
+        let [width, height] = self.size;
+        let row = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let bytes = u64::from(row) * u64::from(height);
+        let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
+        let staging = buffer::create(gpu, "a picture on its way", usage, bytes)?;
+        let mut encoder = gpu.device().create_command_encoder(&Default::default());
+        let layout = wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(row),
+            rows_per_image: None,
+        };
+        encoder.copy_texture_to_buffer(
+            self.texture.as_image_copy(),
+            wgpu::TexelCopyBufferInfo {
+                buffer: &staging,
+                layout,
+            },
+            extent(self.size),
+        );
+        gpu.queue().submit([encoder.finish()]);
+        let (sender, receiver) = mpsc::channel();
+        staging.map_async(wgpu::MapMode::Read, .., move |result| {
+            // Nobody waits if this function has returned.
+            let _ = sender.send(result.map_err(|error| error.to_string()));
+        });
+        gpu.wait()?;
+        let lost = |message: String| RenderError::from(GpuError::Lost { message });
+        let mapped = receiver.recv().map_err(|error| lost(error.to_string()))?;
+        mapped.map_err(lost)?;
+        let range = staging.get_mapped_range(..);
+        let range = range.map_err(|error| lost(error.to_string()))?;
+        let mut rgba = Vec::with_capacity(4 * width as usize * height as usize);
+        for line in range.chunks_exact(row as usize) {
+            rgba.extend_from_slice(&line[..4 * width as usize]);
+        }
+        Ok(Picture {
+            width,
+            height,
+            rgba,
+        })
+    }
+}
+
+fn extent([width, height]: [u32; 2]) -> wgpu::Extent3d {
+    wgpu::Extent3d {
+        width,
+        height,
+        depth_or_array_layers: 1,
+    }
+}

@@ -1,0 +1,38 @@
+//! Pictures of deformable bodies: on a GPU without a copy, or by a software rasterizer.
+//!
+//! A [`Painting`] follows a [`Simulation`](incise::Simulation) through its cuts. A [`Renderer`] draws it as a [`Camera`] sees
+//! it and a [`Style`] wants it: on a device, where the positions of a solver there are drawn from its own buffer, or on the
+//! processor, with the same formulas and nearly the same pixels.
+
+mod camera;
+mod error;
+#[cfg(feature = "gpu")]
+mod gpu;
+mod normals;
+mod painting;
+mod palette;
+mod pick;
+mod picture;
+mod piece_colors;
+mod props;
+mod renderer;
+mod shading;
+mod software;
+mod srgb;
+mod stretch;
+mod style;
+mod view;
+
+pub use camera::Camera;
+pub use error::RenderError;
+#[cfg(feature = "gpu")]
+pub use gpu::{GpuRenderer, Shader, shaders};
+pub use normals::normal_sums;
+pub use painting::{Painting, blade_at};
+pub use palette::Legend;
+pub use pick::Hit;
+pub use picture::Picture;
+pub use renderer::Renderer;
+pub use software::SoftwareRenderer;
+pub use stretch::stretch;
+pub use style::{ColorBy, Style};

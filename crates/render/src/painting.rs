@@ -1,0 +1,371 @@
+//! [`Painting`]: what is drawn of a simulation, kept current.
+//!
+//! It holds the skin, which follows cuts, and the colors of its triangles; obstacles and ground as the scene has them; a
+//! blade where its owner says. It holds no positions: those are the simulation's, on the processor or on a device. What
+//! changed is known by revisions, unique in the process, so that any number of renderers upload only what they do not
+//! have. Cost: what the cuts changed; nothing in frames without one.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use glam::DVec3;
+use incise::cutting::Skin;
+use incise::scene::{ColliderSpec, GroundSpec, StrokeSpec};
+use incise::{Scene, Simulation};
+
+use crate::palette::{self, Legend, decades, legend_from};
+use crate::pick::{self, Hit};
+use crate::piece_colors::PieceNumbers;
+use crate::{ColorBy, RenderError, stretch};
+
+/// The color of a triangle without one: it is drawn as tissue.
+const NONE: u32 = 0;
+
+/// What is drawn of a simulation.
+///
+/// # Example
+/// ```
+/// use incise::{Scene, Simulation};
+/// use incise_render::{Camera, Painting, SoftwareRenderer, Style};
+///
+/// let scene = Scene::from_toml(
+///     r#"
+///     [[body]]
+///     shape = { kind = "sphere", tets = 300 }
+///     [[stroke]]
+///     kind = "plane"
+///     frame = 1
+///     point = [0.05, 0.0, 0.0]
+///     normal = [1.0, 0.0, 0.0]
+///     "#,
+/// )?;
+/// let mut simulation = Simulation::new(&scene)?;
+/// let mut painting = Painting::new(&simulation, &scene);
+/// let [low, high] = painting.bounds(&simulation);
+/// let camera = Camera::fit(low, high);
+/// let mut renderer = SoftwareRenderer::new();
+/// for _ in 0..3 {
+///     simulation.step()?;
+///     painting.follow(&simulation);
+///     let size = [64, 48];
+///     let picture = renderer.picture(&painting, &simulation, &camera, &Style::default(), size)?;
+///     assert_eq!(picture.rgba.len(), 64 * 48 * 4);
+/// }
+/// # Ok::<(), incise_render::RenderError>(())
+/// ```
+#[derive(Debug)]
+pub struct Painting {
+    skin: Skin,
+    /// Of each triangle, or nothing where colors show tissue.
+    colors: Vec<u32>,
+    shown: ColorBy,
+    /// What colors that stay while nothing changes were made for.
+    made_for: Option<(ColorBy, u64)>,
+    pieces: PieceNumbers,
+    /// Of the skin.
+    topology: u64,
+    /// Of clusters and colors, which change with each cut and when they are made anew.
+    plan: u64,
+    /// Of the triangles' colors.
+    coloring: u64,
+    /// The simulated time at which it last followed.
+    followed: f64,
+    /// Whether a device has had a step since the topology last changed other than by its cuts.
+    device_is_current: bool,
+    ground: Option<GroundSpec>,
+    obstacles: Vec<ColliderSpec>,
+    blade: Vec<DVec3>,
+    /// The bodies' box at the start.
+    start: [DVec3; 2],
+}
+
+impl Painting {
+    /// All of a simulation as it is now; of `scene`, which it was made from, ground and obstacles. O(tets).
+    #[must_use]
+    pub fn new(simulation: &Simulation, scene: &Scene) -> Self {
+        let mut painting = Self {
+            skin: Skin::default(),
+            colors: Vec::new(),
+            shown: ColorBy::Tissue,
+            made_for: None,
+            pieces: PieceNumbers::default(),
+            topology: 0,
+            plan: 0,
+            coloring: revision(),
+            followed: 0.0,
+            device_is_current: false,
+            ground: scene.world.ground,
+            obstacles: scene.collider.clone(),
+            blade: Vec::new(),
+            start: [DVec3::ZERO; 2],
+        };
+        painting.reset(simulation);
+        painting.start = painting.bounds(simulation);
+        painting
+    }
+
+    /// Follows a step of the simulation. To be called after each; a second call after the same one does nothing.
+    ///
+    /// # Panics
+    /// If a step with a cut was left out: [`Painting::reset`] starts anew.
+    pub fn follow(&mut self, simulation: &Simulation) {
+        let now = simulation.report().time_s;
+        if now == self.followed {
+            return;
+        }
+        self.followed = now;
+        self.device_is_current = true;
+        if simulation.report().reclustered > 0 {
+            self.plan = revision();
+        }
+        let deltas = simulation.deltas();
+        if deltas.is_empty() {
+            return;
+        }
+        let colored = !self.colors.is_empty();
+        for delta in deltas {
+            let change = self.skin.follow(delta);
+            if colored {
+                self.colors.resize(self.skin.triangles().len(), NONE);
+                for triangle in change.triangles {
+                    self.colors[triangle] = NONE;
+                }
+            }
+        }
+        if colored {
+            self.coloring = revision();
+        }
+        self.topology = revision();
+        self.plan = self.topology;
+    }
+
+    /// Starts anew from what the simulation is now: after a jump to another state, or another plan of the same one.
+    /// O(tets).
+    pub fn reset(&mut self, simulation: &Simulation) {
+        self.skin = Skin::new(simulation.boundary());
+        self.topology = revision();
+        self.plan = self.topology;
+        self.coloring = self.topology;
+        self.colors.clear();
+        self.made_for = None;
+        self.pieces.clear();
+        self.followed = simulation.report().time_s;
+        self.device_is_current = false;
+    }
+
+    /// Colors the triangles for the present state; returns what the colors mean where they are values.
+    ///
+    /// Colors, clusters and pieces are looked at only when they or `by` changed. Stretch fetches positions from a device
+    /// and takes O(triangles) each time; `residuals` has a value for each tet and is shown by its logarithm.
+    ///
+    /// # Errors
+    /// If residuals are to be shown and there is not one for each tet; if a device is lost.
+    pub fn color(
+        &mut self,
+        simulation: &mut Simulation,
+        by: ColorBy,
+        residuals: Option<&[f64]>,
+    ) -> Result<Option<Legend>, RenderError> {
+        let stays = !matches!(by, ColorBy::Stretch | ColorBy::Residual);
+        if stays && self.made_for == Some((by, self.plan)) {
+            return Ok(None);
+        }
+        let legend = match by {
+            ColorBy::Tissue => {
+                self.colors.clear();
+                None
+            }
+            ColorBy::Color => {
+                let (clustering, coloring) = (simulation.clustering(), simulation.coloring());
+                self.paint(|tet| {
+                    let cluster = clustering.labels()[tet];
+                    palette::distinct(coloring.color(cluster.index()).0)
+                });
+                None
+            }
+            ColorBy::Cluster => {
+                let clustering = simulation.clustering();
+                self.paint(|tet| palette::distinct(clustering.labels()[tet].0));
+                None
+            }
+            ColorBy::Piece => {
+                let found = simulation.mesh().pieces();
+                let mut pieces = std::mem::take(&mut self.pieces);
+                let numbers = pieces.follow(&found.labels, found.count);
+                self.paint(|tet| palette::distinct(numbers[tet]));
+                self.pieces = pieces;
+                None
+            }
+            ColorBy::Stretch => {
+                simulation.read_back()?;
+                let (mesh, now) = (simulation.mesh(), simulation.positions());
+                let of_tet = |tet: usize| {
+                    let corners = mesh.tets[tet];
+                    let rest = corners.map(|p| mesh.positions[p.index()]);
+                    stretch(rest, corners.map(|p| now[p.index()]))
+                };
+                let values: Vec<f64> = (0..self.skin.triangles().len())
+                    .map(|triangle| of_tet(self.skin.tet(triangle).index()))
+                    .collect();
+                let legend = legend_from(1.0, values.clone(), "");
+                self.paint_values(&legend, values);
+                Some(legend)
+            }
+            ColorBy::Residual => {
+                let residuals = residuals.ok_or(RenderError::NoResiduals)?;
+                let tets = simulation.mesh().tets.len();
+                if residuals.len() != tets {
+                    let given = residuals.len();
+                    return Err(RenderError::Residuals { given, tets });
+                }
+                let values: Vec<f64> = (0..self.skin.triangles().len())
+                    .map(|triangle| residuals[self.skin.tet(triangle).index()])
+                    .collect();
+                let legend = decades(&values, "");
+                self.paint_values(&legend, values);
+                Some(legend)
+            }
+        };
+        self.shown = by;
+        self.made_for = stays.then_some((by, self.plan));
+        self.coloring = revision();
+        Ok(legend)
+    }
+
+    /// Colors each triangle by its tet.
+    fn paint(&mut self, of_tet: impl Fn(usize) -> [u8; 3]) {
+        let tets = (0..self.skin.triangles().len()).map(|triangle| self.skin.tet(triangle));
+        self.colors = tets.map(|tet| palette::pack(of_tet(tet.index()))).collect();
+    }
+
+    fn paint_values(&mut self, legend: &Legend, values: Vec<f64>) {
+        let color = |value| palette::pack(legend.color(legend.fraction(value)));
+        self.colors = values.into_iter().map(color).collect();
+    }
+
+    /// Says where a blade is that is drawn as a thin tube along a polyline; `None` or a single point: there is none.
+    pub fn set_blade(&mut self, blade: Option<&[DVec3]>) {
+        self.blade.clear();
+        self.blade.extend_from_slice(blade.unwrap_or_default());
+    }
+
+    /// The box of all bodies as far as the host knows their positions: see [`Simulation::read_back`]. O(triangles).
+    #[must_use]
+    pub fn bounds(&self, simulation: &Simulation) -> [DVec3; 2] {
+        let positions = simulation.positions();
+        let mut bounds = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+        for v in self.skin.triangles().iter().flatten() {
+            let x = positions[self.skin.vertices()[*v as usize].particle.index()];
+            bounds = [bounds[0].min(x), bounds[1].max(x)];
+        }
+        if bounds[0].is_finite() {
+            bounds
+        } else {
+            [DVec3::ZERO; 2]
+        }
+    }
+
+    /// The triangles that are drawn.
+    #[must_use]
+    pub fn skin(&self) -> &Skin {
+        &self.skin
+    }
+
+    /// The color of each triangle in sRGB, as [`Painting::color`] made them; `None` for one that is drawn as tissue.
+    #[must_use]
+    pub fn color_of(&self, triangle: usize) -> Option<[u8; 3]> {
+        let word = self.colors.get(triangle).copied().unwrap_or(NONE);
+        let [r, g, b, alpha] = word.to_le_bytes();
+        (alpha > 0).then_some([r, g, b])
+    }
+
+    /// The first triangle that a ray meets, for particles at `positions`. O(triangles).
+    ///
+    /// # Panics
+    /// If a particle has no position.
+    #[must_use]
+    pub fn pick(&self, positions: &[DVec3], origin: DVec3, direction: DVec3) -> Option<Hit> {
+        pick::pick(&self.skin, positions, origin, direction)
+    }
+
+    /// The colors that a style shows: one for each triangle, or none at all.
+    pub(crate) fn colors_for(&self, by: ColorBy) -> &[u32] {
+        if by == self.shown { &self.colors } else { &[] }
+    }
+
+    pub(crate) fn topology(&self) -> u64 {
+        self.topology
+    }
+
+    #[cfg(feature = "gpu")]
+    pub(crate) fn coloring(&self) -> u64 {
+        self.coloring
+    }
+
+    #[cfg(feature = "gpu")]
+    pub(crate) fn device_is_current(&self) -> bool {
+        self.device_is_current
+    }
+
+    pub(crate) fn ground(&self) -> Option<GroundSpec> {
+        self.ground
+    }
+
+    pub(crate) fn obstacles(&self) -> &[ColliderSpec] {
+        &self.obstacles
+    }
+
+    pub(crate) fn blade(&self) -> &[DVec3] {
+        &self.blade
+    }
+
+    /// The bodies' box at the start.
+    pub(crate) fn start(&self) -> [DVec3; 2] {
+        self.start
+    }
+}
+
+/// A number that nothing else in the process has.
+fn revision() -> u64 {
+    static LAST: AtomicU64 = AtomicU64::new(0);
+    LAST.fetch_add(1, Ordering::Relaxed) + 1
+}
+
+/// Where the blade of a stroke is at the start of a frame; `None` before it begins, after it has ended, and for strokes
+/// that cut at once.
+///
+/// ```
+/// use incise::Scene;
+/// use incise_render::blade_at;
+///
+/// let stroke = &Scene::built_in().stroke[0]; // frames 4 to 64, straight down
+/// let (start, middle) = (blade_at(stroke, 4).unwrap(), blade_at(stroke, 34).unwrap());
+/// assert!((start[0].z - middle[0].z - 0.2).abs() < 1e-12);
+/// assert_eq!(blade_at(stroke, 65), None);
+/// ```
+#[must_use]
+pub fn blade_at(stroke: &StrokeSpec, frame: u64) -> Option<Vec<DVec3>> {
+    let StrokeSpec::Sweep {
+        frames: [first, last],
+        blade,
+        path,
+        ..
+    } = stroke
+    else {
+        return None;
+    };
+    if !(first..=last).contains(&&frame) || path.is_empty() || first == last {
+        return None;
+    }
+    let legs = path.len() - 1;
+    let passed = (frame - first) as f64 / (last - first) as f64 * legs as f64;
+    // The leg it is on; at the end of the last one that is still the last.
+    let leg = (0..legs).rfind(|&leg| leg as f64 <= passed).unwrap_or(0);
+    let [from, to] = [leg, (leg + 1).min(legs)].map(|i| DVec3::from_array(path[i]));
+    let offset = from.lerp(to, passed - leg as f64);
+    Some(
+        blade
+            .iter()
+            .map(|x| DVec3::from_array(*x) + offset)
+            .collect(),
+    )
+}

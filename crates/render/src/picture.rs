@@ -1,0 +1,141 @@
+//! [`Picture`]: pixels, and PNG files of them.
+
+use std::fs::File;
+use std::io::{self, BufReader, BufWriter, Write};
+use std::path::Path;
+
+use incise::mesh::MeshError;
+use incise::mesh::io::write_atomically;
+
+use crate::RenderError;
+
+/// Pixels in sRGB.
+///
+/// # Example
+/// ```
+/// use incise_render::Picture;
+///
+/// let path = std::env::temp_dir().join(format!("incise-render-doc-{}.png", std::process::id()));
+/// let picture = Picture::filled(4, 3, [200, 180, 160]);
+/// picture.write_png(&path)?;
+/// assert_eq!(Picture::read_png(&path)?, picture);
+/// # std::fs::remove_file(path).ok();
+/// # Ok::<(), incise_render::RenderError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Picture {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Four bytes a pixel, row by row from above, opaque.
+    pub rgba: Vec<u8>,
+}
+
+impl Picture {
+    /// One color everywhere.
+    #[must_use]
+    pub fn filled(width: u32, height: u32, [r, g, b]: [u8; 3]) -> Self {
+        let pixels = width as usize * height as usize;
+        Self {
+            width,
+            height,
+            rgba: [r, g, b, 255].repeat(pixels),
+        }
+    }
+
+    /// The color of a pixel, counted from the upper left.
+    ///
+    /// # Panics
+    /// If there is no such pixel.
+    #[must_use]
+    pub fn pixel(&self, x: u32, y: u32) -> [u8; 3] {
+        assert!(x < self.width, "no such pixel");
+        let at = 4 * (y as usize * self.width as usize + x as usize);
+        [self.rgba[at], self.rgba[at + 1], self.rgba[at + 2]]
+    }
+
+    /// Writes a PNG file, beside its name first: the name never stands for half a file.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn write_png(&self, path: impl AsRef<Path>) -> Result<(), RenderError> {
+        atomically(path.as_ref(), |out| self.encode_png(out))
+    }
+
+    /// The bytes of a PNG file, without the opacity that all pixels have. O(pixels).
+    fn encode_png(&self, out: &mut dyn Write) -> io::Result<()> {
+        let mut encoder = png::Encoder::new(out, self.width, self.height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_compression(png::Compression::Fast);
+        encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&self.rgb())?;
+        writer.finish()?;
+        Ok(())
+    }
+
+    /// Three bytes a pixel.
+    pub(crate) fn rgb(&self) -> Vec<u8> {
+        let mut bytes = Vec::with_capacity(self.rgba.len() / 4 * 3);
+        for pixel in self.rgba.chunks_exact(4) {
+            bytes.extend_from_slice(&pixel[..3]);
+        }
+        bytes
+    }
+
+    /// Reads a PNG file with eight bits a channel, the first picture of an animated one.
+    ///
+    /// # Errors
+    /// If it cannot be read or is not such a file.
+    pub fn read_png(path: impl AsRef<Path>) -> Result<Self, RenderError> {
+        let path = path.as_ref();
+        let read = || -> io::Result<Self> {
+            let mut decoder = png::Decoder::new(BufReader::new(File::open(path)?));
+            decoder
+                .set_transformations(png::Transformations::ALPHA | png::Transformations::STRIP_16);
+            let mut reader = decoder.read_info()?;
+            let too_large = || io::Error::other("the picture is too large");
+            let mut bytes = vec![0; reader.output_buffer_size().ok_or_else(too_large)?];
+            let info = reader.next_frame(&mut bytes)?;
+            bytes.truncate(info.buffer_size());
+            if info.color_type == png::ColorType::GrayscaleAlpha {
+                let spread = |pixel: &[u8]| [pixel[0], pixel[0], pixel[0], pixel[1]];
+                bytes = bytes.chunks_exact(2).flat_map(spread).collect();
+            }
+            Ok(Self {
+                width: info.width,
+                height: info.height,
+                rgba: bytes,
+            })
+        };
+        read().map_err(|source| RenderError::Io {
+            action: "read",
+            path: path.to_owned(),
+            source,
+        })
+    }
+}
+
+/// Writes a file all or nothing.
+pub(crate) fn atomically(
+    path: &Path,
+    content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), RenderError> {
+    let content = |out: &mut dyn Write| {
+        let mut buffered = BufWriter::new(out);
+        content(&mut buffered)?;
+        buffered.flush()
+    };
+    write_atomically(path, content).map_err(|error| {
+        let source = match error {
+            MeshError::Io { source, .. } => source,
+            other => io::Error::other(other.to_string()),
+        };
+        RenderError::Io {
+            action: "write",
+            path: path.to_owned(),
+            source,
+        }
+    })
+}

@@ -1,0 +1,85 @@
+//! [`Renderer`]: a device if there is one, else the processor.
+
+use incise::Simulation;
+
+#[cfg(feature = "gpu")]
+use crate::GpuRenderer;
+use crate::{Camera, Painting, Picture, RenderError, SoftwareRenderer, Style};
+
+/// Draws on a device or on the processor.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum Renderer {
+    /// On a device.
+    #[cfg(feature = "gpu")]
+    Gpu(Box<GpuRenderer>),
+    /// On the processor.
+    Software(SoftwareRenderer),
+}
+
+impl Renderer {
+    /// A device's if there is a real one that can, else the processor's, with the reason. Opening a device takes some
+    /// hundred milliseconds. A device that is a processor in disguise is slower than the processor itself: it draws only if
+    /// the environment names it, by `WGPU_ADAPTER_NAME`.
+    #[must_use]
+    pub fn open() -> (Self, Option<String>) {
+        #[cfg(feature = "gpu")]
+        return match Self::on_device() {
+            Ok(renderer) => (Self::Gpu(Box::new(renderer)), None),
+            Err(reason) => (Self::Software(SoftwareRenderer::new()), Some(reason)),
+        };
+        #[cfg(not(feature = "gpu"))]
+        {
+            let reason = "this build draws on no GPU (feature `gpu`)".to_owned();
+            (Self::Software(SoftwareRenderer::new()), Some(reason))
+        }
+    }
+
+    #[cfg(feature = "gpu")]
+    fn on_device() -> Result<GpuRenderer, String> {
+        use incise::gpu::{GpuContext, GpuOptions};
+
+        let options = GpuOptions::from_env();
+        let gpu = GpuContext::new(&options).map_err(|error| error.to_string())?;
+        let adapter = gpu.adapter();
+        if adapter.software && options.adapter.is_none() {
+            return Err(format!("the only GPU is software ({})", adapter.name));
+        }
+        GpuRenderer::new(gpu.into()).map_err(|error| error.to_string())
+    }
+
+    /// What it draws on, in words.
+    #[must_use]
+    pub fn describe(&self) -> String {
+        match self {
+            #[cfg(feature = "gpu")]
+            Self::Gpu(renderer) => {
+                let adapter = renderer.gpu().adapter();
+                format!("{} ({})", adapter.name, adapter.backend)
+            }
+            Self::Software(_) => "the processor".to_owned(),
+        }
+    }
+
+    /// Draws a picture. A simulation on a device other than the renderer's must have been read back.
+    ///
+    /// # Errors
+    /// If a side of the picture is 0 or too large; if a device is lost or out of memory.
+    ///
+    /// # Panics
+    /// If the painting does not follow the simulation.
+    pub fn picture(
+        &mut self,
+        painting: &Painting,
+        simulation: &Simulation,
+        camera: &Camera,
+        style: &Style,
+        size: [u32; 2],
+    ) -> Result<Picture, RenderError> {
+        match self {
+            #[cfg(feature = "gpu")]
+            Self::Gpu(renderer) => renderer.picture(painting, simulation, camera, style, size),
+            Self::Software(renderer) => renderer.picture(painting, simulation, camera, style, size),
+        }
+    }
+}

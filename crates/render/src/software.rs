@@ -1,0 +1,398 @@
+//! [`SoftwareRenderer`]: the same pictures without a device.
+//!
+//! Triangles are clipped and cut into rows of pixels by `retrofire-core`: of the rasterizers in Rust it is the one that clips
+//! against all planes of the view (without it a camera inside a scene draws nonsense), fills exactly the pixels whose middle
+//! a triangle covers, interpolates one over depth, has no dependencies and no unsafe code in the way. `euc` 0.5 does not
+//! clip, so that triangles behind the eye come out mirrored.
+//!
+//! What the rasterizer is asked for is only which triangle is in front at each of four samples of a pixel, placed as devices
+//! place them. A pixel is then shaded once for each triangle that it shows, at the middle of the samples that show it: what
+//! a device does with four samples. Bands of rows are done in parallel; each pixel is computed by one thread in one order,
+//! so a picture is the same for any number of threads. Cost: four passes over the rows of each triangle, and a shading or
+//! two a pixel.
+
+use glam::{Vec2, Vec3};
+use incise::Simulation;
+use incise::cutting::FaceTag;
+use rayon::prelude::*;
+use retrofire_core::geom::{Tri, Vertex, vertex};
+use retrofire_core::math::{ProjVec3, pt3};
+use retrofire_core::render::clip::{ClipVert, Status, view_frustum};
+use retrofire_core::render::raster::{ScreenPt, tri_fill};
+
+use crate::normals::normal_sums;
+use crate::props::{Plane, PropCorner, Props};
+use crate::shading::{self, Surface, direction};
+use crate::srgb::encode;
+use crate::view::{LARGEST_SIDE, View};
+use crate::{Camera, Painting, Picture, RenderError, Style};
+
+/// Where the samples of a pixel are: the standard places of Vulkan, Metal and Direct3D.
+const SAMPLES: [Vec2; 4] = [
+    Vec2::new(0.375, 0.125),
+    Vec2::new(0.875, 0.375),
+    Vec2::new(0.125, 0.625),
+    Vec2::new(0.625, 0.875),
+];
+/// Rows that a thread does at once.
+const BAND: usize = 16;
+/// Triangles that a thread places at once.
+const CHUNK: usize = 512;
+/// No triangle.
+const NOTHING: u32 = u32::MAX;
+
+/// Draws on the processor.
+///
+/// # Example
+/// See [`Painting`].
+#[derive(Debug, Default)]
+pub struct SoftwareRenderer {}
+
+impl SoftwareRenderer {
+    /// One that has drawn nothing yet.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Draws a picture, of the positions that the host knows: see [`Simulation::read_back`].
+    ///
+    /// The same input gives the same bytes for any number of threads.
+    ///
+    /// # Errors
+    /// If a side of the picture is 0 or more than 8192.
+    ///
+    /// # Panics
+    /// If the painting does not follow the simulation.
+    pub fn picture(
+        &mut self,
+        painting: &Painting,
+        simulation: &Simulation,
+        camera: &Camera,
+        style: &Style,
+        size: [u32; 2],
+    ) -> Result<Picture, RenderError> {
+        let view = View::new(camera, size, LARGEST_SIDE)?;
+        let frame = Frame::new(view, painting, simulation, *style);
+        let placed = frame.place();
+        let [width, height] = size.map(|side| side as usize);
+        let mut rgba = vec![0; 4 * width * height];
+        rgba.par_chunks_mut(4 * width * BAND)
+            .enumerate()
+            .for_each_init(Band::default, |band, (number, rows)| {
+                band.draw(&frame, &placed, number * BAND, rows);
+            });
+        Ok(Picture {
+            width: size[0],
+            height: size[1],
+            rgba,
+        })
+    }
+}
+
+/// All that is drawn in a picture.
+struct Frame<'a> {
+    view: View,
+    style: Style,
+    painting: &'a Painting,
+    colors: &'a [u32],
+    /// Of the skin's vertices, relative to the eye.
+    places: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    props: Props,
+}
+
+/// A triangle on the screen: pixels from the upper left and one over the depth.
+#[derive(Clone, Copy, Debug)]
+struct Placed {
+    corners: [Vec3; 3],
+    /// The skin's triangles come first, then those of obstacles.
+    triangle: u32,
+}
+
+/// What a triangle shows at a place.
+struct Corners<'a> {
+    places: [Vec3; 3],
+    kind: Kind<'a>,
+}
+
+enum Kind<'a> {
+    Skin(usize),
+    Prop(&'a [PropCorner]),
+}
+
+impl<'a> Frame<'a> {
+    fn new(view: View, painting: &'a Painting, simulation: &Simulation, style: Style) -> Self {
+        let skin = painting.skin();
+        let positions = simulation.positions();
+        let origin = positions.first().copied().unwrap_or_default();
+        let vertices = skin.vertices().par_iter().with_min_len(CHUNK);
+        let local: Vec<Vec3> = vertices
+            .map(|vertex| (positions[vertex.particle.index()] - origin).as_vec3())
+            .collect();
+        let normals = if style.smooth {
+            let sums = normal_sums(skin.triangles(), &local);
+            let unit = |sum: &[i32; 3]| direction(Vec3::from_array(sum.map(|part| part as f32)));
+            sums.iter().map(unit).collect()
+        } else {
+            vec![Vec3::Z; local.len()]
+        };
+        let from_eye = view.from_eye(origin);
+        Self {
+            style,
+            colors: painting.colors_for(style.color_by),
+            painting,
+            places: local.into_iter().map(|place| place + from_eye).collect(),
+            normals,
+            props: Props::new(painting, simulation, &view),
+            view,
+        }
+    }
+
+    fn triangles(&self) -> usize {
+        self.painting.skin().triangles().len() + self.props.corners.len() / 3
+    }
+
+    fn corners(&self, triangle: usize) -> Corners<'_> {
+        let skin = self.painting.skin().triangles();
+        match skin.get(triangle) {
+            Some(corners) => Corners {
+                places: corners.map(|v| self.places[v as usize]),
+                kind: Kind::Skin(triangle),
+            },
+            None => {
+                let first = 3 * (triangle - skin.len());
+                let corners = &self.props.corners[first..first + 3];
+                Corners {
+                    places: [0, 1, 2].map(|i| Vec3::from_array(corners[i].place)),
+                    kind: Kind::Prop(corners),
+                }
+            }
+        }
+    }
+
+    /// All triangles on the screen, clipped, in their order.
+    fn place(&self) -> Vec<Placed> {
+        let triangles: Vec<u32> = (0..self.triangles()).map(number).collect();
+        let chunks = triangles.par_chunks(CHUNK);
+        chunks
+            .flat_map_iter(|chunk| {
+                let mut placed = Vec::with_capacity(chunk.len());
+                for &triangle in chunk {
+                    self.place_one(triangle, &mut placed);
+                }
+                placed
+            })
+            .collect()
+    }
+
+    fn place_one(&self, triangle: u32, placed: &mut Vec<Placed>) {
+        let corner = |place: Vec3| {
+            let clip = self.view.clip * place.extend(1.0);
+            // Depth from -w to w is what the clipper expects.
+            let clip = ProjVec3::new([clip.x, clip.y, 2.0 * clip.z - clip.w, clip.w]);
+            ClipVert::new(vertex(clip, ()))
+        };
+        let clipped = Tri(self.corners(triangle as usize).places.map(corner));
+        let mut add = |Tri(corners): Tri<ClipVert<()>>| {
+            placed.push(Placed {
+                corners: corners.map(|corner| self.screen(corner.pos)),
+                triangle,
+            });
+        };
+        match view_frustum::status(&clipped.0) {
+            Status::Hidden => {}
+            Status::Visible => add(clipped),
+            Status::Clipped => {
+                let mut parts = Vec::new();
+                view_frustum::clip(&[clipped][..], &mut parts);
+                parts.into_iter().for_each(&mut add);
+            }
+        }
+    }
+
+    fn screen(&self, clip: ProjVec3) -> Vec3 {
+        let [x, y, _, w] = clip.0;
+        let [width, height] = self.view.size.map(|side| side as f32);
+        Vec3::new(
+            (x / w * 0.5 + 0.5) * width,
+            (0.5 - y / w * 0.5) * height,
+            1.0 / w,
+        )
+    }
+
+    /// What a triangle sends to the eye at a place of the picture.
+    fn shade(&self, triangle: u32, at: Vec2) -> Vec3 {
+        let Corners { places, kind } = self.corners(triangle as usize);
+        let shares = shares(places, self.view.ray(at.x, at.y));
+        let mix = |of: [Vec3; 3]| of[0] * shares.x + of[1] * shares.y + of[2] * shares.z;
+        let place = mix(places);
+        match kind {
+            Kind::Skin(triangle) => {
+                let skin = self.painting.skin();
+                let corners = skin.triangles()[triangle];
+                let cut = skin.tag(triangle) != FaceTag::Outer;
+                let word = self.colors.get(triangle).copied().unwrap_or(0);
+                let (base, gloss) = shading::skin_base(word, cut);
+                let [ab, ac] = [places[1] - places[0], places[2] - places[0]];
+                let face = direction(direction(ab).cross(direction(ac)));
+                let normal = mix(corners.map(|v| self.normals[v as usize]));
+                let surface = Surface {
+                    base,
+                    gloss,
+                    place,
+                    normal: shading::skin_normal(normal, face, cut, self.style.smooth),
+                    face,
+                };
+                let color = shading::shade(surface, self.view.light);
+                if self.style.wireframe {
+                    shading::wire(color, self.distances(places, at))
+                } else {
+                    color
+                }
+            }
+            Kind::Prop(corners) => {
+                let normal = direction(mix([0, 1, 2].map(|i| Vec3::from_array(corners[i].normal))));
+                let [r, g, b, gloss] = corners[0].color;
+                let surface = Surface {
+                    base: Vec3::from_array([r, g, b].map(shading::decode)),
+                    gloss: f32::from(gloss) / 255.0,
+                    place,
+                    normal,
+                    face: normal,
+                };
+                shading::shade(surface, self.view.light)
+            }
+        }
+    }
+
+    /// Distances in pixels from the edges of a triangle; far away if a corner is not in front of the eye.
+    fn distances(&self, places: [Vec3; 3], at: Vec2) -> Vec3 {
+        let [Some(a), Some(b), Some(c)] = places.map(|place| self.view.pixel(place)) else {
+            return Vec3::splat(1e6);
+        };
+        let from = |p: Vec2, q: Vec2| (q - p).perp_dot(at - p).abs() / (q - p).length().max(1e-6);
+        Vec3::new(from(b, c), from(c, a), from(a, b))
+    }
+
+    /// The color of a pixel from what each of its samples shows.
+    fn pixel(&self, x: usize, y: usize, samples: [(u32, f32); 4]) -> [u8; 4] {
+        let corner = Vec2::new(x as f32, y as f32);
+        let middle = corner + 0.5;
+        let mut colors = [Vec3::ZERO; 4];
+        for i in 0..4 {
+            let triangle = samples[i].0;
+            if let Some(same) = samples[..i].iter().position(|other| other.0 == triangle) {
+                colors[i] = colors[same];
+                continue;
+            }
+            colors[i] = if triangle == NOTHING {
+                shading::background(middle.y / self.view.size[1] as f32)
+            } else {
+                let shown = (0..4).filter(|&j| samples[j].0 == triangle);
+                let (sum, count) = shown.fold((Vec2::ZERO, 0.0), |(sum, count), j| {
+                    (sum + SAMPLES[j], count + 1.0)
+                });
+                self.shade(triangle, corner + sum / count)
+            };
+        }
+        if !self.props.planes.is_empty() {
+            let ray = self.view.ray(middle.x, middle.y);
+            for plane in &self.props.planes {
+                self.blend(plane, ray, samples, &mut colors);
+            }
+        }
+        let color = colors.iter().sum::<Vec3>() * 0.25;
+        let [r, g, b] = color.to_array().map(encode);
+        [r, g, b, 255]
+    }
+
+    /// Draws a plane over the samples that show something behind it.
+    fn blend(&self, plane: &Plane, ray: Vec3, samples: [(u32, f32); 4], colors: &mut [Vec3; 4]) {
+        let seen = shading::plane(&self.view, plane, ray, |_| 0.0);
+        let Some((color, cover, depth)) = seen else {
+            return;
+        };
+        for (behind, (_, nearness)) in colors.iter_mut().zip(samples) {
+            if 1.0 / depth > nearness {
+                // What a device keeps of its samples is between black and white.
+                *behind = behind.clamp(Vec3::ZERO, Vec3::ONE).lerp(color, cover);
+            }
+        }
+    }
+}
+
+/// The barycentric coordinates of where a ray meets a triangle's plane, held within the triangle.
+fn shares([a, b, c]: [Vec3; 3], ray: Vec3) -> Vec3 {
+    let (ab, ac) = (b - a, c - a);
+    let across = ray.cross(ac);
+    let determinant = ab.dot(across);
+    let v = -a.dot(across) / determinant;
+    let w = -ray.dot(a.cross(ab)) / determinant;
+    if !(v.is_finite() && w.is_finite()) {
+        // Seen from the edge.
+        return Vec3::splat(1.0 / 3.0);
+    }
+    let shares = Vec3::new(1.0 - v - w, v, w).max(Vec3::ZERO);
+    shares / shares.element_sum()
+}
+
+/// A few rows of pixels, four samples each.
+#[derive(Default)]
+struct Band {
+    /// The triangle and one over its depth.
+    samples: Vec<[(u32, f32); 4]>,
+}
+
+impl Band {
+    /// Draws rows from `top` on.
+    fn draw(&mut self, frame: &Frame<'_>, placed: &[Placed], top: usize, rows: &mut [u8]) {
+        let width = frame.view.size[0] as usize;
+        let height = rows.len() / (4 * width);
+        self.samples.clear();
+        self.samples.resize(width * height, [(NOTHING, 0.0); 4]);
+        let (above, below) = (top as f32 - 1.0, (top + height) as f32 + 1.0);
+        for triangle in placed {
+            let [a, b, c] = triangle.corners.map(|corner| corner.y);
+            if a.max(b).max(c) >= above && a.min(b).min(c) <= below {
+                self.fill(triangle, top, width);
+            }
+        }
+        for (i, pixel) in rows.chunks_exact_mut(4).enumerate() {
+            let color = frame.pixel(i % width, top + i / width, self.samples[i]);
+            pixel.copy_from_slice(&color);
+        }
+    }
+
+    /// Puts a triangle into the samples where it is in front; of several at one depth the first stays.
+    fn fill(&mut self, placed: &Placed, top: usize, width: usize) {
+        let height = self.samples.len() / width;
+        for (sample, place) in SAMPLES.iter().enumerate() {
+            // The rasterizer asks for the middle of a pixel.
+            let shift = 0.5 - *place;
+            let corner = |corner: Vec3| -> Vertex<ScreenPt, ()> {
+                vertex(pt3(corner.x + shift.x, corner.y + shift.y, corner.z), ())
+            };
+            tri_fill(placed.corners.map(corner), |row| {
+                let Some(y) = row.y.checked_sub(top).filter(|&y| y < height) else {
+                    return;
+                };
+                let (start, end) = (row.xs.start, row.xs.end.min(width));
+                if start >= end {
+                    return;
+                }
+                let pixels = &mut self.samples[y * width + start..y * width + end];
+                for (pixel, (at, ())) in pixels.iter_mut().zip(row.vs) {
+                    let nearness = at.z();
+                    if nearness > pixel[sample].1 {
+                        pixel[sample] = (placed.triangle, nearness);
+                    }
+                }
+            });
+        }
+    }
+}
+
+fn number(triangle: usize) -> u32 {
+    u32::try_from(triangle).unwrap_or(NOTHING)
+}

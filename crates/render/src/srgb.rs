@@ -1,0 +1,28 @@
+//! [`encode`]: linear light as a byte of sRGB, by a table as fine as that no byte is off by more than one.
+
+use std::sync::LazyLock;
+
+/// Steps of the table: the darkest byte of sRGB is a step of 1/3295 in linear light.
+const STEPS: f32 = 16_383.0;
+
+/// The byte of a part of linear light; what is below 0 is black, what is above 1 is full.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "clamped to the table"
+)]
+pub(crate) fn encode(linear: f32) -> u8 {
+    static TABLE: LazyLock<Vec<u8>> = LazyLock::new(|| {
+        let byte = |step: u16| {
+            let c = f32::from(step) / STEPS;
+            let encoded = if c <= 0.003_130_8 {
+                12.92 * c
+            } else {
+                1.055 * c.powf(1.0 / 2.4) - 0.055
+            };
+            (encoded * 255.0).round() as u8
+        };
+        (0..=STEPS as u16).map(byte).collect()
+    });
+    TABLE[(linear.clamp(0.0, 1.0) * STEPS).round() as usize]
+}
