@@ -2,10 +2,12 @@
 //!
 //! A [`Painting`] follows a [`Simulation`](incise::Simulation) through its cuts. A [`Renderer`] draws it as a [`Camera`] sees
 //! it and a [`Style`] wants it: on a device, where the positions of a solver there are drawn from its own buffer, or on the
-//! processor, with the same formulas and nearly the same pixels.
+//! processor, with the same formulas and nearly the same pixels. [`Film`] and
+//! [`contact_sheet`] put pictures together.
 
 mod camera;
 mod error;
+mod film;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod normals;
@@ -17,6 +19,7 @@ mod piece_colors;
 mod props;
 mod renderer;
 mod shading;
+mod sheet;
 mod software;
 mod srgb;
 mod stretch;
@@ -25,6 +28,7 @@ mod view;
 
 pub use camera::Camera;
 pub use error::RenderError;
+pub use film::Film;
 #[cfg(feature = "gpu")]
 pub use gpu::{GpuRenderer, Shader, shaders};
 pub use normals::normal_sums;
@@ -33,6 +37,7 @@ pub use palette::Legend;
 pub use pick::Hit;
 pub use picture::Picture;
 pub use renderer::Renderer;
+pub use sheet::contact_sheet;
 pub use software::SoftwareRenderer;
 pub use stretch::stretch;
 pub use style::{ColorBy, Style};

@@ -8,6 +8,7 @@ use incise::mesh::MeshError;
 use incise::mesh::io::write_atomically;
 
 use crate::RenderError;
+use crate::srgb::{decode, encode};
 
 /// Pixels in sRGB.
 ///
@@ -53,6 +54,34 @@ impl Picture {
         assert!(x < self.width, "no such pixel");
         let at = 4 * (y as usize * self.width as usize + x as usize);
         [self.rgba[at], self.rgba[at + 1], self.rgba[at + 2]]
+    }
+
+    /// The picture at one over `factor` of its size, each pixel the mean of a square of pixels in linear light; what does
+    /// not fill a square at the right and the lower edge is left out. A factor of 0 or one above a side changes nothing.
+    #[must_use]
+    pub fn shrunk(&self, factor: u32) -> Self {
+        if factor == 0 || factor > self.width.min(self.height) {
+            return self.clone();
+        }
+        let (width, height) = (self.width / factor, self.height / factor);
+        let mut rgba = Vec::with_capacity(4 * width as usize * height as usize);
+        let share = 1.0 / (factor * factor) as f32;
+        for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
+            let mut sum = [0.0_f32; 3];
+            for (dy, dx) in (0..factor).flat_map(|dy| (0..factor).map(move |dx| (dy, dx))) {
+                let pixel = self.pixel(x * factor + dx, y * factor + dy);
+                for (sum, byte) in sum.iter_mut().zip(pixel) {
+                    *sum += decode(byte);
+                }
+            }
+            rgba.extend(sum.map(|sum| encode(sum * share)));
+            rgba.push(255);
+        }
+        Self {
+            width,
+            height,
+            rgba,
+        }
     }
 
     /// Writes a PNG file, beside its name first: the name never stands for half a file.

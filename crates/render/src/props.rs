@@ -159,7 +159,7 @@ impl Props {
         let in_front = normal.dot(view.eye - point) > 0.0;
         let opacity = if ground { 0.55 } else { 0.25 };
         self.planes.push(Plane {
-            center: view.from_eye(center),
+            center: view.relative(center),
             radius: single(size * PATCH),
             u: u.as_vec3(),
             v: v.as_vec3(),
@@ -172,7 +172,7 @@ impl Props {
 
     fn corner(&mut self, view: &View, place: DVec3, normal: DVec3, color: [u8; 4]) {
         self.corners.push(PropCorner {
-            place: view.from_eye(place).to_array(),
+            place: view.relative(place).to_array(),
             normal: normal.as_vec3().to_array(),
             color,
         });

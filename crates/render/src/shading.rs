@@ -8,6 +8,7 @@
 use glam::Vec3;
 
 use crate::props::Plane;
+use crate::srgb::decode;
 use crate::view::View;
 
 /// Tissue, in linear light.
@@ -156,14 +157,4 @@ fn line(axis: Vec3, offset: f32, spacing: f32, place: Vec3, steps: [Vec3; 2]) ->
     let width = (steps[0].dot(axis).abs() + steps[1].dot(axis).abs()) / spacing;
     let distance = (at - (at + 0.5).floor()).abs();
     (1.0 - smoothstep(0.4 * width, 1.3 * width, distance)) * (1.0 - smoothstep(0.08, 0.45, width))
-}
-
-/// A byte of sRGB as linear light.
-pub(crate) fn decode(byte: u8) -> f32 {
-    let c = f32::from(byte) / 255.0;
-    if c <= 0.040_45 {
-        c / 12.92
-    } else {
-        ((c + 0.055) / 1.055).powf(2.4)
-    }
 }

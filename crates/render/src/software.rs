@@ -23,7 +23,7 @@ use retrofire_core::render::raster::{ScreenPt, tri_fill};
 use crate::normals::normal_sums;
 use crate::props::{Plane, PropCorner, Props};
 use crate::shading::{self, Surface, direction};
-use crate::srgb::encode;
+use crate::srgb::{decode, encode};
 use crate::view::{LARGEST_SIDE, View};
 use crate::{Camera, Painting, Picture, RenderError, Style};
 
@@ -137,7 +137,7 @@ impl<'a> Frame<'a> {
         } else {
             vec![Vec3::Z; local.len()]
         };
-        let from_eye = view.from_eye(origin);
+        let from_eye = view.relative(origin);
         Self {
             style,
             colors: painting.colors_for(style.color_by),
@@ -255,7 +255,7 @@ impl<'a> Frame<'a> {
                 let normal = direction(mix([0, 1, 2].map(|i| Vec3::from_array(corners[i].normal))));
                 let [r, g, b, gloss] = corners[0].color;
                 let surface = Surface {
-                    base: Vec3::from_array([r, g, b].map(shading::decode)),
+                    base: Vec3::from_array([r, g, b].map(decode)),
                     gloss: f32::from(gloss) / 255.0,
                     place,
                     normal,

@@ -1,4 +1,5 @@
-//! [`encode`]: linear light as a byte of sRGB, by a table as fine as that no byte is off by more than one.
+//! sRGB (IEC 61966-2-1): [`encode`] gives the byte of a part of linear light, [`decode`] goes back. Both by tables: the one
+//! is so fine that no byte is off by more than one, the other exact.
 
 use std::sync::LazyLock;
 
@@ -25,4 +26,19 @@ pub(crate) fn encode(linear: f32) -> u8 {
         (0..=STEPS as u16).map(byte).collect()
     });
     TABLE[(linear.clamp(0.0, 1.0) * STEPS).round() as usize]
+}
+
+/// A byte of sRGB as linear light.
+pub(crate) fn decode(byte: u8) -> f32 {
+    static TABLE: LazyLock<[f32; 256]> = LazyLock::new(|| {
+        std::array::from_fn(|i| {
+            let c = i as f32 / 255.0;
+            if c <= 0.040_45 {
+                c / 12.92
+            } else {
+                ((c + 0.055) / 1.055).powf(2.4)
+            }
+        })
+    });
+    TABLE[usize::from(byte)]
 }

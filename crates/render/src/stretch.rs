@@ -1,7 +1,7 @@
 //! [`stretch`]: the largest principal stretch of a tet.
 //!
 //! With the edges from one corner as columns, at rest R and now D, the deformation is F = D R⁻¹; its singular values are
-//! the principal stretches. The largest is the root of the largest eigenvalue of FᵀF, which for a symmetric matrix of
+//! the principal stretches. The largest is the root of the largest eigenvalue of `FᵀF`, which for a symmetric matrix of
 //! three rows has a closed form (O. K. Smith, "Eigenvalues of a symmetric 3 × 3 matrix", 1961). Cost: some 100 operations.
 
 use glam::{DMat3, DVec3};

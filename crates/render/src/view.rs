@@ -61,7 +61,7 @@ impl View {
     }
 
     /// A point relative to the eye.
-    pub(crate) fn from_eye(&self, point: glam::DVec3) -> Vec3 {
+    pub(crate) fn relative(&self, point: glam::DVec3) -> Vec3 {
         (point - self.eye).as_vec3()
     }
 

@@ -174,7 +174,7 @@ impl GpuRenderer {
         let solver = solver_here(&self.gpu, painting, simulation);
         let positions = match solver {
             Some(solver) => {
-                let origin = view.from_eye(solver.as_last_seen().origin());
+                let origin = view.relative(solver.as_last_seen().origin());
                 self.parts
                     .replace(&self.gpu, &[origin.extend(0.0).to_array()])?;
                 solver.positions()
@@ -187,7 +187,7 @@ impl GpuRenderer {
                     .map(|x| (*x - origin).as_vec3().extend(0.0).to_array())
                     .collect();
                 self.positions.replace(&self.gpu, &places)?;
-                let origin = view.from_eye(origin);
+                let origin = view.relative(origin);
                 self.parts
                     .replace(&self.gpu, &[origin.extend(0.0).to_array()])?;
                 self.positions.raw()

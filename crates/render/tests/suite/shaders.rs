@@ -17,6 +17,9 @@ fn naga_accepts_every_shader() {
         let storage = globals
             .filter(|(_, of)| matches!(of.space, naga::AddressSpace::Storage { .. }))
             .count();
-        assert!(storage <= 8, "{name}: {storage} storage buffers, and WebGPU grants 8");
+        assert!(
+            storage <= 8,
+            "{name}: {storage} storage buffers, and WebGPU grants 8"
+        );
     }
 }

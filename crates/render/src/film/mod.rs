@@ -1,0 +1,283 @@
+//! [`Film`]: pictures one after the other in an animated GIF or PNG.
+//!
+//! Each picture is stored as what differs from the one before, so that a film of a still background stays small: as the
+//! rectangle around it in a PNG, which keeps every pixel, and pixel by pixel in a GIF, which has 255 colors a picture.
+//! Nothing but one picture is held in memory. The file has a name of its own while it is written and gets its final one
+//! when it is finished. Cost: O(pixels) a picture; some ten milliseconds for half a million.
+
+mod apng;
+mod gif;
+
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use crate::{Picture, RenderError};
+use apng::Apng;
+use gif::Gif;
+
+/// The endings of films.
+const KNOWN: &str = ".gif, .png, .apng";
+/// Largest side of a picture in a GIF.
+const LARGEST_GIF: u32 = 65_535;
+
+/// An animated picture that is being written; gone if it is dropped before it is finished.
+///
+/// # Example
+/// ```
+/// use incise_render::{Film, Picture};
+///
+/// let path = std::env::temp_dir().join(format!("incise-render-doc-{}.gif", std::process::id()));
+/// let mut film = Film::create(&path, [8, 6], 0.1)?;
+/// for step in 0..4 {
+///     film.push(&Picture::filled(8, 6, [40 * step, 90, 120]))?;
+/// }
+/// film.finish()?;
+/// assert!(path.exists());
+/// # std::fs::remove_file(path).ok();
+/// # Ok::<(), incise_render::RenderError>(())
+/// ```
+#[derive(Debug)]
+pub struct Film {
+    path: PathBuf,
+    temporary: PathBuf,
+    size: [u32; 2],
+    seconds: f64,
+    /// Pictures so far.
+    pictures: u32,
+    /// What is seen after the last one: for a GIF what it was before its colors were reduced.
+    shown: Vec<u8>,
+    /// `None` once it is finished.
+    writer: Option<Writer>,
+}
+
+#[derive(Debug)]
+enum Writer {
+    Gif(Box<Gif>),
+    Apng(Apng),
+}
+
+/// Part of a picture.
+#[derive(Clone, Copy, Debug)]
+struct Rectangle {
+    left: u32,
+    top: u32,
+    width: u32,
+    height: u32,
+}
+
+impl Film {
+    /// Begins a film of pictures of `size` pixels, each shown for as many seconds, in a file whose ending says the format:
+    /// `.gif`, or `.png` or `.apng` for an animated PNG. It plays forever. Most viewers show a picture of a GIF for at
+    /// least 0.02 s.
+    ///
+    /// # Errors
+    /// Before anything is written: if the ending is another one; if a side of the pictures is 0 or, in a GIF, more than
+    /// 65535; if the time is not from 0.01 s to 10 s; if the file cannot be made.
+    pub fn create(
+        path: impl AsRef<Path>,
+        size: [u32; 2],
+        seconds_per_frame: f64,
+    ) -> Result<Self, RenderError> {
+        let path = path.as_ref();
+        let is_gif = is_gif(path)?;
+        let largest = if is_gif { LARGEST_GIF } else { i32::MAX as u32 };
+        if size.iter().any(|side| !(1..=largest).contains(side)) {
+            return Err(RenderError::Size {
+                width: size[0],
+                height: size[1],
+                range: format!("each side has from 1 to {largest} pixels in this kind of film"),
+            });
+        }
+        if !(0.01..=10.0).contains(&seconds_per_frame) {
+            return Err(RenderError::FrameTime {
+                given: seconds_per_frame,
+            });
+        }
+        static COUNTER: AtomicU32 = AtomicU32::new(0);
+        let unique = COUNTER.fetch_add(1, Ordering::Relaxed);
+        let mut name = path.file_name().unwrap_or_default().to_owned();
+        name.push(format!(".partial-{}-{unique}", std::process::id()));
+        let mut film = Self {
+            path: path.to_owned(),
+            temporary: path.with_file_name(name),
+            size,
+            seconds: seconds_per_frame,
+            pictures: 0,
+            shown: Vec::new(),
+            writer: None,
+        };
+        let open = || {
+            if path.is_dir() {
+                return Err(io::Error::other("it is a folder"));
+            }
+            let file = File::create(&film.temporary)?;
+            Ok(if is_gif {
+                Writer::Gif(Box::new(Gif::new(file, size)?))
+            } else {
+                Writer::Apng(Apng::new(file, size)?)
+            })
+        };
+        match open() {
+            Ok(writer) => film.writer = Some(writer),
+            Err(source) => return Err(film.failed(source)),
+        }
+        Ok(film)
+    }
+
+    /// Whether a film can have such a name.
+    ///
+    /// # Errors
+    /// If not: the message names the endings that are known.
+    pub fn check_path(path: impl AsRef<Path>) -> Result<(), RenderError> {
+        is_gif(path.as_ref()).map(|_| ())
+    }
+
+    /// Adds a picture.
+    ///
+    /// # Errors
+    /// If it has another size than the film; if it cannot be written.
+    pub fn push(&mut self, picture: &Picture) -> Result<(), RenderError> {
+        let Picture { width, height, .. } = *picture;
+        if [width, height] != self.size {
+            return Err(RenderError::OtherSize {
+                width,
+                height,
+                film_width: self.size[0],
+                film_height: self.size[1],
+            });
+        }
+        let (number, seconds) = (self.pictures, self.seconds);
+        let written = match &mut self.writer {
+            Some(Writer::Gif(gif)) => {
+                let delay = ticks(number, seconds, 100.0);
+                gif.push(picture, &mut self.shown, delay)
+            }
+            Some(Writer::Apng(apng)) => {
+                let delay = ticks(number, seconds, 1000.0);
+                apng.push(picture, &mut self.shown, delay)
+            }
+            None => Ok(()),
+        };
+        written.map_err(|source| self.failed(source))?;
+        self.pictures += 1;
+        Ok(())
+    }
+
+    /// Completes the film and gives it its name.
+    ///
+    /// # Errors
+    /// If it has no picture or cannot be written; then nothing is left.
+    pub fn finish(mut self) -> Result<(), RenderError> {
+        if self.pictures == 0 {
+            return Err(RenderError::EmptyFilm {
+                path: self.path.clone(),
+            });
+        }
+        let finished = match self.writer.take() {
+            Some(Writer::Gif(gif)) => gif.finish(),
+            Some(Writer::Apng(apng)) => apng.finish(self.pictures),
+            None => Ok(()),
+        };
+        let named = finished.and_then(|()| fs::rename(&self.temporary, &self.path));
+        named.map_err(|source| self.failed(source))
+    }
+
+    fn failed(&self, source: io::Error) -> RenderError {
+        RenderError::Io {
+            action: "write",
+            path: self.path.clone(),
+            source,
+        }
+    }
+}
+
+impl Drop for Film {
+    fn drop(&mut self) {
+        // Closed before it is removed: not every system removes an open file.
+        self.writer = None;
+        // Gone already if it was finished; else there is nobody left to tell.
+        let _ = fs::remove_file(&self.temporary);
+    }
+}
+
+fn is_gif(path: &Path) -> Result<bool, RenderError> {
+    let ending = path.extension().unwrap_or_default();
+    let is = |known: &str| ending.eq_ignore_ascii_case(known);
+    if is("gif") {
+        Ok(true)
+    } else if is("png") || is("apng") {
+        Ok(false)
+    } else {
+        Err(RenderError::UnknownFilm {
+            path: path.to_owned(),
+            known: KNOWN,
+        })
+    }
+}
+
+/// How long the picture of a number is shown, in parts of a second, so that rounding does not add up.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "at most ten seconds of a thousand parts"
+)]
+fn ticks(number: u32, seconds: f64, per_second: f64) -> u16 {
+    let until = |number: f64| (number * seconds * per_second).round();
+    let number = f64::from(number);
+    (until(number + 1.0) - until(number)).clamp(1.0, f64::from(u16::MAX)) as u16
+}
+
+/// The rectangle around all pixels for which `differs` holds, given their four bytes before and now; the first pixel
+/// alone if there is none.
+fn around(
+    before: &[u8],
+    now: &[u8],
+    width: u32,
+    differs: impl Fn(&[u8], &[u8]) -> bool,
+) -> Rectangle {
+    let row = 4 * width as usize;
+    let mut bounds: Option<[usize; 4]> = None;
+    let rows = before.chunks_exact(row).zip(now.chunks_exact(row));
+    for (y, (before, now)) in rows.enumerate() {
+        let mut pixels = before.chunks_exact(4).zip(now.chunks_exact(4));
+        let Some(first) = pixels.clone().position(|(a, b)| differs(a, b)) else {
+            continue;
+        };
+        let last = pixels.rposition(|(a, b)| differs(a, b)).unwrap_or(first);
+        bounds = Some(match bounds {
+            None => [first, y, last, y],
+            Some([left, top, right, _]) => [left.min(first), top, right.max(last), y],
+        });
+    }
+    let [left, top, right, bottom] = bounds
+        .unwrap_or_default()
+        .map(|side| u32::try_from(side).expect("sides of pictures are counted in 32 bits"));
+    Rectangle {
+        left,
+        top,
+        width: right - left + 1,
+        height: bottom - top + 1,
+    }
+}
+
+impl Rectangle {
+    /// All of a picture.
+    fn whole([width, height]: [u32; 2]) -> Self {
+        Self {
+            left: 0,
+            top: 0,
+            width,
+            height,
+        }
+    }
+
+    /// The bytes of its rows in a picture of some width.
+    fn rows(self, width: u32) -> impl Iterator<Item = std::ops::Range<usize>> {
+        (self.top..self.top + self.height).map(move |y| {
+            let start = 4 * (y as usize * width as usize + self.left as usize);
+            start..start + 4 * self.width as usize
+        })
+    }
+}

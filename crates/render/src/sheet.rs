@@ -1,0 +1,79 @@
+//! [`contact_sheet`]: pictures side by side, with captions.
+
+use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
+
+use crate::Picture;
+
+/// Pixels around each picture.
+const MARGIN: usize = 10;
+/// Pixels from one line of a caption's top to its bottom.
+const LINE: usize = 20;
+const PAPER: [u8; 3] = [250, 250, 251];
+const INK: [u8; 3] = [40, 44, 52];
+
+const WEIGHT: FontWeight = FontWeight::Regular;
+const HEIGHT: RasterHeight = RasterHeight::Size16;
+
+/// Pictures in rows of `columns`, from the upper left, each with its caption below. All cells are as large as the largest
+/// picture; captions that are longer than a cell is wide are cut, and characters other than ASCII become `?`. Without a
+/// picture or a column: a sheet of margins. O(pixels).
+///
+/// # Example
+/// ```
+/// use incise_render::{Picture, contact_sheet};
+///
+/// let picture = Picture::filled(80, 60, [120, 60, 50]);
+/// let four = vec![(picture, "frame 0".to_owned()); 4];
+/// let sheet = contact_sheet(&four, 3);
+/// assert_eq!((sheet.width, sheet.height), (3 * 90 + 10, 2 * 90 + 10));
+/// ```
+#[must_use]
+pub fn contact_sheet(pictures: &[(Picture, String)], columns: usize) -> Picture {
+    let columns = columns.min(pictures.len()).max(1);
+    let largest = |side: fn(&Picture) -> u32| {
+        let sides = pictures.iter().map(|(picture, _)| side(picture) as usize);
+        sides.max().unwrap_or(0)
+    };
+    let width = largest(|picture| picture.width);
+    let height = largest(|picture| picture.height);
+    let cell = [width + MARGIN, height + LINE + MARGIN];
+    let rows = pictures.len().div_ceil(columns);
+    let side = |pixels: usize| u32::try_from(pixels).unwrap_or(u32::MAX);
+    let mut sheet = Picture::filled(
+        side(MARGIN + columns * cell[0]),
+        side(MARGIN + rows * cell[1]),
+        PAPER,
+    );
+    for (i, (picture, caption)) in pictures.iter().enumerate() {
+        let left = MARGIN + i % columns * cell[0];
+        let top = MARGIN + i / columns * cell[1];
+        let row = 4 * picture.width as usize;
+        for (y, pixels) in picture.rgba.chunks_exact(row.max(1)).enumerate() {
+            let start = 4 * ((top + y) * sheet.width as usize + left);
+            sheet.rgba[start..start + row].copy_from_slice(pixels);
+        }
+        write(&mut sheet, caption, [left, top + height + 3], width);
+    }
+    sheet
+}
+
+/// Writes a line of text from a place on, as much of it as fits.
+fn write(sheet: &mut Picture, text: &str, [left, top]: [usize; 2], width: usize) {
+    let advance = get_raster_width(WEIGHT, HEIGHT);
+    for (i, letter) in text.chars().take(width / advance).enumerate() {
+        let drawn = get_raster(letter, WEIGHT, HEIGHT).or_else(|| get_raster('?', WEIGHT, HEIGHT));
+        let Some(drawn) = drawn else {
+            continue;
+        };
+        for (y, row) in drawn.rows().enumerate() {
+            for (x, &share) in row.iter().enumerate() {
+                let at = 4 * ((top + y) * sheet.width as usize + left + i * advance + x);
+                for (channel, (paper, ink)) in PAPER.iter().zip(INK).enumerate() {
+                    let share = u32::from(share);
+                    let mixed = (u32::from(*paper) * (255 - share) + u32::from(ink) * share) / 255;
+                    sheet.rgba[at + channel] = u8::try_from(mixed).unwrap_or(u8::MAX);
+                }
+            }
+        }
+    }
+}
