@@ -1,7 +1,12 @@
 // Half spaces: a patch of each plane with a grid that fades into the background. Twin: `plane` in shading.rs.
 
+@group(0) @binding(1) var impression: texture_2d<f32>;
+@group(0) @binding(2) var between: sampler;
+
 const TABLE = vec3<f32>(0.62, 0.635, 0.66);
 const TABLE_LINE = vec3<f32>(0.30, 0.32, 0.36);
+// Half the side of the square with the impression, in radii.
+const SHARE: f32 = 0.6;
 
 struct Patch {
     // w: the radius.
@@ -60,7 +65,13 @@ fn fragment(seen: Seen) -> @location(0) vec4<f32> {
         line(seen.u, seen.numbers.x, place, right, down),
         line(seen.v, seen.numbers.x, place, right, down),
     );
-    let shadow = 0.0;
+    // Everybody looks it up: what only some do in a square of pixels is not defined.
+    let from_center = vec2<f32>(dot(place - seen.center.xyz, seen.u.xyz), dot(place - seen.center.xyz, seen.v.xyz));
+    let at = from_center / (SHARE * seen.center.w) * 0.5 + 0.5;
+    let dark = textureSampleLevel(impression, between, at, 0.0).x;
+    let edge = 0.5 / vec2<f32>(textureDimensions(impression));
+    let within = seen.numbers.z > 0.0 && all(at >= edge) && all(at <= 1.0 - edge);
+    let shadow = select(0.0, dark, within);
     let color = mix(TABLE, TABLE_LINE, 0.55 * lines) * (1.0 - 0.62 * shadow);
     let opacity = seen.numbers.y;
     let cover = opacity + (1.0 - opacity) * max(0.8 * shadow, 0.35 * lines);

@@ -10,6 +10,7 @@ mod error;
 mod film;
 #[cfg(feature = "gpu")]
 mod gpu;
+mod impression;
 mod normals;
 mod painting;
 mod palette;

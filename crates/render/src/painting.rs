@@ -292,6 +292,7 @@ impl Painting {
         if by == self.shown { &self.colors } else { &[] }
     }
 
+    #[cfg(feature = "gpu")]
     pub(crate) fn topology(&self) -> u64 {
         self.topology
     }

@@ -20,6 +20,7 @@ use retrofire_core::math::{ProjVec3, pt3};
 use retrofire_core::render::clip::{ClipVert, Status, view_frustum};
 use retrofire_core::render::raster::{ScreenPt, tri_fill};
 
+use crate::impression::Impression;
 use crate::normals::normal_sums;
 use crate::props::{Plane, PropCorner, Props};
 use crate::shading::{self, Surface, direction};
@@ -100,6 +101,7 @@ struct Frame<'a> {
     places: Vec<Vec3>,
     normals: Vec<Vec3>,
     props: Props,
+    impression: Option<Impression>,
 }
 
 /// A triangle on the screen: pixels from the upper left and one over the depth.
@@ -138,13 +140,18 @@ impl<'a> Frame<'a> {
             vec![Vec3::Z; local.len()]
         };
         let from_eye = view.relative(origin);
+        let places: Vec<Vec3> = local.into_iter().map(|place| place + from_eye).collect();
+        let props = Props::new(painting, simulation, &view);
+        let ground = props.planes.iter().find(|plane| plane.ground);
+        let impression = ground.map(|plane| Impression::new(*plane, skin.triangles(), &places));
         Self {
             style,
             colors: painting.colors_for(style.color_by),
             painting,
-            places: local.into_iter().map(|place| place + from_eye).collect(),
+            places,
             normals,
-            props: Props::new(painting, simulation, &view),
+            props,
+            impression,
             view,
         }
     }
@@ -309,7 +316,10 @@ impl<'a> Frame<'a> {
 
     /// Draws a plane over the samples that show something behind it.
     fn blend(&self, plane: &Plane, ray: Vec3, samples: [(u32, f32); 4], colors: &mut [Vec3; 4]) {
-        let seen = shading::plane(&self.view, plane, ray, |_| 0.0);
+        let impression = self.impression.as_ref().filter(|_| plane.ground);
+        let seen = shading::plane(&self.view, plane, ray, |place| {
+            impression.map_or(0.0, |impression| impression.at(place))
+        });
         let Some((color, cover, depth)) = seen else {
             return;
         };

@@ -27,8 +27,8 @@ use crate::props::Props;
 use crate::view::View;
 use crate::{Camera, Painting, Picture, RenderError, Style};
 use buffer::Buffer;
-use pipelines::Pipelines;
-use target::Target;
+use pipelines::{Pipelines, bind};
+use target::{Dark, Target};
 
 /// Threads of a workgroup of `normals.wgsl`.
 const THREADS: usize = 64;
@@ -92,6 +92,7 @@ pub struct GpuRenderer {
     gpu: Arc<GpuContext>,
     pipelines: Pipelines,
     target: Option<Target>,
+    dark: Dark,
     /// What was uploaded last.
     topology: u64,
     coloring: u64,
@@ -105,6 +106,7 @@ pub struct GpuRenderer {
     count: Buffer<[u32; 4]>,
     props: Buffer<crate::props::PropCorner>,
     planes: Buffer<PlaneNumbers>,
+    ground: Buffer<PlaneNumbers>,
 }
 
 impl GpuRenderer {
@@ -119,6 +121,7 @@ impl GpuRenderer {
         Ok(Self {
             pipelines,
             target: None,
+            dark: Dark::new(&gpu),
             topology: 0,
             coloring: 0,
             view: Buffer::new(&gpu, "view", uniform)?,
@@ -131,6 +134,7 @@ impl GpuRenderer {
             count: Buffer::new(&gpu, "count of triangles", uniform)?,
             props: Buffer::new(&gpu, "obstacles", BufferUsages::VERTEX)?,
             planes: Buffer::new(&gpu, "planes", BufferUsages::VERTEX)?,
+            ground: Buffer::new(&gpu, "ground", uniform)?,
             gpu,
         })
     }
@@ -164,12 +168,12 @@ impl GpuRenderer {
         let largest = self.gpu.device().limits().max_texture_dimension_2d;
         let view = View::new(camera, size, largest)?;
         self.gpu.check()?;
-        let target = match self.target.take() {
-            Some(target) if target.size == size => target,
-            _ => Target::new(&self.gpu, size)?,
+        if self.target.as_ref().is_none_or(|target| target.size != size) {
+            self.target = Some(Target::new(&self.gpu, size)?);
+        }
+        let Some(target) = &self.target else {
+            unreachable!("it was just made");
         };
-        let target = &*self.target.insert(target);
-
         self.gpu.check()?;
         let solver = solver_here(&self.gpu, painting, simulation);
         let positions = match solver {
@@ -225,73 +229,125 @@ impl GpuRenderer {
         let planes: Vec<_> = props.planes.iter().map(plane_numbers).collect();
         self.planes.replace(&self.gpu, &planes)?;
 
+        let ground = props.planes.iter().find(|plane| plane.ground);
+        if let Some(ground) = ground {
+            self.ground.replace(&self.gpu, &[plane_numbers(ground)])?;
+        }
+
         let gpu = &*self.gpu;
         let mut encoder = gpu.device().create_command_encoder(&Default::default());
         let triangles = self.triangles.len();
         if triangles > 0 {
             encoder.clear_buffer(self.sums.raw(), 0, None);
-            let layout = self.pipelines.normals.get_bind_group_layout(0);
-            let bound = Pipelines::bind(
+            let bound = bind(
                 gpu,
-                &layout,
-                &[
-                    positions,
-                    self.vertices.raw(),
-                    self.triangles.raw(),
-                    self.sums.raw(),
-                    self.count.raw(),
+                &self.pipelines.normals.get_bind_group_layout(0),
+                vec![
+                    positions.as_entire_binding(),
+                    self.vertices.raw().as_entire_binding(),
+                    self.triangles.raw().as_entire_binding(),
+                    self.sums.raw().as_entire_binding(),
+                    self.count.raw().as_entire_binding(),
                 ],
             );
             let mut pass = encoder.begin_compute_pass(&Default::default());
             pass.set_pipeline(&self.pipelines.normals);
             pass.set_bind_group(0, &bound, &[]);
-            let groups = u32::try_from(triangles.div_ceil(THREADS)).unwrap_or(u32::MAX);
+            let groups = count(triangles.div_ceil(THREADS));
             let rows = groups.div_ceil(WIDEST);
             pass.dispatch_workgroups(groups.div_ceil(rows), rows, 1);
         }
-        {
-            let mut pass = begin(&mut encoder, target);
-            let view_only = |pipeline: &wgpu::RenderPipeline| {
-                Pipelines::bind(gpu, &pipeline.get_bind_group_layout(0), &[self.view.raw()])
-            };
-            pass.set_pipeline(&self.pipelines.background);
-            pass.set_bind_group(0, &view_only(&self.pipelines.background), &[]);
-            pass.draw(0..3, 0..1);
-            if triangles > 0 {
-                let layout = self.pipelines.skin.get_bind_group_layout(0);
-                let bound = Pipelines::bind(
-                    gpu,
-                    &layout,
-                    &[
-                        self.view.raw(),
-                        positions,
-                        self.vertices.raw(),
-                        self.triangles.raw(),
-                        self.parts.raw(),
-                        self.sums.raw(),
-                        self.colors.raw(),
-                    ],
-                );
-                pass.set_pipeline(&self.pipelines.skin);
-                pass.set_bind_group(0, &bound, &[]);
-                pass.draw(0..count(3 * triangles), 0..1);
-            }
-            if !props.corners.is_empty() {
-                pass.set_pipeline(&self.pipelines.props);
-                pass.set_bind_group(0, &view_only(&self.pipelines.props), &[]);
-                pass.set_vertex_buffer(0, self.props.raw().slice(..));
-                pass.draw(0..count(props.corners.len()), 0..1);
-            }
-            if !planes.is_empty() {
-                pass.set_pipeline(&self.pipelines.plane);
-                pass.set_bind_group(0, &view_only(&self.pipelines.plane), &[]);
-                pass.set_vertex_buffer(0, self.planes.raw().slice(..));
-                pass.draw(0..6, 0..count(planes.len()));
-            }
+        if ground.is_some() {
+            self.draw_impression(&mut encoder, positions);
         }
+        let mut pass = begin(&mut encoder, target);
+        let view_only = |pipeline: &wgpu::RenderPipeline| {
+            let layout = pipeline.get_bind_group_layout(0);
+            bind(gpu, &layout, vec![self.view.raw().as_entire_binding()])
+        };
+        pass.set_pipeline(&self.pipelines.background);
+        pass.set_bind_group(0, &view_only(&self.pipelines.background), &[]);
+        pass.draw(0..3, 0..1);
+        if triangles > 0 {
+            let bound = bind(
+                gpu,
+                &self.pipelines.skin.get_bind_group_layout(0),
+                vec![
+                    self.view.raw().as_entire_binding(),
+                    positions.as_entire_binding(),
+                    self.vertices.raw().as_entire_binding(),
+                    self.triangles.raw().as_entire_binding(),
+                    self.parts.raw().as_entire_binding(),
+                    self.sums.raw().as_entire_binding(),
+                    self.colors.raw().as_entire_binding(),
+                ],
+            );
+            pass.set_pipeline(&self.pipelines.skin);
+            pass.set_bind_group(0, &bound, &[]);
+            pass.draw(0..count(3 * triangles), 0..1);
+        }
+        if !props.corners.is_empty() {
+            pass.set_pipeline(&self.pipelines.props);
+            pass.set_bind_group(0, &view_only(&self.pipelines.props), &[]);
+            pass.set_vertex_buffer(0, self.props.raw().slice(..));
+            pass.draw(0..count(props.corners.len()), 0..1);
+        }
+        if !planes.is_empty() {
+            let bound = bind(
+                gpu,
+                &self.pipelines.plane.get_bind_group_layout(0),
+                vec![
+                    self.view.raw().as_entire_binding(),
+                    wgpu::BindingResource::TextureView(&self.dark.views[0]),
+                    wgpu::BindingResource::Sampler(&self.dark.sampler),
+                ],
+            );
+            pass.set_pipeline(&self.pipelines.plane);
+            pass.set_bind_group(0, &bound, &[]);
+            pass.set_vertex_buffer(0, self.planes.raw().slice(..));
+            pass.draw(0..6, 0..count(planes.len()));
+        }
+        drop(pass);
         gpu.queue().submit([encoder.finish()]);
         gpu.check()?;
         Ok(&target.resolved)
+    }
+
+    /// Draws what bodies leave on the ground and blurs it.
+    fn draw_impression(&self, encoder: &mut wgpu::CommandEncoder, positions: &wgpu::Buffer) {
+        let [first, second] = &self.dark.views;
+        {
+            let mut pass = begin_dark(encoder, first);
+            if self.triangles.len() > 0 {
+                let bound = bind(
+                    &self.gpu,
+                    &self.pipelines.impression.get_bind_group_layout(0),
+                    vec![
+                        self.ground.raw().as_entire_binding(),
+                        positions.as_entire_binding(),
+                        self.vertices.raw().as_entire_binding(),
+                        self.triangles.raw().as_entire_binding(),
+                        self.parts.raw().as_entire_binding(),
+                    ],
+                );
+                pass.set_pipeline(&self.pipelines.impression);
+                pass.set_bind_group(0, &bound, &[]);
+                pass.draw(0..count(3 * self.triangles.len()), 0..1);
+            }
+        }
+        let blurs = [
+            (&self.pipelines.across, first, second),
+            (&self.pipelines.down, second, first),
+        ];
+        for (pipeline, from, to) in blurs {
+            let layout = pipeline.get_bind_group_layout(0);
+            let from = wgpu::BindingResource::TextureView(from);
+            let bound = bind(&self.gpu, &layout, vec![from]);
+            let mut pass = begin_dark(encoder, to);
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, &bound, &[]);
+            pass.draw(0..3, 0..1);
+        }
     }
 
     /// Draws, waits and reads the picture back.
@@ -383,6 +439,28 @@ fn begin<'e>(encoder: &'e mut wgpu::CommandEncoder, target: &Target) -> wgpu::Re
             }),
             stencil_ops: None,
         }),
+        timestamp_writes: None,
+        occlusion_query_set: None,
+        multiview_mask: None,
+    })
+}
+
+fn begin_dark<'e>(
+    encoder: &'e mut wgpu::CommandEncoder,
+    view: &wgpu::TextureView,
+) -> wgpu::RenderPass<'e> {
+    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: Some("impression"),
+        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+            view,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations {
+                load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                store: wgpu::StoreOp::Store,
+            },
+        })],
+        depth_stencil_attachment: None,
         timestamp_writes: None,
         occlusion_query_set: None,
         multiview_mask: None,

@@ -4,13 +4,16 @@ use incise::gpu::wgpu::{self, VertexAttribute, VertexFormat, VertexStepMode};
 use incise::gpu::{GpuContext, GpuError};
 
 use super::shaders::shaders;
-use super::target::{COLOR, DEPTH, SAMPLES};
+use super::target::{COLOR, DARK, DEPTH, SAMPLES};
 use crate::RenderError;
 
-/// What is drawn with, in the order in which it is.
+/// All that is drawn with.
 #[derive(Debug)]
 pub(super) struct Pipelines {
     pub(super) normals: wgpu::ComputePipeline,
+    pub(super) impression: wgpu::RenderPipeline,
+    pub(super) across: wgpu::RenderPipeline,
+    pub(super) down: wgpu::RenderPipeline,
     pub(super) background: wgpu::RenderPipeline,
     pub(super) skin: wgpu::RenderPipeline,
     pub(super) props: wgpu::RenderPipeline,
@@ -19,80 +22,100 @@ pub(super) struct Pipelines {
 
 /// How something is drawn.
 struct How<'a> {
-    name: &'a str,
-    /// One element and its rows of numbers, if vertices come from a buffer.
+    shader: &'a str,
+    fragment: &'a str,
+    /// Once for each vertex or each instance, and its rows of numbers, if vertices come from a buffer.
     vertices: Option<(VertexStepMode, &'a [VertexFormat])>,
-    depth_write: bool,
-    depth_compare: wgpu::CompareFunction,
+    /// Into the picture with its samples and depths, or else into the impression.
+    depth: Option<Depth>,
     blend: Option<wgpu::BlendState>,
+}
+
+/// What is in front of what.
+#[derive(Clone, Copy)]
+enum Depth {
+    /// Behind all.
+    Behind,
+    /// Hides what is behind it.
+    Solid,
+    /// Is hidden and hides nothing.
+    Veil,
 }
 
 impl Pipelines {
     /// # Errors
     /// If the device refuses one of them.
     pub(super) fn new(gpu: &GpuContext) -> Result<Self, RenderError> {
-        let device = gpu.device();
         // A device that lacks something says so here and not in everybody's report.
-        let refused = device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let refused = gpu.device().push_error_scope(wgpu::ErrorFilter::Validation);
+        let how = How {
+            shader: "",
+            fragment: "fragment",
+            vertices: None,
+            depth: None,
+            blend: None,
+        };
+        let corner = [
+            VertexFormat::Float32x3,
+            VertexFormat::Float32x3,
+            VertexFormat::Unorm8x4,
+        ];
+        let patch = [VertexFormat::Float32x4; 4];
+        let blur = |fragment| {
+            drawn(
+                gpu,
+                &How {
+                    shader: "blur",
+                    fragment,
+                    ..how
+                },
+            )
+        };
         let pipelines = Self {
             normals: computed(gpu, "normals"),
+            impression: drawn(
+                gpu,
+                &How {
+                    shader: "impression",
+                    blend: Some(LARGEST),
+                    ..how
+                },
+            ),
+            across: blur("across"),
+            down: blur("down"),
             background: drawn(
                 gpu,
                 &How {
-                    name: "background",
-                    vertices: None,
-                    depth_write: false,
-                    depth_compare: wgpu::CompareFunction::Always,
-                    blend: None,
+                    shader: "background",
+                    depth: Some(Depth::Behind),
+                    ..how
                 },
             ),
             skin: drawn(
                 gpu,
                 &How {
-                    name: "skin",
-                    vertices: None,
-                    depth_write: true,
-                    depth_compare: wgpu::CompareFunction::Less,
-                    blend: None,
+                    shader: "skin",
+                    depth: Some(Depth::Solid),
+                    ..how
                 },
             ),
             props: drawn(
                 gpu,
                 &How {
-                    name: "props",
-                    vertices: Some((
-                        VertexStepMode::Vertex,
-                        &[
-                            VertexFormat::Float32x3,
-                            VertexFormat::Float32x3,
-                            VertexFormat::Unorm8x4,
-                        ],
-                    )),
-                    depth_write: true,
-                    depth_compare: wgpu::CompareFunction::Less,
-                    blend: None,
+                    shader: "props",
+                    vertices: Some((VertexStepMode::Vertex, &corner)),
+                    depth: Some(Depth::Solid),
+                    ..how
                 },
             ),
             plane: drawn(
                 gpu,
                 &How {
-                    name: "plane",
-                    vertices: Some((VertexStepMode::Instance, &[VertexFormat::Float32x4; 4])),
-                    depth_write: false,
-                    depth_compare: wgpu::CompareFunction::Less,
-                    blend: Some(wgpu::BlendState {
-                        color: wgpu::BlendComponent {
-                            src_factor: wgpu::BlendFactor::SrcAlpha,
-                            dst_factor: wgpu::BlendFactor::OneMinusSrcAlpha,
-                            operation: wgpu::BlendOperation::Add,
-                        },
-                        // Pictures are opaque.
-                        alpha: wgpu::BlendComponent {
-                            src_factor: wgpu::BlendFactor::Zero,
-                            dst_factor: wgpu::BlendFactor::One,
-                            operation: wgpu::BlendOperation::Add,
-                        },
-                    }),
+                    shader: "plane",
+                    vertices: Some((VertexStepMode::Instance, &patch)),
+                    depth: Some(Depth::Veil),
+                    blend: Some(COVERING),
+                    ..how
                 },
             ),
         };
@@ -104,27 +127,52 @@ impl Pipelines {
             None => Ok(pipelines),
         }
     }
-
-    /// Binds buffers to a pipeline in the order of the shader's numbers.
-    pub(super) fn bind(
-        gpu: &GpuContext,
-        layout: &wgpu::BindGroupLayout,
-        buffers: &[&wgpu::Buffer],
-    ) -> wgpu::BindGroup {
-        let entries: Vec<_> = (0..)
-            .zip(buffers)
-            .map(|(binding, buffer)| wgpu::BindGroupEntry {
-                binding,
-                resource: buffer.as_entire_binding(),
-            })
-            .collect();
-        gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
-            label: None,
-            layout,
-            entries: &entries,
-        })
-    }
 }
+
+/// Binds buffers, textures and samplers in the order of the shader's numbers.
+pub(super) fn bind(
+    gpu: &GpuContext,
+    layout: &wgpu::BindGroupLayout,
+    resources: Vec<wgpu::BindingResource<'_>>,
+) -> wgpu::BindGroup {
+    let entries: Vec<_> = (0..)
+        .zip(resources)
+        .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
+        .collect();
+    gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
+        label: None,
+        layout,
+        entries: &entries,
+    })
+}
+
+/// The largest of all that is drawn.
+const LARGEST: wgpu::BlendState = wgpu::BlendState {
+    color: wgpu::BlendComponent {
+        src_factor: wgpu::BlendFactor::One,
+        dst_factor: wgpu::BlendFactor::One,
+        operation: wgpu::BlendOperation::Max,
+    },
+    alpha: wgpu::BlendComponent {
+        src_factor: wgpu::BlendFactor::One,
+        dst_factor: wgpu::BlendFactor::One,
+        operation: wgpu::BlendOperation::Max,
+    },
+};
+
+/// Over what is there, which stays opaque.
+const COVERING: wgpu::BlendState = wgpu::BlendState {
+    color: wgpu::BlendComponent {
+        src_factor: wgpu::BlendFactor::SrcAlpha,
+        dst_factor: wgpu::BlendFactor::OneMinusSrcAlpha,
+        operation: wgpu::BlendOperation::Add,
+    },
+    alpha: wgpu::BlendComponent {
+        src_factor: wgpu::BlendFactor::Zero,
+        dst_factor: wgpu::BlendFactor::One,
+        operation: wgpu::BlendOperation::Add,
+    },
+};
 
 /// A report of several lines as one.
 fn one_line(message: &str) -> String {
@@ -156,7 +204,7 @@ fn computed(gpu: &GpuContext, name: &str) -> wgpu::ComputePipeline {
 }
 
 fn drawn(gpu: &GpuContext, how: &How<'_>) -> wgpu::RenderPipeline {
-    let module = module(gpu, how.name);
+    let module = module(gpu, how.shader);
     let mut attributes = Vec::new();
     let mut stride = 0;
     let formats = how.vertices.map_or(&[] as &[_], |(_, formats)| formats);
@@ -176,7 +224,7 @@ fn drawn(gpu: &GpuContext, how: &How<'_>) -> wgpu::RenderPipeline {
     let buffers = if layout.is_some() { &[layout][..] } else { &[] };
     gpu.device()
         .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some(how.name),
+            label: Some(how.shader),
             layout: None,
             vertex: wgpu::VertexState {
                 module: &module,
@@ -186,23 +234,26 @@ fn drawn(gpu: &GpuContext, how: &How<'_>) -> wgpu::RenderPipeline {
             },
             // Nothing is culled: through an open cut the inside is seen.
             primitive: wgpu::PrimitiveState::default(),
-            depth_stencil: Some(wgpu::DepthStencilState {
+            depth_stencil: how.depth.map(|depth| wgpu::DepthStencilState {
                 format: DEPTH,
-                depth_write_enabled: Some(how.depth_write),
-                depth_compare: Some(how.depth_compare),
+                depth_write_enabled: Some(matches!(depth, Depth::Solid)),
+                depth_compare: Some(match depth {
+                    Depth::Behind => wgpu::CompareFunction::Always,
+                    Depth::Solid | Depth::Veil => wgpu::CompareFunction::Less,
+                }),
                 stencil: wgpu::StencilState::default(),
                 bias: wgpu::DepthBiasState::default(),
             }),
             multisample: wgpu::MultisampleState {
-                count: SAMPLES,
+                count: if how.depth.is_some() { SAMPLES } else { 1 },
                 ..wgpu::MultisampleState::default()
             },
             fragment: Some(wgpu::FragmentState {
                 module: &module,
-                entry_point: Some("fragment"),
+                entry_point: Some(how.fragment),
                 compilation_options: wgpu::PipelineCompilationOptions::default(),
                 targets: &[Some(wgpu::ColorTargetState {
-                    format: COLOR,
+                    format: if how.depth.is_some() { COLOR } else { DARK },
                     blend: how.blend,
                     write_mask: wgpu::ColorWrites::ALL,
                 })],

@@ -13,14 +13,18 @@ pub struct Shader {
 const VIEW: &str = include_str!("../../shader/view.wgsl");
 const SHADING: &str = include_str!("../../shader/shading.wgsl");
 
-/// Everything that is drawn has the view and the shading in front; what is computed stands alone.
+/// What is drawn into a picture has the view and the shading in front; the others stand alone.
 const DRAWN: [(&str, &str); 4] = [
     ("background", include_str!("../../shader/background.wgsl")),
     ("skin", include_str!("../../shader/skin.wgsl")),
     ("props", include_str!("../../shader/props.wgsl")),
     ("plane", include_str!("../../shader/plane.wgsl")),
 ];
-const COMPUTED: [(&str, &str); 1] = [("normals", include_str!("../../shader/normals.wgsl"))];
+const ALONE: [(&str, &str); 3] = [
+    ("normals", include_str!("../../shader/normals.wgsl")),
+    ("impression", include_str!("../../shader/impression.wgsl")),
+    ("blur", include_str!("../../shader/blur.wgsl")),
+];
 
 /// All shaders of this crate.
 ///
@@ -34,9 +38,9 @@ pub fn shaders() -> Vec<Shader> {
         name,
         source: [VIEW, SHADING, own].join("\n"),
     });
-    let computed = COMPUTED.iter().map(|(name, own)| Shader {
+    let alone = ALONE.iter().map(|(name, own)| Shader {
         name,
         source: (*own).to_owned(),
     });
-    drawn.chain(computed).collect()
+    drawn.chain(alone).collect()
 }

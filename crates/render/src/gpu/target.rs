@@ -6,10 +6,13 @@ use incise::gpu::wgpu::{self, TextureFormat, TextureUsages};
 use incise::gpu::{GpuContext, GpuError};
 
 use super::buffer;
+use crate::impression::SIDE;
 use crate::{Picture, RenderError};
 
 pub(super) const COLOR: TextureFormat = TextureFormat::Rgba8UnormSrgb;
 pub(super) const DEPTH: TextureFormat = TextureFormat::Depth32Float;
+/// Of the impression on the ground.
+pub(super) const DARK: TextureFormat = TextureFormat::R8Unorm;
 /// Samples of a pixel.
 pub(super) const SAMPLES: u32 = 4;
 
@@ -102,6 +105,42 @@ impl Target {
             height,
             rgba,
         })
+    }
+}
+
+/// Two textures for the impression on the ground, which is blurred from one into the other and back.
+#[derive(Debug)]
+pub(super) struct Dark {
+    pub(super) views: [wgpu::TextureView; 2],
+    pub(super) sampler: wgpu::Sampler,
+}
+
+impl Dark {
+    pub(super) fn new(gpu: &GpuContext) -> Self {
+        let device = gpu.device();
+        let side = u32::try_from(SIDE).unwrap_or(1);
+        let texture = |label| {
+            let texture = device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(label),
+                size: extent([side; 2]),
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: DARK,
+                usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING,
+                view_formats: &[],
+            });
+            texture.create_view(&wgpu::TextureViewDescriptor::default())
+        };
+        Self {
+            views: [texture("impression"), texture("blurred impression")],
+            sampler: device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some("between texels"),
+                mag_filter: wgpu::FilterMode::Linear,
+                min_filter: wgpu::FilterMode::Linear,
+                ..wgpu::SamplerDescriptor::default()
+            }),
+        }
     }
 }
 

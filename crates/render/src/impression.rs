@@ -1,0 +1,120 @@
+//! [`Impression`]: the soft dark spot that bodies leave on the ground, from right above.
+//!
+//! The ground around the bodies is a square of texels. Each knows how near to the ground the lowest triangle above it is; this
+//! is blurred in both directions. It is no shadow of the key light, which would move with the camera: it shows whether and
+//! where something touches. Twin: `impression.wgsl` and `blur.wgsl`, with all steps rounded to a byte as a texture has
+//! them. Cost: a pass over the triangles, most of which are smaller than a texel, and 13 operations a texel twice.
+
+use glam::Vec3;
+use retrofire_core::geom::vertex;
+use retrofire_core::math::pt3;
+use retrofire_core::render::raster::{ScreenPt, tri_fill};
+
+use crate::props::Plane;
+
+/// Texels on a side.
+pub(crate) const SIDE: usize = 128;
+/// Half the square's side, in radii of the ground's patch.
+pub(crate) const SHARE: f32 = 0.6;
+/// The height at which the impression is a third, in radii.
+pub(crate) const FALLOFF: f32 = 0.05;
+/// Weights of the blur: the middle and then to both sides, as of a bell of 2.5 texels.
+const WEIGHTS: [f32; 7] = [0.1624, 0.1499, 0.1179, 0.0790, 0.0451, 0.0219, 0.0050];
+
+/// How dark the ground is, texel by texel.
+#[derive(Clone, Debug)]
+pub(crate) struct Impression {
+    plane: Plane,
+    texels: Vec<f32>,
+}
+
+impl Impression {
+    /// What triangles leave on a plane, with corners at places relative to the eye.
+    pub(crate) fn new(plane: Plane, triangles: &[[u32; 3]], places: &[Vec3]) -> Self {
+        let mut texels = vec![0.0; SIDE * SIDE];
+        let normal = plane.u.cross(plane.v);
+        let scale = SIDE as f32 * 0.5 / (SHARE * plane.radius);
+        let half = SIDE as f32 * 0.5;
+        let put = |place: Vec3| {
+            let from = place - plane.center;
+            // Texels across and down, and the height.
+            Vec3::new(
+                from.dot(plane.u) * scale + half,
+                from.dot(plane.v) * scale + half,
+                from.dot(normal),
+            )
+        };
+        let places: Vec<Vec3> = places.iter().map(|place| put(*place)).collect();
+        let inside = |x: Vec3| x.x >= 0.0 && x.y >= 0.0 && x.x <= SIDE as f32 && x.y <= SIDE as f32;
+        for corners in triangles {
+            let corners = corners.map(|v| places[v as usize]);
+            // Not clipped: what sticks out of the square is far from where anybody looks.
+            if !corners.into_iter().all(inside) {
+                continue;
+            }
+            let corner = |x: Vec3| vertex::<ScreenPt, ()>(pt3(x.x, x.y, x.z), ());
+            tri_fill(corners.map(corner), |row| {
+                if row.y >= SIDE || row.xs.start >= row.xs.end.min(SIDE) {
+                    return;
+                }
+                let (start, end) = (row.xs.start, row.xs.end.min(SIDE));
+                let texels = &mut texels[row.y * SIDE + start..row.y * SIDE + end];
+                for (texel, (at, ())) in texels.iter_mut().zip(row.vs) {
+                    let dark = (-at.z().max(0.0) / (FALLOFF * plane.radius)).exp();
+                    *texel = rounded(dark).max(*texel);
+                }
+            });
+        }
+        let texels = blurred(&blurred(&texels, 1), SIDE);
+        Self { plane, texels }
+    }
+
+    /// How dark it is at a place relative to the eye, from 0 to 1: between texels.
+    pub(crate) fn at(&self, place: Vec3) -> f32 {
+        let plane = &self.plane;
+        let scale = 1.0 / (SHARE * plane.radius);
+        let from = place - plane.center;
+        let side = SIDE as f32;
+        let at = [plane.u, plane.v].map(|axis| (from.dot(axis) * scale * 0.5 + 0.5) * side - 0.5);
+        if at.iter().any(|at| !(0.0..=side - 1.0).contains(at)) {
+            return 0.0;
+        }
+        let [(x, right), (y, down)] = at.map(split);
+        let texel = |x: usize, y: usize| self.texels[y.min(SIDE - 1) * SIDE + x.min(SIDE - 1)];
+        let above = texel(x, y) * (1.0 - right) + texel(x + 1, y) * right;
+        let below = texel(x, y + 1) * (1.0 - right) + texel(x + 1, y + 1) * right;
+        above * (1.0 - down) + below * down
+    }
+}
+
+/// The whole part and the rest.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "within the texels"
+)]
+fn split(at: f32) -> (usize, f32) {
+    (at as usize, at.fract())
+}
+
+/// What a byte holds of a part of one.
+fn rounded(part: f32) -> f32 {
+    (part * 255.0).round() / 255.0
+}
+
+/// Blurred along one direction, given the distance from a texel to the next one; beyond the edge there is nothing.
+fn blurred(texels: &[f32], step: usize) -> Vec<f32> {
+    let at = |i: usize, by: isize| {
+        let along = i / step % SIDE;
+        let there = along.checked_add_signed(by).filter(|&there| there < SIDE);
+        there.map_or(0.0, |there| texels[i - along * step + there * step])
+    };
+    let blur = |i: usize| {
+        let mut sum = texels[i] * WEIGHTS[0];
+        for (by, weight) in (1..).zip(&WEIGHTS[1..]) {
+            sum += (at(i, by) + at(i, -by)) * weight;
+        }
+        rounded(sum)
+    };
+    (0..texels.len()).map(blur).collect()
+}
