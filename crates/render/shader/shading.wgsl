@@ -1,13 +1,13 @@
 // The color of what is seen at a pixel, in linear light: twin of shading.rs, function by function.
 
-const TISSUE = vec3<f32>(0.330, 0.062, 0.048);
-const FLESH = vec3<f32>(0.680, 0.215, 0.180);
+const TISSUE = vec3<f32>(0.245, 0.044, 0.036);
+const FLESH = vec3<f32>(0.620, 0.185, 0.155);
 const GLOSS: f32 = 0.55;
 const FLESH_GLOSS: f32 = 0.35;
 
-const SKY = vec3<f32>(0.56, 0.60, 0.66);
-const EARTH = vec3<f32>(0.30, 0.26, 0.24);
-const KEY = vec3<f32>(0.98, 0.94, 0.86);
+const SKY = vec3<f32>(0.50, 0.54, 0.60);
+const EARTH = vec3<f32>(0.235, 0.205, 0.195);
+const KEY = vec3<f32>(1.12, 1.06, 0.96);
 const LINE = vec3<f32>(0.012, 0.012, 0.018);
 const TOP = vec3<f32>(0.92, 0.935, 0.955);
 const BOTTOM = vec3<f32>(0.66, 0.69, 0.73);
@@ -75,7 +75,7 @@ fn shade(base_color: vec3<f32>, glossiness: f32, place: vec3<f32>, shading: vec3
     let p8 = p4 * p4;
     let p16 = p8 * p8;
     let p32 = p16 * p16;
-    let highlight = gloss * (0.30 * p32 * p8 + 0.06 * p8) * smoothstep(0.0, 0.2, toward);
+    let highlight = gloss * (0.34 * p32 * p32 + 0.10 * p16) * smoothstep(0.0, 0.2, toward);
     let grazing = 1.0 - max(dot(normal, to_eye), 0.0);
     let g2 = grazing * grazing;
     let rim = g2 * g2 * (0.05 + 0.15 * gloss);

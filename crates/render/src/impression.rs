@@ -26,6 +26,8 @@ const WEIGHTS: [f32; 7] = [0.1624, 0.1499, 0.1179, 0.0790, 0.0451, 0.0219, 0.005
 pub(crate) struct Impression {
     plane: Plane,
     texels: Vec<f32>,
+    /// The rows and columns between which it is dark, in texels.
+    bounds: [[f32; 2]; 2],
 }
 
 impl Impression {
@@ -66,7 +68,23 @@ impl Impression {
             });
         }
         let texels = blurred(&blurred(&texels, 1), SIDE);
-        Self { plane, texels }
+        let mut bounds = [[0.0_f32; 2]; 2];
+        let dark = |i: &usize| texels[*i] > 0.0;
+        if let Some(first) = (0..texels.len()).find(dark) {
+            bounds = [[SIDE as f32, 0.0], [(first / SIDE) as f32, 0.0]];
+            for i in (first..texels.len()).filter(dark) {
+                for (bounds, at) in bounds.iter_mut().zip([i % SIDE, i / SIDE]) {
+                    // A texel reaches as far as to the middle of the next one.
+                    bounds[0] = bounds[0].min(at as f32 - 1.0).max(0.0);
+                    bounds[1] = bounds[1].max(at as f32 + 1.0).min((SIDE - 1) as f32);
+                }
+            }
+        }
+        Self {
+            plane,
+            texels,
+            bounds,
+        }
     }
 
     /// How dark it is at a place relative to the eye, from 0 to 1: between texels.
@@ -76,7 +94,8 @@ impl Impression {
         let from = place - plane.center;
         let side = SIDE as f32;
         let at = [plane.u, plane.v].map(|axis| (from.dot(axis) * scale * 0.5 + 0.5) * side - 0.5);
-        if at.iter().any(|at| !(0.0..=side - 1.0).contains(at)) {
+        let within = |(at, [low, high]): (&f32, &[f32; 2])| (*low..*high).contains(at);
+        if !at.iter().zip(&self.bounds).all(within) {
             return 0.0;
         }
         let [(x, right), (y, down)] = at.map(split);
@@ -94,7 +113,7 @@ impl Impression {
     reason = "within the texels"
 )]
 fn split(at: f32) -> (usize, f32) {
-    (at as usize, at.fract())
+    (at as usize, at - (at as usize) as f32)
 }
 
 /// What a byte holds of a part of one.

@@ -12,16 +12,16 @@ use crate::srgb::decode;
 use crate::view::View;
 
 /// Tissue, in linear light.
-pub(crate) const TISSUE: Vec3 = Vec3::new(0.330, 0.062, 0.048);
+pub(crate) const TISSUE: Vec3 = Vec3::new(0.245, 0.044, 0.036);
 /// Tissue that a cut laid bare.
-pub(crate) const FLESH: Vec3 = Vec3::new(0.680, 0.215, 0.180);
+pub(crate) const FLESH: Vec3 = Vec3::new(0.620, 0.185, 0.155);
 /// How much it shines.
 pub(crate) const GLOSS: f32 = 0.55;
 const FLESH_GLOSS: f32 = 0.35;
 
-const SKY: Vec3 = Vec3::new(0.56, 0.60, 0.66);
-const EARTH: Vec3 = Vec3::new(0.30, 0.26, 0.24);
-const KEY: Vec3 = Vec3::new(0.98, 0.94, 0.86);
+const SKY: Vec3 = Vec3::new(0.50, 0.54, 0.60);
+const EARTH: Vec3 = Vec3::new(0.235, 0.205, 0.195);
+const KEY: Vec3 = Vec3::new(1.12, 1.06, 0.96);
 const LINE: Vec3 = Vec3::new(0.012, 0.012, 0.018);
 const TABLE: Vec3 = Vec3::new(0.62, 0.635, 0.66);
 const TABLE_LINE: Vec3 = Vec3::new(0.30, 0.32, 0.36);
@@ -103,7 +103,7 @@ pub(crate) fn shade(surface: Surface, light: Vec3) -> Vec3 {
     let p8 = p4 * p4;
     let p16 = p8 * p8;
     let p32 = p16 * p16;
-    let highlight = gloss * (0.30 * p32 * p8 + 0.06 * p8) * smoothstep(0.0, 0.2, toward);
+    let highlight = gloss * (0.34 * p32 * p32 + 0.10 * p16) * smoothstep(0.0, 0.2, toward);
     let grazing = 1.0 - normal.dot(to_eye).max(0.0);
     let g2 = grazing * grazing;
     let rim = g2 * g2 * (0.05 + 0.15 * gloss);
@@ -155,6 +155,16 @@ pub(crate) fn plane(
 fn line(axis: Vec3, offset: f32, spacing: f32, place: Vec3, steps: [Vec3; 2]) -> f32 {
     let at = (place.dot(axis) + offset) / spacing;
     let width = (steps[0].dot(axis).abs() + steps[1].dot(axis).abs()) / spacing;
-    let distance = (at - (at + 0.5).floor()).abs();
+    let distance = (at - floor(at + 0.5)).abs();
     (1.0 - smoothstep(0.4 * width, 1.3 * width, distance)) * (1.0 - smoothstep(0.08, 0.45, width))
+}
+
+/// `floor` without a call, for what is far from the ends of an integer.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "lines are counted from the eye, and those beyond the patch are not asked for"
+)]
+fn floor(x: f32) -> f32 {
+    let whole = (x as i32) as f32;
+    if whole > x { whole - 1.0 } else { whole }
 }

@@ -283,53 +283,84 @@ impl<'a> Frame<'a> {
     }
 
     /// The color of a pixel from what each of its samples shows.
-    fn pixel(&self, x: usize, y: usize, samples: [(u32, f32); 4]) -> [u8; 4] {
+    fn pixel(&self, x: usize, y: usize, samples: [(u32, f32); 4], sky: Sky) -> [u8; 4] {
         let corner = Vec2::new(x as f32, y as f32);
         let middle = corner + 0.5;
-        let mut colors = [Vec3::ZERO; 4];
-        for i in 0..4 {
-            let triangle = samples[i].0;
-            if let Some(same) = samples[..i].iter().position(|other| other.0 == triangle) {
-                colors[i] = colors[same];
-                continue;
+        let empty = samples.iter().all(|sample| sample.0 == NOTHING);
+        let mut colors = [sky.color; 4];
+        // Of a pixel with nothing in it one sample is enough.
+        let colors = if empty {
+            &mut colors[..1]
+        } else {
+            for i in 0..4 {
+                let triangle = samples[i].0;
+                let same = samples[..i].iter().position(|other| other.0 == triangle);
+                if let Some(same) = same {
+                    colors[i] = colors[same];
+                } else if triangle != NOTHING {
+                    let color = self.shade(triangle, corner + middle_of(triangle, samples));
+                    // What a device keeps of its samples is between black and white.
+                    colors[i] = color.clamp(Vec3::ZERO, Vec3::ONE);
+                }
             }
-            colors[i] = if triangle == NOTHING {
-                shading::background(middle.y / self.view.size[1] as f32)
-            } else {
-                let shown = (0..4).filter(|&j| samples[j].0 == triangle);
-                let (sum, count) = shown.fold((Vec2::ZERO, 0.0), |(sum, count), j| {
-                    (sum + SAMPLES[j], count + 1.0)
-                });
-                self.shade(triangle, corner + sum / count)
-            };
+            &mut colors[..]
+        };
+        let ray = self.view.ray(middle.x, middle.y);
+        let mut veiled = false;
+        for plane in &self.props.planes {
+            veiled |= self.blend(plane, ray, samples, colors);
         }
-        if !self.props.planes.is_empty() {
-            let ray = self.view.ray(middle.x, middle.y);
-            for plane in &self.props.planes {
-                self.blend(plane, ray, samples, &mut colors);
-            }
+        if empty && !veiled {
+            return sky.encoded;
         }
-        let color = colors.iter().sum::<Vec3>() * 0.25;
-        let [r, g, b] = color.to_array().map(encode);
-        [r, g, b, 255]
+        opaque(colors.iter().sum::<Vec3>() / colors.len() as f32)
     }
 
-    /// Draws a plane over the samples that show something behind it.
-    fn blend(&self, plane: &Plane, ray: Vec3, samples: [(u32, f32); 4], colors: &mut [Vec3; 4]) {
+    /// Draws a plane over the samples that show something behind it; whether there is any.
+    fn blend(
+        &self,
+        plane: &Plane,
+        ray: Vec3,
+        samples: [(u32, f32); 4],
+        colors: &mut [Vec3],
+    ) -> bool {
         let impression = self.impression.as_ref().filter(|_| plane.ground);
         let seen = shading::plane(&self.view, plane, ray, |place| {
             impression.map_or(0.0, |impression| impression.at(place))
         });
         let Some((color, cover, depth)) = seen else {
-            return;
+            return false;
         };
         for (behind, (_, nearness)) in colors.iter_mut().zip(samples) {
             if 1.0 / depth > nearness {
-                // What a device keeps of its samples is between black and white.
-                *behind = behind.clamp(Vec3::ZERO, Vec3::ONE).lerp(color, cover);
+                *behind = behind.lerp(color, cover);
             }
         }
+        true
     }
+}
+
+/// What is behind everything in a row.
+#[derive(Clone, Copy)]
+struct Sky {
+    color: Vec3,
+    encoded: [u8; 4],
+}
+
+/// The bytes of a color in linear light.
+fn opaque(color: Vec3) -> [u8; 4] {
+    let [r, g, b] = color.to_array().map(encode);
+    [r, g, b, 255]
+}
+
+/// The middle of the samples of a pixel that show a triangle.
+fn middle_of(triangle: u32, samples: [(u32, f32); 4]) -> Vec2 {
+    let shown = SAMPLES.iter().zip(samples);
+    let shown = shown.filter(|(_, sample)| sample.0 == triangle);
+    let (sum, count) = shown.fold((Vec2::ZERO, 0.0), |(sum, count), (place, _)| {
+        (sum + *place, count + 1.0)
+    });
+    sum / count
 }
 
 /// The barycentric coordinates of where a ray meets a triangle's plane, held within the triangle.
@@ -368,9 +399,14 @@ impl Band {
                 self.fill(triangle, top, width);
             }
         }
-        for (i, pixel) in rows.chunks_exact_mut(4).enumerate() {
-            let color = frame.pixel(i % width, top + i / width, self.samples[i]);
-            pixel.copy_from_slice(&color);
+        let samples = self.samples.chunks_exact(width);
+        for ((row, samples), y) in rows.chunks_exact_mut(4 * width).zip(samples).zip(top..) {
+            let color = shading::background((y as f32 + 0.5) / frame.view.size[1] as f32);
+            let encoded = opaque(color);
+            let sky = Sky { color, encoded };
+            for (x, (pixel, samples)) in row.chunks_exact_mut(4).zip(samples).enumerate() {
+                pixel.copy_from_slice(&frame.pixel(x, y, *samples, sky));
+            }
         }
     }
 

@@ -25,7 +25,7 @@ pub(crate) fn encode(linear: f32) -> u8 {
         };
         (0..=STEPS as u16).map(byte).collect()
     });
-    TABLE[(linear.clamp(0.0, 1.0) * STEPS).round() as usize]
+    TABLE[(linear.clamp(0.0, 1.0) * STEPS + 0.5) as usize]
 }
 
 /// A byte of sRGB as linear light.
