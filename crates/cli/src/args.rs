@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use incise_render::ColorBy;
 
 /// Cuts soft bodies in real time.
 #[derive(Debug, Parser)]
@@ -66,15 +67,73 @@ pub(crate) struct RunArguments {
     /// Write the last mesh at rest to this file; as .vtu with its deformed positions.
     #[arg(long, value_name = "FILE")]
     pub(crate) save_mesh: Option<PathBuf>,
-    /// Write no pictures. This version draws none; accepted so that scripts stay the same.
+    /// Write no pictures and no contact sheet.
     #[arg(long)]
     pub(crate) no_pictures: bool,
+    /// Write a film as well: .gif, or .png for an animated PNG.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) film: Option<PathBuf>,
+    /// Pixels of pictures, across and down [default: 640x480].
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub(crate) size: Option<[u32; 2]>,
+    /// From where pictures are taken: degrees around, degrees above the floor and how many times as large as what fits
+    /// [default: -60,22,1].
+    #[arg(long, value_name = "AZIMUTH,ELEVATION[,ZOOM]", value_parser = view, allow_hyphen_values = true)]
+    pub(crate) view: Option<[f64; 3]>,
+    /// What the colors in pictures show: tissue, color, cluster, piece or stretch.
+    #[arg(long, value_name = "NAME", default_value_t, value_parser = coloring)]
+    pub(crate) color_by: ColorBy,
+    /// Draw the edges of triangles.
+    #[arg(long)]
+    pub(crate) wireframe: bool,
     /// Recompute and compare everything after every cut; slow.
     #[arg(long)]
     pub(crate) check: bool,
     /// Print nothing but errors.
     #[arg(long)]
     pub(crate) quiet: bool,
+}
+
+/// Largest side of a picture.
+const LARGEST_SIDE: u32 = 8192;
+
+/// A size, as in `960x720`.
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let sides = text.split_once('x').and_then(|(width, height)| {
+        let side = |text: &str| text.parse().ok();
+        Some([side(width)?, side(height)?])
+    });
+    let fits = |sides: &[u32; 2]| sides.iter().all(|side| (1..=LARGEST_SIDE).contains(side));
+    sides
+        .filter(fits)
+        .ok_or_else(|| format!("two numbers from 1 to {LARGEST_SIDE}, as in 960x720, are needed"))
+}
+
+/// Where a camera is, as in `-60,22` or `-60,22,1.5`.
+fn view(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    let view = match numbers.unwrap_or_default()[..] {
+        [azimuth, elevation] => Some([azimuth, elevation, 1.0]),
+        [azimuth, elevation, zoom] => Some([azimuth, elevation, zoom]),
+        _ => None,
+    };
+    let fits = |view: &[f64; 3]| {
+        let [azimuth, elevation, zoom] = view;
+        azimuth.is_finite() && elevation.abs() <= 90.0 && (1e-3..=1e3).contains(zoom)
+    };
+    view.filter(fits).ok_or_else(|| {
+        "degrees around, degrees from -90 to 90 and a zoom from 0.001 to 1000, as in -60,22,1.5, are needed"
+            .to_owned()
+    })
+}
+
+/// What colors show, of what a run knows.
+fn coloring(name: &str) -> Result<ColorBy, String> {
+    let by = name.parse::<ColorBy>();
+    match by {
+        Ok(ColorBy::Residual) => Err("a run does not know residuals of tets".to_owned()),
+        other => other.map_err(|error| error.to_string()),
+    }
 }
 
 #[derive(Debug, Args)]

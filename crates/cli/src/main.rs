@@ -9,6 +9,7 @@ mod color;
 mod failure;
 mod mesh;
 mod output;
+mod pictures;
 mod print;
 mod run;
 mod summary;

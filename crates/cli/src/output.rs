@@ -1,4 +1,4 @@
-//! The files of a run: scene, frames, surfaces and last mesh.
+//! The files of a run: scene, frames, surfaces, pictures and last mesh.
 //!
 //! Lines are collected under a temporary name and get their own when the run has ended well; all other files are
 //! written beside and renamed. So a name always stands for a complete file.
@@ -15,8 +15,9 @@ use incise::mesh::io::{Field, Fields, Values, write_atomically, write_pvd, write
 use incise::{Scene, Simulation};
 
 use crate::failure::Failure;
+use crate::pictures::Pictures;
 
-/// About how many surfaces a run saves.
+/// About how many surfaces, and as many pictures, a run saves.
 const SURFACES: u64 = 50;
 
 /// A file of lines that gets its name in the end.
@@ -82,12 +83,18 @@ fn movable(scene: &Scene) -> anyhow::Result<Scene> {
     Ok(scene)
 }
 
+/// Every how many frames a surface is saved, and a picture.
+pub(crate) fn save_every(frames: u64) -> u64 {
+    frames.div_ceil(SURFACES)
+}
+
 /// Where a run's files go.
 #[derive(Debug)]
 pub(crate) struct Output {
     folder: PathBuf,
     lines: Vec<Lines>,
     surfaces: Vec<(f64, String)>,
+    pictures: Option<Pictures>,
     save_every: u64,
     last_frame: u64,
 }
@@ -99,15 +106,19 @@ impl Output {
         jsonl: Option<&Path>,
         scene: &Scene,
         frames: u64,
+        mut pictures: Option<Pictures>,
     ) -> Result<Self, Failure> {
         // Outermost last.
         let missing: Vec<&Path> = folder.ancestors().take_while(|f| !f.exists()).collect();
-        let open = || -> anyhow::Result<Vec<Lines>> {
+        let mut open = || -> anyhow::Result<Vec<Lines>> {
             fs::create_dir_all(folder)
                 .with_context(|| format!("cannot make the folder {}", folder.display()))?;
             let mut lines = vec![Lines::create(&folder.join("frames.jsonl"))?];
             if let Some(path) = jsonl {
                 lines.push(Lines::create(path)?);
+            }
+            if let Some(pictures) = &mut pictures {
+                pictures.begin_film()?;
             }
             let toml = movable(scene)?.to_toml()?;
             write_atomically(folder.join("scene.toml"), |file| {
@@ -126,19 +137,22 @@ impl Output {
             folder: folder.to_owned(),
             lines,
             surfaces: Vec::new(),
-            save_every: frames.div_ceil(SURFACES),
+            pictures,
+            save_every: save_every(frames),
             last_frame: frames - 1,
         })
     }
 
-    /// Writes the line of a frame, and its surface if it is one to save.
+    /// Writes the line of a frame, and its surface and picture if it is one to save.
     pub(crate) fn frame(&mut self, simulation: &mut Simulation) -> anyhow::Result<()> {
         let report = simulation.report();
         let line = serde_json::to_string(report)?;
         for lines in &mut self.lines {
             lines.push(&line)?;
         }
-        if report.frame.is_multiple_of(self.save_every) || report.frame == self.last_frame {
+        let frame = report.frame;
+        let saved = frame.is_multiple_of(self.save_every) || frame == self.last_frame;
+        if saved {
             let (time, name) = (report.time_s, format!("surface_{:05}.vtp", report.frame));
             simulation.read_back()?;
             let surface = simulation.surface();
@@ -164,11 +178,14 @@ impl Output {
             )?;
             self.surfaces.push((time, name));
         }
+        if let Some(pictures) = &mut self.pictures {
+            pictures.frame(simulation, saved, &self.folder)?;
+        }
         Ok(())
     }
 
-    /// Writes what is known at the end and gives all files their names.
-    pub(crate) fn finish(self, simulation: &Simulation) -> anyhow::Result<()> {
+    /// Writes what is known at the end and gives all files their names; returns what is to be said about pictures.
+    pub(crate) fn finish(self, simulation: &Simulation) -> anyhow::Result<Option<String>> {
         write_pvd(self.folder.join("surface.pvd"), &self.surfaces)?;
         let mesh = simulation.mesh();
         let numbers = |of: &dyn Fn(usize) -> u32| {
@@ -205,7 +222,11 @@ impl Output {
             &mesh.tets,
             fields,
         )?;
-        self.lines.into_iter().try_for_each(Lines::finish)
+        self.lines.into_iter().try_for_each(Lines::finish)?;
+        let pictures = self.pictures;
+        pictures
+            .map(|pictures| pictures.finish(&self.folder))
+            .transpose()
     }
 }
 
@@ -229,7 +250,7 @@ pub(crate) fn require_mesh_file(path: &Path) -> Result<(), Failure> {
 }
 
 /// Refuses a path that no file can have.
-fn require_file(path: &Path) -> anyhow::Result<()> {
+pub(crate) fn require_file(path: &Path) -> anyhow::Result<()> {
     let why = match path.parent() {
         _ if path.is_dir() => "it is a folder",
         None => "it names no file",

@@ -5,11 +5,13 @@ use std::path::Path;
 use anyhow::anyhow;
 use incise::scene::{Backend, Precision};
 use incise::{Error, Scene, Simulation};
+use incise_render::Film;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::args::{BackendName, PrecisionName, RunArguments};
 use crate::failure::Failure;
 use crate::output::{Output, require_mesh_file, save_mesh};
+use crate::pictures::Pictures;
 use crate::print::print;
 use crate::summary::Summary;
 
@@ -20,6 +22,9 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.save_mesh {
         require_mesh_file(path)?;
     }
+    if let Some(path) = &arguments.film {
+        Film::check_path(path).map_err(|error| Failure::Input(error.into()))?;
+    }
     let scene = scene(arguments)?;
     let frames = arguments
         .frames
@@ -28,8 +33,10 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<(), Failure> {
         Some(threads) => Simulation::with_threads(&scene, usize::from(threads))?,
         None => Simulation::new(&scene)?,
     };
+    let pictures = Pictures::of(arguments, &scene, &simulation, frames)?;
     let folder = arguments.out.as_deref().unwrap_or(Path::new("out"));
-    let mut output = Output::create(folder, arguments.jsonl.as_deref(), &scene, frames)?;
+    let jsonl = arguments.jsonl.as_deref();
+    let mut output = Output::create(folder, jsonl, &scene, frames, pictures)?;
 
     let kappa = simulation.kappa();
     let mut summary = Summary::new(simulation.report());
@@ -56,7 +63,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<(), Failure> {
     simulation
         .read_back()
         .map_err(|error| Failure::Run(error.into()))?;
-    output.finish(&simulation).map_err(Failure::Run)?;
+    let drawn = output.finish(&simulation).map_err(Failure::Run)?;
     if let Some(path) = &arguments.save_mesh {
         save_mesh(path, &simulation).map_err(Failure::Run)?;
     }
@@ -71,6 +78,9 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<(), Failure> {
             ))?;
         }
         print(format_args!("files are in {}", folder.display()))?;
+        if let Some(drawn) = drawn {
+            print(drawn)?;
+        }
     }
     Ok(())
 }

@@ -73,7 +73,9 @@ pub struct Painting {
     device_is_current: bool,
     ground: Option<GroundSpec>,
     obstacles: Vec<ColliderSpec>,
-    blade: Vec<DVec3>,
+    /// The points of all blades, and where each one ends.
+    blade_points: Vec<DVec3>,
+    blade_ends: Vec<usize>,
     /// The bodies' box at the start.
     start: [DVec3; 2],
 }
@@ -95,7 +97,8 @@ impl Painting {
             device_is_current: false,
             ground: scene.world.ground,
             obstacles: scene.collider.clone(),
-            blade: Vec::new(),
+            blade_points: Vec::new(),
+            blade_ends: Vec::new(),
             start: [DVec3::ZERO; 2],
         };
         painting.reset(simulation);
@@ -244,8 +247,15 @@ impl Painting {
 
     /// Says where a blade is that is drawn as a thin tube along a polyline; `None` or a single point: there is none.
     pub fn set_blade(&mut self, blade: Option<&[DVec3]>) {
-        self.blade.clear();
-        self.blade.extend_from_slice(blade.unwrap_or_default());
+        self.blade_points.clear();
+        self.blade_ends.clear();
+        self.add_blade(blade.unwrap_or_default());
+    }
+
+    /// Adds another blade to those that are drawn, until the next [`Painting::set_blade`].
+    pub fn add_blade(&mut self, blade: &[DVec3]) {
+        self.blade_points.extend_from_slice(blade);
+        self.blade_ends.push(self.blade_points.len());
     }
 
     /// The box of all bodies as far as the host knows their positions: see [`Simulation::read_back`]. O(triangles).
@@ -315,8 +325,11 @@ impl Painting {
         &self.obstacles
     }
 
-    pub(crate) fn blade(&self) -> &[DVec3] {
-        &self.blade
+    /// The polylines of all blades.
+    pub(crate) fn blades(&self) -> impl Iterator<Item = &[DVec3]> {
+        let starts = std::iter::once(&0).chain(&self.blade_ends);
+        let ranges = starts.zip(&self.blade_ends);
+        ranges.map(|(start, end)| &self.blade_points[*start..*end])
     }
 
     /// The bodies' box at the start.

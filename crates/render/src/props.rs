@@ -74,7 +74,9 @@ impl Props {
         for obstacle in painting.obstacles() {
             props.obstacle(view, obstacle, time, middle, size);
         }
-        props.blade(view, painting.blade(), BLADE * size);
+        for blade in painting.blades().filter(|blade| blade.len() > 1) {
+            props.tube(view, blade, BLADE * size, AROUND_BLADE, STEEL);
+        }
         let distance = |plane: &Plane| plane.center.length();
         props
             .planes
@@ -192,12 +194,6 @@ impl Props {
                     self.corner(view, place, turn * normal, STONE);
                 }
             }
-        }
-    }
-
-    fn blade(&mut self, view: &View, blade: &[DVec3], radius: f64) {
-        if blade.len() > 1 {
-            self.tube(view, blade, radius, AROUND_BLADE, STEEL);
         }
     }
 

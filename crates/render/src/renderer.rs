@@ -48,6 +48,38 @@ impl Renderer {
         GpuRenderer::new(gpu.into()).map_err(|error| error.to_string())
     }
 
+    /// The device that a simulation is computed on, so that its positions need not leave it; for one that is not on a device,
+    /// or on one that cannot draw, as [`Renderer::open`].
+    #[must_use]
+    pub fn for_simulation(simulation: &Simulation) -> (Self, Option<String>) {
+        #[cfg(feature = "gpu")]
+        if let Some(solver) = simulation.device_solvers().next()
+            && let Ok(renderer) = GpuRenderer::new(std::sync::Arc::clone(solver.gpu()))
+        {
+            return (Self::Gpu(Box::new(renderer)), None);
+        }
+        #[cfg(not(feature = "gpu"))]
+        let _ = simulation;
+        Self::open()
+    }
+
+    /// Whether a simulation has to be [read back](Simulation::read_back) for a picture of the present: it is on a device,
+    /// and not drawn from there.
+    #[must_use]
+    pub fn needs_read_back(&self, simulation: &Simulation) -> bool {
+        match self {
+            #[cfg(feature = "gpu")]
+            Self::Gpu(renderer) => renderer.needs_read_back(simulation),
+            #[cfg(feature = "gpu")]
+            Self::Software(_) => simulation.device_solvers().next().is_some(),
+            #[cfg(not(feature = "gpu"))]
+            Self::Software(_) => {
+                let _ = simulation;
+                false
+            }
+        }
+    }
+
     /// What it draws on, in words.
     #[must_use]
     pub fn describe(&self) -> String {

@@ -145,6 +145,14 @@ impl GpuRenderer {
         &self.gpu
     }
 
+    /// Whether a simulation has to be [read back](Simulation::read_back) for a picture of the present: it is on a device,
+    /// but on another one than this, or with several solvers.
+    #[must_use]
+    pub fn needs_read_back(&self, simulation: &Simulation) -> bool {
+        let on_device = simulation.device_solvers().next().is_some();
+        on_device && only_solver(&self.gpu, simulation).is_none()
+    }
+
     /// Draws into textures of its own and returns the finished picture's, which stays the same until the size changes, for
     /// a window to show: `Rgba8UnormSrgb`, to be sampled, copied or drawn over. Returns when the commands are with the
     /// driver.
@@ -168,7 +176,11 @@ impl GpuRenderer {
         let largest = self.gpu.device().limits().max_texture_dimension_2d;
         let view = View::new(camera, size, largest)?;
         self.gpu.check()?;
-        if self.target.as_ref().is_none_or(|target| target.size != size) {
+        if self
+            .target
+            .as_ref()
+            .is_none_or(|target| target.size != size)
+        {
             self.target = Some(Target::new(&self.gpu, size)?);
         }
         let Some(target) = &self.target else {
@@ -373,16 +385,20 @@ impl GpuRenderer {
     }
 }
 
-/// The solver whose positions can be drawn as they are: the only one, on this device, and with a step behind it that took
-/// them there.
+/// The solver whose positions can be drawn as they are, if it has taken them there by now: a step does.
 fn solver_here<'s>(
     gpu: &Arc<GpuContext>,
     painting: &Painting,
     simulation: &'s Simulation,
 ) -> Option<&'s GpuSolver> {
+    only_solver(gpu, simulation).filter(|_| painting.device_is_current())
+}
+
+/// The only solver of a simulation, if it is on this device.
+fn only_solver<'s>(gpu: &Arc<GpuContext>, simulation: &'s Simulation) -> Option<&'s GpuSolver> {
     let mut solvers = simulation.device_solvers();
-    let only = solvers.next().filter(|_| solvers.next().is_none());
-    only.filter(|solver| painting.device_is_current() && Arc::ptr_eq(solver.gpu(), gpu))
+    let first = solvers.next()?;
+    (solvers.next().is_none() && Arc::ptr_eq(first.gpu(), gpu)).then_some(first)
 }
 
 /// A point near the bodies that positions are sent relative to.

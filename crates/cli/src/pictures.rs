@@ -1,0 +1,254 @@
+//! [`Pictures`]: what a run looks like: a picture of each frame that is saved, a sheet of some of them, a film.
+//!
+//! A film has its own pace, some 25 pictures a second of simulated time, and may take other frames than those saved.
+
+use std::path::{Path, PathBuf};
+
+use incise::scene::StrokeSpec;
+use incise::{Scene, Simulation};
+use incise_render::{
+    Camera, Film, Painting, Picture, RenderError, Renderer, Style, blade_at, contact_sheet,
+};
+
+use crate::args::RunArguments;
+use crate::failure::Failure;
+use crate::output::{require_file, save_every};
+
+/// Pixels of a picture, across and down.
+const SIZE: [u32; 2] = [640, 480];
+/// Least pictures of a film in a second.
+const PER_SECOND: f64 = 25.0;
+/// Pictures on the sheet, and of a row.
+const ON_SHEET: u64 = 12;
+const COLUMNS: usize = 4;
+/// Most pixels across of a picture on the sheet.
+const SHEET_WIDTH: u32 = 360;
+/// A floor deeper than this many diagonals under the bodies is not kept in sight.
+const DEEPEST: f64 = 3.0;
+
+/// What draws a run.
+#[derive(Debug)]
+pub(crate) struct Pictures {
+    renderer: Renderer,
+    note: Option<String>,
+    painting: Painting,
+    camera: Camera,
+    style: Style,
+    size: [u32; 2],
+    strokes: Vec<StrokeSpec>,
+    /// Whether each is a file of its own.
+    saved: bool,
+    film: Option<PathBuf>,
+    writer: Option<Film>,
+    /// Every how many frames the film has a picture.
+    film_every: u64,
+    time_step: f64,
+    /// The frames on the sheet, ascending.
+    on_sheet: Vec<u64>,
+    sheet: Vec<(Picture, String)>,
+    count: u64,
+}
+
+impl Pictures {
+    /// What the command line asks for; `None` if it wants no pictures.
+    pub(crate) fn of(
+        arguments: &RunArguments,
+        scene: &Scene,
+        simulation: &Simulation,
+        frames: u64,
+    ) -> Result<Option<Self>, Failure> {
+        if arguments.no_pictures && arguments.film.is_none() {
+            return Ok(None);
+        }
+        let (renderer, note) = Renderer::for_simulation(simulation);
+        let painting = Painting::new(simulation, scene);
+        let time_step = scene.solver.time_step;
+        Ok(Some(Self {
+            renderer,
+            note,
+            camera: camera(arguments, scene, painting.bounds(simulation)),
+            painting,
+            style: Style {
+                color_by: arguments.color_by,
+                wireframe: arguments.wireframe,
+                ..Style::default()
+            },
+            size: arguments.size.unwrap_or(SIZE),
+            strokes: scene.stroke.clone(),
+            saved: !arguments.no_pictures,
+            film: arguments.film.clone(),
+            writer: None,
+            film_every: film_every(time_step),
+            time_step,
+            on_sheet: if arguments.no_pictures {
+                Vec::new()
+            } else {
+                on_sheet(frames)
+            },
+            sheet: Vec::new(),
+            count: 0,
+        }))
+    }
+
+    /// Opens the film, if there is to be one, so that what cannot be written is known before the run.
+    pub(crate) fn begin_film(&mut self) -> anyhow::Result<()> {
+        if let Some(path) = &self.film {
+            require_file(path)?;
+            let seconds = (self.film_every as f64 * self.time_step).clamp(0.01, 10.0);
+            self.writer = Some(Film::create(path, self.size, seconds)?);
+        }
+        Ok(())
+    }
+
+    /// Follows a frame and draws it if somebody wants it: `saved` says whether it is one whose files are kept.
+    pub(crate) fn frame(
+        &mut self,
+        simulation: &mut Simulation,
+        saved: bool,
+        folder: &Path,
+    ) -> anyhow::Result<()> {
+        self.painting.follow(simulation);
+        let frame = simulation.report().frame;
+        let saved = saved && self.saved;
+        let filmed = self.writer.is_some() && frame.is_multiple_of(self.film_every);
+        if !(saved || filmed) {
+            return Ok(());
+        }
+        let picture = self.draw(simulation)?;
+        if saved {
+            picture.write_png(folder.join(format!("frame_{frame:05}.png")))?;
+            self.count += 1;
+        }
+        if let Some(film) = self.writer.as_mut().filter(|_| filmed) {
+            film.push(&picture)?;
+        }
+        if saved && self.on_sheet.binary_search(&frame).is_ok() {
+            let report = simulation.report();
+            let pieces = match report.pieces {
+                1 => "1 piece".to_owned(),
+                pieces => format!("{pieces} pieces"),
+            };
+            let caption = format!("frame {frame}  {:.2} s  {pieces}", report.time_s);
+            let smaller = picture.shrunk(self.size[0].div_ceil(SHEET_WIDTH));
+            self.sheet.push((smaller, caption));
+        }
+        Ok(())
+    }
+
+    fn draw(&mut self, simulation: &mut Simulation) -> Result<Picture, RenderError> {
+        if self.renderer.needs_read_back(simulation) {
+            simulation.read_back()?;
+        }
+        let frame = simulation.report().frame;
+        self.painting.set_blade(None);
+        for blade in self
+            .strokes
+            .iter()
+            .filter_map(|stroke| blade_at(stroke, frame))
+        {
+            self.painting.add_blade(&blade);
+        }
+        self.painting.color(simulation, self.style.color_by, None)?;
+        let (painting, camera) = (&self.painting, &self.camera);
+        self.renderer
+            .picture(painting, simulation, camera, &self.style, self.size)
+    }
+
+    /// Completes sheet and film; returns what is to be said about them.
+    pub(crate) fn finish(self, folder: &Path) -> anyhow::Result<String> {
+        let mut places = Vec::new();
+        if self.saved {
+            contact_sheet(&self.sheet, COLUMNS).write_png(folder.join("contact_sheet.png"))?;
+            places.push(format!(
+                "{} pictures and contact_sheet.png are in {}",
+                self.count,
+                folder.display()
+            ));
+        }
+        if let (Some(film), Some(path)) = (self.writer, &self.film) {
+            film.finish()?;
+            places.push(format!("the film is {}", path.display()));
+        }
+        let drawn = self.renderer.describe();
+        let why = self.note.map(|note| format!(": {note}"));
+        let why = why.unwrap_or_default();
+        Ok(format!("{}, drawn by {drawn}{why}", places.join(", ")))
+    }
+}
+
+/// Sees the bodies and, if it is not far, the floor that they may fall on.
+fn camera(
+    arguments: &RunArguments,
+    scene: &Scene,
+    [mut low, high]: [incise::mesh::glam::DVec3; 2],
+) -> Camera {
+    let deepest = low.z - DEEPEST * (high - low).length();
+    if let Some(ground) = scene.world.ground.filter(|ground| ground.height > deepest) {
+        low.z = low.z.min(ground.height);
+    }
+    let mut camera = Camera::fit(low, high);
+    if let Some([azimuth, elevation, zoom]) = arguments.view {
+        camera.azimuth = azimuth.to_radians();
+        camera.elevation = elevation.to_radians();
+        camera.fit_distance(low, high);
+        camera.zoom(1.0 / zoom);
+    }
+    camera
+}
+
+/// Every how many frames a film has a picture.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "at least 1; what is beyond all frames is as good as any other"
+)]
+fn film_every(time_step: f64) -> u64 {
+    // A step of exactly a fraction is not to be rounded away.
+    (1.0 / (PER_SECOND * time_step) + 1e-9).floor().max(1.0) as u64
+}
+
+/// The frames on the sheet: evenly spread over those that are saved.
+fn on_sheet(frames: u64) -> Vec<u64> {
+    let every = save_every(frames);
+    let last = frames - 1;
+    // The last one is saved whatever its number.
+    let saved = last.div_ceil(every) + 1;
+    let count = saved.min(ON_SHEET);
+    (0..count)
+        .map(|i| (i * (saved - 1) + (count - 1) / 2) / (count - 1).max(1))
+        .map(|place| (place * every).min(last))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sheets_have_the_first_and_the_last_frame() {
+        assert_eq!(on_sheet(1), [0]);
+        assert_eq!(on_sheet(2), [0, 1]);
+        assert_eq!(on_sheet(12), (0..12).collect::<Vec<_>>());
+        for frames in 1..400 {
+            let sheet = on_sheet(frames);
+            let saved =
+                (0..frames).filter(|f| f.is_multiple_of(save_every(frames)) || f + 1 == frames);
+            assert_eq!(sheet.len(), saved.count().min(12), "{frames}");
+            assert_eq!((sheet[0], sheet.last()), (0, Some(&(frames - 1))));
+            assert!(
+                sheet.windows(2).all(|pair| pair[0] < pair[1]),
+                "{frames}: {sheet:?}"
+            );
+            let kept = |f: &u64| f.is_multiple_of(save_every(frames)) || f + 1 == frames;
+            assert!(sheet.iter().all(kept), "{frames}: {sheet:?}");
+        }
+    }
+
+    #[test]
+    fn films_have_some_25_pictures_a_second() {
+        assert_eq!(
+            [0.001, 0.01, 0.016, 0.02, 0.04, 0.5].map(film_every),
+            [40, 4, 2, 2, 1, 1]
+        );
+    }
+}
