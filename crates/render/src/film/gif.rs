@@ -1,24 +1,19 @@
 //! Animated GIF ("Graphics Interchange Format, version 89a", 1990).
 //!
-//! A picture has a palette of its own for the pixels that changed; the others are transparent. Palettes are exact where
-//! there are few colors, else found by a self-organizing net (A. Dekker, "Kohonen neural networks for optimal colour
-//! quantization", 1994) through `color_quant`.
+//! A picture has a palette of its own for the pixels that changed; the others are transparent.
 
-use std::collections::HashMap;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 
-use color_quant::NeuQuant;
 use gif::{DisposalMethod, Encoder, EncodingError, Frame, Repeat};
 
+use super::reduce::{Reduced, reduce};
 use super::{Rectangle, around};
 use crate::Picture;
 
 /// Colors of a picture, and the number of the one that is none.
 const COLORS: usize = 255;
 const TRANSPARENT: u8 = 255;
-/// Every how many pixels the net learns from, 1 to 30.
-const SAMPLING: i32 = 7;
 /// What channels may differ by without being stored: less than palettes do.
 const TOLERANCE: u8 = 2;
 
@@ -74,8 +69,10 @@ impl Gif {
                 }
             }
         }
-        let (palette, indices) = reduce(&colors);
-        let mut indices = indices.into_iter();
+        let Reduced { palette, numbers } = reduce(&colors, COLORS);
+        let mut palette = palette.concat();
+        palette.resize(3 * 256, 0);
+        let mut indices = numbers.into_iter();
         let pixels = stored.into_iter().map(|store| match store {
             true => indices.next().unwrap_or(TRANSPARENT),
             false => TRANSPARENT,
@@ -98,37 +95,6 @@ impl Gif {
     pub(super) fn finish(self) -> io::Result<()> {
         self.encoder.into_inner().map_err(why)?.flush()
     }
-}
-
-/// A palette of 256 colors, the last for what is transparent, and the number of each pixel's color in it.
-fn reduce(rgba: &[u8]) -> (Vec<u8>, Vec<u8>) {
-    let pixels = || rgba.chunks_exact(4).map(|p| [p[0], p[1], p[2]]);
-    // The number of each color so far; never iterated.
-    let mut numbers: HashMap<[u8; 3], u8> = HashMap::new();
-    let mut palette = Vec::new();
-    let exact: Option<Vec<u8>> = pixels()
-        .map(|color| {
-            if let Some(&number) = numbers.get(&color) {
-                return Some(number);
-            }
-            let number = u8::try_from(palette.len() / 3).ok();
-            let number = number.filter(|&number| number < TRANSPARENT)?;
-            palette.extend(color);
-            numbers.insert(color, number);
-            Some(number)
-        })
-        .collect();
-    let indices = exact.unwrap_or_else(|| {
-        let net = NeuQuant::new(SAMPLING, COLORS, rgba);
-        palette = net.color_map_rgb();
-        numbers.clear();
-        let nearest = |[r, g, b]: [u8; 3]| u8::try_from(net.index_of(&[r, g, b, 255])).unwrap_or(0);
-        pixels()
-            .map(|color| *numbers.entry(color).or_insert_with(|| nearest(color)))
-            .collect()
-    });
-    palette.resize(3 * 256, 0);
-    (palette, indices)
 }
 
 /// What was checked to fit when the film was begun.

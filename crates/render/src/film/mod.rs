@@ -7,6 +7,7 @@
 
 mod apng;
 mod gif;
+mod reduce;
 
 use std::fs::{self, File};
 use std::io;
