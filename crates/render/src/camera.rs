@@ -13,9 +13,8 @@ const POLE: f64 = 0.01;
 /// Distances stay within these, in m.
 const NEAREST: f64 = 1e-6;
 const FARTHEST: f64 = 1e9;
-/// The nearest and the farthest that is drawn, in distances to the target.
+/// The nearest that is drawn, in distances to the target.
 const NEAR: f64 = 1e-2;
-const FAR: f64 = 1e2;
 
 /// From where a scene is seen. Lengths are in m, angles in radians.
 ///
@@ -134,8 +133,7 @@ impl Camera {
     }
 
     /// From points in the world to the clip space of wgpu: x to the right, y up, depth from 0 to 1. `aspect` is width over
-    /// height. What is nearer than a hundredth of the distance to the target or farther than a hundred of them is not
-    /// seen.
+    /// height. What is nearer than a hundredth of the distance to the target is not seen; there is no farthest.
     #[must_use]
     pub fn view_projection(&self, aspect: f64) -> DMat4 {
         let eye = self.eye();
@@ -147,21 +145,16 @@ impl Camera {
         let (right, up, back) = (self.right(), self.up(), -self.forward());
         let row = |axis: DVec3| axis.extend(0.0);
         let view = DMat4::from_cols(row(right), row(up), row(back), DVec4::W).transpose();
-        let [near, far] = self.depths();
+        let near = self.distance * NEAR;
         let slope = 1.0 / (self.field_of_view * 0.5).tan();
-        let depth = far / (near - far);
+        // Depth is 1 - near over the distance, for which 32 bits are fine enough.
         let projection = DMat4::from_cols(
             DVec4::new(slope / aspect, 0.0, 0.0, 0.0),
             DVec4::new(0.0, slope, 0.0, 0.0),
-            DVec4::new(0.0, 0.0, depth, -1.0),
-            DVec4::new(0.0, 0.0, depth * near, 0.0),
+            DVec4::new(0.0, 0.0, -1.0, -1.0),
+            DVec4::new(0.0, 0.0, -near, 0.0),
         );
         projection * view
-    }
-
-    /// The distances along the view of the nearest and the farthest that is drawn.
-    pub(crate) fn depths(&self) -> [f64; 2] {
-        [self.distance * NEAR, self.distance * FAR]
     }
 
     /// Where a point is seen in a picture of `size` pixels: pixels from its upper left corner, to the right and down, and

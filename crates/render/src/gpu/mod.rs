@@ -129,7 +129,7 @@ impl GpuRenderer {
             vertices: Buffer::new(&gpu, "skin vertices", storage)?,
             triangles: Buffer::new(&gpu, "skin triangles", storage)?,
             parts: Buffer::new(&gpu, "origins", storage)?,
-            sums: Buffer::new(&gpu, "normals", storage)?,
+            sums: Buffer::new(&gpu, "normals", storage | BufferUsages::COPY_SRC)?,
             colors: Buffer::new(&gpu, "colors", storage)?,
             count: Buffer::new(&gpu, "count of triangles", uniform)?,
             props: Buffer::new(&gpu, "obstacles", BufferUsages::VERTEX)?,
@@ -323,6 +323,17 @@ impl GpuRenderer {
         gpu.queue().submit([encoder.finish()]);
         gpu.check()?;
         Ok(&target.resolved)
+    }
+
+    /// The sums that [`normal_sums`](crate::normal_sums) defines, of the skin's vertices in the last picture, for tests: waits
+    /// for the device.
+    ///
+    /// # Errors
+    /// If the device is lost or out of memory.
+    pub fn read_normal_sums(&self) -> Result<Vec<[i32; 3]>, RenderError> {
+        let bytes = (self.sums.len() * size_of::<[i32; 3]>()) as u64;
+        let values = target::read_buffer(&self.gpu, "normals", self.sums.raw(), bytes)?;
+        Ok(bytemuck::pod_collect_to_vec(&values))
     }
 
     /// Draws what bodies leave on the ground and blurs it.

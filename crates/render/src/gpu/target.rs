@@ -84,20 +84,9 @@ impl Target {
             },
             extent(self.size),
         );
-        gpu.queue().submit([encoder.finish()]);
-        let (sender, receiver) = mpsc::channel();
-        staging.map_async(wgpu::MapMode::Read, .., move |result| {
-            // Nobody waits if this function has returned.
-            let _ = sender.send(result.map_err(|error| error.to_string()));
-        });
-        gpu.wait()?;
-        let lost = |message: String| RenderError::from(GpuError::Lost { message });
-        let mapped = receiver.recv().map_err(|error| lost(error.to_string()))?;
-        mapped.map_err(lost)?;
-        let range = staging.get_mapped_range(..);
-        let range = range.map_err(|error| lost(error.to_string()))?;
+        let bytes = collect(gpu, encoder, &staging)?;
         let mut rgba = Vec::with_capacity(4 * width as usize * height as usize);
-        for line in range.chunks_exact(row as usize) {
+        for line in bytes.chunks_exact(row as usize) {
             rgba.extend_from_slice(&line[..4 * width as usize]);
         }
         Ok(Picture {
@@ -106,6 +95,44 @@ impl Target {
             rgba,
         })
     }
+}
+
+/// Waits for the first bytes of a buffer.
+pub(super) fn read_buffer(
+    gpu: &GpuContext,
+    what: &'static str,
+    from: &wgpu::Buffer,
+    bytes: u64,
+) -> Result<Vec<u8>, RenderError> {
+    if bytes == 0 {
+        return Ok(Vec::new());
+    }
+    let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
+    let staging = buffer::create(gpu, what, usage, bytes)?;
+    let mut encoder = gpu.device().create_command_encoder(&Default::default());
+    encoder.copy_buffer_to_buffer(from, 0, &staging, 0, bytes);
+    collect(gpu, encoder, &staging)
+}
+
+/// Hands over commands that fill a buffer, waits and reads it.
+fn collect(
+    gpu: &GpuContext,
+    encoder: wgpu::CommandEncoder,
+    staging: &wgpu::Buffer,
+) -> Result<Vec<u8>, RenderError> {
+    gpu.queue().submit([encoder.finish()]);
+    let (sender, receiver) = mpsc::channel();
+    staging.map_async(wgpu::MapMode::Read, .., move |result| {
+        // Nobody waits if this function has returned.
+        let _ = sender.send(result.map_err(|error| error.to_string()));
+    });
+    gpu.wait()?;
+    let lost = |message: String| RenderError::from(GpuError::Lost { message });
+    let mapped = receiver.recv().map_err(|error| lost(error.to_string()))?;
+    mapped.map_err(lost)?;
+    let range = staging.get_mapped_range(..);
+    let range = range.map_err(|error| lost(error.to_string()))?;
+    Ok(range.to_vec())
 }
 
 /// Two textures for the impression on the ground, which is blurred from one into the other and back.

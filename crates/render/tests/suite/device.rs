@@ -1,0 +1,169 @@
+//! Drawing on a device: from the solver's own buffer, with the normals and the pixels of the processor.
+
+#![cfg(feature = "gpu")]
+
+use std::sync::Arc;
+
+use glam::Vec3;
+use incise::{Scene, Simulation};
+use incise_render::{
+    Camera, ColorBy, GpuRenderer, Painting, RenderError, SoftwareRenderer, Style, normal_sums,
+};
+
+use crate::support::{Difference, LIVER, Shown, TWO_BODIES, gpu};
+
+const SIZE: [u32; 2] = [120, 90];
+
+/// Draws on both and compares. The same tolerances as for the references, but for what both see the same.
+fn assert_alike(renderer: &mut GpuRenderer, shown: &Shown, style: &Style, what: &str) {
+    let camera = shown.camera();
+    let (painting, simulation) = (&shown.painting, &shown.simulation);
+    let there = renderer
+        .picture(painting, simulation, &camera, style, SIZE)
+        .unwrap();
+    let here = SoftwareRenderer::new().picture(painting, simulation, &camera, style, SIZE);
+    let difference = Difference::of(&there, &here.unwrap(), 24);
+    assert!(
+        difference.mean < 1.0 && difference.share < 0.04,
+        "{what}: {difference:?}"
+    );
+}
+
+#[test]
+fn both_draw_the_same() {
+    let Some(gpu) = gpu("both_draw_the_same") else {
+        return;
+    };
+    let mut renderer = GpuRenderer::new(gpu).unwrap();
+    // One renderer for all, so that what it keeps of one painting does not show in another.
+    let mut liver = Shown::new(LIVER, 0);
+    let bodies = Shown::new(TWO_BODIES, 2);
+    for frame in 0..4 {
+        assert_alike(&mut renderer, &liver, &Style::default(), "tissue");
+        assert_alike(&mut renderer, &bodies, &Style::default(), "bodies");
+        let by = [ColorBy::Color, ColorBy::Piece, ColorBy::Stretch][frame % 3];
+        liver
+            .painting
+            .color(&mut liver.simulation, by, None)
+            .unwrap();
+        for smooth in [true, false] {
+            let style = Style {
+                color_by: by,
+                wireframe: !smooth,
+                smooth,
+            };
+            assert_alike(&mut renderer, &liver, &style, by.name());
+        }
+        liver.advance(1);
+    }
+}
+
+#[test]
+fn positions_do_not_leave_the_device() {
+    let Some(gpu) = gpu("positions_do_not_leave_the_device") else {
+        return;
+    };
+    let scene = Scene::from_toml(&LIVER.replace("substeps = 8", "substeps = 3")).unwrap();
+    let mut simulation = Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap();
+    let mut painting = Painting::new(&simulation, &scene);
+    let mut renderer = GpuRenderer::new(Arc::clone(&gpu)).unwrap();
+    let camera = Camera::fit(glam::DVec3::splat(-0.2), glam::DVec3::splat(0.2));
+    assert!(!renderer.needs_read_back(&simulation));
+    let style = Style::default();
+    for frame in 0..4 {
+        // Before the first step too, when the device has no positions yet.
+        let read = || gpu.traffic().readbacks;
+        let before = read();
+        renderer
+            .draw(&painting, &simulation, &camera, &style, SIZE)
+            .unwrap();
+        assert_eq!(read(), before, "frame {frame}");
+        let there = renderer
+            .picture(&painting, &simulation, &camera, &style, SIZE)
+            .unwrap();
+        simulation.read_back().unwrap();
+        let here = SoftwareRenderer::new()
+            .picture(&painting, &simulation, &camera, &style, SIZE)
+            .unwrap();
+        let difference = Difference::of(&there, &here, 24);
+        // As in `assert_alike`.
+        assert!(
+            difference.mean < 1.0 && difference.share < 0.04,
+            "{frame}: {difference:?}"
+        );
+        simulation.step().unwrap();
+        painting.follow(&simulation);
+    }
+    assert!(simulation.report().tets > simulation.mesh().tets.len() / 2);
+    let two = Scene::from_toml(TWO_BODIES).unwrap();
+    let two = Simulation::on_device(&two, gpu).unwrap();
+    assert!(renderer.needs_read_back(&two), "two solvers");
+}
+
+#[test]
+fn normals_are_those_of_the_processor() {
+    let Some(gpu) = gpu("normals_are_those_of_the_processor") else {
+        return;
+    };
+    let shown = Shown::new(LIVER, 4);
+    let mut renderer = GpuRenderer::new(gpu).unwrap();
+    let camera = shown.camera();
+    let style = Style::default();
+    renderer
+        .draw(&shown.painting, &shown.simulation, &camera, &style, SIZE)
+        .unwrap();
+    let there = renderer.read_normal_sums().unwrap();
+    let skin = shown.painting.skin();
+    let positions = shown.simulation.positions();
+    let place = |p: usize| (positions[p] - positions[0]).as_vec3();
+    let vertices = skin.vertices().iter();
+    let places: Vec<Vec3> = vertices
+        .map(|vertex| place(vertex.particle.index()))
+        .collect();
+    let here = normal_sums(skin.triangles(), &places);
+    assert_eq!(here.len(), there.len());
+    let mut used = vec![false; here.len()];
+    skin.triangles()
+        .iter()
+        .flatten()
+        .for_each(|v| used[*v as usize] = true);
+    for ((here, there), used) in here.iter().zip(&there).zip(used) {
+        let [here, there] = [here, there].map(|sum| Vec3::from_array(sum.map(|part| part as f32)));
+        assert_eq!(here != Vec3::ZERO, used);
+        // WGSL grants an arc tangent 4096 units in the last place, which is 5e-4, and each of some six triangles may err
+        // the same way; a unit is a millionth of the sum.
+        assert!(
+            (here - there).length() <= 1e-3 * here.length(),
+            "{here} {there}"
+        );
+    }
+}
+
+#[test]
+fn sizes_that_are_no_pictures_are_refused() {
+    let Some(gpu) = gpu("sizes_that_are_no_pictures_are_refused") else {
+        return;
+    };
+    let shown = Shown::new(LIVER, 0);
+    let largest = gpu.device().limits().max_texture_dimension_2d;
+    let mut renderer = GpuRenderer::new(Arc::clone(&gpu)).unwrap();
+    let camera = shown.camera();
+    let mut draw = |size| {
+        let picture = renderer.picture(
+            &shown.painting,
+            &shown.simulation,
+            &camera,
+            &Style::default(),
+            size,
+        );
+        picture.map(|picture| picture.rgba.len())
+    };
+    for size in [[0, 1], [1, 0], [largest + 1, 1], [1, u32::MAX]] {
+        let error = draw(size).unwrap_err();
+        assert!(matches!(error, RenderError::Size { .. }), "{error}");
+    }
+    for size in [[1, 1], [33, 17], [16, 40]] {
+        assert_eq!(draw(size).unwrap(), 4 * size[0] as usize * size[1] as usize);
+    }
+    assert!(gpu.check().is_ok(), "nothing was refused by the driver");
+}
