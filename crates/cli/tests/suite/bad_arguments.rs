@@ -18,6 +18,18 @@ fn places_that_cannot_be_written() {
         (&["--save-mesh", "last.xyz"], "last.xyz"),
         (&["--save-mesh", "last"], "last"),
         (&["--jsonl", "/"], "cannot write /"),
+        (&["--film", "none/film.gif"], "none/film.gif"),
+        (&["--film", "tet.vtk/film.png"], "tet.vtk/film.png"),
+        (
+            &["--film", "film.mp4"],
+            "film.mp4: unknown ending: films are written as .gif, .png, .apng",
+        ),
+        (&["--film", "film"], "unknown ending"),
+        (
+            &["--out", "a/b/c", "--film", "none/film.gif"],
+            "none/film.gif",
+        ),
+        (&["--no-pictures", "--film", "film.avi"], "film.avi"),
         (
             &["--out", "a/b/c", "--jsonl", "none/frames.jsonl"],
             "none/frames.jsonl",
@@ -122,6 +134,39 @@ fn arguments_that_do_not_exist() {
         ),
         (&["mesh", "generate", "box", "a.vtk"], &["--tets"]),
         (&["run", "scene.toml", "--jsonl", ""], &["--jsonl"]),
+        (
+            &["run", "scene.toml", "--size", "0x480"],
+            &["--size", "from 1 to 8192"],
+        ),
+        (
+            &["run", "scene.toml", "--size", "9000x480"],
+            &["--size", "from 1 to 8192"],
+        ),
+        (
+            &["run", "scene.toml", "--size", "640"],
+            &["--size", "960x720"],
+        ),
+        (
+            &["run", "scene.toml", "--view", "1"],
+            &["--view", "-60,22,1.5"],
+        ),
+        (
+            &["run", "scene.toml", "--view", "0,91"],
+            &["--view", "from -90 to 90"],
+        ),
+        (
+            &["run", "scene.toml", "--view", "0,0,0"],
+            &["--view", "zoom from 0.001"],
+        ),
+        (&["run", "scene.toml", "--view", "nan,0"], &["--view"]),
+        (
+            &["run", "scene.toml", "--color-by", "blue"],
+            &["blue", "tissue, color, cluster"],
+        ),
+        (
+            &["run", "scene.toml", "--color-by", "residual"],
+            &["--color-by", "residual"],
+        ),
         (&["color"], &["INPUT"]),
         (&["mesh"], &["info"]),
     ] {

@@ -11,6 +11,7 @@ mod color_graph;
 mod gpu;
 mod help;
 mod mesh;
+mod pictures;
 mod run;
 mod run_files;
 mod support;

@@ -97,7 +97,14 @@ fn reports_appear_when_asked_for() {
     let place = Place::new();
     let report = "[report]\nevery = 2\nquantities = [\"residual\", \"energy\", \"volume\", \"speed\", \"kappa\"]\n";
     place.write("scene.toml", report.to_owned() + SCENE);
-    place.good(&["run", "scene.toml", "--frames", "3", "--quiet"]);
+    place.good(&[
+        "run",
+        "scene.toml",
+        "--frames",
+        "3",
+        "--quiet",
+        "--no-pictures",
+    ]);
     let frames = frames(&place, "out/frames.jsonl");
     let all = format!(
         "{ALWAYS}, residual, energy, volume, volume_error, min_volume_ratio, max_speed, inverted_tets, kappa, softened, bodies"
@@ -121,7 +128,7 @@ fn chosen_substeps_are_in_the_table_and_in_every_line() {
     let place = Place::new();
     let solver = "[solver]\nsubsteps = \"auto\"\nmax_substeps = 2\n";
     place.write("scene.toml", SCENE.replace("1e4", "1e6") + solver);
-    let table = place.good(&["run", "scene.toml", "--frames", "3"]);
+    let table = place.good(&["run", "scene.toml", "--frames", "3", "--no-pictures"]);
     assert!(table.contains("substeps of body 0"), "{table}");
     assert!(table.contains("2 (the cap; "), "{table}");
     for frame in frames(&place, "out/frames.jsonl") {
@@ -146,7 +153,14 @@ fn check_says_how_many_cuts_it_checked() {
         "[[stroke]]\nkind = \"plane\"\nframe = 3\npoint = [0, 0.02, 0]\nnormal = [0, 1, 0]\n";
     place.write("scene.toml", SCENE.to_owned() + second);
     for (frames, cuts) in [("1", 0), ("3", 1), ("5", 2)] {
-        let text = place.good(&["run", "scene.toml", "--frames", frames, "--check"]);
+        let text = place.good(&[
+            "run",
+            "scene.toml",
+            "--frames",
+            frames,
+            "--check",
+            "--no-pictures",
+        ]);
         assert!(
             text.contains(&format!("checked after each of {cuts} cuts")),
             "{text}"
@@ -161,7 +175,7 @@ fn without_frames_all_strokes_are_carried_out() {
         .replace("frame = 1", "frame = 203")
         .replace("tets = 300", "tets = 200");
     place.write("scene.toml", late);
-    place.good(&["run", "scene.toml", "--quiet"]);
+    place.good(&["run", "scene.toml", "--quiet", "--no-pictures"]);
     let frames = frames(&place, "out/frames.jsonl");
     assert_eq!(frames.len(), 204);
     assert_eq!(frames[203]["pieces"], 2);

@@ -8,7 +8,7 @@ use crate::support::{Place, SCENE};
 fn same_files(place: &Place, a: &str, b: &str) {
     assert_eq!(place.names(a), place.names(b));
     for name in place.names(a).iter().filter(|name| *name != "frames.jsonl") {
-        let [a, b] = [a, b].map(|folder| place.read(&format!("{folder}/{name}")));
+        let [a, b] = [a, b].map(|folder| fs::read(place.path(folder).join(name)).unwrap());
         assert!(a == b, "{name} differs");
     }
 }
@@ -28,6 +28,8 @@ fn any_number_of_threads_writes_the_same_bytes() {
             "--frames",
             "3",
             "--quiet",
+            "--size",
+            "160x120",
             "--threads",
             threads,
             "--out",
@@ -47,6 +49,7 @@ fn precision_is_as_asked_for() {
             "--frames",
             "2",
             "--quiet",
+            "--no-pictures",
             "--precision",
             precision,
             "--out",
@@ -93,6 +96,8 @@ fn the_written_scene_runs_again_to_the_same_files() {
         "--frames",
         "3",
         "--quiet",
+        "--size",
+        "64x48",
         "--out",
         "deep/first",
     ]);
@@ -102,6 +107,8 @@ fn the_written_scene_runs_again_to_the_same_files() {
         "--frames",
         "3",
         "--quiet",
+        "--size",
+        "64x48",
         "--out",
         "second",
     ]);
@@ -208,6 +215,10 @@ fn a_failed_run_leaves_nothing_half_written() {
         "lines.jsonl",
         "--save-mesh",
         "last.vtk",
+        "--film",
+        "film.gif",
+        "--size",
+        "64x48",
     ]);
     assert_eq!(
         (outcome.code, outcome.stdout.as_str()),
@@ -217,6 +228,8 @@ fn a_failed_run_leaves_nothing_half_written() {
     assert_eq!(outcome.stderr.lines().count(), 1, "{outcome:?}");
     assert!(outcome.stderr.contains("surface_00002.vtp"), "{outcome:?}");
     let left = [
+        "frame_00000.png",
+        "frame_00001.png",
         "scene.toml",
         "surface_00000.vtp",
         "surface_00001.vtp",
@@ -225,7 +238,7 @@ fn a_failed_run_leaves_nothing_half_written() {
     assert_eq!(place.names("out"), left);
     assert_eq!(place.names("."), ["lines.jsonl", "out", "scene.toml"]);
     assert_eq!(place.read("lines.jsonl"), "of an earlier run\n");
-    for whole in &left[1..3] {
+    for whole in &left[3..5] {
         assert!(
             place
                 .read(&format!("out/{whole}"))

@@ -23,8 +23,8 @@ fn references() -> [Reference; 3] {
         .painting
         .color(&mut colored.simulation, ColorBy::Color, None)
         .unwrap();
-    let mut closer = colored.camera();
-    closer.zoom(0.6);
+    let [low, high] = colored.painting.bounds(&colored.simulation);
+    let closer = Camera::fit(low, high);
     let mut bodies = Shown::new(TWO_BODIES, 5);
     let blade = [[-0.5, -0.5, 0.2], [0.2, 0.0, 0.25], [0.5, 0.5, 0.1]];
     bodies

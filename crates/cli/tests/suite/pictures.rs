@@ -1,0 +1,143 @@
+//! What a run looks like: pictures, a sheet and films, of the sizes and frames that were asked for.
+
+use std::fs;
+
+use crate::support::Place;
+
+/// A run of the small scene with these arguments more; what it printed.
+fn run(place: &Place, rest: &[&str]) -> String {
+    place.good(&[&["run", "scene.toml"], rest].concat())
+}
+
+/// Width and height as a PNG file says.
+fn size(place: &Place, name: &str) -> [u32; 2] {
+    let bytes = fs::read(place.path(name)).unwrap();
+    assert!(bytes.starts_with(b"\x89PNG\r\n\x1a\n"), "{name}");
+    assert!(bytes.ends_with(b"IEND\xae\x42\x60\x82"), "{name} is whole");
+    [16, 20].map(|at| u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap()))
+}
+
+fn pngs(place: &Place, folder: &str) -> Vec<String> {
+    let names = place.names(folder).into_iter();
+    names.filter(|name| name.ends_with(".png")).collect()
+}
+
+#[test]
+fn a_run_is_seen() {
+    let place = Place::with_scene();
+    let said = run(&place, &["--frames", "4"]);
+    assert!(
+        said.contains("4 pictures and contact_sheet.png are in out, drawn by "),
+        "{said}"
+    );
+    let frames = [0, 1, 2, 3].map(|frame| format!("frame_{frame:05}.png"));
+    let mut expected = vec!["contact_sheet.png"];
+    expected.extend(frames.iter().map(String::as_str));
+    assert_eq!(pngs(&place, "out"), expected);
+    for frame in &frames {
+        assert_eq!(size(&place, &format!("out/{frame}")), [640, 480]);
+    }
+    // Four columns of half the size with margins of 10, and a row with captions of 20.
+    assert_eq!(
+        size(&place, "out/contact_sheet.png"),
+        [10 + 4 * 330, 10 + 270]
+    );
+    let read = |frame: &String| fs::read(place.path("out").join(frame)).unwrap();
+    assert_ne!(read(&frames[0]), read(&frames[3]), "it falls");
+}
+
+#[test]
+fn about_fifty_frames_are_seen() {
+    let place = Place::with_scene();
+    run(&place, &["--frames", "120", "--size", "24x16", "--quiet"]);
+    let surfaces = place.names("out").into_iter();
+    let surfaces = surfaces.filter(|name| name.ends_with(".vtp")).count();
+    // One more is the sheet.
+    assert_eq!(pngs(&place, "out").len(), surfaces + 1);
+    assert!((40..=51).contains(&surfaces), "{surfaces}");
+    // Twelve in three rows.
+    assert_eq!(
+        size(&place, "out/contact_sheet.png"),
+        [10 + 4 * 34, 10 + 3 * 46]
+    );
+}
+
+#[test]
+fn what_nobody_wants_is_not_there() {
+    let place = Place::with_scene();
+    let said = run(&place, &["--frames", "2", "--no-pictures"]);
+    assert!(!said.contains("drawn"), "{said}");
+    assert!(pngs(&place, "out").is_empty());
+}
+
+#[test]
+fn films_are_written_in_both_formats() {
+    let place = Place::with_scene();
+    // A step of 16 ms: every other frame.
+    let arguments = ["--frames", "12", "--size", "48x40"];
+    let film = |rest: &[&str]| run(&place, &[&arguments, rest].concat());
+    let said = film(&["--film", "run.gif", "--out", "a"]);
+    assert!(said.contains("the film is run.gif"), "{said}");
+    let gif = fs::read(place.path("run.gif")).unwrap();
+    assert!(
+        gif.starts_with(b"GIF89a") && gif.ends_with(&[0x3b]),
+        "whole"
+    );
+    assert_eq!([gif[6], gif[8]], [48, 40]);
+    // Graphic control extensions: one a picture, with a delay of 3 hundredths, rounded.
+    let controls = gif
+        .windows(3)
+        .filter(|bytes| *bytes == [0x21, 0xf9, 4])
+        .count();
+    assert_eq!(controls, 6);
+    assert_eq!(pngs(&place, "a").len(), 13);
+
+    let said = film(&["--film", "b/run.png", "--no-pictures", "--out", "b"]);
+    assert!(said.contains("the film is b/run.png, drawn by"), "{said}");
+    assert_eq!(pngs(&place, "b"), ["run.png"]);
+    assert_eq!(size(&place, "b/run.png"), [48, 40]);
+    let png = fs::read(place.path("b/run.png")).unwrap();
+    let at = png.windows(4).position(|name| name == b"acTL").unwrap();
+    assert_eq!(png[at + 4..at + 8], [0, 0, 0, 6]);
+    assert!(
+        place
+            .names(".")
+            .iter()
+            .all(|name| !name.contains("partial"))
+    );
+}
+
+#[test]
+fn how_it_is_seen_can_be_chosen() {
+    let place = Place::with_scene();
+    let mut pictures = Vec::new();
+    for (i, rest) in [
+        &[][..],
+        &["--view", "30,40"],
+        &["--view=-60,22,2"],
+        &["--color-by", "color"],
+        &["--color-by", "stretch", "--wireframe"],
+        &["--wireframe"],
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let folder = i.to_string();
+        let usual = [
+            "--frames", "2", "--size", "60x40", "--quiet", "--out", &folder,
+        ];
+        run(&place, &[&usual, rest].concat());
+        let name = format!("{folder}/frame_00001.png");
+        assert_eq!(size(&place, &name), [60, 40]);
+        pictures.push(fs::read(place.path(&name)).unwrap());
+    }
+    for (i, picture) in pictures.iter().enumerate() {
+        assert!(!pictures[..i].contains(picture), "{i}");
+    }
+    // The view that is there anyway.
+    let usual = [
+        "--frames", "2", "--size", "60x40", "--quiet", "--out", "again",
+    ];
+    run(&place, &[&usual[..], &["--view", "-60,22"]].concat());
+    assert!(fs::read(place.path("again/frame_00001.png")).unwrap() == pictures[0]);
+}
