@@ -35,6 +35,7 @@ mod islands;
 mod joined;
 mod limits;
 mod link;
+mod live_blade;
 mod measure;
 mod method;
 mod pieces;

@@ -4,6 +4,7 @@
 //! advance, those of different groups of bodies in parallel; the report is made. A frame without a cut touches only the
 //! solvers.
 
+mod live;
 mod state;
 
 use std::borrow::Cow;

@@ -12,6 +12,7 @@ mod determinism;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod kappa;
+mod live;
 mod locality;
 mod methods;
 mod mistakes;
