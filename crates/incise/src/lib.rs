@@ -29,6 +29,7 @@ mod descent;
 #[cfg(feature = "gpu")]
 mod device;
 mod error;
+mod grab;
 mod group;
 mod handle;
 mod islands;
@@ -56,6 +57,7 @@ mod volume;
 mod whole;
 
 pub use error::Error;
+pub use grab::Grab;
 pub use incise_clustering as clustering;
 pub use incise_coloring as coloring;
 pub use incise_cutting as cutting;

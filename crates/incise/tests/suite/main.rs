@@ -11,6 +11,7 @@ mod cutting;
 mod determinism;
 #[cfg(feature = "gpu")]
 mod gpu;
+mod grab;
 mod kappa;
 mod live;
 mod locality;
