@@ -16,7 +16,7 @@ use crate::Error;
 use crate::backend::{AnySolver, each, each_mut};
 use crate::group::Group;
 
-/// Something that is held: see [`Simulation::grab`](crate::Simulation::grab).
+/// Something that is held, in the simulation that gave it: see [`Simulation::grab`](crate::Simulation::grab).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Grab {
     pub(crate) group: usize,

@@ -11,6 +11,8 @@ mod cutting;
 mod determinism;
 #[cfg(feature = "gpu")]
 mod gpu;
+#[cfg(feature = "gpu")]
+mod gpu_live;
 mod grab;
 mod kappa;
 mod live;
