@@ -8,7 +8,6 @@
 //! anew, O(tets); with a compliance it does not. A frame costs what its handles cost.
 
 use glam::DVec3;
-use incise_cutting::CuttableMesh;
 use incise_mesh::ParticleId;
 use incise_xpbd::Pose;
 
@@ -196,7 +195,7 @@ impl Group {
         let Some(grip) = self.hand.find(grab) else {
             return Ok(false);
         };
-        let_go(&mut self.solver, &self.cuttable, grip.handle)?;
+        let_go(&mut self.solver, grip.handle)?;
         grip.held = false;
         grip.user += 1;
         self.wake();
@@ -206,17 +205,13 @@ impl Group {
 
 /// Lets all go that hangs on a handle, copies that cuts made too, and sends the handle back to where it began, so that
 /// its way does not add up from grab to grab.
-fn let_go(solver: &mut AnySolver, cuttable: &CuttableMesh, handle: u32) -> Result<(), Error> {
+fn let_go(solver: &mut AnySolver, handle: u32) -> Result<(), Error> {
     each_mut!(solver, solver => {
         let all = solver.attachments();
         let held: Vec<u32> = all.filter(|a| a.handle == handle).map(|a| a.particle).collect();
         // The list of what hangs closes up behind each of them.
         for p in held.into_iter().rev() {
             solver.detach(p as usize);
-            // Particles that lost all their tets stay where they are.
-            if cuttable.around(ParticleId(p)).next().is_none() {
-                solver.set_velocity(p as usize, DVec3::ZERO);
-            }
         }
         solver.move_handle(handle, Pose::at(DVec3::ZERO));
     });

@@ -13,9 +13,7 @@ use crate::tool::long_enough;
 /// How far a blade is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Progress {
-    /// No frame has seen it yet.
-    Begun,
-    /// A frame has carried out its pose.
+    /// A frame has carried out its pose, or it is its first one, which does not cut.
     Arrived,
     /// Its pose is that of the next frame.
     Moved,
@@ -37,7 +35,7 @@ impl LiveBlade {
         long_enough(field, pose)?;
         Ok(Self {
             pose: pose.to_vec(),
-            progress: Progress::Begun,
+            progress: Progress::Arrived,
         })
     }
 
@@ -57,9 +55,7 @@ impl LiveBlade {
         }
         check(field, pose)?;
         self.pose.copy_from_slice(pose);
-        if self.progress == Progress::Arrived {
-            self.progress = Progress::Moved;
-        }
+        self.progress = Progress::Moved;
         Ok(())
     }
 
