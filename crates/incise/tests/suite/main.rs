@@ -14,6 +14,7 @@ mod gpu;
 #[cfg(feature = "gpu")]
 mod gpu_live;
 mod grab;
+mod hands;
 mod kappa;
 mod live;
 mod locality;
