@@ -12,6 +12,7 @@ use incise_mesh::signed_volume;
 use incise_xpbd::{KappaLimit, StepReport, StepSettings};
 
 use crate::backend::{AnySolver, each, each_mut};
+use crate::grab::Hand;
 use crate::handle::Handle;
 use crate::joined::Joined;
 use crate::place::Place;
@@ -36,6 +37,8 @@ pub(crate) struct Group {
     /// Its colliders are where they are at the start of the next frame.
     pub(crate) settings: StepSettings,
     pub(crate) handles: Vec<Handle>,
+    /// What somebody holds.
+    pub(crate) hand: Hand,
     volumes: Option<Volumes>,
     /// The present positions.
     pub(crate) positions: Vec<DVec3>,
@@ -105,6 +108,7 @@ impl Group {
             plan,
             settings,
             handles: joined.handles,
+            hand: Hand::default(),
             volumes,
             positions: Vec::new(),
             pieces: PieceTracker::new(&cuttable),
@@ -125,6 +129,13 @@ impl Group {
         self.rest.is_some_and(|rest| rest.asleep())
     }
 
+    /// Wakes it, in a scene where bodies may sleep.
+    pub(crate) fn wake(&mut self) {
+        if let Some(rest) = &mut self.rest {
+            rest.wake();
+        }
+    }
+
     /// Advances by the frame of a number, unless it sleeps. What moves a handle or a collider wakes it.
     pub(crate) fn step(
         &mut self,
@@ -132,8 +143,8 @@ impl Group {
         keeping_residuals: bool,
     ) -> Result<StepReport, Error> {
         let moved = self.rest.is_some() && self.is_moved(frame);
-        if let Some(rest) = self.rest.as_mut().filter(|_| moved) {
-            rest.wake();
+        if moved {
+            self.wake();
         }
         if self.asleep() {
             return Ok(StepReport::default());
@@ -144,6 +155,7 @@ impl Group {
         let (schedule, settings) = (&self.plan.schedule, &self.settings);
         let step = self.solver.step(schedule, settings, keeping_residuals)?;
         collider::advance(&mut self.settings);
+        self.hand.arrive();
         let time = self.settings.time_step;
         if let Some(rest) = self.rest.as_mut().filter(|_| !moved) {
             let state = self.solver.state(None, &[Quantity::Speed])?;
@@ -159,11 +171,12 @@ impl Group {
         Ok(step)
     }
 
-    /// Whether a handle or a collider moves in a frame.
+    /// Whether a handle, a hand or a collider moves in a frame.
     fn is_moved(&self, frame: u64) -> bool {
         let mut colliders = self.settings.colliders.iter();
         colliders.any(|collider| collider.velocity != DVec3::ZERO)
             || self.handles.iter().any(|handle| handle.moves(frame))
+            || self.hand.moves()
     }
 
     /// Lets solver, pieces, clusters, colors, schedule and volume constraints follow a cut of the mesh, and wakes it.
@@ -173,9 +186,7 @@ impl Group {
         delta: &CutDelta,
         ms: &mut Milliseconds,
     ) -> Result<Vec<PieceEvent>, Error> {
-        if let Some(rest) = &mut self.rest {
-            rest.wake();
-        }
+        self.wake();
         let positions = &self.cuttable.mesh().positions;
         for tet in &delta.deleted {
             self.removed_volume += signed_volume(tet.corners.map(|p| positions[p.index()]));
@@ -257,6 +268,7 @@ impl Group {
             )));
         }
         self.solver.check(&self.cuttable, &self.plan.schedule)?;
+        self.hand.check(&self.solver)?;
         self.plan.check(mesh)?;
         self.pieces
             .check(&self.cuttable)

@@ -29,12 +29,14 @@ mod descent;
 #[cfg(feature = "gpu")]
 mod device;
 mod error;
+mod grab;
 mod group;
 mod handle;
 mod islands;
 mod joined;
 mod limits;
 mod link;
+mod live_blade;
 mod measure;
 mod method;
 mod pieces;
@@ -55,6 +57,7 @@ mod volume;
 mod whole;
 
 pub use error::Error;
+pub use grab::Grab;
 pub use incise_clustering as clustering;
 pub use incise_coloring as coloring;
 pub use incise_cutting as cutting;

@@ -148,7 +148,8 @@ pub(crate) fn check_descent(scene: &Scene) -> Result<(), Error> {
     Ok(())
 }
 
-fn refused(field: &str, given: impl ToString, range: &str) -> Error {
+/// An error about a value that descent does not know.
+pub(crate) fn refused(field: &str, given: impl ToString, range: &str) -> Error {
     value(
         field,
         given,

@@ -4,6 +4,7 @@
 //! advance, those of different groups of bodies in parallel; the report is made. A frame without a cut touches only the
 //! solvers.
 
+mod live;
 mod state;
 
 use std::borrow::Cow;
@@ -395,7 +396,7 @@ impl Simulation {
     }
 
     /// The boundary triangles with what each of them is: outer surface or laid bare by the stroke of a number, counted
-    /// from 0 in the order of the scene and of [`Simulation::cut`]. No pass over the mesh.
+    /// from 0 in the order of the scene, of [`Simulation::cut`] and of [`Simulation::begin_stroke`]. No pass over the mesh.
     pub fn boundary(&self) -> impl Iterator<Item = BoundaryTriangle> + '_ {
         let groups = self.groups.iter().enumerate();
         groups.flat_map(move |(g, group)| {
@@ -472,7 +473,8 @@ impl Simulation {
     }
 
     /// Recomputes everything derived and compares: the mesh, the lists around its particles, volume, masses, clusters,
-    /// colors, schedule, pieces. O(n log n); for tests and on request.
+    /// colors, schedule, pieces. O(n log n); for tests and on request. A device is sent what changes with the next step:
+    /// ask after one, not before the first or between [`Simulation::grab`] or [`Simulation::release`] and the next.
     ///
     /// # Errors
     /// [`Error::Inconsistent`] or [`Error::Cut`] name the first difference.

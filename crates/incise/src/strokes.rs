@@ -7,6 +7,8 @@ use incise_cutting::{
 
 use crate::Error;
 use crate::group::Group;
+use crate::limits::value;
+use crate::live_blade::LiveBlade;
 use crate::scene::StrokeSpec;
 use crate::tool::{Tool, tool};
 
@@ -16,7 +18,7 @@ struct Stroke {
     field: String,
     tool: Tool,
     options: CutOptions,
-    /// The frames in which it cuts first and last.
+    /// The frames in which it cuts first and last; a live one from the start on and for as long as it is held.
     frames: [u64; 2],
     /// One for each group of bodies once a blade has its first pose.
     sweeps: Vec<Sweep>,
@@ -44,8 +46,22 @@ impl Timeline {
     /// Adds a stroke, if all its values are in their ranges. Faces it lays bare are tagged with its number, counted from
     /// 0 in the order of adding.
     pub(crate) fn add(&mut self, spec: &StrokeSpec) -> Result<(), Error> {
-        let field = format!("stroke[{}]", self.added);
+        let field = self.next_field();
         let (tool, snap) = tool(&field, spec)?;
+        self.push(field, tool, snap, [spec.first_frame(), spec.last_frame()])
+    }
+
+    fn next_field(&self) -> String {
+        format!("stroke[{}]", self.added)
+    }
+
+    fn push(
+        &mut self,
+        field: String,
+        tool: Tool,
+        snap: f64,
+        frames: [u64; 2],
+    ) -> Result<(), Error> {
         let options = CutOptions {
             snap,
             tolerance: self.tolerance,
@@ -60,11 +76,48 @@ impl Timeline {
             field,
             tool,
             options,
-            frames: [spec.first_frame(), spec.last_frame()],
+            frames,
             sweeps: Vec::new(),
         });
         self.added += 1;
         Ok(())
+    }
+
+    /// Adds a stroke whose blade is moved by [`Timeline::move_blade`]; returns its number.
+    pub(crate) fn begin(&mut self, pose: &[DVec3], snap: f64) -> Result<u32, Error> {
+        let field = self.next_field();
+        let blade = LiveBlade::new(&field, pose)?;
+        let number = self.added;
+        self.push(field, Tool::Live(blade), snap, [0, u64::MAX])?;
+        Ok(number)
+    }
+
+    /// Says where the blade of a live stroke is at the start of the next frame.
+    pub(crate) fn move_blade(&mut self, stroke: u32, pose: &[DVec3]) -> Result<(), Error> {
+        let (_, field, blade) = self.live(stroke)?;
+        blade.go_to(field, pose)
+    }
+
+    /// Ends a live stroke: after the next frame if that has a pose to carry out, or else at once.
+    pub(crate) fn end(&mut self, stroke: u32) -> Result<(), Error> {
+        let (place, _, blade) = self.live(stroke)?;
+        if !blade.end() {
+            self.strokes.remove(place);
+        }
+        Ok(())
+    }
+
+    /// A live stroke that goes on: its place in the list, its name and its blade.
+    fn live(&mut self, number: u32) -> Result<(usize, &str, &mut LiveBlade), Error> {
+        let strokes = self.strokes.iter_mut().enumerate();
+        let mut live = strokes.filter_map(|(place, stroke)| match &mut stroke.tool {
+            Tool::Live(blade) if stroke.options.tag == number && !blade.is_ended() => {
+                Some((place, stroke.field.as_str(), blade))
+            }
+            _ => None,
+        });
+        let range = "the number of a stroke that was begun and has not ended";
+        live.next().ok_or_else(|| value("stroke", number, range))
     }
 
     /// Whether a stroke begins or goes on in a frame.
@@ -102,7 +155,10 @@ impl Timeline {
                 follow(g, group, &delta)?;
             }
         }
-        self.strokes.retain(|stroke| frame < stroke.frames[1]);
+        self.strokes.retain_mut(|stroke| match &mut stroke.tool {
+            Tool::Live(blade) => blade.arrive(),
+            _ => frame < stroke.frames[1],
+        });
         Ok(())
     }
 }
@@ -121,19 +177,22 @@ impl Stroke {
             return Ok(None);
         }
         let (cuttable, positions, options) = (&mut group.cuttable, &group.positions, &self.options);
+        let sweeps = &mut self.sweeps;
+        let mut sweep = |pose: &[DVec3]| match sweeps.get_mut(number) {
+            Some(sweep) => sweep.advance_joining(cuttable, positions, pose, memory),
+            None => Sweep::new(cuttable, positions, pose, *options).map(|sweep| {
+                sweeps.push(sweep);
+                CutDelta::default()
+            }),
+        };
         let cut = match &self.tool {
             Tool::Sweep { blade, path } => {
                 let elapsed = (frame.min(last) - first) as f64 / (last - first) as f64;
                 let offset = along(path, elapsed);
                 let pose: Vec<DVec3> = blade.iter().map(|x| *x + offset).collect();
-                match self.sweeps.get_mut(number) {
-                    Some(sweep) => sweep.advance_joining(cuttable, positions, &pose, memory),
-                    None => Sweep::new(cuttable, positions, &pose, *options).map(|sweep| {
-                        self.sweeps.push(sweep);
-                        CutDelta::default()
-                    }),
-                }
+                sweep(&pose)
             }
+            Tool::Live(blade) => sweep(blade.pose()),
             Tool::Surface(surface) => {
                 cut_surface_joining(cuttable, positions, surface, options, memory)
             }
@@ -145,7 +204,10 @@ impl Stroke {
             field: self.field.clone(),
             source,
         })?;
-        let joins = matches!(self.tool, Tool::Sweep { .. } | Tool::Surface(_));
+        let joins = matches!(
+            self.tool,
+            Tool::Sweep { .. } | Tool::Live(_) | Tool::Surface(_)
+        );
         if !joins && !delta.is_empty() {
             memory.follow(&group.cuttable, &delta, &self.options);
         }

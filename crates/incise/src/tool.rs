@@ -5,6 +5,7 @@ use incise_cutting::{CutError, Plane, TriangleSurface};
 
 use crate::Error;
 use crate::limits::{coordinates, direction, value};
+use crate::live_blade::LiveBlade;
 use crate::region::Solid;
 use crate::scene::{Region, StrokeSpec};
 
@@ -22,6 +23,8 @@ pub(crate) enum Tool {
         blade: Vec<DVec3>,
         path: Vec<[f64; 3]>,
     },
+    /// A polyline that somebody moves.
+    Live(LiveBlade),
 }
 
 /// The tool of a stroke and its snap distance.
@@ -90,17 +93,23 @@ pub(crate) fn tool(field: &str, spec: &StrokeSpec) -> Result<(Tool, f64), Error>
             }
             points("path", path)?;
             let (path, blade) = (path.clone(), points("blade", blade)?);
-            let length: f64 = blade.windows(2).map(|ends| ends[0].distance(ends[1])).sum();
-            if blade.len() < 2 || length == 0.0 {
-                let points = blade.len();
-                return Err(Error::Cut {
-                    field: format!("{field}.blade"),
-                    source: CutError::ShortBlade { points, length },
-                });
-            }
+            long_enough(field, &blade)?;
             (Tool::Sweep { blade, path }, *snap)
         }
     })
+}
+
+/// Refuses a blade that is a point.
+pub(crate) fn long_enough(field: &str, blade: &[DVec3]) -> Result<(), Error> {
+    let length: f64 = blade.windows(2).map(|ends| ends[0].distance(ends[1])).sum();
+    if blade.len() < 2 || length == 0.0 {
+        let points = blade.len();
+        return Err(Error::Cut {
+            field: format!("{field}.blade"),
+            source: CutError::ShortBlade { points, length },
+        });
+    }
+    Ok(())
 }
 
 fn solid(field: &str, region: &Region) -> Result<Solid, Error> {

@@ -25,12 +25,30 @@ struct Numbers {
     tets: Vec<TetId>,
 }
 
+impl Numbers {
+    /// Appends particles of the group; their numbers in the whole are the next ones, so `places` gets theirs at its end.
+    fn add_particles(
+        &mut self,
+        group: usize,
+        new: impl Iterator<Item = ParticleId>,
+        places: &mut Vec<(u32, ParticleId)>,
+    ) {
+        let group = u32::try_from(group).expect("each group has particles, numbered by 32 bits");
+        for particle in new {
+            places.push((group, ParticleId::new(self.particles.len())));
+            self.particles.push(particle);
+        }
+    }
+}
+
 /// All groups as one mesh.
 #[derive(Debug)]
 pub(crate) struct Whole {
     pub(crate) mesh: TetMesh,
     pub(crate) positions: Vec<DVec3>,
     numbers: Vec<Numbers>,
+    /// For each particle its group and its number there.
+    places: Vec<(u32, ParticleId)>,
 }
 
 impl Whole {
@@ -39,6 +57,7 @@ impl Whole {
         let mut mesh = TetMesh::default();
         let groups = islands.iter().max().map_or(0, |last| last + 1);
         let mut numbers: Vec<Numbers> = (0..groups).map(|_| Numbers::default()).collect();
+        let mut places = Vec::new();
         for (body, &island) in bodies.iter().zip(islands) {
             let first = mesh.positions.len();
             let shifted = |p: ParticleId| ParticleId::new(first + p.index());
@@ -48,7 +67,7 @@ impl Whole {
             mesh.tets.extend(tets);
             let numbers = &mut numbers[island];
             let particles = (first..mesh.positions.len()).map(ParticleId::new);
-            numbers.particles.extend(particles);
+            numbers.add_particles(island, particles, &mut places);
             let tets = (first_tet..mesh.tets.len()).map(TetId::new);
             numbers.tets.extend(tets);
         }
@@ -56,7 +75,14 @@ impl Whole {
             positions: mesh.positions.clone(),
             mesh,
             numbers,
+            places,
         }
+    }
+
+    /// The group of a particle and its number there. O(1).
+    pub(crate) fn place(&self, particle: ParticleId) -> (usize, usize) {
+        let (group, number) = self.places[particle.index()];
+        (group as usize, number.index())
     }
 
     /// Follows a cut in one group; returns what it changed in the numbers of the whole.
@@ -65,7 +91,7 @@ impl Whole {
         let (particles_before, tets_before) = (self.mesh.positions.len(), self.mesh.tets.len());
         let new = delta.particles_after() - delta.particles_before;
         let particles = (particles_before..particles_before + new).map(ParticleId::new);
-        numbers.particles.extend(particles);
+        numbers.add_particles(group, particles, &mut self.places);
         let new = delta.added.len() - delta.removed.len();
         let new = (tets_before..tets_before + new).map(TetId::new);
         numbers.tets.extend(new);
@@ -208,7 +234,7 @@ impl Whole {
         let mut particles = vec![0_u32; self.mesh.positions.len()];
         let mut tets = vec![0_u32; self.mesh.tets.len()];
         let differs = |what: &str| Err(Error::Inconsistent(format!("{what} of the whole differs")));
-        for (numbers, group) in self.numbers.iter().zip(groups) {
+        for (g, (numbers, group)) in self.numbers.iter().zip(groups).enumerate() {
             let mesh = group.cuttable.mesh();
             if (numbers.particles.len(), numbers.tets.len())
                 != (mesh.positions.len(), mesh.tets.len())
@@ -219,6 +245,7 @@ impl Whole {
                 particles[number.index()] += 1;
                 if self.mesh.positions[number.index()] != mesh.positions[p]
                     || self.positions[number.index()] != group.positions[p]
+                    || self.place(*number) != (g, p)
                 {
                     return differs("a particle");
                 }

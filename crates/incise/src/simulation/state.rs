@@ -5,6 +5,8 @@
 
 use std::time::Instant;
 
+use incise_mesh::ParticleId;
+
 use super::Simulation;
 use crate::Error;
 use crate::measure::{by_body, energy, kappa, max_speed, residual, softened, states, volume};
@@ -88,7 +90,60 @@ impl Simulation {
         self.place.note.as_deref()
     }
 
-    /// The device solvers of the scene's groups of bodies, for renderers; none on the processor.
+    /// The duration of a frame in s.
+    #[must_use]
+    pub fn time_step(&self) -> f64 {
+        self.time_step
+    }
+
+    /// The number of the frame to come, counted from 0: that of the frames that were made.
+    #[must_use]
+    pub fn next_frame(&self) -> u64 {
+        self.next_frame
+    }
+
+    /// In which group of bodies a particle of [`Simulation::mesh`] is solved, and its number there. O(1).
+    ///
+    /// Bodies that links join are a group, every other one is a group of its own; groups are numbered in the order of
+    /// their first bodies. On a device the group is the number of its solver in `Simulation::device_solvers`: a renderer
+    /// that draws the whole mesh from the buffers of the solvers looks its particles up here, once at the start and then
+    /// those that [`Simulation::deltas`] append. A particle keeps its place for good.
+    ///
+    /// # Panics
+    /// If the particle does not exist.
+    ///
+    /// # Example
+    /// ```
+    /// use incise::mesh::ParticleId;
+    /// use incise::{Scene, Simulation};
+    ///
+    /// let scene = Scene::from_toml(
+    ///     r#"
+    ///     [[body]]
+    ///     shape = { kind = "box", tets = 200 }
+    ///     [[body]]
+    ///     shape = { kind = "sphere", tets = 200 }
+    ///     position = [3.0, 0.0, 0.0]
+    ///     "#,
+    /// )?;
+    /// let simulation = Simulation::new(&scene)?;
+    /// let last = ParticleId::new(simulation.mesh().positions.len() - 1);
+    /// assert_eq!(simulation.place_of(ParticleId(0)), (0, 0));
+    /// assert_eq!(simulation.place_of(last).0, 1);
+    /// # Ok::<(), incise::Error>(())
+    /// ```
+    #[must_use]
+    pub fn place_of(&self, particle: ParticleId) -> (usize, usize) {
+        let count = self.mesh().positions.len();
+        assert!(particle.index() < count, "the mesh has {count} particles");
+        match &self.whole {
+            Some(whole) => whole.place(particle),
+            None => (0, particle.index()),
+        }
+    }
+
+    /// The device solvers of the scene's groups of bodies, for renderers; none on the processor. Which of them has a
+    /// particle: [`Simulation::place_of`].
     #[cfg(feature = "gpu")]
     pub fn device_solvers(&self) -> impl Iterator<Item = &crate::gpu::GpuSolver> + '_ {
         self.groups.iter().filter_map(|group| group.solver.device())

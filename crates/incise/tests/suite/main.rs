@@ -11,7 +11,12 @@ mod cutting;
 mod determinism;
 #[cfg(feature = "gpu")]
 mod gpu;
+#[cfg(feature = "gpu")]
+mod gpu_live;
+mod grab;
+mod hands;
 mod kappa;
+mod live;
 mod locality;
 mod methods;
 mod mistakes;

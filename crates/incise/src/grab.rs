@@ -1,0 +1,219 @@
+//! [`Hand`]: what somebody holds of a group of bodies and moves, in grabs that come and go.
+//!
+//! A grab hangs particles on a handle of the solver that only it moves, and never turns. A handle that is let go is taken
+//! by the next grab, so the solver grows with the most that are held at a time, not with how often somebody grabs.
+//!
+//! Source: handles as in `incise_xpbd::Pose`. Cost: a pass over the particles to take hold and one over what hangs on
+//! handles to let go. Where particles are held rigidly both change whose mass counts, so the next step lays out all tets
+//! anew, O(tets); with a compliance it does not. A frame costs what its handles cost.
+
+use glam::DVec3;
+use incise_mesh::ParticleId;
+use incise_xpbd::Pose;
+
+use crate::Error;
+use crate::backend::{AnySolver, each, each_mut};
+use crate::group::Group;
+
+/// Something that is held, in the simulation that gave it: see [`Simulation::grab`](crate::Simulation::grab).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Grab {
+    pub(crate) group: usize,
+    /// Its grip in the group, and which user of the grip it is.
+    slot: usize,
+    user: u64,
+}
+
+/// A handle for grabs.
+#[derive(Clone, Debug)]
+struct Grip {
+    /// Its number in the solver.
+    handle: u32,
+    /// Grabs that have let it go.
+    user: u64,
+    held: bool,
+    /// The point that was grabbed, and where it is to be at the end of the next frame.
+    point: DVec3,
+    to: DVec3,
+    /// Where the handle was when it took hold.
+    start: DVec3,
+    /// Whether `to` is news for the next frame.
+    moved: bool,
+}
+
+/// The grabs of a group.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Hand {
+    grips: Vec<Grip>,
+}
+
+impl Hand {
+    /// Whether something that is held is to move in the next frame.
+    pub(crate) fn moves(&self) -> bool {
+        self.grips.iter().any(|grip| grip.held && grip.moved)
+    }
+
+    /// Notes that a frame has been made.
+    pub(crate) fn arrive(&mut self) {
+        for grip in &mut self.grips {
+            grip.moved = false;
+        }
+    }
+
+    fn find(&mut self, grab: Grab) -> Option<&mut Grip> {
+        let grip = self.grips.get_mut(grab.slot)?;
+        (grip.held && grip.user == grab.user).then_some(grip)
+    }
+
+    /// Hangs particles on a handle that is free; returns the slot and the user.
+    fn take(
+        &mut self,
+        solver: &mut AnySolver,
+        particles: &[usize],
+        point: DVec3,
+        compliance: f64,
+    ) -> Result<(usize, u64), Error> {
+        let vacant = self.grips.iter().position(|grip| !grip.held);
+        let slot = vacant.unwrap_or(self.grips.len());
+        each_mut!(solver, solver => {
+            let known = self.grips.get(slot).map(|grip| grip.handle);
+            let handle = known.unwrap_or_else(|| solver.add_handle(Pose::at(DVec3::ZERO)));
+            let pose = solver.handle(handle);
+            // It may be on its way back.
+            solver.move_handle(handle, pose);
+            for &p in particles {
+                solver
+                    .attach(p, handle, compliance, 0.0)
+                    .map_err(|source| Error::Xpbd { field: "grab".into(), source })?;
+            }
+            let user = self.grips.get(slot).map_or(0, |grip| grip.user);
+            let grip = Grip {
+                handle,
+                user,
+                held: true,
+                point,
+                to: point,
+                start: pose.position,
+                moved: false,
+            };
+            match self.grips.get_mut(slot) {
+                Some(old) => *old = grip,
+                None => self.grips.push(grip),
+            }
+            Ok((slot, user))
+        })
+    }
+
+    /// Refuses a solver where something hangs on a handle that nobody holds.
+    pub(crate) fn check(&self, solver: &AnySolver) -> Result<(), Error> {
+        let free = |handle| {
+            let mut grips = self.grips.iter();
+            grips.any(|grip| grip.handle == handle && !grip.held)
+        };
+        let hanging = each!(solver, solver => {
+            solver.attachments().find(|attachment| free(attachment.handle))
+        });
+        hanging.map_or(Ok(()), |attachment| {
+            let p = attachment.particle;
+            let what = format!("particle {p} hangs on a handle that was let go");
+            Err(Error::Inconsistent(what))
+        })
+    }
+}
+
+impl Group {
+    /// The nearest particle to a point within a radius that can be held, and its squared distance.
+    pub(crate) fn nearest(&self, point: DVec3, radius: f64) -> Option<(f64, usize)> {
+        let near = self.holdable(point, radius);
+        // The first of those at the same distance.
+        near.min_by(|(a, _), (b, _)| a.total_cmp(b))
+    }
+
+    /// The particles within a radius around a point that can be held, with their squared distances: neither fixed nor on
+    /// a handle, and corner of a tet.
+    fn holdable(&self, point: DVec3, radius: f64) -> impl Iterator<Item = (f64, usize)> + '_ {
+        let distances = self
+            .positions
+            .iter()
+            .map(move |x| x.distance_squared(point));
+        let near = distances
+            .zip(0..)
+            .filter(move |(d, _)| *d <= radius * radius);
+        near.filter(|&(_, p)| {
+            let free = each!(&self.solver, solver => {
+                !solver.is_fixed(p) && solver.handle_of(p).is_none()
+            });
+            free && self.piece_of(p).is_some()
+        })
+    }
+
+    /// The piece of a particle, unless it has lost all its tets.
+    fn piece_of(&self, particle: usize) -> Option<u32> {
+        let mut around = self.cuttable.around(ParticleId::new(particle));
+        around.next().map(|tet| self.pieces.piece_of(tet))
+    }
+
+    /// Takes hold of what can be held within a radius around a point, of the piece of the particle `nearest`. `number` is
+    /// that of the group. Wakes it.
+    pub(crate) fn grab(
+        &mut self,
+        number: usize,
+        nearest: usize,
+        point: DVec3,
+        radius: f64,
+        compliance: f64,
+    ) -> Result<Grab, Error> {
+        let piece = self.piece_of(nearest);
+        let near = self.holdable(point, radius).map(|(_, p)| p);
+        let particles: Vec<usize> = near.filter(|&p| self.piece_of(p) == piece).collect();
+        let (slot, user) = self
+            .hand
+            .take(&mut self.solver, &particles, point, compliance)?;
+        self.wake();
+        Ok(Grab {
+            group: number,
+            slot,
+            user,
+        })
+    }
+
+    /// Says where the point of a grab is to be at the end of the next frame; tells whether there is such a grab.
+    pub(crate) fn move_grab(&mut self, grab: Grab, to: DVec3) -> bool {
+        let Some(grip) = self.hand.find(grab) else {
+            return false;
+        };
+        // What is held stays awake only while it really moves.
+        grip.moved |= grip.to != to;
+        grip.to = to;
+        let pose = Pose::at(grip.start + (to - grip.point));
+        self.solver.move_handle(grip.handle, pose);
+        true
+    }
+
+    /// Lets go of all that hangs on a grab's handle, and wakes the group; tells whether there is such a grab.
+    pub(crate) fn release(&mut self, grab: Grab) -> Result<bool, Error> {
+        let Some(grip) = self.hand.find(grab) else {
+            return Ok(false);
+        };
+        let_go(&mut self.solver, grip.handle)?;
+        grip.held = false;
+        grip.user += 1;
+        self.wake();
+        Ok(true)
+    }
+}
+
+/// Lets all go that hangs on a handle, copies that cuts made too, and sends the handle back to where it began, so that
+/// its way does not add up from grab to grab.
+fn let_go(solver: &mut AnySolver, handle: u32) -> Result<(), Error> {
+    each_mut!(solver, solver => {
+        let all = solver.attachments();
+        let held: Vec<u32> = all.filter(|a| a.handle == handle).map(|a| a.particle).collect();
+        // The list of what hangs closes up behind each of them.
+        for p in held.into_iter().rev() {
+            solver.detach(p as usize);
+        }
+        solver.move_handle(handle, Pose::at(DVec3::ZERO));
+    });
+    Ok(())
+}

@@ -1,0 +1,87 @@
+//! [`LiveBlade`]: a blade whose path is not known, as a hand or a device moves it.
+//!
+//! It tells a stroke where it is, frame by frame; the stroke cuts with it as with a blade on a path, so that both cut the
+//! same to the bit where they come by the same poses. Cost: a copy of the points.
+
+use glam::DVec3;
+use incise_cutting::CutError;
+
+use crate::Error;
+use crate::limits::coordinates;
+use crate::tool::long_enough;
+
+/// How far a blade is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Progress {
+    /// A frame has carried out its pose, or it is its first one, which does not cut.
+    Arrived,
+    /// Its pose is that of the next frame.
+    Moved,
+    /// The same, and that frame is its last.
+    Ended,
+}
+
+/// A blade in somebody's hand.
+#[derive(Clone, Debug)]
+pub(crate) struct LiveBlade {
+    pose: Vec<DVec3>,
+    progress: Progress,
+}
+
+impl LiveBlade {
+    /// In its first pose.
+    pub(crate) fn new(field: &str, pose: &[DVec3]) -> Result<Self, Error> {
+        check(field, pose)?;
+        long_enough(field, pose)?;
+        Ok(Self {
+            pose: pose.to_vec(),
+            progress: Progress::Arrived,
+        })
+    }
+
+    /// Where it is at the start of the next frame.
+    pub(crate) fn pose(&self) -> &[DVec3] {
+        &self.pose
+    }
+
+    /// Says where it is at the start of the next frame.
+    pub(crate) fn go_to(&mut self, field: &str, pose: &[DVec3]) -> Result<(), Error> {
+        let (before, now) = (self.pose.len(), pose.len());
+        if before != now {
+            return Err(Error::Cut {
+                field: format!("{field}.blade"),
+                source: CutError::BladeChanged { before, now },
+            });
+        }
+        check(field, pose)?;
+        self.pose.copy_from_slice(pose);
+        self.progress = Progress::Moved;
+        Ok(())
+    }
+
+    /// Ends its stroke; tells whether the next frame has a pose to carry out first.
+    pub(crate) fn end(&mut self) -> bool {
+        let cuts = self.progress == Progress::Moved;
+        if cuts {
+            self.progress = Progress::Ended;
+        }
+        cuts
+    }
+
+    pub(crate) fn is_ended(&self) -> bool {
+        self.progress == Progress::Ended
+    }
+
+    /// Notes that a frame has carried out its pose; tells whether it goes on.
+    pub(crate) fn arrive(&mut self) -> bool {
+        let goes_on = !self.is_ended();
+        self.progress = Progress::Arrived;
+        goes_on
+    }
+}
+
+fn check(field: &str, pose: &[DVec3]) -> Result<(), Error> {
+    let field = format!("{field}.blade");
+    pose.iter()
+        .try_for_each(|x| coordinates(&field, x.to_array()).map(drop))
+}

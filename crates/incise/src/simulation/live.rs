@@ -1,0 +1,217 @@
+//! Hands in a [`Simulation`]: blades and grabs whose future is not known, as a viewer, a haptic device or a controller
+//! moves them.
+//!
+//! What moves is told between two frames and carried out in the next one. Cost: that of cuts and of handles. On a device a
+//! frame with a live blade waits for the positions, and so do taking hold and letting go; moving a grab does not.
+
+use glam::DVec3;
+
+use super::Simulation;
+use crate::limits::{coordinates, value, within};
+use crate::method::refused;
+use crate::{Error, Grab};
+
+impl Simulation {
+    /// Begins a stroke whose blade somebody moves, and returns its number: faces that it lays bare are tagged with it, as
+    /// those of the scene's strokes are.
+    ///
+    /// `blade` is a polyline of at least two points in m: its first pose, taken at the start of the next frame, which
+    /// does not cut yet. `snap` is the snap distance as in [`StrokeSpec`](crate::scene::StrokeSpec), from 0 to 0.25 of an
+    /// edge; scenes take 0.1 by default.
+    ///
+    /// Such a stroke cuts as a sweep of the scene that comes by the same poses, to the bit. It is due in every frame
+    /// until it ends: a blade that stands still cuts a body that moves through it. Several may be held at once, more
+    /// than a tet apart where they cross.
+    ///
+    /// Cost: as [`incise_cutting::Sweep`]; on a device every frame fetches the positions while the stroke is held.
+    ///
+    /// # Errors
+    /// If the blade has fewer than two different points, if a coordinate is not finite or beyond 1e9 m, or if `snap` lies
+    /// outside its range.
+    ///
+    /// # Example
+    /// ```
+    /// use incise::mesh::glam::DVec3;
+    /// use incise::{Scene, Simulation};
+    ///
+    /// let scene = Scene::from_toml("[[body]]\nshape = { kind = \"box\", tets = 200 }")?;
+    /// let mut simulation = Simulation::new(&scene)?;
+    /// let blade = |z: f64| [DVec3::new(-1.0, 0.03, z), DVec3::new(1.0, 0.03, z)];
+    /// let stroke = simulation.begin_stroke(&blade(0.6), 0.1)?;
+    /// simulation.step()?;
+    /// for z in [0.3, 0.0, -0.3, -0.6] {
+    ///     simulation.move_blade(stroke, &blade(z))?;
+    ///     simulation.step()?;
+    /// }
+    /// simulation.end_stroke(stroke)?;
+    /// assert_eq!(simulation.report().pieces, 2);
+    /// # Ok::<(), incise::Error>(())
+    /// ```
+    pub fn begin_stroke(&mut self, blade: &[DVec3], snap: f64) -> Result<u32, Error> {
+        self.timeline.begin(blade, snap)
+    }
+
+    /// Says where the blade of a stroke is at the start of the next frame; of several calls before a frame the last one
+    /// holds. Until told again, it stays there.
+    ///
+    /// # Errors
+    /// If the stroke was not begun by [`Simulation::begin_stroke`] or has ended, if the blade has another number of
+    /// points than before, or if a coordinate is not finite or beyond 1e9 m. The blade stays where it was then.
+    pub fn move_blade(&mut self, stroke: u32, blade: &[DVec3]) -> Result<(), Error> {
+        self.timeline.move_blade(stroke, blade)
+    }
+
+    /// Ends a stroke: after the next frame if its blade was moved since the last one, so that no pose is lost, or else at
+    /// once. A stroke that no frame has seen leaves nothing. In either case it can be moved no more.
+    ///
+    /// # Errors
+    /// If the stroke was not begun by [`Simulation::begin_stroke`] or has ended.
+    pub fn end_stroke(&mut self, stroke: u32) -> Result<(), Error> {
+        self.timeline.end(stroke)
+    }
+
+    /// Takes hold of the body at a point, to move it by hand; `None` if there is nothing to hold.
+    ///
+    /// Held are the particles that lie within `radius` m of `point` now and belong to the same piece as the nearest one,
+    /// so that nothing is tied together that hangs apart. Those that are fixed or that a handle or another grab holds
+    /// stay with these; the nearest one is the nearest of the others.
+    ///
+    /// `compliance` is one over the stiffness by which each particle is held, in m/N, as in
+    /// [`HandleSpec`](crate::scene::HandleSpec): 0 holds rigidly, whatever the body does, and a large one lets the
+    /// body pull away from the hand. Descent knows 0 only.
+    ///
+    /// A body that sleeps wakes. Cuts through what is held leave both sides held.
+    ///
+    /// O(particles); with a compliance of 0 the next step costs O(tets) more. On a device the positions are fetched.
+    ///
+    /// # Errors
+    /// If a coordinate is not finite or beyond 1e9 m, `radius` or `compliance` is not from 0 to 1e9, the compliance is not
+    /// 0 with descent, or the device is lost.
+    ///
+    /// # Example
+    /// ```
+    /// use incise::mesh::glam::DVec3;
+    /// use incise::{Scene, Simulation};
+    ///
+    /// let scene = Scene::from_toml("[[body]]\nshape = { kind = \"sphere\", tets = 300 }")?;
+    /// let mut simulation = Simulation::new(&scene)?;
+    /// let top = simulation.positions().iter().copied().fold(DVec3::ZERO, |a, b| if b.z > a.z { b } else { a });
+    /// let grab = simulation.grab(top, 0.1, 0.0)?.expect("a particle is there");
+    /// for step in 1..=5 {
+    ///     simulation.move_grab(grab, top + DVec3::Z * (0.02 * f64::from(step)))?;
+    ///     simulation.step()?;
+    /// }
+    /// simulation.release(grab)?;
+    /// assert!(simulation.positions().iter().any(|x| x.z > top.z + 0.09));
+    /// assert!(simulation.grab(DVec3::splat(50.0), 0.1, 0.0)?.is_none());
+    /// # Ok::<(), incise::Error>(())
+    /// ```
+    pub fn grab(
+        &mut self,
+        point: DVec3,
+        radius: f64,
+        compliance: f64,
+    ) -> Result<Option<Grab>, Error> {
+        coordinates("grab.point", point.to_array())?;
+        within("grab.radius", radius, 0.0, 1e9)?;
+        within("grab.compliance", compliance, 0.0, 1e9)?;
+        let descends = self.groups.iter().any(|group| group.solver.descends());
+        if descends && compliance != 0.0 {
+            return Err(refused("grab.compliance", compliance, "0 where"));
+        }
+        self.read_back()?;
+        let groups = self.groups.iter().enumerate();
+        let nearest = groups.filter_map(|(g, group)| {
+            let (distance, particle) = group.nearest(point, radius)?;
+            Some((distance, g, particle))
+        });
+        let nearest = nearest.min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((_, g, particle)) = nearest else {
+            return Ok(None);
+        };
+        let grab = self.groups[g].grab(g, particle, point, radius, compliance)?;
+        Ok(Some(grab))
+    }
+
+    /// Says where the point that was grabbed is to be at the end of the next frame; of several calls before a frame the
+    /// last one holds. Until told again, it stays there.
+    ///
+    /// What is held moves there in a straight line and does not turn. The shorter the way in a frame, the better: a jump
+    /// of more than a tet may turn tets inside out for a while. O(grabs of the body), nothing waits.
+    ///
+    /// # Errors
+    /// If the grab was released, or if a coordinate is not finite or beyond 1e9 m. The hand stays where it was then.
+    pub fn move_grab(&mut self, grab: Grab, to: DVec3) -> Result<(), Error> {
+        coordinates("grab.to", to.to_array())?;
+        let group = self.groups.get_mut(grab.group);
+        match group.is_some_and(|group| group.move_grab(grab, to)) {
+            true => Ok(()),
+            false => Err(unknown(grab)),
+        }
+    }
+
+    /// Lets go; what was held keeps its velocity, that of the hand in the last frame.
+    ///
+    /// What cuts made of it is let go, too. O(what hangs on handles); after a grab with a compliance of 0 the next step
+    /// costs O(tets) more. On a device the positions are fetched.
+    ///
+    /// # Errors
+    /// If the grab was released before, or the device is lost.
+    pub fn release(&mut self, grab: Grab) -> Result<(), Error> {
+        let group = self.groups.get_mut(grab.group);
+        match group.map_or(Ok(false), |group| group.release(grab))? {
+            true => Ok(()),
+            false => Err(unknown(grab)),
+        }
+    }
+}
+
+fn unknown(grab: Grab) -> Error {
+    value("grab", format!("{grab:?}"), "one that was not released")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::each;
+    use crate::scene::Precision;
+    use crate::{Scene, Simulation};
+
+    #[test]
+    fn a_thousand_grabs_take_two_handles() {
+        let body = "[[body]]\nshape = { kind = \"box\", tets = 200 }";
+        for precision in [Precision::F32, Precision::F64] {
+            let mut scene = Scene::from_toml(body).unwrap();
+            scene.solver.precision = precision;
+            let mut simulation = Simulation::new(&scene).unwrap();
+            for number in 0..500 {
+                let last = simulation.mesh().positions.len() - 1;
+                let [one, other] = [0, last].map(|p| {
+                    let point = simulation.positions()[p];
+                    let grab = simulation.grab(point, 0.1, 1e-3 * f64::from(number % 2));
+                    grab.unwrap().expect("opposite corners are free")
+                });
+                simulation.move_grab(other, DVec3::Y).unwrap();
+                // A frame now and then, while both are held, one is, or none.
+                let step_at = |simulation: &mut Simulation, turn: i32| {
+                    if number % 50 == turn {
+                        simulation.step().unwrap();
+                    }
+                };
+                step_at(&mut simulation, 0);
+                simulation.release(one).unwrap();
+                step_at(&mut simulation, 7);
+                simulation.release(other).unwrap();
+                step_at(&mut simulation, 9);
+            }
+            let solver = &simulation.groups[0].solver;
+            let (handles, hanging) = each!(solver, solver => {
+                let ways = solver.handle_poses(1.0).map(|pose| pose.position);
+                (ways.collect::<Vec<_>>(), solver.attachments().len())
+            });
+            // Their ways do not add up.
+            assert_eq!((handles, hanging), (vec![DVec3::ZERO; 2], 0));
+            simulation.check().unwrap();
+        }
+    }
+}
