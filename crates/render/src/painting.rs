@@ -141,8 +141,8 @@ impl Painting {
         self.plan = self.topology;
     }
 
-    /// Starts anew from what the simulation is now: after a jump to another state, or another plan of the same one.
-    /// O(tets).
+    /// Starts anew from what the simulation is now: after a jump to another state, or a change of how the same one is
+    /// solved. Until the next step, positions are those that the host knows. O(tets).
     pub fn reset(&mut self, simulation: &Simulation) {
         self.skin = Skin::new(simulation.boundary());
         self.topology = revision();

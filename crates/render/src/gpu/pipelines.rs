@@ -133,11 +133,14 @@ impl Pipelines {
 pub(super) fn bind(
     gpu: &GpuContext,
     layout: &wgpu::BindGroupLayout,
-    resources: Vec<wgpu::BindingResource<'_>>,
+    resources: &[wgpu::BindingResource<'_>],
 ) -> wgpu::BindGroup {
     let entries: Vec<_> = (0..)
         .zip(resources)
-        .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
+        .map(|(binding, resource)| wgpu::BindGroupEntry {
+            binding,
+            resource: resource.clone(),
+        })
         .collect();
     gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
         label: None,

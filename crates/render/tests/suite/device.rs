@@ -95,9 +95,45 @@ fn positions_do_not_leave_the_device() {
         painting.follow(&simulation);
     }
     assert!(simulation.report().tets > simulation.mesh().tets.len() / 2);
-    let two = Scene::from_toml(TWO_BODIES).unwrap();
-    let two = Simulation::on_device(&two, gpu).unwrap();
-    assert!(renderer.needs_read_back(&two), "two solvers");
+}
+
+#[test]
+fn bodies_of_several_solvers_are_put_together_on_the_device() {
+    let Some(gpu) = gpu("bodies_of_several_solvers_are_put_together_on_the_device") else {
+        return;
+    };
+    let cuts = "[[stroke]]\nkind = \"plane\"\nframe = 1\npoint = [0.02, 0.0, 0.0]\nnormal = [1.0, 0.1, 0.0]\n";
+    let scene = Scene::from_toml(&format!("{TWO_BODIES}{cuts}")).unwrap();
+    let mut simulation = Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap();
+    assert_eq!(simulation.device_solvers().count(), 2);
+    let mut painting = Painting::new(&simulation, &scene);
+    let mut renderer = GpuRenderer::new(Arc::clone(&gpu)).unwrap();
+    assert!(!renderer.needs_read_back(&simulation));
+    let [low, high] = painting.bounds(&simulation);
+    let (camera, style) = (Camera::fit(low, high), Style::default());
+    for frame in 0..3 {
+        simulation.step().unwrap();
+        painting.follow(&simulation);
+        let before = gpu.traffic().readbacks;
+        renderer
+            .draw(&painting, &simulation, &camera, &style, SIZE)
+            .unwrap();
+        assert_eq!(gpu.traffic().readbacks, before);
+        let there = renderer
+            .picture(&painting, &simulation, &camera, &style, SIZE)
+            .unwrap();
+        simulation.read_back().unwrap();
+        let here = SoftwareRenderer::new()
+            .picture(&painting, &simulation, &camera, &style, SIZE)
+            .unwrap();
+        let difference = Difference::of(&there, &here, 24);
+        // As in `assert_alike`.
+        assert!(
+            difference.mean < 1.0 && difference.share < 0.04,
+            "{frame}: {difference:?}"
+        );
+    }
+    assert_eq!(simulation.report().pieces, 4);
 }
 
 #[test]

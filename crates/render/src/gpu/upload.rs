@@ -1,0 +1,255 @@
+//! [`Upload`]: what a device has to know to draw, sent only when it changed.
+//!
+//! The skin is sent when a cut or a jump changed it, colors when they were made anew. Positions are those of the solvers on
+//! this device or else sent each time, as are view, obstacles and planes: some hundred bytes in most scenes.
+
+use std::sync::Arc;
+
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec3, Vec3};
+use incise::Simulation;
+use incise::cutting::{FaceTag, SkinVertex};
+use incise::gpu::wgpu::{self, BufferUsages};
+use incise::gpu::{GpuContext, GpuSolver};
+
+use super::buffer::Buffer;
+use super::count;
+use crate::props::{Plane, PropCorner, Props};
+use crate::view::View;
+use crate::{Painting, RenderError, Style};
+
+/// Set in a vertex that a cut laid bare.
+const CUT: u32 = 0x8000_0000;
+
+/// `View` in `view.wgsl`.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct ViewNumbers {
+    clip: [[f32; 4]; 4],
+    right: [f32; 4],
+    up: [f32; 4],
+    forward: [f32; 4],
+    light: [f32; 4],
+    size: [f32; 2],
+    flags: u32,
+    unused: u32,
+}
+
+/// `Patch` in `plane.wgsl`, `Ground` in `impression.wgsl`.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct PlaneNumbers {
+    center: [f32; 4],
+    u: [f32; 4],
+    v: [f32; 4],
+    numbers: [f32; 4],
+}
+
+/// Buffers of what is drawn.
+#[derive(Debug)]
+pub(super) struct Upload {
+    /// The skin that was sent last, and whether its particles are numbered as the solvers on the device do.
+    skin: (u64, bool),
+    coloring: u64,
+    /// Whether there is a ground.
+    pub(super) has_ground: bool,
+    pub(super) view: Buffer<ViewNumbers>,
+    pub(super) positions: Buffer<[f32; 4]>,
+    pub(super) vertices: Buffer<[u32; 2]>,
+    pub(super) triangles: Buffer<[u32; 3]>,
+    pub(super) parts: Buffer<[f32; 4]>,
+    pub(super) sums: Buffer<[i32; 3]>,
+    pub(super) colors: Buffer<u32>,
+    pub(super) count: Buffer<[u32; 4]>,
+    pub(super) props: Buffer<PropCorner>,
+    pub(super) planes: Buffer<PlaneNumbers>,
+    pub(super) ground: Buffer<PlaneNumbers>,
+}
+
+impl Upload {
+    pub(super) fn new(gpu: &GpuContext) -> Result<Self, RenderError> {
+        let (storage, uniform) = (BufferUsages::STORAGE, BufferUsages::UNIFORM);
+        Ok(Self {
+            skin: (0, false),
+            coloring: 0,
+            has_ground: false,
+            view: Buffer::new(gpu, "view", uniform)?,
+            positions: Buffer::new(gpu, "positions to draw", storage)?,
+            vertices: Buffer::new(gpu, "skin vertices", storage)?,
+            triangles: Buffer::new(gpu, "skin triangles", storage)?,
+            parts: Buffer::new(gpu, "origins", storage)?,
+            sums: Buffer::new(gpu, "normals", storage | BufferUsages::COPY_SRC)?,
+            colors: Buffer::new(gpu, "colors", storage)?,
+            count: Buffer::new(gpu, "count of triangles", uniform)?,
+            props: Buffer::new(gpu, "obstacles", BufferUsages::VERTEX)?,
+            planes: Buffer::new(gpu, "planes", BufferUsages::VERTEX)?,
+            ground: Buffer::new(gpu, "ground", uniform)?,
+        })
+    }
+
+    /// Sends what is not there yet. `solvers` are those to draw from, none if positions are to be sent.
+    pub(super) fn send(
+        &mut self,
+        gpu: &GpuContext,
+        painting: &Painting,
+        simulation: &Simulation,
+        solvers: &[&GpuSolver],
+        style: &Style,
+        view: &View,
+    ) -> Result<(), RenderError> {
+        let skin = (painting.topology(), !solvers.is_empty());
+        if self.skin != skin {
+            self.send_skin(gpu, painting, simulation, solvers)?;
+            self.skin = skin;
+        }
+        self.send_positions(gpu, simulation, solvers, view)?;
+        let colors = painting.colors_for(style.color_by);
+        if !colors.is_empty() && self.coloring != painting.coloring() {
+            self.colors.replace(gpu, colors)?;
+            self.coloring = painting.coloring();
+        }
+        let flags = u32::from(style.wireframe)
+            | u32::from(style.smooth) << 1
+            | u32::from(!colors.is_empty()) << 2;
+        self.view.replace(gpu, &[view_numbers(view, flags)])?;
+
+        let props = Props::new(painting, simulation, view);
+        self.props.replace(gpu, &props.corners)?;
+        let planes: Vec<_> = props.planes.iter().map(plane_numbers).collect();
+        self.planes.replace(gpu, &planes)?;
+        let ground = props.planes.iter().find(|plane| plane.ground);
+        self.has_ground = ground.is_some();
+        if let Some(ground) = ground {
+            self.ground.replace(gpu, &[plane_numbers(ground)])?;
+        }
+        Ok(())
+    }
+
+    /// Sends what the skin is made of; its particles are numbered as the positions are stored.
+    fn send_skin(
+        &mut self,
+        gpu: &GpuContext,
+        painting: &Painting,
+        simulation: &Simulation,
+        solvers: &[&GpuSolver],
+    ) -> Result<(), RenderError> {
+        let skin = painting.skin();
+        // Where the particles of each solver begin.
+        let mut first = Vec::with_capacity(solvers.len());
+        let mut particles = 0;
+        for solver in solvers {
+            first.push(particles);
+            particles += count(solver.as_last_seen().particle_count());
+        }
+        let vertex = |vertex: &SkinVertex| {
+            let outer = vertex.tag == FaceTag::Outer;
+            let cut = if outer { 0 } else { CUT };
+            if solvers.is_empty() {
+                return [vertex.particle.0, cut];
+            }
+            let (part, place) = simulation.place_of(vertex.particle);
+            [first[part] + count(place), count(part) | cut]
+        };
+        let vertices: Vec<[u32; 2]> = skin.vertices().iter().map(vertex).collect();
+        self.vertices.replace(gpu, &vertices)?;
+        self.triangles.replace(gpu, skin.triangles())?;
+        self.sums.resize(gpu, vertices.len())?;
+        let triangles = count(skin.triangles().len());
+        self.count.replace(gpu, &[[triangles, 0, 0, 0]])?;
+        Ok(())
+    }
+
+    /// Says where parts are, and sends positions unless they are on the device.
+    fn send_positions(
+        &mut self,
+        gpu: &GpuContext,
+        simulation: &Simulation,
+        solvers: &[&GpuSolver],
+        view: &View,
+    ) -> Result<(), RenderError> {
+        let part = |origin: DVec3| view.relative(origin).extend(0.0).to_array();
+        if solvers.is_empty() {
+            let positions = simulation.positions();
+            // Near the bodies: far from the origin of the world single precision would not do.
+            let origin = positions.first().copied().unwrap_or_default();
+            let local = |x: &DVec3| (*x - origin).as_vec3().extend(0.0).to_array();
+            let places: Vec<[f32; 4]> = positions.iter().map(local).collect();
+            self.positions.replace(gpu, &places)?;
+            self.parts.replace(gpu, &[part(origin)])?;
+            return Ok(());
+        }
+        let origins = solvers.iter().map(|solver| solver.as_last_seen().origin());
+        let parts: Vec<_> = origins.map(part).collect();
+        self.parts.replace(gpu, &parts)?;
+        if solvers.len() > 1 {
+            let particles = solvers.iter();
+            let particles = particles.map(|solver| solver.as_last_seen().particle_count());
+            self.positions.resize(gpu, particles.sum())?;
+        }
+        Ok(())
+    }
+
+    /// Puts the positions of several solvers together; those of a single one are drawn from where they are.
+    pub(super) fn gather<'b>(
+        &'b self,
+        encoder: &mut wgpu::CommandEncoder,
+        solvers: &[&'b GpuSolver],
+    ) -> &'b wgpu::Buffer {
+        if let [only] = solvers {
+            return only.positions();
+        }
+        let mut place = 0;
+        for solver in solvers {
+            let (from, bytes) = (solver.positions(), bytes_of(solver));
+            encoder.copy_buffer_to_buffer(from, 0, self.positions.raw(), place, bytes);
+            place += bytes;
+        }
+        self.positions.raw()
+    }
+}
+
+/// The solvers of a simulation, if they are on this device and have taken their particles there.
+pub(super) fn solvers_here<'s>(
+    gpu: &Arc<GpuContext>,
+    simulation: &'s Simulation,
+) -> Vec<&'s GpuSolver> {
+    let solvers: Vec<_> = simulation.device_solvers().collect();
+    let here = |solver: &&GpuSolver| {
+        Arc::ptr_eq(solver.gpu(), gpu) && bytes_of(solver) <= solver.positions().size()
+    };
+    if solvers.iter().all(here) {
+        solvers
+    } else {
+        Vec::new()
+    }
+}
+
+/// Bytes of the positions of all its particles.
+fn bytes_of(solver: &GpuSolver) -> u64 {
+    (solver.as_last_seen().particle_count() * size_of::<[f32; 4]>()) as u64
+}
+
+fn view_numbers(view: &View, flags: u32) -> ViewNumbers {
+    let with = |v: Vec3, w: f32| v.extend(w).to_array();
+    ViewNumbers {
+        clip: view.clip.to_cols_array_2d(),
+        right: with(view.right, view.tangents[0]),
+        up: with(view.up, view.tangents[1]),
+        forward: with(view.forward, 0.0),
+        light: with(view.light, 0.0),
+        size: view.size.map(|side| side as f32),
+        flags,
+        unused: 0,
+    }
+}
+
+fn plane_numbers(plane: &Plane) -> PlaneNumbers {
+    let with = |v: Vec3, w: f32| v.extend(w).to_array();
+    let ground = if plane.ground { 1.0 } else { 0.0 };
+    PlaneNumbers {
+        center: with(plane.center, plane.radius),
+        u: with(plane.u, plane.offsets[0]),
+        v: with(plane.v, plane.offsets[1]),
+        numbers: [plane.spacing, plane.opacity, ground, 0.0],
+    }
+}
