@@ -28,11 +28,26 @@ pub(crate) enum AnySolver {
 }
 
 /// A solver and what its method needs beside it.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Backend<R: Real> {
     pub(crate) solver: Solver<R>,
     /// In a scene that is solved by descent.
     descent: Option<Descent<R>>,
+}
+
+/// A copy is on the processor: of a solver on a device, with the state that was last read back.
+impl Clone for AnySolver {
+    fn clone(&self) -> Self {
+        match self {
+            Self::Single(backend) => Self::Single(backend.clone()),
+            Self::Double(backend) => Self::Double(backend.clone()),
+            #[cfg(feature = "gpu")]
+            Self::Device(device) => Self::Single(Backend {
+                solver: device.solver.as_last_seen().clone(),
+                descent: None,
+            }),
+        }
+    }
 }
 
 /// How far the last substep is from a solution of its equations; XPBD knows more than that.
@@ -122,12 +137,7 @@ impl AnySolver {
     pub(crate) fn prepare(&mut self, spec: &SolverSpec, place: &Place) -> Result<(), Error> {
         #[cfg(feature = "gpu")]
         if let Some(gpu) = &place.gpu {
-            // Any other one will do: it is replaced at once.
-            let single = std::mem::replace(self, Self::Double(Backend::new(&[])));
-            if let Self::Single(Backend { solver, .. }) = single {
-                *self = Self::Device(Box::new(Device::new(gpu, solver, spec)?));
-            }
-            return Ok(());
+            return self.take_to(gpu, spec);
         }
         debug_assert!(!place.is_device(), "a device was prepared");
         match self {
@@ -136,6 +146,21 @@ impl AnySolver {
             #[cfg(feature = "gpu")]
             Self::Device(_) => Ok(()),
         }
+    }
+
+    /// Takes a solver in single precision to a device.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn take_to(
+        &mut self,
+        gpu: &std::sync::Arc<incise_gpu::GpuContext>,
+        spec: &SolverSpec,
+    ) -> Result<(), Error> {
+        // Any other one will do: it is replaced at once.
+        let single = std::mem::replace(self, Self::Double(Backend::new(&[])));
+        if let Self::Single(Backend { solver, .. }) = single {
+            *self = Self::Device(Box::new(Device::new(gpu, solver, spec)?));
+        }
+        Ok(())
     }
 
     /// Advances by one frame, keeping what [`AnySolver::last_substep`] needs if told to.

@@ -18,7 +18,7 @@ use crate::{Error, method};
 const AGGREGATES: usize = 50;
 
 /// The state of descent beside that of the solver.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Descent<R: Real> {
     stars: Stars<R>,
     /// Where corrections are asked for.

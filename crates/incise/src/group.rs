@@ -24,8 +24,8 @@ use crate::substeps::Choice;
 use crate::volume::Volumes;
 use crate::{Error, Scene, collider, link};
 
-/// Bodies that are solved together.
-#[derive(Debug)]
+/// Bodies that are solved together. A copy has the state as it is known here, and its solver on the processor.
+#[derive(Clone, Debug)]
 pub(crate) struct Group {
     /// The numbers of its bodies in the scene, ascending.
     pub(crate) bodies: Vec<usize>,
@@ -52,7 +52,7 @@ pub(crate) struct Group {
     /// Whether it sleeps, in a scene where bodies may.
     pub(crate) rest: Option<Rest>,
     /// What renews the plan, in a scene where plans are renewed.
-    recluster: Option<Recluster>,
+    pub(crate) recluster: Option<Recluster>,
 }
 
 /// What cuts did to kappa.

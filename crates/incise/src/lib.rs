@@ -65,7 +65,7 @@ pub use incise_mesh as mesh;
 pub use incise_xpbd as xpbd;
 pub use report::FrameReport;
 pub use scene::Scene;
-pub use simulation::Simulation;
+pub use simulation::{Simulation, Snapshot};
 
 /// The example of the README, run as a test.
 #[cfg(doctest)]

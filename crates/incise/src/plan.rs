@@ -19,7 +19,7 @@ use crate::{Error, Scene};
 const SLACK: usize = 4;
 
 /// Who is solved when.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Plan {
     pub(crate) clustering: Clustering,
     recoloring: Recoloring,
@@ -51,6 +51,13 @@ struct Lists {
     /// Tets whose clusters may be small.
     seeds: Vec<u32>,
     merging: MergeLists,
+}
+
+/// What they hold is of no use after the cut, and copies begin without.
+impl Clone for Lists {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
 }
 
 impl Recipe {

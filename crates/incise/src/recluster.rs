@@ -66,14 +66,32 @@ pub(crate) struct Recluster {
     pending: Option<Pending>,
 }
 
+/// A copy has no thread: a plan in the making is left out, unless [`Recluster::settle`] was called.
+impl Clone for Recluster {
+    fn clone(&self) -> Self {
+        Self {
+            spec: self.spec,
+            fresh: self.fresh,
+            pending: self.pending.as_ref().and_then(Pending::copy),
+        }
+    }
+}
+
 /// A plan in the making.
 #[derive(Debug)]
 struct Pending {
     /// The frame that takes it.
     due: u64,
-    thread: JoinHandle<Result<Plan, Error>>,
+    making: Making,
     /// The cuts since.
     deltas: Vec<CutDelta>,
+}
+
+/// A plan, or who makes it.
+#[derive(Debug)]
+enum Making {
+    Thread(JoinHandle<Result<Plan, Error>>),
+    Made(Box<Plan>),
 }
 
 impl Recluster {
@@ -111,6 +129,18 @@ impl Recluster {
         Ok(true)
     }
 
+    /// Waits for a plan in the making, so that a copy has it, too. It is taken in the same frame as it would be.
+    pub(crate) fn settle(&mut self) -> Result<(), Error> {
+        let Some(pending) = self.pending.take() else {
+            return Ok(());
+        };
+        self.pending = Some(Pending {
+            making: Making::Made(Box::new(pending.making.plan()?)),
+            ..pending
+        });
+        Ok(())
+    }
+
     fn wear(&self, plan: &Plan) -> f64 {
         let ([colors, size], now) = (self.fresh, plan.measures());
         (now[0] / colors).max(size / now[1])
@@ -133,17 +163,37 @@ impl Pending {
             .map_err(|error| refused(error.to_string()))?;
         Ok(Self {
             due,
-            thread,
+            making: Making::Thread(thread),
             deltas: Vec::new(),
         })
     }
 
+    fn copy(&self) -> Option<Self> {
+        match &self.making {
+            Making::Thread(_) => None,
+            Making::Made(plan) => Some(Self {
+                due: self.due,
+                making: Making::Made(plan.clone()),
+                deltas: self.deltas.clone(),
+            }),
+        }
+    }
+
     /// Waits for the plan and lets it follow what has been cut meanwhile.
     fn finish(self, cuttable: &CuttableMesh) -> Result<Plan, Error> {
-        let plan = self.thread.join();
-        let mut plan =
-            plan.map_err(|_| Error::Inconsistent("clustering in the background failed".into()))??;
+        let mut plan = self.making.plan()?;
         plan.catch_up(&self.deltas, cuttable)?;
         Ok(plan)
+    }
+}
+
+impl Making {
+    /// The plan; waits for it.
+    fn plan(self) -> Result<Plan, Error> {
+        let failed = |_| Error::Inconsistent("clustering in the background failed".into());
+        match self {
+            Self::Thread(thread) => thread.join().map_err(failed)?,
+            Self::Made(plan) => Ok(*plan),
+        }
     }
 }

@@ -4,9 +4,11 @@
 //! advance, those of different groups of bodies in parallel; the report is made. A frame without a cut touches only the
 //! solvers.
 
+mod snapshot;
 mod state;
 
 use std::borrow::Cow;
+use std::sync::Arc;
 use std::time::Instant;
 
 use glam::DVec3;
@@ -28,10 +30,12 @@ use crate::place::Place;
 use crate::report::{
     CutReport, DetachedReport, FrameReport, Milliseconds, PieceReport, SoftenedReport, milliseconds,
 };
-use crate::scene::{Precision, Quantity, StrokeSpec};
+use crate::scene::{Precision, Quantity, SolverSpec, StrokeSpec};
 use crate::strokes::Timeline;
 use crate::whole::Whole;
 use crate::{Error, Scene, link};
+
+pub use snapshot::Snapshot;
 
 /// A scene in motion.
 ///
@@ -62,8 +66,14 @@ use crate::{Error, Scene, link};
 /// ```
 #[derive(Debug)]
 pub struct Simulation {
+    /// As it was set up.
+    scene: Arc<Scene>,
+    /// How it is computed now.
+    solver: SolverSpec,
     /// In s.
     time_step: f64,
+    /// The frame since which time steps have been as long, and the simulated time in s at its start.
+    epoch: (u64, f64),
     gravity: Option<DVec3>,
     quantities: Vec<Quantity>,
     every: u64,
@@ -120,7 +130,9 @@ impl Simulation {
         gpu: std::sync::Arc<crate::gpu::GpuContext>,
     ) -> Result<Self, Error> {
         crate::place::check(scene)?;
-        Self::build(scene, Place::on(gpu), None)
+        let mut simulation = Self::build(scene, Place::on(gpu), None)?;
+        simulation.solver.backend = crate::scene::Backend::Gpu;
+        Ok(simulation)
     }
 
     fn build(scene: &Scene, place: Place, pool: Option<ThreadPool>) -> Result<Self, Error> {
@@ -153,7 +165,10 @@ impl Simulation {
             None => make_groups(),
         }?;
         let mut simulation = Self {
+            scene: Arc::new(scene.clone()),
+            solver: scene.solver.clone(),
             time_step: settings.time_step,
+            epoch: (0, 0.0),
             gravity: settings.gravity,
             quantities: scene.report.quantities.clone(),
             every: scene.report.every,
@@ -252,7 +267,7 @@ impl Simulation {
         }
         self.report = FrameReport {
             frame: self.next_frame,
-            time_s: (self.next_frame + 1) as f64 * self.time_step,
+            time_s: self.time_at(self.next_frame + 1),
             cut,
             detached,
             repaired,
@@ -332,24 +347,6 @@ impl Simulation {
         let others = ms.cluster + ms.color + ms.schedule + ms.upload + measuring;
         ms.cut = milliseconds(start.elapsed()) - others;
         Ok(report)
-    }
-
-    /// Fills in the counts.
-    fn count(&mut self) {
-        let mesh = self.mesh();
-        let (particles, tets) = (mesh.positions.len(), mesh.tets.len());
-        let plans = || self.groups.iter().map(|group| &group.plan);
-        let clusters = plans().map(|plan| plan.clustering.occupied()).sum();
-        let colors = plans().map(|plan| plan.schedule.color_count());
-        let colors = colors.max().unwrap_or(0);
-        let report = &mut self.report;
-        report.particles = particles;
-        report.tets = tets;
-        report.clusters = clusters;
-        report.colors = colors;
-        report.pieces = self.groups.iter().map(|group| group.pieces.count()).sum();
-        report.backend = self.place.name();
-        report.precision = self.precision.name();
     }
 
     /// The report on the last frame; before the first, only its counts and the chosen substeps mean something.

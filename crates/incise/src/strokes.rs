@@ -11,7 +11,7 @@ use crate::scene::StrokeSpec;
 use crate::tool::{Tool, tool};
 
 /// A stroke and how far it is.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Stroke {
     field: String,
     tool: Tool,
@@ -23,7 +23,7 @@ struct Stroke {
 }
 
 /// The strokes that are not finished.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Timeline {
     strokes: Vec<Stroke>,
     added: u32,

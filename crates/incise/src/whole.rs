@@ -19,14 +19,14 @@ use crate::body::Body;
 use crate::group::Group;
 
 /// The numbers in the whole of a group's particles and tets.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct Numbers {
     particles: Vec<ParticleId>,
     tets: Vec<TetId>,
 }
 
 /// All groups as one mesh.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Whole {
     pub(crate) mesh: TetMesh,
     pub(crate) positions: Vec<DVec3>,

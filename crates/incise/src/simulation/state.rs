@@ -52,6 +52,30 @@ impl Simulation {
         Ok(())
     }
 
+    /// Fills in the counts.
+    pub(super) fn count(&mut self) {
+        let mesh = self.mesh();
+        let (particles, tets) = (mesh.positions.len(), mesh.tets.len());
+        let plans = || self.groups.iter().map(|group| &group.plan);
+        let clusters = plans().map(|plan| plan.clustering.occupied()).sum();
+        let colors = plans().map(|plan| plan.schedule.color_count());
+        let colors = colors.max().unwrap_or(0);
+        let report = &mut self.report;
+        report.particles = particles;
+        report.tets = tets;
+        report.clusters = clusters;
+        report.colors = colors;
+        report.pieces = self.groups.iter().map(|group| group.pieces.count()).sum();
+        report.backend = self.place.name();
+        report.precision = self.precision.name();
+    }
+
+    /// The simulated time in s at the start of a frame.
+    pub(super) fn time_at(&self, frame: u64) -> f64 {
+        let (first, start) = self.epoch;
+        start + (frame - first) as f64 * self.time_step
+    }
+
     /// Takes over state and positions; returns how many particles a device had to put back since the last time.
     pub(super) fn fetch(&mut self, ms: &mut Milliseconds) -> Result<usize, Error> {
         let start = Instant::now();

@@ -24,6 +24,7 @@ mod regions;
 mod reports;
 mod scenarios;
 mod sleep;
+mod snapshot;
 mod strokes;
 mod substeps;
 mod support;
