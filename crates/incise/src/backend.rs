@@ -370,6 +370,16 @@ impl AnySolver {
         }
     }
 
+    /// Bytes of a copy.
+    pub(crate) fn bytes(&self) -> usize {
+        match self {
+            Self::Single(backend) => backend.bytes(),
+            Self::Double(backend) => backend.bytes(),
+            #[cfg(feature = "gpu")]
+            Self::Device(device) => device.solver.as_last_seen().bytes(),
+        }
+    }
+
     pub(crate) fn positions(&self, out: &mut Vec<DVec3>) {
         each!(self, solver => solver.positions(out));
     }
@@ -424,6 +434,10 @@ impl<R: Real> Backend<R> {
                 .residuals(substep_time)
                 .map(LastSubstep::Constraints),
         }
+    }
+
+    fn bytes(&self) -> usize {
+        self.solver.bytes() + self.descent.as_ref().map_or(0, Descent::bytes)
     }
 
     fn lay_out(&mut self, schedule: &Schedule) {

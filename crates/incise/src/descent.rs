@@ -39,6 +39,11 @@ impl<R: Real> Descent<R> {
         })
     }
 
+    /// Bytes of all arrays.
+    pub(crate) fn bytes(&self) -> usize {
+        self.stars.bytes() + self.correction.as_ref().map_or(0, Correction::bytes)
+    }
+
     /// Follows a cut, after the solver has.
     pub(crate) fn follow(
         &mut self,

@@ -141,6 +141,11 @@ impl Recluster {
         Ok(())
     }
 
+    /// Whether a plan is in the making.
+    pub(crate) fn is_pending(&self) -> bool {
+        self.pending.is_some()
+    }
+
     fn wear(&self, plan: &Plan) -> f64 {
         let ([colors, size], now) = (self.fresh, plan.measures());
         (now[0] / colors).max(size / now[1])

@@ -67,6 +67,20 @@ impl Timeline {
         Ok(())
     }
 
+    /// About the bytes of what its strokes know of so many particles, of which some are on a cut.
+    pub(crate) fn bytes(&self, particles: usize, on_cut: usize) -> usize {
+        // Where a blade met them last, and in which tiles they are.
+        const UNDER_WAY: usize = 70;
+        // What earlier strokes know of them, in a table that is mostly half full.
+        const REMEMBERED: usize = 250;
+        let under_way = self
+            .strokes
+            .iter()
+            .filter(|stroke| !stroke.sweeps.is_empty());
+        let remembered = if self.memories.is_empty() { 0 } else { on_cut };
+        UNDER_WAY * particles * under_way.count() + REMEMBERED * remembered
+    }
+
     /// Whether a stroke begins or goes on in a frame.
     pub(crate) fn is_due(&self, frame: u64) -> bool {
         self.strokes.iter().any(|stroke| stroke.frames[0] <= frame)

@@ -165,6 +165,15 @@ impl Whole {
         whole.moved.sort_unstable_by_key(|moved| moved.to);
     }
 
+    /// Bytes of all arrays.
+    pub(crate) fn bytes(&self) -> usize {
+        let of = |numbers: &Numbers| size_of_val(&*numbers.particles) + size_of_val(&*numbers.tets);
+        size_of_val(&*self.mesh.positions)
+            + size_of_val(&*self.mesh.tets)
+            + size_of_val(&*self.positions)
+            + self.numbers.iter().map(of).sum::<usize>()
+    }
+
     /// The number of a group's particle.
     #[cfg(feature = "advise")]
     pub(crate) fn particle(&self, group: usize, particle: usize) -> usize {

@@ -216,3 +216,45 @@ fn reports_change_from_the_next_frame_on() {
     assert!(!reported(&mut simulation));
     assert!(reported(&mut simulation));
 }
+
+/// Against what an allocator counts.
+#[test]
+fn the_bytes_are_about_those_that_are_asked_for() {
+    let of = |name: &str| {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures");
+        Scene::load(&folder.join(format!("{name}.toml"))).unwrap()
+    };
+    let with = |mut scene: Scene, change: &dyn Fn(&mut incise::scene::SolverSpec)| {
+        change(&mut scene.solver);
+        scene
+    };
+    let doubled = |name| with(of(name), &|solver| solver.precision = Precision::F64);
+    for (scene, frames) in [
+        (of("beam"), 1),
+        (of("crossing"), 2),
+        (of("crossing"), 12),
+        (of("crossing"), 45),
+        (doubled("crossing"), 45),
+        (of("two_bodies"), 2),
+        (doubled("two_bodies"), 6),
+        (of("handles"), 70),
+        (doubled("links"), 1),
+        (two_bodies("method = \"descent\"\nsubsteps = 1"), 2),
+        (
+            two_bodies("method = \"descent\"\nsubsteps = 1\ncoarse = true\nprecision = \"f64\""),
+            2,
+        ),
+        (two_bodies("recluster = { wear = 1.01, frames = 9 }"), 6),
+    ] {
+        let mut simulation = simulation(&scene);
+        (0..frames).for_each(|_| assert!(simulation.step().is_ok()));
+        let mut snapshot = None;
+        let asked = allocation_counter::measure(|| snapshot = Some(simulation.snapshot().unwrap()));
+        let ratio = snapshot.unwrap().bytes() as f64 / asked.bytes_current as f64;
+        // Strokes' memories and small clusters are not known better.
+        assert!(
+            (0.8..1.2).contains(&ratio),
+            "{ratio} times what is asked for"
+        );
+    }
+}
