@@ -244,17 +244,57 @@ impl AnySolver {
         }
     }
 
-    /// Softens every tet, present and to come, that exceeds the limit. O(tets).
-    pub(crate) fn limit_kappa(&mut self, limit: KappaLimit, mesh: &TetMesh) -> Result<(), Error> {
+    /// Softens every tet, present and to come, that exceeds the limit, and no other one: those that were softened to an
+    /// earlier limit are made anew from their rest shapes. O(tets), but O(1) from a limit to the same.
+    pub(crate) fn limit_kappa(
+        &mut self,
+        before: Option<KappaLimit>,
+        limit: Option<KappaLimit>,
+        mesh: &TetMesh,
+    ) -> Result<(), Error> {
+        if before == limit {
+            return Ok(());
+        }
         each_mut!(self, solver => {
-            solver.limit_kappa(Some(limit));
+            solver.limit_kappa(limit);
             for t in 0..solver.tet_count() {
-                if solver.kappa_of(t, limit.substep_time) > limit.kappa {
+                if exceeds(solver, t, before) || exceeds(solver, t, limit) {
                     solver.replace_tet(t, solver.tet_particles(t), mesh.corners(TetId::new(t)));
                 }
             }
         });
         Ok(())
+    }
+
+    /// Whether a limit softens a tet. O(tets).
+    pub(crate) fn exceeds(&self, limit: Option<KappaLimit>) -> bool {
+        limit.is_some()
+            && each!(self, solver => (0..solver.tet_count()).any(|t| exceeds(solver, t, limit)))
+    }
+
+    /// Whether it is where it should be, in the form that settings ask for there.
+    pub(crate) fn is_at(&self, place: &Place, spec: &SolverSpec) -> Result<bool, Error> {
+        #[cfg(feature = "gpu")]
+        return match (self, &place.gpu) {
+            (Self::Device(device), Some(gpu)) => device.serves(gpu, spec),
+            (Self::Device(_), None) | (_, Some(_)) => Ok(false),
+            (_, None) => Ok(true),
+        };
+        #[cfg(not(feature = "gpu"))]
+        {
+            let _ = spec;
+            Ok(!place.is_device())
+        }
+    }
+
+    /// Lets go of what only descent needs.
+    pub(crate) fn end_descent(&mut self) {
+        match self {
+            Self::Single(backend) => backend.descent = None,
+            Self::Double(backend) => backend.descent = None,
+            #[cfg(feature = "gpu")]
+            Self::Device(_) => {}
+        }
     }
 
     /// Follows a cut. Costs what the cut touched; descent sorts its stars anew, O(tets).
@@ -452,6 +492,11 @@ impl<R: Real> Backend<R> {
             .as_mut()
             .map_or(Ok(()), |descent| descent.follow(solver, ms))
     }
+}
+
+/// Whether a tet is too stiff for a limit.
+fn exceeds<R: Real>(solver: &Solver<R>, tet: usize, limit: Option<KappaLimit>) -> bool {
+    limit.is_some_and(|limit| solver.kappa_of(tet, limit.substep_time) > limit.kappa)
 }
 
 /// A quarter of the mass of each tet around a particle, summed in the order of the tets, which `star` has afterwards.

@@ -61,8 +61,6 @@ impl ReclusterSpec {
 #[derive(Debug)]
 pub(crate) struct Recluster {
     spec: ReclusterSpec,
-    /// Colors and mean cluster size of the last whole plan.
-    fresh: [f64; 2],
     pending: Option<Pending>,
 }
 
@@ -71,7 +69,6 @@ impl Clone for Recluster {
     fn clone(&self) -> Self {
         Self {
             spec: self.spec,
-            fresh: self.fresh,
             pending: self.pending.as_ref().and_then(Pending::copy),
         }
     }
@@ -95,12 +92,16 @@ enum Making {
 }
 
 impl Recluster {
-    pub(crate) fn new(spec: ReclusterSpec, plan: &Plan) -> Self {
+    pub(crate) fn new(spec: ReclusterSpec) -> Self {
         Self {
             spec,
-            fresh: plan.measures(),
             pending: None,
         }
+    }
+
+    /// The same under another spec; what is in the making is taken when it would have been.
+    pub(crate) fn with(self, spec: ReclusterSpec) -> Self {
+        Self { spec, ..self }
     }
 
     /// Notes a cut for the plan in the making.
@@ -117,7 +118,7 @@ impl Recluster {
         plan: &mut Plan,
         cuttable: &CuttableMesh,
     ) -> Result<bool, Error> {
-        if self.pending.is_none() && self.wear(plan) >= self.spec.wear {
+        if self.pending.is_none() && plan.wear() >= self.spec.wear {
             let due = frame + u64::from(self.spec.frames.get());
             self.pending = Some(Pending::start(due, plan.recipe(), cuttable)?);
         }
@@ -125,7 +126,6 @@ impl Recluster {
             return Ok(false);
         };
         *plan = pending.finish(cuttable)?;
-        self.fresh = plan.measures();
         Ok(true)
     }
 
@@ -144,11 +144,6 @@ impl Recluster {
     /// Whether a plan is in the making.
     pub(crate) fn is_pending(&self) -> bool {
         self.pending.is_some()
-    }
-
-    fn wear(&self, plan: &Plan) -> f64 {
-        let ([colors, size], now) = (self.fresh, plan.measures());
-        (now[0] / colors).max(size / now[1])
     }
 }
 

@@ -4,6 +4,7 @@
 //! advance, those of different groups of bodies in parallel; the report is made. A frame without a cut touches only the
 //! solvers.
 
+mod retune;
 mod snapshot;
 mod state;
 
@@ -23,10 +24,10 @@ use crate::group::Group;
 use crate::islands::islands;
 use crate::joined::Joined;
 use crate::limits::{self, value};
-use crate::measure::{by_body, kappa, softened};
+use crate::measure::{kappa, softened};
 use crate::method::settings;
 use crate::pieces::PieceNumbers;
-use crate::place::Place;
+use crate::place::{AtHand, Place};
 use crate::report::{
     CutReport, DetachedReport, FrameReport, Milliseconds, PieceReport, SoftenedReport, milliseconds,
 };
@@ -79,6 +80,8 @@ pub struct Simulation {
     every: u64,
     precision: Precision,
     place: Place,
+    /// To go to when one is asked for.
+    at_hand: AtHand,
     /// In the order of their first bodies.
     groups: Vec<Group>,
     /// All groups together, if there are several.
@@ -100,7 +103,7 @@ impl Simulation {
     /// # Errors
     /// If a value of the scene lies outside its range or a mesh cannot be read or is broken.
     pub fn new(scene: &Scene) -> Result<Self, Error> {
-        Self::build(scene, Place::choose(scene)?, None)
+        Self::build(scene, Place::choose(scene, None)?, None)
     }
 
     /// The same on a number of threads of its own. The result is the same to the bit for any number.
@@ -116,7 +119,7 @@ impl Simulation {
             threads,
             message: error.to_string(),
         })?;
-        Self::build(scene, Place::choose(scene)?, Some(pool))
+        Self::build(scene, Place::choose(scene, None)?, Some(pool))
     }
 
     /// Sets a scene up on a device that is open, whatever its `solver.backend` says: a renderer's, that of another
@@ -174,6 +177,7 @@ impl Simulation {
             every: scene.report.every,
             precision,
             place,
+            at_hand: None,
             on_cut: Vec::new(),
             deltas: Vec::new(),
             pieces: PieceNumbers::new(&groups),
@@ -185,10 +189,7 @@ impl Simulation {
             pool,
         };
         simulation.collect_positions();
-        simulation.count();
-        if simulation.chooses() {
-            simulation.report.bodies = by_body(&mut simulation.groups, false);
-        }
+        simulation.report_before_the_first();
         Ok(simulation)
     }
 

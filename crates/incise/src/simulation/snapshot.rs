@@ -131,6 +131,8 @@ impl Simulation {
             quantities,
             every,
             place,
+            // Of the simulation, whatever the moment.
+            at_hand: _,
             groups,
             whole,
             pieces,
@@ -163,8 +165,9 @@ impl Simulation {
     /// Comes back to a moment: what follows is to the bit what would have followed then, on a device on the same device
     /// and driver. The snapshot can be used again.
     ///
-    /// Everything goes back: also the settings of [`Simulation::set_report`] and the number of the
-    /// next frame, strokes added since are gone, and who computes is who computed then. [`Simulation::deltas`] is empty:
+    /// Everything goes back: also what [`Simulation::retune`] and [`Simulation::set_report`] have set and the number of the
+    /// next frame, strokes added since are gone, and who computes is who computed then. Whoever wants to keep the present
+    /// settings of the solver hands a copy of [`Simulation::solver_spec`] to `retune` afterwards. [`Simulation::deltas`] is empty:
     /// renderers and recorders begin anew from [`Simulation::boundary`]. O(particles + tets).
     ///
     /// # Errors
@@ -205,6 +208,7 @@ impl Simulation {
         self.epoch = *epoch;
         self.quantities.clone_from(quantities);
         self.every = *every;
+        self.leave_device();
         self.place = place.clone();
         self.groups = groups;
         self.whole.clone_from(whole);

@@ -8,7 +8,7 @@ use std::time::Instant;
 use super::Simulation;
 use crate::Error;
 use crate::measure::{by_body, energy, kappa, max_speed, residual, softened, states, volume};
-use crate::report::{Milliseconds, milliseconds};
+use crate::report::{FrameReport, Milliseconds, milliseconds};
 use crate::scene::Quantity;
 
 impl Simulation {
@@ -50,6 +50,15 @@ impl Simulation {
             }
         }
         Ok(())
+    }
+
+    /// Makes the report what it is before the first frame.
+    pub(super) fn report_before_the_first(&mut self) {
+        self.report = FrameReport::default();
+        self.count();
+        if self.chooses() {
+            self.report.bodies = by_body(&mut self.groups, false);
+        }
     }
 
     /// Fills in the counts.

@@ -22,6 +22,7 @@ mod preset;
 mod recluster;
 mod regions;
 mod reports;
+mod retune;
 mod scenarios;
 mod sleep;
 mod snapshot;

@@ -1,0 +1,520 @@
+//! Knobs turned on a simulation that runs: as if it had been set up so, and nothing else changes.
+
+use incise::scene::{
+    Form, Method, Precision, Quantity, ReclusterSpec, SleepSpec, SolverSpec, Substeps,
+};
+use incise::{Error, Scene, Simulation};
+use proptest::prelude::*;
+
+use crate::snapshot::{everything, halving};
+use crate::support::{body, plane, scene, simulation, sweep};
+
+/// A beam that is held and swept, and a box; both can be cut.
+fn two_bodies() -> Scene {
+    let beam = body("beam", 300, [0.0, 0.0, 0.0]);
+    let cube = body("box", 200, [0.0, 2.0, 0.0]);
+    let sweep = sweep(
+        [1, 4],
+        [[0.05, -1.0, 0.4], [0.1, 3.0, 0.4]],
+        [0.0, 0.0, -0.8],
+    );
+    let plane = plane(3, [-0.1, 0.0, 0.0], [1.0, 0.2, 0.0]);
+    scene(&format!(
+        "[world]\ngravity = [0.0, 0.0, -9.81]\nground = {{ height = -0.6, friction = 0.4 }}\n\
+         {beam}fixed = [{{ half_space = {{ point = [-0.45, 0.0, 0.0], normal = [-1.0, 0.0, 0.0] }} }}]\n\
+         {cube}{sweep}{plane}\n\
+         [[collider]]\nkind = \"sphere\"\ncenter = [0.2, 0.0, 0.5]\nradius = 0.1\nvelocity = [0.0, 0.0, -1.0]\n\
+         [[handle]]\nbody = 0\nholds = [{{ half_space = {{ point = [0.45, 0.0, 0.0], normal = [1.0, 0.0, 0.0] }} }}]\n\
+         frames = [0, 6]\npath = [[0.0, 0.0, 0.0], [0.05, 0.0, 0.0]]"
+    ))
+}
+
+/// Settings that differ from the defaults, each in something else, by name.
+pub(crate) fn settings() -> Vec<(&'static str, SolverSpec)> {
+    let of = SolverSpec::of;
+    let plain = SolverSpec::default;
+    vec![
+        ("nothing", plain()),
+        (
+            "iterations",
+            SolverSpec {
+                iterations: 3,
+                relaxation: 0.9,
+                form: Form::Sequential,
+                ..plain()
+            },
+        ),
+        ("jacobi", of(Method::Jacobi)),
+        ("chebyshev", of(Method::Chebyshev)),
+        ("descent", of(Method::Descent)),
+        (
+            "corrected descent with a limit",
+            SolverSpec {
+                substeps: 1.into(),
+                iterations: 3,
+                coarse: true,
+                kappa_limit: 0.05,
+                ..of(Method::Descent)
+            },
+        ),
+        (
+            "substeps",
+            SolverSpec {
+                substeps: 2.into(),
+                ..plain()
+            },
+        ),
+        (
+            "auto",
+            SolverSpec {
+                substeps: Substeps::Auto,
+                max_substeps: 7,
+                ..plain()
+            },
+        ),
+        (
+            "time step",
+            SolverSpec {
+                time_step: 0.008,
+                ..plain()
+            },
+        ),
+        (
+            "low limit",
+            SolverSpec {
+                kappa_limit: 0.02,
+                ..plain()
+            },
+        ),
+        (
+            "no limit",
+            SolverSpec {
+                kappa_limit: f64::INFINITY,
+                ..plain()
+            },
+        ),
+        (
+            "clusters",
+            SolverSpec {
+                clustering: "none".into(),
+                coloring: "scgc".into(),
+                ..plain()
+            },
+        ),
+        (
+            "wear",
+            SolverSpec {
+                merge_clusters: false,
+                recluster: Some(ReclusterSpec {
+                    wear: 1.01,
+                    frames: std::num::NonZeroU32::MIN.saturating_add(1),
+                }),
+                ..plain()
+            },
+        ),
+        (
+            "sleep",
+            SolverSpec {
+                sleep: Some(SleepSpec {
+                    speed: 1.0,
+                    time: 0.02,
+                }),
+                ..plain()
+            },
+        ),
+    ]
+}
+
+fn with(scene: &Scene, solver: &SolverSpec) -> Scene {
+    let mut scene = scene.clone();
+    scene.solver = solver.clone();
+    scene
+}
+
+#[test]
+fn at_the_start_it_is_as_if_set_up_so() {
+    let mut base = two_bodies();
+    base.report.quantities = vec![Quantity::Residual, Quantity::Kappa, Quantity::Energy];
+    let mut all = settings();
+    // From a limit that softens half of the tets, too.
+    let (_, low) = all.iter().find(|(name, _)| *name == "low limit").unwrap();
+    let softened = simulation(&with(&base, low)).softened();
+    assert!(softened.tets > 100, "{softened:?}");
+    let starts = [
+        SolverSpec::default(),
+        low.clone(),
+        SolverSpec::of(Method::Descent),
+    ];
+    for precision in [Precision::F32, Precision::F64] {
+        for start in &starts {
+            for (name, solver) in &mut all {
+                let start = SolverSpec {
+                    precision,
+                    ..start.clone()
+                };
+                solver.precision = precision;
+                let mut expected = simulation(&with(&base, solver));
+                let mut retuned = simulation(&with(&base, &start));
+                retuned.retune(solver).unwrap();
+                assert_eq!(retuned.solver_spec(), solver);
+                retuned.check().unwrap();
+                for frame in 0..3 {
+                    assert!(
+                        everything(&mut retuned) == everything(&mut expected),
+                        "{name} {precision:?} {frame}"
+                    );
+                    expected.step().unwrap();
+                    retuned.step().unwrap();
+                }
+            }
+        }
+    }
+}
+
+/// Through all settings and back on a body that is cut meanwhile.
+#[test]
+fn a_cut_body_keeps_its_state() {
+    let mut simulation = simulation(&two_bodies());
+    (0..5).for_each(|_| assert!(simulation.step().is_ok()));
+    let mut time = simulation.report().time_s;
+    for (at, (name, solver)) in settings().into_iter().enumerate() {
+        if at == 4 {
+            simulation.cut(halving(0.3)).unwrap();
+        }
+        let before = (
+            simulation.positions().to_vec(),
+            simulation.pieces(),
+            simulation.on_cut().to_vec(),
+            simulation.mesh().clone(),
+        );
+        simulation.retune(&solver).unwrap();
+        simulation.check().unwrap();
+        let after = (
+            simulation.positions().to_vec(),
+            simulation.pieces(),
+            simulation.on_cut().to_vec(),
+            simulation.mesh().clone(),
+        );
+        assert!(before == after, "{name}");
+        for _ in 0..2 {
+            let report = simulation.step().unwrap();
+            time += solver.time_step;
+            // Sums of a few dozen time steps.
+            assert!((report.time_s - time).abs() < 1e-12, "{name}");
+            assert!(report.repaired == 0, "{name}");
+            simulation.check().unwrap();
+        }
+        let low = simulation
+            .positions()
+            .iter()
+            .fold(0.0_f64, |low, x| low.min(x.z));
+        assert!(low > -0.7, "{name}: through the ground, to {low}");
+    }
+    assert!(simulation.report().pieces > 2);
+}
+
+/// What was softened for one limit is not for another: as in a simulation that never knew the first.
+#[test]
+fn softened_tets_of_a_cut_body_are_restored() {
+    let mut base = two_bodies();
+    base.world = incise::scene::WorldSpec::default();
+    base.collider.clear();
+    base.handle.clear();
+    let limits = |kappa_limit, substeps: u32| SolverSpec {
+        kappa_limit,
+        substeps: substeps.into(),
+        ..SolverSpec::default()
+    };
+    // Nothing moves but by the cut, which is the same: so are the meshes.
+    let [mut here, mut there] =
+        [limits(0.05, 5), limits(1.0, 5)].map(|solver| simulation(&with(&base, &solver)));
+    for simulation in [&mut here, &mut there] {
+        (0..5).for_each(|_| assert!(simulation.step().is_ok()));
+    }
+    assert!(here.report().tets > 600);
+    assert_eq!(here.mesh(), there.mesh());
+    assert!(here.softened().tets > there.softened().tets);
+    for solver in [
+        limits(1.0, 5),
+        limits(0.05, 4),
+        limits(f64::INFINITY, 5),
+        limits(0.5, 2),
+    ] {
+        here.retune(&solver).unwrap();
+        there.retune(&solver).unwrap();
+        assert_eq!(here.softened(), there.softened(), "{solver:?}");
+        assert_eq!(here.kappa(), there.kappa());
+        here.check().unwrap();
+    }
+}
+
+#[test]
+fn auto_chooses_from_the_body_as_it_is() {
+    let mut simulation = simulation(&two_bodies());
+    (0..5).for_each(|_| assert!(simulation.step().is_ok()));
+    let auto = |max_substeps| SolverSpec {
+        substeps: Substeps::Auto,
+        max_substeps,
+        ..SolverSpec::default()
+    };
+    simulation.retune(&auto(200)).unwrap();
+    let chosen = |simulation: &mut Simulation| {
+        let bodies = simulation.step().unwrap().bodies.clone();
+        bodies
+            .iter()
+            .map(|body| (body.substeps, body.choice.unwrap()))
+            .collect::<Vec<_>>()
+    };
+    let first = chosen(&mut simulation);
+    assert!(
+        first
+            .iter()
+            .all(|(substeps, choice)| *substeps == choice.substeps && *substeps > 2)
+    );
+    // Iterations have nothing to do with it.
+    simulation
+        .retune(&SolverSpec {
+            iterations: 2,
+            ..auto(200)
+        })
+        .unwrap();
+    assert_eq!(chosen(&mut simulation), first);
+    simulation.retune(&auto(2)).unwrap();
+    assert!(
+        chosen(&mut simulation)
+            .iter()
+            .all(|(substeps, _)| *substeps == 2)
+    );
+    simulation.retune(&SolverSpec::default()).unwrap();
+    assert!(simulation.step().unwrap().bodies.is_empty());
+}
+
+/// Sleeping bodies would not show other settings.
+#[test]
+fn who_sleeps_wakes() {
+    let sleep = Some(SleepSpec {
+        speed: 10.0,
+        time: 0.03,
+    });
+    let mut scene = scene(&body("sphere", 200, [0.0, 0.0, 0.0]));
+    scene.solver.sleep = sleep;
+    let mut simulation = simulation(&scene);
+    let asleep =
+        |simulation: &mut Simulation| simulation.step().unwrap().bodies[0].asleep == Some(true);
+    assert_eq!(
+        [(); 3].map(|()| asleep(&mut simulation)),
+        [false, true, true]
+    );
+    simulation.retune(&scene.solver.clone()).unwrap();
+    assert!(asleep(&mut simulation), "nothing differs");
+    let more = SolverSpec {
+        iterations: 2,
+        ..scene.solver.clone()
+    };
+    simulation.retune(&more).unwrap();
+    assert_eq!([(); 2].map(|()| asleep(&mut simulation)), [false, true]);
+}
+
+#[test]
+fn worn_clusters_are_renewed_once_that_is_asked_for() {
+    let mut simulation = simulation(&two_bodies());
+    (0..5).for_each(|_| assert!(simulation.step().is_ok()));
+    let recluster = |wear| SolverSpec {
+        recluster: Some(ReclusterSpec {
+            wear,
+            frames: std::num::NonZeroU32::MIN,
+        }),
+        ..SolverSpec::default()
+    };
+    simulation.retune(&recluster(1.01)).unwrap();
+    assert_eq!(simulation.step().unwrap().reclustered, 0);
+    assert!(
+        simulation.step().unwrap().reclustered > 0,
+        "no cluster is worn"
+    );
+    assert_eq!(simulation.step().unwrap().reclustered, 0);
+    simulation.check().unwrap();
+}
+
+#[test]
+fn what_is_refused_changes_nothing() {
+    let mut scene = two_bodies();
+    scene.body[0].damping = 0.01;
+    let mut simulation = simulation(&scene);
+    (0..3).for_each(|_| assert!(simulation.step().is_ok()));
+    let mut other = {
+        let snapshot = simulation.snapshot().unwrap();
+        let mut other = Simulation::with_threads(&scene, 1).unwrap();
+        other.restore(&snapshot).unwrap();
+        other
+    };
+    let plain = SolverSpec::default;
+    let refused: [(SolverSpec, &str); 12] = [
+        (
+            SolverSpec {
+                precision: Precision::F64,
+                ..plain()
+            },
+            "solver.precision",
+        ),
+        (
+            SolverSpec {
+                time_step: f64::NAN,
+                ..plain()
+            },
+            "time_step",
+        ),
+        (
+            SolverSpec {
+                substeps: 0.into(),
+                ..plain()
+            },
+            "substeps",
+        ),
+        (
+            SolverSpec {
+                max_substeps: 0,
+                ..plain()
+            },
+            "solver.max_substeps",
+        ),
+        (
+            SolverSpec {
+                iterations: 0,
+                ..plain()
+            },
+            "iterations",
+        ),
+        (
+            SolverSpec {
+                relaxation: 3.0,
+                ..plain()
+            },
+            "relaxation",
+        ),
+        (
+            SolverSpec {
+                kappa_limit: -1.0,
+                ..plain()
+            },
+            "solver.kappa_limit",
+        ),
+        (
+            SolverSpec {
+                clustering: "round:3".into(),
+                ..plain()
+            },
+            "solver.clustering",
+        ),
+        (
+            SolverSpec {
+                coloring: "pink".into(),
+                ..plain()
+            },
+            "solver.coloring",
+        ),
+        (
+            SolverSpec {
+                coarse: true,
+                ..plain()
+            },
+            "solver.coarse",
+        ),
+        (
+            SolverSpec {
+                sleep: Some(SleepSpec {
+                    speed: -1.0,
+                    time: 1.0,
+                }),
+                ..plain()
+            },
+            "solver.sleep",
+        ),
+        // The beam is damped.
+        (SolverSpec::of(Method::Descent), "body[0].damping"),
+    ];
+    for (solver, key) in refused {
+        let error = simulation.retune(&solver).unwrap_err();
+        assert!(error.to_string().contains(key), "{key}: {error}");
+        assert_eq!(simulation.solver_spec(), &plain());
+    }
+    for _ in 0..3 {
+        simulation.step().unwrap();
+        other.step().unwrap();
+        assert!(everything(&mut simulation) == everything(&mut other));
+    }
+}
+
+#[cfg(not(feature = "gpu"))]
+#[test]
+fn a_device_is_refused_where_there_is_no_path_to_one() {
+    use incise::scene::Backend;
+    let mut simulation = simulation(&two_bodies());
+    let on = |backend| SolverSpec {
+        backend,
+        ..SolverSpec::default()
+    };
+    let error = simulation.retune(&on(Backend::Gpu)).unwrap_err();
+    assert!(matches!(error, Error::NoGpuPath), "{error}");
+    assert!(simulation.backend_note().is_none());
+    simulation.retune(&on(Backend::Auto)).unwrap();
+    assert!(simulation.backend_note().unwrap().contains("no GPU path"));
+    simulation.retune(&on(Backend::Cpu)).unwrap();
+    assert!(simulation.backend_note().is_none());
+}
+
+/// The settings of a snapshot hold again; the present ones can be kept.
+#[test]
+fn a_snapshot_outlives_other_settings() {
+    let mut simulation = simulation(&two_bodies());
+    simulation.step().unwrap();
+    let snapshot = simulation.snapshot().unwrap();
+    let frames = |simulation: &mut Simulation| -> Vec<_> {
+        let frames = (0..3).map(|_| {
+            simulation.step().unwrap();
+            everything(simulation)
+        });
+        frames.collect()
+    };
+    let then = frames(&mut simulation);
+    for (name, solver) in settings() {
+        simulation.retune(&solver).unwrap();
+        simulation.step().unwrap();
+        simulation.restore(&snapshot).unwrap();
+        assert_eq!(simulation.solver_spec(), &SolverSpec::default());
+        assert!(frames(&mut simulation) == then, "{name}");
+        simulation.restore(&snapshot).unwrap();
+        simulation.retune(&solver).unwrap();
+        simulation.step().unwrap();
+        simulation.check().unwrap();
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+
+    /// Whatever is done in whatever order, everything derived agrees and nothing leaves the numbers.
+    #[test]
+    fn any_order_keeps_everything_sound(
+        acts in prop::collection::vec((0..6_usize, any::<prop::sample::Index>(), -0.4..0.4f64), 4..20),
+    ) {
+        let mut simulation = simulation(&two_bodies());
+        let settings = settings();
+        let mut snapshots = Vec::new();
+        for (act, which, at) in acts {
+            match act {
+                0 => simulation.cut(halving(at)).unwrap(),
+                1 => simulation.retune(&settings[which.index(settings.len())].1).unwrap(),
+                2 => snapshots.push(simulation.snapshot().unwrap()),
+                3 if !snapshots.is_empty() => {
+                    simulation.restore(&snapshots[which.index(snapshots.len())]).unwrap();
+                }
+                _ => {
+                    simulation.step().unwrap();
+                }
+            }
+            simulation.check().unwrap();
+            prop_assert!(simulation.positions().iter().all(|x| x.is_finite()));
+        }
+    }
+}
