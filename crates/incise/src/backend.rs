@@ -266,6 +266,11 @@ impl AnySolver {
         Ok(())
     }
 
+    /// The residual of each tet in the last substep, if they were kept; descent has none.
+    pub(crate) fn residuals_of_tets(&self, substep_time: f64) -> Option<Vec<f64>> {
+        each!(self, solver => solver.residuals_of_tets(substep_time))
+    }
+
     /// Whether a limit softens a tet. O(tets).
     pub(crate) fn exceeds(&self, limit: Option<KappaLimit>) -> bool {
         limit.is_some()

@@ -94,6 +94,8 @@ pub struct Simulation {
     deltas: Vec<CutDelta>,
     next_frame: u64,
     report: FrameReport,
+    /// Whether the solvers have the residuals of the last frame.
+    residuals_kept: bool,
     pool: Option<ThreadPool>,
 }
 
@@ -186,6 +188,7 @@ impl Simulation {
             timeline,
             next_frame: 0,
             report: FrameReport::default(),
+            residuals_kept: false,
             pool,
         };
         simulation.collect_positions();
@@ -261,6 +264,7 @@ impl Simulation {
             .map(|group| group.step(frame, residual).map(|step| step.repaired))
             .try_reduce(|| 0, |a, b| Ok(a + b))?;
         ms.solve = milliseconds(before_solve.elapsed());
+        self.residuals_kept = residual;
 
         // A device measures what it has; residuals need positions and multipliers of all.
         if !self.place.is_device() || residual {

@@ -180,6 +180,17 @@ impl Whole {
         self.numbers[group].particles[particle].index()
     }
 
+    /// Puts what each group says of its tets in the order of the whole.
+    pub(crate) fn of_tets(&self, of_groups: &[Vec<f64>]) -> Vec<f64> {
+        let mut of_tets = vec![0.0; self.mesh.tets.len()];
+        for (numbers, of_group) in self.numbers.iter().zip(of_groups) {
+            for (tet, value) in numbers.tets.iter().zip(of_group) {
+                of_tets[tet.index()] = *value;
+            }
+        }
+        of_tets
+    }
+
     /// Takes over the groups' positions.
     pub(crate) fn collect_positions(&mut self, groups: &[Group]) {
         for (numbers, group) in self.numbers.iter().zip(groups) {

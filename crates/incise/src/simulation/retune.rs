@@ -130,6 +130,7 @@ impl Simulation {
         self.leave_device();
         self.place = place;
         self.solver = solver.clone();
+        self.residuals_kept = false;
         if self.next_frame == 0 {
             self.report_before_the_first();
         }

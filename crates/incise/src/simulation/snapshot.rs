@@ -40,6 +40,7 @@ pub struct Snapshot {
     on_cut: Vec<bool>,
     next_frame: u64,
     report: FrameReport,
+    residuals_kept: bool,
 }
 
 /// Bytes of a tet in what a cut needs: corners, the lists of the stars around its corners, the links of its faces.
@@ -142,6 +143,7 @@ impl Simulation {
             deltas: _,
             next_frame,
             report,
+            residuals_kept,
             pool: _,
         } = self;
         Ok(Snapshot {
@@ -159,6 +161,7 @@ impl Simulation {
             on_cut: on_cut.clone(),
             next_frame: *next_frame,
             report: report.clone(),
+            residuals_kept: *residuals_kept,
         })
     }
 
@@ -201,6 +204,7 @@ impl Simulation {
             on_cut,
             next_frame,
             report,
+            residuals_kept,
         } = snapshot;
         self.scene = Arc::clone(scene);
         self.solver = solver.clone();
@@ -218,6 +222,7 @@ impl Simulation {
         self.deltas.clear();
         self.next_frame = *next_frame;
         self.report = report.clone();
+        self.residuals_kept = *residuals_kept;
         Ok(())
     }
 

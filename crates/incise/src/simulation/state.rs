@@ -7,9 +7,11 @@ use std::time::Instant;
 
 use super::Simulation;
 use crate::Error;
-use crate::measure::{by_body, energy, kappa, max_speed, residual, softened, states, volume};
+use crate::measure::{
+    by_body, energy, kappa, max_speed, residual, residuals_of_tets, softened, states, volume,
+};
 use crate::report::{FrameReport, Milliseconds, milliseconds};
-use crate::scene::Quantity;
+use crate::scene::{Method, Quantity};
 
 impl Simulation {
     /// Computes the quantities that this frame reports.
@@ -125,6 +127,39 @@ impl Simulation {
     #[cfg(feature = "gpu")]
     pub fn device_solvers(&self) -> impl Iterator<Item = &crate::gpu::GpuSolver> + '_ {
         self.groups.iter().filter_map(|group| group.solver.device())
+    }
+
+    /// For each tet of [`Simulation::mesh`] how far its constraints are from solved in the last substep: the norm of
+    /// `C + α̃ λ` over its two, without unit. The root of the sum of squares is the `dual` of the residuals that the frame
+    /// reports. 0 for tets that take no part and for bodies asleep.
+    ///
+    /// `None` unless the last frame has reported [`Quantity::Residual`], and after [`Simulation::retune`] until the next
+    /// one does. Descent knows no multipliers and its force is a matter of particles: `None`, too. O(tets).
+    ///
+    /// ```
+    /// use incise::{Scene, Simulation};
+    ///
+    /// let scene = Scene::from_toml(
+    ///     "[report]\nquantities = [\"residual\"]\n[[body]]\nshape = { kind = \"sphere\", tets = 300 }",
+    /// )?;
+    /// let mut simulation = Simulation::new(&scene)?;
+    /// assert!(simulation.residuals_of_tets().is_none());
+    /// simulation.step()?;
+    /// let residuals = simulation.residuals_of_tets().expect("they are reported");
+    /// assert_eq!(residuals.len(), simulation.mesh().tets.len());
+    /// # Ok::<(), incise::Error>(())
+    /// ```
+    #[must_use]
+    pub fn residuals_of_tets(&self) -> Option<Vec<f64>> {
+        if !self.residuals_kept || self.solver.method == Method::Descent {
+            return None;
+        }
+        let groups = self.groups.iter().map(residuals_of_tets);
+        let mut groups = groups.collect::<Option<Vec<_>>>()?;
+        match &self.whole {
+            Some(whole) => Some(whole.of_tets(&groups)),
+            None => groups.pop(),
+        }
     }
 
     /// Takes over the positions of the solvers.

@@ -22,6 +22,7 @@ mod preset;
 mod recluster;
 mod regions;
 mod reports;
+mod residuals;
 mod retune;
 mod scenarios;
 mod sleep;
