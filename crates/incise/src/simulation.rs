@@ -130,10 +130,7 @@ impl Simulation {
     /// # Errors
     /// As [`Simulation::new`], and if the device cannot do what the scene asks for.
     #[cfg(feature = "gpu")]
-    pub fn on_device(
-        scene: &Scene,
-        gpu: std::sync::Arc<crate::gpu::GpuContext>,
-    ) -> Result<Self, Error> {
+    pub fn on_device(scene: &Scene, gpu: Arc<crate::gpu::GpuContext>) -> Result<Self, Error> {
         crate::place::check(scene)?;
         let mut simulation = Self::build(scene, Place::on(gpu), None)?;
         simulation.solver.backend = crate::scene::Backend::Gpu;

@@ -14,7 +14,7 @@ use incise::{Error, Scene, Simulation};
 static CONTEXT: OnceLock<Result<Arc<GpuContext>, GpuError>> = OnceLock::new();
 
 /// The device of all tests, or `None` on a machine without one, which is said.
-fn gpu(test: &str) -> Option<Arc<GpuContext>> {
+pub(crate) fn gpu(test: &str) -> Option<Arc<GpuContext>> {
     let open = || GpuContext::new(&GpuOptions::from_env()).map(Arc::new);
     match CONTEXT.get_or_init(open) {
         Ok(gpu) => Some(Arc::clone(gpu)),
@@ -49,7 +49,7 @@ fn scene(tets: usize, clustering: &str) -> Scene {
     scene
 }
 
-fn farthest(a: &[DVec3], b: &[DVec3]) -> f64 {
+pub(crate) fn farthest(a: &[DVec3], b: &[DVec3]) -> f64 {
     assert_eq!(a.len(), b.len());
     a.iter()
         .zip(b)

@@ -11,6 +11,8 @@ mod cutting;
 mod determinism;
 #[cfg(feature = "gpu")]
 mod gpu;
+#[cfg(feature = "gpu")]
+mod gpu_knobs;
 mod kappa;
 mod locality;
 mod methods;

@@ -3,7 +3,7 @@
 use incise::scene::{
     Form, Method, Precision, Quantity, ReclusterSpec, SleepSpec, SolverSpec, Substeps,
 };
-use incise::{Error, Scene, Simulation};
+use incise::{Scene, Simulation};
 use proptest::prelude::*;
 
 use crate::snapshot::{everything, halving};
@@ -448,6 +448,7 @@ fn what_is_refused_changes_nothing() {
 #[cfg(not(feature = "gpu"))]
 #[test]
 fn a_device_is_refused_where_there_is_no_path_to_one() {
+    use incise::Error;
     use incise::scene::Backend;
     let mut simulation = simulation(&two_bodies());
     let on = |backend| SolverSpec {
