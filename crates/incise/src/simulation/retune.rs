@@ -96,11 +96,23 @@ impl Simulation {
             );
             return Err(value("solver.precision", solver.precision.name(), range));
         }
+        let Scene {
+            world,
+            body,
+            collider,
+            handle,
+            link,
+            ..
+        } = &*self.scene;
         let scene = Scene {
             solver: solver.clone(),
-            // They are under way.
-            stroke: Vec::new(),
-            ..(*self.scene).clone()
+            world: *world,
+            body: body.clone(),
+            collider: collider.clone(),
+            handle: handle.clone(),
+            link: link.clone(),
+            // Strokes are under way, and reports are not the solver's business.
+            ..Scene::default()
         };
         let settings = settings(&scene)?;
         limits::check(&scene)?;

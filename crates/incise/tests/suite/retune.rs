@@ -145,28 +145,66 @@ fn at_the_start_it_is_as_if_set_up_so() {
         low.clone(),
         SolverSpec::of(Method::Descent),
     ];
+    let three = |simulation: &mut Simulation| -> Vec<_> {
+        let frames = (0..3).map(|_| {
+            let words = everything(simulation);
+            simulation.step().unwrap();
+            words
+        });
+        frames.collect()
+    };
     for precision in [Precision::F32, Precision::F64] {
+        all.iter_mut()
+            .for_each(|(_, solver)| solver.precision = precision);
+        let expected: Vec<_> = all
+            .iter()
+            .map(|(_, solver)| three(&mut simulation(&with(&base, solver))))
+            .collect();
         for start in &starts {
-            for (name, solver) in &mut all {
-                let start = SolverSpec {
-                    precision,
-                    ..start.clone()
-                };
-                solver.precision = precision;
-                let mut expected = simulation(&with(&base, solver));
-                let mut retuned = simulation(&with(&base, &start));
-                retuned.retune(solver).unwrap();
-                assert_eq!(retuned.solver_spec(), solver);
-                retuned.check().unwrap();
-                for frame in 0..3 {
-                    assert!(
-                        everything(&mut retuned) == everything(&mut expected),
-                        "{name} {precision:?} {frame}"
-                    );
-                    expected.step().unwrap();
-                    retuned.step().unwrap();
-                }
+            let start = SolverSpec {
+                precision,
+                ..start.clone()
+            };
+            let mut simulation = simulation(&with(&base, &start));
+            // Making its meshes takes longer than all else.
+            let snapshot = simulation.snapshot().unwrap();
+            for ((name, solver), expected) in all.iter().zip(&expected) {
+                simulation.retune(solver).unwrap();
+                assert_eq!(simulation.solver_spec(), solver);
+                simulation.check().unwrap();
+                assert!(three(&mut simulation) == *expected, "{name} {precision:?}");
+                simulation.restore(&snapshot).unwrap();
             }
+        }
+    }
+}
+
+/// Where volumes, links and damping follow the plan, too.
+#[test]
+fn other_constraints_follow_from_the_start() {
+    let beam = body("beam", 300, [0.0, 0.0, 0.0]);
+    let cube = body("box", 200, [0.0, 1.2, 0.0]);
+    let base = scene(&format!(
+        "[world]\ngravity = [0.0, 0.0, -9.81]\n\
+         {beam}damping = 0.01\nvolume_compliance = 1e-6\nsubsteps = \"auto\"\n{cube}\n\
+         [[link]]\nfrom = {{ body = 0, point = [0.0, 0.0, 0.0] }}\nto = {{ body = 1, point = [0.0, 1.2, 0.0] }}\n\
+         compliance = 1e-4"
+    ));
+    for (name, solver) in settings() {
+        let mut retuned = simulation(&base);
+        let refused = retuned.retune(&solver).is_err();
+        assert_eq!(refused, solver.method == Method::Descent, "{name}");
+        if refused {
+            continue;
+        }
+        let mut expected = simulation(&with(&base, &solver));
+        for _ in 0..2 {
+            expected.step().unwrap();
+            retuned.step().unwrap();
+            assert!(
+                everything(&mut retuned) == everything(&mut expected),
+                "{name}"
+            );
         }
     }
 }
@@ -245,6 +283,38 @@ fn softened_tets_of_a_cut_body_are_restored() {
         assert_eq!(here.softened(), there.softened(), "{solver:?}");
         assert_eq!(here.kappa(), there.kappa());
         here.check().unwrap();
+    }
+}
+
+/// On a cut body the settings that it comes from leave no trace, whatever they softened.
+#[test]
+fn detours_leave_no_trace() {
+    let mut simulation = simulation(&two_bodies());
+    (0..5).for_each(|_| assert!(simulation.step().is_ok()));
+    let snapshot = simulation.snapshot().unwrap();
+    // But for clusters and colors, which are made anew only by settings that ask for others.
+    let mut settings = settings();
+    settings.retain(|(name, _)| !["clusters", "wear"].contains(name));
+    let mut end = |way: &[&SolverSpec]| {
+        simulation.restore(&snapshot).unwrap();
+        for solver in way {
+            simulation.retune(solver).unwrap();
+        }
+        let before = simulation.softened();
+        simulation.step().unwrap();
+        (before, everything(&mut simulation))
+    };
+    let mut detours = settings.iter().map(|(_, solver)| solver).cycle().skip(3);
+    for (name, solver) in &settings {
+        if *name == "nothing" {
+            // Which would not wake who sleeps.
+            continue;
+        }
+        let straight = end(&[solver]);
+        for _ in 0..3 {
+            let detour = detours.next().unwrap();
+            assert!(end(&[detour, solver]) == straight, "{name} by {detour:?}");
+        }
     }
 }
 
