@@ -29,6 +29,7 @@ mod descent;
 #[cfg(feature = "gpu")]
 mod device;
 mod error;
+mod follow;
 mod group;
 mod handle;
 mod islands;

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use incise_xpbd::{KappaLimit, StepSettings};
 
 use super::Simulation;
-use crate::backend::AnySolver;
+use crate::backend::{AnySolver, each};
 use crate::group::{Group, kappa_limit};
 use crate::joined::substeps;
 use crate::limits::{self, value};
@@ -231,6 +231,11 @@ impl Retuned {
         place: &Place,
     ) -> Result<Self, Error> {
         let after = &scene.solver;
+        let soft = || each!(&group.solver, solver => solver.attachments().any(|held| held.compliance > 0.0));
+        if after.method == Method::Descent && soft() {
+            let range = "another one while something is held by a compliance";
+            return Err(value("solver.method", "descent", range));
+        }
         let mesh = group.cuttable.mesh();
         let mut settings = StepSettings {
             substeps: group.settings.substeps,
@@ -330,4 +335,32 @@ fn substeps_follow_from(spec: &SolverSpec) -> impl PartialEq + use<> {
         spec.max_substeps,
         limited,
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::each_mut;
+
+    /// Not every hold is a handle of the scene.
+    #[test]
+    fn descent_is_refused_while_something_is_held_softly() {
+        let scene = Scene::from_toml("[[body]]\nshape = { kind = \"box\", tets = 200 }").unwrap();
+        let mut simulation = Simulation::new(&scene).unwrap();
+        let hold = |simulation: &mut Simulation, compliance| -> Result<(), Error> {
+            each_mut!(&mut simulation.groups[0].solver, solver => {
+                let handle = solver.add_handle(incise_xpbd::Pose::at(glam::DVec3::ZERO));
+                solver.attach(0, handle, compliance, 0.0).unwrap();
+            });
+            Ok(())
+        };
+        let descent = SolverSpec::of(Method::Descent);
+        hold(&mut simulation, 1e-3).unwrap();
+        let error = simulation.retune(&descent).unwrap_err();
+        assert!(error.to_string().contains("compliance"), "{error}");
+        simulation.step().unwrap();
+        hold(&mut simulation, 0.0).unwrap();
+        simulation.retune(&descent).unwrap();
+        simulation.step().unwrap();
+    }
 }

@@ -14,6 +14,7 @@ mod gpu;
 #[cfg(feature = "gpu")]
 mod gpu_knobs;
 mod kappa;
+mod knobs;
 mod locality;
 mod methods;
 mod mistakes;
