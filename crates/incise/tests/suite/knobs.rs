@@ -44,6 +44,13 @@ pub(crate) fn settings() -> Vec<(&'static str, SolverSpec)> {
         ("chebyshev", of(Method::Chebyshev)),
         ("descent", of(Method::Descent)),
         (
+            "descent with a limit",
+            SolverSpec {
+                kappa_limit: 0.02,
+                ..of(Method::Descent)
+            },
+        ),
+        (
             "corrected descent with a limit",
             SolverSpec {
                 substeps: 1.into(),

@@ -128,6 +128,33 @@ fn a_cut_body_keeps_its_state() {
     assert!(simulation.report().pieces > 2);
 }
 
+/// A floor that rises by 1 m/s carries a body: it goes on from where it is, and so does the time.
+#[test]
+fn obstacles_go_on_from_where_they_are() {
+    let mut simulation = simulation(&scene(&format!(
+        "{}[[collider]]\nkind = \"plane\"\npoint = [0.0, 0.0, -0.55]\nnormal = [0.0, 0.0, 1.0]\n\
+         velocity = [0.0, 0.0, 1.0]",
+        body("sphere", 200, [0.0, 0.0, 0.0])
+    )));
+    let mut floor = -0.55;
+    for time_step in [0.016, 0.008, 0.016] {
+        let solver = SolverSpec {
+            time_step,
+            ..SolverSpec::default()
+        };
+        simulation.retune(&solver).unwrap();
+        for _ in 0..20 {
+            simulation.step().unwrap();
+            floor += time_step;
+            let heights = simulation.positions().iter().map(|x| x.z);
+            let low = heights.fold(f64::MAX, f64::min);
+            // Single precision, and what penetrates is put onto the floor in each substep.
+            assert!(low >= floor - 1e-5, "{low} below {floor}");
+        }
+        assert!((simulation.report().time_s - (floor + 0.55)).abs() < 1e-12);
+    }
+}
+
 /// What was softened for one limit is not for another: as in a simulation that never knew the first.
 #[test]
 fn softened_tets_of_a_cut_body_are_restored() {
