@@ -34,12 +34,12 @@ impl Backend {
     }
 }
 
-/// A device that is open.
-#[cfg(feature = "gpu")]
-pub(crate) type AtHand = Option<Arc<GpuContext>>;
-/// None: this build has no path to one.
-#[cfg(not(feature = "gpu"))]
-pub(crate) type AtHand = Option<std::convert::Infallible>;
+/// A device that is open, if one is.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct AtHand {
+    #[cfg(feature = "gpu")]
+    pub(crate) gpu: Option<Arc<GpuContext>>,
+}
 
 /// Where a scene is computed.
 #[derive(Clone, Debug, Default)]
@@ -52,7 +52,7 @@ pub(crate) struct Place {
 
 impl Place {
     /// Where the scene wants to be computed; on which device if one is at hand.
-    pub(crate) fn choose(scene: &Scene, at_hand: AtHand) -> Result<Self, Error> {
+    pub(crate) fn choose(scene: &Scene, at_hand: &AtHand) -> Result<Self, Error> {
         let backend = scene.solver.backend;
         if backend.is_cpu() {
             return Ok(Self::default());
@@ -66,12 +66,18 @@ impl Place {
         Self::open(backend, at_hand)
     }
 
-    /// The device, for whoever comes next.
-    pub(crate) fn at_hand(&self) -> AtHand {
-        #[cfg(feature = "gpu")]
-        return self.gpu.clone();
-        #[cfg(not(feature = "gpu"))]
-        return None;
+    /// The device that it is, or else the other one.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn or(&self, other: &AtHand) -> AtHand {
+        AtHand {
+            gpu: self.gpu.clone().or_else(|| other.gpu.clone()),
+        }
+    }
+
+    /// There is none.
+    #[cfg(not(feature = "gpu"))]
+    pub(crate) fn or(&self, other: &AtHand) -> AtHand {
+        other.clone()
     }
 
     fn cpu(reason: &str) -> Self {
@@ -83,7 +89,7 @@ impl Place {
     }
 
     #[cfg(not(feature = "gpu"))]
-    fn open(backend: Backend, _: AtHand) -> Result<Self, Error> {
+    fn open(backend: Backend, _: &AtHand) -> Result<Self, Error> {
         match backend {
             Backend::Gpu => Err(Error::NoGpuPath),
             _ => Ok(Self::cpu("this build has no GPU path (feature `gpu`)")),
@@ -91,9 +97,9 @@ impl Place {
     }
 
     #[cfg(feature = "gpu")]
-    fn open(backend: Backend, at_hand: AtHand) -> Result<Self, Error> {
+    fn open(backend: Backend, at_hand: &AtHand) -> Result<Self, Error> {
         let open = || GpuContext::new(&GpuOptions::from_env()).map(Arc::new);
-        match at_hand.map_or_else(open, Ok) {
+        match at_hand.gpu.clone().map_or_else(open, Ok) {
             Ok(gpu) if backend == Backend::Auto && gpu.adapter().software => {
                 let name = &gpu.adapter().name;
                 Ok(Self::cpu(&format!("the only GPU is software ({name})")))

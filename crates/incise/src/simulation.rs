@@ -105,7 +105,7 @@ impl Simulation {
     /// # Errors
     /// If a value of the scene lies outside its range or a mesh cannot be read or is broken.
     pub fn new(scene: &Scene) -> Result<Self, Error> {
-        Self::build(scene, Place::choose(scene, None)?, None)
+        Self::build(scene, Place::choose(scene, &AtHand::default())?, None)
     }
 
     /// The same on a number of threads of its own. The result is the same to the bit for any number.
@@ -121,7 +121,7 @@ impl Simulation {
             threads,
             message: error.to_string(),
         })?;
-        Self::build(scene, Place::choose(scene, None)?, Some(pool))
+        Self::build(scene, Place::choose(scene, &AtHand::default())?, Some(pool))
     }
 
     /// Sets a scene up on a device that is open, whatever its `solver.backend` says: a renderer's, that of another
@@ -176,7 +176,7 @@ impl Simulation {
             every: scene.report.every,
             precision,
             place,
-            at_hand: None,
+            at_hand: AtHand::default(),
             on_cut: Vec::new(),
             deltas: Vec::new(),
             pieces: PieceNumbers::new(&groups),

@@ -57,8 +57,8 @@ impl Simulation {
     /// * `clustering`, `coloring`, `merge_clusters`: clusters and colors of all tets are made anew.
     /// * `recluster`: counts the wear since clusters and colors were made anew last. Those in the making are still taken,
     ///   unless they are those of other settings.
-    /// * `backend`, and with `auto` also `method` and `clustering`: the state goes over to a device or comes back; see
-    ///   [`Simulation::offer_device`] for which.
+    /// * `backend`, and with `auto` also `method` and `clustering`: the state goes over to a device or comes back. The
+    ///   device is the present one, or that of `offer_device`, or one that the simulation has left, or else it is opened.
     /// * `preset`: a name only. Its defaults are applied when a scene is read.
     ///
     /// Any difference wakes all bodies, for they were at rest under the settings before. Settings equal to those before
@@ -176,7 +176,7 @@ impl Simulation {
     /// ```
     #[cfg(feature = "gpu")]
     pub fn offer_device(&mut self, gpu: std::sync::Arc<crate::gpu::GpuContext>) {
-        self.at_hand = Some(gpu);
+        self.at_hand.gpu = Some(gpu);
     }
 
     /// Where the scene with other settings is computed.
@@ -187,14 +187,14 @@ impl Simulation {
         {
             return Ok(self.place.clone());
         }
-        let at_hand = self.place.at_hand().or_else(|| self.at_hand.clone());
-        Place::choose(scene, at_hand)
+        Place::choose(scene, &self.place.or(&self.at_hand))
     }
 
     /// Keeps the present device at hand, unless another one is.
     pub(super) fn leave_device(&mut self) {
-        if self.at_hand.is_none() {
-            self.at_hand = self.place.at_hand();
+        #[cfg(feature = "gpu")]
+        if self.at_hand.gpu.is_none() {
+            self.at_hand.gpu.clone_from(&self.place.gpu);
         }
     }
 }
