@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use glam::DVec3;
-use incise_cutting::{CutDelta, CuttableMesh};
+use incise_cutting::CuttableMesh;
 use incise_graph::Schedule;
 use incise_mesh::{ParticleId, TetId, TetMesh};
 use incise_xpbd::{KappaLimit, Pose, Real, Residuals, Solver, StepReport, StepSettings, XpbdError};
@@ -12,6 +12,7 @@ use crate::Error;
 use crate::descent::Descent;
 #[cfg(feature = "gpu")]
 use crate::device::Device;
+use crate::follow::mass;
 use crate::joined::Joined;
 use crate::measure::State;
 use crate::place::Place;
@@ -28,11 +29,26 @@ pub(crate) enum AnySolver {
 }
 
 /// A solver and what its method needs beside it.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Backend<R: Real> {
     pub(crate) solver: Solver<R>,
     /// In a scene that is solved by descent.
     descent: Option<Descent<R>>,
+}
+
+/// A copy is on the processor: of a solver on a device, with the state that was last read back.
+impl Clone for AnySolver {
+    fn clone(&self) -> Self {
+        match self {
+            Self::Single(backend) => Self::Single(backend.clone()),
+            Self::Double(backend) => Self::Double(backend.clone()),
+            #[cfg(feature = "gpu")]
+            Self::Device(device) => Self::Single(Backend {
+                solver: device.solver.as_last_seen().clone(),
+                descent: None,
+            }),
+        }
+    }
 }
 
 /// How far the last substep is from a solution of its equations; XPBD knows more than that.
@@ -122,12 +138,7 @@ impl AnySolver {
     pub(crate) fn prepare(&mut self, spec: &SolverSpec, place: &Place) -> Result<(), Error> {
         #[cfg(feature = "gpu")]
         if let Some(gpu) = &place.gpu {
-            // Any other one will do: it is replaced at once.
-            let single = std::mem::replace(self, Self::Double(Backend::new(&[])));
-            if let Self::Single(Backend { solver, .. }) = single {
-                *self = Self::Device(Box::new(Device::new(gpu, solver, spec)?));
-            }
-            return Ok(());
+            return self.take_to(gpu, spec);
         }
         debug_assert!(!place.is_device(), "a device was prepared");
         match self {
@@ -136,6 +147,21 @@ impl AnySolver {
             #[cfg(feature = "gpu")]
             Self::Device(_) => Ok(()),
         }
+    }
+
+    /// Takes a solver in single precision to a device.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn take_to(
+        &mut self,
+        gpu: &std::sync::Arc<incise_gpu::GpuContext>,
+        spec: &SolverSpec,
+    ) -> Result<(), Error> {
+        // Any other one will do: it is replaced at once.
+        let single = std::mem::replace(self, Self::Double(Backend::new(&[])));
+        if let Self::Single(Backend { solver, .. }) = single {
+            *self = Self::Device(Box::new(Device::new(gpu, solver, spec)?));
+        }
+        Ok(())
     }
 
     /// Advances by one frame, keeping what [`AnySolver::last_substep`] needs if told to.
@@ -229,12 +255,21 @@ impl AnySolver {
         }
     }
 
-    /// Softens every tet, present and to come, that exceeds the limit. O(tets).
-    pub(crate) fn limit_kappa(&mut self, limit: KappaLimit, mesh: &TetMesh) -> Result<(), Error> {
+    /// Softens every tet, present and to come, that exceeds the limit, and no other one: those that were softened to an
+    /// earlier limit are made anew from their rest shapes. O(tets), but O(1) from a limit to the same.
+    pub(crate) fn limit_kappa(
+        &mut self,
+        before: Option<KappaLimit>,
+        limit: Option<KappaLimit>,
+        mesh: &TetMesh,
+    ) -> Result<(), Error> {
+        if before == limit {
+            return Ok(());
+        }
         each_mut!(self, solver => {
-            solver.limit_kappa(Some(limit));
+            solver.limit_kappa(limit);
             for t in 0..solver.tet_count() {
-                if solver.kappa_of(t, limit.substep_time) > limit.kappa {
+                if exceeds(solver, t, before) || exceeds(solver, t, limit) {
                     solver.replace_tet(t, solver.tet_particles(t), mesh.corners(TetId::new(t)));
                 }
             }
@@ -242,56 +277,39 @@ impl AnySolver {
         Ok(())
     }
 
-    /// Follows a cut. Costs what the cut touched; descent sorts its stars anew, O(tets).
-    pub(crate) fn follow(
-        &mut self,
-        delta: &CutDelta,
-        cuttable: &CuttableMesh,
-        ms: &mut Milliseconds,
-    ) -> Result<(), Error> {
-        let mesh = cuttable.mesh();
-        each_mut!(self, solver => {
-            for point in &delta.points {
-                let [a, b] = point.ends.map(ParticleId::index);
-                solver.push_particle_between(a, b, point.parameter);
-            }
-            for source in &delta.copies {
-                solver.push_copy(source.index());
-            }
-            let mut added: Vec<_> = delta.added.iter().collect();
-            added.sort_unstable_by_key(|tet| tet.tet);
-            for tet in added {
-                let (corners, rest) = (tet.corners.map(|p| p.0), mesh.corners(tet.tet));
-                if tet.tet.index() < solver.tet_count() {
-                    solver.replace_tet(tet.tet.index(), corners, rest);
-                } else {
-                    solver.push_tet(corners, rest, solver.material_of(tet.parent.index()));
-                }
-            }
-            for tet in &delta.relinked {
-                solver.relink_tet(tet.tet.index(), tet.after.map(|p| p.0));
-            }
-            for tet in &delta.moved {
-                solver.move_tet(tet.from.index(), tet.to.index());
-            }
-            solver.truncate_tets(delta.tets_after());
-            let mut star = Vec::new();
-            for p in touched(delta) {
-                let mass = mass(solver, cuttable, p, &mut star);
-                solver.set_mass_in_star(p.index(), mass, star.iter().map(|tet| tet.index()));
-            }
-            // Particles that lost all their tets stay where they are.
-            for p in delta.deleted.iter().flat_map(|tet| tet.corners) {
-                if cuttable.around(p).next().is_none() {
-                    solver.set_velocity(p.index(), DVec3::ZERO);
-                }
-            }
-        });
+    /// The residual of each tet in the last substep, if they were kept; descent has none.
+    pub(crate) fn residuals_of_tets(&self, substep_time: f64) -> Option<Vec<f64>> {
+        each!(self, solver => solver.residuals_of_tets(substep_time))
+    }
+
+    /// Whether a limit softens a tet. O(tets).
+    pub(crate) fn exceeds(&self, limit: Option<KappaLimit>) -> bool {
+        limit.is_some()
+            && each!(self, solver => (0..solver.tet_count()).any(|t| exceeds(solver, t, limit)))
+    }
+
+    /// Whether it is where it should be, in the form that settings ask for there.
+    pub(crate) fn is_at(&self, place: &Place, spec: &SolverSpec) -> Result<bool, Error> {
+        #[cfg(feature = "gpu")]
+        return match (self, &place.gpu) {
+            (Self::Device(device), Some(gpu)) => device.serves(gpu, spec),
+            (Self::Device(_), None) | (_, Some(_)) => Ok(false),
+            (_, None) => Ok(true),
+        };
+        #[cfg(not(feature = "gpu"))]
+        {
+            let _ = spec;
+            Ok(!place.is_device())
+        }
+    }
+
+    /// Lets go of what only descent needs.
+    pub(crate) fn end_descent(&mut self) {
         match self {
-            Self::Single(backend) => backend.follow(ms),
-            Self::Double(backend) => backend.follow(ms),
+            Self::Single(backend) => backend.descent = None,
+            Self::Double(backend) => backend.descent = None,
             #[cfg(feature = "gpu")]
-            Self::Device(_) => Ok(()),
+            Self::Device(_) => {}
         }
     }
 
@@ -355,6 +373,16 @@ impl AnySolver {
         }
     }
 
+    /// Bytes of a copy.
+    pub(crate) fn bytes(&self) -> usize {
+        match self {
+            Self::Single(backend) => backend.bytes(),
+            Self::Double(backend) => backend.bytes(),
+            #[cfg(feature = "gpu")]
+            Self::Device(device) => device.solver.as_last_seen().bytes(),
+        }
+    }
+
     pub(crate) fn positions(&self, out: &mut Vec<DVec3>) {
         each!(self, solver => solver.positions(out));
     }
@@ -411,13 +439,18 @@ impl<R: Real> Backend<R> {
         }
     }
 
+    fn bytes(&self) -> usize {
+        self.solver.bytes() + self.descent.as_ref().map_or(0, Descent::bytes)
+    }
+
     fn lay_out(&mut self, schedule: &Schedule) {
         if self.descent.is_none() {
             self.solver.lay_out(schedule);
         }
     }
 
-    fn follow(&mut self, ms: &mut Milliseconds) -> Result<(), Error> {
+    /// Lets descent follow a cut, after the solver has.
+    pub(crate) fn follow(&mut self, ms: &mut Milliseconds) -> Result<(), Error> {
         let Self { solver, descent } = self;
         descent
             .as_mut()
@@ -425,32 +458,7 @@ impl<R: Real> Backend<R> {
     }
 }
 
-/// A quarter of the mass of each tet around a particle, summed in the order of the tets, which `star` has afterwards.
-fn mass<R: Real>(
-    solver: &Solver<R>,
-    cuttable: &CuttableMesh,
-    particle: ParticleId,
-    star: &mut Vec<TetId>,
-) -> f64 {
-    star.clear();
-    star.extend(cuttable.around(particle));
-    star.sort_unstable();
-    let quarter = |t: &TetId| 0.25 * solver.density_of(t.index()) * cuttable.mesh().volume(*t);
-    // Rounding can make the volume of a sliver negative.
-    star.iter().map(quarter).sum::<f64>().max(0.0)
-}
-
-/// The particles whose tets changed, ascending.
-fn touched(delta: &CutDelta) -> Vec<ParticleId> {
-    let added = delta.added.iter().flat_map(|tet| tet.corners);
-    let relinked = delta
-        .relinked
-        .iter()
-        .flat_map(|tet| tet.before.into_iter().chain(tet.after));
-    let removed = delta.removed.iter().chain(&delta.deleted);
-    let removed = removed.flat_map(|tet| tet.corners);
-    let mut touched: Vec<ParticleId> = added.chain(relinked).chain(removed).collect();
-    touched.sort_unstable();
-    touched.dedup();
-    touched
+/// Whether a tet is too stiff for a limit.
+fn exceeds<R: Real>(solver: &Solver<R>, tet: usize, limit: Option<KappaLimit>) -> bool {
+    limit.is_some_and(|limit| solver.kappa_of(tet, limit.substep_time) > limit.kappa)
 }

@@ -18,7 +18,7 @@ use crate::{Error, method};
 const AGGREGATES: usize = 50;
 
 /// The state of descent beside that of the solver.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Descent<R: Real> {
     stars: Stars<R>,
     /// Where corrections are asked for.
@@ -37,6 +37,11 @@ impl<R: Real> Descent<R> {
             correction,
             last: DescentReport::default(),
         })
+    }
+
+    /// Bytes of all arrays.
+    pub(crate) fn bytes(&self) -> usize {
+        self.stars.bytes() + self.correction.as_ref().map_or(0, Correction::bytes)
     }
 
     /// Follows a cut, after the solver has.

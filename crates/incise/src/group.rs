@@ -19,14 +19,14 @@ use crate::place::Place;
 use crate::plan::Plan;
 use crate::recluster::Recluster;
 use crate::report::{Milliseconds, milliseconds};
-use crate::scene::Quantity;
+use crate::scene::{Quantity, SolverSpec};
 use crate::sleep::Rest;
 use crate::substeps::Choice;
 use crate::volume::Volumes;
 use crate::{Error, Scene, collider, link};
 
-/// Bodies that are solved together.
-#[derive(Debug)]
+/// Bodies that are solved together. A copy has the state as it is known here, and its solver on the processor.
+#[derive(Clone, Debug)]
 pub(crate) struct Group {
     /// The numbers of its bodies in the scene, ascending.
     pub(crate) bodies: Vec<usize>,
@@ -55,7 +55,7 @@ pub(crate) struct Group {
     /// Whether it sleeps, in a scene where bodies may.
     pub(crate) rest: Option<Rest>,
     /// What renews the plan, in a scene where plans are renewed.
-    recluster: Option<Recluster>,
+    pub(crate) recluster: Option<Recluster>,
 }
 
 /// What cuts did to kappa.
@@ -65,6 +65,15 @@ pub(crate) struct CutKappa {
     pub(crate) before: Option<f64>,
     /// The largest of a tet that was made.
     pub(crate) new_tets: f64,
+}
+
+/// The limit of kappa that settings ask for, if it is one.
+pub(crate) fn kappa_limit(solver: &SolverSpec, settings: &StepSettings) -> Option<KappaLimit> {
+    let limit = KappaLimit {
+        kappa: solver.kappa_limit,
+        substep_time: settings.substep_time(),
+    };
+    limit.kappa.is_finite().then_some(limit)
 }
 
 impl Group {
@@ -82,15 +91,8 @@ impl Group {
         let mut solver = AnySolver::new(scene.solver.precision, &joined, &cuttable)?;
         let (substeps, choice) = joined.substeps(scene, &solver, &cuttable);
         settings.substeps = substeps;
-        let kappa = scene.solver.kappa_limit;
-        if kappa.is_finite() {
-            let substep_time = settings.substep_time();
-            let limit = KappaLimit {
-                kappa,
-                substep_time,
-            };
-            solver.limit_kappa(limit, cuttable.mesh())?;
-        }
+        let limit = kappa_limit(&scene.solver, &settings);
+        solver.limit_kappa(None, limit, cuttable.mesh())?;
         for handle in &mut joined.handles {
             handle.attach(&mut solver)?;
         }
@@ -103,7 +105,7 @@ impl Group {
         solver.prepare(&scene.solver, place)?;
         let recluster = scene.solver.recluster;
         let mut group = Self {
-            recluster: recluster.map(|spec| Recluster::new(spec, &plan)),
+            recluster: recluster.map(Recluster::new),
             solver,
             plan,
             settings,
@@ -212,12 +214,20 @@ impl Group {
         };
         let start = Instant::now();
         let renewed = recluster.advance(frame, &mut self.plan, &self.cuttable)?;
-        if let Some(volumes) = self.volumes.as_ref().filter(|_| renewed) {
-            let (nothing, schedule) = (CutDelta::default(), &self.plan.schedule);
-            volumes.follow(&mut self.solver, &nothing, &self.cuttable, schedule)?;
+        if renewed {
+            self.reschedule_volumes()?;
         }
         ms.cluster += milliseconds(start.elapsed());
         Ok(renewed)
+    }
+
+    /// Lets volume constraints follow another plan.
+    pub(crate) fn reschedule_volumes(&mut self) -> Result<(), Error> {
+        let Some(volumes) = &self.volumes else {
+            return Ok(());
+        };
+        let (nothing, schedule) = (CutDelta::default(), &self.plan.schedule);
+        volumes.follow(&mut self.solver, &nothing, &self.cuttable, schedule)
     }
 
     /// Notes the largest kappa before the first cut of a frame. O(tets).

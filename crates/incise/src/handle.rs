@@ -49,7 +49,7 @@ pub struct TurnSpec {
 }
 
 /// A handle, checked.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Handle {
     /// Its key in the scene.
     field: String,

@@ -13,7 +13,7 @@ use crate::backend::{AnySolver, each};
 use crate::body::Body;
 use crate::handle::Handle;
 use crate::limits::{existing, value};
-use crate::scene::Substeps;
+use crate::scene::{SolverSpec, Substeps};
 use crate::substeps::{Choice, choose};
 use crate::volume::Volumes;
 use crate::{Error, Scene, link};
@@ -107,24 +107,31 @@ impl Joined {
         solver: &AnySolver,
         cuttable: &CuttableMesh,
     ) -> (u32, Option<Choice>) {
-        let fixed = |substeps: &Substeps| match substeps {
-            Substeps::Fixed(substeps) => *substeps,
-            Substeps::Auto => 1,
-        };
-        let most = self.substeps.iter().map(fixed).max().unwrap_or(1);
-        if !self.substeps.contains(&Substeps::Auto) {
-            return (most, None);
-        }
-        let mesh = cuttable.mesh();
-        let time = scene.solver.time_step;
-        let auto = |t: &usize| self.substeps[usize::from(self.material_of[*t])] == Substeps::Auto;
-        let of_tet = |t: usize| {
-            let kappa = each!(solver, solver => solver.kappa_of(t, time));
-            (kappa, mesh.volume(TetId::new(t)))
-        };
-        let tets = (0..mesh.tets.len()).filter(auto).map(of_tet).collect();
-        let softens = scene.solver.kappa_limit.is_finite();
-        let choice = choose(tets, scene.solver.max_substeps, softens);
-        (most.max(choice.substeps), Some(choice))
+        substeps(&self.substeps, &scene.solver, solver, cuttable.mesh())
     }
+}
+
+/// The same for bodies that ask for these substeps. Each has the material of its number.
+pub(crate) fn substeps(
+    asked: &[Substeps],
+    spec: &SolverSpec,
+    solver: &AnySolver,
+    mesh: &TetMesh,
+) -> (u32, Option<Choice>) {
+    let fixed = |substeps: &Substeps| match substeps {
+        Substeps::Fixed(substeps) => *substeps,
+        Substeps::Auto => 1,
+    };
+    let most = asked.iter().map(fixed).max().unwrap_or(1);
+    if !asked.contains(&Substeps::Auto) {
+        return (most, None);
+    }
+    let tets: Vec<(f64, f64)> = each!(solver, solver => {
+        let auto = |t: &usize| asked[usize::from(solver.material_of(*t))] == Substeps::Auto;
+        let kappa = |t: usize| solver.kappa_of(t, spec.time_step);
+        let tets = (0..mesh.tets.len()).filter(auto);
+        tets.map(|t| (kappa(t), mesh.volume(TetId::new(t)))).collect()
+    });
+    let choice = choose(tets, spec.max_substeps, spec.kappa_limit.is_finite());
+    (most.max(choice.substeps), Some(choice))
 }

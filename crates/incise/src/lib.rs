@@ -29,6 +29,7 @@ mod descent;
 #[cfg(feature = "gpu")]
 mod device;
 mod error;
+mod follow;
 mod grab;
 mod group;
 mod handle;
@@ -68,7 +69,7 @@ pub use incise_mesh as mesh;
 pub use incise_xpbd as xpbd;
 pub use report::FrameReport;
 pub use scene::Scene;
-pub use simulation::Simulation;
+pub use simulation::{Simulation, Snapshot};
 
 /// The example of the README, run as a test.
 #[cfg(doctest)]

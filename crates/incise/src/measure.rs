@@ -88,6 +88,15 @@ pub(crate) fn residual(groups: &[Group], gravity: Option<DVec3>) -> Option<Resid
     })
 }
 
+/// The residual of each tet of a group in the last substep: none asleep; `None` if they were not kept.
+pub(crate) fn residuals_of_tets(group: &Group) -> Option<Vec<f64>> {
+    if group.asleep() {
+        return Some(vec![0.0; group.cuttable.mesh().tets.len()]);
+    }
+    let time = group.settings.substep_time();
+    group.solver.residuals_of_tets(time)
+}
+
 pub(crate) fn energy(states: &[State]) -> EnergyReport {
     let mut sum = EnergyReport {
         kinetic: 0.0,

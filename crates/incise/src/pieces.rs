@@ -28,7 +28,7 @@ struct Number {
 }
 
 /// The pieces of all groups.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct PieceNumbers {
     /// By number in the scene.
     pieces: Vec<Number>,
@@ -37,7 +37,7 @@ pub(crate) struct PieceNumbers {
 }
 
 /// The numbers in the scene of a group's pieces.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct Numbers(Vec<u32>);
 
 impl PieceNumbers {

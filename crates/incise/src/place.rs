@@ -34,6 +34,13 @@ impl Backend {
     }
 }
 
+/// A device that is open, if one is.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct AtHand {
+    #[cfg(feature = "gpu")]
+    pub(crate) gpu: Option<Arc<GpuContext>>,
+}
+
 /// Where a scene is computed.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Place {
@@ -44,8 +51,8 @@ pub(crate) struct Place {
 }
 
 impl Place {
-    /// Where the scene wants to be computed.
-    pub(crate) fn choose(scene: &Scene) -> Result<Self, Error> {
+    /// Where the scene wants to be computed; on which device if one is at hand.
+    pub(crate) fn choose(scene: &Scene, at_hand: &AtHand) -> Result<Self, Error> {
         let backend = scene.solver.backend;
         if backend.is_cpu() {
             return Ok(Self::default());
@@ -56,7 +63,21 @@ impl Place {
                 _ => Err(refused),
             };
         }
-        Self::open(backend)
+        Self::open(backend, at_hand)
+    }
+
+    /// The device that it is, or else the other one.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn or(&self, other: &AtHand) -> AtHand {
+        AtHand {
+            gpu: self.gpu.clone().or_else(|| other.gpu.clone()),
+        }
+    }
+
+    /// There is none.
+    #[cfg(not(feature = "gpu"))]
+    pub(crate) fn or(&self, other: &AtHand) -> AtHand {
+        other.clone()
     }
 
     fn cpu(reason: &str) -> Self {
@@ -68,7 +89,7 @@ impl Place {
     }
 
     #[cfg(not(feature = "gpu"))]
-    fn open(backend: Backend) -> Result<Self, Error> {
+    fn open(backend: Backend, _: &AtHand) -> Result<Self, Error> {
         match backend {
             Backend::Gpu => Err(Error::NoGpuPath),
             _ => Ok(Self::cpu("this build has no GPU path (feature `gpu`)")),
@@ -76,13 +97,14 @@ impl Place {
     }
 
     #[cfg(feature = "gpu")]
-    fn open(backend: Backend) -> Result<Self, Error> {
-        match GpuContext::new(&GpuOptions::from_env()) {
+    fn open(backend: Backend, at_hand: &AtHand) -> Result<Self, Error> {
+        let open = || GpuContext::new(&GpuOptions::from_env()).map(Arc::new);
+        match at_hand.gpu.clone().map_or_else(open, Ok) {
             Ok(gpu) if backend == Backend::Auto && gpu.adapter().software => {
                 let name = &gpu.adapter().name;
                 Ok(Self::cpu(&format!("the only GPU is software ({name})")))
             }
-            Ok(gpu) => Ok(Self::on(Arc::new(gpu))),
+            Ok(gpu) => Ok(Self::on(gpu)),
             Err(error) if backend == Backend::Auto => Ok(Self::cpu(&error.to_string())),
             Err(error) => Err(error.into()),
         }

@@ -10,6 +10,7 @@ use incise_graph::{ClusterId, Clustering, Coloring, Incidence, Schedule};
 use incise_mesh::{TetId, TetMesh};
 
 use crate::report::{Milliseconds, milliseconds};
+use crate::scene::SolverSpec;
 use crate::{Error, Scene};
 
 /// Colors that cuts may add before all clusters are colored anew: each color is a barrier in every iteration, but a
@@ -19,12 +20,14 @@ use crate::{Error, Scene};
 const SLACK: usize = 4;
 
 /// Who is solved when.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Plan {
     pub(crate) clustering: Clustering,
     recoloring: Recoloring,
     pub(crate) schedule: Schedule,
     recipe: Recipe,
+    /// Colors and mean cluster size when all was made anew last.
+    fresh: [f64; 2],
     lists: Lists,
 }
 
@@ -53,7 +56,23 @@ struct Lists {
     merging: MergeLists,
 }
 
+/// What they hold is of no use after the cut, and copies begin without.
+impl Clone for Lists {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
 impl Recipe {
+    /// What settings ask for.
+    pub(crate) fn new(solver: &SolverSpec) -> Result<Self, Error> {
+        Ok(Self {
+            method: solver.clustering.parse()?,
+            algorithm: solver.coloring.parse()?,
+            merges: solver.merge_clusters,
+        })
+    }
+
     /// The largest size of a cluster.
     fn limit(self) -> NonZeroUsize {
         self.method.max_size()
@@ -62,12 +81,7 @@ impl Recipe {
 
 impl Plan {
     pub(crate) fn new(scene: &Scene, mesh: &TetMesh) -> Result<Self, Error> {
-        let recipe = Recipe {
-            method: scene.solver.clustering.parse()?,
-            algorithm: scene.solver.coloring.parse()?,
-            merges: scene.solver.merge_clusters,
-        };
-        Self::of(recipe, mesh)
+        Self::of(Recipe::new(&scene.solver)?, mesh)
     }
 
     /// Clusters and colors a mesh.
@@ -80,21 +94,31 @@ impl Plan {
         let tets = mesh.tets.iter().zip(clustering.labels());
         let pairs = tets.flat_map(|(corners, cluster)| corners.map(|p| (cluster.0, p.0)));
         let recoloring = Recoloring::with_coloring(pairs, coloring, SLACK)?;
-        Ok(Self {
+        let mut plan = Self {
             clustering,
             recoloring,
             schedule,
             recipe,
+            fresh: [1.0; 2],
             lists: Lists::default(),
-        })
+        };
+        plan.fresh = plan.measures();
+        Ok(plan)
     }
 
     pub(crate) fn recipe(&self) -> Recipe {
         self.recipe
     }
 
+    /// How far cuts have worn it: its number of colors over that when it was fresh, or the mean size of its clusters then
+    /// over that now, whichever is larger. O(1).
+    pub(crate) fn wear(&self) -> f64 {
+        let ([colors, size], now) = (self.fresh, self.measures());
+        (now[0] / colors).max(size / now[1])
+    }
+
     /// The number of colors and the mean size of the clusters, both 1 if there are none. O(1).
-    pub(crate) fn measures(&self) -> [f64; 2] {
+    fn measures(&self) -> [f64; 2] {
         let clusters = self.clustering.occupied().max(1) as f64;
         let tets = self.clustering.constraint_count() as f64;
         let colors = self.recoloring.color_count() as f64;
@@ -188,6 +212,7 @@ impl Plan {
         }
         self.schedule
             .rebuild(&self.clustering, self.recoloring.coloring());
+        self.fresh = self.measures();
         Ok(())
     }
 

@@ -61,9 +61,17 @@ impl ReclusterSpec {
 #[derive(Debug)]
 pub(crate) struct Recluster {
     spec: ReclusterSpec,
-    /// Colors and mean cluster size of the last whole plan.
-    fresh: [f64; 2],
     pending: Option<Pending>,
+}
+
+/// A copy has no thread: a plan in the making is left out, unless [`Recluster::settle`] was called.
+impl Clone for Recluster {
+    fn clone(&self) -> Self {
+        Self {
+            spec: self.spec,
+            pending: self.pending.as_ref().and_then(Pending::copy),
+        }
+    }
 }
 
 /// A plan in the making.
@@ -71,18 +79,29 @@ pub(crate) struct Recluster {
 struct Pending {
     /// The frame that takes it.
     due: u64,
-    thread: JoinHandle<Result<Plan, Error>>,
+    making: Making,
     /// The cuts since.
     deltas: Vec<CutDelta>,
 }
 
+/// A plan, or who makes it.
+#[derive(Debug)]
+enum Making {
+    Thread(JoinHandle<Result<Plan, Error>>),
+    Made(Box<Plan>),
+}
+
 impl Recluster {
-    pub(crate) fn new(spec: ReclusterSpec, plan: &Plan) -> Self {
+    pub(crate) fn new(spec: ReclusterSpec) -> Self {
         Self {
             spec,
-            fresh: plan.measures(),
             pending: None,
         }
+    }
+
+    /// The same under another spec; what is in the making is taken when it would have been.
+    pub(crate) fn with(self, spec: ReclusterSpec) -> Self {
+        Self { spec, ..self }
     }
 
     /// Notes a cut for the plan in the making.
@@ -99,7 +118,7 @@ impl Recluster {
         plan: &mut Plan,
         cuttable: &CuttableMesh,
     ) -> Result<bool, Error> {
-        if self.pending.is_none() && self.wear(plan) >= self.spec.wear {
+        if self.pending.is_none() && plan.wear() >= self.spec.wear {
             let due = frame + u64::from(self.spec.frames.get());
             self.pending = Some(Pending::start(due, plan.recipe(), cuttable)?);
         }
@@ -107,13 +126,24 @@ impl Recluster {
             return Ok(false);
         };
         *plan = pending.finish(cuttable)?;
-        self.fresh = plan.measures();
         Ok(true)
     }
 
-    fn wear(&self, plan: &Plan) -> f64 {
-        let ([colors, size], now) = (self.fresh, plan.measures());
-        (now[0] / colors).max(size / now[1])
+    /// Waits for a plan in the making, so that a copy has it, too. It is taken in the same frame as it would be.
+    pub(crate) fn settle(&mut self) -> Result<(), Error> {
+        let Some(pending) = self.pending.take() else {
+            return Ok(());
+        };
+        self.pending = Some(Pending {
+            making: Making::Made(Box::new(pending.making.plan()?)),
+            ..pending
+        });
+        Ok(())
+    }
+
+    /// Whether a plan is in the making.
+    pub(crate) fn is_pending(&self) -> bool {
+        self.pending.is_some()
     }
 }
 
@@ -133,17 +163,37 @@ impl Pending {
             .map_err(|error| refused(error.to_string()))?;
         Ok(Self {
             due,
-            thread,
+            making: Making::Thread(thread),
             deltas: Vec::new(),
         })
     }
 
+    fn copy(&self) -> Option<Self> {
+        match &self.making {
+            Making::Thread(_) => None,
+            Making::Made(plan) => Some(Self {
+                due: self.due,
+                making: Making::Made(plan.clone()),
+                deltas: self.deltas.clone(),
+            }),
+        }
+    }
+
     /// Waits for the plan and lets it follow what has been cut meanwhile.
     fn finish(self, cuttable: &CuttableMesh) -> Result<Plan, Error> {
-        let plan = self.thread.join();
-        let mut plan =
-            plan.map_err(|_| Error::Inconsistent("clustering in the background failed".into()))??;
+        let mut plan = self.making.plan()?;
         plan.catch_up(&self.deltas, cuttable)?;
         Ok(plan)
+    }
+}
+
+impl Making {
+    /// The plan; waits for it.
+    fn plan(self) -> Result<Plan, Error> {
+        let failed = |_| Error::Inconsistent("clustering in the background failed".into());
+        match self {
+            Self::Thread(thread) => thread.join().map_err(failed)?,
+            Self::Made(plan) => Ok(*plan),
+        }
     }
 }

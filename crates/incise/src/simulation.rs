@@ -5,9 +5,12 @@
 //! solvers.
 
 mod live;
+mod retune;
+mod snapshot;
 mod state;
 
 use std::borrow::Cow;
+use std::sync::Arc;
 use std::time::Instant;
 
 use glam::DVec3;
@@ -22,17 +25,19 @@ use crate::group::Group;
 use crate::islands::islands;
 use crate::joined::Joined;
 use crate::limits::{self, value};
-use crate::measure::{by_body, kappa, softened};
+use crate::measure::{kappa, softened};
 use crate::method::settings;
 use crate::pieces::PieceNumbers;
-use crate::place::Place;
+use crate::place::{AtHand, Place};
 use crate::report::{
     CutReport, DetachedReport, FrameReport, Milliseconds, PieceReport, SoftenedReport, milliseconds,
 };
-use crate::scene::{Precision, Quantity, StrokeSpec};
+use crate::scene::{Precision, Quantity, SolverSpec, StrokeSpec};
 use crate::strokes::Timeline;
 use crate::whole::Whole;
 use crate::{Error, Scene, link};
+
+pub use snapshot::Snapshot;
 
 /// A scene in motion.
 ///
@@ -63,13 +68,21 @@ use crate::{Error, Scene, link};
 /// ```
 #[derive(Debug)]
 pub struct Simulation {
+    /// As it was set up.
+    scene: Arc<Scene>,
+    /// How it is computed now.
+    solver: SolverSpec,
     /// In s.
     time_step: f64,
+    /// The frame since which time steps have been as long, and the simulated time in s at its start.
+    epoch: (u64, f64),
     gravity: Option<DVec3>,
     quantities: Vec<Quantity>,
     every: u64,
     precision: Precision,
     place: Place,
+    /// To go to when one is asked for.
+    at_hand: AtHand,
     /// In the order of their first bodies.
     groups: Vec<Group>,
     /// All groups together, if there are several.
@@ -82,6 +95,8 @@ pub struct Simulation {
     deltas: Vec<CutDelta>,
     next_frame: u64,
     report: FrameReport,
+    /// Whether the solvers have the residuals of the last frame.
+    residuals_kept: bool,
     pool: Option<ThreadPool>,
 }
 
@@ -91,7 +106,7 @@ impl Simulation {
     /// # Errors
     /// If a value of the scene lies outside its range or a mesh cannot be read or is broken.
     pub fn new(scene: &Scene) -> Result<Self, Error> {
-        Self::build(scene, Place::choose(scene)?, None)
+        Self::build(scene, Place::choose(scene, &AtHand::default())?, None)
     }
 
     /// The same on a number of threads of its own. The result is the same to the bit for any number.
@@ -107,7 +122,7 @@ impl Simulation {
             threads,
             message: error.to_string(),
         })?;
-        Self::build(scene, Place::choose(scene)?, Some(pool))
+        Self::build(scene, Place::choose(scene, &AtHand::default())?, Some(pool))
     }
 
     /// Sets a scene up on a device that is open, whatever its `solver.backend` says: a renderer's, that of another
@@ -116,12 +131,11 @@ impl Simulation {
     /// # Errors
     /// As [`Simulation::new`], and if the device cannot do what the scene asks for.
     #[cfg(feature = "gpu")]
-    pub fn on_device(
-        scene: &Scene,
-        gpu: std::sync::Arc<crate::gpu::GpuContext>,
-    ) -> Result<Self, Error> {
+    pub fn on_device(scene: &Scene, gpu: Arc<crate::gpu::GpuContext>) -> Result<Self, Error> {
         crate::place::check(scene)?;
-        Self::build(scene, Place::on(gpu), None)
+        let mut simulation = Self::build(scene, Place::on(gpu), None)?;
+        simulation.solver.backend = crate::scene::Backend::Gpu;
+        Ok(simulation)
     }
 
     fn build(scene: &Scene, place: Place, pool: Option<ThreadPool>) -> Result<Self, Error> {
@@ -154,12 +168,16 @@ impl Simulation {
             None => make_groups(),
         }?;
         let mut simulation = Self {
+            scene: Arc::new(scene.clone()),
+            solver: scene.solver.clone(),
             time_step: settings.time_step,
+            epoch: (0, 0.0),
             gravity: settings.gravity,
             quantities: scene.report.quantities.clone(),
             every: scene.report.every,
             precision,
             place,
+            at_hand: AtHand::default(),
             on_cut: Vec::new(),
             deltas: Vec::new(),
             pieces: PieceNumbers::new(&groups),
@@ -168,13 +186,11 @@ impl Simulation {
             timeline,
             next_frame: 0,
             report: FrameReport::default(),
+            residuals_kept: false,
             pool,
         };
         simulation.collect_positions();
-        simulation.count();
-        if simulation.chooses() {
-            simulation.report.bodies = by_body(&mut simulation.groups, false);
-        }
+        simulation.report_before_the_first();
         Ok(simulation)
     }
 
@@ -246,6 +262,7 @@ impl Simulation {
             .map(|group| group.step(frame, residual).map(|step| step.repaired))
             .try_reduce(|| 0, |a, b| Ok(a + b))?;
         ms.solve = milliseconds(before_solve.elapsed());
+        self.residuals_kept = residual;
 
         // A device measures what it has; residuals need positions and multipliers of all.
         if !self.place.is_device() || residual {
@@ -253,7 +270,7 @@ impl Simulation {
         }
         self.report = FrameReport {
             frame: self.next_frame,
-            time_s: (self.next_frame + 1) as f64 * self.time_step,
+            time_s: self.time_at(self.next_frame + 1),
             cut,
             detached,
             repaired,
@@ -333,24 +350,6 @@ impl Simulation {
         let others = ms.cluster + ms.color + ms.schedule + ms.upload + measuring;
         ms.cut = milliseconds(start.elapsed()) - others;
         Ok(report)
-    }
-
-    /// Fills in the counts.
-    fn count(&mut self) {
-        let mesh = self.mesh();
-        let (particles, tets) = (mesh.positions.len(), mesh.tets.len());
-        let plans = || self.groups.iter().map(|group| &group.plan);
-        let clusters = plans().map(|plan| plan.clustering.occupied()).sum();
-        let colors = plans().map(|plan| plan.schedule.color_count());
-        let colors = colors.max().unwrap_or(0);
-        let report = &mut self.report;
-        report.particles = particles;
-        report.tets = tets;
-        report.clusters = clusters;
-        report.colors = colors;
-        report.pieces = self.groups.iter().map(|group| group.pieces.count()).sum();
-        report.backend = self.place.name();
-        report.precision = self.precision.name();
     }
 
     /// The report on the last frame; before the first, only its counts and the chosen substeps mean something.

@@ -13,7 +13,7 @@ use crate::scene::StrokeSpec;
 use crate::tool::{Tool, tool};
 
 /// A stroke and how far it is.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Stroke {
     field: String,
     tool: Tool,
@@ -25,7 +25,7 @@ struct Stroke {
 }
 
 /// The strokes that are not finished.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Timeline {
     strokes: Vec<Stroke>,
     added: u32,
@@ -118,6 +118,20 @@ impl Timeline {
         });
         let range = "the number of a stroke that was begun and has not ended";
         live.next().ok_or_else(|| value("stroke", number, range))
+    }
+
+    /// About the bytes of what its strokes know of so many particles, of which some are on a cut.
+    pub(crate) fn bytes(&self, particles: usize, on_cut: usize) -> usize {
+        // Where a blade met them last, and in which tiles they are.
+        const UNDER_WAY: usize = 70;
+        // What earlier strokes know of them, in a table that is mostly half full.
+        const REMEMBERED: usize = 250;
+        let under_way = self
+            .strokes
+            .iter()
+            .filter(|stroke| !stroke.sweeps.is_empty());
+        let remembered = if self.memories.is_empty() { 0 } else { on_cut };
+        UNDER_WAY * particles * under_way.count() + REMEMBERED * remembered
     }
 
     /// Whether a stroke begins or goes on in a frame.

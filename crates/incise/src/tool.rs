@@ -10,7 +10,7 @@ use crate::region::Solid;
 use crate::scene::{Region, StrokeSpec};
 
 /// What a stroke cuts with.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) enum Tool {
     Plane(Plane),
     Surface(TriangleSurface),

@@ -14,7 +14,7 @@ use crate::Error;
 use crate::backend::{AnySolver, each_mut};
 
 /// What each body of a group asks for.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Volumes {
     compliances: Vec<Option<f64>>,
 }

@@ -19,7 +19,7 @@ use crate::body::Body;
 use crate::group::Group;
 
 /// The numbers in the whole of a group's particles and tets.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct Numbers {
     particles: Vec<ParticleId>,
     tets: Vec<TetId>,
@@ -42,7 +42,7 @@ impl Numbers {
 }
 
 /// All groups as one mesh.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Whole {
     pub(crate) mesh: TetMesh,
     pub(crate) positions: Vec<DVec3>,
@@ -191,10 +191,30 @@ impl Whole {
         whole.moved.sort_unstable_by_key(|moved| moved.to);
     }
 
+    /// Bytes of all arrays.
+    pub(crate) fn bytes(&self) -> usize {
+        let of = |numbers: &Numbers| size_of_val(&*numbers.particles) + size_of_val(&*numbers.tets);
+        size_of_val(&*self.mesh.positions)
+            + size_of_val(&*self.mesh.tets)
+            + size_of_val(&*self.positions)
+            + self.numbers.iter().map(of).sum::<usize>()
+    }
+
     /// The number of a group's particle.
     #[cfg(feature = "advise")]
     pub(crate) fn particle(&self, group: usize, particle: usize) -> usize {
         self.numbers[group].particles[particle].index()
+    }
+
+    /// Puts what each group says of its tets in the order of the whole.
+    pub(crate) fn of_tets(&self, of_groups: &[Vec<f64>]) -> Vec<f64> {
+        let mut of_tets = vec![0.0; self.mesh.tets.len()];
+        for (numbers, of_group) in self.numbers.iter().zip(of_groups) {
+            for (tet, value) in numbers.tets.iter().zip(of_group) {
+                of_tets[tet.index()] = *value;
+            }
+        }
+        of_tets
     }
 
     /// Takes over the groups' positions.

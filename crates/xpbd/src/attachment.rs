@@ -88,7 +88,7 @@ struct Attachment<R: Real> {
 }
 
 /// All handles and what hangs on them.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Attachments<R: Real> {
     handles: Vec<Handle>,
     /// Ascending by particle, at most one each.
@@ -105,6 +105,11 @@ impl<R: Real> Default for Attachments<R> {
 }
 
 impl<R: Real> Attachments<R> {
+    /// Bytes of both lists.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(&*self.handles) + size_of_val(&*self.list)
+    }
+
     fn find(&self, particle: usize) -> Result<usize, usize> {
         self.list
             .binary_search_by_key(&particle, |a| a.particle as usize)

@@ -41,6 +41,7 @@
 
 mod attachment;
 mod collider;
+mod copy;
 mod crew;
 mod descent;
 mod device;

@@ -39,6 +39,18 @@ pub(crate) struct Constraints<R: Real, C> {
     multipliers: Vec<R::Atomic>,
 }
 
+impl<R: Real, C: Clone> Clone for Constraints<R, C> {
+    fn clone(&self) -> Self {
+        Self {
+            list: self.list.clone(),
+            schedule: self.schedule.clone(),
+            damped: self.damped,
+            // They begin anew with each substep.
+            multipliers: Vec::new(),
+        }
+    }
+}
+
 impl<R: Real, C> Constraints<R, C> {
     /// Puts constraints and a schedule together that fit. `what` names the kind.
     pub(crate) fn new<const K: usize>(

@@ -270,6 +270,15 @@ impl GpuSolver {
         Ok(&mut self.host)
     }
 
+    /// Puts another solver in the place of the host's; the device takes over all of it, with its state, in the next step.
+    /// Kernels and memory stay. The state of the device is lost: who wants it, or the count of repairs up to now, calls
+    /// [`GpuSolver::host`] before. O(particles + tets) in the next step.
+    pub fn replace(&mut self, mut solver: Solver<f32>) {
+        solver.track_changes();
+        self.host = solver;
+        self.ahead = false;
+    }
+
     /// Says where a handle is at the end of the next frame, as [`Solver::move_handle`] does, without waiting for the
     /// device.
     ///

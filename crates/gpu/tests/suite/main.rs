@@ -14,6 +14,7 @@ mod flight;
 mod handles;
 mod jacobi;
 mod measures;
+mod replace;
 mod scalars;
 mod shaders;
 mod sizes;

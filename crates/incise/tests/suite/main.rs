@@ -12,10 +12,13 @@ mod determinism;
 #[cfg(feature = "gpu")]
 mod gpu;
 #[cfg(feature = "gpu")]
+mod gpu_knobs;
+#[cfg(feature = "gpu")]
 mod gpu_live;
 mod grab;
 mod hands;
 mod kappa;
+mod knobs;
 mod live;
 mod locality;
 mod methods;
@@ -27,8 +30,11 @@ mod preset;
 mod recluster;
 mod regions;
 mod reports;
+mod residuals;
+mod retune;
 mod scenarios;
 mod sleep;
+mod snapshot;
 mod strokes;
 mod substeps;
 mod support;

@@ -16,6 +16,11 @@ pub(super) struct Cholesky {
 const VANISHED: f64 = 1e-10;
 
 impl Cholesky {
+    /// Bytes of the factor.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&*self.factor)
+    }
+
     /// A zero matrix to fill and then factor.
     pub(super) fn reset(&mut self, size: usize) {
         self.size = size;

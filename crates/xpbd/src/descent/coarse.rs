@@ -26,6 +26,14 @@ pub(super) struct Coarse {
 }
 
 impl Coarse {
+    /// Bytes of lists and factor.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&*self.of)
+            + size_of_val(&*self.weights)
+            + size_of_val(&*self.values)
+            + self.cholesky.bytes()
+    }
+
     pub(super) fn new(of: Vec<u32>, count: usize) -> Self {
         let weights = vec![[0.0; VECTORS]; of.len()];
         Self {

@@ -33,6 +33,18 @@ pub(super) struct Conjugate<R: Real> {
 }
 
 impl<R: Real> Conjugate<R> {
+    /// Bytes of all vectors.
+    pub(super) fn bytes(&self) -> usize {
+        let vectors = [
+            &self.solution,
+            &self.residual,
+            &self.direction,
+            &self.product,
+            &self.preconditioned,
+        ];
+        size_of_val(&*self.inverses) + vectors.map(|v| size_of_val(&**v)).iter().sum::<usize>()
+    }
+
     /// The result of [`Conjugate::solve`].
     pub(super) fn solution(&self) -> &[R::Vector] {
         &self.solution

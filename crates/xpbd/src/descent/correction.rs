@@ -71,6 +71,17 @@ const IDLE_ROUNDS: u32 = 2;
 const ROUNDING: f64 = 1e-11;
 
 impl<R: Real> Correction<R> {
+    /// Bytes of all arrays. O(1).
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.matrix.bytes()
+            + self.coarse.bytes()
+            + self.conjugate.bytes()
+            + size_of_val(&*self.held)
+            + size_of_val(&*self.force)
+            + size_of_val(&*self.base)
+    }
+
     /// Prepares corrections for some stars. O(pairs).
     ///
     /// Large aggregates are cheap to factor but need more iterations of conjugate gradients. The factor costs

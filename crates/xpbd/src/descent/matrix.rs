@@ -36,6 +36,16 @@ pub(super) struct Blocks<R: Real> {
 }
 
 impl<R: Real> Blocks<R> {
+    /// Bytes of all lists.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&*self.offsets)
+            + size_of_val(&*self.upper)
+            + size_of_val(&*self.columns)
+            + size_of_val(&*self.blocks)
+            + size_of_val(&*self.places)
+            + size_of_val(&*self.excess)
+    }
+
     /// The pattern of some stars; no values yet. O(pairs log valence).
     pub(super) fn new(stars: &Stars<R>) -> Self {
         let rows = stars.order.len();

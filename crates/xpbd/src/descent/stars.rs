@@ -93,6 +93,17 @@ impl<R: Real> Stars<R> {
         Ok(())
     }
 
+    /// Bytes of all arrays. O(1).
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        size_of_val(&*self.order)
+            + size_of_val(&*self.colors)
+            + size_of_val(&*self.offsets)
+            + size_of_val(&*self.spokes)
+            + size_of_val(&*self.tets)
+            + size_of_val(&*self.earlier)
+    }
+
     /// Number of colors.
     #[must_use]
     pub fn color_count(&self) -> usize {

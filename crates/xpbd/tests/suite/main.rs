@@ -13,6 +13,7 @@ mod closed_forms;
 mod colliders;
 mod conservation;
 mod convergence;
+mod copies;
 mod damping;
 mod descent;
 mod descent_correction;

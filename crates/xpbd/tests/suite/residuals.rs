@@ -1,6 +1,7 @@
 //! What a step says about how well it solved its equations.
 
 use glam::{DVec3, dvec3};
+use incise_graph::{Clustering, ColorId, Coloring, Schedule};
 use incise_mesh::generate::kuhn_box;
 use incise_xpbd::{Real, Residuals, Solver, StepSettings};
 
@@ -302,4 +303,58 @@ fn what_takes_no_part_is_not_measured() {
         (solver.load(DVec3::X) - 12.0_f64.sqrt()).abs(),
         1e-14,
     );
+}
+
+/// The parts of the dual residual: they sum up to it, and are there when it is.
+#[test]
+fn residuals_of_tets_are_the_parts_of_the_dual_one() {
+    fn check<R: Real>() {
+        let mesh = kuhn_box([2, 2, 2], DVec3::ONE);
+        let mut solver = body::<R>(&mesh, RUBBER);
+        disturb(&mut solver, 0.05, 13);
+        let settings = substep(&solver, 0.3);
+        let time = settings.substep_time();
+        assert_eq!(solver.residuals_of_tets(time), None);
+        solver
+            .step_keeping_residuals(&plain(&mesh), &settings)
+            .unwrap();
+        let of_tets = solver.residuals_of_tets(time).unwrap();
+        assert_eq!(of_tets.len(), mesh.tets.len());
+        assert!(of_tets.iter().all(|&left| left > 0.0));
+        let dual = solver.residuals(time).unwrap().dual;
+        let sum: f64 = of_tets.iter().map(|left| left * left).sum();
+        // Both are sums of 96 squares in double precision, in another order.
+        within("sum", (sum.sqrt() / dual - 1.0).abs(), 1e-13);
+        solver.step(&plain(&mesh), &settings).unwrap();
+        assert_eq!(solver.residuals_of_tets(time), None);
+    }
+    check::<f32>();
+    check::<f64>();
+}
+
+/// A tet too flat to take part has nothing left, whatever its corners do; one that alone is pulled has all.
+#[test]
+fn only_tets_that_take_part_have_residuals() {
+    let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+    let far = corners.map(|x| x + 5.0 * DVec3::X);
+    let mut solver = Solver::<f64>::new(&[corners, far].concat());
+    solver.add_material(RUBBER).unwrap();
+    solver.push_tet([0, 1, 2, 3], corners, 0);
+    solver.push_tet([4, 5, 6, 7], far, 0);
+    // The same particles, flat at rest.
+    solver.push_tet(
+        [0, 1, 2, 3],
+        [corners[0], corners[1], corners[2], dvec3(1.0, 1.0, 0.0)],
+        0,
+    );
+    (0..8).for_each(|p| solver.set_mass(p, 40.0));
+    solver.set_position(3, 2.0 * DVec3::Z);
+    let colors = Coloring::new([0, 0, 1].map(ColorId).to_vec());
+    let schedule = Schedule::new(&Clustering::none(3), &colors);
+    let settings = StepSettings::new(1e-3);
+    solver.step_keeping_residuals(&schedule, &settings).unwrap();
+    let of_tets = solver.residuals_of_tets(settings.substep_time()).unwrap();
+    // The one at rest is solved to rounding, 1e-16 times a few operations.
+    assert!(of_tets[0] > 1e-6 && of_tets[1] < 1e-12, "{of_tets:?}");
+    assert_eq!(of_tets[2], 0.0);
 }

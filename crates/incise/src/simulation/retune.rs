@@ -1,0 +1,366 @@
+//! [`Simulation::retune`]: other settings of the solver for a simulation that runs.
+//!
+//! Mesh, cuts, positions, velocities, pieces, handles, obstacles and strokes stay as they are. From the settings follow
+//! substeps, softened tets, plans, what descent needs and the place: what differs is made anew from the body as it is
+//! now, as a new simulation would make it from such a body, and what does not differ is not touched. Everything that can
+//! fail is made first, beside what is there; only then it takes its place.
+//!
+//! Cost: nothing for iterations, relaxation, form and the methods of XPBD; a pass over the tets for the time of a substep
+//! and the limit of kappa; clustering and coloring for those; a copy of the solvers for descent and for another place.
+
+use rayon::prelude::*;
+
+use incise_xpbd::{KappaLimit, StepSettings};
+
+use super::Simulation;
+use crate::backend::{AnySolver, each};
+use crate::group::{Group, kappa_limit};
+use crate::joined::substeps;
+use crate::limits::{self, value};
+use crate::method::settings;
+use crate::place::Place;
+use crate::plan::{Plan, Recipe};
+use crate::recluster::Recluster;
+use crate::scene::{Method, SolverSpec};
+use crate::sleep::Rest;
+use crate::substeps::Choice;
+use crate::{Error, Scene};
+
+/// What other settings make of a group; what is `None` stays.
+#[derive(Debug)]
+struct Retuned {
+    settings: StepSettings,
+    choice: Option<Choice>,
+    /// The limit of kappa before and from now on.
+    limits: [Option<KappaLimit>; 2],
+    plan: Option<Plan>,
+    /// With the limit from now on.
+    solver: Option<AnySolver>,
+}
+
+impl Simulation {
+    /// The settings of the solver as they are now: those of the scene, or of the last [`Simulation::retune`].
+    #[must_use]
+    pub fn solver_spec(&self) -> &SolverSpec {
+        &self.solver
+    }
+
+    /// Has the simulation go on with other settings of the solver from the next frame on. Whatever is cut, moves and
+    /// holds stays as it is. At frame 0 the result is to the bit a simulation set up with these settings.
+    ///
+    /// * `time_step`: handles and strokes go by frames, so they pass through the world faster or slower; obstacles keep
+    ///   their velocities; the simulated time goes on from where it is.
+    /// * `substeps`, `max_substeps`: `auto` chooses anew, from the tets as they are now, if one of these, `time_step` or
+    ///   whether there is a limit of kappa changes. Substeps that bodies ask for themselves stay.
+    /// * `kappa_limit`, or another time of a substep: tets are softened to the new limit, and those that need not be any
+    ///   more are what their material says.
+    /// * `clustering`, `coloring`, `merge_clusters`: clusters and colors of all tets are made anew.
+    /// * `recluster`: counts the wear since clusters and colors were made anew last. Those in the making are still taken,
+    ///   unless they are those of other settings.
+    /// * `backend`, and with `auto` also `method` and `clustering`: the state goes over to a device or comes back. The
+    ///   device is the present one, or that of `offer_device`, or one that the simulation has left, or else it is opened.
+    /// * `preset`: a name only. Its defaults are applied when a scene is read.
+    ///
+    /// Any difference wakes all bodies, for they were at rest under the settings before. Settings equal to those before
+    /// change nothing.
+    ///
+    /// Costs what differs: see this module's head in the source; iterations, relaxation, form and methods other than
+    /// descent cost nothing.
+    ///
+    /// # Errors
+    /// As [`Simulation::new`] for these settings, and if `precision` differs. Nothing has changed then.
+    ///
+    /// # Example
+    /// ```
+    /// use incise::{Scene, Simulation, scene::{Method, SolverSpec}};
+    ///
+    /// let scene = Scene::from_toml("[[body]]\nshape = { kind = \"sphere\", tets = 300 }")?;
+    /// let mut simulation = Simulation::new(&scene)?;
+    /// simulation.step()?;
+    /// let spec = SolverSpec { iterations: 3, ..simulation.solver_spec().clone() };
+    /// simulation.retune(&spec)?;
+    /// simulation.step()?;
+    /// simulation.retune(&SolverSpec::of(Method::Descent))?;
+    /// simulation.step()?;
+    /// assert_eq!(simulation.solver_spec().method, Method::Descent);
+    /// # Ok::<(), incise::Error>(())
+    /// ```
+    pub fn retune(&mut self, solver: &SolverSpec) -> Result<(), Error> {
+        if *solver == self.solver {
+            return Ok(());
+        }
+        if solver.precision != self.precision {
+            let range = format!(
+                "{}, as when the simulation was set up",
+                self.precision.name()
+            );
+            return Err(value("solver.precision", solver.precision.name(), range));
+        }
+        let Scene {
+            world,
+            body,
+            collider,
+            handle,
+            link,
+            ..
+        } = &*self.scene;
+        let scene = Scene {
+            solver: solver.clone(),
+            world: *world,
+            body: body.clone(),
+            collider: collider.clone(),
+            handle: handle.clone(),
+            link: link.clone(),
+            // Strokes are under way, and reports are not the solver's business.
+            ..Scene::default()
+        };
+        let settings = settings(&scene)?;
+        limits::check(&scene)?;
+        let place = self.place_for(&scene)?;
+        if !is_light(&self.solver, solver) {
+            self.read_back()?;
+        }
+        let retuned = || {
+            let groups = self.groups.par_iter();
+            groups
+                .map(|group| Retuned::of(group, &self.solver, &scene, &settings, &place))
+                .collect::<Result<Vec<_>, Error>>()
+        };
+        let retuned = match &self.pool {
+            Some(pool) => pool.install(retuned),
+            None => retuned(),
+        }?;
+
+        // Nothing fails from here on: what is on a device has been fetched.
+        for (group, retuned) in self.groups.iter_mut().zip(retuned) {
+            retuned.take_effect(group, solver)?;
+        }
+        if settings.time_step.to_bits() != self.time_step.to_bits() {
+            self.epoch = (self.next_frame, self.time_at(self.next_frame));
+            self.time_step = settings.time_step;
+        }
+        self.leave_device();
+        self.place = place;
+        self.solver = solver.clone();
+        self.residuals_kept = false;
+        if self.next_frame == 0 {
+            self.report_before_the_first();
+        }
+        Ok(())
+    }
+
+    /// Hands a device over that is open, a window's above all: it is the one to be used when [`Simulation::retune`] asks
+    /// for one next and the simulation is not on one. Without an offer the simulation goes back to a device that it has
+    /// left, or opens one as [`Simulation::new`] does.
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    ///
+    /// use incise::gpu::{GpuContext, GpuError, GpuOptions};
+    /// use incise::scene::{Backend, SolverSpec};
+    /// use incise::{Scene, Simulation};
+    ///
+    /// let gpu = match GpuContext::new(&GpuOptions::from_env()) {
+    ///     Ok(gpu) => Arc::new(gpu),
+    ///     Err(GpuError::NoAdapter { .. }) => return Ok(()),
+    ///     Err(other) => return Err(other.into()),
+    /// };
+    /// let scene = Scene::from_toml("[[body]]\nshape = { kind = \"sphere\", tets = 300 }")?;
+    /// let mut simulation = Simulation::new(&scene)?;
+    /// simulation.offer_device(gpu);
+    /// simulation.step()?;
+    /// let spec = SolverSpec { backend: Backend::Gpu, ..simulation.solver_spec().clone() };
+    /// simulation.retune(&spec)?;
+    /// assert_eq!(simulation.step()?.backend, "gpu");
+    /// # Ok::<(), incise::Error>(())
+    /// ```
+    #[cfg(feature = "gpu")]
+    pub fn offer_device(&mut self, gpu: std::sync::Arc<crate::gpu::GpuContext>) {
+        self.at_hand.gpu = Some(gpu);
+    }
+
+    /// Where the scene with other settings is computed.
+    fn place_for(&self, scene: &Scene) -> Result<Place, Error> {
+        let (before, after) = (&self.solver, &scene.solver);
+        if (before.backend, before.method, &before.clustering)
+            == (after.backend, after.method, &after.clustering)
+        {
+            return Ok(self.place.clone());
+        }
+        Place::choose(scene, &self.place.or(&self.at_hand))
+    }
+
+    /// Keeps the present device at hand, unless another one is.
+    pub(super) fn leave_device(&mut self) {
+        #[cfg(feature = "gpu")]
+        if self.at_hand.gpu.is_none() {
+            self.at_hand.gpu.clone_from(&self.place.gpu);
+        }
+    }
+}
+
+/// Whether a step asks for all that differs, and nothing has been made of it.
+fn is_light(before: &SolverSpec, after: &SolverSpec) -> bool {
+    let is_descent = |spec: &SolverSpec| spec.method == Method::Descent;
+    let light = SolverSpec {
+        preset: before.preset,
+        iterations: before.iterations,
+        method: if is_descent(before) == is_descent(after) {
+            before.method
+        } else {
+            after.method
+        },
+        form: before.form,
+        relaxation: before.relaxation,
+        spectral_radius: before.spectral_radius,
+        delay: before.delay,
+        recluster: before.recluster,
+        sleep: before.sleep,
+        ..after.clone()
+    };
+    light == *before
+}
+
+impl Retuned {
+    /// What becomes of a group under the settings of `scene`.
+    fn of(
+        group: &Group,
+        before: &SolverSpec,
+        scene: &Scene,
+        settings: &StepSettings,
+        place: &Place,
+    ) -> Result<Self, Error> {
+        let after = &scene.solver;
+        let soft = || each!(&group.solver, solver => solver.attachments().any(|held| held.compliance > 0.0));
+        if after.method == Method::Descent && soft() {
+            let range = "another one while something is held by a compliance";
+            return Err(value("solver.method", "descent", range));
+        }
+        let mesh = group.cuttable.mesh();
+        let mut settings = StepSettings {
+            substeps: group.settings.substeps,
+            colliders: group.settings.colliders.clone(),
+            ..settings.clone()
+        };
+        let mut choice = group.choice;
+        if substeps_follow_from(before) != substeps_follow_from(after) {
+            let bodies = group.bodies.iter().map(|&body| &scene.body[body]);
+            let asked: Vec<_> = bodies
+                .map(|body| body.substeps.unwrap_or(after.substeps))
+                .collect();
+            (settings.substeps, choice) = substeps(&asked, after, &group.solver, mesh);
+        }
+        let limits = [
+            kappa_limit(before, &group.settings),
+            kappa_limit(after, &settings),
+        ];
+        let planned = |spec: &SolverSpec| {
+            let SolverSpec {
+                clustering,
+                coloring,
+                ..
+            } = spec;
+            (clustering.clone(), coloring.clone(), spec.merge_clusters)
+        };
+        let plan = (planned(before) != planned(after))
+            .then(|| Plan::of(Recipe::new(after)?, mesh))
+            .transpose()?;
+        let mut solver = None;
+        if Self::needs_another_solver(group, before, after, limits, place)? {
+            let mut copy = group.solver.clone();
+            copy.limit_kappa(limits[0], limits[1], mesh)?;
+            copy.end_descent();
+            copy.prepare(after, place)?;
+            solver = Some(copy);
+        }
+        Ok(Self {
+            settings,
+            choice,
+            limits,
+            plan,
+            solver,
+        })
+    }
+
+    /// Whether the solver is in the wrong place or form, or knows not, or wrongly, what descent has to.
+    fn needs_another_solver(
+        group: &Group,
+        before: &SolverSpec,
+        after: &SolverSpec,
+        limits: [Option<KappaLimit>; 2],
+        place: &Place,
+    ) -> Result<bool, Error> {
+        if !group.solver.is_at(place, after)? {
+            return Ok(true);
+        }
+        let softens = || limits[0] != limits[1] && limits.iter().any(|l| group.solver.exceeds(*l));
+        Ok(after.method == Method::Descent
+            && ((before.method, before.coarse) != (after.method, after.coarse) || softens()))
+    }
+
+    fn take_effect(self, group: &mut Group, spec: &SolverSpec) -> Result<(), Error> {
+        match self.solver {
+            Some(solver) => group.solver = solver,
+            None => {
+                let [before, after] = self.limits;
+                let mesh = group.cuttable.mesh();
+                group.solver.limit_kappa(before, after, mesh)?;
+                if spec.method != Method::Descent {
+                    group.solver.end_descent();
+                }
+            }
+        }
+        let planned = self.plan.is_some();
+        if let Some(plan) = self.plan {
+            group.plan = plan;
+            group.reschedule_volumes()?;
+        }
+        group.recluster = match (spec.recluster, group.recluster.take()) {
+            (Some(spec), Some(old)) if !planned => Some(old.with(spec)),
+            (spec, _) => spec.map(Recluster::new),
+        };
+        group.rest = spec.sleep.map(Rest::new);
+        group.settings = self.settings;
+        group.choice = self.choice;
+        Ok(())
+    }
+}
+
+/// What the substeps of a group follow from.
+fn substeps_follow_from(spec: &SolverSpec) -> impl PartialEq + use<> {
+    let limited = spec.kappa_limit.is_finite();
+    (
+        spec.time_step.to_bits(),
+        spec.substeps,
+        spec.max_substeps,
+        limited,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::each_mut;
+
+    /// Not every hold is a handle of the scene.
+    #[test]
+    fn descent_is_refused_while_something_is_held_softly() {
+        let scene = Scene::from_toml("[[body]]\nshape = { kind = \"box\", tets = 200 }").unwrap();
+        let mut simulation = Simulation::new(&scene).unwrap();
+        let hold = |simulation: &mut Simulation, compliance| -> Result<(), Error> {
+            each_mut!(&mut simulation.groups[0].solver, solver => {
+                let handle = solver.add_handle(incise_xpbd::Pose::at(glam::DVec3::ZERO));
+                solver.attach(0, handle, compliance, 0.0).unwrap();
+            });
+            Ok(())
+        };
+        let descent = SolverSpec::of(Method::Descent);
+        hold(&mut simulation, 1e-3).unwrap();
+        let error = simulation.retune(&descent).unwrap_err();
+        assert!(error.to_string().contains("compliance"), "{error}");
+        simulation.step().unwrap();
+        hold(&mut simulation, 0.0).unwrap();
+        simulation.retune(&descent).unwrap();
+        simulation.step().unwrap();
+    }
+}

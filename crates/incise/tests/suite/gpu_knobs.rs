@@ -1,0 +1,261 @@
+//! Snapshots and other settings on a GPU, and the ways there and back.
+
+use std::sync::Arc;
+
+use incise::scene::{Backend, Method, Quantity, SolverSpec};
+use incise::{Error, Scene, Simulation};
+
+use crate::gpu::{farthest, gpu};
+use crate::snapshot::{everything, halving};
+use crate::support::{body, scene};
+
+/// A beam that is held, and a box; small, for the sake of time.
+fn two_bodies() -> Scene {
+    let beam = body("beam", 300, [0.0, 0.0, 0.0]);
+    let cube = body("box", 200, [0.0, 2.0, 0.0]);
+    let mut scene = scene(&format!(
+        "[world]\ngravity = [0.0, 0.0, -9.81]\n\
+         {beam}fixed = [{{ half_space = {{ point = [-0.45, 0.0, 0.0], normal = [-1.0, 0.0, 0.0] }} }}]\n\
+         {cube}"
+    ));
+    scene.solver.substeps = 2.into();
+    scene
+}
+
+/// Goes on for three frames, the second with a cut; what is to be seen after each.
+fn go_on(simulation: &mut Simulation) -> Vec<Vec<u64>> {
+    let frames = (0..3).map(|frame| {
+        if frame == 1 {
+            simulation.cut(halving(0.1)).unwrap();
+        }
+        simulation.step().unwrap();
+        simulation.check().unwrap();
+        everything(simulation)
+    });
+    frames.collect()
+}
+
+fn on(backend: Backend, spec: &SolverSpec) -> SolverSpec {
+    SolverSpec {
+        backend,
+        ..spec.clone()
+    }
+}
+
+#[test]
+fn a_device_goes_on_as_it_did() {
+    let Some(gpu) = gpu("a_device_goes_on_as_it_did") else {
+        return;
+    };
+    let plain = two_bodies().solver;
+    for solver in [
+        plain.clone(),
+        SolverSpec {
+            method: Method::Jacobi,
+            iterations: 3,
+            relaxation: 0.05,
+            ..plain.clone()
+        },
+        SolverSpec {
+            clustering: "pressure:64".into(),
+            ..plain
+        },
+    ] {
+        let mut scene = two_bodies();
+        scene.solver = solver;
+        let mut there = Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap();
+        there.cut(halving(-0.1)).unwrap();
+        (0..2).for_each(|_| assert!(there.step().is_ok()));
+        let snapshot = there.snapshot().unwrap();
+        let then = go_on(&mut there);
+        assert_eq!(there.report().pieces, 6);
+        // In the same, in one that is set up anew, and in one that was on the processor.
+        let mut fresh = Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap();
+        let mut here = Simulation::new(&scene).unwrap();
+        for simulation in [&mut there, &mut fresh, &mut here] {
+            simulation.restore(&snapshot).unwrap();
+            assert!(go_on(simulation) == then, "{:?}", scene.solver);
+            assert_eq!(simulation.report().backend, "gpu");
+        }
+    }
+}
+
+#[test]
+fn a_device_at_the_start_is_as_if_set_up_so() {
+    let Some(gpu) = gpu("a_device_at_the_start_is_as_if_set_up_so") else {
+        return;
+    };
+    let plain = SolverSpec {
+        backend: Backend::Gpu,
+        ..two_bodies().solver
+    };
+    for solver in [
+        SolverSpec {
+            substeps: 3.into(),
+            kappa_limit: 0.05,
+            ..plain.clone()
+        },
+        SolverSpec {
+            clustering: "pressure:64".into(),
+            ..plain.clone()
+        },
+        SolverSpec {
+            iterations: 2,
+            ..plain.clone()
+        },
+        SolverSpec {
+            method: Method::Chebyshev,
+            iterations: 3,
+            relaxation: 0.05,
+            ..plain
+        },
+    ] {
+        let mut scene = two_bodies();
+        let [mut from_here, mut from_there] = [
+            Simulation::new(&scene).unwrap(),
+            Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap(),
+        ];
+        assert_eq!(from_there.solver_spec().backend, Backend::Gpu);
+        from_here.offer_device(Arc::clone(&gpu));
+        scene.solver = solver.clone();
+        let mut expected = Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap();
+        let then = go_on(&mut expected);
+        for simulation in [&mut from_here, &mut from_there] {
+            simulation.retune(&solver).unwrap();
+            let mut devices = simulation.device_solvers();
+            assert!(devices.all(|device| Arc::ptr_eq(device.gpu(), &gpu)));
+            drop(devices);
+            assert!(go_on(simulation) == then, "{solver:?}");
+        }
+    }
+}
+
+/// There, cut, tuned, and back: the same motion as of a body that never left the processor.
+#[test]
+fn the_state_goes_there_and_comes_back() {
+    let Some(gpu) = gpu("the_state_goes_there_and_comes_back") else {
+        return;
+    };
+    let scene = two_bodies();
+    let mut stays = Simulation::new(&scene).unwrap();
+    let mut moves = Simulation::new(&scene).unwrap();
+    moves.offer_device(gpu);
+    let limited = SolverSpec {
+        kappa_limit: 0.1,
+        ..scene.solver.clone()
+    };
+    let places = [
+        (Backend::Cpu, &scene.solver),
+        (Backend::Gpu, &scene.solver),
+        (Backend::Gpu, &limited),
+        (Backend::Cpu, &limited),
+        (Backend::Gpu, &scene.solver),
+    ];
+    for (turn, (backend, solver)) in places.into_iter().enumerate() {
+        stays.retune(solver).unwrap();
+        moves.read_back().unwrap();
+        let before = moves.positions().to_vec();
+        moves.retune(&on(backend, solver)).unwrap();
+        assert_eq!(moves.positions(), before);
+        for simulation in [&mut stays, &mut moves] {
+            if turn % 2 == 1 {
+                let at = 0.1 * turn as f64 - 0.2;
+                simulation.cut(halving(at)).unwrap();
+            }
+            (0..2).for_each(|_| assert!(simulation.step().is_ok()));
+            simulation.check().unwrap();
+        }
+        let name = if backend == Backend::Gpu {
+            "gpu"
+        } else {
+            "cpu"
+        };
+        assert_eq!(moves.report().backend, name);
+        assert_eq!(moves.backend_note().is_some(), backend == Backend::Gpu);
+        moves.read_back().unwrap();
+        assert_eq!(stays.mesh().tets, moves.mesh().tets);
+        assert_eq!(stays.softened(), moves.softened());
+        // The body has a length of 1: single precision and ten frames.
+        let far = farthest(stays.positions(), moves.positions());
+        assert!(far < 1e-4, "{turn}: {far}");
+    }
+}
+
+/// A snapshot says where it is computed, too.
+#[test]
+fn a_snapshot_goes_back_to_its_place() {
+    let Some(gpu) = gpu("a_snapshot_goes_back_to_its_place") else {
+        return;
+    };
+    let scene = two_bodies();
+    let mut simulation = Simulation::new(&scene).unwrap();
+    simulation.offer_device(gpu);
+    simulation.step().unwrap();
+    let here = simulation.snapshot().unwrap();
+    let then = go_on(&mut simulation);
+    simulation.retune(&on(Backend::Gpu, &scene.solver)).unwrap();
+    simulation.step().unwrap();
+    let there = simulation.snapshot().unwrap();
+    simulation.restore(&here).unwrap();
+    assert!(go_on(&mut simulation) == then);
+    assert_eq!(simulation.report().backend, "cpu");
+    simulation.restore(&there).unwrap();
+    assert_eq!(simulation.step().unwrap().backend, "gpu");
+    // It knows the way by itself now.
+    simulation.restore(&here).unwrap();
+    simulation.retune(&on(Backend::Gpu, &scene.solver)).unwrap();
+    assert_eq!(simulation.step().unwrap().backend, "gpu");
+}
+
+#[test]
+fn a_device_is_refused_what_it_does_not_do() {
+    let Some(gpu) = gpu("a_device_is_refused_what_it_does_not_do") else {
+        return;
+    };
+    let scene = two_bodies();
+    let plain = &scene.solver;
+    let descent = SolverSpec::of(Method::Descent);
+    let mut there = Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap();
+    there.step().unwrap();
+    let error = there.retune(&on(Backend::Gpu, &descent)).unwrap_err();
+    assert!(
+        matches!(&error, Error::Value { field, .. } if field == "solver.method"),
+        "{error}"
+    );
+    assert_eq!(there.step().unwrap().backend, "gpu");
+    there.check().unwrap();
+    // Automatically it goes where it can.
+    there.retune(&on(Backend::Auto, &descent)).unwrap();
+    assert!(there.backend_note().unwrap().contains("solver.method"));
+    assert_eq!(there.step().unwrap().backend, "cpu");
+    there.retune(&on(Backend::Auto, plain)).unwrap();
+    let name = if gpu.adapter().software { "cpu" } else { "gpu" };
+    assert_eq!(there.step().unwrap().backend, name);
+}
+
+/// As on the processor but for rounding, and only in the frames that report them.
+#[test]
+fn a_device_knows_the_residuals_of_its_tets() {
+    let Some(gpu) = gpu("a_device_knows_the_residuals_of_its_tets") else {
+        return;
+    };
+    let mut scene = two_bodies();
+    scene.report.every = 2;
+    scene.report.quantities = vec![Quantity::Residual];
+    let mut there = Simulation::on_device(&scene, gpu).unwrap();
+    for frame in 0..4 {
+        there.step().unwrap();
+        let Some(of_tets) = there.residuals_of_tets() else {
+            assert!(frame % 2 == 1, "{frame}");
+            // Nor does the frame before the last one count when somebody looks.
+            there.read_back().unwrap();
+            assert!(there.residuals_of_tets().is_none());
+            continue;
+        };
+        assert!(frame % 2 == 0);
+        let dual = there.report().residual.unwrap().dual.unwrap();
+        let sum: f64 = of_tets.iter().map(|left| left * left).sum();
+        // Sums of hundreds of squares in double precision, in another order.
+        assert!(dual > 0.0 && (sum.sqrt() / dual - 1.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,136 @@
+//! A scene with everything in it that cuts, holds and is in the way, and settings to solve it with, each in its own way.
+
+use incise::Scene;
+use incise::scene::{Form, Method, ReclusterSpec, SleepSpec, SolverSpec, Substeps};
+
+use crate::support::{body, plane, scene, sweep};
+
+/// A beam that is held and swept, and a box; both can be cut.
+pub(crate) fn two_bodies() -> Scene {
+    let beam = body("beam", 300, [0.0, 0.0, 0.0]);
+    let cube = body("box", 200, [0.0, 2.0, 0.0]);
+    let sweep = sweep(
+        [1, 4],
+        [[0.05, -1.0, 0.4], [0.1, 3.0, 0.4]],
+        [0.0, 0.0, -0.8],
+    );
+    let plane = plane(3, [-0.1, 0.0, 0.0], [1.0, 0.2, 0.0]);
+    scene(&format!(
+        "[world]\ngravity = [0.0, 0.0, -9.81]\nground = {{ height = -0.6, friction = 0.4 }}\n\
+         {beam}fixed = [{{ half_space = {{ point = [-0.45, 0.0, 0.0], normal = [-1.0, 0.0, 0.0] }} }}]\n\
+         {cube}{sweep}{plane}\n\
+         [[collider]]\nkind = \"sphere\"\ncenter = [0.2, 0.0, 0.5]\nradius = 0.1\nvelocity = [0.0, 0.0, -1.0]\n\
+         [[handle]]\nbody = 0\nholds = [{{ half_space = {{ point = [0.45, 0.0, 0.0], normal = [1.0, 0.0, 0.0] }} }}]\n\
+         frames = [0, 6]\npath = [[0.0, 0.0, 0.0], [0.05, 0.0, 0.0]]"
+    ))
+}
+
+/// Settings that differ from the defaults, each in something else, by name.
+pub(crate) fn settings() -> Vec<(&'static str, SolverSpec)> {
+    let of = SolverSpec::of;
+    let plain = SolverSpec::default;
+    vec![
+        ("nothing", plain()),
+        (
+            "iterations",
+            SolverSpec {
+                iterations: 3,
+                relaxation: 0.9,
+                form: Form::Sequential,
+                ..plain()
+            },
+        ),
+        ("jacobi", of(Method::Jacobi)),
+        ("chebyshev", of(Method::Chebyshev)),
+        ("descent", of(Method::Descent)),
+        (
+            "descent with a limit",
+            SolverSpec {
+                kappa_limit: 0.02,
+                ..of(Method::Descent)
+            },
+        ),
+        (
+            "corrected descent with a limit",
+            SolverSpec {
+                substeps: 1.into(),
+                iterations: 3,
+                coarse: true,
+                kappa_limit: 0.05,
+                ..of(Method::Descent)
+            },
+        ),
+        (
+            "substeps",
+            SolverSpec {
+                substeps: 2.into(),
+                ..plain()
+            },
+        ),
+        (
+            "auto",
+            SolverSpec {
+                substeps: Substeps::Auto,
+                max_substeps: 7,
+                ..plain()
+            },
+        ),
+        (
+            "time step",
+            SolverSpec {
+                time_step: 0.008,
+                ..plain()
+            },
+        ),
+        (
+            "low limit",
+            SolverSpec {
+                kappa_limit: 0.02,
+                ..plain()
+            },
+        ),
+        (
+            "no limit",
+            SolverSpec {
+                kappa_limit: f64::INFINITY,
+                ..plain()
+            },
+        ),
+        (
+            "clusters",
+            SolverSpec {
+                clustering: "none".into(),
+                coloring: "scgc".into(),
+                ..plain()
+            },
+        ),
+        (
+            "wear",
+            SolverSpec {
+                merge_clusters: false,
+                recluster: Some(ReclusterSpec {
+                    wear: 1.01,
+                    frames: std::num::NonZeroU32::MIN.saturating_add(1),
+                }),
+                ..plain()
+            },
+        ),
+        (
+            "sleep",
+            SolverSpec {
+                sleep: Some(SleepSpec {
+                    speed: 1.0,
+                    time: 0.02,
+                }),
+                ..plain()
+            },
+        ),
+    ]
+}
+
+/// The scene solved with other settings.
+pub(crate) fn with(scene: &Scene, solver: &SolverSpec) -> Scene {
+    let mut scene = scene.clone();
+    scene.solver = solver.clone();
+    scene
+}
