@@ -58,7 +58,7 @@ pub(crate) struct RunArguments {
     /// Number of threads, at most 1024 [default: one for each core]. The result is the same for any number.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) threads: Option<u16>,
-    /// Folder for scene, frames, surfaces and last mesh.
+    /// Folder for scene, frames, surfaces, pictures and last mesh.
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub(crate) out: Option<PathBuf>,
     /// Write one JSON object per frame to this file as well.
@@ -80,8 +80,8 @@ pub(crate) struct RunArguments {
     /// [default: -60,22,1].
     #[arg(long, value_name = "AZIMUTH,ELEVATION[,ZOOM]", value_parser = view, allow_hyphen_values = true)]
     pub(crate) view: Option<[f64; 3]>,
-    /// What the colors in pictures show: tissue, color, cluster, piece or stretch.
-    #[arg(long, value_name = "NAME", default_value_t, value_parser = coloring)]
+    /// What the colors in pictures show: tissue, color, cluster, piece, stretch or residual, which every frame then reports.
+    #[arg(long, value_name = "NAME", default_value_t)]
     pub(crate) color_by: ColorBy,
     /// Draw the edges of triangles.
     #[arg(long)]
@@ -125,15 +125,6 @@ fn view(text: &str) -> Result<[f64; 3], String> {
         "degrees around, degrees from -90 to 90 and a zoom from 0.001 to 1000, as in -60,22,1.5, are needed"
             .to_owned()
     })
-}
-
-/// What colors show, of what a run knows.
-fn coloring(name: &str) -> Result<ColorBy, String> {
-    let by = name.parse::<ColorBy>();
-    match by {
-        Ok(ColorBy::Residual) => Err("a run does not know residuals of tets".to_owned()),
-        other => other.map_err(|error| error.to_string()),
-    }
 }
 
 #[derive(Debug, Args)]

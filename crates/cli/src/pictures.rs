@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use incise::scene::StrokeSpec;
 use incise::{Scene, Simulation};
 use incise_render::{
-    Camera, Film, Painting, Picture, RenderError, Renderer, Style, blade_at, contact_sheet,
+    Camera, ColorBy, Film, Painting, Picture, RenderError, Renderer, Style, blade_at, contact_sheet,
 };
 
 use crate::args::RunArguments;
@@ -148,7 +148,10 @@ impl Pictures {
         {
             self.painting.add_blade(&blade);
         }
-        self.painting.color(simulation, self.style.color_by, None)?;
+        let by = self.style.color_by;
+        let wanted = by == ColorBy::Residual;
+        let residuals = wanted.then(|| simulation.residuals_of_tets()).flatten();
+        self.painting.color(simulation, by, residuals.as_deref())?;
         let (painting, camera) = (&self.painting, &self.camera);
         self.renderer
             .picture(painting, simulation, camera, &self.style, self.size)

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use anyhow::anyhow;
-use incise::scene::{Backend, Precision};
+use incise::scene::{Backend, Method, Precision, Quantity};
 use incise::{Error, Scene, Simulation};
-use incise_render::Film;
+use incise_render::{ColorBy, Film};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::args::{BackendName, PrecisionName, RunArguments};
@@ -108,6 +108,16 @@ fn scene(arguments: &RunArguments) -> Result<Scene, Failure> {
             body.ok_or_else(|| Failure::Input(anyhow!("--mesh needs a scene with a [[body]]")))?;
         body.mesh = Some(mesh.clone());
         body.shape = None;
+    }
+    if arguments.color_by == ColorBy::Residual && scene.solver.method == Method::Descent {
+        let why = "--color-by residual needs constraints: the scene is solved by descent";
+        return Err(Failure::Input(anyhow!(why)));
+    }
+    if arguments.color_by == ColorBy::Residual {
+        scene.report.every = 1;
+        if !scene.report.quantities.contains(&Quantity::Residual) {
+            scene.report.quantities.push(Quantity::Residual);
+        }
     }
     match arguments.precision {
         Some(PrecisionName::F32) => scene.solver.precision = Precision::F32,

@@ -42,3 +42,8 @@ pub use sheet::contact_sheet;
 pub use software::SoftwareRenderer;
 pub use stretch::stretch;
 pub use style::{ColorBy, Style};
+
+/// The example of the README, run as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

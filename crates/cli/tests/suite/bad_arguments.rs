@@ -163,10 +163,6 @@ fn arguments_that_do_not_exist() {
             &["run", "scene.toml", "--color-by", "blue"],
             &["blue", "tissue, color, cluster"],
         ),
-        (
-            &["run", "scene.toml", "--color-by", "residual"],
-            &["--color-by", "residual"],
-        ),
         (&["color"], &["INPUT"]),
         (&["mesh"], &["info"]),
     ] {

@@ -2,6 +2,7 @@
 
 use std::fs;
 
+use crate::bad_input::refused_in_a_sentence;
 use crate::support::Place;
 
 /// A run of the small scene with these arguments more; what it printed.
@@ -118,6 +119,7 @@ fn how_it_is_seen_can_be_chosen() {
         &["--color-by", "color"],
         &["--color-by", "stretch", "--wireframe"],
         &["--wireframe"],
+        &["--color-by", "residual"],
     ]
     .into_iter()
     .enumerate()
@@ -140,4 +142,25 @@ fn how_it_is_seen_can_be_chosen() {
     ];
     run(&place, &[&usual[..], &["--view", "-60,22"]].concat());
     assert!(fs::read(place.path("again/frame_00001.png")).unwrap() == pictures[0]);
+}
+
+#[test]
+fn residuals_are_shown_where_there_are_some() {
+    let place = Place::with_scene();
+    let usual = [
+        "--frames",
+        "2",
+        "--size",
+        "30x20",
+        "--quiet",
+        "--color-by",
+        "residual",
+    ];
+    run(&place, &usual);
+    let lines = place.read("out/frames.jsonl");
+    assert_eq!(lines.matches("\"residual\":").count(), 2, "{lines}");
+    let scene = crate::support::SCENE.replace("[world]", "[solver]\nmethod = \"descent\"\n[world]");
+    place.write("descent.toml", scene);
+    let command = [&["run", "descent.toml"], &usual[..]].concat();
+    refused_in_a_sentence(&place, &command, &["--color-by residual", "descent"]);
 }
