@@ -103,8 +103,20 @@ impl GpuContext {
     pub fn new(options: &GpuOptions) -> Result<Self, GpuError> {
         let adapter = choose(options)?;
         let info = adapter.get_info();
+        let opened = block_on(adapter.request_device(&Self::descriptor(&adapter)));
+        let (device, queue) = opened.map_err(|error| GpuError::Refused {
+            adapter: info.name.clone(),
+            message: error.to_string(),
+        })?;
+        Ok(Self::from_device(device, queue))
+    }
+
+    /// What to ask an adapter for that is to compute, for renderers that open the device: WebGPU's default limits, buffers
+    /// as large as there are, timestamps if there are any.
+    #[must_use]
+    pub fn descriptor(adapter: &Adapter) -> wgpu::DeviceDescriptor<'static> {
         let present = adapter.limits();
-        let descriptor = wgpu::DeviceDescriptor {
+        wgpu::DeviceDescriptor {
             label: Some("incise"),
             required_features: adapter.features() & Features::TIMESTAMP_QUERY,
             required_limits: Limits {
@@ -114,17 +126,11 @@ impl GpuContext {
             },
             memory_hints: wgpu::MemoryHints::Performance,
             ..wgpu::DeviceDescriptor::default()
-        };
-        let opened = block_on(adapter.request_device(&descriptor));
-        let (device, queue) = opened.map_err(|error| GpuError::Refused {
-            adapter: info.name.clone(),
-            message: error.to_string(),
-        })?;
-        Ok(Self::from_device(device, queue))
+        }
     }
 
     /// Takes a device that somebody else has opened, a renderer above all: what is computed here can be drawn there
-    /// without a copy. It must allow WebGPU's default limits.
+    /// without a copy. It must allow WebGPU's default limits, see [`GpuContext::descriptor`].
     #[must_use]
     pub fn from_device(device: Device, queue: Queue) -> Self {
         let report = Report::default();

@@ -295,7 +295,10 @@ fn hands_go_on_where_they_were() {
         go_on(&mut simulation, 2);
         simulation.restore(&snapshot).unwrap();
         assert!(work(&mut simulation, 5..12) == then, "it went on otherwise");
-        assert!(simulation.mesh().tets.len() > tets, "the blade goes on, too");
+        assert!(
+            simulation.mesh().tets.len() > tets,
+            "the blade goes on, too"
+        );
         // Other settings leave hands as they are.
         let spec = SolverSpec {
             substeps: Substeps::Fixed(9),

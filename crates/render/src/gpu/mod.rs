@@ -99,7 +99,7 @@ impl GpuRenderer {
     }
 
     /// Draws into textures of its own and returns the finished picture's, which stays the same until the size changes, for
-    /// a window to show: `Rgba8UnormSrgb`, to be sampled, copied or drawn over. Returns when the commands are with the
+    /// a window to show: its colors as they are stored (`Rgba8Unorm`), to be sampled. Returns when the commands are with the
     /// driver.
     ///
     /// A simulation on this device is drawn from there, once it has made a step since the painting was made or reset. Of
@@ -134,7 +134,7 @@ impl GpuRenderer {
             .send(&self.gpu, painting, simulation, &solvers, style, &view)?;
         self.record(&target, &solvers);
         self.gpu.check()?;
-        Ok(&self.target.insert(target).resolved)
+        Ok(&self.target.insert(target).shown)
     }
 
     /// Hands over the commands that draw what was sent.

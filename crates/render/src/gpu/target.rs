@@ -10,6 +10,8 @@ use crate::impression::SIDE;
 use crate::{Picture, RenderError};
 
 pub(super) const COLOR: TextureFormat = TextureFormat::Rgba8UnormSrgb;
+/// The format of colors without their meaning: eight bits each, as they are stored.
+const STORED: TextureFormat = TextureFormat::Rgba8Unorm;
 pub(super) const DEPTH: TextureFormat = TextureFormat::Depth32Float;
 /// Of the impression on the ground.
 pub(super) const DARK: TextureFormat = TextureFormat::R8Unorm;
@@ -23,6 +25,8 @@ pub(super) struct Target {
     pub(super) samples: wgpu::TextureView,
     pub(super) depth: wgpu::TextureView,
     pub(super) resolved: wgpu::TextureView,
+    /// The same texture as it is stored, for windows that take colors as they are.
+    pub(super) shown: wgpu::TextureView,
     texture: wgpu::Texture,
 }
 
@@ -30,7 +34,7 @@ impl Target {
     pub(super) fn new(gpu: &GpuContext, size: [u32; 2]) -> Result<Self, RenderError> {
         let device = gpu.device();
         let memory = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
-        let texture = |label, format, sample_count, usage| {
+        let texture = |label, format, sample_count, usage, view_formats| {
             device.create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),
                 size: extent(size),
@@ -39,14 +43,14 @@ impl Target {
                 dimension: wgpu::TextureDimension::D2,
                 format,
                 usage,
-                view_formats: &[],
+                view_formats,
             })
         };
         let drawn = TextureUsages::RENDER_ATTACHMENT;
-        let samples = texture("samples", COLOR, SAMPLES, drawn);
-        let depth = texture("depth", DEPTH, SAMPLES, drawn);
+        let samples = texture("samples", COLOR, SAMPLES, drawn, &[]);
+        let depth = texture("depth", DEPTH, SAMPLES, drawn, &[]);
         let shown = drawn | TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_SRC;
-        let resolved = texture("picture", COLOR, 1, shown);
+        let resolved = texture("picture", COLOR, 1, shown, &[STORED]);
         if pollster::block_on(memory.pop()).is_some() {
             let bytes = u64::from(size[0]) * u64::from(size[1]) * u64::from(8 * SAMPLES + 4);
             let what = "a picture";
@@ -59,6 +63,11 @@ impl Target {
             samples: view(&samples),
             depth: view(&depth),
             resolved: view(&resolved),
+            shown: resolved.create_view(&wgpu::TextureViewDescriptor {
+                format: Some(STORED),
+                usage: Some(TextureUsages::TEXTURE_BINDING),
+                ..wgpu::TextureViewDescriptor::default()
+            }),
             texture: resolved,
         })
     }
