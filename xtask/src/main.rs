@@ -15,6 +15,7 @@ mod solver;
 mod stability;
 mod sweep;
 mod trade;
+mod viewer;
 mod wear;
 
 use anyhow::Context;
@@ -107,6 +108,8 @@ enum Command {
     Sweep(sweep::SweepArguments),
     /// What accuracy costs: errors against Newton's method beside times, for every knob of the solver.
     Trade(ExperimentArguments),
+    /// Use the viewer with a synthetic hand on a screen without a monitor, and check what it shows (needs Xvfb).
+    ViewerSmoke(viewer::SmokeArguments),
     /// Cut a mesh many times in small strokes, and see what becomes of clusters, colors and the time to solve.
     Wear(wear::WearArguments),
 }
@@ -129,6 +132,7 @@ fn main() -> anyhow::Result<()> {
         Command::Stability(arguments) => stability::stability(&arguments),
         Command::Sweep(arguments) => sweep::sweep(&arguments),
         Command::Trade(arguments) => trade::trade(&arguments),
+        Command::ViewerSmoke(arguments) => viewer::smoke(&arguments),
         Command::Wear(arguments) => wear::wear(&arguments),
     }
 }

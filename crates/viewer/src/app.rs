@@ -1,0 +1,430 @@
+//! [`Viewer`]: the window.
+//!
+//! Each of its frames takes input, lets simulated time catch up with real time, draws, and lays panel and overlays around
+//! the picture. Errors of a running body stop it and are shown in a dialog; nothing is lost and nothing panics.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use eframe::egui::{
+    self, Align2, CentralPanel, Color32, Context, Frame, Panel, PointerButton, Pos2, Rect,
+    Response, Sense, Stroke, Ui, Window,
+};
+use incise::gpu::GpuContext;
+use incise::scene::Backend;
+use incise_render::Style;
+
+use crate::canvas::Canvas;
+use crate::graphics;
+use crate::help::{self, Action};
+use crate::load::{Loading, Source, TETS};
+use crate::pace::Pace;
+use crate::panel::{self, Controls, Wishes};
+use crate::stage::Stage;
+use crate::tool::Tool;
+
+/// The window.
+pub(crate) struct Viewer {
+    canvas: Canvas,
+    gpu: Option<Arc<GpuContext>>,
+    backend: Backend,
+    notes: Vec<String>,
+    stage: Option<Stage>,
+    loading: Option<Loading>,
+    /// A sentence that waits to be read.
+    error: Option<String>,
+    style: Style,
+    tool: Tool,
+    pace: Pace,
+    running: bool,
+    has_panel: bool,
+    has_help: bool,
+    /// What is typed into the field for a file.
+    file: String,
+    /// The line that is being drawn, in points of the window.
+    line: Vec<Pos2>,
+}
+
+impl Viewer {
+    pub(crate) fn new(
+        creation: &eframe::CreationContext<'_>,
+        source: Source,
+        backend: Backend,
+        paused: bool,
+    ) -> Self {
+        let state = creation.wgpu_render_state.as_ref();
+        let mut notes = Vec::new();
+        let gpu = match state.map(graphics::share) {
+            Some(Ok(gpu)) => Some(gpu),
+            Some(Err(why)) => {
+                notes.push(why);
+                None
+            }
+            None => None,
+        };
+        let (canvas, note) = Canvas::new(state, gpu.as_ref());
+        notes.extend(note);
+        let mut viewer = Self {
+            canvas,
+            gpu,
+            backend,
+            notes,
+            stage: None,
+            loading: None,
+            error: None,
+            style: Style::default(),
+            tool: Tool::default(),
+            pace: Pace::default(),
+            running: !paused,
+            has_panel: true,
+            has_help: false,
+            file: String::new(),
+            line: Vec::new(),
+        };
+        viewer.load(&creation.egui_ctx, source);
+        viewer
+    }
+
+    fn load(&mut self, context: &Context, source: Source) {
+        let (wake, gpu) = (context.clone(), self.gpu.clone());
+        let wake = move || wake.request_repaint();
+        self.loading = Some(Loading::start(source, self.backend, gpu, wake));
+    }
+
+    fn load_file(&mut self, context: &Context, path: &Path) {
+        match Source::new(Some(path), TETS) {
+            Ok(source) => self.load(context, source),
+            Err(error) => self.error = Some(format!("{error:#}")),
+        }
+    }
+
+    /// Keeps an error for the dialog and stops.
+    fn fail(&mut self, error: &anyhow::Error) {
+        self.error = Some(format!("{error:#}"));
+        self.running = false;
+        self.pace.pause();
+    }
+
+    fn take(&mut self, result: anyhow::Result<()>) {
+        if let Err(error) = result {
+            self.fail(&error);
+        }
+    }
+
+    /// Does something with the stage, if there is one; keeps its error for the dialog.
+    fn with_stage(&mut self, act: impl FnOnce(&mut Stage) -> anyhow::Result<()>) {
+        if let Some(result) = self.stage.as_mut().map(act) {
+            self.take(result);
+        }
+    }
+
+    fn take_files(&mut self, context: &Context) {
+        let dropped = context.input(|input| input.raw.dropped_files.first().cloned());
+        if let Some(file) = dropped {
+            self.load_file(context, file.path());
+        }
+        let Some(result) = self.loading.as_ref().and_then(Loading::poll) else {
+            return;
+        };
+        self.loading = None;
+        let stage = result.and_then(|loaded| {
+            let note = loaded.simulation.backend_note().map(str::to_owned);
+            Stage::new(loaded).map(|stage| (stage, note))
+        });
+        match stage {
+            Ok((stage, note)) => {
+                context.send_viewport_cmd(egui::ViewportCommand::Title(format!(
+                    "{} - incise",
+                    stage.name
+                )));
+                self.notes.truncate(1);
+                self.notes.extend(note);
+                self.stage = Some(stage);
+                self.pace.pause();
+            }
+            // What was loaded before goes on.
+            Err(error) => self.error = Some(format!("{error:#}")),
+        }
+    }
+
+    fn act(&mut self, action: Action) {
+        match action {
+            Action::Pause => {
+                self.running = !self.running;
+                self.pace.pause();
+            }
+            Action::Step => {
+                self.running = false;
+                self.with_stage(Stage::step);
+            }
+            Action::Reset => self.with_stage(Stage::reset),
+            Action::Undo => {
+                let undone = self.stage.as_mut().map_or(Ok(None), Stage::undo);
+                match undone {
+                    // It would cut again at once.
+                    Ok(Some(true)) => {
+                        self.running = false;
+                        self.pace.pause();
+                    }
+                    Ok(_) => {}
+                    Err(error) => self.fail(&error),
+                }
+            }
+            Action::Take(tool) => {
+                self.let_go();
+                self.tool = tool;
+            }
+            Action::Fit => self.with_stage(|stage| {
+                stage.fit();
+                Ok(())
+            }),
+            Action::Wireframe => self.style.wireframe = !self.style.wireframe,
+            Action::Smooth => self.style.smooth = !self.style.smooth,
+            Action::Color(by) => self.style.color_by = by,
+            Action::Panel => self.has_panel = !self.has_panel,
+            Action::Help => self.has_help = !self.has_help,
+            Action::Cancel => {
+                self.let_go();
+                (self.has_help, self.error) = (false, None);
+            }
+        }
+    }
+
+    fn let_go(&mut self) {
+        self.line.clear();
+        if let Some(stage) = &mut self.stage {
+            stage.lift_blade();
+            stage.let_go();
+        }
+    }
+
+    /// What the mouse does in the picture.
+    fn mouse(&mut self, response: &Response, rect: Rect) {
+        let context = &response.ctx;
+        let size = [f64::from(rect.width()), f64::from(rect.height())];
+        let pixel = |at: Pos2| {
+            let at = at - rect.min;
+            [f64::from(at.x), f64::from(at.y)]
+        };
+        let Some(stage) = &mut self.stage else {
+            return;
+        };
+        let by = |button| response.dragged_by(button);
+        let delta = response.drag_delta();
+        let part = |points: f32| f64::from(points) / size[1];
+        let turns =
+            by(PointerButton::Secondary) || (self.tool == Tool::Turn && by(PointerButton::Primary));
+        if turns {
+            stage
+                .camera
+                .orbit(-4.0 * part(delta.x), 4.0 * part(delta.y));
+        } else if by(PointerButton::Middle) {
+            stage.camera.pan(-part(delta.x), part(delta.y));
+        }
+        if response.hovered() {
+            let (wheel, pinch) =
+                context.input(|input| (input.smooth_scroll_delta().y, input.zoom_delta()));
+            let factor = (-0.002 * f64::from(wheel)).exp() / f64::from(pinch);
+            if factor != 1.0 {
+                stage.camera.zoom(factor);
+            }
+        }
+        if self.tool == Tool::Turn {
+            return;
+        }
+        let places = places(context);
+        let primary = PointerButton::Primary;
+        let result = if response.drag_started_by(primary) {
+            let origin = context.input(|input| input.pointer.press_origin());
+            let at = origin
+                .or(response.interact_pointer_pos())
+                .unwrap_or(rect.min);
+            self.line = vec![at];
+            match self.tool {
+                Tool::Blade => stage.press_blade(pixel(at), size),
+                _ => stage.take(pixel(at), size).map(|_| ()),
+            }
+        } else {
+            Ok(())
+        };
+        let result = result.and_then(|()| {
+            if !response.dragged_by(primary) {
+                return Ok(());
+            }
+            match self.tool {
+                Tool::Blade => places.iter().try_for_each(|&at| {
+                    self.line.push(at);
+                    stage.draw_blade(pixel(at), size)
+                }),
+                _ => places
+                    .last()
+                    .map_or(Ok(()), |&at| stage.pull(pixel(at), size)),
+            }
+        });
+        if response.drag_stopped_by(primary) {
+            self.let_go();
+        }
+        self.take(result);
+    }
+
+    /// Lets simulated time catch up.
+    fn advance(&mut self) {
+        let Some(stage) = &mut self.stage else {
+            return;
+        };
+        if !self.running {
+            return;
+        }
+        let time_step = stage.solver().time_step;
+        let mut result = Ok(());
+        self.pace.run(Instant::now(), time_step, || {
+            result = stage.step();
+            result.is_ok()
+        });
+        self.take(result);
+    }
+
+    fn picture(&mut self, ui: &mut Ui) {
+        let rect = ui.available_rect_before_wrap();
+        let response = ui.allocate_rect(rect, Sense::click_and_drag());
+        self.mouse(&response, rect);
+        self.advance();
+        let Some(stage) = &mut self.stage else {
+            return;
+        };
+        let drawn = stage
+            .color(self.style.color_by)
+            .and_then(|()| self.canvas.show(ui, rect, stage, &self.style));
+        overlay(ui, rect, stage, &self.line);
+        self.take(drawn);
+    }
+
+    fn windows(&mut self, context: &Context) {
+        if let Some(loading) = &self.loading {
+            Window::new("Loading")
+                .title_bar(false)
+                .resizable(false)
+                .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
+                .show(context, |ui| {
+                    ui.horizontal(|ui| {
+                        ui.spinner();
+                        let seconds = loading.since.elapsed().as_secs();
+                        ui.label(format!("{} … {seconds} s", loading.name));
+                    });
+                });
+        }
+        if context.input(|input| !input.raw.hovered_files.is_empty()) {
+            Window::new("Drop")
+                .title_bar(false)
+                .resizable(false)
+                .anchor(Align2::CENTER_CENTER, [0.0, 60.0])
+                .show(context, |ui| {
+                    ui.label("let go to load: a scene, a tet mesh, a closed surface");
+                });
+        }
+        if let Some(error) = &self.error {
+            let mut closed = false;
+            Window::new("That did not work")
+                .collapsible(false)
+                .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
+                .show(context, |ui| {
+                    ui.label(error);
+                    closed = ui.button("close").clicked();
+                });
+            if closed {
+                self.error = None;
+            }
+        }
+        if self.has_help {
+            help::show(context, &mut self.has_help);
+        }
+    }
+
+    fn fulfil(&mut self, context: &Context, wishes: Wishes) {
+        if let Some(path) = wishes.file {
+            self.load_file(context, &path);
+        }
+        for action in wishes.actions {
+            self.act(action);
+        }
+        if let Some(on) = wishes.measure {
+            self.with_stage(|stage| stage.measure(on));
+        }
+        if let Some(turn) = wishes.turn {
+            let turned = self
+                .stage
+                .as_mut()
+                .map_or(Ok(()), |stage| stage.turn(&turn));
+            // A knob that cannot be turned is no reason to stop.
+            self.error = turned.err().map(|error| format!("{error:#}"));
+        }
+    }
+}
+
+impl eframe::App for Viewer {
+    fn ui(&mut self, ui: &mut Ui, _: &mut eframe::Frame) {
+        let context = ui.ctx().clone();
+        self.take_files(&context);
+        for action in help::actions(&context) {
+            self.act(action);
+        }
+        let mut wishes = Wishes::default();
+        if let Some(stage) = self.stage.as_mut().filter(|_| self.has_panel) {
+            let mut controls = Controls {
+                running: self.running,
+                tool: self.tool,
+                style: &mut self.style,
+                pace: &mut self.pace,
+                has_gpu: self.gpu.is_some(),
+                file: &mut self.file,
+                notes: &self.notes,
+            };
+            Panel::right("panel").exact_size(340.0).show(ui, |ui| {
+                wishes = panel::show(ui, stage, &mut controls);
+            });
+        }
+        self.fulfil(&context, wishes);
+        CentralPanel::default()
+            .frame(Frame::NONE)
+            .show(ui, |ui| self.picture(ui));
+        self.windows(&context);
+        let busy = self.loading.is_some() || (self.running && self.stage.is_some());
+        if busy {
+            context.request_repaint();
+        }
+    }
+}
+
+/// All places of the pointer since the last frame, so that a fast stroke keeps its shape; if the button went down
+/// meanwhile, those since then.
+fn places(context: &Context) -> Vec<Pos2> {
+    context.input(|input| {
+        let mut places = Vec::new();
+        for event in &input.raw.events {
+            match event {
+                egui::Event::PointerMoved(at) => places.push(*at),
+                egui::Event::PointerButton { pressed: true, .. } => places.clear(),
+                _ => {}
+            }
+        }
+        places
+    })
+}
+
+/// The drawn line, the hand and what the button would do.
+fn overlay(ui: &Ui, rect: Rect, stage: &Stage, line: &[Pos2]) {
+    let painter = ui.painter_at(rect);
+    if stage.cuts() && line.len() > 1 {
+        let thin = Stroke::new(1.5, Color32::from_rgb(190, 30, 30));
+        painter.line(line.to_vec(), thin);
+    }
+    if let Some(to) = stage.hand() {
+        let size = [f64::from(rect.width()), f64::from(rect.height())];
+        if let Some(at) = stage.camera.project(to, size) {
+            #[expect(clippy::cast_possible_truncation, reason = "pixels of a window")]
+            let at = rect.min + egui::vec2(at.x as f32, at.y as f32);
+            painter.circle_stroke(at, 7.0, Stroke::new(2.0, Color32::from_rgb(30, 90, 190)));
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! [`Canvas`]: the picture of the body in the window.
+//!
+//! On a device that can simulate the picture is drawn by it, from the buffers in which the solver computes, into a texture
+//! that the window shows. Elsewhere the processor draws, as for pictures of a run, and the window gets the pixels.
+
+use std::sync::Arc;
+
+use eframe::egui::{self, Color32, ColorImage, Rect, TextureHandle, TextureId, TextureOptions};
+use eframe::egui_wgpu::RenderState;
+use incise::gpu::{GpuContext, wgpu};
+use incise_render::{GpuRenderer, SoftwareRenderer, Style};
+
+use crate::stage::Stage;
+
+/// Who draws.
+pub(crate) enum Canvas {
+    /// The window's device.
+    Device {
+        state: RenderState,
+        renderer: Box<GpuRenderer>,
+        /// What the window knows the texture as, and how large that is.
+        shown: Option<(TextureId, [u32; 2])>,
+    },
+    /// The processor.
+    Processor {
+        renderer: SoftwareRenderer,
+        texture: Option<TextureHandle>,
+    },
+}
+
+impl Canvas {
+    /// Draws on the window's device if it can, else the reason for not doing so is the second part.
+    pub(crate) fn new(
+        state: Option<&RenderState>,
+        gpu: Option<&Arc<GpuContext>>,
+    ) -> (Self, Option<String>) {
+        let processor = Self::Processor {
+            renderer: SoftwareRenderer::new(),
+            texture: None,
+        };
+        let (Some(state), Some(gpu)) = (state, gpu) else {
+            return (processor, None);
+        };
+        match GpuRenderer::new(Arc::clone(gpu)) {
+            Ok(renderer) => {
+                let device = Self::Device {
+                    state: state.clone(),
+                    renderer: Box::new(renderer),
+                    shown: None,
+                };
+                (device, None)
+            }
+            Err(error) => (processor, Some(format!("drawn by the processor: {error}"))),
+        }
+    }
+
+    /// Draws the stage into a part of the window.
+    pub(crate) fn show(
+        &mut self,
+        ui: &egui::Ui,
+        rect: Rect,
+        stage: &mut Stage,
+        style: &Style,
+    ) -> anyhow::Result<()> {
+        let size = pixels(rect, ui.ctx().pixels_per_point());
+        let texture = match self {
+            Self::Device {
+                state,
+                renderer,
+                shown,
+            } => {
+                let view = renderer.draw(
+                    &stage.painting,
+                    &stage.simulation,
+                    &stage.camera,
+                    style,
+                    size,
+                )?;
+                let mut known = state.renderer.write();
+                let nearest = wgpu::FilterMode::Nearest;
+                match *shown {
+                    Some((id, old)) => {
+                        if old != size {
+                            let device = &state.device;
+                            known.update_egui_texture_from_wgpu_texture(device, view, nearest, id);
+                            *shown = Some((id, size));
+                        }
+                        id
+                    }
+                    None => {
+                        let id = known.register_native_texture(&state.device, view, nearest);
+                        *shown = Some((id, size));
+                        id
+                    }
+                }
+            }
+            Self::Processor { renderer, texture } => {
+                stage.simulation.read_back()?;
+                let picture = renderer.picture(
+                    &stage.painting,
+                    &stage.simulation,
+                    &stage.camera,
+                    style,
+                    size,
+                )?;
+                let size = [picture.width as usize, picture.height as usize];
+                let image = ColorImage::from_rgba_unmultiplied(size, &picture.rgba);
+                match texture {
+                    Some(texture) => texture.set(image, TextureOptions::NEAREST),
+                    None => {
+                        let context = ui.ctx();
+                        *texture =
+                            Some(context.load_texture("body", image, TextureOptions::NEAREST));
+                    }
+                }
+                match texture {
+                    Some(texture) => texture.id(),
+                    None => return Ok(()),
+                }
+            }
+        };
+        let whole = Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
+        ui.painter().image(texture, rect, whole, Color32::WHITE);
+        Ok(())
+    }
+}
+
+/// The size of a part of the window in pixels, at least one each way.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "windows have some thousand pixels"
+)]
+fn pixels(rect: Rect, per_point: f32) -> [u32; 2] {
+    let of = |points: f32| (points * per_point).round().clamp(1.0, 16384.0) as u32;
+    [of(rect.width()), of(rect.height())]
+}

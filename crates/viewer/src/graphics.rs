@@ -1,0 +1,60 @@
+//! The window's device: one for drawing and, if it can, for simulating.
+//!
+//! An adapter that allows what the kernels need gets a device that both share, so that what is computed is drawn
+//! without a copy. A lesser one (OpenGL of an old driver) only shows the window: bodies are then simulated and drawn by
+//! the processor, and the panel says so.
+
+use std::sync::Arc;
+
+use eframe::egui_wgpu::{RenderState, WgpuConfiguration, WgpuSetup, WgpuSetupCreateNew};
+use incise::gpu::{GpuContext, wgpu};
+
+/// How the window opens its device.
+pub(crate) fn configuration() -> WgpuConfiguration {
+    let mut setup = WgpuSetupCreateNew::without_display_handle();
+    let lesser = Arc::clone(&setup.device_descriptor);
+    setup.device_descriptor = Arc::new(move |adapter| {
+        if can_simulate(adapter) {
+            GpuContext::descriptor(adapter)
+        } else {
+            lesser(adapter)
+        }
+    });
+    WgpuConfiguration {
+        wgpu_setup: WgpuSetup::CreateNew(setup),
+        ..WgpuConfiguration::default()
+    }
+}
+
+/// Whether an adapter allows what the kernels need.
+fn can_simulate(adapter: &wgpu::Adapter) -> bool {
+    wgpu::Limits::default().check_limits(&adapter.limits())
+}
+
+/// The window's device for simulating and drawing, or why it is not one.
+pub(crate) fn share(state: &RenderState) -> Result<Arc<GpuContext>, String> {
+    if can_simulate(&state.adapter) {
+        let (device, queue) = (state.device.clone(), state.queue.clone());
+        return Ok(Arc::new(GpuContext::from_device(device, queue)));
+    }
+    let info = state.adapter.get_info();
+    Err(format!(
+        "{} ({}) cannot run the kernels: simulated and drawn by the processor",
+        info.name, info.backend
+    ))
+}
+
+/// A sentence for whoever gets no window.
+pub(crate) fn why_no_window(error: &eframe::Error) -> String {
+    match error {
+        eframe::Error::WinitEventLoop(error) => format!(
+            "no window can be opened, is there a display (DISPLAY, WAYLAND_DISPLAY)? `incise run` makes pictures \
+             without one ({error})"
+        ),
+        eframe::Error::Wgpu(error) => format!(
+            "no graphics adapter can show a window (Vulkan, Metal, Direct3D 12, OpenGL); `incise run` makes pictures \
+             without one ({error})"
+        ),
+        other => format!("no window can be opened: {other}"),
+    }
+}

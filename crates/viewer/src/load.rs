@@ -1,0 +1,236 @@
+//! [`Source`]: what is to be loaded, and [`Loading`]: the thread that does it.
+//!
+//! A scene is taken as it is. A mesh alone is put on a table, glued to it by its lowest part, at the size of an organ; a
+//! closed surface is filled with tets first. Setting up a million tets takes seconds, so the window does not wait for it.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::time::Instant;
+
+use anyhow::{Context, anyhow};
+use incise::gpu::GpuContext;
+use incise::mesh::glam::DVec3;
+use incise::mesh::{Solid, generate, io};
+use incise::scene::{Backend, BodySpec, GroundSpec, Region};
+use incise::{Scene, Simulation};
+
+/// Tets to fill a surface with if nobody says.
+pub(crate) const TETS: u32 = 11_000;
+
+/// The longest side of a mesh that comes without a scene, in m.
+const SIZE: f64 = 0.25;
+
+/// What is to be loaded.
+#[derive(Clone, Debug)]
+pub(crate) enum Source {
+    /// A scene and its name.
+    Scene(Box<Scene>, String),
+    /// A mesh or a surface without a scene, and tets to fill a surface with.
+    Mesh(PathBuf, u32),
+}
+
+impl Source {
+    /// What a file holds, or the built-in scene.
+    ///
+    /// A scene is read here, so that its errors are known at once; a mesh only has to exist.
+    pub(crate) fn new(path: Option<&Path>, tets: u32) -> anyhow::Result<Self> {
+        let Some(path) = path else {
+            let name = "built-in liver".to_owned();
+            return Ok(Self::Scene(Box::new(Scene::built_in()), name));
+        };
+        if path
+            .extension()
+            .is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
+        {
+            let scene = Scene::load(path).with_context(|| path.display().to_string())?;
+            return Ok(Self::Scene(Box::new(scene), name_of(path)));
+        }
+        if !path.is_file() {
+            return Err(anyhow!("{}: there is no such file", path.display()));
+        }
+        Ok(Self::Mesh(path.to_owned(), tets))
+    }
+
+    /// For the title.
+    pub(crate) fn name(&self) -> String {
+        match self {
+            Self::Scene(_, name) => name.clone(),
+            Self::Mesh(path, _) => name_of(path),
+        }
+    }
+
+    fn scene(&self) -> anyhow::Result<(Scene, Option<tempfile::TempPath>)> {
+        match self {
+            Self::Scene(scene, _) => Ok(((**scene).clone(), None)),
+            Self::Mesh(path, tets) => around(path, *tets),
+        }
+    }
+}
+
+fn name_of(path: &Path) -> String {
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    name.to_string_lossy().into_owned()
+}
+
+/// A scene around a mesh, and the file of its tets if it was a surface.
+fn around(path: &Path, tets: u32) -> anyhow::Result<(Scene, Option<tempfile::TempPath>)> {
+    let mut filled = None;
+    let mut file = path.to_owned();
+    let mesh = if io::is_surface(path) {
+        let surface = io::read_surface(path)?;
+        let solid = Solid::new(&surface).with_context(|| path.display().to_string())?;
+        let mesh = generate::tetrahedralize(&solid, tets as usize, 0)
+            .with_context(|| path.display().to_string())?;
+        let temporary = tempfile::Builder::new().suffix(".vtk").tempfile()?;
+        let temporary = temporary.into_temp_path();
+        io::write(&temporary, &mesh)?;
+        file = temporary.to_path_buf();
+        filled = Some(temporary);
+        mesh
+    } else {
+        io::read(path)?
+    };
+    let start = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+    let [low, high] = mesh
+        .positions
+        .iter()
+        .fold(start, |[low, high], x| [low.min(*x), high.max(*x)]);
+    let scale = SIZE / (high - low).max_element();
+    if !scale.is_finite() {
+        return Err(anyhow!("{}: the mesh has no extent", path.display()));
+    }
+    let (low, high) = (low * scale, high * scale);
+    let mut scene = Scene::built_in();
+    scene.stroke.clear();
+    let table = GroundSpec {
+        height: 0.0,
+        friction: 0.5,
+    };
+    scene.world.ground = Some(table);
+    let model: &BodySpec = &scene.body[0];
+    let glued = Region::HalfSpace {
+        point: [0.0, 0.0, 0.1 * (high.z - low.z)],
+        normal: [0.0, 0.0, -1.0],
+    };
+    scene.body = vec![BodySpec {
+        mesh: Some(file),
+        shape: None,
+        scale,
+        position: [-(low.x + high.x) / 2.0, -(low.y + high.y) / 2.0, -low.z],
+        fixed: vec![glued],
+        ..model.clone()
+    }];
+    Ok((scene, filled))
+}
+
+/// What was loaded.
+#[derive(Debug)]
+pub(crate) struct Loaded {
+    pub(crate) name: String,
+    pub(crate) scene: Scene,
+    pub(crate) simulation: Simulation,
+}
+
+/// Something on its way.
+#[derive(Debug)]
+pub(crate) struct Loading {
+    pub(crate) name: String,
+    pub(crate) since: Instant,
+    receiver: Receiver<anyhow::Result<Loaded>>,
+}
+
+impl Loading {
+    /// Starts to load; `wake` is called when it is done. `gpu` is the window's device, if it can simulate.
+    pub(crate) fn start(
+        source: Source,
+        backend: Backend,
+        gpu: Option<Arc<GpuContext>>,
+        wake: impl FnOnce() + Send + 'static,
+    ) -> Self {
+        let (sender, receiver) = channel();
+        let name = source.name();
+        std::thread::spawn(move || {
+            // Nobody may be left to take it.
+            let _ = sender.send(load(&source, backend, gpu));
+            wake();
+        });
+        Self {
+            name,
+            since: Instant::now(),
+            receiver,
+        }
+    }
+
+    /// What was loaded, once it is.
+    pub(crate) fn poll(&self) -> Option<anyhow::Result<Loaded>> {
+        match self.receiver.try_recv() {
+            Ok(result) => Some(result),
+            Err(TryRecvError::Empty) => None,
+            Err(TryRecvError::Disconnected) => Some(Err(anyhow!("{}: loading failed", self.name))),
+        }
+    }
+}
+
+fn load(source: &Source, backend: Backend, gpu: Option<Arc<GpuContext>>) -> anyhow::Result<Loaded> {
+    let (mut scene, _file) = source.scene()?;
+    // The window's device or none: one of its own could not be drawn from.
+    scene.solver.backend = Backend::Cpu;
+    let mut simulation = Simulation::new(&scene)?;
+    if let Some(gpu) = gpu {
+        simulation.offer_device(gpu);
+        if backend != Backend::Cpu {
+            scene.solver.backend = backend;
+            simulation.retune(&scene.solver)?;
+        }
+    }
+    Ok(Loaded {
+        name: source.name(),
+        scene,
+        simulation,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mesh_alone_is_an_organ_on_a_table() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("body.vtk");
+        let mesh = generate::kuhn_box([4, 2, 6], DVec3::new(40.0, 20.0, 60.0));
+        io::write(&path, &mesh).unwrap();
+        let loaded = load(&Source::new(Some(&path), TETS).unwrap(), Backend::Cpu, None).unwrap();
+        let positions = loaded.simulation.positions();
+        let high = positions.iter().fold(DVec3::NEG_INFINITY, |a, b| a.max(*b));
+        let low = positions.iter().fold(DVec3::INFINITY, |a, b| a.min(*b));
+        // The solver's positions are single.
+        assert!((high - low - DVec3::new(4.0, 2.0, 6.0) * SIZE / 6.0).length() < 1e-7);
+        assert!(low.z.abs() < 1e-7 && (low.x + high.x).abs() < 1e-7);
+        assert_eq!(loaded.name, "body.vtk");
+    }
+
+    #[test]
+    fn a_surface_is_filled() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("body.stl");
+        let mesh = generate::kuhn_box([2; 3], DVec3::ONE);
+        io::write_surface(&path, &io::TriangleSurface::boundary_of(&mesh)).unwrap();
+        let loaded = load(&Source::new(Some(&path), 2000).unwrap(), Backend::Cpu, None).unwrap();
+        let tets = loaded.simulation.mesh().tets.len();
+        assert!((1000..4000).contains(&tets), "{tets}");
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_said() {
+        let missing = Source::new(Some(Path::new("missing.vtk")), TETS).unwrap_err();
+        assert!(missing.to_string().contains("missing.vtk"));
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("broken.vtk");
+        std::fs::write(&path, "nothing").unwrap();
+        let source = Source::new(Some(&path), TETS).unwrap();
+        let error = load(&source, Backend::Cpu, None).unwrap_err();
+        assert!(format!("{error:#}").contains("broken.vtk"));
+    }
+}

@@ -1,0 +1,121 @@
+//! [`Pace`]: how many frames of the simulation a frame of the window carries.
+//!
+//! Simulated time follows real time. Who is too slow falls behind instead of freezing the window: what does not fit into
+//! [`PATIENCE`] is dropped, and the panel tells by how much the body lags.
+
+use std::time::{Duration, Instant};
+
+/// The most time that the window spends on simulating before it shows something.
+const PATIENCE: Duration = Duration::from_millis(40);
+
+/// Weight of the newest frame in the mean speed.
+const NEWEST: f64 = 0.05;
+
+/// The clock of a simulation.
+#[derive(Debug)]
+pub(crate) struct Pace {
+    /// Wanted simulated time for each second.
+    pub(crate) speed: f64,
+    last: Option<Instant>,
+    /// Simulated time that is due in s.
+    due: f64,
+    /// Mean simulated time for each second.
+    reached: f64,
+}
+
+impl Default for Pace {
+    fn default() -> Self {
+        Self {
+            speed: 1.0,
+            last: None,
+            due: 0.0,
+            reached: 0.0,
+        }
+    }
+}
+
+impl Pace {
+    /// Starts anew, after a pause.
+    pub(crate) fn pause(&mut self) {
+        (self.last, self.due) = (None, 0.0);
+    }
+
+    /// Calls `step` as often as time has passed for, each call for a frame of `time_step` seconds, until it returns
+    /// false.
+    pub(crate) fn run(&mut self, now: Instant, time_step: f64, mut step: impl FnMut() -> bool) {
+        let passed = self.last.map(|last| (now - last).as_secs_f64());
+        self.last = Some(now);
+        let Some(passed) = passed else {
+            step();
+            return;
+        };
+        self.due += passed * self.speed;
+        let mut done = 0.0;
+        while self.due >= time_step {
+            if now.elapsed() > PATIENCE {
+                self.due = 0.0;
+                break;
+            }
+            self.due -= time_step;
+            done += time_step;
+            if !step() {
+                break;
+            }
+        }
+        if passed > 0.0 {
+            self.reached += NEWEST * (done / passed - self.reached);
+        }
+    }
+
+    /// Mean simulated time for each second, of late.
+    pub(crate) fn reached(&self) -> f64 {
+        self.reached
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_follow_the_clock() {
+        let (mut pace, start) = (Pace::default(), Instant::now());
+        let mut frames = 0;
+        for tick in 0..=50 {
+            // In the future, so that no patience is lost.
+            let now = start + Duration::from_secs(1000) + Duration::from_millis(20 * tick);
+            pace.run(now, 0.005, || {
+                frames += 1;
+                true
+            });
+        }
+        // The first tick has nothing to follow and makes one; then a second's worth, up to rounding.
+        assert!((200..=201).contains(&frames), "{frames}");
+    }
+
+    #[test]
+    fn what_does_not_fit_is_dropped() {
+        let (mut pace, start) = (Pace::default(), Instant::now());
+        let past = start - Duration::from_millis(500);
+        pace.run(past, 0.01, || true);
+        let mut frames = 0;
+        // Half a second is due, and the clock says that patience is over.
+        pace.run(past + Duration::from_millis(300), 0.01, || {
+            frames += 1;
+            true
+        });
+        assert_eq!((frames, pace.due), (0, 0.0));
+    }
+
+    #[test]
+    fn a_failed_frame_ends_it() {
+        let (mut pace, start) = (Pace::default(), Instant::now() + Duration::from_secs(1000));
+        pace.run(start, 0.01, || true);
+        let mut frames = 0;
+        pace.run(start + Duration::from_secs(1), 0.01, || {
+            frames += 1;
+            frames < 3
+        });
+        assert_eq!(frames, 3);
+    }
+}

@@ -1,0 +1,272 @@
+//! The panel at the side: what the body is, what a frame costs, and the knobs.
+
+use std::path::PathBuf;
+
+use eframe::egui::{
+    Button, Color32, ComboBox, Grid, Key, RichText, ScrollArea, Slider, TextEdit, Ui,
+};
+use incise_render::{ColorBy, Legend, Style};
+
+use crate::help::Action;
+use crate::knobs::{self, Turn};
+use crate::pace::Pace;
+use crate::stage::Stage;
+use crate::tool::Tool;
+
+/// What the panel shows and changes beside the stage.
+#[derive(Debug)]
+pub(crate) struct Controls<'a> {
+    pub(crate) running: bool,
+    pub(crate) tool: Tool,
+    pub(crate) style: &'a mut Style,
+    pub(crate) pace: &'a mut Pace,
+    /// Whether a GPU can be chosen.
+    pub(crate) has_gpu: bool,
+    /// A file that somebody types.
+    pub(crate) file: &'a mut String,
+    /// What is to be said about where it is computed and drawn.
+    pub(crate) notes: &'a [String],
+}
+
+/// What was asked for in the panel.
+#[derive(Debug, Default)]
+pub(crate) struct Wishes {
+    pub(crate) actions: Vec<Action>,
+    pub(crate) turn: Option<Turn>,
+    /// A file to load.
+    pub(crate) file: Option<PathBuf>,
+    /// Whether residuals are to be measured, if that was changed.
+    pub(crate) measure: Option<bool>,
+}
+
+/// Shows the panel.
+pub(crate) fn show(ui: &mut Ui, stage: &mut Stage, controls: &mut Controls<'_>) -> Wishes {
+    let mut wishes = Wishes::default();
+    ScrollArea::vertical().show(ui, |ui| {
+        ui.add_space(4.0);
+        ui.heading(&stage.name);
+        buttons(ui, stage, controls, &mut wishes);
+        ui.separator();
+        tools(ui, stage, controls, &mut wishes);
+        ui.separator();
+        look(ui, stage, controls);
+        ui.separator();
+        counts(ui, stage, controls, &mut wishes);
+        stage.times.show(ui);
+        ui.separator();
+        ui.strong("Speed and accuracy");
+        wishes.turn = knobs::show(ui, stage.solver(), controls.has_gpu);
+        effects(ui, stage);
+        ui.separator();
+        files(ui, controls, &mut wishes);
+        for note in controls.notes {
+            ui.label(RichText::new(note).weak().small());
+        }
+    });
+    wishes
+}
+
+fn buttons(ui: &mut Ui, stage: &Stage, controls: &mut Controls<'_>, wishes: &mut Wishes) {
+    ui.horizontal_wrapped(|ui| {
+        let pause = if controls.running { "pause" } else { "go on" };
+        for (text, action, on) in [
+            (pause, Action::Pause, true),
+            ("step", Action::Step, !controls.running),
+            ("reset", Action::Reset, true),
+            ("undo cut", Action::Undo, stage.strokes() > 0),
+            ("fit", Action::Fit, true),
+            ("help", Action::Help, true),
+        ] {
+            if ui.add_enabled(on, Button::new(text)).clicked() {
+                wishes.actions.push(action);
+            }
+        }
+    });
+    ui.add(
+        Slider::new(&mut controls.pace.speed, 0.05..=2.0)
+            .logarithmic(true)
+            .text("of real time"),
+    );
+}
+
+fn tools(ui: &mut Ui, stage: &mut Stage, controls: &mut Controls<'_>, wishes: &mut Wishes) {
+    ui.horizontal(|ui| {
+        for (tool, name) in [
+            (Tool::Blade, "blade"),
+            (Tool::Hand, "hand"),
+            (Tool::Turn, "turn"),
+        ] {
+            let mut chosen = controls.tool;
+            if ui.selectable_value(&mut chosen, tool, name).clicked() {
+                wishes.actions.push(Action::Take(tool));
+            }
+        }
+    });
+    let grip = &mut stage.grip;
+    match controls.tool {
+        Tool::Blade => {
+            ui.add(
+                Slider::new(&mut grip.depth, 0.02..=1.0)
+                    .text("depth")
+                    .custom_formatter(|depth, _| match depth {
+                        depth if depth >= 1.0 => "through".to_owned(),
+                        depth => format!("{:.0} %", 100.0 * depth),
+                    }),
+            );
+            ui.add(Slider::new(&mut grip.snap, 0.0..=0.25).text("snap"));
+        }
+        Tool::Hand => {
+            ui.add(Slider::new(&mut grip.radius, 0.01..=0.3).text("radius"));
+            ui.add(
+                Slider::new(&mut grip.compliance, 1e-5..=1.0)
+                    .logarithmic(true)
+                    .text("softness in m/N"),
+            );
+        }
+        Tool::Turn => {}
+    }
+}
+
+fn look(ui: &mut Ui, stage: &Stage, controls: &mut Controls<'_>) {
+    let style = &mut *controls.style;
+    ui.horizontal(|ui| {
+        ComboBox::from_label("colors")
+            .selected_text(style.color_by.to_string())
+            .show_ui(ui, |ui| {
+                for by in ColorBy::ALL {
+                    ui.selectable_value(&mut style.color_by, by, by.to_string());
+                }
+            });
+        ui.checkbox(&mut style.wireframe, "wireframe");
+        ui.checkbox(&mut style.smooth, "smooth");
+    });
+    if let Some(legend) = &stage.legend {
+        bar(ui, legend);
+    }
+}
+
+/// The colors of a legend from low to high.
+fn bar(ui: &mut Ui, legend: &Legend) {
+    use eframe::egui::{Rect, Sense, vec2};
+
+    let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), 10.0), Sense::hover());
+    let parts = 48;
+    for part in 0..parts {
+        let [red, green, blue] = legend.color((f64::from(part) + 0.5) / f64::from(parts));
+        #[expect(clippy::cast_precision_loss, reason = "small")]
+        let width = rect.width() / parts as f32;
+        let left = rect.left() + width * part as f32;
+        let strip =
+            Rect::from_min_size([left, rect.top()].into(), vec2(width + 1.0, rect.height()));
+        ui.painter()
+            .rect_filled(strip, 0.0, Color32::from_rgb(red, green, blue));
+    }
+    let scale = if legend.logarithmic {
+        ", logarithmic"
+    } else {
+        ""
+    };
+    let Legend {
+        low, high, unit, ..
+    } = legend;
+    ui.label(
+        RichText::new(format!(
+            "{} to {} {unit}{scale}",
+            number(*low),
+            number(*high)
+        ))
+        .small(),
+    );
+}
+
+fn number(value: f64) -> String {
+    match value {
+        value if value != 0.0 && !(1e-2..1e4).contains(&value.abs()) => format!("{value:.1e}"),
+        value => format!("{value:.2}"),
+    }
+}
+
+fn counts(ui: &mut Ui, stage: &mut Stage, controls: &Controls<'_>, wishes: &mut Wishes) {
+    let report = stage.report();
+    let mut rows = vec![
+        (
+            "frame",
+            format!("{}  at {:.2} s", report.frame, report.time_s),
+        ),
+        ("tets", report.tets.to_string()),
+        ("particles", report.particles.to_string()),
+        ("pieces", report.pieces.to_string()),
+        ("clusters", report.clusters.to_string()),
+        ("colors", report.colors.to_string()),
+        (
+            "a frame",
+            format!(
+                "{:.1} of {:.0} ms, {:.2} of real time",
+                stage.frame_ms,
+                1e3 * stage.solver().time_step,
+                controls.pace.reached(),
+            ),
+        ),
+    ];
+    let measured = stage.measured.as_ref();
+    if let Some(residual) = measured.and_then(|report| report.residual) {
+        let force = residual.force_relative.map_or_else(
+            || format!("{} N", number(residual.force)),
+            |relative| format!("{} of the weight", number(relative)),
+        );
+        rows.push(("residual", force));
+    }
+    if let Some(error) = measured.and_then(|report| report.volume_error) {
+        rows.push(("volume error", format!("{:.2} %", 100.0 * error)));
+    }
+    let inverted = measured.and_then(|report| report.inverted_tets);
+    if let Some(inverted) = inverted.filter(|&count| count > 0) {
+        rows.push(("inverted tets", inverted.to_string()));
+    }
+    rows.push((
+        "computed",
+        format!("{} {}", report.backend, report.precision),
+    ));
+    Grid::new("counts")
+        .num_columns(2)
+        .spacing([16.0, 2.0])
+        .show(ui, |ui| {
+            for (name, value) in rows {
+                ui.label(name);
+                ui.label(RichText::new(value).strong());
+                ui.end_row();
+            }
+        });
+    let mut measures = stage.measures();
+    if ui
+        .checkbox(&mut measures, "measure the residual (costs time)")
+        .changed()
+    {
+        wishes.measure = Some(measures);
+    }
+}
+
+/// A field for a file, since not every desktop hands over what is dropped onto a window.
+fn files(ui: &mut Ui, controls: &mut Controls<'_>, wishes: &mut Wishes) {
+    ui.horizontal(|ui| {
+        let field = TextEdit::singleline(controls.file).hint_text("scene, mesh or surface");
+        let typed = ui.add(field.desired_width(230.0));
+        let enter = typed.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
+        let on = !controls.file.trim().is_empty();
+        if ui.add_enabled(on, Button::new("load")).clicked() || (enter && on) {
+            wishes.file = Some(controls.file.trim().into());
+        }
+    });
+}
+
+fn effects(ui: &mut Ui, stage: &Stage) {
+    for effect in stage.effects.turns() {
+        ui.label(RichText::new(&effect.what).strong());
+        let mut text = effect.time();
+        let residual = effect.residual();
+        if !residual.is_empty() {
+            text = format!("{text}; {residual}");
+        }
+        ui.label(RichText::new(text).small());
+    }
+}

@@ -1,0 +1,266 @@
+//! [`Stage`]: a simulation that somebody is looking at and working on.
+//!
+//! It holds what belongs to a loaded scene: the simulation, what is drawn of it, the strokes that can be taken back, the
+//! blade and the hand in use. Input comes as pixels; what it means in space is decided here.
+
+mod hands;
+
+use std::collections::VecDeque;
+use std::time::Instant;
+
+use anyhow::Context;
+use incise::mesh::glam::DVec3;
+use incise::report::FrameReport;
+use incise::scene::{Quantity, ReportSpec, SolverSpec};
+use incise::{Grab, Scene, Simulation, Snapshot};
+use incise_render::{Camera, ColorBy, Legend, Painting, blade_at};
+
+use crate::effects::Effects;
+use crate::history::{History, Moment};
+use crate::knobs::Turn;
+use crate::load::Loaded;
+use crate::times::Times;
+use crate::tool::Grip;
+
+/// Residuals are measured every so many frames.
+const EVERY: u64 = 5;
+
+/// A blade in use.
+#[derive(Debug)]
+struct Stroke {
+    number: u32,
+    /// Poses that the body has not met yet, one for each frame to come.
+    poses: VecDeque<[DVec3; 2]>,
+    /// Where the view ray last met the body, in m from the eye.
+    surface: Option<f64>,
+    /// Whether the button is up: the stroke ends with its last pose.
+    ends: bool,
+}
+
+/// A hand in use.
+#[derive(Clone, Copy, Debug)]
+struct Hold {
+    grab: Grab,
+    /// How far from the eye along the camera's direction, in m.
+    depth: f64,
+    /// Where it pulls to.
+    to: DVec3,
+}
+
+/// A simulation at work.
+#[derive(Debug)]
+pub(crate) struct Stage {
+    pub(crate) name: String,
+    pub(crate) scene: Scene,
+    pub(crate) simulation: Simulation,
+    pub(crate) painting: Painting,
+    pub(crate) camera: Camera,
+    pub(crate) grip: Grip,
+    pub(crate) times: Times,
+    pub(crate) effects: Effects,
+    /// Time of the last frame until it was done, on a device too, in ms.
+    pub(crate) frame_ms: f64,
+    /// What the colors mean, if they stand for numbers.
+    pub(crate) legend: Option<Legend>,
+    /// The last report that measured the body.
+    pub(crate) measured: Option<FrameReport>,
+    /// Whether residuals are measured.
+    measures: bool,
+    start: Snapshot,
+    history: History,
+    stroke: Option<Stroke>,
+    hold: Option<Hold>,
+    /// First frames of the scene's own strokes.
+    scripted: Vec<u64>,
+}
+
+impl Stage {
+    pub(crate) fn new(loaded: Loaded) -> anyhow::Result<Self> {
+        let Loaded {
+            name,
+            scene,
+            mut simulation,
+        } = loaded;
+        let painting = Painting::new(&simulation, &scene);
+        let [low, high] = painting.bounds(&simulation);
+        let start = simulation.snapshot()?;
+        let mut stage = Self {
+            name,
+            scripted: scene
+                .stroke
+                .iter()
+                .map(|stroke| stroke.first_frame())
+                .collect(),
+            scene,
+            simulation,
+            painting,
+            camera: Camera::fit(low, high),
+            grip: Grip::default(),
+            times: Times::default(),
+            effects: Effects::default(),
+            frame_ms: 0.0,
+            legend: None,
+            measured: None,
+            measures: false,
+            start,
+            history: History::default(),
+            stroke: None,
+            hold: None,
+        };
+        stage.measure(true)?;
+        Ok(stage)
+    }
+
+    /// Whether residuals are measured.
+    pub(crate) fn measures(&self) -> bool {
+        self.measures
+    }
+
+    /// Has residuals measured or not.
+    pub(crate) fn measure(&mut self, on: bool) -> anyhow::Result<()> {
+        let mut report = self.scene.report.clone();
+        if on {
+            report = ReportSpec {
+                every: EVERY,
+                quantities: vec![Quantity::Residual, Quantity::Volume],
+            };
+        }
+        self.simulation.set_report(report)?;
+        (self.measures, self.measured) = (on, None);
+        Ok(())
+    }
+
+    /// Advances by one frame.
+    pub(crate) fn step(&mut self) -> anyhow::Result<()> {
+        let frame = self.simulation.next_frame();
+        if self.scripted.contains(&frame) {
+            self.remember(true)?;
+        }
+        self.move_blade()?;
+        let start = Instant::now();
+        let report = self.simulation.step()?.clone();
+        self.wait()?;
+        self.frame_ms = start.elapsed().as_secs_f64() * 1e3;
+        self.painting.follow(&self.simulation);
+        self.show_scripted_blade(frame);
+        self.times.note(report.frame, report.ms);
+        self.effects.note(&report, self.frame_ms);
+        if report.residual.is_some() {
+            self.measured = Some(report);
+        }
+        Ok(())
+    }
+
+    /// Shows the blade of the scene's own strokes in a frame, unless somebody holds one.
+    fn show_scripted_blade(&mut self, frame: u64) {
+        if self.stroke.is_none() && !self.scripted.is_empty() {
+            let strokes = self.scene.stroke.iter();
+            let blade = strokes.filter_map(|stroke| blade_at(stroke, frame)).next();
+            self.painting.set_blade(blade.as_deref());
+        }
+    }
+
+    /// Waits for the device, so that times are those of its work.
+    fn wait(&self) -> anyhow::Result<()> {
+        match self.simulation.device_solvers().next() {
+            Some(solver) => Ok(solver.gpu().wait()?),
+            None => Ok(()),
+        }
+    }
+
+    pub(crate) fn report(&self) -> &FrameReport {
+        self.simulation.report()
+    }
+
+    /// Colors the body for the present frame.
+    pub(crate) fn color(&mut self, by: ColorBy) -> anyhow::Result<()> {
+        let residuals = match by {
+            ColorBy::Residual => self.simulation.residuals_of_tets(),
+            _ => None,
+        };
+        // Between two measured frames the colors of the last one stay.
+        if by == ColorBy::Residual && residuals.is_none() && self.legend.is_some() {
+            return Ok(());
+        }
+        let painted = self
+            .painting
+            .color(&mut self.simulation, by, residuals.as_deref());
+        self.legend = painted?;
+        Ok(())
+    }
+
+    /// Sees the whole body.
+    pub(crate) fn fit(&mut self) {
+        let [low, high] = self.painting.bounds(&self.simulation);
+        let fitted = Camera::fit(low, high);
+        (self.camera.target, self.camera.distance) = (fitted.target, fitted.distance);
+    }
+
+    fn remember(&mut self, scripted: bool) -> anyhow::Result<()> {
+        let snapshot = self.simulation.snapshot()?;
+        self.history.keep(Moment { snapshot, scripted });
+        Ok(())
+    }
+
+    /// The strokes that can be taken back.
+    pub(crate) fn strokes(&self) -> usize {
+        self.history.len()
+    }
+
+    /// Goes back to before the last stroke; tells whether that one will begin again by itself, and nothing if there is
+    /// none.
+    pub(crate) fn undo(&mut self) -> anyhow::Result<Option<bool>> {
+        let Some(moment) = self.history.take() else {
+            return Ok(None);
+        };
+        self.go_to(&moment.snapshot)?;
+        Ok(Some(moment.scripted))
+    }
+
+    /// Goes back to the first frame.
+    pub(crate) fn reset(&mut self) -> anyhow::Result<()> {
+        let start = self.start.clone();
+        self.history.clear();
+        self.go_to(&start)
+    }
+
+    /// Goes to another time, with the knobs as they are now.
+    fn go_to(&mut self, snapshot: &Snapshot) -> anyhow::Result<()> {
+        self.lift_at_once();
+        self.let_go();
+        let spec = self.simulation.solver_spec().clone();
+        self.simulation.restore(snapshot)?;
+        self.simulation.retune(&spec)?;
+        self.measure(self.measures)?;
+        self.repaint()
+    }
+
+    /// Draws anew from what is known here; a device has its part again after the next step.
+    fn repaint(&mut self) -> anyhow::Result<()> {
+        self.simulation.read_back()?;
+        self.painting.reset(&self.simulation);
+        Ok(())
+    }
+
+    /// Takes a turned knob over.
+    pub(crate) fn turn(&mut self, turn: &Turn) -> anyhow::Result<()> {
+        let Turn {
+            knob,
+            from,
+            to,
+            spec,
+        } = turn;
+        self.simulation
+            .retune(spec)
+            .with_context(|| format!("{knob} stays at {from}"))?;
+        self.effects.turned(knob, from, to);
+        self.repaint()
+    }
+
+    pub(crate) fn solver(&self) -> &SolverSpec {
+        self.simulation.solver_spec()
+    }
+}
+
+#[cfg(test)]
+mod tests;

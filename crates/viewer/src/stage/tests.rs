@@ -1,0 +1,163 @@
+//! A stage without a window: lines are drawn, bodies cut, pulled and brought back.
+
+use incise::scene::{Method, Substeps};
+
+use super::*;
+
+const SIZE: [f64; 2] = [800.0, 600.0];
+
+/// A block that floats, seen in a window.
+fn stage(strokes: &str) -> Stage {
+    let scene =
+        format!("[[body]]\nshape = {{ kind = \"box\", tets = 600 }}\nscale = 0.2\n{strokes}");
+    let scene = Scene::from_toml(&scene).unwrap();
+    let simulation = Simulation::new(&scene).unwrap();
+    let loaded = Loaded {
+        name: "block".to_owned(),
+        scene,
+        simulation,
+    };
+    Stage::new(loaded).unwrap()
+}
+
+/// Draws from the top of the window to its bottom and waits until the body has met all of it.
+fn cut(stage: &mut Stage) {
+    stage.press_blade([410.0, 20.0], SIZE).unwrap();
+    for step in 1..=20 {
+        stage
+            .draw_blade([410.0, 20.0 + 28.0 * f64::from(step)], SIZE)
+            .unwrap();
+    }
+    stage.lift_blade();
+    while stage.cuts() {
+        stage.step().unwrap();
+    }
+}
+
+#[test]
+fn a_drawn_line_cuts_and_is_taken_back() {
+    let mut stage = stage("");
+    stage.step().unwrap();
+    let tets = stage.report().tets;
+    cut(&mut stage);
+    assert_eq!((stage.report().pieces, stage.strokes()), (2, 1));
+    stage.simulation.check().unwrap();
+    assert_eq!(stage.undo().unwrap(), Some(false));
+    assert_eq!((stage.report().pieces, stage.report().tets), (1, tets));
+    assert_eq!(stage.undo().unwrap(), None);
+    // And again: what is taken back can be cut anew.
+    cut(&mut stage);
+    assert_eq!(stage.report().pieces, 2);
+    stage.reset().unwrap();
+    assert_eq!((stage.simulation.next_frame(), stage.strokes()), (0, 0));
+}
+
+#[test]
+fn a_shallow_stroke_does_not_go_through() {
+    let mut stage = stage("");
+    stage.grip.depth = 0.15;
+    let tets = stage.simulation.mesh().tets.len();
+    cut(&mut stage);
+    assert_eq!(stage.report().pieces, 1);
+    assert!(stage.report().tets > tets, "it cuts, though");
+}
+
+#[test]
+fn a_stroke_of_the_scene_is_taken_back_and_would_begin_again() {
+    let mut stage = stage(
+        "[[stroke]]\nkind = \"plane\"\nframe = 2\npoint = [0.01, 0, 0]\nnormal = [1, 0, 0]\n",
+    );
+    for _ in 0..4 {
+        stage.step().unwrap();
+    }
+    assert_eq!(stage.report().pieces, 2);
+    assert_eq!(stage.undo().unwrap(), Some(true));
+    assert_eq!(
+        (stage.report().pieces, stage.simulation.next_frame()),
+        (1, 2)
+    );
+}
+
+#[test]
+fn the_hand_pulls_what_it_holds() {
+    let mut stage = stage("");
+    let middle = |stage: &Stage| {
+        let positions = stage.simulation.positions();
+        positions.iter().sum::<DVec3>() / positions.len() as f64
+    };
+    let before = middle(&stage);
+    assert!(!stage.take([2.0, 2.0], SIZE).unwrap(), "nothing is there");
+    assert!(stage.take([400.0, 300.0], SIZE).unwrap());
+    let from = stage.hand().unwrap();
+    for step in 1..=30 {
+        stage
+            .pull([400.0 + 4.0 * f64::from(step), 300.0], SIZE)
+            .unwrap();
+        stage.step().unwrap();
+    }
+    let pulled = stage.hand().unwrap() - from;
+    let right = stage.camera.right();
+    assert!(pulled.dot(right) > 0.9 * pulled.length(), "to the right");
+    let moved = (middle(&stage) - before).dot(right);
+    assert!(
+        moved > 0.2 * pulled.length(),
+        "{moved} of {}",
+        pulled.length()
+    );
+    stage.let_go();
+    assert_eq!(stage.hand(), None);
+}
+
+#[test]
+fn knobs_are_turned_on_a_body_that_is_cut() {
+    let mut stage = stage("");
+    cut(&mut stage);
+    let turn = |to: &str, spec: SolverSpec| Turn {
+        knob: "knob",
+        from: "here".to_owned(),
+        to: to.to_owned(),
+        spec,
+    };
+    let spec = SolverSpec {
+        substeps: Substeps::Fixed(9),
+        iterations: 3,
+        clustering: "serial:4".to_owned(),
+        ..stage.solver().clone()
+    };
+    let this = turn("there", spec.clone());
+    stage.turn(&this).unwrap();
+    stage.step().unwrap();
+    assert_eq!(stage.solver(), &spec);
+    assert_eq!(
+        stage.effects.turns().next().unwrap().what,
+        "knob here → there"
+    );
+    assert_eq!(stage.report().pieces, 2);
+    // A knob that cannot be turned stays where it was.
+    let impossible = SolverSpec {
+        relaxation: -1.0,
+        ..SolverSpec::of(Method::Jacobi)
+    };
+    let this = turn("nowhere", impossible);
+    let refused = format!("{:#}", stage.turn(&this).unwrap_err());
+    assert!(refused.starts_with("knob stays at here"), "{refused}");
+    assert_eq!(stage.solver(), &spec);
+    // A jump in time leaves knobs as they are.
+    stage.reset().unwrap();
+    assert_eq!(stage.solver(), &spec);
+    stage.step().unwrap();
+}
+
+#[test]
+fn all_colors_can_be_shown_at_any_time() {
+    let mut stage = stage("");
+    for by in ColorBy::ALL {
+        stage.color(by).unwrap();
+    }
+    cut(&mut stage);
+    stage.measure(false).unwrap();
+    stage.step().unwrap();
+    for by in ColorBy::ALL {
+        stage.color(by).unwrap();
+    }
+}

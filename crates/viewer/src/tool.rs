@@ -1,0 +1,100 @@
+//! What the left mouse button holds: a blade or a hand.
+//!
+//! A blade is the part of the view ray under the pointer from in front of the body to a chosen depth below its surface, so
+//! a stroke is the drawn line swept along the view direction: seen from where it was drawn, it is that line.
+
+use incise::mesh::glam::DVec3;
+use incise_render::Camera;
+
+/// What the left mouse button holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Tool {
+    /// Cuts along the drawn line.
+    #[default]
+    Blade,
+    /// Takes hold of the body and pulls.
+    Hand,
+    /// Turns the camera, as the right button always does.
+    Turn,
+}
+
+/// How the tools act.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Grip {
+    /// How deep the blade goes below the surface, as a fraction of the body's size; 1 and more goes through.
+    pub(crate) depth: f64,
+    /// Snap distance as a fraction of an edge.
+    pub(crate) snap: f64,
+    /// What the hand takes hold of, as a fraction of the body's size.
+    pub(crate) radius: f64,
+    /// How softly it holds, in m/N.
+    pub(crate) compliance: f64,
+}
+
+impl Default for Grip {
+    fn default() -> Self {
+        Self {
+            depth: 1.0,
+            snap: 0.1,
+            radius: 0.08,
+            compliance: 0.002,
+        }
+    }
+}
+
+/// The blade under a pixel. `bounds` are those of the body, `surface` is the distance along the ray at which it meets the
+/// body, now or the last time it did.
+pub(crate) fn blade(
+    camera: &Camera,
+    pixel: [f64; 2],
+    size: [f64; 2],
+    bounds: [DVec3; 2],
+    surface: Option<f64>,
+    grip: &Grip,
+) -> [DVec3; 2] {
+    let (origin, direction) = camera.ray(pixel, size);
+    let [low, high] = bounds;
+    let (middle, reach) = ((low + high) / 2.0, (high - low).length() / 2.0);
+    // Farther than any pose of the body while the stroke lasts, but not behind the eye.
+    let along = (middle - origin).dot(direction);
+    let near = (along - 1.5 * reach).max(0.02 * along.abs().max(reach));
+    let through = along + 1.5 * reach;
+    let far = match surface {
+        Some(surface) if grip.depth < 1.0 => surface + 2.0 * reach * grip.depth,
+        _ => through,
+    };
+    [near, far.max(near + 1e-3 * reach)].map(|distance| origin + direction * distance)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_blade_lies_on_the_view_ray_and_goes_as_deep_as_told() {
+        let bounds = [DVec3::splat(-1.0), DVec3::splat(1.0)];
+        let camera = Camera::fit(bounds[0], bounds[1]);
+        let (pixel, size) = ([400.0, 300.0], [800.0, 600.0]);
+        let (origin, direction) = camera.ray(pixel, size);
+        for depth in [0.1, 0.5, 2.0] {
+            let grip = Grip {
+                depth,
+                ..Grip::default()
+            };
+            let surface = (camera.target - origin).length() - 0.5;
+            let ends = blade(&camera, pixel, size, bounds, Some(surface), &grip);
+            for end in ends {
+                let off = (end - origin).cross(direction).length();
+                assert!(off < 1e-9, "off the ray by {off}");
+            }
+            let reach = (ends[1] - origin).dot(direction);
+            let expected = surface + 2.0 * 3.0_f64.sqrt() * depth;
+            if depth < 1.0 {
+                assert!((reach - expected).abs() < 1e-9);
+            } else {
+                assert!(reach > surface + 2.0, "goes through");
+            }
+            assert!((ends[0] - origin).dot(direction) < surface);
+        }
+    }
+}
