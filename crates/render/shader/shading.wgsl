@@ -1,7 +1,7 @@
 // The color of what is seen at a pixel, in linear light: twin of shading.rs, function by function.
 
 const TISSUE = vec3<f32>(0.245, 0.044, 0.036);
-const FLESH = vec3<f32>(0.620, 0.185, 0.155);
+const FLESH = vec3<f32>(0.780, 0.290, 0.250);
 const GLOSS: f32 = 0.55;
 const FLESH_GLOSS: f32 = 0.35;
 
@@ -42,12 +42,12 @@ fn skin_base(word: u32, cut: bool) -> vec4<f32> {
     return vec4<f32>(base, 0.25);
 }
 
-// The normal that a triangle of a body is shaded by: cut faces are nearly flat.
+// The normal that a triangle of a body is shaded by: cut faces are flatter than others.
 fn skin_normal(normal: vec3<f32>, face: vec3<f32>, cut: bool, smoothly: bool) -> vec3<f32> {
     if !smoothly {
         return face;
     }
-    let share = select(0.0, 0.5, cut);
+    let share = select(0.0, 0.35, cut);
     return direction(mix(direction(normal), face, share));
 }
 

@@ -14,7 +14,7 @@ use crate::view::View;
 /// Tissue, in linear light.
 pub(crate) const TISSUE: Vec3 = Vec3::new(0.245, 0.044, 0.036);
 /// Tissue that a cut laid bare.
-pub(crate) const FLESH: Vec3 = Vec3::new(0.620, 0.185, 0.155);
+pub(crate) const FLESH: Vec3 = Vec3::new(0.780, 0.290, 0.250);
 /// How much it shines.
 pub(crate) const GLOSS: f32 = 0.55;
 const FLESH_GLOSS: f32 = 0.35;
@@ -75,12 +75,12 @@ pub(crate) fn skin_base(word: u32, cut: bool) -> (Vec3, f32) {
     }
 }
 
-/// The normal that a triangle of a body is shaded by: cut faces are nearly flat.
+/// The normal that a triangle of a body is shaded by: cut faces are flatter than others.
 pub(crate) fn skin_normal(normal: Vec3, face: Vec3, cut: bool, smooth: bool) -> Vec3 {
     if !smooth {
         return face;
     }
-    let share = if cut { 0.5 } else { 0.0 };
+    let share = if cut { 0.35 } else { 0.0 };
     direction(direction(normal).lerp(face, share))
 }
 
