@@ -13,7 +13,7 @@ use eframe::egui::{
 };
 use incise::gpu::GpuContext;
 use incise::scene::Backend;
-use incise_render::Style;
+use incise_render::{ColorBy, Style};
 
 use crate::canvas::Canvas;
 use crate::graphics;
@@ -293,6 +293,12 @@ impl Viewer {
         let Some(stage) = &mut self.stage else {
             return;
         };
+        // What is to be shown has to be measured.
+        if self.style.color_by == ColorBy::Residual && !stage.measures() {
+            let measured = stage.measure(true);
+            self.take(measured);
+            return;
+        }
         let drawn = stage
             .color(self.style.color_by)
             .and_then(|()| self.canvas.show(ui, rect, stage, &self.style));
@@ -310,7 +316,7 @@ impl Viewer {
                     ui.horizontal(|ui| {
                         ui.spinner();
                         let seconds = loading.since.elapsed().as_secs();
-                        ui.label(format!("{} … {seconds} s", loading.name));
+                        ui.label(format!("{}, {seconds} s", loading.name));
                     });
                 });
         }

@@ -34,7 +34,7 @@ pub(crate) struct Measure {
 /// A turn of a knob and what it did.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Effect {
-    /// As `substeps 5 → 10`.
+    /// As `substeps 5 to 10`.
     pub(crate) what: String,
     pub(crate) before: Option<Measure>,
     /// Of the frames so far.
@@ -85,15 +85,15 @@ impl Effects {
         let same = |turn: &&mut Effect| turn.after.is_none() && turn.what.starts_with(knob);
         if let Some(turn) = self.turns.back_mut().filter(same) {
             let from = turn.what[knob.len()..]
-                .split('→')
+                .split(" to ")
                 .next()
                 .unwrap_or(from)
                 .trim();
-            turn.what = format!("{knob} {from} → {to}");
+            turn.what = format!("{knob} {from} to {to}");
             return;
         }
         self.turns.push_back(Effect {
-            what: format!("{knob} {from} → {to}"),
+            what: format!("{knob} {from} to {to}"),
             before,
             after: None,
         });
@@ -123,7 +123,7 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
 }
 
 impl Effect {
-    /// As `1.20 → 2.31 ms (×1.93)`.
+    /// As `1.20 to 2.31 ms (×1.93)`.
     pub(crate) fn time(&self) -> String {
         compare(self.before.map(|m| m.ms), self.after.map(|m| m.ms), "ms")
     }
@@ -146,10 +146,10 @@ fn compare(before: Option<f64>, after: Option<f64>, unit: &str) -> String {
     match (before, after) {
         (Some(before), Some(after)) if before > 0.0 => {
             let (factor, before, after) = (number(after / before), number(before), number(after));
-            format!("{before} → {after} {unit} (×{factor})")
+            format!("{before} to {after} {unit} (×{factor})")
         }
         (_, Some(after)) => format!("{} {unit}", number(after)),
-        (_, None) => "measuring …".to_owned(),
+        (_, None) => "measuring".to_owned(),
     }
 }
 
@@ -168,7 +168,7 @@ mod tests {
         let mut effects = Effects::default();
         frames(&mut effects, 30, 2.0);
         effects.turned("substeps", "5", "10");
-        assert_eq!(effects.turns().next().unwrap().time(), "measuring …");
+        assert_eq!(effects.turns().next().unwrap().time(), "measuring");
         // While it settles nothing counts, then one slow frame in ten does not.
         frames(&mut effects, SETTLE, 1000.0);
         for _ in 0..4 {
@@ -176,8 +176,8 @@ mod tests {
             frames(&mut effects, 1, 90.0);
         }
         let effect = effects.turns().next().unwrap();
-        assert_eq!(effect.what, "substeps 5 → 10");
-        assert_eq!(effect.time(), "2.00 → 4.00 ms (×2.00)");
+        assert_eq!(effect.what, "substeps 5 to 10");
+        assert_eq!(effect.time(), "2.00 to 4.00 ms (×2.00)");
         assert_eq!(effect.residual(), "");
     }
 
@@ -192,7 +192,7 @@ mod tests {
         }
         assert_eq!(effects.turns().count(), 1);
         let effect = effects.turns().next().unwrap();
-        assert_eq!(effect.what, "substeps 5 → 9");
+        assert_eq!(effect.what, "substeps 5 to 9");
         assert_eq!(effect.before.unwrap().ms, 2.0);
     }
 }

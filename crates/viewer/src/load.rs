@@ -1,6 +1,6 @@
 //! [`Source`]: what is to be loaded, and [`Loading`]: the thread that does it.
 //!
-//! A scene is taken as it is. A mesh alone is put on a table, glued to it by its lowest part, at the size of an organ; a
+//! A scene is taken as it is. A mesh alone is put on a table, z up, glued to it by its lowest part, at the size of an organ; a
 //! closed surface is filled with tets first. Setting up a million tets takes seconds, so the window does not wait for it.
 
 use std::path::{Path, PathBuf};
@@ -20,6 +20,9 @@ pub(crate) const TETS: u32 = 11_000;
 
 /// The longest side of a mesh that comes without a scene, in m.
 const SIZE: f64 = 0.25;
+
+/// Its stiffness in Pa: so that a body of that size stands and still yields to a hand.
+const STIFFNESS: f64 = 4e4;
 
 /// What is to be loaded.
 #[derive(Clone, Debug)]
@@ -119,6 +122,7 @@ fn around(path: &Path, tets: u32) -> anyhow::Result<(Scene, Option<tempfile::Tem
         scale,
         position: [-(low.x + high.x) / 2.0, -(low.y + high.y) / 2.0, -low.z],
         fixed: vec![glued],
+        young_modulus: STIFFNESS,
         ..model.clone()
     }];
     Ok((scene, filled))

@@ -62,6 +62,8 @@ pub(crate) struct Stage {
     pub(crate) frame_ms: f64,
     /// What the colors mean, if they stand for numbers.
     pub(crate) legend: Option<Legend>,
+    /// What is shown by the colors.
+    shown: ColorBy,
     /// The last report that measured the body.
     pub(crate) measured: Option<FrameReport>,
     /// Whether residuals are measured.
@@ -100,6 +102,7 @@ impl Stage {
             effects: Effects::default(),
             frame_ms: 0.0,
             legend: None,
+            shown: ColorBy::Tissue,
             measured: None,
             measures: false,
             start,
@@ -172,20 +175,22 @@ impl Stage {
         self.simulation.report()
     }
 
-    /// Colors the body for the present frame.
+    /// Colors the body for the present frame; as tissue where residuals are to be shown and none is known yet.
     pub(crate) fn color(&mut self, by: ColorBy) -> anyhow::Result<()> {
         let residuals = match by {
             ColorBy::Residual => self.simulation.residuals_of_tets(),
             _ => None,
         };
-        // Between two measured frames the colors of the last one stay.
-        if by == ColorBy::Residual && residuals.is_none() && self.legend.is_some() {
-            return Ok(());
-        }
+        let by = match (by, &residuals) {
+            // Between two measured frames the colors of the last one stay.
+            (ColorBy::Residual, None) if self.shown == by => return Ok(()),
+            (ColorBy::Residual, None) => ColorBy::Tissue,
+            _ => by,
+        };
         let painted = self
             .painting
             .color(&mut self.simulation, by, residuals.as_deref());
-        self.legend = painted?;
+        (self.legend, self.shown) = (painted?, by);
         Ok(())
     }
 
@@ -239,6 +244,7 @@ impl Stage {
     fn repaint(&mut self) -> anyhow::Result<()> {
         self.simulation.read_back()?;
         self.painting.reset(&self.simulation);
+        (self.legend, self.shown) = (None, ColorBy::Tissue);
         Ok(())
     }
 

@@ -130,7 +130,7 @@ fn knobs_are_turned_on_a_body_that_is_cut() {
     assert_eq!(stage.solver(), &spec);
     assert_eq!(
         stage.effects.turns().next().unwrap().what,
-        "knob here → there"
+        "knob here to there"
     );
     assert_eq!(stage.report().pieces, 2);
     // A knob that cannot be turned stays where it was.
@@ -151,13 +151,34 @@ fn knobs_are_turned_on_a_body_that_is_cut() {
 #[test]
 fn all_colors_can_be_shown_at_any_time() {
     let mut stage = stage("");
-    for by in ColorBy::ALL {
-        stage.color(by).unwrap();
-    }
-    cut(&mut stage);
-    stage.measure(false).unwrap();
+    let residual = ColorBy::Residual;
+    // Nothing is known before the first frame, and nothing else is shown in its place.
+    stage.color(ColorBy::Stretch).unwrap();
+    assert!(stage.legend.is_some());
+    stage.color(residual).unwrap();
+    assert!(stage.legend.is_none());
+    // Frame 0 is measured, the next ones are not: its colors stay, also on what they cut.
     stage.step().unwrap();
-    for by in ColorBy::ALL {
+    stage.color(residual).unwrap();
+    assert!(stage.legend.is_some());
+    cut(&mut stage);
+    stage.color(residual).unwrap();
+    assert!(stage.legend.is_some());
+    stage.measure(false).unwrap();
+    for by in ColorBy::ALL.into_iter().chain(ColorBy::ALL) {
+        stage.step().unwrap();
         stage.color(by).unwrap();
     }
+    let descent = SolverSpec::of(Method::Descent);
+    let turn = Turn {
+        knob: "method",
+        from: String::new(),
+        to: String::new(),
+        spec: descent,
+    };
+    stage.turn(&turn).unwrap();
+    stage.measure(true).unwrap();
+    stage.step().unwrap();
+    stage.color(residual).unwrap();
+    assert!(stage.legend.is_none(), "descent has none by tets");
 }
