@@ -113,6 +113,9 @@ fn instructions(scene: &Scene, way: Way, folder: &Path) -> anyhow::Result<Counts
 }
 
 /// What a scene asks of the heap.
+///
+/// A simulation keeps the description it was made from, to be turned to other settings later; that is as long as what
+/// somebody wrote, whatever is simulated, and not counted.
 pub(crate) fn memory(scene: &Scene, way: Way) -> anyhow::Result<Memory> {
     let pool = ThreadPoolBuilder::new().num_threads(1).build()?;
     pool.install(|| {
@@ -139,7 +142,7 @@ pub(crate) fn memory(scene: &Scene, way: Way) -> anyhow::Result<Memory> {
         }
         result?;
         Ok(Memory {
-            bytes: held.bytes_current + later.bytes_current,
+            bytes: held.bytes_current + later.bytes_current - description(scene, way),
             ready_to_cut: match way {
                 Way::Facade => ready_to_cut(scene)?,
                 Way::Hand | Way::Empty => 0,
@@ -147,6 +150,17 @@ pub(crate) fn memory(scene: &Scene, way: Way) -> anyhow::Result<Memory> {
             allocations: later.count_total,
         })
     })
+}
+
+/// Bytes of the lists and names in the description of a scene, of which a simulation keeps a copy.
+fn description(scene: &Scene, way: Way) -> i64 {
+    if way != Way::Facade {
+        return 0;
+    }
+    let mut copy = None;
+    let held = allocation_counter::measure(|| copy = Some(scene.clone()));
+    drop(copy);
+    held.bytes_current
 }
 
 /// Bytes that a mesh takes beside its positions and tets so that it can be cut at any time.
