@@ -42,6 +42,8 @@ pub(crate) struct Viewer {
     has_help: bool,
     /// What is typed into the field for a file.
     file: String,
+    /// Whether the tool is in use: the left button went down on the picture and is not up yet.
+    working: bool,
     /// The line that is being drawn, in points of the window.
     line: Vec<Pos2>,
 }
@@ -80,6 +82,7 @@ impl Viewer {
             has_panel: true,
             has_help: false,
             file: String::new(),
+            working: false,
             line: Vec::new(),
         };
         viewer.load(&creation.egui_ctx, source);
@@ -128,19 +131,14 @@ impl Viewer {
             return;
         };
         self.loading = None;
-        let stage = result.and_then(|loaded| {
-            let note = loaded.simulation.backend_note().map(str::to_owned);
-            Stage::new(loaded).map(|stage| (stage, note))
-        });
-        match stage {
-            Ok((stage, note)) => {
+        match result.and_then(Stage::new) {
+            Ok(stage) => {
                 context.send_viewport_cmd(egui::ViewportCommand::Title(format!(
                     "{} - incise",
                     stage.name
                 )));
-                self.notes.truncate(1);
-                self.notes.extend(note);
                 self.stage = Some(stage);
+                (self.working, self.line) = (false, Vec::new());
                 self.pace.pause();
             }
             // What was loaded before goes on.
@@ -192,6 +190,7 @@ impl Viewer {
     }
 
     fn let_go(&mut self) {
+        self.working = false;
         self.line.clear();
         if let Some(stage) = &mut self.stage {
             stage.lift_blade();
@@ -220,7 +219,7 @@ impl Viewer {
                 .camera
                 .orbit(-4.0 * part(delta.x), 4.0 * part(delta.y));
         } else if by(PointerButton::Middle) {
-            stage.camera.pan(-part(delta.x), part(delta.y));
+            stage.camera.pan(part(delta.x), -part(delta.y));
         }
         if response.hovered() {
             let (wheel, pinch) =
@@ -233,36 +232,34 @@ impl Viewer {
         if self.tool == Tool::Turn {
             return;
         }
-        let places = places(context);
         let primary = PointerButton::Primary;
-        let result = if response.drag_started_by(primary) {
+        let mut result = Ok(());
+        if response.drag_started_by(primary) {
             let origin = context.input(|input| input.pointer.press_origin());
             let at = origin
                 .or(response.interact_pointer_pos())
                 .unwrap_or(rect.min);
-            self.line = vec![at];
-            match self.tool {
+            (self.working, self.line) = (true, vec![at]);
+            result = match self.tool {
                 Tool::Blade => stage.press_blade(pixel(at), size),
                 _ => stage.take(pixel(at), size).map(|_| ()),
-            }
-        } else {
-            Ok(())
-        };
-        let result = result.and_then(|()| {
-            if !response.dragged_by(primary) {
-                return Ok(());
-            }
-            match self.tool {
-                Tool::Blade => places.iter().try_for_each(|&at| {
-                    self.line.push(at);
-                    stage.draw_blade(pixel(at), size)
-                }),
-                _ => places
-                    .last()
-                    .map_or(Ok(()), |&at| stage.pull(pixel(at), size)),
-            }
+            };
+        }
+        if !self.working {
+            return;
+        }
+        let places = places(context);
+        result = result.and_then(|()| match self.tool {
+            Tool::Blade => places.iter().try_for_each(|&at| {
+                self.line.push(at);
+                stage.draw_blade(pixel(at), size)
+            }),
+            _ => places
+                .last()
+                .map_or(Ok(()), |&at| stage.pull(pixel(at), size)),
         });
-        if response.drag_stopped_by(primary) {
+        // Not when the drag ends, which any button's release does.
+        if !context.input(|input| input.pointer.button_down(primary)) {
             self.let_go();
         }
         self.take(result);
@@ -294,13 +291,12 @@ impl Viewer {
             return;
         };
         // What is to be shown has to be measured.
-        if self.style.color_by == ColorBy::Residual && !stage.measures() {
-            let measured = stage.measure(true);
-            self.take(measured);
-            return;
-        }
-        let drawn = stage
-            .color(self.style.color_by)
+        let measured = match self.style.color_by {
+            ColorBy::Residual if !stage.measures() => stage.measure(true),
+            _ => Ok(()),
+        };
+        let drawn = measured
+            .and_then(|()| stage.color(self.style.color_by))
             .and_then(|()| self.canvas.show(ui, rect, stage, &self.style));
         overlay(ui, rect, stage, &self.line);
         self.take(drawn);
@@ -363,7 +359,9 @@ impl Viewer {
                 .as_mut()
                 .map_or(Ok(()), |stage| stage.turn(&turn));
             // A knob that cannot be turned is no reason to stop.
-            self.error = turned.err().map(|error| format!("{error:#}"));
+            if let Err(error) = turned {
+                self.error = Some(format!("{error:#}"));
+            }
         }
     }
 }
@@ -376,7 +374,7 @@ impl eframe::App for Viewer {
             self.act(action);
         }
         let mut wishes = Wishes::default();
-        if let Some(stage) = self.stage.as_mut().filter(|_| self.has_panel) {
+        if self.has_panel {
             let mut controls = Controls {
                 running: self.running,
                 tool: self.tool,
@@ -386,6 +384,7 @@ impl eframe::App for Viewer {
                 file: &mut self.file,
                 notes: &self.notes,
             };
+            let stage = self.stage.as_mut();
             Panel::right("panel").exact_size(340.0).show(ui, |ui| {
                 wishes = panel::show(ui, stage, &mut controls);
             });
@@ -402,15 +401,23 @@ impl eframe::App for Viewer {
     }
 }
 
-/// All places of the pointer since the last frame, so that a fast stroke keeps its shape; if the button went down
-/// meanwhile, those since then.
+/// All places of the pointer since the last frame in which the left button was down, so that a fast stroke keeps its shape.
 fn places(context: &Context) -> Vec<Pos2> {
     context.input(|input| {
         let mut places = Vec::new();
         for event in &input.raw.events {
             match event {
                 egui::Event::PointerMoved(at) => places.push(*at),
-                egui::Event::PointerButton { pressed: true, .. } => places.clear(),
+                egui::Event::PointerButton {
+                    button: PointerButton::Primary,
+                    pressed: true,
+                    ..
+                } => places.clear(),
+                egui::Event::PointerButton {
+                    button: PointerButton::Primary,
+                    pressed: false,
+                    ..
+                } => break,
                 _ => {}
             }
         }

@@ -1,6 +1,6 @@
 //! The keys, and the overlay that lists them.
 
-use eframe::egui::{Align2, Context, Grid, Key, Modifiers, RichText, Window};
+use eframe::egui::{Align2, Context, Event, Grid, Key, Modifiers, RichText, Window};
 use incise_render::ColorBy;
 
 use crate::tool::Tool;
@@ -124,15 +124,27 @@ pub(crate) fn actions(context: &Context) -> Vec<Action> {
     if context.egui_wants_keyboard_input() {
         return Vec::new();
     }
-    context.input_mut(|input| {
-        let mut actions = Vec::new();
-        for ((modifiers, key), _, action, _) in KEYS {
-            // A slow window may get several presses at once.
-            let presses = input.count_and_consume_key(modifiers, key);
-            actions.extend(std::iter::repeat_n(action, presses));
-        }
-        actions
+    context.input(|input| {
+        let actions = input.events.iter().filter_map(|event| match event {
+            Event::Key {
+                key,
+                pressed: true,
+                repeat,
+                modifiers,
+                ..
+            } => action(*key, *modifiers, *repeat),
+            _ => None,
+        });
+        actions.collect()
     })
+}
+
+/// What a key asks for. Held down, only the one for a frame asks again.
+fn action(key: Key, modifiers: Modifiers, repeats: bool) -> Option<Action> {
+    let mut known = KEYS.iter();
+    let found = known.find(|((with, of), ..)| *of == key && modifiers.matches_logically(*with));
+    let action = found.map(|(_, _, action, _)| *action);
+    action.filter(|action| !repeats || *action == Action::Step)
 }
 
 /// Shows the overlay.
@@ -164,6 +176,19 @@ pub(crate) fn show(context: &Context, open: &mut bool) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn keys_with_other_modifiers_are_other_keys() {
+        let undo = action(Key::Z, Modifiers::COMMAND, false);
+        assert_eq!(undo, Some(Action::Undo));
+        assert_eq!(action(Key::Z, Modifiers::NONE, false), None);
+        assert_eq!(action(Key::R, Modifiers::COMMAND, false), None);
+        assert_eq!(action(Key::R, Modifiers::NONE, true), None);
+        assert_eq!(
+            action(Key::Period, Modifiers::NONE, true),
+            Some(Action::Step)
+        );
+    }
 
     #[test]
     fn no_key_does_two_things() {

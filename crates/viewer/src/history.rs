@@ -5,7 +5,7 @@
 
 use std::collections::VecDeque;
 
-use incise::Snapshot;
+use incise::{Grab, Snapshot};
 
 /// The most memory for snapshots, in bytes.
 const BUDGET: usize = 1 << 30;
@@ -16,6 +16,10 @@ pub(crate) struct Moment {
     pub(crate) snapshot: Snapshot,
     /// Whether the stroke is the scene's: it will begin again.
     pub(crate) scripted: bool,
+    /// The stroke that somebody was drawing.
+    pub(crate) stroke: Option<u32>,
+    /// What somebody held.
+    pub(crate) grab: Option<Grab>,
 }
 
 /// The moments before the strokes, oldest first.

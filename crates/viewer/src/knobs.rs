@@ -3,7 +3,7 @@
 //! Each turn is taken over at once by the running body; a turn that a scene does not allow is refused with its reason,
 //! and the knob goes back. Changing the method takes the defaults that go with it.
 
-use eframe::egui::{ComboBox, DragValue, Slider, Ui};
+use eframe::egui::{ComboBox, DragValue, Slider, SliderClamping, Ui};
 use incise::scene::{Backend, Method, SolverSpec, Substeps};
 
 /// A knob that was turned.
@@ -98,7 +98,9 @@ pub(crate) fn show(ui: &mut Ui, spec: &SolverSpec, has_gpu: bool) -> Option<Turn
             Substeps::Fixed(count) => count,
             Substeps::Auto => 30,
         };
-        let slider = Slider::new(&mut count, 1..=spec.max_substeps.max(2)).logarithmic(true);
+        let slider = Slider::new(&mut count, 1..=spec.max_substeps.max(2))
+            .logarithmic(true)
+            .clamping(SliderClamping::Edits);
         let moved = ui.add_enabled(!auto, slider.text("substeps")).changed();
         if ui.checkbox(&mut auto, "auto").changed() || moved {
             let substeps = if auto {
@@ -116,7 +118,9 @@ pub(crate) fn show(ui: &mut Ui, spec: &SolverSpec, has_gpu: bool) -> Option<Turn
     });
 
     let mut iterations = spec.iterations;
-    let slider = Slider::new(&mut iterations, 1..=200).logarithmic(true);
+    let slider = Slider::new(&mut iterations, 1..=200)
+        .logarithmic(true)
+        .clamping(SliderClamping::Edits);
     if ui.add(slider.text("iterations")).changed() {
         let spec_after = SolverSpec {
             iterations,
@@ -127,7 +131,9 @@ pub(crate) fn show(ui: &mut Ui, spec: &SolverSpec, has_gpu: bool) -> Option<Turn
     }
 
     let mut relaxation = spec.relaxation;
-    let slider = Slider::new(&mut relaxation, 0.05..=1.9).max_decimals(2);
+    let slider = Slider::new(&mut relaxation, 0.05..=1.9)
+        .max_decimals(2)
+        .clamping(SliderClamping::Edits);
     if ui.add(slider.text("relaxation")).changed() {
         let spec_after = SolverSpec {
             relaxation,
@@ -153,7 +159,10 @@ pub(crate) fn show(ui: &mut Ui, spec: &SolverSpec, has_gpu: bool) -> Option<Turn
         if kind != "none" {
             let mut size = size;
             // Clusters beyond 32 tets are made for workgroups of a GPU.
-            let value = DragValue::new(&mut size).range(2..=256).speed(0.1);
+            let value = DragValue::new(&mut size)
+                .range(2..=256)
+                .clamp_existing_to_range(false)
+                .speed(0.1);
             if ui.add(value).changed() {
                 clustering = joined(kind, size);
             }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use eframe::egui::{
-    Button, Color32, ComboBox, Grid, Key, RichText, ScrollArea, Slider, TextEdit, Ui,
+    Button, Checkbox, Color32, ComboBox, Grid, Key, RichText, ScrollArea, Slider, TextEdit, Ui,
 };
 use incise_render::{ColorBy, Legend, Style};
 
@@ -39,27 +39,31 @@ pub(crate) struct Wishes {
     pub(crate) measure: Option<bool>,
 }
 
-/// Shows the panel.
-pub(crate) fn show(ui: &mut Ui, stage: &mut Stage, controls: &mut Controls<'_>) -> Wishes {
+/// Shows the panel; without a stage only what it takes to load one.
+pub(crate) fn show(ui: &mut Ui, stage: Option<&mut Stage>, controls: &mut Controls<'_>) -> Wishes {
     let mut wishes = Wishes::default();
     ScrollArea::vertical().show(ui, |ui| {
         ui.add_space(4.0);
-        ui.heading(&stage.name);
-        buttons(ui, stage, controls, &mut wishes);
-        ui.separator();
-        tools(ui, stage, controls, &mut wishes);
-        ui.separator();
-        look(ui, stage, controls);
-        ui.separator();
-        counts(ui, stage, controls, &mut wishes);
-        stage.times.show(ui);
-        ui.separator();
-        ui.strong("Speed and accuracy");
-        wishes.turn = knobs::show(ui, stage.solver(), controls.has_gpu);
-        effects(ui, stage);
-        ui.separator();
+        let mut note = None;
+        if let Some(stage) = stage {
+            ui.heading(&stage.name);
+            buttons(ui, stage, controls, &mut wishes);
+            ui.separator();
+            tools(ui, stage, controls, &mut wishes);
+            ui.separator();
+            look(ui, stage, controls);
+            ui.separator();
+            counts(ui, stage, controls, &mut wishes);
+            stage.times.show(ui);
+            ui.separator();
+            ui.strong("Speed and accuracy");
+            wishes.turn = knobs::show(ui, stage.solver(), controls.has_gpu);
+            effects(ui, stage);
+            ui.separator();
+            note = stage.simulation.backend_note();
+        }
         files(ui, controls, &mut wishes);
-        for note in controls.notes {
+        for note in controls.notes.iter().map(String::as_str).chain(note) {
             ui.label(RichText::new(note).weak().small());
         }
     });
@@ -239,11 +243,11 @@ fn counts(ui: &mut Ui, stage: &mut Stage, controls: &Controls<'_>, wishes: &mut 
                 ui.end_row();
             }
         });
+    // What is shown is measured.
+    let free = controls.style.color_by != ColorBy::Residual;
     let mut measures = stage.measures();
-    if ui
-        .checkbox(&mut measures, "measure the residual (costs time)")
-        .changed()
-    {
+    let mark = Checkbox::new(&mut measures, "measure the residual (costs time)");
+    if ui.add_enabled(free, mark).changed() {
         wishes.measure = Some(measures);
     }
 }

@@ -43,14 +43,14 @@ impl Default for Grip {
 }
 
 /// The blade under a pixel. `bounds` are those of the body, `surface` is the distance along the ray at which it meets the
-/// body, now or the last time it did.
+/// body, now or the last time it did, and `depth` how deep it goes below that, in m; absent: through.
 pub(crate) fn blade(
     camera: &Camera,
     pixel: [f64; 2],
     size: [f64; 2],
     bounds: [DVec3; 2],
     surface: Option<f64>,
-    grip: &Grip,
+    depth: Option<f64>,
 ) -> [DVec3; 2] {
     let (origin, direction) = camera.ray(pixel, size);
     let [low, high] = bounds;
@@ -59,8 +59,8 @@ pub(crate) fn blade(
     let along = (middle - origin).dot(direction);
     let near = (along - 1.5 * reach).max(0.02 * along.abs().max(reach));
     let through = along + 1.5 * reach;
-    let far = match surface {
-        Some(surface) if grip.depth < 1.0 => surface + 2.0 * reach * grip.depth,
+    let far = match (surface, depth) {
+        (Some(surface), Some(depth)) => surface + depth,
         _ => through,
     };
     [near, far.max(near + 1e-3 * reach)].map(|distance| origin + direction * distance)
@@ -76,23 +76,17 @@ mod tests {
         let camera = Camera::fit(bounds[0], bounds[1]);
         let (pixel, size) = ([400.0, 300.0], [800.0, 600.0]);
         let (origin, direction) = camera.ray(pixel, size);
-        for depth in [0.1, 0.5, 2.0] {
-            let grip = Grip {
-                depth,
-                ..Grip::default()
-            };
+        for depth in [Some(0.3), Some(1.7), None] {
             let surface = (camera.target - origin).length() - 0.5;
-            let ends = blade(&camera, pixel, size, bounds, Some(surface), &grip);
+            let ends = blade(&camera, pixel, size, bounds, Some(surface), depth);
             for end in ends {
                 let off = (end - origin).cross(direction).length();
                 assert!(off < 1e-9, "off the ray by {off}");
             }
             let reach = (ends[1] - origin).dot(direction);
-            let expected = surface + 2.0 * 3.0_f64.sqrt() * depth;
-            if depth < 1.0 {
-                assert!((reach - expected).abs() < 1e-9);
-            } else {
-                assert!(reach > surface + 2.0, "goes through");
+            match depth {
+                Some(depth) => assert!((reach - surface - depth).abs() < 1e-9),
+                None => assert!(reach > surface + 2.0, "goes through"),
             }
             assert!((ends[0] - origin).dot(direction) < surface);
         }

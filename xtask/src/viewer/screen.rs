@@ -163,7 +163,6 @@ impl Screen {
             let part = |k: usize| from[k] + (to[k] - from[k]) * step / steps;
             self.point([part(0), part(1)])?;
         }
-        sleep(Duration::from_millis(100));
         Ok(())
     }
 

@@ -169,10 +169,10 @@ impl Simulation {
     /// and driver. The snapshot can be used again.
     ///
     /// Everything goes back: also what [`Simulation::retune`] and [`Simulation::set_report`] have set and the number of the
-    /// next frame, strokes added since are gone, and who computes is who computed then. Whoever wants to keep the present
-    /// settings of the solver hands a copy of [`Simulation::solver_spec`] to `retune` afterwards. [`Simulation::deltas`] is empty:
-    /// renderers and recorders begin anew from [`Simulation::boundary`], and find other buffers in the solvers of a
-    /// device. O(particles + tets).
+    /// next frame. Strokes added since are gone, and who computes is who computed then. Grabs and strokes begun since are
+    /// void: their numbers may come to name later ones. Whoever wants to keep the present settings of the solver hands a
+    /// copy of [`Simulation::solver_spec`] to `retune` afterwards. [`Simulation::deltas`] is empty: renderers and recorders
+    /// begin anew from [`Simulation::boundary`], and find other buffers in the solvers of a device. O(particles + tets).
     ///
     /// # Errors
     /// If the snapshot is of a simulation of another scene, or the device is lost or out of memory; nothing has changed

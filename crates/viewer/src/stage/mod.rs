@@ -15,6 +15,7 @@ use incise::scene::{Quantity, ReportSpec, SolverSpec};
 use incise::{Grab, Scene, Simulation, Snapshot};
 use incise_render::{Camera, ColorBy, Legend, Painting, blade_at};
 
+use self::hands::Line;
 use crate::effects::Effects;
 use crate::history::{History, Moment};
 use crate::knobs::Turn;
@@ -24,18 +25,6 @@ use crate::tool::Grip;
 
 /// Residuals are measured every so many frames.
 const EVERY: u64 = 5;
-
-/// A blade in use.
-#[derive(Debug)]
-struct Stroke {
-    number: u32,
-    /// Poses that the body has not met yet, one for each frame to come.
-    poses: VecDeque<[DVec3; 2]>,
-    /// Where the view ray last met the body, in m from the eye.
-    surface: Option<f64>,
-    /// Whether the button is up: the stroke ends with its last pose.
-    ends: bool,
-}
 
 /// A hand in use.
 #[derive(Clone, Copy, Debug)]
@@ -70,8 +59,11 @@ pub(crate) struct Stage {
     measures: bool,
     start: Snapshot,
     history: History,
-    stroke: Option<Stroke>,
+    /// Drawn lines that the body has not met to the end, oldest first.
+    lines: VecDeque<Line>,
     hold: Option<Hold>,
+    /// The diagonal of all bodies when they were loaded, in m.
+    extent: f64,
     /// First frames of the scene's own strokes.
     scripted: Vec<u64>,
 }
@@ -107,8 +99,9 @@ impl Stage {
             measures: false,
             start,
             history: History::default(),
-            stroke: None,
+            lines: VecDeque::new(),
             hold: None,
+            extent: (high - low).length(),
         };
         stage.measure(true)?;
         Ok(stage)
@@ -121,7 +114,7 @@ impl Stage {
 
     /// Has residuals measured or not.
     pub(crate) fn measure(&mut self, on: bool) -> anyhow::Result<()> {
-        let mut report = self.scene.report.clone();
+        let mut report = ReportSpec::default();
         if on {
             report = ReportSpec {
                 every: EVERY,
@@ -133,11 +126,21 @@ impl Stage {
         Ok(())
     }
 
-    /// Advances by one frame.
+    /// Advances by one frame. If that fails, blades are taken away, and what is drawn is what is there.
     pub(crate) fn step(&mut self) -> anyhow::Result<()> {
+        let result = self.frame();
+        if result.is_err() {
+            self.drop_lines();
+            self.painting.reset(&self.simulation);
+        }
+        result
+    }
+
+    fn frame(&mut self) -> anyhow::Result<()> {
         let frame = self.simulation.next_frame();
         if self.scripted.contains(&frame) {
-            self.remember(true)?;
+            let moment = self.moment(true)?;
+            self.history.keep(moment);
         }
         self.move_blade()?;
         let start = Instant::now();
@@ -148,6 +151,9 @@ impl Stage {
         self.show_scripted_blade(frame);
         self.times.note(report.frame, report.ms);
         self.effects.note(&report, self.frame_ms);
+        if report.cut.is_some() {
+            self.note_cut();
+        }
         if report.residual.is_some() {
             self.measured = Some(report);
         }
@@ -156,7 +162,7 @@ impl Stage {
 
     /// Shows the blade of the scene's own strokes in a frame, unless somebody holds one.
     fn show_scripted_blade(&mut self, frame: u64) {
-        if self.stroke.is_none() && !self.scripted.is_empty() {
+        if self.lines.is_empty() && !self.scripted.is_empty() {
             let strokes = self.scene.stroke.iter();
             let blade = strokes.filter_map(|stroke| blade_at(stroke, frame)).next();
             self.painting.set_blade(blade.as_deref());
@@ -201,10 +207,14 @@ impl Stage {
         (self.camera.target, self.camera.distance) = (fitted.target, fitted.distance);
     }
 
-    fn remember(&mut self, scripted: bool) -> anyhow::Result<()> {
-        let snapshot = self.simulation.snapshot()?;
-        self.history.keep(Moment { snapshot, scripted });
-        Ok(())
+    /// The present moment, with what hands are doing in it.
+    fn moment(&mut self, scripted: bool) -> anyhow::Result<Moment> {
+        Ok(Moment {
+            snapshot: self.simulation.snapshot()?,
+            scripted,
+            stroke: self.lines.front().and_then(|line| line.stroke),
+            grab: self.hold.map(|hold| hold.grab),
+        })
     }
 
     /// The strokes that can be taken back.
@@ -218,26 +228,41 @@ impl Stage {
         let Some(moment) = self.history.take() else {
             return Ok(None);
         };
-        self.go_to(&moment.snapshot)?;
+        self.go_to(&moment)?;
         Ok(Some(moment.scripted))
     }
 
     /// Goes back to the first frame.
     pub(crate) fn reset(&mut self) -> anyhow::Result<()> {
-        let start = self.start.clone();
+        let start = Moment {
+            snapshot: self.start.clone(),
+            scripted: false,
+            stroke: None,
+            grab: None,
+        };
         self.history.clear();
         self.go_to(&start)
     }
 
-    /// Goes to another time, with the knobs as they are now.
-    fn go_to(&mut self, snapshot: &Snapshot) -> anyhow::Result<()> {
-        self.lift_at_once();
+    /// Goes to another time, with the knobs as they are now and empty hands.
+    fn go_to(&mut self, moment: &Moment) -> anyhow::Result<()> {
+        self.drop_lines();
         self.let_go();
         let spec = self.simulation.solver_spec().clone();
-        self.simulation.restore(snapshot)?;
-        self.simulation.retune(&spec)?;
-        self.measure(self.measures)?;
-        self.repaint()
+        self.simulation.restore(&moment.snapshot)?;
+        // What was in somebody's hands then is so again, and nobody is there to let it go.
+        if let Some(stroke) = moment.stroke {
+            self.simulation.end_stroke(stroke)?;
+        }
+        if let Some(grab) = moment.grab {
+            self.simulation.release(grab)?;
+        }
+        let turned = self.simulation.retune(&spec);
+        let measured = self.measure(self.measures);
+        // Whatever the knobs say, the body is another one.
+        self.repaint()?;
+        turned?;
+        measured
     }
 
     /// Draws anew from what is known here; a device has its part again after the next step.

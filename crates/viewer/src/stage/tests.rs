@@ -20,6 +20,24 @@ fn stage(strokes: &str) -> Stage {
     Stage::new(loaded).unwrap()
 }
 
+/// A stroke of the scene that comes in frame 2.
+const PLANE: &str = r#"
+[[stroke]]
+kind = "plane"
+frame = 2
+point = [0.01, 0, 0]
+normal = [1, 0, 0]
+"#;
+
+fn to_descent() -> Turn {
+    Turn {
+        knob: "method",
+        from: String::new(),
+        to: String::new(),
+        spec: SolverSpec::of(Method::Descent),
+    }
+}
+
 /// Draws from the top of the window to its bottom and waits until the body has met all of it.
 fn cut(stage: &mut Stage) {
     stage.press_blade([410.0, 20.0], SIZE).unwrap();
@@ -53,6 +71,59 @@ fn a_drawn_line_cuts_and_is_taken_back() {
 }
 
 #[test]
+fn lines_drawn_while_time_stands_still_are_cut_one_after_the_other() {
+    let mut stage = stage("");
+    for x in [330.0, 470.0] {
+        stage.press_blade([x, 20.0], SIZE).unwrap();
+        stage.draw_blade([x, 580.0], SIZE).unwrap();
+        stage.lift_blade();
+    }
+    // A finished line is not drawn on.
+    stage.draw_blade([20.0, 580.0], SIZE).unwrap();
+    assert_eq!((stage.report().pieces, stage.strokes()), (1, 0));
+    while stage.cuts() {
+        stage.step().unwrap();
+    }
+    assert_eq!((stage.report().pieces, stage.strokes()), (3, 2));
+    stage.undo().unwrap();
+    assert_eq!(stage.report().pieces, 2);
+    stage.undo().unwrap();
+    assert_eq!(stage.report().pieces, 1);
+}
+
+#[test]
+fn a_line_beside_the_body_is_nothing_to_take_back() {
+    let mut stage = stage("");
+    stage.press_blade([10.0, 20.0], SIZE).unwrap();
+    stage.draw_blade([10.0, 580.0], SIZE).unwrap();
+    stage.lift_blade();
+    while stage.cuts() {
+        stage.step().unwrap();
+    }
+    assert_eq!((stage.report().pieces, stage.strokes()), (1, 0));
+}
+
+#[test]
+fn what_was_held_at_a_moment_is_free_when_it_comes_back() {
+    let mut stage = stage(PLANE);
+    assert!(stage.take([400.0, 300.0], SIZE).unwrap());
+    for step in 1..=4 {
+        let x = 400.0 + 5.0 * f64::from(step);
+        stage.pull([x, 300.0], SIZE).unwrap();
+        stage.step().unwrap();
+    }
+    stage.let_go();
+    stage.turn(&to_descent()).unwrap();
+    // Held softly at that time, which descent does not know.
+    assert_eq!(stage.undo().unwrap(), Some(true));
+    assert_eq!((stage.report().pieces, stage.hand()), (1, None));
+    stage.step().unwrap();
+    assert_eq!(stage.solver().method, Method::Descent);
+    // Nothing hangs on a handle any more: the same place can be taken again.
+    assert!(stage.take([400.0, 300.0], SIZE).unwrap());
+}
+
+#[test]
 fn a_shallow_stroke_does_not_go_through() {
     let mut stage = stage("");
     stage.grip.depth = 0.15;
@@ -64,9 +135,7 @@ fn a_shallow_stroke_does_not_go_through() {
 
 #[test]
 fn a_stroke_of_the_scene_is_taken_back_and_would_begin_again() {
-    let mut stage = stage(
-        "[[stroke]]\nkind = \"plane\"\nframe = 2\npoint = [0.01, 0, 0]\nnormal = [1, 0, 0]\n",
-    );
+    let mut stage = stage(PLANE);
     for _ in 0..4 {
         stage.step().unwrap();
     }
@@ -169,14 +238,7 @@ fn all_colors_can_be_shown_at_any_time() {
         stage.step().unwrap();
         stage.color(by).unwrap();
     }
-    let descent = SolverSpec::of(Method::Descent);
-    let turn = Turn {
-        knob: "method",
-        from: String::new(),
-        to: String::new(),
-        spec: descent,
-    };
-    stage.turn(&turn).unwrap();
+    stage.turn(&to_descent()).unwrap();
     stage.measure(true).unwrap();
     stage.step().unwrap();
     stage.color(residual).unwrap();
