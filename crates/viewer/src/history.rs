@@ -1,7 +1,7 @@
 //! [`History`]: where the strokes began, to go back there.
 //!
-//! Taking a stroke back goes back in time, to the frame before its blade touched: what has fallen off since then is where
-//! it was. Only the newest snapshots are kept, as many as fit into [`BUDGET`].
+//! Taking a stroke back goes back in time, to the frame in which it began: what has fallen off since then is where it was.
+//! Only the newest snapshots are kept, as many as fit into [`BUDGET`].
 
 use std::collections::VecDeque;
 

@@ -121,7 +121,7 @@ fn start(
 
 /// The built-in liver in the middle of its cut, after a fixed number of frames, for the README.
 fn portrait(viewer: &Path, backend: &str, screen: &Screen, out: &Path) -> anyhow::Result<()> {
-    const FRAMES: usize = 46;
+    const FRAMES: usize = 38;
     let _viewer = start(viewer, &["--paused"], backend, screen)?;
     screen.window("built-in liver", Duration::from_secs(60))?;
     until("the liver is shown", || {
