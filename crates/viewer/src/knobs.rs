@@ -39,7 +39,7 @@ fn backend_name(backend: Backend) -> &'static str {
     match backend {
         Backend::Cpu => "processor",
         Backend::Gpu => "GPU",
-        Backend::Auto => "GPU if real",
+        Backend::Auto => "either",
     }
 }
 
@@ -63,9 +63,16 @@ fn joined(kind: &str, size: u32) -> String {
     }
 }
 
-/// Shows the knobs as `spec` has them; returns the one that was turned. `has_gpu` tells whether a GPU can be chosen.
-pub(crate) fn show(ui: &mut Ui, spec: &SolverSpec, has_gpu: bool) -> Option<Turn> {
+/// Shows the knobs as `spec` has them; returns the one that was turned. `has_gpu` tells whether a GPU can be chosen,
+/// `on_gpu` whether one computes.
+pub(crate) fn show(ui: &mut Ui, spec: &SolverSpec, has_gpu: bool, on_gpu: bool) -> Option<Turn> {
     let mut turn = None;
+    // Whoever left the choice open sees what was chosen.
+    let present = match spec.backend {
+        Backend::Auto if on_gpu => Backend::Gpu,
+        Backend::Auto => Backend::Cpu,
+        chosen => chosen,
+    };
     let mut turned = |knob, from: String, to: String, spec: SolverSpec| {
         if from != to {
             turn = Some(Turn {
@@ -179,13 +186,13 @@ pub(crate) fn show(ui: &mut Ui, spec: &SolverSpec, has_gpu: bool) -> Option<Turn
 
     ui.add_enabled_ui(has_gpu, |ui| {
         ComboBox::from_label("computed by")
-            .selected_text(backend_name(spec.backend))
+            .selected_text(backend_name(present))
             .show_ui(ui, |ui| {
                 for backend in [Backend::Cpu, Backend::Gpu] {
-                    let mut chosen = spec.backend;
+                    let mut chosen = present;
                     ui.selectable_value(&mut chosen, backend, backend_name(backend));
-                    if chosen != spec.backend {
-                        let (from, to) = (backend_name(spec.backend), backend_name(backend));
+                    if chosen != present {
+                        let (from, to) = (backend_name(present), backend_name(backend));
                         let spec_after = SolverSpec {
                             backend,
                             ..spec.clone()

@@ -57,7 +57,8 @@ pub(crate) fn show(ui: &mut Ui, stage: Option<&mut Stage>, controls: &mut Contro
             stage.times.show(ui);
             ui.separator();
             ui.strong("Speed and accuracy");
-            wishes.turn = knobs::show(ui, stage.solver(), controls.has_gpu);
+            let on_gpu = stage.simulation.device_solvers().next().is_some();
+            wishes.turn = knobs::show(ui, stage.solver(), controls.has_gpu, on_gpu);
             effects(ui, stage);
             ui.separator();
             note = stage.simulation.backend_note();
