@@ -127,6 +127,7 @@ impl Painting {
         let colored = !self.colors.is_empty();
         for delta in deltas {
             let change = self.skin.follow(delta);
+            self.pieces.follow_cut(delta);
             if colored {
                 self.colors.resize(self.skin.triangles().len(), NONE);
                 for triangle in change.triangles {
