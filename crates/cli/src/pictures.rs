@@ -16,6 +16,8 @@ use crate::output::{require_file, save_every};
 
 /// Pixels of a picture, across and down.
 const SIZE: [u32; 2] = [640, 480];
+/// Degrees around, degrees above the floor and magnification.
+const VIEW: [f64; 3] = [-60.0, 22.0, 1.0];
 /// Least pictures of a film in a second.
 const PER_SECOND: f64 = 25.0;
 /// Pictures on the sheet, and of a row.
@@ -190,12 +192,13 @@ fn camera(
         low.z = low.z.min(ground.height);
     }
     let mut camera = Camera::fit(low, high);
-    if let Some([azimuth, elevation, zoom]) = arguments.view {
-        camera.azimuth = azimuth.to_radians();
-        camera.elevation = elevation.to_radians();
-        camera.fit_distance(low, high);
-        camera.zoom(1.0 / zoom);
-    }
+    let [azimuth, elevation, zoom] = arguments.view.unwrap_or(VIEW);
+    camera.azimuth = azimuth.to_radians();
+    camera.elevation = elevation.to_radians();
+    let [width, height] = arguments.size.unwrap_or(SIZE).map(f64::from);
+    // A picture wider than high keeps room at its sides for what falls apart.
+    camera.fit_distance(low, high, (width / height).min(1.0));
+    camera.zoom(1.0 / zoom);
     camera
 }
 

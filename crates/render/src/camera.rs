@@ -57,22 +57,24 @@ impl Camera {
             elevation: 22_f64.to_radians(),
             field_of_view: 28_f64.to_radians(),
         };
-        camera.fit_distance(low, high);
+        camera.fit_distance(low, high, 1.0);
         camera
     }
 
-    /// Goes as close to its target as still shows all of a box, whatever the direction: for a camera that was turned
-    /// after [`Camera::fit`].
-    pub fn fit_distance(&mut self, low: DVec3, high: DVec3) {
+    /// Goes as close to its target as still shows all of a box in a picture of `aspect`, width over height, whatever the
+    /// direction: for a camera that was turned after [`Camera::fit`], and for pictures higher than wide. An aspect that is
+    /// no positive number changes nothing.
+    pub fn fit_distance(&mut self, low: DVec3, high: DVec3, aspect: f64) {
         let tangent = (self.field_of_view * 0.5).tan();
         let (forward, right, up) = (self.forward(), self.right(), self.up());
         let mut distance: f64 = 0.0;
         for corner in corners(low, high) {
             let from_target = corner - self.target;
-            let aside = right.dot(from_target).abs().max(up.dot(from_target).abs());
+            let across = right.dot(from_target).abs() / aspect;
+            let aside = across.max(up.dot(from_target).abs());
             distance = distance.max(aside * 1.08 / tangent - forward.dot(from_target));
         }
-        if distance > 0.0 && distance.is_finite() {
+        if aspect > 0.0 && distance > 0.0 && distance.is_finite() {
             self.distance = distance.clamp(NEAREST, FARTHEST);
         }
     }
