@@ -138,7 +138,7 @@ impl Pictures {
     }
 
     fn draw(&mut self, simulation: &mut Simulation) -> Result<Picture, RenderError> {
-        if self.renderer.needs_read_back(simulation) {
+        if self.renderer.needs_read_back(&self.painting, simulation) {
             simulation.read_back()?;
         }
         let frame = simulation.report().frame;

@@ -13,6 +13,8 @@ pub(super) struct Buffer<T> {
     usage: BufferUsages,
     buffer: wgpu::Buffer,
     len: usize,
+    /// Bytes written since it was made.
+    sent: u64,
     of: PhantomData<T>,
 }
 
@@ -30,6 +32,7 @@ impl<T: NoUninit> Buffer<T> {
             // No binding may be empty, and the largest element has a few dozen bytes.
             buffer: create(gpu, what, usage, 256)?,
             len: 0,
+            sent: 0,
             of: PhantomData,
         })
     }
@@ -38,7 +41,8 @@ impl<T: NoUninit> Buffer<T> {
     pub(super) fn replace(&mut self, gpu: &GpuContext, values: &[T]) -> Result<(), GpuError> {
         self.resize(gpu, values.len())?;
         if !values.is_empty() {
-            let bytes = bytemuck::cast_slice(values);
+            let bytes: &[u8] = bytemuck::cast_slice(values);
+            self.sent += bytes.len() as u64;
             gpu.queue().write_buffer(&self.buffer, 0, bytes);
         }
         Ok(())
@@ -58,6 +62,10 @@ impl<T: NoUninit> Buffer<T> {
 
     pub(super) fn len(&self) -> usize {
         self.len
+    }
+
+    pub(super) fn sent(&self) -> u64 {
+        self.sent
     }
 
     pub(super) fn raw(&self) -> &wgpu::Buffer {

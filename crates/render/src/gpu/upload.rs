@@ -87,6 +87,14 @@ impl Upload {
         })
     }
 
+    /// Bytes sent since it was made.
+    pub(super) fn sent(&self) -> u64 {
+        let skin = self.vertices.sent() + self.triangles.sent() + self.count.sent();
+        let bodies = skin + self.positions.sent() + self.parts.sent() + self.colors.sent();
+        let planes = self.planes.sent() + self.ground.sent();
+        bodies + self.view.sent() + self.props.sent() + planes
+    }
+
     /// Sends what is not there yet. `solvers` are those to draw from, none if positions are to be sent.
     pub(super) fn send(
         &mut self,

@@ -7,7 +7,8 @@ use std::sync::Arc;
 use glam::Vec3;
 use incise::{Scene, Simulation};
 use incise_render::{
-    Camera, ColorBy, GpuRenderer, Painting, RenderError, SoftwareRenderer, Style, normal_sums,
+    Camera, ColorBy, GpuRenderer, Painting, Picture, RenderError, SoftwareRenderer, Style,
+    normal_sums,
 };
 
 use crate::support::{Difference, LIVER, Shown, TWO_BODIES, gpu};
@@ -58,43 +59,106 @@ fn both_draw_the_same() {
     }
 }
 
+/// Reads the simulation back, draws it by software and compares. As in `assert_alike`.
+fn assert_present(
+    there: &Picture,
+    painting: &Painting,
+    simulation: &mut Simulation,
+    camera: &Camera,
+    what: &str,
+) {
+    simulation.read_back().unwrap();
+    let here = SoftwareRenderer::new()
+        .picture(painting, simulation, camera, &Style::default(), SIZE)
+        .unwrap();
+    let difference = Difference::of(there, &here, 24);
+    assert!(
+        difference.mean < 1.0 && difference.share < 0.04,
+        "{what}: {difference:?}"
+    );
+}
+
+/// Draws twice; the second time sends no positions and no skin, and neither reads.
+fn assert_little_is_sent(
+    renderer: &mut GpuRenderer,
+    painting: &Painting,
+    simulation: &Simulation,
+    camera: &Camera,
+) {
+    let read = renderer.readbacks();
+    let mut sent = [0; 2];
+    for sent in &mut sent {
+        let before = renderer.uploaded_bytes();
+        renderer
+            .draw(painting, simulation, camera, &Style::default(), SIZE)
+            .unwrap();
+        *sent = renderer.uploaded_bytes() - before;
+    }
+    let positions = 16 * simulation.positions().len() as u64;
+    assert!(sent[1] < positions, "{sent:?} of {positions} bytes");
+    assert_eq!(renderer.readbacks(), read);
+}
+
 #[test]
 fn positions_do_not_leave_the_device() {
     let Some(gpu) = gpu("positions_do_not_leave_the_device") else {
         return;
     };
-    let scene = Scene::from_toml(&LIVER.replace("substeps = 8", "substeps = 3")).unwrap();
+    let scene = Scene::from_toml(&LIVER.replace("substeps = 8", "substeps = 1")).unwrap();
     let mut simulation = Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap();
     let mut painting = Painting::new(&simulation, &scene);
-    let mut renderer = GpuRenderer::new(Arc::clone(&gpu)).unwrap();
-    let camera = Camera::fit(glam::DVec3::splat(-0.2), glam::DVec3::splat(0.2));
-    assert!(!renderer.needs_read_back(&simulation));
+    let mut renderer = GpuRenderer::new(gpu).unwrap();
+    let camera = Camera::fit(Vec3::splat(-0.22).into(), Vec3::splat(0.2).into());
     let style = Style::default();
-    for frame in 0..4 {
-        // Before the first step too, when the device has no positions yet.
-        let read = || gpu.traffic().readbacks;
-        let before = read();
-        renderer
-            .draw(&painting, &simulation, &camera, &style, SIZE)
-            .unwrap();
-        assert_eq!(read(), before, "frame {frame}");
-        let there = renderer
-            .picture(&painting, &simulation, &camera, &style, SIZE)
-            .unwrap();
-        simulation.read_back().unwrap();
-        let here = SoftwareRenderer::new()
-            .picture(&painting, &simulation, &camera, &style, SIZE)
-            .unwrap();
-        let difference = Difference::of(&there, &here, 24);
-        // As in `assert_alike`.
-        assert!(
-            difference.mean < 1.0 && difference.share < 0.04,
-            "{frame}: {difference:?}"
-        );
+    // Before the first step too, when the device has no positions yet.
+    let there = renderer
+        .picture(&painting, &simulation, &camera, &style, SIZE)
+        .unwrap();
+    assert_present(&there, &painting, &mut simulation, &camera, "at the start");
+    for _ in 0..20 {
         simulation.step().unwrap();
         painting.follow(&simulation);
     }
-    assert!(simulation.report().tets > simulation.mesh().tets.len() / 2);
+    assert!(!renderer.needs_read_back(&painting, &simulation));
+    assert_little_is_sent(&mut renderer, &painting, &simulation, &camera);
+    let there = renderer
+        .picture(&painting, &simulation, &camera, &style, SIZE)
+        .unwrap();
+    // The host does not know yet how far it fell.
+    let old = SoftwareRenderer::new()
+        .picture(&painting, &simulation, &camera, &style, SIZE)
+        .unwrap();
+    let difference = Difference::of(&there, &old, 24);
+    assert!(difference.mean > 1.0, "{difference:?}");
+    assert_present(&there, &painting, &mut simulation, &camera, "20 frames on");
+}
+
+#[test]
+fn a_painting_made_late_needs_positions_of_the_host() {
+    let Some(gpu) = gpu("a_painting_made_late_needs_positions_of_the_host") else {
+        return;
+    };
+    let scene = Scene::from_toml(&LIVER.replace("substeps = 8", "substeps = 1")).unwrap();
+    let mut simulation = Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap();
+    let mut renderer = GpuRenderer::new(gpu).unwrap();
+    let camera = Camera::fit(Vec3::splat(-0.22).into(), Vec3::splat(0.2).into());
+    let style = Style::default();
+    for _ in 0..10 {
+        simulation.step().unwrap();
+    }
+    let mut painting = Painting::new(&simulation, &scene);
+    for what in ["made", "reset"] {
+        assert!(renderer.needs_read_back(&painting, &simulation), "{what}");
+        simulation.read_back().unwrap();
+        let there = renderer
+            .picture(&painting, &simulation, &camera, &style, SIZE)
+            .unwrap();
+        assert_present(&there, &painting, &mut simulation, &camera, what);
+        simulation.step().unwrap();
+        painting.follow(&simulation);
+        assert!(!renderer.needs_read_back(&painting, &simulation), "{what}");
+        painting.reset(&simulation);
+    }
 }
 
 #[test]
@@ -107,30 +171,22 @@ fn bodies_of_several_solvers_are_put_together_on_the_device() {
     let mut simulation = Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap();
     assert_eq!(simulation.device_solvers().count(), 2);
     let mut painting = Painting::new(&simulation, &scene);
-    let mut renderer = GpuRenderer::new(Arc::clone(&gpu)).unwrap();
-    assert!(!renderer.needs_read_back(&simulation));
+    let mut renderer = GpuRenderer::new(gpu).unwrap();
     let [low, high] = painting.bounds(&simulation);
     let (camera, style) = (Camera::fit(low, high), Style::default());
     for frame in 0..3 {
         simulation.step().unwrap();
         painting.follow(&simulation);
-        let before = gpu.traffic().readbacks;
-        renderer
-            .draw(&painting, &simulation, &camera, &style, SIZE)
-            .unwrap();
-        assert_eq!(gpu.traffic().readbacks, before);
+        assert!(!renderer.needs_read_back(&painting, &simulation));
         let there = renderer
             .picture(&painting, &simulation, &camera, &style, SIZE)
             .unwrap();
-        simulation.read_back().unwrap();
-        let here = SoftwareRenderer::new()
-            .picture(&painting, &simulation, &camera, &style, SIZE)
-            .unwrap();
-        let difference = Difference::of(&there, &here, 24);
-        // As in `assert_alike`.
-        assert!(
-            difference.mean < 1.0 && difference.share < 0.04,
-            "{frame}: {difference:?}"
+        assert_present(
+            &there,
+            &painting,
+            &mut simulation,
+            &camera,
+            &format!("frame {frame}"),
         );
     }
     assert_eq!(simulation.report().pieces, 4);
