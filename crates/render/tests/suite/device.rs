@@ -192,15 +192,9 @@ fn bodies_of_several_solvers_are_put_together_on_the_device() {
     assert_eq!(simulation.report().pieces, 4);
 }
 
-#[test]
-fn normals_are_those_of_the_processor() {
-    let Some(gpu) = gpu("normals_are_those_of_the_processor") else {
-        return;
-    };
-    let shown = Shown::new(LIVER, 4);
-    let mut renderer = GpuRenderer::new(gpu).unwrap();
-    let camera = shown.camera();
-    let style = Style::default();
+/// Sums of normals of the skin's vertices by the processor and by the device, for a simulation on the processor.
+fn normals_of_both(renderer: &mut GpuRenderer, shown: &Shown) -> [Vec<[i32; 3]>; 2] {
+    let (camera, style) = (shown.camera(), Style::default());
     renderer
         .draw(&shown.painting, &shown.simulation, &camera, &style, SIZE)
         .unwrap();
@@ -214,6 +208,18 @@ fn normals_are_those_of_the_processor() {
         .collect();
     let here = normal_sums(skin.triangles(), &places);
     assert_eq!(here.len(), there.len());
+    [here, there]
+}
+
+#[test]
+fn normals_are_those_of_the_processor() {
+    let Some(gpu) = gpu("normals_are_those_of_the_processor") else {
+        return;
+    };
+    let shown = Shown::new(LIVER, 4);
+    let mut renderer = GpuRenderer::new(gpu).unwrap();
+    let [here, there] = normals_of_both(&mut renderer, &shown);
+    let skin = shown.painting.skin();
     let mut used = vec![false; here.len()];
     skin.triangles()
         .iter()
@@ -229,6 +235,36 @@ fn normals_are_those_of_the_processor() {
             "{here} {there}"
         );
     }
+}
+
+/// A body of 1 m so far from the other one that single precision sees its particles at one place.
+#[test]
+fn triangles_without_an_area_have_no_normal() {
+    let Some(gpu) = gpu("triangles_without_an_area_have_no_normal") else {
+        return;
+    };
+    let shown = Shown::new(
+        r#"
+        [[body]]
+        shape = { kind = "box", tets = 200 }
+        [[body]]
+        shape = { kind = "box", tets = 200 }
+        position = [9.0e8, 9.0e8, 9.0e8]
+        "#,
+        0,
+    );
+    let mut renderer = GpuRenderer::new(gpu).unwrap();
+    let [here, there] = normals_of_both(&mut renderer, &shown);
+    let skin = shown.painting.skin();
+    let rest = &shown.simulation.mesh().positions;
+    let mut flat = 0;
+    for (v, vertex) in skin.vertices().iter().enumerate() {
+        if rest[vertex.particle.index()].x > 1e8 {
+            assert_eq!([here[v], there[v]], [[0; 3]; 2]);
+            flat += 1;
+        }
+    }
+    assert!(0 < flat && flat < skin.vertices().len());
 }
 
 #[test]
