@@ -53,7 +53,7 @@ impl<T: NoUninit> Buffer<T> {
         let bytes = (len * size_of::<T>()) as u64;
         if bytes > self.buffer.size() {
             let roomy = (bytes + bytes / 2).next_multiple_of(4);
-            let size = roomy.min(gpu.buffer_limit()).max(bytes);
+            let size = roomy.min(limit(gpu, self.usage)).max(bytes);
             self.buffer = create(gpu, self.what, self.usage, size)?;
         }
         self.len = len;
@@ -73,6 +73,15 @@ impl<T: NoUninit> Buffer<T> {
     }
 }
 
+/// Most bytes of a buffer: those that no shader sees, as for pictures on their way, may be larger than a binding.
+fn limit(gpu: &GpuContext, usage: BufferUsages) -> u64 {
+    if usage.intersects(BufferUsages::STORAGE | BufferUsages::UNIFORM) {
+        gpu.buffer_limit()
+    } else {
+        gpu.device().limits().max_buffer_size
+    }
+}
+
 /// Makes a buffer, or says why not.
 pub(super) fn create(
     gpu: &GpuContext,
@@ -81,7 +90,7 @@ pub(super) fn create(
     bytes: u64,
 ) -> Result<wgpu::Buffer, GpuError> {
     gpu.check()?;
-    let limit = gpu.buffer_limit();
+    let limit = limit(gpu, usage);
     if bytes > limit {
         return Err(GpuError::TooLarge { what, bytes, limit });
     }

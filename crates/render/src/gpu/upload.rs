@@ -21,6 +21,9 @@ use crate::{Painting, RenderError, Style};
 /// Set in a vertex that a cut laid bare.
 const CUT: u32 = 0x8000_0000;
 
+/// The key of no skin: revisions begin with 1.
+const NOTHING: (u64, bool) = (0, false);
+
 /// `View` in `view.wgsl`.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
@@ -70,7 +73,7 @@ impl Upload {
     pub(super) fn new(gpu: &GpuContext) -> Result<Self, RenderError> {
         let (storage, uniform) = (BufferUsages::STORAGE, BufferUsages::UNIFORM);
         Ok(Self {
-            skin: (0, false),
+            skin: NOTHING,
             coloring: 0,
             has_ground: false,
             view: Buffer::new(gpu, "view", uniform)?,
@@ -106,13 +109,16 @@ impl Upload {
         view: &View,
     ) -> Result<(), RenderError> {
         let skin = (painting.topology(), !solvers.is_empty());
+        // A key stands for what has arrived: none while something is on its way and may fail.
         if self.skin != skin {
+            self.skin = NOTHING;
             self.send_skin(gpu, painting, simulation, solvers)?;
             self.skin = skin;
         }
         self.send_positions(gpu, simulation, solvers, view)?;
         let colors = painting.colors_for(style.color_by);
         if !colors.is_empty() && self.coloring != painting.coloring() {
+            self.coloring = 0;
             self.colors.replace(gpu, colors)?;
             self.coloring = painting.coloring();
         }
