@@ -59,7 +59,7 @@ impl Pictures {
         simulation: &Simulation,
         frames: u64,
     ) -> Result<Option<Self>, Failure> {
-        if arguments.no_pictures && arguments.film.is_none() {
+        if !arguments.draws() {
             return Ok(None);
         }
         let (renderer, note) = Renderer::for_simulation(simulation);
@@ -96,7 +96,7 @@ impl Pictures {
     pub(crate) fn begin_film(&mut self) -> anyhow::Result<()> {
         if let Some(path) = &self.film {
             require_file(path)?;
-            let seconds = (self.film_every as f64 * self.time_step).clamp(0.01, 10.0);
+            let seconds = self.film_every as f64 * self.time_step;
             self.writer = Some(Film::create(path, self.size, seconds)?);
         }
         Ok(())

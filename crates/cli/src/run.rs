@@ -109,11 +109,12 @@ fn scene(arguments: &RunArguments) -> Result<Scene, Failure> {
         body.mesh = Some(mesh.clone());
         body.shape = None;
     }
-    if arguments.color_by == ColorBy::Residual && scene.solver.method == Method::Descent {
-        let why = "--color-by residual needs constraints: the scene is solved by descent";
-        return Err(Failure::Input(anyhow!(why)));
-    }
-    if arguments.color_by == ColorBy::Residual {
+    // Without a picture, nobody asks what its colors show.
+    if arguments.draws() && arguments.color_by == ColorBy::Residual {
+        if scene.solver.method == Method::Descent {
+            let why = "--color-by residual needs constraints: the scene is solved by descent";
+            return Err(Failure::Input(anyhow!(why)));
+        }
         scene.report.every = 1;
         if !scene.report.quantities.contains(&Quantity::Residual) {
             scene.report.quantities.push(Quantity::Residual);

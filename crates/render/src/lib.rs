@@ -42,6 +42,7 @@ pub use sheet::contact_sheet;
 pub use software::SoftwareRenderer;
 pub use stretch::stretch;
 pub use style::{ColorBy, Style};
+pub use view::LARGEST_SIDE;
 
 /// The example of the README, run as a test.
 #[cfg(doctest)]

@@ -7,8 +7,8 @@ use glam::{Mat4, Vec3, Vec4Swizzles};
 
 use crate::{Camera, RenderError};
 
-/// The largest picture on a side: what devices allow that allow WebGPU's default limits.
-pub(crate) const LARGEST_SIDE: u32 = 8192;
+/// Most pixels on a side of a picture by software: what every device allows that has WebGPU's default limits.
+pub const LARGEST_SIDE: u32 = 8192;
 
 /// What is the same for all that is drawn in a picture.
 #[derive(Clone, Copy, Debug)]
