@@ -55,7 +55,7 @@ pub(crate) struct RunArguments {
     /// Width of the numbers [default: as the scene says].
     #[arg(long, value_enum)]
     pub(crate) precision: Option<PrecisionName>,
-    /// Number of threads, at most 1024 [default: one for each core]. The result is the same for any number.
+    /// Number of threads that simulate and draw, at most 1024 [default: one for each core]. The result is the same for any number.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) threads: Option<u16>,
     /// Folder for scene, frames, surfaces, pictures and last mesh.

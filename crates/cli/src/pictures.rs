@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use incise::scene::StrokeSpec;
 use incise::{Scene, Simulation};
 use incise_render::{
-    Camera, ColorBy, Film, Painting, Picture, RenderError, Renderer, Style, blade_at, contact_sheet,
+    Camera, ColorBy, Film, Painting, Picture, RenderError, Renderer, Style, contact_sheet,
 };
 
 use crate::args::RunArguments;
@@ -146,7 +146,7 @@ impl Pictures {
         for blade in self
             .strokes
             .iter()
-            .filter_map(|stroke| blade_at(stroke, frame))
+            .filter_map(|stroke| stroke.blade_at(frame))
         {
             self.painting.add_blade(&blade);
         }

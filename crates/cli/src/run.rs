@@ -7,6 +7,7 @@ use incise::scene::{Backend, Method, Precision, Quantity};
 use incise::{Error, Scene, Simulation};
 use incise_render::{ColorBy, Film};
 use indicatif::{ProgressBar, ProgressStyle};
+use rayon::ThreadPoolBuilder;
 
 use crate::args::{BackendName, PrecisionName, RunArguments};
 use crate::failure::Failure;
@@ -19,6 +20,20 @@ use crate::summary::Summary;
 const FRAMES: u64 = 200;
 
 pub(crate) fn run(arguments: &RunArguments) -> Result<(), Failure> {
+    let Some(threads) = arguments.threads.map(usize::from) else {
+        return simulate(arguments);
+    };
+    // Here and not in the simulation alone: drawing shares them.
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|error| Error::Threads {
+        threads,
+        message: error.to_string(),
+    })?;
+    pool.install(|| simulate(arguments))
+}
+
+/// Simulates and draws on the threads of the pool that it is called in.
+fn simulate(arguments: &RunArguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.save_mesh {
         require_mesh_file(path)?;
     }
@@ -29,10 +44,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let frames = arguments
         .frames
         .unwrap_or_else(|| scene.frames_needed().max(FRAMES));
-    let mut simulation = match arguments.threads {
-        Some(threads) => Simulation::with_threads(&scene, usize::from(threads))?,
-        None => Simulation::new(&scene)?,
-    };
+    let mut simulation = Simulation::new(&scene)?;
     let pictures = Pictures::of(arguments, &scene, &simulation, frames)?;
     let folder = arguments.out.as_deref().unwrap_or(Path::new("out"));
     let jsonl = arguments.jsonl.as_deref();

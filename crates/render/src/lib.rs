@@ -33,7 +33,7 @@ pub use film::Film;
 #[cfg(feature = "gpu")]
 pub use gpu::{GpuRenderer, Shader, shaders};
 pub use normals::normal_sums;
-pub use painting::{Painting, blade_at};
+pub use painting::Painting;
 pub use palette::Legend;
 pub use pick::Hit;
 pub use picture::Picture;

@@ -13,7 +13,7 @@ use incise::mesh::glam::DVec3;
 use incise::report::FrameReport;
 use incise::scene::{Quantity, ReportSpec, SolverSpec};
 use incise::{Grab, Scene, Simulation, Snapshot};
-use incise_render::{Camera, ColorBy, Legend, Painting, blade_at};
+use incise_render::{Camera, ColorBy, Legend, Painting};
 
 use crate::effects::Effects;
 use crate::history::{History, Moment};
@@ -158,7 +158,7 @@ impl Stage {
     fn show_scripted_blade(&mut self, frame: u64) {
         if self.stroke.is_none() && !self.scripted.is_empty() {
             let strokes = self.scene.stroke.iter();
-            let blade = strokes.filter_map(|stroke| blade_at(stroke, frame)).next();
+            let blade = strokes.filter_map(|stroke| stroke.blade_at(frame)).next();
             self.painting.set_blade(blade.as_deref());
         }
     }
