@@ -1,7 +1,8 @@
 //! [`View`]: what both renderers derive from camera and size, in single precision relative to the eye.
 //!
-//! Differences to the eye are taken in double precision and rounded once, so a body is as sharp far from the origin of the
-//! world as at it.
+//! Differences to the eye are taken in double precision and rounded once. Particles have single precision relative to the
+//! origin of their solver, or to the first particle where positions are sent: what is near that is as sharp far from the
+//! origin of the world as at it.
 
 use glam::{Mat4, Vec3, Vec4Swizzles};
 

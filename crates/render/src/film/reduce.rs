@@ -5,7 +5,7 @@
 //! 1992, in its greedy form); each gives the mean of its colors. Colors count by the root of how often they are seen, so that
 //! a small highlight is not lost in a large background. Cost: O(pixels), and a few passes over the colors that differ.
 //!
-//! Crates were tried on a picture of the built-in run. NeuQuant (`color_quant`) is nearer on average, but wrong by up to 50
+//! Crates were tried on a picture of the built-in run. `NeuQuant` (in `color_quant`) is nearer on average, but wrong by up to 50
 //! levels where colors are rare, which shows as blemishes; Wu's method in `quantette` finds 67 colors and is wrong by 2 on
 //! average. This one is wrong by 0.3 on average and by 11 at most.
 

@@ -1,8 +1,8 @@
 //! [`GpuRenderer`]: pictures drawn by a device.
 //!
 //! The bodies' vertices are not sent: the vertex shader reads positions from the solver's own buffer, looks up the triangle
-//! and its corners, and normals are computed on the device too. What is sent is the skin's triangles and colors when they
-//! changed, and some hundred bytes of view a picture. Several solvers' positions are put together by copies on the device. A
+//! and its corners, and normals are computed on the device too. What is sent is all of the skin's triangles and colors when
+//! any changed, and for each picture the view and the obstacles. Several solvers' positions are put together by copies on the device. A
 //! simulation that runs on the processor sends its positions. All is one submit; nothing is read back unless a [`Picture`]
 //! is asked for.
 //!
