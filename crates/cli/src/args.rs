@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use incise_render::ColorBy;
+use incise_render::{ColorBy, LARGEST_SIDE};
 
 /// Cuts soft bodies in real time.
 #[derive(Debug, Parser)]
@@ -55,7 +55,7 @@ pub(crate) struct RunArguments {
     /// Width of the numbers [default: as the scene says].
     #[arg(long, value_enum)]
     pub(crate) precision: Option<PrecisionName>,
-    /// Number of threads, at most 1024 [default: one for each core]. The result is the same for any number.
+    /// Number of threads that simulate and draw, at most 1024 [default: one for each core]. The result is the same for any number.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) threads: Option<u16>,
     /// Folder for scene, frames, surfaces, pictures and last mesh.
@@ -80,7 +80,8 @@ pub(crate) struct RunArguments {
     /// [default: -60,22,1].
     #[arg(long, value_name = "AZIMUTH,ELEVATION[,ZOOM]", value_parser = view, allow_hyphen_values = true)]
     pub(crate) view: Option<[f64; 3]>,
-    /// What the colors in pictures show: tissue, color, cluster, piece, stretch or residual, which every frame then reports.
+    /// What the colors in pictures show: tissue, color, cluster, piece, stretch or residual. Where there are pictures by
+    /// residual, every frame reports it.
     #[arg(long, value_name = "NAME", default_value_t)]
     pub(crate) color_by: ColorBy,
     /// Draw the edges of triangles.
@@ -94,8 +95,12 @@ pub(crate) struct RunArguments {
     pub(crate) quiet: bool,
 }
 
-/// Largest side of a picture.
-const LARGEST_SIDE: u32 = 8192;
+impl RunArguments {
+    /// Whether there is to be any picture.
+    pub(crate) fn draws(&self) -> bool {
+        !self.no_pictures || self.film.is_some()
+    }
+}
 
 /// A size, as in `960x720`.
 fn size(text: &str) -> Result<[u32; 2], String> {

@@ -1,7 +1,8 @@
 //! The files of a run: scene, frames, surfaces, pictures and last mesh.
 //!
-//! Lines are collected under a temporary name and get their own when the run has ended well; all other files are
-//! written beside and renamed. So a name always stands for a complete file.
+//! Lines are collected under a temporary name and get their own when the run has ended well and all else is written;
+//! all other files are written beside and renamed. So a name always stands for a complete file. Pictures of an earlier run
+//! in the folder are removed at the start, so that those that are there belong together.
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
@@ -74,6 +75,28 @@ impl Drop for Lines {
     }
 }
 
+/// Removes the pictures of an earlier run; files of other names stay.
+fn remove_pictures(folder: &Path) -> anyhow::Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        let is_ours = entry.file_name().to_str().is_some_and(is_picture);
+        if is_ours && entry.file_type()?.is_file() {
+            let path = entry.path();
+            fs::remove_file(&path).with_context(|| format!("cannot remove {}", path.display()))?;
+        }
+    }
+    Ok(())
+}
+
+/// Whether a run gives its pictures such a name.
+fn is_picture(name: &str) -> bool {
+    let number = name
+        .strip_prefix("frame_")
+        .and_then(|rest| rest.strip_suffix(".png"));
+    let is_number = |number: &str| number.len() >= 5 && number.bytes().all(|b| b.is_ascii_digit());
+    name == "contact_sheet.png" || number.is_some_and(is_number)
+}
+
 /// The scene with absolute paths, which mean the same wherever it is written to.
 fn movable(scene: &Scene) -> anyhow::Result<Scene> {
     let mut scene = scene.clone();
@@ -124,6 +147,7 @@ impl Output {
             write_atomically(folder.join("scene.toml"), |file| {
                 file.write_all(toml.as_bytes())
             })?;
+            remove_pictures(folder)?;
             Ok(lines)
         };
         let lines = open().map_err(|error| {
@@ -222,11 +246,12 @@ impl Output {
             &mesh.tets,
             fields,
         )?;
-        self.lines.into_iter().try_for_each(Lines::finish)?;
-        let pictures = self.pictures;
-        pictures
+        let said = self
+            .pictures
             .map(|pictures| pictures.finish(&self.folder))
-            .transpose()
+            .transpose()?;
+        self.lines.into_iter().try_for_each(Lines::finish)?;
+        Ok(said)
     }
 }
 

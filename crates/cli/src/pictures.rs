@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use incise::scene::StrokeSpec;
 use incise::{Scene, Simulation};
 use incise_render::{
-    Camera, ColorBy, Film, Painting, Picture, RenderError, Renderer, Style, blade_at, contact_sheet,
+    Camera, ColorBy, Film, Painting, Picture, RenderError, Renderer, Style, contact_sheet,
 };
 
 use crate::args::RunArguments;
@@ -16,6 +16,8 @@ use crate::output::{require_file, save_every};
 
 /// Pixels of a picture, across and down.
 const SIZE: [u32; 2] = [640, 480];
+/// Degrees around, degrees above the floor and magnification.
+const VIEW: [f64; 3] = [-60.0, 22.0, 1.0];
 /// Least pictures of a film in a second.
 const PER_SECOND: f64 = 25.0;
 /// Pictures on the sheet, and of a row.
@@ -57,7 +59,7 @@ impl Pictures {
         simulation: &Simulation,
         frames: u64,
     ) -> Result<Option<Self>, Failure> {
-        if arguments.no_pictures && arguments.film.is_none() {
+        if !arguments.draws() {
             return Ok(None);
         }
         let (renderer, note) = Renderer::for_simulation(simulation);
@@ -94,7 +96,7 @@ impl Pictures {
     pub(crate) fn begin_film(&mut self) -> anyhow::Result<()> {
         if let Some(path) = &self.film {
             require_file(path)?;
-            let seconds = (self.film_every as f64 * self.time_step).clamp(0.01, 10.0);
+            let seconds = self.film_every as f64 * self.time_step;
             self.writer = Some(Film::create(path, self.size, seconds)?);
         }
         Ok(())
@@ -136,7 +138,7 @@ impl Pictures {
     }
 
     fn draw(&mut self, simulation: &mut Simulation) -> Result<Picture, RenderError> {
-        if self.renderer.needs_read_back(simulation) {
+        if self.renderer.needs_read_back(&self.painting, simulation) {
             simulation.read_back()?;
         }
         let frame = simulation.report().frame;
@@ -144,7 +146,7 @@ impl Pictures {
         for blade in self
             .strokes
             .iter()
-            .filter_map(|stroke| blade_at(stroke, frame))
+            .filter_map(|stroke| stroke.blade_at(frame))
         {
             self.painting.add_blade(&blade);
         }
@@ -190,12 +192,13 @@ fn camera(
         low.z = low.z.min(ground.height);
     }
     let mut camera = Camera::fit(low, high);
-    if let Some([azimuth, elevation, zoom]) = arguments.view {
-        camera.azimuth = azimuth.to_radians();
-        camera.elevation = elevation.to_radians();
-        camera.fit_distance(low, high);
-        camera.zoom(1.0 / zoom);
-    }
+    let [azimuth, elevation, zoom] = arguments.view.unwrap_or(VIEW);
+    camera.azimuth = azimuth.to_radians();
+    camera.elevation = elevation.to_radians();
+    let [width, height] = arguments.size.unwrap_or(SIZE).map(f64::from);
+    // A picture wider than high keeps room at its sides for what falls apart.
+    camera.fit_distance(low, high, (width / height).min(1.0));
+    camera.zoom(1.0 / zoom);
     camera
 }
 

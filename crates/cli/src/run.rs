@@ -7,6 +7,7 @@ use incise::scene::{Backend, Method, Precision, Quantity};
 use incise::{Error, Scene, Simulation};
 use incise_render::{ColorBy, Film};
 use indicatif::{ProgressBar, ProgressStyle};
+use rayon::ThreadPoolBuilder;
 
 use crate::args::{BackendName, PrecisionName, RunArguments};
 use crate::failure::Failure;
@@ -19,6 +20,20 @@ use crate::summary::Summary;
 const FRAMES: u64 = 200;
 
 pub(crate) fn run(arguments: &RunArguments) -> Result<(), Failure> {
+    let Some(threads) = arguments.threads.map(usize::from) else {
+        return simulate(arguments);
+    };
+    // Here and not in the simulation alone: drawing shares them.
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|error| Error::Threads {
+        threads,
+        message: error.to_string(),
+    })?;
+    pool.install(|| simulate(arguments))
+}
+
+/// Simulates and draws on the threads of the pool that it is called in.
+fn simulate(arguments: &RunArguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.save_mesh {
         require_mesh_file(path)?;
     }
@@ -29,10 +44,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let frames = arguments
         .frames
         .unwrap_or_else(|| scene.frames_needed().max(FRAMES));
-    let mut simulation = match arguments.threads {
-        Some(threads) => Simulation::with_threads(&scene, usize::from(threads))?,
-        None => Simulation::new(&scene)?,
-    };
+    let mut simulation = Simulation::new(&scene)?;
     let pictures = Pictures::of(arguments, &scene, &simulation, frames)?;
     let folder = arguments.out.as_deref().unwrap_or(Path::new("out"));
     let jsonl = arguments.jsonl.as_deref();
@@ -109,11 +121,12 @@ fn scene(arguments: &RunArguments) -> Result<Scene, Failure> {
         body.mesh = Some(mesh.clone());
         body.shape = None;
     }
-    if arguments.color_by == ColorBy::Residual && scene.solver.method == Method::Descent {
-        let why = "--color-by residual needs constraints: the scene is solved by descent";
-        return Err(Failure::Input(anyhow!(why)));
-    }
-    if arguments.color_by == ColorBy::Residual {
+    // Without a picture, nobody asks what its colors show.
+    if arguments.draws() && arguments.color_by == ColorBy::Residual {
+        if scene.solver.method == Method::Descent {
+            let why = "--color-by residual needs constraints: the scene is solved by descent";
+            return Err(Failure::Input(anyhow!(why)));
+        }
         scene.report.every = 1;
         if !scene.report.quantities.contains(&Quantity::Residual) {
             scene.report.quantities.push(Quantity::Residual);

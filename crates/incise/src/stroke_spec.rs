@@ -3,9 +3,11 @@
 //! Every kind names the frame at whose start it acts, in the space where the body is then. What is carried out:
 //! `tool.rs` checks and prepares, `strokes.rs` cuts.
 
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::scene::Region;
+use crate::strokes::along;
 
 /// A cut.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -102,8 +104,75 @@ impl StrokeSpec {
             Self::Sweep { frames, .. } => frames[1],
         }
     }
+
+    /// Where the blade is at the start of a frame, a polyline in m; `None` before it begins, after it has ended, for strokes
+    /// that cut at once, and for a path that no simulation takes. The same arithmetic as that of the cut.
+    ///
+    /// ```
+    /// use incise::Scene;
+    ///
+    /// let stroke = &Scene::built_in().stroke[0]; // frames 4 to 64, straight down
+    /// let (start, middle) = (stroke.blade_at(4).unwrap(), stroke.blade_at(34).unwrap());
+    /// assert!((start[0].z - middle[0].z - 0.2).abs() < 1e-12);
+    /// assert_eq!(stroke.blade_at(65), None);
+    /// ```
+    #[must_use]
+    pub fn blade_at(&self, frame: u64) -> Option<Vec<DVec3>> {
+        let Self::Sweep {
+            frames: [first, last],
+            blade,
+            path,
+            ..
+        } = self
+        else {
+            return None;
+        };
+        if first == last || !(first..=last).contains(&&frame) || path.is_empty() {
+            return None;
+        }
+        let blade = blade.iter().map(|x| DVec3::from_array(*x));
+        Some(pose(blade, path, [*first, *last], frame))
+    }
+}
+
+/// A blade at the start of a frame that its stroke has reached, for `frames` that ascend and a path with a point.
+pub(crate) fn pose(
+    blade: impl Iterator<Item = DVec3>,
+    path: &[[f64; 3]],
+    [first, last]: [u64; 2],
+    frame: u64,
+) -> Vec<DVec3> {
+    let passed = (frame.min(last) - first) as f64 / (last - first) as f64;
+    let offset = along(path, passed);
+    blade.map(|x| x + offset).collect()
 }
 
 fn tenth() -> f64 {
     0.1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blades_are_where_they_cut() {
+        let sweep = |frames, path: &[[f64; 3]]| StrokeSpec::Sweep {
+            frames,
+            blade: vec![[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]],
+            path: path.to_vec(),
+            snap: 0.1,
+        };
+        let path = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 4.0, 0.0]];
+        let stroke = sweep([3, 7], &path);
+        assert_eq!([2, 8].map(|frame| stroke.blade_at(frame)), [None, None]);
+        let x = [3, 4, 5, 7].map(|frame| stroke.blade_at(frame).unwrap()[0].x);
+        assert_eq!(x, [0.0, 0.5, 1.0, 1.0]);
+        let end = [DVec3::new(1.0, 3.0, 0.0), DVec3::new(1.0, 5.0, 0.0)];
+        assert_eq!(stroke.blade_at(7).unwrap(), end);
+        // What no simulation takes.
+        assert_eq!(sweep([3, 3], &path).blade_at(3), None);
+        assert_eq!(sweep([7, 3], &path).blade_at(5), None);
+        assert_eq!(sweep([3, 7], &[]).blade_at(5), None);
+    }
 }

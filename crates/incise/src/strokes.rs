@@ -10,6 +10,7 @@ use crate::group::Group;
 use crate::limits::value;
 use crate::live_blade::LiveBlade;
 use crate::scene::StrokeSpec;
+use crate::stroke_spec::pose;
 use crate::tool::{Tool, tool};
 
 /// A stroke and how far it is.
@@ -201,10 +202,7 @@ impl Stroke {
         };
         let cut = match &self.tool {
             Tool::Sweep { blade, path } => {
-                let elapsed = (frame.min(last) - first) as f64 / (last - first) as f64;
-                let offset = along(path, elapsed);
-                let pose: Vec<DVec3> = blade.iter().map(|x| *x + offset).collect();
-                sweep(&pose)
+                sweep(&pose(blade.iter().copied(), path, [first, last], frame))
             }
             Tool::Live(blade) => sweep(blade.pose()),
             Tool::Surface(surface) => {

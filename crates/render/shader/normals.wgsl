@@ -41,6 +41,10 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups
     let bc = unit(c - b);
     let ca = unit(a - c);
     let normal = unit(cross(ab, -ca));
+    if all(normal == vec3<f32>(0.0)) {
+        // No area and perhaps no edges, of which an arc tangent is not defined.
+        return;
+    }
     // Of two directions, by sine and cosine.
     let at_a = atan2(length(cross(ab, -ca)), dot(ab, -ca));
     let at_b = atan2(length(cross(bc, -ab)), dot(bc, -ab));

@@ -1,8 +1,7 @@
 //! [`Camera`]: from where a scene is seen.
 //!
 //! It looks at a target from a distance, in a direction given by two angles; z is up. All that the renderers and whoever
-//! picks with a mouse need follows from these five numbers: axes, rays, projections. In double precision throughout, so
-//! that bodies far from the origin of the world are seen as well as others.
+//! picks with a mouse need follows from these five numbers: axes, rays, projections. In double precision throughout.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -57,22 +56,24 @@ impl Camera {
             elevation: 22_f64.to_radians(),
             field_of_view: 28_f64.to_radians(),
         };
-        camera.fit_distance(low, high);
+        camera.fit_distance(low, high, 1.0);
         camera
     }
 
-    /// Goes as close to its target as still shows all of a box, whatever the direction: for a camera that was turned
-    /// after [`Camera::fit`].
-    pub fn fit_distance(&mut self, low: DVec3, high: DVec3) {
+    /// Goes as close to its target as still shows all of a box in a picture of `aspect`, width over height, whatever the
+    /// direction: for a camera that was turned after [`Camera::fit`], and for pictures higher than wide. An aspect that is
+    /// no positive number changes nothing.
+    pub fn fit_distance(&mut self, low: DVec3, high: DVec3, aspect: f64) {
         let tangent = (self.field_of_view * 0.5).tan();
         let (forward, right, up) = (self.forward(), self.right(), self.up());
         let mut distance: f64 = 0.0;
         for corner in corners(low, high) {
             let from_target = corner - self.target;
-            let aside = right.dot(from_target).abs().max(up.dot(from_target).abs());
+            let across = right.dot(from_target).abs() / aspect;
+            let aside = across.max(up.dot(from_target).abs());
             distance = distance.max(aside * 1.08 / tangent - forward.dot(from_target));
         }
-        if distance > 0.0 && distance.is_finite() {
+        if aspect > 0.0 && distance > 0.0 && distance.is_finite() {
             self.distance = distance.clamp(NEAREST, FARTHEST);
         }
     }
@@ -132,15 +133,8 @@ impl Camera {
         self.right().cross(self.forward())
     }
 
-    /// From points in the world to the clip space of wgpu: x to the right, y up, depth from 0 to 1. `aspect` is width over
-    /// height. What is nearer than a hundredth of the distance to the target is not seen; there is no farthest.
-    #[must_use]
-    pub fn view_projection(&self, aspect: f64) -> DMat4 {
-        let eye = self.eye();
-        self.projection(aspect) * DMat4::from_translation(-eye)
-    }
-
-    /// The same for points relative to the eye.
+    /// From points relative to the eye to the clip space of wgpu: x to the right, y up, depth from 0 to 1. `aspect` is width
+    /// over height. What is nearer than a hundredth of the distance to the target is not seen; there is no farthest.
     pub(crate) fn projection(&self, aspect: f64) -> DMat4 {
         let (right, up, back) = (self.right(), self.up(), -self.forward());
         let row = |axis: DVec3| axis.extend(0.0);
@@ -198,4 +192,26 @@ pub(crate) fn corners(low: DVec3, high: DVec3) -> [DVec3; 8] {
             pick(2, low.z, high.z),
         )
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clip_space_is_the_same_projection() {
+        let mut camera = Camera::fit(DVec3::new(1.0, 2.0, 3.0), DVec3::new(4.0, 4.0, 5.0));
+        camera.orbit(0.7, -0.9);
+        let size = [640.0, 480.0];
+        for corner in corners(DVec3::splat(-0.4), DVec3::new(0.1, 0.3, 0.4)) {
+            let at = camera.target + corner * camera.distance;
+            let clip = camera.projection(size[0] / size[1]) * (at - camera.eye()).extend(1.0);
+            let place = clip / clip.w;
+            let seen = camera.project(at, size).unwrap();
+            // Pixels of some hundred with sixteen digits.
+            assert!(((place.x + 1.0) * 0.5 * size[0] - seen.x).abs() < 1e-9);
+            assert!(((1.0 - place.y) * 0.5 * size[1] - seen.y).abs() < 1e-9);
+            assert!((0.0..=1.0).contains(&place.z));
+        }
+    }
 }

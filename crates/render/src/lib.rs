@@ -33,7 +33,7 @@ pub use film::Film;
 #[cfg(feature = "gpu")]
 pub use gpu::{GpuRenderer, Shader, shaders};
 pub use normals::normal_sums;
-pub use painting::{Painting, blade_at};
+pub use painting::Painting;
 pub use palette::Legend;
 pub use pick::Hit;
 pub use picture::Picture;
@@ -42,6 +42,7 @@ pub use sheet::contact_sheet;
 pub use software::SoftwareRenderer;
 pub use stretch::stretch;
 pub use style::{ColorBy, Style};
+pub use view::LARGEST_SIDE;
 
 /// The example of the README, run as a test.
 #[cfg(doctest)]

@@ -32,6 +32,10 @@ pub fn normal_sums(triangles: &[[u32; 3]], places: &[Vec3]) -> Vec<[i32; 3]> {
         let [a, b, c] = corners.map(|v| places[v as usize]);
         let (ab, bc, ca) = (unit(b - a), unit(c - b), unit(a - c));
         let normal = unit(ab.cross(-ca));
+        if normal == Vec3::ZERO {
+            // No area and perhaps no edges, of which an arc tangent is not defined.
+            continue;
+        }
         let at_a = angle(ab, -ca);
         let at_b = angle(bc, -ab);
         let at_c = std::f32::consts::PI - at_a - at_b;

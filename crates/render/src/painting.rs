@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::DVec3;
 use incise::cutting::Skin;
-use incise::scene::{ColliderSpec, GroundSpec, StrokeSpec};
+use incise::scene::{ColliderSpec, GroundSpec};
 use incise::{Scene, Simulation};
 
 use crate::palette::{self, Legend, decades, legend_from};
@@ -127,6 +127,7 @@ impl Painting {
         let colored = !self.colors.is_empty();
         for delta in deltas {
             let change = self.skin.follow(delta);
+            self.pieces.follow_cut(delta);
             if colored {
                 self.colors.resize(self.skin.triangles().len(), NONE);
                 for triangle in change.triangles {
@@ -342,44 +343,4 @@ impl Painting {
 fn revision() -> u64 {
     static LAST: AtomicU64 = AtomicU64::new(0);
     LAST.fetch_add(1, Ordering::Relaxed) + 1
-}
-
-/// Where the blade of a stroke is at the start of a frame; `None` before it begins, after it has ended, and for strokes
-/// that cut at once.
-///
-/// ```
-/// use incise::Scene;
-/// use incise_render::blade_at;
-///
-/// let stroke = &Scene::built_in().stroke[0]; // frames 4 to 64, straight down
-/// let (start, middle) = (blade_at(stroke, 4).unwrap(), blade_at(stroke, 34).unwrap());
-/// assert!((start[0].z - middle[0].z - 0.2).abs() < 1e-12);
-/// assert_eq!(blade_at(stroke, 65), None);
-/// ```
-#[must_use]
-pub fn blade_at(stroke: &StrokeSpec, frame: u64) -> Option<Vec<DVec3>> {
-    let StrokeSpec::Sweep {
-        frames: [first, last],
-        blade,
-        path,
-        ..
-    } = stroke
-    else {
-        return None;
-    };
-    if !(first..=last).contains(&&frame) || path.is_empty() || first == last {
-        return None;
-    }
-    let legs = path.len() - 1;
-    let passed = (frame - first) as f64 / (last - first) as f64 * legs as f64;
-    // The leg it is on; at the end of the last one that is still the last.
-    let leg = (0..legs).rfind(|&leg| leg as f64 <= passed).unwrap_or(0);
-    let [from, to] = [leg, (leg + 1).min(legs)].map(|i| DVec3::from_array(path[i]));
-    let offset = from.lerp(to, passed - leg as f64);
-    Some(
-        blade
-            .iter()
-            .map(|x| DVec3::from_array(*x) + offset)
-            .collect(),
-    )
 }

@@ -2,12 +2,18 @@
 //!
 //! A mesh numbers its pieces in the order of their first tets, so a cut may give a piece another number and with it another
 //! color. Here the piece that has the most tets of a former one keeps its number, and the others get new ones. Cost: a
-//! sort of the tets, in frames whose topology changed and only while pieces are shown.
+//! sort of the tets, in frames whose topology changed and only while pieces are shown; the tets that cuts add or move in
+//! every such frame from then on.
+
+use incise::cutting::CutDelta;
+
+/// The number of a tet that is newer than the last look.
+const UNKNOWN: u32 = u32::MAX;
 
 /// The numbers of the pieces when they were last looked at.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PieceNumbers {
-    /// Of each tet then.
+    /// Of each tet then, in the slot that it has now; empty before the first look.
     of_tet: Vec<u32>,
     next: u32,
 }
@@ -18,12 +24,26 @@ impl PieceNumbers {
         *self = Self::default();
     }
 
+    /// Follows the tets through a cut: the last ones may have moved into the slots of deleted ones.
+    pub(crate) fn follow_cut(&mut self, delta: &CutDelta) {
+        if self.of_tet.is_empty() {
+            return;
+        }
+        let before_moves = delta.tets_before + delta.added.len() - delta.removed.len();
+        self.of_tet.resize(before_moves, UNKNOWN);
+        for moved in &delta.moved {
+            self.of_tet[moved.to.index()] = self.of_tet[moved.from.index()];
+        }
+        self.of_tet.truncate(delta.tets_after());
+    }
+
     /// The number of each tet's piece, for labels of `count` pieces.
     pub(crate) fn follow(&mut self, labels: &[u32], count: usize) -> &[u32] {
         let mut pairs: Vec<(u32, u32)> = labels
             .iter()
             .copied()
             .zip(self.of_tet.iter().copied())
+            .filter(|(_, number)| *number != UNKNOWN)
             .collect();
         pairs.sort_unstable();
         let mut shared: Vec<(usize, u32, u32)> = pairs

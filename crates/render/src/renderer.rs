@@ -64,17 +64,17 @@ impl Renderer {
     }
 
     /// Whether a simulation has to be [read back](Simulation::read_back) for a picture of the present: it is on a device,
-    /// and not drawn from there.
+    /// and not drawn from there. Until a step after the painting was made or reset, no simulation is drawn from a device.
     #[must_use]
-    pub fn needs_read_back(&self, simulation: &Simulation) -> bool {
+    pub fn needs_read_back(&self, painting: &Painting, simulation: &Simulation) -> bool {
         match self {
             #[cfg(feature = "gpu")]
-            Self::Gpu(renderer) => renderer.needs_read_back(simulation),
+            Self::Gpu(renderer) => renderer.needs_read_back(painting, simulation),
             #[cfg(feature = "gpu")]
             Self::Software(_) => simulation.device_solvers().next().is_some(),
             #[cfg(not(feature = "gpu"))]
             Self::Software(_) => {
-                let _ = simulation;
+                let _ = (painting, simulation);
                 false
             }
         }
@@ -93,7 +93,7 @@ impl Renderer {
         }
     }
 
-    /// Draws a picture. A simulation on a device other than the renderer's must have been read back.
+    /// Draws a picture, of the present if the simulation was read back where [`Renderer::needs_read_back`] says so.
     ///
     /// # Errors
     /// If a side of the picture is 0 or too large; if a device is lost or out of memory.

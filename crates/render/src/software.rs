@@ -8,8 +8,8 @@
 //! What the rasterizer is asked for is only which triangle is in front at each of four samples of a pixel, placed as devices
 //! place them. A pixel is then shaded once for each triangle that it shows, at the middle of the samples that show it: what
 //! a device does with four samples. Bands of rows are done in parallel; each pixel is computed by one thread in one order,
-//! so a picture is the same for any number of threads. Cost: four passes over the rows of each triangle, and a shading or
-//! two a pixel.
+//! so a picture is the same for any number of threads. Cost: each band looks at each triangle, O(bands x triangles); four
+//! passes over the rows of those in it, and a shading or two a pixel.
 
 use glam::{Vec2, Vec3};
 use incise::Simulation;

@@ -1,14 +1,15 @@
 //! [`View`]: what both renderers derive from camera and size, in single precision relative to the eye.
 //!
-//! Differences to the eye are taken in double precision and rounded once, so a body is as sharp far from the origin of the
-//! world as at it.
+//! Differences to the eye are taken in double precision and rounded once. Particles have single precision relative to the
+//! origin of their solver, or to the first particle where positions are sent: what is near that is as sharp far from the
+//! origin of the world as at it.
 
 use glam::{Mat4, Vec3, Vec4Swizzles};
 
 use crate::{Camera, RenderError};
 
-/// The largest picture on a side: what devices allow that allow WebGPU's default limits.
-pub(crate) const LARGEST_SIDE: u32 = 8192;
+/// Most pixels on a side of a picture by software: what every device allows that has WebGPU's default limits.
+pub const LARGEST_SIDE: u32 = 8192;
 
 /// What is the same for all that is drawn in a picture.
 #[derive(Clone, Copy, Debug)]

@@ -1,6 +1,7 @@
 //! Arguments that cannot be meant and places that cannot be written end like any other bad input.
 
 use crate::bad_input::{place, refused, refused_in_a_sentence};
+use crate::support::SCENE;
 
 #[test]
 fn places_that_cannot_be_written() {
@@ -37,6 +38,11 @@ fn places_that_cannot_be_written() {
     ] {
         refused_in_a_sentence(&place, &run(rest), &[part]);
     }
+    // A picture of a film cannot be shown for as long as a step of this scene takes.
+    let slow = SCENE.replace("[world]", "[solver]\ntime_step = 20.0\n[world]");
+    place.write("slow.toml", slow);
+    let film = ["run", "slow.toml", "--frames", "2", "--film", "film.gif"];
+    refused_in_a_sentence(&place, &film, &["20 s a picture", "0.01 s to 10 s"]);
     for command in [
         &["color", "tet.vtk", "--csv", "tet.vtk/colors.csv"][..],
         &["color", "tet.vtk", "--csv", "none/colors.csv"],

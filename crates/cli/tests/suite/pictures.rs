@@ -163,4 +163,36 @@ fn residuals_are_shown_where_there_are_some() {
     place.write("descent.toml", scene);
     let command = [&["run", "descent.toml"], &usual[..]].concat();
     refused_in_a_sentence(&place, &command, &["--color-by residual", "descent"]);
+    // Where nothing is drawn, they are nobody's.
+    let nothing = [&command[..], &["--no-pictures"]].concat();
+    place.good(&nothing);
+    run(&place, &[&usual[..], &["--no-pictures"]].concat());
+    let lines = place.read("out/frames.jsonl");
+    assert!(!lines.contains("\"residual\":"), "{lines}");
+    let film = [&nothing[..], &["--film", "film.gif"]].concat();
+    refused_in_a_sentence(&place, &film, &["--color-by residual", "descent"]);
+}
+
+#[test]
+fn pictures_of_an_earlier_run_are_not_left_among_those_of_this_one() {
+    let place = Place::with_scene();
+    let usual = ["--size", "30x20", "--quiet", "--frames"];
+    run(&place, &[&usual[..], &["4"]].concat());
+    for name in ["frame_1.png", "frame_0000x.png", "my_frame_00001.png"] {
+        place.write(&format!("out/{name}"), "somebody's");
+    }
+    // What is refused removes nothing.
+    let refused = [
+        &["run", "scene.toml", "--film", "none/film.gif"],
+        &usual[..],
+    ]
+    .concat();
+    refused_in_a_sentence(&place, &[&refused[..], &["2"]].concat(), &["none/film.gif"]);
+    assert_eq!(pngs(&place, "out").len(), 4 + 1 + 3);
+    run(&place, &[&usual[..], &["2"]].concat());
+    let mut expected = vec!["contact_sheet.png", "frame_00000.png", "frame_00001.png"];
+    expected.extend(["frame_0000x.png", "frame_1.png", "my_frame_00001.png"]);
+    assert_eq!(pngs(&place, "out"), expected);
+    run(&place, &[&usual[..], &["2", "--no-pictures"]].concat());
+    assert_eq!(pngs(&place, "out"), expected[3..]);
 }

@@ -49,7 +49,7 @@ pub struct Film {
     pictures: u32,
     /// What is seen after the last one: for a GIF what it was before its colors were reduced.
     shown: Vec<u8>,
-    /// `None` once it is finished.
+    /// `None` once it is finished or a picture could not be written.
     writer: Option<Writer>,
 }
 
@@ -138,7 +138,7 @@ impl Film {
     /// Adds a picture.
     ///
     /// # Errors
-    /// If it has another size than the film; if it cannot be written.
+    /// If it has another size than the film; if it or an earlier one cannot be written: then the film is lost.
     pub fn push(&mut self, picture: &Picture) -> Result<(), RenderError> {
         let Picture { width, height, .. } = *picture;
         if [width, height] != self.size {
@@ -159,9 +159,13 @@ impl Film {
                 let delay = ticks(number, seconds, 1000.0);
                 apng.push(picture, &mut self.shown, delay)
             }
-            None => Ok(()),
+            None => Err(broken()),
         };
-        written.map_err(|source| self.failed(source))?;
+        if let Err(source) = written {
+            // Part of a picture may have been written: no film with that gets its name.
+            self.writer = None;
+            return Err(self.failed(source));
+        }
         self.pictures += 1;
         Ok(())
     }
@@ -169,7 +173,7 @@ impl Film {
     /// Completes the film and gives it its name.
     ///
     /// # Errors
-    /// If it has no picture or cannot be written; then nothing is left.
+    /// If it has no picture or one of them or the end cannot be written; then nothing is left.
     pub fn finish(mut self) -> Result<(), RenderError> {
         if self.pictures == 0 {
             return Err(RenderError::EmptyFilm {
@@ -179,7 +183,7 @@ impl Film {
         let finished = match self.writer.take() {
             Some(Writer::Gif(gif)) => gif.finish(),
             Some(Writer::Apng(apng)) => apng.finish(self.pictures),
-            None => Ok(()),
+            None => Err(broken()),
         };
         let named = finished.and_then(|()| fs::rename(&self.temporary, &self.path));
         named.map_err(|source| self.failed(source))
@@ -201,6 +205,11 @@ impl Drop for Film {
         // Gone already if it was finished; else there is nobody left to tell.
         let _ = fs::remove_file(&self.temporary);
     }
+}
+
+/// Why a film without a writer does not go on.
+fn broken() -> io::Error {
+    io::Error::other("an earlier picture could not be written")
 }
 
 fn is_gif(path: &Path) -> Result<bool, RenderError> {
@@ -280,5 +289,50 @@ impl Rectangle {
             let start = 4 * (y as usize * width as usize + self.left as usize);
             start..start + 4 * self.width as usize
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_film_that_lost_a_picture_gets_no_name() {
+        for ending in ["gif", "png"] {
+            let name = format!("incise-broken-{}.{ending}", std::process::id());
+            let path = std::env::temp_dir().join(name);
+            let picture = Picture::filled(3, 2, [1, 2, 3]);
+            let mut film = Film::create(&path, [3, 2], 0.1).unwrap();
+            film.push(&picture).unwrap();
+            // What a push does that fails.
+            film.writer = None;
+            assert!(matches!(film.push(&picture), Err(RenderError::Io { .. })));
+            let temporary = film.temporary.clone();
+            assert!(matches!(film.finish(), Err(RenderError::Io { .. })));
+            assert!(!path.exists() && !temporary.exists());
+        }
+    }
+
+    /// On a disk that is full.
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn a_picture_that_does_not_fit_on_the_disk_ends_the_film() {
+        let size = [200, 200];
+        let name = format!("incise-full-{}.gif", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        let mut picture = Picture::filled(size[0], size[1], [0; 3]);
+        // More than a buffer of eight thousand bytes holds, however it is compressed.
+        let noise = (0..).map(|i: u32| i.wrapping_mul(2_654_435_761).to_be_bytes()[0]);
+        for (byte, noise) in picture.rgba.iter_mut().zip(noise) {
+            *byte = noise;
+        }
+        let mut film = Film::create(&path, size, 0.1).unwrap();
+        let full = File::options().write(true).open("/dev/full").unwrap();
+        film.writer = Some(Writer::Gif(Box::new(Gif::new(full, size).unwrap())));
+        assert!(matches!(film.push(&picture), Err(RenderError::Io { .. })));
+        assert!(film.writer.is_none());
+        film.pictures = 1;
+        assert!(matches!(film.finish(), Err(RenderError::Io { .. })));
+        assert!(!path.exists());
     }
 }

@@ -13,6 +13,8 @@ pub(super) struct Buffer<T> {
     usage: BufferUsages,
     buffer: wgpu::Buffer,
     len: usize,
+    /// Bytes written since it was made.
+    sent: u64,
     of: PhantomData<T>,
 }
 
@@ -30,6 +32,7 @@ impl<T: NoUninit> Buffer<T> {
             // No binding may be empty, and the largest element has a few dozen bytes.
             buffer: create(gpu, what, usage, 256)?,
             len: 0,
+            sent: 0,
             of: PhantomData,
         })
     }
@@ -38,7 +41,8 @@ impl<T: NoUninit> Buffer<T> {
     pub(super) fn replace(&mut self, gpu: &GpuContext, values: &[T]) -> Result<(), GpuError> {
         self.resize(gpu, values.len())?;
         if !values.is_empty() {
-            let bytes = bytemuck::cast_slice(values);
+            let bytes: &[u8] = bytemuck::cast_slice(values);
+            self.sent += bytes.len() as u64;
             gpu.queue().write_buffer(&self.buffer, 0, bytes);
         }
         Ok(())
@@ -49,7 +53,7 @@ impl<T: NoUninit> Buffer<T> {
         let bytes = (len * size_of::<T>()) as u64;
         if bytes > self.buffer.size() {
             let roomy = (bytes + bytes / 2).next_multiple_of(4);
-            let size = roomy.min(gpu.buffer_limit()).max(bytes);
+            let size = roomy.min(limit(gpu, self.usage)).max(bytes);
             self.buffer = create(gpu, self.what, self.usage, size)?;
         }
         self.len = len;
@@ -60,8 +64,21 @@ impl<T: NoUninit> Buffer<T> {
         self.len
     }
 
+    pub(super) fn sent(&self) -> u64 {
+        self.sent
+    }
+
     pub(super) fn raw(&self) -> &wgpu::Buffer {
         &self.buffer
+    }
+}
+
+/// Most bytes of a buffer: those that no shader sees, as for pictures on their way, may be larger than a binding.
+fn limit(gpu: &GpuContext, usage: BufferUsages) -> u64 {
+    if usage.intersects(BufferUsages::STORAGE | BufferUsages::UNIFORM) {
+        gpu.buffer_limit()
+    } else {
+        gpu.device().limits().max_buffer_size
     }
 }
 
@@ -73,7 +90,7 @@ pub(super) fn create(
     bytes: u64,
 ) -> Result<wgpu::Buffer, GpuError> {
     gpu.check()?;
-    let limit = gpu.buffer_limit();
+    let limit = limit(gpu, usage);
     if bytes > limit {
         return Err(GpuError::TooLarge { what, bytes, limit });
     }

@@ -1,8 +1,8 @@
 //! [`GpuRenderer`]: pictures drawn by a device.
 //!
 //! The bodies' vertices are not sent: the vertex shader reads positions from the solver's own buffer, looks up the triangle
-//! and its corners, and normals are computed on the device too. What is sent is the skin's triangles and colors when they
-//! changed, and some hundred bytes of view a picture. Several solvers' positions are put together by copies on the device. A
+//! and its corners, and normals are computed on the device too. What is sent is all of the skin's triangles and colors when
+//! any changed, and for each picture the view and the obstacles. Several solvers' positions are put together by copies on the device. A
 //! simulation that runs on the processor sends its positions. All is one submit; nothing is read back unless a [`Picture`]
 //! is asked for.
 //!
@@ -66,6 +66,7 @@ pub struct GpuRenderer {
     target: Option<Target>,
     dark: Dark,
     upload: Upload,
+    readbacks: u64,
 }
 
 impl GpuRenderer {
@@ -80,6 +81,7 @@ impl GpuRenderer {
             target: None,
             dark: Dark::new(&gpu),
             upload: Upload::new(&gpu)?,
+            readbacks: 0,
             gpu,
         })
     }
@@ -90,12 +92,26 @@ impl GpuRenderer {
         &self.gpu
     }
 
-    /// Whether a simulation has to be [read back](Simulation::read_back) for a picture of the present: it is on another
-    /// device than this.
+    /// Bytes that it has sent to the device since it was made. What the solvers send is counted by
+    /// [`GpuContext::traffic`].
     #[must_use]
-    pub fn needs_read_back(&self, simulation: &Simulation) -> bool {
+    pub fn uploaded_bytes(&self) -> u64 {
+        self.upload.sent()
+    }
+
+    /// How often it has read something from the device since it was made, each a wait: once a [`Picture`].
+    #[must_use]
+    pub fn readbacks(&self) -> u64 {
+        self.readbacks
+    }
+
+    /// Whether a simulation has to be [read back](Simulation::read_back) for a picture of the present: it is on another
+    /// device than this, or on any and has made no step since the painting was made or reset.
+    #[must_use]
+    pub fn needs_read_back(&self, painting: &Painting, simulation: &Simulation) -> bool {
         let mut solvers = simulation.device_solvers();
-        solvers.any(|solver| !Arc::ptr_eq(solver.gpu(), &self.gpu))
+        let current = painting.device_is_current();
+        solvers.any(|solver| !current || !Arc::ptr_eq(solver.gpu(), &self.gpu))
     }
 
     /// Draws into textures of its own and returns the finished picture's, which stays the same until the size changes, for
@@ -224,9 +240,10 @@ impl GpuRenderer {
     ///
     /// # Errors
     /// If the device is lost or out of memory.
-    pub fn read_normal_sums(&self) -> Result<Vec<[i32; 3]>, RenderError> {
+    pub fn read_normal_sums(&mut self) -> Result<Vec<[i32; 3]>, RenderError> {
         let bytes = (self.upload.sums.len() * size_of::<[i32; 3]>()) as u64;
-        let values = target::read_buffer(&self.gpu, "normals", self.upload.sums.raw(), bytes)?;
+        let sums = self.upload.sums.raw();
+        let values = target::read_buffer(&self.gpu, "normals", sums, bytes, &mut self.readbacks)?;
         Ok(bytemuck::pod_collect_to_vec(&values))
     }
 
@@ -284,7 +301,7 @@ impl GpuRenderer {
     ) -> Result<Picture, RenderError> {
         self.draw(painting, simulation, camera, style, size)?;
         match &self.target {
-            Some(target) => target.read(&self.gpu),
+            Some(target) => target.read(&self.gpu, &mut self.readbacks),
             None => unreachable!("a picture was drawn into it"),
         }
     }

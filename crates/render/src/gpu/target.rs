@@ -72,8 +72,12 @@ impl Target {
         })
     }
 
-    /// Waits for the picture and reads it.
-    pub(super) fn read(&self, gpu: &GpuContext) -> Result<Picture, RenderError> {
+    /// Waits for the picture and reads it; counts that.
+    pub(super) fn read(
+        &self,
+        gpu: &GpuContext,
+        readbacks: &mut u64,
+    ) -> Result<Picture, RenderError> {
         let [width, height] = self.size;
         let row = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let bytes = u64::from(row) * u64::from(height);
@@ -93,7 +97,7 @@ impl Target {
             },
             extent(self.size),
         );
-        let bytes = collect(gpu, encoder, &staging)?;
+        let bytes = collect(gpu, encoder, &staging, readbacks)?;
         let mut rgba = Vec::with_capacity(4 * width as usize * height as usize);
         for line in bytes.chunks_exact(row as usize) {
             rgba.extend_from_slice(&line[..4 * width as usize]);
@@ -106,12 +110,13 @@ impl Target {
     }
 }
 
-/// Waits for the first bytes of a buffer.
+/// Waits for the first bytes of a buffer; counts that.
 pub(super) fn read_buffer(
     gpu: &GpuContext,
     what: &'static str,
     from: &wgpu::Buffer,
     bytes: u64,
+    readbacks: &mut u64,
 ) -> Result<Vec<u8>, RenderError> {
     if bytes == 0 {
         return Ok(Vec::new());
@@ -120,7 +125,7 @@ pub(super) fn read_buffer(
     let staging = buffer::create(gpu, what, usage, bytes)?;
     let mut encoder = gpu.device().create_command_encoder(&Default::default());
     encoder.copy_buffer_to_buffer(from, 0, &staging, 0, bytes);
-    collect(gpu, encoder, &staging)
+    collect(gpu, encoder, &staging, readbacks)
 }
 
 /// Hands over commands that fill a buffer, waits and reads it.
@@ -128,7 +133,9 @@ fn collect(
     gpu: &GpuContext,
     encoder: wgpu::CommandEncoder,
     staging: &wgpu::Buffer,
+    readbacks: &mut u64,
 ) -> Result<Vec<u8>, RenderError> {
+    *readbacks += 1;
     gpu.queue().submit([encoder.finish()]);
     let (sender, receiver) = mpsc::channel();
     staging.map_async(wgpu::MapMode::Read, .., move |result| {

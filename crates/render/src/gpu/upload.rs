@@ -1,7 +1,8 @@
 //! [`Upload`]: what a device has to know to draw, sent only when it changed.
 //!
-//! The skin is sent when a cut or a jump changed it, colors when they were made anew. Positions are those of the solvers on
-//! this device or else sent each time, as are view, obstacles and planes: some hundred bytes in most scenes.
+//! When a cut or a jump changed the skin, all of it is sent again, and all its colors: O(triangles), also for a small cut.
+//! Positions are those of the solvers on this device or else sent each time: 16 bytes a particle. View, planes and the
+//! triangles of obstacles and blades are sent for each picture: some hundred bytes where there is no obstacle.
 
 use std::sync::Arc;
 
@@ -20,6 +21,9 @@ use crate::{Painting, RenderError, Style};
 
 /// Set in a vertex that a cut laid bare.
 const CUT: u32 = 0x8000_0000;
+
+/// The key of no skin: revisions begin with 1.
+const NOTHING: (u64, bool) = (0, false);
 
 /// `View` in `view.wgsl`.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -70,7 +74,7 @@ impl Upload {
     pub(super) fn new(gpu: &GpuContext) -> Result<Self, RenderError> {
         let (storage, uniform) = (BufferUsages::STORAGE, BufferUsages::UNIFORM);
         Ok(Self {
-            skin: (0, false),
+            skin: NOTHING,
             coloring: 0,
             has_ground: false,
             view: Buffer::new(gpu, "view", uniform)?,
@@ -87,6 +91,14 @@ impl Upload {
         })
     }
 
+    /// Bytes sent since it was made.
+    pub(super) fn sent(&self) -> u64 {
+        let skin = self.vertices.sent() + self.triangles.sent() + self.count.sent();
+        let bodies = skin + self.positions.sent() + self.parts.sent() + self.colors.sent();
+        let planes = self.planes.sent() + self.ground.sent();
+        bodies + self.view.sent() + self.props.sent() + planes
+    }
+
     /// Sends what is not there yet. `solvers` are those to draw from, none if positions are to be sent.
     pub(super) fn send(
         &mut self,
@@ -98,13 +110,16 @@ impl Upload {
         view: &View,
     ) -> Result<(), RenderError> {
         let skin = (painting.topology(), !solvers.is_empty());
+        // A key stands for what has arrived: none while something is on its way and may fail.
         if self.skin != skin {
+            self.skin = NOTHING;
             self.send_skin(gpu, painting, simulation, solvers)?;
             self.skin = skin;
         }
         self.send_positions(gpu, simulation, solvers, view)?;
         let colors = painting.colors_for(style.color_by);
         if !colors.is_empty() && self.coloring != painting.coloring() {
+            self.coloring = 0;
             self.colors.replace(gpu, colors)?;
             self.coloring = painting.coloring();
         }

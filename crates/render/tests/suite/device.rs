@@ -7,7 +7,8 @@ use std::sync::Arc;
 use glam::Vec3;
 use incise::{Scene, Simulation};
 use incise_render::{
-    Camera, ColorBy, GpuRenderer, Painting, RenderError, SoftwareRenderer, Style, normal_sums,
+    Camera, ColorBy, GpuRenderer, Painting, Picture, RenderError, SoftwareRenderer, Style,
+    normal_sums,
 };
 
 use crate::support::{Difference, LIVER, Shown, TWO_BODIES, gpu};
@@ -58,43 +59,106 @@ fn both_draw_the_same() {
     }
 }
 
+/// Reads the simulation back, draws it by software and compares. As in `assert_alike`.
+fn assert_present(
+    there: &Picture,
+    painting: &Painting,
+    simulation: &mut Simulation,
+    camera: &Camera,
+    what: &str,
+) {
+    simulation.read_back().unwrap();
+    let here = SoftwareRenderer::new()
+        .picture(painting, simulation, camera, &Style::default(), SIZE)
+        .unwrap();
+    let difference = Difference::of(there, &here, 24);
+    assert!(
+        difference.mean < 1.0 && difference.share < 0.04,
+        "{what}: {difference:?}"
+    );
+}
+
+/// Draws twice; the second time sends no positions and no skin, and neither reads.
+fn assert_little_is_sent(
+    renderer: &mut GpuRenderer,
+    painting: &Painting,
+    simulation: &Simulation,
+    camera: &Camera,
+) {
+    let read = renderer.readbacks();
+    let mut sent = [0; 2];
+    for sent in &mut sent {
+        let before = renderer.uploaded_bytes();
+        renderer
+            .draw(painting, simulation, camera, &Style::default(), SIZE)
+            .unwrap();
+        *sent = renderer.uploaded_bytes() - before;
+    }
+    let positions = 16 * simulation.positions().len() as u64;
+    assert!(sent[1] < positions, "{sent:?} of {positions} bytes");
+    assert_eq!(renderer.readbacks(), read);
+}
+
 #[test]
 fn positions_do_not_leave_the_device() {
     let Some(gpu) = gpu("positions_do_not_leave_the_device") else {
         return;
     };
-    let scene = Scene::from_toml(&LIVER.replace("substeps = 8", "substeps = 3")).unwrap();
+    let scene = Scene::from_toml(&LIVER.replace("substeps = 8", "substeps = 1")).unwrap();
     let mut simulation = Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap();
     let mut painting = Painting::new(&simulation, &scene);
-    let mut renderer = GpuRenderer::new(Arc::clone(&gpu)).unwrap();
-    let camera = Camera::fit(glam::DVec3::splat(-0.2), glam::DVec3::splat(0.2));
-    assert!(!renderer.needs_read_back(&simulation));
+    let mut renderer = GpuRenderer::new(gpu).unwrap();
+    let camera = Camera::fit(Vec3::splat(-0.22).into(), Vec3::splat(0.2).into());
     let style = Style::default();
-    for frame in 0..4 {
-        // Before the first step too, when the device has no positions yet.
-        let read = || gpu.traffic().readbacks;
-        let before = read();
-        renderer
-            .draw(&painting, &simulation, &camera, &style, SIZE)
-            .unwrap();
-        assert_eq!(read(), before, "frame {frame}");
-        let there = renderer
-            .picture(&painting, &simulation, &camera, &style, SIZE)
-            .unwrap();
-        simulation.read_back().unwrap();
-        let here = SoftwareRenderer::new()
-            .picture(&painting, &simulation, &camera, &style, SIZE)
-            .unwrap();
-        let difference = Difference::of(&there, &here, 24);
-        // As in `assert_alike`.
-        assert!(
-            difference.mean < 1.0 && difference.share < 0.04,
-            "{frame}: {difference:?}"
-        );
+    // Before the first step too, when the device has no positions yet.
+    let there = renderer
+        .picture(&painting, &simulation, &camera, &style, SIZE)
+        .unwrap();
+    assert_present(&there, &painting, &mut simulation, &camera, "at the start");
+    for _ in 0..20 {
         simulation.step().unwrap();
         painting.follow(&simulation);
     }
-    assert!(simulation.report().tets > simulation.mesh().tets.len() / 2);
+    assert!(!renderer.needs_read_back(&painting, &simulation));
+    assert_little_is_sent(&mut renderer, &painting, &simulation, &camera);
+    let there = renderer
+        .picture(&painting, &simulation, &camera, &style, SIZE)
+        .unwrap();
+    // The host does not know yet how far it fell.
+    let old = SoftwareRenderer::new()
+        .picture(&painting, &simulation, &camera, &style, SIZE)
+        .unwrap();
+    let difference = Difference::of(&there, &old, 24);
+    assert!(difference.mean > 1.0, "{difference:?}");
+    assert_present(&there, &painting, &mut simulation, &camera, "20 frames on");
+}
+
+#[test]
+fn a_painting_made_late_needs_positions_of_the_host() {
+    let Some(gpu) = gpu("a_painting_made_late_needs_positions_of_the_host") else {
+        return;
+    };
+    let scene = Scene::from_toml(&LIVER.replace("substeps = 8", "substeps = 1")).unwrap();
+    let mut simulation = Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap();
+    let mut renderer = GpuRenderer::new(gpu).unwrap();
+    let camera = Camera::fit(Vec3::splat(-0.22).into(), Vec3::splat(0.2).into());
+    let style = Style::default();
+    for _ in 0..10 {
+        simulation.step().unwrap();
+    }
+    let mut painting = Painting::new(&simulation, &scene);
+    for what in ["made", "reset"] {
+        assert!(renderer.needs_read_back(&painting, &simulation), "{what}");
+        simulation.read_back().unwrap();
+        let there = renderer
+            .picture(&painting, &simulation, &camera, &style, SIZE)
+            .unwrap();
+        assert_present(&there, &painting, &mut simulation, &camera, what);
+        simulation.step().unwrap();
+        painting.follow(&simulation);
+        assert!(!renderer.needs_read_back(&painting, &simulation), "{what}");
+        painting.reset(&simulation);
+    }
 }
 
 #[test]
@@ -107,44 +171,30 @@ fn bodies_of_several_solvers_are_put_together_on_the_device() {
     let mut simulation = Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap();
     assert_eq!(simulation.device_solvers().count(), 2);
     let mut painting = Painting::new(&simulation, &scene);
-    let mut renderer = GpuRenderer::new(Arc::clone(&gpu)).unwrap();
-    assert!(!renderer.needs_read_back(&simulation));
+    let mut renderer = GpuRenderer::new(gpu).unwrap();
     let [low, high] = painting.bounds(&simulation);
     let (camera, style) = (Camera::fit(low, high), Style::default());
     for frame in 0..3 {
         simulation.step().unwrap();
         painting.follow(&simulation);
-        let before = gpu.traffic().readbacks;
-        renderer
-            .draw(&painting, &simulation, &camera, &style, SIZE)
-            .unwrap();
-        assert_eq!(gpu.traffic().readbacks, before);
+        assert!(!renderer.needs_read_back(&painting, &simulation));
         let there = renderer
             .picture(&painting, &simulation, &camera, &style, SIZE)
             .unwrap();
-        simulation.read_back().unwrap();
-        let here = SoftwareRenderer::new()
-            .picture(&painting, &simulation, &camera, &style, SIZE)
-            .unwrap();
-        let difference = Difference::of(&there, &here, 24);
-        // As in `assert_alike`.
-        assert!(
-            difference.mean < 1.0 && difference.share < 0.04,
-            "{frame}: {difference:?}"
+        assert_present(
+            &there,
+            &painting,
+            &mut simulation,
+            &camera,
+            &format!("frame {frame}"),
         );
     }
     assert_eq!(simulation.report().pieces, 4);
 }
 
-#[test]
-fn normals_are_those_of_the_processor() {
-    let Some(gpu) = gpu("normals_are_those_of_the_processor") else {
-        return;
-    };
-    let shown = Shown::new(LIVER, 4);
-    let mut renderer = GpuRenderer::new(gpu).unwrap();
-    let camera = shown.camera();
-    let style = Style::default();
+/// Sums of normals of the skin's vertices by the processor and by the device, for a simulation on the processor.
+fn normals_of_both(renderer: &mut GpuRenderer, shown: &Shown) -> [Vec<[i32; 3]>; 2] {
+    let (camera, style) = (shown.camera(), Style::default());
     renderer
         .draw(&shown.painting, &shown.simulation, &camera, &style, SIZE)
         .unwrap();
@@ -158,6 +208,18 @@ fn normals_are_those_of_the_processor() {
         .collect();
     let here = normal_sums(skin.triangles(), &places);
     assert_eq!(here.len(), there.len());
+    [here, there]
+}
+
+#[test]
+fn normals_are_those_of_the_processor() {
+    let Some(gpu) = gpu("normals_are_those_of_the_processor") else {
+        return;
+    };
+    let shown = Shown::new(LIVER, 4);
+    let mut renderer = GpuRenderer::new(gpu).unwrap();
+    let [here, there] = normals_of_both(&mut renderer, &shown);
+    let skin = shown.painting.skin();
     let mut used = vec![false; here.len()];
     skin.triangles()
         .iter()
@@ -173,6 +235,36 @@ fn normals_are_those_of_the_processor() {
             "{here} {there}"
         );
     }
+}
+
+/// A body of 1 m so far from the other one that single precision sees its particles at one place.
+#[test]
+fn triangles_without_an_area_have_no_normal() {
+    let Some(gpu) = gpu("triangles_without_an_area_have_no_normal") else {
+        return;
+    };
+    let shown = Shown::new(
+        r#"
+        [[body]]
+        shape = { kind = "box", tets = 200 }
+        [[body]]
+        shape = { kind = "box", tets = 200 }
+        position = [9.0e8, 9.0e8, 9.0e8]
+        "#,
+        0,
+    );
+    let mut renderer = GpuRenderer::new(gpu).unwrap();
+    let [here, there] = normals_of_both(&mut renderer, &shown);
+    let skin = shown.painting.skin();
+    let rest = &shown.simulation.mesh().positions;
+    let mut flat = 0;
+    for (v, vertex) in skin.vertices().iter().enumerate() {
+        if rest[vertex.particle.index()].x > 1e8 {
+            assert_eq!([here[v], there[v]], [[0; 3]; 2]);
+            flat += 1;
+        }
+    }
+    assert!(0 < flat && flat < skin.vertices().len());
 }
 
 #[test]

@@ -93,12 +93,19 @@ fn following_is_starting_anew() {
 fn pieces_keep_their_colors_and_new_ones_get_others() {
     let mut shown = Shown::new(STROKES, 0);
     let mut colors = Vec::new();
-    for _ in 0..9 {
+    let mut before = Vec::new();
+    for frame in 0..9 {
         shown.advance(1);
         shown
             .painting
             .color(&mut shown.simulation, ColorBy::Piece, None)
             .unwrap();
+        let ball = triangles_of_ball(&shown);
+        if frame == 7 {
+            // Only the box loses tets; those of the ball move into their slots.
+            assert_eq!(ball, before);
+        }
+        before = ball;
         let labels = shown.simulation.mesh().pieces();
         // Each piece has one color, and each color one piece.
         let mut of_piece = vec![None; labels.count];
@@ -117,6 +124,51 @@ fn pieces_keep_their_colors_and_new_ones_get_others() {
         assert!(pair[0].iter().all(|color| pair[1].contains(color)));
     }
     assert!(colors[6].len() > 3, "{} pieces", colors[6].len());
+}
+
+/// The triangles of the second body, by their particles, which no cut numbers anew, with their colors.
+fn triangles_of_ball(shown: &Shown) -> Vec<([ParticleId; 3], Option<[u8; 3]>)> {
+    let rest = &shown.simulation.mesh().positions;
+    let mut all: Vec<_> = triangles(&shown.painting)
+        .into_iter()
+        .filter(|(_, corners, ..)| rest[corners[0].index()].x > 0.6)
+        .map(|(_, corners, _, color)| (corners, color))
+        .collect();
+    all.sort_unstable();
+    all
+}
+
+/// Of the larger body, less than the smaller one is left, whose tets are then where the larger one's were.
+#[test]
+fn a_piece_keeps_its_color_when_another_is_carved() {
+    let mut shown = Shown::new(
+        r#"
+        [solver]
+        substeps = 2
+        [[body]]
+        shape = { kind = "box", tets = 1000 }
+        [[body]]
+        shape = { kind = "sphere", tets = 200 }
+        position = [1.2, 0.0, 0.0]
+        [[stroke]]
+        kind = "remove"
+        frame = 1
+        region = { box = { low = [-1.0, -1.0, -1.0], high = [0.35, 1.0, 1.0] } }
+        "#,
+        1,
+    );
+    let mut color = || {
+        let simulation = &mut shown.simulation;
+        let painting = &mut shown.painting;
+        painting.color(simulation, ColorBy::Piece, None).unwrap();
+        let ball = triangles_of_ball(&shown);
+        shown.advance(1);
+        ball
+    };
+    let before = color();
+    assert!(!before.is_empty());
+    assert_eq!(before, color());
+    assert_eq!(shown.simulation.report().pieces, 2);
 }
 
 #[test]

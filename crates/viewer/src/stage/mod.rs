@@ -13,7 +13,7 @@ use incise::mesh::glam::DVec3;
 use incise::report::FrameReport;
 use incise::scene::{Quantity, ReportSpec, SolverSpec};
 use incise::{Grab, Scene, Simulation, Snapshot};
-use incise_render::{Camera, ColorBy, Legend, Painting, blade_at};
+use incise_render::{Camera, ColorBy, Legend, Painting};
 
 use self::hands::Line;
 use crate::effects::Effects;
@@ -164,7 +164,7 @@ impl Stage {
     fn show_scripted_blade(&mut self, frame: u64) {
         if self.lines.is_empty() && !self.scripted.is_empty() {
             let strokes = self.scene.stroke.iter();
-            let blade = strokes.filter_map(|stroke| blade_at(stroke, frame)).next();
+            let blade = strokes.filter_map(|stroke| stroke.blade_at(frame)).next();
             self.painting.set_blade(blade.as_deref());
         }
     }
