@@ -47,10 +47,14 @@ pub(crate) fn share(state: &RenderState) -> Result<Arc<GpuContext>, String> {
 /// A sentence for whoever gets no window.
 pub(crate) fn why_no_window(error: &eframe::Error) -> String {
     match error {
-        eframe::Error::WinitEventLoop(error) => format!(
-            "no window can be opened, is there a display (DISPLAY, WAYLAND_DISPLAY)? `incise run` makes pictures \
-             without one ({error})"
-        ),
+        eframe::Error::WinitEventLoop(error) => {
+            // What comes before the last colon is where in winit it came up.
+            let error = error.to_string();
+            let why = error.rsplit(": ").next().unwrap_or(&error);
+            format!(
+                "no window can be opened, is there a display? `incise run` makes pictures without one ({why})"
+            )
+        }
         eframe::Error::Wgpu(error) => format!(
             "no graphics adapter can show a window (Vulkan, Metal, Direct3D 12, OpenGL); `incise run` makes pictures \
              without one ({error})"
