@@ -12,7 +12,7 @@ use incise_render::{
 
 use crate::args::RunArguments;
 use crate::failure::Failure;
-use crate::output::save_every;
+use crate::output::{require_file, save_every};
 
 /// Pixels of a picture, across and down.
 const SIZE: [u32; 2] = [640, 480];
@@ -95,6 +95,8 @@ impl Pictures {
     /// Opens the film, if there is to be one, so that what cannot be written is known before the run.
     pub(crate) fn begin_film(&mut self) -> anyhow::Result<()> {
         if let Some(path) = &self.film {
+            // Its folder may be the run's, which has just been made.
+            require_file(path)?;
             let seconds = self.film_every as f64 * self.time_step;
             self.writer = Some(Film::create(path, self.size, seconds)?);
         }

@@ -11,7 +11,7 @@ use rayon::ThreadPoolBuilder;
 
 use crate::args::{BackendName, PrecisionName, RunArguments};
 use crate::failure::Failure;
-use crate::output::{Output, require_file, require_mesh_file, save_mesh};
+use crate::output::{Output, require_mesh_file, save_mesh};
 use crate::pictures::Pictures;
 use crate::print::print;
 use crate::summary::Summary;
@@ -39,7 +39,6 @@ fn simulate(arguments: &RunArguments) -> Result<(), Failure> {
     }
     if let Some(path) = &arguments.film {
         Film::check_path(path).map_err(|error| Failure::Input(error.into()))?;
-        require_file(path).map_err(Failure::Input)?;
     }
     let scene = scene(arguments)?;
     let frames = arguments
