@@ -39,7 +39,7 @@ pub use pick::Hit;
 pub use picture::Picture;
 pub use renderer::Renderer;
 pub use sheet::contact_sheet;
-pub use software::SoftwareRenderer;
+pub use software::software_picture;
 pub use stretch::stretch;
 pub use style::{ColorBy, Style};
 pub use view::LARGEST_SIDE;

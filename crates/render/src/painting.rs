@@ -25,7 +25,7 @@ const NONE: u32 = 0;
 /// # Example
 /// ```
 /// use incise::{Scene, Simulation};
-/// use incise_render::{Camera, Painting, SoftwareRenderer, Style};
+/// use incise_render::{Camera, Painting, Style, software_picture};
 ///
 /// let scene = Scene::from_toml(
 ///     r#"
@@ -42,12 +42,11 @@ const NONE: u32 = 0;
 /// let mut painting = Painting::new(&simulation, &scene);
 /// let [low, high] = painting.bounds(&simulation);
 /// let camera = Camera::fit(low, high);
-/// let mut renderer = SoftwareRenderer::new();
 /// for _ in 0..3 {
 ///     simulation.step()?;
 ///     painting.follow(&simulation);
 ///     let size = [64, 48];
-///     let picture = renderer.picture(&painting, &simulation, &camera, &Style::default(), size)?;
+///     let picture = software_picture(&painting, &simulation, &camera, &Style::default(), size)?;
 ///     assert_eq!(picture.rgba.len(), 64 * 48 * 4);
 /// }
 /// # Ok::<(), incise_render::RenderError>(())

@@ -4,7 +4,7 @@ use incise::Simulation;
 
 #[cfg(feature = "gpu")]
 use crate::GpuRenderer;
-use crate::{Camera, Painting, Picture, RenderError, SoftwareRenderer, Style};
+use crate::{Camera, Painting, Picture, RenderError, Style, software_picture};
 
 /// Draws on a device or on the processor.
 #[derive(Debug)]
@@ -14,7 +14,7 @@ pub enum Renderer {
     #[cfg(feature = "gpu")]
     Gpu(Box<GpuRenderer>),
     /// On the processor.
-    Software(SoftwareRenderer),
+    Software,
 }
 
 impl Renderer {
@@ -26,12 +26,12 @@ impl Renderer {
         #[cfg(feature = "gpu")]
         return match Self::on_device() {
             Ok(renderer) => (Self::Gpu(Box::new(renderer)), None),
-            Err(reason) => (Self::Software(SoftwareRenderer::new()), Some(reason)),
+            Err(reason) => (Self::Software, Some(reason)),
         };
         #[cfg(not(feature = "gpu"))]
         {
             let reason = "this build draws on no GPU (feature `gpu`)".to_owned();
-            (Self::Software(SoftwareRenderer::new()), Some(reason))
+            (Self::Software, Some(reason))
         }
     }
 
@@ -40,6 +40,9 @@ impl Renderer {
         use incise::gpu::{GpuContext, GpuOptions};
 
         let options = GpuOptions::from_env();
+        if options.adapter.is_none() && !may_have_gpu() {
+            return Err("there is no GPU".to_owned());
+        }
         let gpu = GpuContext::new(&options).map_err(|error| error.to_string())?;
         let adapter = gpu.adapter();
         if adapter.software && options.adapter.is_none() {
@@ -71,9 +74,9 @@ impl Renderer {
             #[cfg(feature = "gpu")]
             Self::Gpu(renderer) => renderer.needs_read_back(painting, simulation),
             #[cfg(feature = "gpu")]
-            Self::Software(_) => simulation.device_solvers().next().is_some(),
+            Self::Software => simulation.device_solvers().next().is_some(),
             #[cfg(not(feature = "gpu"))]
-            Self::Software(_) => {
+            Self::Software => {
                 let _ = (painting, simulation);
                 false
             }
@@ -89,7 +92,7 @@ impl Renderer {
                 let adapter = renderer.gpu().adapter();
                 format!("{} ({})", adapter.name, adapter.backend)
             }
-            Self::Software(_) => "the processor".to_owned(),
+            Self::Software => "the processor".to_owned(),
         }
     }
 
@@ -111,7 +114,22 @@ impl Renderer {
         match self {
             #[cfg(feature = "gpu")]
             Self::Gpu(renderer) => renderer.picture(painting, simulation, camera, style, size),
-            Self::Software(renderer) => renderer.picture(painting, simulation, camera, style, size),
+            Self::Software => software_picture(painting, simulation, camera, style, size),
         }
     }
+}
+
+/// Whether it makes sense to look for a real device. Loading drivers takes a tenth of a second, and those that find nothing
+/// complain on the terminal; on Linux a GPU shows in the file system.
+#[cfg(feature = "gpu")]
+fn may_have_gpu() -> bool {
+    const NODES: [&str; 6] = [
+        "/dev/dri",
+        "/dev/nvidiactl",
+        "/dev/dxg",
+        "/dev/nvhost-gpu",
+        "/dev/kgsl-3d0",
+        "/dev/mali0",
+    ];
+    !cfg!(target_os = "linux") || NODES.iter().any(|node| std::path::Path::new(node).exists())
 }

@@ -1,4 +1,4 @@
-//! [`SoftwareRenderer`]: the same pictures without a device.
+//! [`software_picture`]: the same pictures without a device.
 //!
 //! Triangles are clipped and cut into rows of pixels by `retrofire-core`: of the rasterizers in Rust it is the one that clips
 //! against all planes of the view (without it a camera inside a scene draws nonsense), fills exactly the pixels whose middle
@@ -42,53 +42,40 @@ const CHUNK: usize = 512;
 /// No triangle.
 const NOTHING: u32 = u32::MAX;
 
-/// Draws on the processor.
+/// Draws a picture on the processor, of the positions that the host knows: see [`Simulation::read_back`].
+///
+/// The same input gives the same bytes for any number of threads.
+///
+/// # Errors
+/// If a side of the picture is 0 or more than [`LARGEST_SIDE`].
+///
+/// # Panics
+/// If the painting does not follow the simulation.
 ///
 /// # Example
 /// See [`Painting`].
-#[derive(Debug, Default)]
-pub struct SoftwareRenderer {}
-
-impl SoftwareRenderer {
-    /// One that has drawn nothing yet.
-    #[must_use]
-    pub fn new() -> Self {
-        Self::default()
-    }
-
-    /// Draws a picture, of the positions that the host knows: see [`Simulation::read_back`].
-    ///
-    /// The same input gives the same bytes for any number of threads.
-    ///
-    /// # Errors
-    /// If a side of the picture is 0 or more than 8192.
-    ///
-    /// # Panics
-    /// If the painting does not follow the simulation.
-    pub fn picture(
-        &mut self,
-        painting: &Painting,
-        simulation: &Simulation,
-        camera: &Camera,
-        style: &Style,
-        size: [u32; 2],
-    ) -> Result<Picture, RenderError> {
-        let view = View::new(camera, size, LARGEST_SIDE)?;
-        let frame = Frame::new(view, painting, simulation, *style);
-        let placed = frame.place();
-        let [width, height] = size.map(|side| side as usize);
-        let mut rgba = vec![0; 4 * width * height];
-        rgba.par_chunks_mut(4 * width * BAND)
-            .enumerate()
-            .for_each_init(Band::default, |band, (number, rows)| {
-                band.draw(&frame, &placed, number * BAND, rows);
-            });
-        Ok(Picture {
-            width: size[0],
-            height: size[1],
-            rgba,
-        })
-    }
+pub fn software_picture(
+    painting: &Painting,
+    simulation: &Simulation,
+    camera: &Camera,
+    style: &Style,
+    size: [u32; 2],
+) -> Result<Picture, RenderError> {
+    let view = View::new(camera, size, LARGEST_SIDE)?;
+    let frame = Frame::new(view, painting, simulation, *style);
+    let placed = frame.place();
+    let [width, height] = size.map(|side| side as usize);
+    let mut rgba = vec![0; 4 * width * height];
+    rgba.par_chunks_mut(4 * width * BAND)
+        .enumerate()
+        .for_each_init(Band::default, |band, (number, rows)| {
+            band.draw(&frame, &placed, number * BAND, rows);
+        });
+    Ok(Picture {
+        width: size[0],
+        height: size[1],
+        rgba,
+    })
 }
 
 /// All that is drawn in a picture.

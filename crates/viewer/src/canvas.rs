@@ -8,7 +8,7 @@ use std::sync::Arc;
 use eframe::egui::{self, Color32, ColorImage, Rect, TextureHandle, TextureId, TextureOptions};
 use eframe::egui_wgpu::RenderState;
 use incise::gpu::{GpuContext, wgpu};
-use incise_render::{GpuRenderer, SoftwareRenderer, Style};
+use incise_render::{GpuRenderer, Style, software_picture};
 
 use crate::stage::Stage;
 
@@ -22,10 +22,7 @@ pub(crate) enum Canvas {
         shown: Option<(TextureId, [u32; 2])>,
     },
     /// The processor.
-    Processor {
-        renderer: SoftwareRenderer,
-        texture: Option<TextureHandle>,
-    },
+    Processor { texture: Option<TextureHandle> },
 }
 
 impl Canvas {
@@ -34,10 +31,7 @@ impl Canvas {
         state: Option<&RenderState>,
         gpu: Option<&Arc<GpuContext>>,
     ) -> (Self, Option<String>) {
-        let processor = Self::Processor {
-            renderer: SoftwareRenderer::new(),
-            texture: None,
-        };
+        let processor = Self::Processor { texture: None };
         let (Some(state), Some(gpu)) = (state, gpu) else {
             return (processor, None);
         };
@@ -94,9 +88,9 @@ impl Canvas {
                     }
                 }
             }
-            Self::Processor { renderer, texture } => {
+            Self::Processor { texture } => {
                 stage.simulation.read_back()?;
-                let picture = renderer.picture(
+                let picture = software_picture(
                     &stage.painting,
                     &stage.simulation,
                     &stage.camera,

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use glam::Vec3;
 use incise::{Scene, Simulation};
 use incise_render::{
-    Camera, ColorBy, GpuRenderer, Painting, Picture, RenderError, SoftwareRenderer, Style,
-    normal_sums,
+    Camera, ColorBy, GpuRenderer, Painting, Picture, RenderError, Style, normal_sums,
+    software_picture,
 };
 
 use crate::support::{Difference, LIVER, Shown, TWO_BODIES, gpu};
@@ -22,7 +22,7 @@ fn assert_alike(renderer: &mut GpuRenderer, shown: &Shown, style: &Style, what: 
     let there = renderer
         .picture(painting, simulation, &camera, style, SIZE)
         .unwrap();
-    let here = SoftwareRenderer::new().picture(painting, simulation, &camera, style, SIZE);
+    let here = software_picture(painting, simulation, &camera, style, SIZE);
     let difference = Difference::of(&there, &here.unwrap(), 24);
     assert!(
         difference.mean < 1.0 && difference.share < 0.04,
@@ -68,9 +68,7 @@ fn assert_present(
     what: &str,
 ) {
     simulation.read_back().unwrap();
-    let here = SoftwareRenderer::new()
-        .picture(painting, simulation, camera, &Style::default(), SIZE)
-        .unwrap();
+    let here = software_picture(painting, simulation, camera, &Style::default(), SIZE).unwrap();
     let difference = Difference::of(there, &here, 24);
     assert!(
         difference.mean < 1.0 && difference.share < 0.04,
@@ -125,9 +123,7 @@ fn positions_do_not_leave_the_device() {
         .picture(&painting, &simulation, &camera, &style, SIZE)
         .unwrap();
     // The host does not know yet how far it fell.
-    let old = SoftwareRenderer::new()
-        .picture(&painting, &simulation, &camera, &style, SIZE)
-        .unwrap();
+    let old = software_picture(&painting, &simulation, &camera, &style, SIZE).unwrap();
     let difference = Difference::of(&there, &old, 24);
     assert!(difference.mean > 1.0, "{difference:?}");
     assert_present(&there, &painting, &mut simulation, &camera, "20 frames on");

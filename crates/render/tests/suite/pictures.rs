@@ -1,14 +1,12 @@
 //! Pictures: sizes, threads, cameras in odd places, and that two pieces look like two.
 
 use glam::DVec3;
-use incise_render::{Camera, ColorBy, Picture, RenderError, SoftwareRenderer, Style};
+use incise_render::{Camera, ColorBy, Picture, RenderError, Style, software_picture};
 
 use crate::support::{LIVER, Shown, TWO_BODIES};
 
 fn draw(shown: &Shown, camera: &Camera, style: &Style, size: [u32; 2]) -> Picture {
-    SoftwareRenderer::new()
-        .picture(&shown.painting, &shown.simulation, camera, style, size)
-        .unwrap()
+    software_picture(&shown.painting, &shown.simulation, camera, style, size).unwrap()
 }
 
 /// Numbers of pixels of what is red, by connected regions, the largest first; below ten pixels nothing counts.
@@ -64,7 +62,7 @@ fn sizes_that_are_no_pictures_are_refused() {
     let shown = Shown::new(LIVER, 0);
     let camera = shown.camera();
     for size in [[0, 1], [1, 0], [0, 0], [8193, 1], [1, u32::MAX]] {
-        let picture = SoftwareRenderer::new().picture(
+        let picture = software_picture(
             &shown.painting,
             &shown.simulation,
             &camera,

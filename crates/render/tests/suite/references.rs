@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use incise_render::{Camera, ColorBy, Picture, SoftwareRenderer, Style};
+use incise_render::{Camera, ColorBy, Picture, Style, software_picture};
 
 use crate::support::{Difference, LIVER, Shown, TWO_BODIES};
 
@@ -75,7 +75,7 @@ fn software_draws_the_references() {
             style,
         } = reference;
         let (painting, simulation) = (&shown.painting, &shown.simulation);
-        let drawn = SoftwareRenderer::new().picture(painting, simulation, &camera, &style, SIZE);
+        let drawn = software_picture(painting, simulation, &camera, &style, SIZE);
         let drawn = drawn.unwrap();
         if std::env::var_os("INCISE_BLESS").is_some() {
             drawn.write_png(path(name)).unwrap();
