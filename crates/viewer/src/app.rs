@@ -18,7 +18,7 @@ use incise_render::{ColorBy, Style};
 use crate::canvas::Canvas;
 use crate::graphics;
 use crate::help::{self, Action};
-use crate::load::{Loading, Source, TETS};
+use crate::load::{Loading, Source};
 use crate::pace::Pace;
 use crate::panel::{self, Controls, Wishes};
 use crate::stage::Stage;
@@ -29,6 +29,8 @@ pub(crate) struct Viewer {
     canvas: Canvas,
     gpu: Option<Arc<GpuContext>>,
     backend: Backend,
+    /// Tets to fill a surface with.
+    tets: u32,
     notes: Vec<String>,
     stage: Option<Stage>,
     loading: Option<Loading>,
@@ -53,6 +55,7 @@ impl Viewer {
         creation: &eframe::CreationContext<'_>,
         source: Source,
         backend: Backend,
+        tets: u32,
         paused: bool,
     ) -> Self {
         let state = creation.wgpu_render_state.as_ref();
@@ -71,6 +74,7 @@ impl Viewer {
             canvas,
             gpu,
             backend,
+            tets,
             notes,
             stage: None,
             loading: None,
@@ -96,7 +100,7 @@ impl Viewer {
     }
 
     fn load_file(&mut self, context: &Context, path: &Path) {
-        match Source::new(Some(path), TETS) {
+        match Source::new(Some(path), self.tets) {
             Ok(source) => self.load(context, source),
             Err(error) => self.error = Some(format!("{error:#}")),
         }

@@ -107,11 +107,15 @@ fn open(source: Source, arguments: &Arguments) -> anyhow::Result<()> {
         wgpu_options: graphics::configuration(),
         ..eframe::NativeOptions::default()
     };
-    let (backend, paused) = (arguments.backend.into(), arguments.paused);
+    let (backend, tets, paused) = (arguments.backend.into(), arguments.tets, arguments.paused);
     eframe::run_native(
         "incise",
         options,
-        Box::new(move |creation| Ok(Box::new(Viewer::new(creation, source, backend, paused)))),
+        Box::new(move |creation| {
+            Ok(Box::new(Viewer::new(
+                creation, source, backend, tets, paused,
+            )))
+        }),
     )
     .map_err(|error| anyhow!("{}", graphics::why_no_window(&error)))
 }
