@@ -123,8 +123,8 @@ fn scene(arguments: &RunArguments) -> Result<Scene, Failure> {
     }
     // Without a picture, nobody asks what its colors show.
     if arguments.draws() && arguments.color_by == ColorBy::Residual {
-        if scene.solver.method == Method::Descent {
-            let why = "--color-by residual needs constraints: the scene is solved by descent";
+        if scene.solver.method == Method::Vbd {
+            let why = "--color-by residual needs constraints: the scene is solved by vbd";
             return Err(Failure::Input(anyhow!(why)));
         }
         scene.report.every = 1;

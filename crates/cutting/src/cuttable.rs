@@ -6,7 +6,7 @@ use foldhash::fast::FixedState;
 use incise_mesh::{ParticleId, TetId, TetMesh};
 
 use crate::faces::{Behind, Face, Faces};
-use crate::stars::Stars;
+use crate::stars::VertexStars;
 use crate::{BoundaryTriangle, CutError};
 
 /// A tetrahedral mesh at rest that can be cut.
@@ -17,7 +17,7 @@ use crate::{BoundaryTriangle, CutError};
 #[derive(Clone, Debug)]
 pub struct CuttableMesh {
     pub(crate) mesh: TetMesh,
-    pub(crate) stars: Stars,
+    pub(crate) stars: VertexStars,
     pub(crate) faces: Faces,
     /// How far planes and level sets were bent to particles. Never iterated.
     pub(crate) bent: HashMap<ParticleId, f64, FixedState>,
@@ -30,7 +30,7 @@ impl CuttableMesh {
     /// [`CutError::Mesh`] if the mesh does not pass [`TetMesh::check`].
     pub fn new(mesh: TetMesh) -> Result<Self, CutError> {
         mesh.check()?;
-        let stars = Stars::new(&mesh);
+        let stars = VertexStars::new(&mesh);
         let faces = Faces::new(&mesh);
         Ok(Self {
             mesh,

@@ -1,4 +1,4 @@
-//! [`Stars`]: for each particle the tets around it, editable in constant time.
+//! [`VertexStars`]: for each particle the tets around it, editable in constant time.
 //!
 //! A doubly linked list per particle, threaded through the tets' corners: slot `4 t + k` holds the neighbors in the
 //! list of the particle at corner `k` of tet `t`. Linking and unlinking a corner touches three entries and never
@@ -10,13 +10,13 @@ const NONE: u32 = u32::MAX;
 
 /// The tets around each particle.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Stars {
+pub(crate) struct VertexStars {
     head: Vec<u32>,
     next: Vec<u32>,
     previous: Vec<u32>,
 }
 
-impl Stars {
+impl VertexStars {
     pub(crate) fn new(mesh: &TetMesh) -> Self {
         let mut stars = Self {
             head: vec![NONE; mesh.positions.len()],

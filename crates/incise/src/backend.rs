@@ -9,7 +9,6 @@ use incise_mesh::{ParticleId, TetId, TetMesh};
 use incise_xpbd::{KappaLimit, Pose, Real, Residuals, Solver, StepReport, StepSettings, XpbdError};
 
 use crate::Error;
-use crate::descent::Descent;
 #[cfg(feature = "gpu")]
 use crate::device::Device;
 use crate::follow::mass;
@@ -18,6 +17,7 @@ use crate::measure::State;
 use crate::place::Place;
 use crate::report::{Milliseconds, milliseconds};
 use crate::scene::{Method, Precision, Quantity, SolverSpec};
+use crate::vbd::Vbd;
 
 /// A solver in one of both precisions.
 #[derive(Debug)]
@@ -32,8 +32,8 @@ pub(crate) enum AnySolver {
 #[derive(Clone, Debug)]
 pub(crate) struct Backend<R: Real> {
     pub(crate) solver: Solver<R>,
-    /// In a scene that is solved by descent.
-    descent: Option<Descent<R>>,
+    /// In a scene that is solved by VBD.
+    vbd: Option<Vbd<R>>,
 }
 
 /// A copy is on the processor: of a solver on a device, with the state that was last read back.
@@ -45,7 +45,7 @@ impl Clone for AnySolver {
             #[cfg(feature = "gpu")]
             Self::Device(device) => Self::Single(Backend {
                 solver: device.solver.as_last_seen().clone(),
-                descent: None,
+                vbd: None,
             }),
         }
     }
@@ -55,7 +55,7 @@ impl Clone for AnySolver {
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum LastSubstep {
     Constraints(Residuals),
-    Descent { force: f64, potential: f64 },
+    Vbd { force: f64, potential: f64 },
 }
 
 /// Does the same with whichever solver it is. On a device: with the host's, whose state is that of the last time it was
@@ -222,11 +222,11 @@ impl AnySolver {
         }
     }
 
-    /// Whether it is solved by descent, which holds rigidly only.
+    /// Whether it is solved by VBD, which holds rigidly only.
     pub(crate) fn descends(&self) -> bool {
         match self {
-            Self::Single(backend) => backend.descent.is_some(),
-            Self::Double(backend) => backend.descent.is_some(),
+            Self::Single(backend) => backend.vbd.is_some(),
+            Self::Double(backend) => backend.vbd.is_some(),
             #[cfg(feature = "gpu")]
             Self::Device(_) => false,
         }
@@ -277,7 +277,7 @@ impl AnySolver {
         Ok(())
     }
 
-    /// The residual of each tet in the last substep, if they were kept; descent has none.
+    /// The residual of each tet in the last substep, if they were kept; VBD has none.
     pub(crate) fn residuals_of_tets(&self, substep_time: f64) -> Option<Vec<f64>> {
         each!(self, solver => solver.residuals_of_tets(substep_time))
     }
@@ -303,18 +303,18 @@ impl AnySolver {
         }
     }
 
-    /// Lets go of what only descent needs.
-    pub(crate) fn end_descent(&mut self) {
+    /// Lets go of what only VBD needs.
+    pub(crate) fn end_vbd(&mut self) {
         match self {
-            Self::Single(backend) => backend.descent = None,
-            Self::Double(backend) => backend.descent = None,
+            Self::Single(backend) => backend.vbd = None,
+            Self::Double(backend) => backend.vbd = None,
             #[cfg(feature = "gpu")]
             Self::Device(_) => {}
         }
     }
 
     /// Brings the layout up to date with the schedule, or sends a device what has changed; the next step would do it
-    /// otherwise. Descent has none.
+    /// otherwise. VBD has none.
     pub(crate) fn lay_out(
         &mut self,
         schedule: &Schedule,
@@ -392,13 +392,13 @@ impl<R: Real> Backend<R> {
     fn new(positions: &[DVec3]) -> Self {
         Self {
             solver: Solver::new(positions),
-            descent: None,
+            vbd: None,
         }
     }
 
     fn prepare(&mut self, spec: &SolverSpec) -> Result<(), Error> {
-        if spec.method == Method::Descent {
-            self.descent = Some(Descent::new(&self.solver, spec.coarse)?);
+        if spec.method == Method::Vbd {
+            self.vbd = Some(Vbd::new(&self.solver, spec.two_level)?);
         }
         Ok(())
     }
@@ -409,9 +409,9 @@ impl<R: Real> Backend<R> {
         settings: &StepSettings,
         keep: bool,
     ) -> Result<StepReport, XpbdError> {
-        let Self { solver, descent } = self;
-        match descent {
-            Some(descent) => descent.step(solver, settings, keep),
+        let Self { solver, vbd } = self;
+        match vbd {
+            Some(vbd) => vbd.step(solver, settings, keep),
             None if keep => solver.step_keeping_residuals(schedule, settings),
             None => solver.step(schedule, settings),
         }
@@ -427,10 +427,10 @@ impl<R: Real> Backend<R> {
     }
 
     fn last_substep(&self, substep_time: f64) -> Option<LastSubstep> {
-        match &self.descent {
-            Some(descent) => Some(LastSubstep::Descent {
-                force: descent.last.force?,
-                potential: descent.last.potential?,
+        match &self.vbd {
+            Some(vbd) => Some(LastSubstep::Vbd {
+                force: vbd.last.force?,
+                potential: vbd.last.potential?,
             }),
             None => self
                 .solver
@@ -440,21 +440,19 @@ impl<R: Real> Backend<R> {
     }
 
     fn bytes(&self) -> usize {
-        self.solver.bytes() + self.descent.as_ref().map_or(0, Descent::bytes)
+        self.solver.bytes() + self.vbd.as_ref().map_or(0, Vbd::bytes)
     }
 
     fn lay_out(&mut self, schedule: &Schedule) {
-        if self.descent.is_none() {
+        if self.vbd.is_none() {
             self.solver.lay_out(schedule);
         }
     }
 
-    /// Lets descent follow a cut, after the solver has.
+    /// Lets VBD follow a cut, after the solver has.
     pub(crate) fn follow(&mut self, ms: &mut Milliseconds) -> Result<(), Error> {
-        let Self { solver, descent } = self;
-        descent
-            .as_mut()
-            .map_or(Ok(()), |descent| descent.follow(solver, ms))
+        let Self { solver, vbd } = self;
+        vbd.as_mut().map_or(Ok(()), |vbd| vbd.follow(solver, ms))
     }
 }
 

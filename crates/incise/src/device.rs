@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use incise_clustering::Method;
-use incise_gpu::{Form, GpuContext, GpuSolver};
+use incise_gpu::{ClusterMapping, GpuContext, GpuSolver};
 use incise_graph::Schedule;
 use incise_xpbd::{Solver, StepReport, StepSettings};
 
@@ -71,9 +71,9 @@ impl Device {
 }
 
 /// Who solves a cluster.
-fn form(spec: &SolverSpec) -> Result<Form, Error> {
+fn form(spec: &SolverSpec) -> Result<ClusterMapping, Error> {
     let method: Method = spec.clustering.parse()?;
-    Ok(Form::for_clusters_of(method.max_size().get()))
+    Ok(ClusterMapping::for_clusters_of(method.max_size().get()))
 }
 
 /// Takes the solvers of `new` groups, which are on the processor, to a device; where `old` ones are there already, they

@@ -1,7 +1,7 @@
 //! How a solver follows a cut of its mesh.
 //!
 //! Tets keep the numbers of the mesh's, new particles come between two others or as copies, and masses are summed anew
-//! where tets have changed. Cost: what the cut touched; descent sorts its stars anew, O(tets).
+//! where tets have changed. Cost: what the cut touched; VBD sorts its stars anew, O(tets).
 
 use glam::DVec3;
 use incise_cutting::{CutDelta, CuttableMesh};
@@ -13,7 +13,7 @@ use crate::backend::{AnySolver, each_mut};
 use crate::report::Milliseconds;
 
 impl AnySolver {
-    /// Follows a cut. Costs what the cut touched; descent sorts its stars anew, O(tets).
+    /// Follows a cut. Costs what the cut touched; VBD sorts its stars anew, O(tets).
     pub(crate) fn follow(
         &mut self,
         delta: &CutDelta,

@@ -25,7 +25,6 @@ pub mod advise;
 mod backend;
 mod body;
 mod collider;
-mod descent;
 #[cfg(feature = "gpu")]
 mod device;
 mod error;
@@ -54,6 +53,7 @@ mod stroke_spec;
 mod strokes;
 mod substeps;
 mod tool;
+mod vbd;
 mod volume;
 mod whole;
 

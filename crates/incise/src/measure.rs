@@ -64,7 +64,7 @@ pub(crate) fn residual(groups: &[Group], gravity: Option<DVec3>) -> Option<Resid
                 potential += residuals.potential;
                 constraints += residuals.constraints;
             }
-            LastSubstep::Descent {
+            LastSubstep::Vbd {
                 force: left,
                 potential: of_group,
             } => {

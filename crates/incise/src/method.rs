@@ -1,10 +1,10 @@
 //! [`Method`]: how a substep is solved, and which keys of a scene go with it.
 //!
-//! Gauss-Seidel, Jacobi and Chebyshev are ways through the same constraints of XPBD. Descent knows no constraints: it
+//! Gauss-Seidel, Jacobi and Chebyshev are ways through the same constraints of XPBD. VBD knows no constraints: it
 //! lowers the potential of the implicit step, so what XPBD adds as constraints (links, soft handles, volumes) or as
 //! damping does not exist for it, and scenes that ask for both are refused.
 
-use incise_xpbd::{DescentSettings, StepSettings};
+use incise_xpbd::{StepSettings, VbdSettings};
 use serde::{Deserialize, Serialize};
 
 use crate::limits::{coordinates, value, within};
@@ -24,16 +24,16 @@ pub enum Method {
     /// Jacobi, extrapolated: see `incise_xpbd::Method::Chebyshev`.
     Chebyshev,
     /// No XPBD: particle by particle into the minimum of the implicit step's potential, see
-    /// `incise_xpbd::Solver::descend`. Stable at any stiffness. Neither damping nor links, soft handles and volume
+    /// `incise_xpbd::Solver::step_vbd`. Stable at any stiffness. Neither damping nor links, soft handles and volume
     /// constraints go with it.
-    Descent,
+    Vbd,
 }
 
 /// How the two constraints of a tet are solved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
-pub enum Form {
+pub enum TetSolve {
     /// As one system of two unknowns.
     #[default]
     Block,
@@ -46,7 +46,7 @@ impl SolverSpec {
     ///
     /// * all methods but Gauss-Seidel take 20 `iterations`, as one of theirs does little;
     /// * Jacobi and Chebyshev have a `relaxation` of 0.1: with 1 they overshoot where more than two tets meet;
-    /// * descent has no `kappa_limit`: it is stable without.
+    /// * VBD has no `kappa_limit`: it is stable without.
     ///
     /// ```
     /// let scene = incise::Scene::from_toml("[solver]\nmethod = \"jacobi\"\niterations = 7")?;
@@ -62,7 +62,7 @@ impl SolverSpec {
         match method {
             Method::GaussSeidel => {}
             Method::Jacobi | Method::Chebyshev => (spec.iterations, spec.relaxation) = (20, 0.1),
-            Method::Descent => (spec.iterations, spec.kappa_limit) = (20, f64::INFINITY),
+            Method::Vbd => (spec.iterations, spec.kappa_limit) = (20, f64::INFINITY),
         }
         spec
     }
@@ -85,12 +85,12 @@ pub(crate) fn settings(scene: &Scene) -> Result<StepSettings, Error> {
                 delay: solver.delay,
             },
             Method::Jacobi => incise_xpbd::Method::Jacobi,
-            // Descent does not ask.
-            Method::GaussSeidel | Method::Descent => incise_xpbd::Method::GaussSeidel,
+            // VBD does not ask.
+            Method::GaussSeidel | Method::Vbd => incise_xpbd::Method::GaussSeidel,
         },
-        form: match solver.form {
-            Form::Block => incise_xpbd::Form::Block,
-            Form::Sequential => incise_xpbd::Form::Sequential,
+        tet_solve: match solver.tet_solve {
+            TetSolve::Block => incise_xpbd::TetSolve::Block,
+            TetSolve::Sequential => incise_xpbd::TetSolve::Sequential,
         },
         relaxation: solver.relaxation,
         gravity: gravity
@@ -99,8 +99,8 @@ pub(crate) fn settings(scene: &Scene) -> Result<StepSettings, Error> {
         colliders: collider::colliders(scene)?,
     };
     let checked = match solver.method {
-        Method::Descent => check_descent(scene).map(|()| descent(&settings).check()),
-        _ if solver.coarse => Err(refused("solver.coarse", true, "false unless")),
+        Method::Vbd => check_vbd(scene).map(|()| vbd(&settings).check()),
+        _ if solver.two_level => Err(refused("solver.two_level", true, "false unless")),
         _ => Ok(settings.check()),
     };
     checked?.map_err(|source| Error::Xpbd {
@@ -111,20 +111,20 @@ pub(crate) fn settings(scene: &Scene) -> Result<StepSettings, Error> {
     Ok(settings)
 }
 
-/// The same for descent.
-pub(crate) fn descent(settings: &StepSettings) -> DescentSettings {
-    DescentSettings {
+/// The same for VBD.
+pub(crate) fn vbd(settings: &StepSettings) -> VbdSettings {
+    VbdSettings {
         // What lies or hangs starts where it is, so that few sweeps do.
         guess: incise_xpbd::Guess::Adaptive,
         step: settings.clone(),
-        ..DescentSettings::new(settings.time_step, settings.iterations)
+        ..VbdSettings::new(settings.time_step, settings.iterations)
     }
 }
 
-/// Refuses what descent would silently leave out.
-pub(crate) fn check_descent(scene: &Scene) -> Result<(), Error> {
-    if scene.solver.form != Form::Block {
-        return Err(refused("solver.form", "sequential", "block where"));
+/// Refuses what VBD would silently leave out.
+pub(crate) fn check_vbd(scene: &Scene) -> Result<(), Error> {
+    if scene.solver.tet_solve != TetSolve::Block {
+        return Err(refused("solver.tet_solve", "sequential", "block where"));
     }
     if !scene.link.is_empty() {
         return Err(refused("link", "given", "absent where"));
@@ -148,11 +148,7 @@ pub(crate) fn check_descent(scene: &Scene) -> Result<(), Error> {
     Ok(())
 }
 
-/// An error about a value that descent does not know.
+/// An error about a value that VBD does not know.
 pub(crate) fn refused(field: &str, given: impl ToString, range: &str) -> Error {
-    value(
-        field,
-        given,
-        format!("{range} solver.method is \"descent\""),
-    )
+    value(field, given, format!("{range} solver.method is \"vbd\""))
 }

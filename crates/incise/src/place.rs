@@ -141,9 +141,9 @@ pub(crate) fn check(scene: &Scene) -> Result<(), Error> {
     if solver.precision == Precision::F64 {
         return Err(value("solver.precision", "f64", "f32 on a GPU"));
     }
-    if solver.method == Method::Descent {
+    if solver.method == Method::Vbd {
         let range = "gauss-seidel, jacobi or chebyshev on a GPU";
-        return Err(value("solver.method", "descent", range));
+        return Err(value("solver.method", "vbd", range));
     }
     let method: incise_clustering::Method = solver.clustering.parse()?;
     let limit = method.max_size().get();

@@ -6,7 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
-use crate::scene::{Form, Method, SolverSpec, Substeps};
+use crate::scene::{Method, SolverSpec, Substeps, TetSolve};
 
 /// Other defaults for the keys of `[solver]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -21,7 +21,7 @@ impl SolverSpec {
     /// The setting of the paper's experiments: frames of 0.016 s in a single step of many iterations, one constraint of
     /// a tet after the other, relaxation 0.8 for Gauss-Seidel and 0.1 for Jacobi and Chebyshev (table 3), SCGC colors
     /// on serial clusters of 10 that are never merged, nothing softened. The paper's convergence experiments take 500 iterations (section
-    /// 5.1.1); how many its animations take it does not say. It has no descent; with that, the keys that only
+    /// 5.1.1); how many its animations take it does not say. It has no VBD; with that, the keys that only
     /// constraints have keep their defaults.
     ///
     /// It is there to compare with, not to use: its kappa is far beyond what is accurate or even stable, as the paper's
@@ -35,17 +35,17 @@ impl SolverSpec {
     /// ```
     #[must_use]
     pub fn paper(method: Method) -> Self {
-        let (form, relaxation) = match method {
-            Method::GaussSeidel => (Form::Sequential, 0.8),
-            Method::Jacobi | Method::Chebyshev => (Form::Sequential, 0.1),
-            Method::Descent => (Form::Block, 1.0),
+        let (tet_solve, relaxation) = match method {
+            Method::GaussSeidel => (TetSolve::Sequential, 0.8),
+            Method::Jacobi | Method::Chebyshev => (TetSolve::Sequential, 0.1),
+            Method::Vbd => (TetSolve::Block, 1.0),
         };
         Self {
             preset: Some(Preset::Paper),
             time_step: 0.016,
             substeps: Substeps::Fixed(1),
             iterations: 500,
-            form,
+            tet_solve,
             relaxation,
             clustering: "serial:10".to_owned(),
             merge_clusters: false,

@@ -212,7 +212,7 @@ pub struct Milliseconds {
     pub schedule: f64,
     /// Sending to a device.
     pub upload: f64,
-    /// Solving. On a device: telling it what to do, after waiting for the frame before the last one if that is not done; it
+    /// TetSolve. On a device: telling it what to do, after waiting for the frame before the last one if that is not done; it
     /// works on by itself.
     pub solve: f64,
     /// Waiting for a device and fetching from it, where somebody asked: a blade, a reported quantity.
@@ -223,7 +223,7 @@ pub struct Milliseconds {
     pub total: f64,
 }
 
-/// Residuals of the last substep. Descent has no multipliers, and therefore no primal and dual ones.
+/// Residuals of the last substep. VBD has no multipliers, and therefore no primal and dual ones.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct ResidualReport {
@@ -240,7 +240,7 @@ pub struct ResidualReport {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dual_rms: Option<f64>,
     /// The unbalanced force of the implicit step in N, from positions alone. XPBD counts that of colliders as
-    /// unbalanced; descent leaves out what they bear.
+    /// unbalanced; VBD leaves out what they bear.
     pub force: f64,
     /// The same as a part of the weight's norm; absent without gravity.
     #[serde(skip_serializing_if = "Option::is_none")]

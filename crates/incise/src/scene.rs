@@ -11,7 +11,7 @@ use crate::Error;
 pub use crate::collider::{ColliderSpec, RotationSpec};
 pub use crate::handle::{HandleSpec, TurnSpec};
 pub use crate::link::{EndSpec, LinkSpec};
-pub use crate::method::{Form, Method};
+pub use crate::method::{Method, TetSolve};
 pub use crate::place::Backend;
 pub use crate::preset::Preset;
 pub use crate::recluster::ReclusterSpec;
@@ -146,12 +146,12 @@ pub struct SolverSpec {
     pub substeps: Substeps,
     /// The most substeps that `auto` takes.
     pub max_substeps: u32,
-    /// Passes over the constraints in a substep, or sweeps of descent. With Gauss-Seidel 1 is what converges.
+    /// Passes over the constraints in a substep, or sweeps of VBD. With Gauss-Seidel 1 is what converges.
     pub iterations: u32,
     /// How a pass is made.
     pub method: Method,
-    /// How the two constraints of a tet are solved. Descent has no constraints.
-    pub form: Form,
+    /// How the two constraints of a tet are solved. VBD has no constraints.
+    pub tet_solve: TetSolve,
     /// Factor on each correction.
     pub relaxation: f64,
     /// For Chebyshev: the spectral radius of the Jacobi iteration, from 0 to below 1: the larger, the bolder. At 0.99
@@ -160,9 +160,9 @@ pub struct SolverSpec {
     /// For Chebyshev: plain iterations before the first extrapolation, at least 1. They damp what extrapolation would
     /// blow up.
     pub delay: u32,
-    /// For descent: whether each sweep is followed by a correction of the whole body, which costs some 100 sweeps.
+    /// For VBD: whether each sweep is followed by a correction of the whole body, which costs some 100 sweeps.
     #[serde(skip_serializing_if = "is_false")]
-    pub coarse: bool,
+    pub two_level: bool,
     /// How constraints are put together: `none` or `serial:K`.
     pub clustering: String,
     /// Whether clusters that a cut leaves small are merged with neighbors. It makes a cut a little dearer, and all frames
@@ -197,11 +197,11 @@ impl Default for SolverSpec {
             max_substeps: 200,
             iterations: 1,
             method: Method::GaussSeidel,
-            form: Form::Block,
+            tet_solve: TetSolve::Block,
             relaxation: 1.0,
             spectral_radius: 0.99,
             delay: 10,
-            coarse: false,
+            two_level: false,
             clustering: "serial:10".to_owned(),
             merge_clusters: true,
             recluster: None,

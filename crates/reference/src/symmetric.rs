@@ -1,7 +1,7 @@
 //! Symmetric 9×9 matrices: are they positive definite, and if not, the nearest ones that are.
 //!
 //! The stiffness of a tet may have negative eigenvalues where the tet is compressed or inverted. Raised to a small
-//! positive value they give a direction of descent (Teran et al. 2005). Most tets need none of it, and a Cholesky
+//! positive value they give a direction of VBD (Teran et al. 2005). Most tets need none of it, and a Cholesky
 //! factorization tells which; the others get all their eigenvalues by Jacobi's method of cyclic rotations
 //! (Golub and Van Loan, section 8.5), which is accurate to rounding without any condition.
 //!

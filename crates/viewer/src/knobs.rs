@@ -20,7 +20,7 @@ const METHODS: [Method; 4] = [
     Method::GaussSeidel,
     Method::Jacobi,
     Method::Chebyshev,
-    Method::Descent,
+    Method::Vbd,
 ];
 
 const CLUSTERINGS: [&str; 4] = ["none", "serial", "greedy-k", "pressure"];
@@ -30,7 +30,7 @@ fn method_name(method: Method) -> &'static str {
         Method::GaussSeidel => "Gauss-Seidel",
         Method::Jacobi => "Jacobi",
         Method::Chebyshev => "Chebyshev",
-        Method::Descent => "descent",
+        Method::Vbd => "vbd",
         _ => "other",
     }
 }
@@ -218,7 +218,7 @@ fn with_method(spec: &SolverSpec, method: Method) -> SolverSpec {
         iterations,
         relaxation,
         kappa_limit,
-        coarse: false,
+        two_level: false,
         ..spec.clone()
     }
 }

@@ -148,7 +148,7 @@ fn look(ui: &mut Ui, stage: &Stage, controls: &mut Controls<'_>) {
     if let Some(legend) = &stage.legend {
         bar(ui, legend);
     } else if style.color_by == ColorBy::Residual {
-        ui.label(RichText::new("no residuals of tets yet; descent has none").small());
+        ui.label(RichText::new("no residuals of tets yet; vbd has none").small());
     }
 }
 

@@ -1,4 +1,4 @@
-//! How descent converges within one large step: residual and milliseconds, round by round.
+//! How VBD converges within one large step: residual and milliseconds, round by round.
 //!
 //! `cargo run --release -p incise-xpbd --example convergence -- [MESH] [gravity|stretch] [f32|f64] [ROUNDS]
 //! [SWEEPS] [OMEGA] [AGGREGATE] [REDUCTION]`
@@ -17,7 +17,8 @@ use glam::DVec3;
 use incise_graph::{Clustering, Schedule};
 use incise_mesh::{TetId, TetMesh, generate::kuhn_box, io};
 use incise_xpbd::{
-    Correction, CorrectionSettings, DescentSettings, ImplicitStep, Material, Real, Solver, Stars,
+    CoarseCorrection, CoarseCorrectionSettings, ImplicitStep, Material, Real, Solver, VbdSettings,
+    VertexStars,
 };
 
 const STUFF: Material = Material {
@@ -35,7 +36,7 @@ struct Plan {
     rounds: usize,
     sweeps: usize,
     relaxation: f64,
-    correction: CorrectionSettings,
+    correction: CoarseCorrectionSettings,
 }
 
 fn body<R: Real>(mesh: &TetMesh) -> Result<Solver<R>, Box<dyn Error>> {
@@ -62,7 +63,7 @@ fn body<R: Real>(mesh: &TetMesh) -> Result<Solver<R>, Box<dyn Error>> {
 
 fn run<R: Real>(mesh: &TetMesh, plan: &Plan) -> Result<(), Box<dyn Error>> {
     let mut solver = body::<R>(mesh)?;
-    let mut settings = DescentSettings::new(TIME_STEP, 1);
+    let mut settings = VbdSettings::new(TIME_STEP, 1);
     settings.step.relaxation = plan.relaxation;
     let free: Vec<usize> = (0..solver.particle_count())
         .filter(|&p| !solver.is_fixed(p))
@@ -83,17 +84,19 @@ fn run<R: Real>(mesh: &TetMesh, plan: &Plan) -> Result<(), Box<dyn Error>> {
     let incidence = solver.star_incidence();
     let colored = incise_coloring::color("greedy".parse()?, &incidence, 0)?;
     let clusters = Clustering::none(incidence.constraint_count());
-    let mut stars = Stars::new(&solver, &Schedule::new(&clusters, &colored.coloring))?;
+    let mut stars = VertexStars::new(&solver, &Schedule::new(&clusters, &colored.coloring))?;
     let mut correction = None;
     if plan.correction.aggregate > 0 {
-        correction = Some(Correction::new(&stars, plan.correction)?);
+        correction = Some(CoarseCorrection::new(&stars, plan.correction)?);
     }
     println!(
         "{} particles, {} pairs, {} colors, {} aggregates, made in {:.1} ms; kappa up to {:.0}",
         solver.particle_count(),
         stars.pair_count(),
         stars.color_count(),
-        correction.as_ref().map_or(0, Correction::aggregate_count),
+        correction
+            .as_ref()
+            .map_or(0, CoarseCorrection::aggregate_count),
         clock.elapsed().as_secs_f64() * 1e3,
         solver.kappa(TIME_STEP),
     );
@@ -148,10 +151,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         rounds: argument(3, "20").parse()?,
         sweeps: argument(4, "1").parse()?,
         relaxation: argument(5, "1.5").parse()?,
-        correction: CorrectionSettings {
+        correction: CoarseCorrectionSettings {
             aggregate: argument(6, "120").parse()?,
             reduction: argument(7, "0.01").parse()?,
-            ..CorrectionSettings::default()
+            ..CoarseCorrectionSettings::default()
         },
     };
     match argument(2, "f64") {

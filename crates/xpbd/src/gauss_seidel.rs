@@ -11,7 +11,7 @@ use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
 use crate::crew::in_rounds;
 use crate::lanes::{Kind, Pass, solve_block};
-use crate::{Form, Real};
+use crate::{Real, TetSolve};
 
 /// Fewest blocks that a thread is given of a color: about a microsecond of work.
 const BLOCKS_A_THREAD: usize = 4;
@@ -36,11 +36,11 @@ impl Kind for Sequential {
 }
 
 /// Makes a pass.
-pub(crate) fn run<R: Real>(level: Level, damped: bool, form: Form, pass: &Pass<'_, R>) {
+pub(crate) fn run<R: Real>(level: Level, damped: bool, form: TetSolve, pass: &Pass<'_, R>) {
     match (form, damped) {
-        (Form::Block, false) => with::<R, Plain>(level, pass),
-        (Form::Block, true) => with::<R, Damped>(level, pass),
-        (Form::Sequential, _) => with::<R, Sequential>(level, pass),
+        (TetSolve::Block, false) => with::<R, Plain>(level, pass),
+        (TetSolve::Block, true) => with::<R, Damped>(level, pass),
+        (TetSolve::Sequential, _) => with::<R, Sequential>(level, pass),
     }
 }
 

@@ -43,7 +43,6 @@ mod attachment;
 mod collider;
 mod copy;
 mod crew;
-mod descent;
 mod device;
 #[cfg(feature = "direct")]
 mod direct;
@@ -66,14 +65,11 @@ mod settings;
 mod solver;
 mod step;
 mod unfold;
+mod vbd;
 mod volume;
 
 pub use attachment::Pose;
 pub use collider::{Collider, ColliderShape};
-pub use descent::{
-    Correction, CorrectionReport, CorrectionSettings, DescentReport, DescentSettings, Guess,
-    ImplicitStep, Stars,
-};
 pub use device::{AttachmentData, Changes, DistanceData, TetData, VolumeData};
 pub use distance::DistanceConstraint;
 pub use error::XpbdError;
@@ -82,9 +78,13 @@ pub use material::Material;
 pub use measure::{Energy, Softened, Volume};
 pub use real::Real;
 pub use residuals::Residuals;
-pub use settings::{Form, Method, StepSettings};
+pub use settings::{Method, StepSettings, TetSolve};
 pub use solver::Solver;
 pub use step::StepReport;
+pub use vbd::{
+    CoarseCorrection, CoarseCorrectionReport, CoarseCorrectionSettings, Guess, ImplicitStep,
+    VbdReport, VbdSettings, VertexStars,
+};
 pub use volume::VolumeConstraint;
 
 /// The example of the README, run as a test.

@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use fearless_simd::{Level, Simd, SimdFloat, SimdFloatElement};
 use glam::{DVec3, Vec3};
 
-use crate::Form;
+use crate::TetSolve;
 use crate::gauss_seidel;
 use crate::lanes::Pass;
 
@@ -90,7 +90,7 @@ pub trait Real:
     /// Makes a pass over tets. Here and not where it is called, so that it is compiled once for each precision, not
     /// in every crate that steps a solver.
     #[doc(hidden)]
-    fn solve_tets(level: Level, damped: bool, form: Form, pass: &Pass<'_, Self>);
+    fn solve_tets(level: Level, damped: bool, form: TetSolve, pass: &Pass<'_, Self>);
 
     /// Rounds a vector of doubles to this precision.
     #[inline]
@@ -166,7 +166,7 @@ macro_rules! real {
                 cell.store(self.to_bits(), Ordering::Relaxed);
             }
             #[inline(never)]
-            fn solve_tets(level: Level, damped: bool, form: Form, pass: &Pass<'_, Self>) {
+            fn solve_tets(level: Level, damped: bool, form: TetSolve, pass: &Pass<'_, Self>) {
                 gauss_seidel::run(level, damped, form, pass);
             }
             #[inline(always)]

@@ -25,7 +25,7 @@ pub struct StepSettings {
     /// How an iteration is made.
     pub method: Method,
     /// How the two constraints of a tet are solved.
-    pub form: Form,
+    pub tet_solve: TetSolve,
     /// Factor on each correction, above 0 and at most 2; 1 is none.
     pub relaxation: f64,
     /// Acceleration in m/s².
@@ -55,7 +55,7 @@ pub enum Method {
 
 /// How the two constraints of a tet are solved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Form {
+pub enum TetSolve {
     /// As one system of two unknowns: a tet at rest stays at rest whatever the stiffness.
     #[default]
     Block,
@@ -72,7 +72,7 @@ impl StepSettings {
             substeps: 1,
             iterations: 1,
             method: Method::GaussSeidel,
-            form: Form::Block,
+            tet_solve: TetSolve::Block,
             relaxation: 1.0,
             gravity: None,
             colliders: Vec::new(),

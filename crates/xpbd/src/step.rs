@@ -191,7 +191,7 @@ impl<R: Real> Solver<R> {
             factors: *factors,
         };
         let damped = self.materials.iter().any(|m| m.damping > 0.0);
-        R::solve_tets(self.level, damped, settings.form, &pass);
+        R::solve_tets(self.level, damped, settings.tet_solve, &pass);
         let Some(jacobi) = jacobi else { return };
         jacobi.apply(&self.particles);
         if let Method::Chebyshev {

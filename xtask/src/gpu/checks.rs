@@ -11,7 +11,7 @@ use anyhow::{Context, ensure};
 use incise::clustering::{Method, cluster};
 use incise::coloring::{Order, color_within_clusters, greedy};
 use incise::gpu::coloring::ColoringKernels;
-use incise::gpu::{Form, GpuContext, GpuSolver};
+use incise::gpu::{ClusterMapping, GpuContext, GpuSolver};
 use incise::graph::{Clustering, ColorId, Coloring, Incidence, Schedule};
 use incise::mesh::TetMesh;
 use incise::mesh::generate::{Shape, kuhn_box};
@@ -101,8 +101,8 @@ fn built_in(gpu: &Arc<GpuContext>, kernels: &mut ColoringKernels) -> anyhow::Res
     ensure!(all, "the device has no room for a graph of 1500 tets");
     let mut farthest = 0.0_f64;
     for (clustering, form) in [
-        ("serial:10", Form::Threads),
-        ("pressure:128", Form::Workgroups),
+        ("serial:10", ClusterMapping::Threads),
+        ("pressure:128", ClusterMapping::Workgroups),
     ] {
         farthest = farthest.max(apart(gpu, clustering, form)?);
     }
@@ -115,7 +115,7 @@ fn built_in(gpu: &Arc<GpuContext>, kernels: &mut ColoringKernels) -> anyhow::Res
 }
 
 /// How far the device is from the host after ten frames of a bar that bends, in m.
-fn apart(gpu: &Arc<GpuContext>, clustering: &str, form: Form) -> anyhow::Result<f64> {
+fn apart(gpu: &Arc<GpuContext>, clustering: &str, form: ClusterMapping) -> anyhow::Result<f64> {
     let mesh = kuhn_box([6, 3, 3], DVec3::new(1.0, 0.5, 0.5));
     let soft = Material {
         young_modulus: 1e5,
@@ -155,13 +155,17 @@ fn apart(gpu: &Arc<GpuContext>, clustering: &str, form: Form) -> anyhow::Result<
 }
 
 /// A schedule, and the order in which a device in that form solves its tets.
-fn orders(mesh: &TetMesh, clustering: &str, form: Form) -> anyhow::Result<(Schedule, Schedule)> {
+fn orders(
+    mesh: &TetMesh,
+    clustering: &str,
+    form: ClusterMapping,
+) -> anyhow::Result<(Schedule, Schedule)> {
     let tets = mesh.tets.iter().copied();
     let incidence = Incidence::from_constraints(mesh.positions.len(), tets)?;
     let clusters = cluster(clustering.parse::<Method>()?, &incidence);
     let outer = greedy(&incidence.quotient(&clusters), Order::LargestFirst);
     let schedule = Schedule::new(&clusters, &outer);
-    if form == Form::Threads {
+    if form == ClusterMapping::Threads {
         return Ok((schedule.clone(), schedule));
     }
     let inner = color_within_clusters(&incidence, &clusters);

@@ -11,7 +11,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use incise::gpu::{Form, GpuContext, GpuError, GpuSolver};
+use incise::gpu::{ClusterMapping, GpuContext, GpuError, GpuSolver};
 use incise::graph::Schedule;
 use incise::mesh::TetMesh;
 use incise::mesh::glam::DVec3;
@@ -26,7 +26,7 @@ use crate::solver::body::{body, scaled, schedule};
 pub(crate) struct Way {
     pub(crate) name: &'static str,
     pub(crate) clustering: &'static str,
-    pub(crate) form: Form,
+    pub(crate) form: ClusterMapping,
     /// Jacobi's relaxation, if it is Jacobi.
     jacobi: Option<f64>,
 }
@@ -48,14 +48,14 @@ impl Way {
         Self {
             name,
             clustering,
-            form: Form::Threads,
+            form: ClusterMapping::Threads,
             jacobi: None,
         }
     }
 
     const fn workgroups(name: &'static str, clustering: &'static str) -> Self {
         Self {
-            form: Form::Workgroups,
+            form: ClusterMapping::Workgroups,
             ..Self::threads(name, clustering)
         }
     }
@@ -224,7 +224,7 @@ fn frames(
 /// The bytes that an iteration of Gauss-Seidel moves at least.
 pub(crate) fn least_bytes(
     schedule: &Schedule,
-    form: Form,
+    form: ClusterMapping,
     corners: impl Fn(u32) -> [u32; 4],
 ) -> u64 {
     let (mut tets, mut particles) = (0, 0);
@@ -241,8 +241,8 @@ pub(crate) fn least_bytes(
         }
     }
     let listed = match form {
-        Form::Threads => 0,
-        Form::Workgroups => 4,
+        ClusterMapping::Threads => 0,
+        ClusterMapping::Workgroups => 4,
     };
     tets * (64 + 16 + 2 * 8) + particles * (2 * 16 + listed)
 }
@@ -287,12 +287,15 @@ mod tests {
         let apart = Coloring::new(vec![ColorId(0), ColorId(1)]);
         let apart = Schedule::new(&Clustering::none(2), &apart);
         assert_eq!(
-            least_bytes(&together, Form::Threads, corners),
+            least_bytes(&together, ClusterMapping::Threads, corners),
             2 * 96 + 5 * 32
         );
-        assert_eq!(least_bytes(&apart, Form::Threads, corners), 2 * 96 + 8 * 32);
         assert_eq!(
-            least_bytes(&together, Form::Workgroups, corners),
+            least_bytes(&apart, ClusterMapping::Threads, corners),
+            2 * 96 + 8 * 32
+        );
+        assert_eq!(
+            least_bytes(&together, ClusterMapping::Workgroups, corners),
             2 * 96 + 5 * 36
         );
     }

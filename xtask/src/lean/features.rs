@@ -6,8 +6,8 @@
 
 use incise::Scene;
 use incise::scene::{
-    BodySpec, ColliderSpec, EndSpec, Form, GroundSpec, HandleSpec, LinkSpec, Method, Precision,
-    Quantity, ReclusterSpec, Region, ReportSpec, ShapeSpec, SleepSpec, StrokeSpec, Substeps,
+    BodySpec, ColliderSpec, EndSpec, GroundSpec, HandleSpec, LinkSpec, Method, Precision, Quantity,
+    ReclusterSpec, Region, ReportSpec, ShapeSpec, SleepSpec, StrokeSpec, Substeps, TetSolve,
 };
 
 /// What of a feature a scene has.
@@ -314,7 +314,7 @@ pub(crate) fn cases() -> Vec<Case> {
             s.solver.precision = Precision::F64;
         }),
         case("sequential form", Used, "as in the paper", |s| {
-            s.solver.form = Form::Sequential;
+            s.solver.tet_solve = TetSolve::Sequential;
         }),
         case("jacobi", Used, "1 iteration", |s| {
             s.solver.method = Method::Jacobi;

@@ -15,7 +15,7 @@ const MODULES: [(&str, &[&str]); 12] = [
     ("volume constraints", &["xpbd::volume", "incise::volume"]),
     ("colliders, ground", &["xpbd::collider", "incise::collider"]),
     ("Jacobi, Chebyshev", &["xpbd::jacobi"]),
-    ("descent", &["xpbd::descent", "incise::descent"]),
+    ("vbd", &["xpbd::vbd", "incise::vbd"]),
     (
         "strokes, pieces",
         &["incise::strokes", "incise::pieces", "incise_cutting"],

@@ -8,7 +8,7 @@ use std::time::Instant;
 use incise::coloring::{Algorithm, balance, color};
 use incise::graph::{Clustering, Coloring, ColoringMetrics, ConstraintGraph, Incidence, Schedule};
 use incise::mesh::TetMesh;
-use incise::xpbd::{Form, Material, StepSettings};
+use incise::xpbd::{Material, StepSettings, TetSolve};
 use serde::{Deserialize, Serialize};
 
 use crate::solver::body::{body, scaled};
@@ -165,7 +165,7 @@ pub(super) fn solve_ms(mesh: &TetMesh, schedules: &[Schedule]) -> anyhow::Result
     let mesh = scaled(mesh, 1.0);
     let settings = StepSettings {
         iterations: ITERATIONS,
-        form: Form::Sequential,
+        tet_solve: TetSolve::Sequential,
         relaxation: 0.8,
         ..StepSettings::new(1e-5)
     };

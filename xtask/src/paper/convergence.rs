@@ -10,7 +10,7 @@ use std::time::Instant;
 use incise::graph::Schedule;
 use incise::mesh::TetMesh;
 use incise::mesh::glam::DVec3;
-use incise::xpbd::{Form, Material, Method, Solver, StepSettings};
+use incise::xpbd::{Material, Method, Solver, StepSettings, TetSolve};
 use serde::{Deserialize, Serialize};
 
 use super::body::Body;
@@ -64,14 +64,14 @@ impl Setup {
 
 /// The methods of Table 3: all cluster sizes of Gauss-Seidel, Jacobi, Chebyshev.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) enum Solving {
+pub(super) enum PaperMethod {
     /// In clusters of this size; 1 is none.
     GaussSeidel(u32),
     Jacobi,
     Chebyshev,
 }
 
-impl Solving {
+impl PaperMethod {
     pub(super) const ALL: [Self; 8] = [
         Self::GaussSeidel(1),
         Self::GaussSeidel(5),
@@ -123,7 +123,7 @@ impl Solving {
             method,
             relaxation,
             iterations,
-            form: Form::Sequential,
+            tet_solve: TetSolve::Sequential,
             ..StepSettings::new(TIME_STEP)
         }
     }
@@ -152,7 +152,7 @@ impl Point {
 pub(super) struct Trial {
     pub(super) mesh: TetMesh,
     schedule: Schedule,
-    solving: Solving,
+    solving: PaperMethod,
     /// By how much the body is scaled before it is let go.
     scaled: f64,
     /// The force at the start in N.
@@ -162,7 +162,7 @@ pub(super) struct Trial {
 impl Trial {
     pub(super) fn new(
         setup: Setup,
-        solving: Solving,
+        solving: PaperMethod,
         arguments: &ExperimentArguments,
     ) -> anyhow::Result<Self> {
         let mesh = Body::named("liver_11k")?.mesh(arguments)?;
@@ -176,7 +176,7 @@ impl Trial {
         };
         let mesh = scaled(&mesh, size);
         let clustering = match solving {
-            Solving::GaussSeidel(size) if size > 1 => format!("serial:{size}"),
+            PaperMethod::GaussSeidel(size) if size > 1 => format!("serial:{size}"),
             _ => "none".to_owned(),
         };
         let schedule = schedule(&mesh, &clustering)?;

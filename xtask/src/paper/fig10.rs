@@ -10,7 +10,7 @@ use std::f64::consts::{PI, TAU};
 use incise::mesh::glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::convergence::{Setup, Solving, Trial, norm};
+use super::convergence::{PaperMethod, Setup, Trial, norm};
 use crate::experiment::{
     Axis, Cell, Experiment, ExperimentArguments, Page, Part, Plot, Series, Style, Table,
 };
@@ -21,20 +21,20 @@ const QUICK_COUNTS: [u32; 3] = [1, 4, 15];
 const BANDS: usize = 24;
 /// Directions of wave vectors, or frequencies in a band.
 const WAVES: usize = 64;
-const SOLVING: [Solving; 7] = [
-    Solving::GaussSeidel(1),
-    Solving::GaussSeidel(5),
-    Solving::GaussSeidel(10),
-    Solving::GaussSeidel(15),
-    Solving::GaussSeidel(20),
-    Solving::Jacobi,
-    Solving::Chebyshev,
+const SOLVING: [PaperMethod; 7] = [
+    PaperMethod::GaussSeidel(1),
+    PaperMethod::GaussSeidel(5),
+    PaperMethod::GaussSeidel(10),
+    PaperMethod::GaussSeidel(15),
+    PaperMethod::GaussSeidel(20),
+    PaperMethod::Jacobi,
+    PaperMethod::Chebyshev,
 ];
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Row {
     setup: Setup,
-    solving: Solving,
+    solving: PaperMethod,
     spectra: Vec<Spectra>,
 }
 
@@ -64,7 +64,11 @@ pub(super) fn experiment(arguments: &ExperimentArguments) -> Experiment<Row> {
     }
 }
 
-fn measure(setup: Setup, solving: Solving, arguments: &ExperimentArguments) -> anyhow::Result<Row> {
+fn measure(
+    setup: Setup,
+    solving: PaperMethod,
+    arguments: &ExperimentArguments,
+) -> anyhow::Result<Row> {
     let trial = Trial::new(setup, solving, arguments)?;
     let start =
         norm(&trial.forces(&trial.released()?)?).powi(2) / trial.mesh.positions.len() as f64;
@@ -169,7 +173,7 @@ fn page(rows: &[Row]) -> anyhow::Result<Page> {
     for setup in Setup::ALL {
         let of_this: Vec<&Row> = rows.iter().filter(|row| row.setup == setup).collect();
         let mut head = vec!["method".to_owned(), "after".to_owned()];
-        head.extend(["coarse third", "middle", "fine third"].map(str::to_owned));
+        head.extend(["two_level third", "middle", "fine third"].map(str::to_owned));
         let caption = format!("The body {}: mean power over space", setup.words());
         let mut table = Table::new(caption, head);
         for place in 0..COUNTS.len() {

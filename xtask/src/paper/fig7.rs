@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::convergence::{Point, Setup, Solving, Trial};
+use super::convergence::{PaperMethod, Point, Setup, Trial};
 use crate::experiment::{
     Axis, Cell, Experiment, ExperimentArguments, Page, Part, Plot, Series, Style, Table,
 };
@@ -13,14 +13,14 @@ const QUICK_COUNTS: [u32; 5] = [1, 2, 4, 8, 15];
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Row {
     pub(super) setup: Setup,
-    pub(super) solving: Solving,
+    pub(super) solving: PaperMethod,
     pub(super) points: Vec<Point>,
 }
 
 pub(super) fn experiment(arguments: &ExperimentArguments) -> Experiment<Row> {
     let mut cells = Vec::new();
     for setup in Setup::ALL {
-        for solving in Solving::ALL {
+        for solving in PaperMethod::ALL {
             let arguments = arguments.clone();
             let id = format!("{}-{}", setup.id(), solving.id());
             cells.push(Cell::new(id, move || {

@@ -6,7 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::compared::{compared, header, number};
-use super::convergence::{Point, Setup, Solving, Trial};
+use super::convergence::{PaperMethod, Point, Setup, Trial};
 use super::printed;
 use crate::experiment::{Cell, Experiment, ExperimentArguments, Page, Part, Table};
 
@@ -21,7 +21,7 @@ const QUICK_CAP: u32 = 64;
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Row {
     pub(super) setup: Setup,
-    pub(super) solving: Solving,
+    pub(super) solving: PaperMethod,
     pub(super) tets: usize,
     pub(super) cap: u32,
     /// The first counts found at which each residual is reached.
@@ -34,7 +34,7 @@ pub(super) struct Row {
 pub(super) fn experiment(arguments: &ExperimentArguments) -> Experiment<Row> {
     let mut cells = Vec::new();
     for setup in Setup::ALL {
-        for solving in Solving::ALL {
+        for solving in PaperMethod::ALL {
             let arguments = arguments.clone();
             let id = format!("{}-{}", setup.id(), solving.id());
             cells.push(Cell::new(id, move || measure(setup, solving, &arguments)));
@@ -47,7 +47,11 @@ pub(super) fn experiment(arguments: &ExperimentArguments) -> Experiment<Row> {
     }
 }
 
-fn measure(setup: Setup, solving: Solving, arguments: &ExperimentArguments) -> anyhow::Result<Row> {
+fn measure(
+    setup: Setup,
+    solving: PaperMethod,
+    arguments: &ExperimentArguments,
+) -> anyhow::Result<Row> {
     let trial = Trial::new(setup, solving, arguments)?;
     let cap = if arguments.quick { QUICK_CAP } else { CAP };
     // Where a step is well-posed, what has not come after a few thousand will not come.

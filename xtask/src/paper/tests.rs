@@ -8,7 +8,7 @@ use serde::de::DeserializeOwned;
 
 use super::body::{Body, incidence};
 use super::colorings::{ALGORITHMS, Problem, occupied};
-use super::convergence::{Setup, Solving, TIME_STEP, Trial, norm};
+use super::convergence::{PaperMethod, Setup, TIME_STEP, Trial, norm};
 use super::{What, printed, run};
 use crate::experiment::{Backend, ExperimentArguments};
 
@@ -211,7 +211,7 @@ fn everything_is_made_and_claims_take_what_is_there() {
 #[test]
 fn forces_have_the_norm_that_the_solver_reports() {
     let folder = Folder::new("forces");
-    for solving in [Solving::GaussSeidel(5), Solving::Jacobi] {
+    for solving in [PaperMethod::GaussSeidel(5), PaperMethod::Jacobi] {
         let trial = Trial::new(Setup::Gentle, solving, &folder.0).unwrap();
         let (solver, _) = trial.step(3).unwrap();
         let reported = solver.residuals(TIME_STEP).unwrap().force;

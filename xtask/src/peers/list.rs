@@ -90,7 +90,7 @@ pub(super) const PEERS: &[Peer] = &[
     },
     Peer {
         id: "newton-vbd",
-        what: "vertex block descent, stable neo-Hookean (Newton on Warp)",
+        what: "vertex block vbd, stable neo-Hookean (Newton on Warp)",
         caveat: "another method: a sweep solves each particle's 3 x 3 system, and visits each tet four times; what an \
             iteration is worth differs",
         precision: Precision::F32,

@@ -9,7 +9,7 @@ use incise::graph::{Clustering, Incidence, Schedule};
 use incise::mesh::generate::{Shape, generate};
 use incise::mesh::glam::DVec3;
 use incise::mesh::{TetId, TetMesh, io};
-use incise::xpbd::{Material, Real, Solver, Stars};
+use incise::xpbd::{Material, Real, Solver, VertexStars};
 
 /// The liver of a folder of models, or a generated one of the same number of tets.
 pub(crate) fn liver(models: Option<&Path>, quick: bool) -> anyhow::Result<TetMesh> {
@@ -83,12 +83,15 @@ pub(crate) fn schedule(mesh: &TetMesh, clustering: &str) -> anyhow::Result<Sched
     Ok(Schedule::new(&clusters, &coloring))
 }
 
-/// The particles in the order in which descent visits them.
-pub(crate) fn stars<R: Real>(solver: &Solver<R>) -> anyhow::Result<Stars<R>> {
+/// The particles in the order in which VBD visits them.
+pub(crate) fn stars<R: Real>(solver: &Solver<R>) -> anyhow::Result<VertexStars<R>> {
     let incidence = solver.star_incidence();
     let coloring = color(auto()?, &incidence, 0)?.coloring;
     let clusters = Clustering::none(incidence.constraint_count());
-    Ok(Stars::new(solver, &Schedule::new(&clusters, &coloring))?)
+    Ok(VertexStars::new(
+        solver,
+        &Schedule::new(&clusters, &coloring),
+    )?)
 }
 
 fn auto() -> anyhow::Result<Algorithm> {

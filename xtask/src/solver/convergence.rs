@@ -11,8 +11,8 @@ use comfy_table::Table;
 use incise::mesh::TetMesh;
 use incise::mesh::glam::DVec3;
 use incise::xpbd::{
-    Correction, CorrectionSettings, DescentSettings, Form, ImplicitStep, Material, Method, Solver,
-    StepSettings,
+    CoarseCorrection, CoarseCorrectionSettings, ImplicitStep, Material, Method, Solver,
+    StepSettings, TetSolve, VbdSettings,
 };
 
 use super::body::{body, scaled, schedule, stars};
@@ -83,7 +83,7 @@ fn runs(mesh: &TetMesh, quick: bool) -> anyhow::Result<Vec<(String, Vec<Point>)>
         ..StepSettings::new(TIME_STEP)
     };
     let paper = StepSettings {
-        form: Form::Sequential,
+        tet_solve: TetSolve::Sequential,
         relaxation: 0.8,
         ..plain.clone()
     };
@@ -118,10 +118,10 @@ fn runs(mesh: &TetMesh, quick: bool) -> anyhow::Result<Vec<(String, Vec<Point>)>
         runs.push((name, xpbd(mesh, "none", &settings, most)?));
     }
     for relaxation in [1.0, 1.9] {
-        let name = format!("descent, relaxation {relaxation}");
-        runs.push((name, descent(mesh, relaxation, most)?));
+        let name = format!("vbd, relaxation {relaxation}");
+        runs.push((name, vbd(mesh, relaxation, most)?));
     }
-    let name = "descent with coarse correction".to_owned();
+    let name = "vbd with coarse correction".to_owned();
     runs.push((name, corrected(mesh, 8)?));
     Ok(runs)
 }
@@ -225,7 +225,7 @@ fn xpbd(
     Ok(points)
 }
 
-fn descent(mesh: &TetMesh, relaxation: f64, most: u32) -> anyhow::Result<Vec<Point>> {
+fn vbd(mesh: &TetMesh, relaxation: f64, most: u32) -> anyhow::Result<Vec<Point>> {
     let mut solver = hanging(mesh)?;
     let weight = solver.load(GRAVITY);
     let mut stars = stars(&solver)?;
@@ -252,7 +252,7 @@ fn corrected(mesh: &TetMesh, rounds: u32) -> anyhow::Result<Vec<Point>> {
     let mut solver = hanging(mesh)?;
     let weight = solver.load(GRAVITY);
     let mut stars = stars(&solver)?;
-    let mut correction = Correction::new(&stars, CorrectionSettings::default())?;
+    let mut correction = CoarseCorrection::new(&stars, CoarseCorrectionSettings::default())?;
     let mut step = ImplicitStep::new(&mut solver, &mut stars, &settings(1.5))?;
     let (mut ms, mut points) = (0.0, Vec::new());
     for iterations in 1..=rounds {
@@ -272,8 +272,8 @@ fn corrected(mesh: &TetMesh, rounds: u32) -> anyhow::Result<Vec<Point>> {
     Ok(points)
 }
 
-fn settings(relaxation: f64) -> DescentSettings {
-    let mut settings = DescentSettings::new(TIME_STEP, 1);
+fn settings(relaxation: f64) -> VbdSettings {
+    let mut settings = VbdSettings::new(TIME_STEP, 1);
     settings.step.gravity = Some(GRAVITY);
     settings.step.relaxation = relaxation;
     settings

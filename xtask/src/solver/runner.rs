@@ -3,7 +3,8 @@
 use incise::graph::Schedule;
 use incise::mesh::TetMesh;
 use incise::xpbd::{
-    Correction, CorrectionSettings, DescentSettings, Real, Solver, Stars, StepSettings,
+    CoarseCorrection, CoarseCorrectionSettings, Real, Solver, StepSettings, VbdSettings,
+    VertexStars,
 };
 
 use super::body::{schedule, stars};
@@ -15,9 +16,9 @@ pub(crate) enum Recipe {
         clustering: &'static str,
         settings: StepSettings,
     },
-    Descent(DescentSettings),
-    /// Descent with a coarse correction after each sweep.
-    Corrected(DescentSettings),
+    Vbd(VbdSettings),
+    /// VBD with a coarse correction after each sweep.
+    Corrected(VbdSettings),
 }
 
 /// A body that moves by a recipe.
@@ -30,18 +31,19 @@ pub(crate) struct Runner<R: Real> {
 /// What a recipe has to prepare.
 enum Tools<R: Real> {
     Schedule(Schedule),
-    Stars(Box<Stars<R>>, Option<Box<Correction<R>>>),
+    VertexStars(Box<VertexStars<R>>, Option<Box<CoarseCorrection<R>>>),
 }
 
 impl<R: Real> Runner<R> {
     pub(crate) fn new(solver: Solver<R>, mesh: &TetMesh, recipe: &Recipe) -> anyhow::Result<Self> {
         let tools = match recipe {
             Recipe::Xpbd { clustering, .. } => Tools::Schedule(schedule(mesh, clustering)?),
-            Recipe::Descent(_) => Tools::Stars(Box::new(stars(&solver)?), None),
+            Recipe::Vbd(_) => Tools::VertexStars(Box::new(stars(&solver)?), None),
             Recipe::Corrected(_) => {
                 let stars = stars(&solver)?;
-                let correction = Correction::new(&stars, CorrectionSettings::default())?;
-                Tools::Stars(Box::new(stars), Some(Box::new(correction)))
+                let correction =
+                    CoarseCorrection::new(&stars, CoarseCorrectionSettings::default())?;
+                Tools::VertexStars(Box::new(stars), Some(Box::new(correction)))
             }
         };
         Ok(Self {
@@ -59,15 +61,15 @@ impl<R: Real> Runner<R> {
                 solver.step(schedule, settings)?.repaired
             }
             (
-                Recipe::Descent(settings) | Recipe::Corrected(settings),
-                Tools::Stars(stars, correction),
+                Recipe::Vbd(settings) | Recipe::Corrected(settings),
+                Tools::VertexStars(stars, correction),
             ) => match correction {
                 Some(correction) => {
                     solver
-                        .descend_corrected(stars, correction, settings)?
+                        .step_vbd_two_level(stars, correction, settings)?
                         .repaired
                 }
-                None => solver.descend(stars, settings)?.repaired,
+                None => solver.step_vbd(stars, settings)?.repaired,
             },
             _ => unreachable!("the tools are made for the recipe"),
         };

@@ -10,7 +10,7 @@ use comfy_table::Table;
 use incise::mesh::TetMesh;
 use incise::mesh::generate::kuhn_box;
 use incise::mesh::glam::DVec3;
-use incise::xpbd::{Form, Material, Real, StepSettings};
+use incise::xpbd::{Material, Real, StepSettings, TetSolve};
 use rayon::ThreadPoolBuilder;
 
 use super::body::{body, scaled, schedule};
@@ -45,7 +45,7 @@ pub(crate) fn speed(liver: &TetMesh, quick: bool) -> anyhow::Result<String> {
     }
     for (name, mesh) in &bodies {
         for clusters in ["none", "serial:10"] {
-            for form in [Form::Block, Form::Sequential] {
+            for form in [TetSolve::Block, TetSolve::Sequential] {
                 row::<f32>(&mut table, name, mesh, clusters, form, quick)?;
                 row::<f64>(&mut table, name, mesh, clusters, form, quick)?;
             }
@@ -59,13 +59,13 @@ fn row<R: Real>(
     name: &str,
     mesh: &TetMesh,
     clusters: &str,
-    form: Form,
+    tet_solve: TetSolve,
     quick: bool,
 ) -> anyhow::Result<()> {
     let schedule = schedule(mesh, clusters)?;
     let settings = StepSettings {
         substeps: SUBSTEPS,
-        form,
+        tet_solve,
         gravity: Some(DVec3::new(0.0, 0.0, -9.81)),
         ..StepSettings::new(1.0 / 240.0)
     };
@@ -89,7 +89,7 @@ fn row<R: Real>(
         format!("{name}, {tets} tets"),
         clusters.to_owned(),
         schedule.color_count().to_string(),
-        format!("{form:?}").to_lowercase(),
+        format!("{tet_solve:?}").to_lowercase(),
         format!("f{}", 8 * size_of::<R>()),
         each(one),
         format!("{:.3}", one * 1e3),

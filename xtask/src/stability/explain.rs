@@ -17,7 +17,7 @@ pub(super) struct Explanation {
     pub(super) text: &'static str,
 }
 
-use Method::{Block, Chebyshev, Corrected, Descent, Jacobi, Paper, Substeps};
+use Method::{Block, Chebyshev, Corrected, Jacobi, Paper, Substeps, Vbd};
 use Verdict::{Bent, Collapsed, FewInverted, Gains, Inverted, Off, Repaired};
 
 /// One step of twenty iterations through constraints.
@@ -59,10 +59,10 @@ const TABLE: &[Explanation] = &[
     },
     Explanation {
         extremes: &["cut"],
-        methods: &[Descent, Corrected],
+        methods: &[Vbd, Corrected],
         verdicts: &[Inverted, FewInverted, Off, Gains],
         kappa: 0.0,
-        text: "Descent does not soften slivers: those that were turned over by a stroke's step may stay so, in a local \
+        text: "Vbd does not soften slivers: those that were turned over by a stroke's step may stay so, in a local \
             minimum. In single precision, where the last digit of a position is more than the height of the thinnest, what \
             rounding leaves of their energy may grow without end, though not to infinity; in double precision the same \
             strokes leave a body in shape.",
@@ -75,11 +75,11 @@ const TABLE: &[Explanation] = &[
         text: "Kappa of the frame is above 1, and a frame is one step. Iterations drive the constraints to zero and not \
             the equations of motion, of which XPBD drops a part: shear is explicit in all but name, so stiff bodies go \
             soft, ring or collapse (Jacobi and Chebyshev as well, at the relaxation at which they do not diverge). Take \
-            substeps, or descent.",
+            substeps, or vbd.",
     },
     Explanation {
         extremes: &["size-1e-6"],
-        methods: &[Descent, Corrected],
+        methods: &[Vbd, Corrected],
         verdicts: &[Collapsed, Inverted, FewInverted, Gains, Off, Repaired],
         kappa: 1e12,
         text: "A body of a micrometer in a frame of 1/60 s has a kappa of 1e14 (it is not the size: with time in \
@@ -136,16 +136,16 @@ const TABLE: &[Explanation] = &[
     },
     Explanation {
         extremes: STATES,
-        methods: &[Descent, Corrected],
+        methods: &[Vbd, Corrected],
         verdicts: &[Inverted, FewInverted, Off, Bent],
         kappa: 1.0,
-        text: "From so violent a start the potential of a step has many minima: descent goes to the next one, where single \
+        text: "From so violent a start the potential of a step has many minima: vbd goes to the next one, where single \
             tets may stay inverted, above all at the held end; and with 20 sweeps a frame it is slow to spread what it \
             knows, so the body is long in straightening.",
     },
     Explanation {
         extremes: &[""],
-        methods: &[Descent],
+        methods: &[Vbd],
         verdicts: &[Inverted, FewInverted, Off, Gains],
         kappa: 1.0,
         text: "20 sweeps are far from the solution of a step at this kappa. What they leave over is elastic energy that \

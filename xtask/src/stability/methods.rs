@@ -5,8 +5,8 @@
 //! tets that are still too stiff softened to kappa 1.
 
 use incise::mesh::glam::DVec3;
-use incise::scene::{self, Form as SceneForm, SolverSpec, Substeps};
-use incise::xpbd::{DescentSettings, Form, KappaLimit, Method as XpbdMethod, StepSettings};
+use incise::scene::{self, SolverSpec, Substeps, TetSolve as SceneTetSolve};
+use incise::xpbd::{KappaLimit, Method as XpbdMethod, StepSettings, TetSolve, VbdSettings};
 use serde::{Deserialize, Serialize};
 
 use crate::solver::runner::Recipe;
@@ -37,16 +37,15 @@ pub(crate) enum Method {
     /// Relaxation 0.1, spectral radius 0.9.
     Chebyshev,
     /// 20 sweeps.
-    Descent,
+    Vbd,
     /// 5 sweeps, each with a correction of the whole body.
     Corrected,
 }
 
-use Method::{Block, Chebyshev, Corrected, Descent, Jacobi, Paper, Substeps as ByKappa};
+use Method::{Block, Chebyshev, Corrected, Jacobi, Paper, Substeps as ByKappa, Vbd};
 
 impl Method {
-    pub(crate) const ALL: [Self; 7] =
-        [ByKappa, Block, Paper, Jacobi, Chebyshev, Descent, Corrected];
+    pub(crate) const ALL: [Self; 7] = [ByKappa, Block, Paper, Jacobi, Chebyshev, Vbd, Corrected];
 
     pub(crate) fn name(self) -> &'static str {
         match self {
@@ -55,14 +54,14 @@ impl Method {
             Paper => "paper",
             Jacobi => "Jacobi",
             Chebyshev => "Chebyshev",
-            Descent => "descent",
+            Vbd => "vbd",
             Corrected => "corrected",
         }
     }
 
     /// Whether it is a way through constraints, which kappa limits, and which a device can go as well.
     pub(crate) fn is_xpbd(self) -> bool {
-        !matches!(self, Descent | Corrected)
+        !matches!(self, Vbd | Corrected)
     }
 
     /// Iterations, sweeps or rounds of a substep.
@@ -108,10 +107,10 @@ impl Method {
                 },
                 _ => XpbdMethod::GaussSeidel,
             },
-            form: if self == Paper {
-                Form::Sequential
+            tet_solve: if self == Paper {
+                TetSolve::Sequential
             } else {
-                Form::Block
+                TetSolve::Block
             },
             relaxation: match self {
                 Paper => 0.8,
@@ -121,13 +120,13 @@ impl Method {
             gravity,
             ..StepSettings::new(time_step)
         };
-        let descent = |settings| DescentSettings {
+        let vbd = |settings| VbdSettings {
             step: settings,
-            ..DescentSettings::new(time_step, self.iterations())
+            ..VbdSettings::new(time_step, self.iterations())
         };
         match self {
-            Descent => Recipe::Descent(descent(settings)),
-            Corrected => Recipe::Corrected(descent(settings)),
+            Vbd => Recipe::Vbd(vbd(settings)),
+            Corrected => Recipe::Corrected(vbd(settings)),
             Paper => Recipe::Xpbd {
                 clustering: "serial:10",
                 settings,
@@ -145,7 +144,7 @@ impl Method {
             ByKappa | Block | Paper => scene::Method::GaussSeidel,
             Jacobi => scene::Method::Jacobi,
             Chebyshev => scene::Method::Chebyshev,
-            Descent | Corrected => scene::Method::Descent,
+            Vbd | Corrected => scene::Method::Vbd,
         };
         let mut spec = match self {
             Paper => SolverSpec::paper(method),
@@ -156,9 +155,9 @@ impl Method {
             _ => Substeps::Fixed(1),
         };
         spec.iterations = self.iterations();
-        debug_assert_eq!(self == Paper, spec.form == SceneForm::Sequential);
+        debug_assert_eq!(self == Paper, spec.tet_solve == SceneTetSolve::Sequential);
         spec.time_step = 1.0 / 60.0;
-        spec.coarse = self == Corrected;
+        spec.two_level = self == Corrected;
         spec.precision = match column.precision {
             Precision::F32 => scene::Precision::F32,
             Precision::F64 => scene::Precision::F64,

@@ -14,7 +14,7 @@ are scenes with a softer beam (E = 1e4 Pa), in which everything is recomputed an
 *substeps* is XPBD in block form by as many substeps of one iteration as bring kappa to 0.5, at most 200, tets that are \
 still too stiff softened to kappa 1, as in scenes. All others take a frame in one step of 20 iterations: *block*, XPBD in \
 block form; *paper*, one constraint of a tet after the other, relaxation 0.8, clusters of 10; *Jacobi* and *Chebyshev* \
-(spectral radius 0.9) with relaxation 0.1; *descent*, 20 sweeps; *corrected*, 5 sweeps, a correction of the whole body after each.
+(spectral radius 0.9) with relaxation 0.1; *vbd*, 20 sweeps; *corrected*, 5 sweeps, a correction of the whole body after each.
 
 After every frame positions, velocities, energies and volumes are looked at. Green: in shape. Yellow: `3 inverted`, tets \
 that are, at most 2 %; `volume 1.07`, over that at rest; `energy 3e1`, it rose so many times above what there was to \

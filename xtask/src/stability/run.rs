@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use incise::gpu::{Form, GpuContext, GpuSolver};
+use incise::gpu::{ClusterMapping, GpuContext, GpuSolver};
 use incise::mesh::glam::DVec3;
 use incise::xpbd::{Real, Solver};
 
@@ -48,7 +48,7 @@ fn on_device(extreme: &Extreme, column: Column, gpu: &Arc<GpuContext>) -> anyhow
         anyhow::bail!("{} does not run on a device", column.method.name());
     };
     let schedule = schedule(&extreme.mesh, clustering)?;
-    let mut body = GpuSolver::new(gpu.clone(), solver, Form::Threads)?;
+    let mut body = GpuSolver::new(gpu.clone(), solver, ClusterMapping::Threads)?;
     let mut before = 0;
     for _ in 0..extreme.frames() {
         body.step(&schedule, &settings)?;

@@ -29,7 +29,7 @@ fn the_quick_matrix_is_finite_explained_and_shown() {
                 let explained = explain::explain(row, outcome).is_some();
                 assert!(explained, "nobody knows why: {}: {outcome:?}", row.id);
             }
-            // Constraints keep momentum but for rounding, measured: 1e-5. Descent keeps it as far as it converges.
+            // Constraints keep momentum but for rounding, measured: 1e-5. VBD keeps it as far as it converges.
             let drift = outcome.momentum_drift.unwrap_or(0.0);
             let xpbd = outcome.column.method.is_xpbd();
             assert!(!xpbd || drift < 1e-3, "{}: {outcome:?}", row.id);

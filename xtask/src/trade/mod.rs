@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::experiment::{Backend, Cell, Experiment, ExperimentArguments};
 use scenes::{Kind, frames};
-use settings::{large_descent, large_step, settings};
+use settings::{large_step, large_vbd, settings};
 
 /// All that was measured of a scene.
 #[derive(Debug, Serialize, Deserialize)]
@@ -69,9 +69,9 @@ struct ExchangeRow {
 #[derive(Debug, Serialize, Deserialize)]
 struct LargeRow {
     iterations: u32,
-    /// In %; of XPBD, and of descent with coarse correction where the scene allows that.
+    /// In %; of XPBD, and of VBD with coarse correction where the scene allows that.
     xpbd: Deviation,
-    descent: Option<Deviation>,
+    vbd: Option<Deviation>,
 }
 
 pub(crate) fn trade(arguments: &ExperimentArguments) -> anyhow::Result<()> {
@@ -172,16 +172,16 @@ fn large(scene: &Scene, frames: u32, quick: bool) -> anyhow::Result<Vec<LargeRow
     let row = |&iterations: &u32| {
         let motion = |spec| Motion::of(&with(scene, &spec), frames, Some(1));
         let xpbd = motion(large_step(iterations))?;
-        // Rounds of descent are dear, and few are enough. Scenes with links cannot be run with it.
-        let descent = if iterations <= 16 && scene.link.is_empty() {
-            Some(motion(large_descent(iterations))?.deviation(&newton))
+        // Rounds of VBD are dear, and few are enough. Scenes with links cannot be run with it.
+        let vbd = if iterations <= 16 && scene.link.is_empty() {
+            Some(motion(large_vbd(iterations))?.deviation(&newton))
         } else {
             None
         };
         Ok(LargeRow {
             iterations,
             xpbd: xpbd.deviation(&newton),
-            descent,
+            vbd,
         })
     };
     let rows = counts

@@ -158,7 +158,7 @@ fn spread(values: &mut [f64]) -> Option<[f64; 3]> {
 /// What became of one step a frame, by its last rows.
 fn large_step(rows: &[SceneRow]) -> String {
     let mut text = "XPBD drops a part of the equations of motion, so with one substep a frame its iterations do not lead to \
-        the solution of that step; descent with coarse correction solves the same step. Distances from the solution of \
+        the solution of that step; vbd with coarse correction solves the same step. Distances from the solution of \
         the step by Newton's method, double precision, nothing softened:\n\n"
         .to_owned();
     for row in rows {
@@ -166,11 +166,11 @@ fn large_step(rows: &[SceneRow]) -> String {
             continue;
         };
         let first = &row.large[0];
-        let descent = row
+        let vbd = row
             .large
             .iter()
             .rev()
-            .find_map(|l| Some((l.iterations, l.descent?)));
+            .find_map(|l| Some((l.iterations, l.vbd?)));
         text += &format!(
             "- {}: XPBD is {} % off after {} iteration and {} % after {}",
             row.title,
@@ -179,10 +179,10 @@ fn large_step(rows: &[SceneRow]) -> String {
             digits(last.xpbd.largest),
             last.iterations
         );
-        if let Some((rounds, descent)) = descent {
+        if let Some((rounds, vbd)) = vbd {
             text += &format!(
-                "; descent is {} % off after {rounds} rounds",
-                digits(descent.largest)
+                "; vbd is {} % off after {rounds} rounds",
+                digits(vbd.largest)
             );
         }
         text += ".\n";
@@ -204,9 +204,9 @@ fn large_plot(row: &SceneRow) -> Plot {
         style: Style::Both,
     };
     let mut all = vec![series("XPBD", points(|l| Some(l.xpbd.largest)))];
-    let descent: Vec<_> = points(|l| Some(l.descent?.largest));
-    if !descent.is_empty() {
-        all.push(series("descent with coarse correction", descent));
+    let vbd: Vec<_> = points(|l| Some(l.vbd?.largest));
+    if !vbd.is_empty() {
+        all.push(series("vbd with coarse correction", vbd));
     }
     Plot {
         title: format!("{}: one step a frame", row.title),

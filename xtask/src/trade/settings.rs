@@ -3,7 +3,7 @@
 //! Around the default with `n` substeps, the number that brings kappa to 0.5: each knob alone, and substeps with each
 //! method.
 
-use incise::scene::{Backend, Form, Method, Precision, SolverSpec, Substeps};
+use incise::scene::{Backend, Method, Precision, SolverSpec, Substeps, TetSolve};
 
 /// The settings that are compared, with the knob that each turns: the curve it belongs to.
 pub(super) struct Settings {
@@ -41,7 +41,7 @@ pub(super) fn settings(substeps: u32, gpu: bool) -> Settings {
         ..xpbd(8, 1)
     };
     let sequential = |eighths| SolverSpec {
-        form: Form::Sequential,
+        tet_solve: TetSolve::Sequential,
         ..xpbd(eighths, 1)
     };
     let jacobi = |eighths, iterations, relaxation| SolverSpec {
@@ -52,14 +52,14 @@ pub(super) fn settings(substeps: u32, gpu: bool) -> Settings {
         spectral_radius: 0.9,
         ..of(Method::Chebyshev, eighths, iterations)
     };
-    let descent = |substeps: u32, iterations, relaxation| SolverSpec {
+    let vbd = |substeps: u32, iterations, relaxation| SolverSpec {
         substeps: Substeps::Fixed(substeps),
         relaxation,
-        ..of(Method::Descent, 8, iterations)
+        ..of(Method::Vbd, 8, iterations)
     };
     let coarse = |substeps: u32| SolverSpec {
-        coarse: true,
-        ..double(descent(substeps, 4, 1.0))
+        two_level: true,
+        ..double(vbd(substeps, 4, 1.0))
     };
     let unsoftened = |spec: SolverSpec| SolverSpec {
         kappa_limit: f64::INFINITY,
@@ -118,17 +118,17 @@ pub(super) fn settings(substeps: u32, gpu: bool) -> Settings {
         vec![chebyshev(8, 12), chebyshev(8, 20), chebyshev(16, 20)],
     );
     add(
-        "descent",
+        "vbd",
         vec![
-            descent(1, 20, 1.0),
-            descent(1, 100, 1.0),
-            descent(1, 100, 1.9),
-            descent(4, 20, 1.0),
-            descent(4, 100, 1.9),
+            vbd(1, 20, 1.0),
+            vbd(1, 100, 1.0),
+            vbd(1, 100, 1.9),
+            vbd(4, 20, 1.0),
+            vbd(4, 100, 1.9),
         ],
     );
     add(
-        "descent, coarse correction, f64",
+        "vbd, coarse correction, f64",
         [1, 2, 4, 8].map(coarse).into(),
     );
     add(
@@ -256,19 +256,19 @@ pub(super) fn settings(substeps: u32, gpu: bool) -> Settings {
         ),
         exchange(
             "method",
-            "Descent, 1 step of 100 sweeps with relaxation 1.9, in place of Gauss-Seidel at n substeps",
+            "Vbd, 1 step of 100 sweeps with relaxation 1.9, in place of Gauss-Seidel at n substeps",
             &xpbd(8, 1),
-            &descent(1, 100, 1.9),
+            &vbd(1, 100, 1.9),
         ),
         exchange(
             "method",
-            "Descent with coarse correction in 4 steps in place of Gauss-Seidel at n substeps",
+            "Vbd with coarse correction in 4 steps in place of Gauss-Seidel at n substeps",
             &xpbd(8, 1),
             &coarse(4),
         ),
         exchange(
             "method",
-            "Doubling the steps of descent with coarse correction from 4 to 8",
+            "Doubling the steps of vbd with coarse correction from 4 to 8",
             &coarse(4),
             &coarse(8),
         ),
@@ -296,11 +296,11 @@ pub(super) fn large_step(iterations: u32) -> SolverSpec {
     }
 }
 
-/// The same step by descent, each sweep with a coarse correction.
-pub(super) fn large_descent(iterations: u32) -> SolverSpec {
+/// The same step by VBD, each sweep with a coarse correction.
+pub(super) fn large_vbd(iterations: u32) -> SolverSpec {
     SolverSpec {
-        method: Method::Descent,
-        coarse: true,
+        method: Method::Vbd,
+        two_level: true,
         ..large_step(iterations)
     }
 }

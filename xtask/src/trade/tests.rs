@@ -78,7 +78,7 @@ fn the_reference_bounds_what_can_be_told() {
 }
 
 /// Two quick scenes, one with a handle, one cut: implicit Euler converges at its order, the error falls with substeps,
-/// iterations of a large step do not lead to the step, descent does.
+/// iterations of a large step do not lead to the step, VBD does.
 #[test]
 fn quick_scenes_show_what_the_page_says() {
     let folder = folder("quick");
@@ -107,16 +107,8 @@ fn quick_scenes_show_what_the_page_says() {
             row.title
         );
         let last = row.large.last().unwrap();
-        let descent = row
-            .large
-            .iter()
-            .filter_map(|l| l.descent)
-            .next_back()
-            .unwrap();
-        assert!(
-            descent.largest < 0.1 * last.xpbd.largest,
-            "{last:?}, {descent:?}"
-        );
+        let vbd = row.large.iter().filter_map(|l| l.vbd).next_back().unwrap();
+        assert!(vbd.largest < 0.1 * last.xpbd.largest, "{last:?}, {vbd:?}");
     }
     let page = page(&rows).unwrap();
     assert!(page.parts.len() > 10);

@@ -159,10 +159,10 @@ fn residuals_are_shown_where_there_are_some() {
     run(&place, &usual);
     let lines = place.read("out/frames.jsonl");
     assert_eq!(lines.matches("\"residual\":").count(), 2, "{lines}");
-    let scene = crate::support::SCENE.replace("[world]", "[solver]\nmethod = \"descent\"\n[world]");
-    place.write("descent.toml", scene);
-    let command = [&["run", "descent.toml"], &usual[..]].concat();
-    refused_in_a_sentence(&place, &command, &["--color-by residual", "descent"]);
+    let scene = crate::support::SCENE.replace("[world]", "[solver]\nmethod = \"vbd\"\n[world]");
+    place.write("vbd.toml", scene);
+    let command = [&["run", "vbd.toml"], &usual[..]].concat();
+    refused_in_a_sentence(&place, &command, &["--color-by residual", "vbd"]);
     // Where nothing is drawn, they are nobody's.
     let nothing = [&command[..], &["--no-pictures"]].concat();
     place.good(&nothing);
@@ -170,7 +170,7 @@ fn residuals_are_shown_where_there_are_some() {
     let lines = place.read("out/frames.jsonl");
     assert!(!lines.contains("\"residual\":"), "{lines}");
     let film = [&nothing[..], &["--film", "film.gif"]].concat();
-    refused_in_a_sentence(&place, &film, &["--color-by residual", "descent"]);
+    refused_in_a_sentence(&place, &film, &["--color-by residual", "vbd"]);
 }
 
 #[test]

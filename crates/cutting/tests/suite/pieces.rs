@@ -381,7 +381,7 @@ fn looks_follow_the_cut() {
     };
     let looks = corner.pieces.looks();
     assert!(chip < tets / 100, "{chip} tets came off");
-    // Stars at the boundary are smaller than inside, hence 20 instead of 12.
+    // VertexStars at the boundary are smaller than inside, hence 20 instead of 12.
     assert!(looks < 20 * chip, "{looks} looks for a chip of {chip}");
 
     // Halved bodies and rings cut once make it count all tets, after a search that looked at tets a quarter as often.

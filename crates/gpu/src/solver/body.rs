@@ -10,7 +10,7 @@ use incise_xpbd::{Changes, Solver};
 use super::colors::Colors;
 use super::handles::Handles;
 use super::kernels::{Kernels, PATCH_PARTICLES, PATCH_TETS, Variant};
-use super::layout::{Form, Layout, THREADS};
+use super::layout::{ClusterMapping, Layout, THREADS};
 use super::numbers::{NUMBERS, Part, ParticlePatch, TetPatch};
 use super::scalars::{Kind, Scalars};
 use super::tile::number_count;
@@ -50,7 +50,7 @@ pub(crate) struct Body {
 }
 
 impl Body {
-    pub(crate) fn new(gpu: &GpuContext, form: Form) -> Result<Self, GpuError> {
+    pub(crate) fn new(gpu: &GpuContext, form: ClusterMapping) -> Result<Self, GpuError> {
         Ok(Self {
             layout: Layout::new(form),
             colors: Colors::new(gpu)?,
@@ -104,7 +104,7 @@ impl Body {
         if various {
             self.constants.resize(gpu, places)?;
         }
-        if self.layout.form == Form::Workgroups {
+        if self.layout.form == ClusterMapping::Workgroups {
             let tiles = self.layout.seats.seat_count();
             let room = self.layout.depth();
             let numbers_of_tile = number_count(room);

@@ -6,7 +6,7 @@
 use incise_graph::Schedule;
 
 use super::GpuSolver;
-use super::layout::{Form, THREADS};
+use super::layout::{ClusterMapping, THREADS};
 use super::numbers::NUMBERS;
 use super::tile::number_count;
 use crate::GpuError;
@@ -70,7 +70,7 @@ impl GpuSolver {
         };
         let data = self.host.tet_data(tet);
         let mut corners = copy.corners[place];
-        if self.form() == Form::Workgroups {
+        if self.form() == ClusterMapping::Workgroups {
             let room = self.body.layout.depth();
             let list = place / room * number_count(room) + 2 + room;
             corners = corners.map(|p| copy.tiles[list + p as usize]);
@@ -125,13 +125,13 @@ impl GpuSolver {
     fn places(&self, group: u32, copy: &Copy) -> Vec<usize> {
         let group = group as usize;
         match self.form() {
-            Form::Threads => {
+            ClusterMapping::Threads => {
                 let places = self.body.layout.depth() * THREADS;
                 let all = group * places..(group + 1) * places;
                 all.filter(|&p| copy.corners[p][0] != copy.corners[p][1])
                     .collect()
             }
-            Form::Workgroups => {
+            ClusterMapping::Workgroups => {
                 let room = self.body.layout.depth();
                 let (steps, ends) = steps(group, room, copy);
                 let count = if steps == 0 {
@@ -146,7 +146,7 @@ impl GpuSolver {
 
     /// Looks whether the tets of a step share a particle.
     fn check_steps(&self, copy: &Copy) -> Result<(), GpuError> {
-        if self.form() == Form::Threads {
+        if self.form() == ClusterMapping::Threads {
             return Ok(());
         }
         let seats = &self.body.layout.seats;

@@ -3,14 +3,14 @@
 //! Everything that differs from substep to substep is in buffers before the pass begins, so it needs no break. Twin:
 //! `Solver::substep` of incise-xpbd. Cost: recording a third of a microsecond a dispatch.
 
-use incise_xpbd::{Form as Solving, Solver, StepSettings};
+use incise_xpbd::{Solver, StepSettings, TetSolve};
 use wgpu::{Buffer, BufferUsages, SubmissionIndex};
 
 use super::body::Body;
 use super::handles::{self, Handles};
 use super::jacobi::{self, Jacobi};
 use super::kernels::{Bound, CLEAR, Kernels, PREDICT, UPDATE_VELOCITIES, Variant, solve};
-use super::layout::{Form, THREADS};
+use super::layout::{ClusterMapping, THREADS};
 use super::numbers::Settings;
 use super::obstacles::Obstacles;
 use super::scalars;
@@ -174,8 +174,8 @@ impl Frame {
             material[..3].copy_from_slice(&host.tet_data(0).constants);
         }
         let depth = match body.layout.form {
-            Form::Threads => body.layout.depth(),
-            Form::Workgroups => 0,
+            ClusterMapping::Threads => body.layout.depth(),
+            ClusterMapping::Workgroups => 0,
         };
         #[expect(
             clippy::cast_possible_truncation,
@@ -294,15 +294,15 @@ impl Frame {
         let velocities = body.velocities.buffer();
         let variant = Variant {
             damped: host.is_damped(),
-            sequential: settings.form == Solving::Sequential,
+            sequential: settings.tet_solve == TetSolve::Sequential,
             keeps,
             jacobi: self.jacobi.is_some(),
             various: !host.is_uniform(),
             tile: body.layout.tile(),
         };
         let last = match body.layout.form {
-            Form::Threads => body.corrections.buffer(),
-            Form::Workgroups => body.tiles.buffer(),
+            ClusterMapping::Threads => body.corrections.buffer(),
+            ClusterMapping::Workgroups => body.tiles.buffer(),
         };
         let tets = [
             constants,

@@ -13,7 +13,7 @@ use wgpu::Buffer;
 use super::body::Body;
 use super::frame::Shared;
 use super::kernels::{APPLY_CORRECTIONS, Bound, EXTRAPOLATE_MULTIPLIERS, Kernels, Variant};
-use super::layout::{Form, THREADS};
+use super::layout::{ClusterMapping, THREADS};
 use crate::array::Array;
 use crate::kernel::Recorder;
 use crate::{GpuContext, GpuError};
@@ -41,7 +41,7 @@ impl Jacobi {
             *this = None;
             return Ok(());
         }
-        if body.layout.form == Form::Workgroups {
+        if body.layout.form == ClusterMapping::Workgroups {
             return Err(GpuError::Unsupported {
                 what: "Jacobi iterations in workgroups (threads do them)",
             });

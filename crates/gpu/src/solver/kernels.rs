@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use wgpu::{BindGroup, Buffer};
 
-use super::layout::Form;
+use super::layout::ClusterMapping;
 use super::scalars::Kind;
 use crate::kernel::{Kernel, Recorder, Use};
 use crate::{GpuContext, GpuError};
@@ -372,12 +372,12 @@ pub(crate) const SOURCES: &[Source] = &[
 ];
 
 /// The kernel that solves colors, or a row of colors of one group each.
-pub(crate) fn solve(form: Form, tail: bool) -> &'static Source {
+pub(crate) fn solve(form: ClusterMapping, tail: bool) -> &'static Source {
     match (form, tail) {
-        (Form::Threads, false) => &SOLVE_THREADS,
-        (Form::Threads, true) => &SOLVE_THREADS_TAIL,
-        (Form::Workgroups, false) => &SOLVE_WORKGROUPS,
-        (Form::Workgroups, true) => &SOLVE_WORKGROUPS_TAIL,
+        (ClusterMapping::Threads, false) => &SOLVE_THREADS,
+        (ClusterMapping::Threads, true) => &SOLVE_THREADS_TAIL,
+        (ClusterMapping::Workgroups, false) => &SOLVE_WORKGROUPS,
+        (ClusterMapping::Workgroups, true) => &SOLVE_WORKGROUPS_TAIL,
     }
 }
 

@@ -1,7 +1,7 @@
 //! [`Layout`]: which tet is in which place on the device, and what has to be sent there after a change.
 //!
-//! Two forms of the same schedule. [`Form::Threads`] is the paper's: a thread solves a cluster, tet after tet, 64
-//! clusters of a color a workgroup. [`Form::Workgroups`] takes clusters of up to 128 tets: a workgroup solves one, with
+//! Two forms of the same schedule. [`ClusterMapping::Threads`] is the paper's: a thread solves a cluster, tet after tet, 64
+//! clusters of a color a workgroup. [`ClusterMapping::Workgroups`] takes clusters of up to 128 tets: a workgroup solves one, with
 //! its particles in workgroup memory and its tets in steps that share no particle, so that a small body needs few colors
 //! and thus few dispatches. Either way a cluster has a seat (`seats.rs`) and its tets the places of that seat.
 //!
@@ -23,16 +23,16 @@ const NONE: u32 = u32::MAX;
 
 /// Who solves a cluster.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Form {
+pub enum ClusterMapping {
     /// A thread, tet after tet (paper section 4.1).
     #[default]
     Threads,
-    /// A workgroup, its tets in steps: for clusters of up to 256 tets, of which [`Form::LARGE`] and more are worth it.
+    /// A workgroup, its tets in steps: for clusters of up to 256 tets, of which [`ClusterMapping::LARGE`] and more are worth it.
     /// Tiles have room for 64, 128 or 256 tets, whatever the largest cluster needs.
     Workgroups,
 }
 
-impl Form {
+impl ClusterMapping {
     /// The size of clusters, as a limit that a clustering was made with, from which on a workgroup is worth it.
     pub const LARGE: usize = 33;
 
@@ -50,7 +50,7 @@ impl Form {
 /// Who is where.
 #[derive(Debug)]
 pub(crate) struct Layout {
-    pub(crate) form: Form,
+    pub(crate) form: ClusterMapping,
     /// Tets that a seat has places for.
     depth: usize,
     pub(crate) seats: Seats,
@@ -76,10 +76,10 @@ pub(crate) struct Patch {
 }
 
 impl Layout {
-    pub(crate) fn new(form: Form) -> Self {
+    pub(crate) fn new(form: ClusterMapping) -> Self {
         let width = match form {
-            Form::Threads => THREADS,
-            Form::Workgroups => 1,
+            ClusterMapping::Threads => THREADS,
+            ClusterMapping::Workgroups => 1,
         };
         Self {
             form,
@@ -109,8 +109,8 @@ impl Layout {
     /// Tets that a tile has room for; 0 without tiles.
     pub(crate) fn tile(&self) -> u32 {
         match self.form {
-            Form::Threads => 0,
-            Form::Workgroups => index(self.depth),
+            ClusterMapping::Threads => 0,
+            ClusterMapping::Workgroups => index(self.depth),
         }
     }
 
@@ -131,8 +131,10 @@ impl Layout {
     fn place_of(&self, seat: u32, k: usize) -> usize {
         let seat = seat as usize;
         match self.form {
-            Form::Threads => ((seat / THREADS) * self.depth + k) * THREADS + seat % THREADS,
-            Form::Workgroups => seat * self.depth + k,
+            ClusterMapping::Threads => {
+                ((seat / THREADS) * self.depth + k) * THREADS + seat % THREADS
+            }
+            ClusterMapping::Workgroups => seat * self.depth + k,
         }
     }
 
@@ -163,8 +165,8 @@ impl Layout {
                 let seats: Vec<u32> = (0..index(self.seats.seat_count())).collect();
                 let largest = self.largest(&seats, schedule)?;
                 self.depth = match self.form {
-                    Form::Threads => largest.max(1),
-                    Form::Workgroups => tile::room_for(largest),
+                    ClusterMapping::Threads => largest.max(1),
+                    ClusterMapping::Workgroups => tile::room_for(largest),
                 };
                 self.filled.clear();
                 self.places.clear();
@@ -192,7 +194,7 @@ impl Layout {
         let clusters = seats.iter().filter_map(|&seat| self.seats.cluster(seat));
         let sized = clusters.map(|cluster| (schedule.constraints(cluster).len(), cluster));
         let (tets, cluster) = sized.max().unwrap_or((0, ClusterId(0)));
-        if self.form == Form::Workgroups && tets > tile::LARGEST {
+        if self.form == ClusterMapping::Workgroups && tets > tile::LARGEST {
             self.seats.forget();
             return Err(GpuError::Block {
                 cluster: cluster.0,
@@ -220,16 +222,18 @@ impl Layout {
                 continue;
             };
             let seat = index(match self.form {
-                Form::Threads => place / (self.depth * THREADS) * THREADS + place % THREADS,
-                Form::Workgroups => place / self.depth,
+                ClusterMapping::Threads => {
+                    place / (self.depth * THREADS) * THREADS + place % THREADS
+                }
+                ClusterMapping::Workgroups => place / self.depth,
             });
             if seats[..known].binary_search(&seat).is_ok() {
                 continue;
             }
             match self.form {
                 // One that is gone is in no schedule, so its seat is among those.
-                Form::Threads => patch.tets.push(filled_in(place, tet, solver)),
-                Form::Workgroups => seats.push(seat),
+                ClusterMapping::Threads => patch.tets.push(filled_in(place, tet, solver)),
+                ClusterMapping::Workgroups => seats.push(seat),
             }
         }
         seats.sort_unstable();
@@ -258,15 +262,15 @@ impl Layout {
         let cluster = self.seats.cluster(seat);
         let tets = cluster.map_or(&[][..], |cluster| schedule.constraints(cluster));
         match self.form {
-            Form::Threads => {
+            ClusterMapping::Threads => {
                 for (k, &tet) in tets.iter().enumerate() {
                     let place = self.place_of(seat, k);
                     self.put(tet, place);
                     patch.tets.push(filled_in(place, tet, solver));
                 }
             }
-            Form::Workgroups if tets.is_empty() => {}
-            Form::Workgroups => {
+            ClusterMapping::Workgroups if tets.is_empty() => {}
+            ClusterMapping::Workgroups => {
                 let tile = Tile::new(tets, |tet| solver.tet_particles(tet as usize));
                 for (k, (tet, corners)) in tile.tets().enumerate() {
                     let place = self.place_of(seat, k);

@@ -217,7 +217,7 @@ impl GpuSolver {
     /// ```
     /// # use std::sync::Arc;
     /// # use glam::DVec3;
-    /// # use incise_gpu::{Form, GpuContext, GpuError, GpuOptions, GpuSolver};
+    /// # use incise_gpu::{ClusterMapping, GpuContext, GpuError, GpuOptions, GpuSolver};
     /// # use incise_graph::{Clustering, Coloring, Schedule};
     /// # use incise_xpbd::{Solver, StepSettings};
     /// # let gpu = match GpuContext::new(&GpuOptions::from_env()) {
@@ -228,7 +228,7 @@ impl GpuSolver {
     /// # let schedule = Schedule::new(&Clustering::none(0), &Coloring::new(vec![]));
     /// let mut solver = Solver::new(&[DVec3::ZERO]);
     /// solver.set_mass(0, 2.0);
-    /// let mut device = GpuSolver::new(gpu, solver, Form::Threads)?;
+    /// let mut device = GpuSolver::new(gpu, solver, ClusterMapping::Threads)?;
     /// let gravity = Some(DVec3::new(0.0, 0.0, -10.0));
     /// device.step(&schedule, &StepSettings { gravity, ..StepSettings::new(0.1) })?;
     /// let measures = device.measure(gravity)?;

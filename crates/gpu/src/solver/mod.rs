@@ -6,7 +6,7 @@
 //! velocities, substep by substep. What a scene does not have takes no memory and no dispatch. Nothing is read back:
 //! whoever wants to know something asks ([`GpuSolver::host`], [`GpuSolver::measure`]), and that waits for the device.
 //!
-//! Twin: `Solver::step` of incise-xpbd, with the same schedule in the form [`Form::Threads`]. Positions agree up to the
+//! Twin: `Solver::step` of incise-xpbd, with the same schedule in the form [`ClusterMapping::Threads`]. Positions agree up to the
 //! rounding of sums, which compilers of shaders may take in another order or fuse.
 //! Cost: a dispatch a color and two or three a substep, one more for each other thing in the scene; uploads only of what
 //! edits changed and of handles and colliders that move.
@@ -39,7 +39,7 @@ use incise_xpbd::{Changes, Pose, Solver, StepSettings};
 use wgpu::SubmissionIndex;
 
 pub(crate) use kernels::SOURCES;
-pub use layout::Form;
+pub use layout::ClusterMapping;
 pub use measure::Measures;
 pub use readback::Readback;
 pub use stages::StageTimes;
@@ -67,7 +67,7 @@ const FRAMES_IN_FLIGHT: usize = 2;
 ///
 /// use glam::DVec3;
 /// use incise_graph::{Clustering, ColorId, Coloring, Schedule};
-/// use incise_gpu::{Form, GpuContext, GpuError, GpuOptions, GpuSolver};
+/// use incise_gpu::{ClusterMapping, GpuContext, GpuError, GpuOptions, GpuSolver};
 /// use incise_xpbd::{Material, Solver, StepSettings};
 ///
 /// let gpu = match GpuContext::new(&GpuOptions::from_env()) {
@@ -86,7 +86,7 @@ const FRAMES_IN_FLIGHT: usize = 2;
 /// let schedule = Schedule::new(&Clustering::none(1), &Coloring::new(vec![ColorId(0)]));
 /// let gravity = Some(DVec3::new(0.0, 0.0, -9.81));
 /// let settings = StepSettings { substeps: 4, gravity, ..StepSettings::new(0.016) };
-/// let mut device = GpuSolver::new(gpu, solver, Form::Threads)?;
+/// let mut device = GpuSolver::new(gpu, solver, ClusterMapping::Threads)?;
 /// for _ in 0..10 {
 ///     device.step(&schedule, &settings)?;
 /// }
@@ -121,7 +121,7 @@ impl GpuSolver {
     pub fn new(
         gpu: Arc<GpuContext>,
         mut solver: Solver<f32>,
-        form: Form,
+        form: ClusterMapping,
     ) -> Result<Self, GpuError> {
         solver.track_changes();
         Ok(Self {
@@ -146,7 +146,7 @@ impl GpuSolver {
 
     /// Who solves a cluster.
     #[must_use]
-    pub fn form(&self) -> Form {
+    pub fn form(&self) -> ClusterMapping {
         self.body.layout.form
     }
 
@@ -158,7 +158,7 @@ impl GpuSolver {
     ///
     /// # Errors
     /// If the settings do not pass [`StepSettings::check`]; if they ask for Jacobi or Chebyshev iterations in
-    /// [`Form::Workgroups`]; if a cluster is larger than the form allows; if the device is lost or out of memory.
+    /// [`ClusterMapping::Workgroups`]; if a cluster is larger than the form allows; if the device is lost or out of memory.
     ///
     /// # Panics
     /// If the schedule names a tet that does not exist.

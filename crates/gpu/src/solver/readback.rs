@@ -17,7 +17,7 @@ use crate::{GpuContext, GpuError};
 /// ```
 /// # use std::sync::Arc;
 /// # use glam::DVec3;
-/// # use incise_gpu::{Form, GpuContext, GpuError, GpuOptions, GpuSolver};
+/// # use incise_gpu::{ClusterMapping, GpuContext, GpuError, GpuOptions, GpuSolver};
 /// # use incise_graph::{Clustering, Coloring, Schedule};
 /// # use incise_xpbd::{Solver, StepSettings};
 /// # let gpu = match GpuContext::new(&GpuOptions::from_env()) {
@@ -28,7 +28,7 @@ use crate::{GpuContext, GpuError};
 /// # let solver = Solver::new(&[DVec3::ONE]);
 /// # let schedule = Schedule::new(&Clustering::none(0), &Coloring::new(vec![]));
 /// # let settings = StepSettings::new(0.01);
-/// # let mut device = GpuSolver::new(gpu, solver, Form::Threads)?;
+/// # let mut device = GpuSolver::new(gpu, solver, ClusterMapping::Threads)?;
 /// device.step(&schedule, &settings)?;
 /// let mut frame = device.begin_readback()?;
 /// device.step(&schedule, &settings)?;

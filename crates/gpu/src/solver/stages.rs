@@ -196,7 +196,7 @@ impl GpuSolver {
     /// ```
     /// # use std::sync::Arc;
     /// # use glam::DVec3;
-    /// # use incise_gpu::{Form, GpuContext, GpuError, GpuOptions, GpuSolver};
+    /// # use incise_gpu::{ClusterMapping, GpuContext, GpuError, GpuOptions, GpuSolver};
     /// # use incise_graph::{Clustering, Coloring, Schedule};
     /// # use incise_xpbd::{Solver, StepSettings};
     /// # let gpu = match GpuContext::new(&GpuOptions::from_env()) {
@@ -206,7 +206,7 @@ impl GpuSolver {
     /// # };
     /// # let schedule = Schedule::new(&Clustering::none(0), &Coloring::new(vec![]));
     /// # let timed = gpu.has_timestamps();
-    /// let mut device = GpuSolver::new(gpu, Solver::new(&[DVec3::ZERO]), Form::Threads)?;
+    /// let mut device = GpuSolver::new(gpu, Solver::new(&[DVec3::ZERO]), ClusterMapping::Threads)?;
     /// # if timed {
     /// device.time_stages(true)?;
     /// device.step(&schedule, &StepSettings::new(0.01))?;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::{DQuat, DVec3, dvec3};
-use incise_gpu::{Form, GpuSolver};
+use incise_gpu::{ClusterMapping, GpuSolver};
 use incise_mesh::generate::kuhn_box;
 use incise_xpbd::{Collider, ColliderShape, Solver, StepSettings};
 
@@ -161,7 +161,7 @@ fn particles_on_the_axis_leave_as_on_the_host() {
             ..StepSettings::new(0.01)
         };
         let schedule = incise_graph::Schedule::default();
-        let mut device = GpuSolver::new(share(gpu), make(), Form::Threads).unwrap();
+        let mut device = GpuSolver::new(share(gpu), make(), ClusterMapping::Threads).unwrap();
         let mut twin = make();
         device.step(&schedule, &settings).unwrap();
         twin.step(&schedule, &settings).unwrap();
@@ -186,7 +186,12 @@ fn colliders_at_rest_are_sent_once() {
     let gpu = share(gpu);
     let mesh = kuhn_box([2, 2, 2], DVec3::ONE);
     let (schedule, _) = schedules(&mesh, "serial:10");
-    let mut device = GpuSolver::new(Arc::clone(&gpu), body(&mesh, &[SOFT]), Form::Threads).unwrap();
+    let mut device = GpuSolver::new(
+        Arc::clone(&gpu),
+        body(&mesh, &[SOFT]),
+        ClusterMapping::Threads,
+    )
+    .unwrap();
     let mut settings = StepSettings {
         colliders: vec![Collider::ground(-0.1, 0.5), Collider::ground(-0.2, 0.5)],
         ..settings()

@@ -1,7 +1,7 @@
 //! Edits of a body on the device are followed: it stays the twin of one that was edited the same way.
 
 use glam::{DVec3, dvec3};
-use incise_gpu::{Form, GpuContext, GpuError};
+use incise_gpu::{ClusterMapping, GpuContext, GpuError};
 use incise_graph::{Clustering, ColorId, Coloring, Incidence};
 use incise_mesh::TetId;
 use incise_mesh::generate::kuhn_box;
@@ -53,7 +53,7 @@ fn edit() -> impl Strategy<Value = Edit> {
 /// Twins with what is needed to edit them.
 struct Edited {
     twins: Twins,
-    form: Form,
+    form: ClusterMapping,
     clustering: Clustering,
     coloring: Coloring,
     /// Tet -> corners at rest.
@@ -204,8 +204,8 @@ impl Edited {
             .check(&incidence)
             .expect("the edits keep it proper");
         self.twins.order = match self.form {
-            Form::Threads => self.twins.schedule.clone(),
-            Form::Workgroups => tiled(&incidence, &self.clustering, &self.coloring),
+            ClusterMapping::Threads => self.twins.schedule.clone(),
+            ClusterMapping::Workgroups => tiled(&incidence, &self.clustering, &self.coloring),
         };
     }
 }
@@ -236,7 +236,7 @@ proptest! {
 }
 
 /// Applies the edits of each round before some frames; says how far apart the twins came.
-fn run(gpu: &'static GpuContext, form: (&str, Form), rounds: &[Vec<Edit>]) -> f64 {
+fn run(gpu: &'static GpuContext, form: (&str, ClusterMapping), rounds: &[Vec<Edit>]) -> f64 {
     let mesh = bar();
     let (clustering, coloring) = clusters(&mesh, form.0);
     let rest = (0..mesh.tets.len()).map(|t| mesh.corners(TetId::new(t)));

@@ -1,7 +1,7 @@
 //! Whatever a body has to bear on the device: no infinity and no NaN comes out.
 
 use glam::{DVec3, dvec3};
-use incise_gpu::{Form, GpuSolver};
+use incise_gpu::{ClusterMapping, GpuSolver};
 use incise_mesh::TetMesh;
 use incise_mesh::generate::kuhn_box;
 use incise_xpbd::{Collider, ColliderShape, Material, Method, Pose, Solver, StepSettings};
@@ -26,7 +26,7 @@ fn survive(
     test: &str,
     material: Material,
     settings: &StepSettings,
-    forms: &[(&str, Form)],
+    forms: &[(&str, ClusterMapping)],
     prepare: impl Fn(&mut Solver<f32>),
 ) {
     let Some(gpu) = gpu(test) else { return };

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::{DVec3, dvec3};
-use incise_gpu::{Form, GpuContext, GpuError, GpuOptions, GpuSolver};
+use incise_gpu::{ClusterMapping, GpuContext, GpuError, GpuOptions, GpuSolver};
 
 use crate::solver::{SOFT, body, schedules, settings, share};
 use crate::support::gpu;
@@ -120,7 +120,12 @@ fn reading_back_is_one_submit_and_after_the_first_time_makes_no_buffer() {
     let gpu = share(gpu);
     let mesh = bar();
     let (schedule, _) = schedules(&mesh, "serial:10");
-    let mut device = GpuSolver::new(Arc::clone(&gpu), body(&mesh, &[SOFT]), Form::Threads).unwrap();
+    let mut device = GpuSolver::new(
+        Arc::clone(&gpu),
+        body(&mesh, &[SOFT]),
+        ClusterMapping::Threads,
+    )
+    .unwrap();
     let mut read = || {
         device.step(&schedule, &settings()).unwrap();
         let before = gpu.traffic();

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::{DQuat, DVec3, dvec3};
-use incise_gpu::{Form, GpuSolver};
+use incise_gpu::{ClusterMapping, GpuSolver};
 use incise_xpbd::{Pose, Solver, StepSettings};
 
 use crate::solver::{SOFT, body, schedules, settings, share};
@@ -167,7 +167,7 @@ fn handles_at_rest_are_sent_once() {
     let (schedule, _) = schedules(&bar(), "serial:10");
     let mut solver = body(&bar(), &[SOFT]);
     hang(&mut solver);
-    let mut device = GpuSolver::new(Arc::clone(&gpu), solver, Form::Threads).unwrap();
+    let mut device = GpuSolver::new(Arc::clone(&gpu), solver, ClusterMapping::Threads).unwrap();
     let spent = |device: &mut GpuSolver| {
         let before = gpu.traffic();
         device.step(&schedule, &settings()).unwrap();

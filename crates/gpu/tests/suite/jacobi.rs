@@ -1,9 +1,9 @@
 //! Jacobi and Chebyshev iterations on the device against those of the host.
 
 use glam::dvec3;
-use incise_gpu::{Form, GpuError, GpuSolver};
+use incise_gpu::{ClusterMapping, GpuError, GpuSolver};
 use incise_mesh::generate::{Shape, generate};
-use incise_xpbd::{Collider, Form as Solving, Material, Method, Pose, Solver, StepSettings};
+use incise_xpbd::{Collider, Material, Method, Pose, Solver, StepSettings, TetSolve};
 
 use crate::solver::{SOFT, body, schedules, settings, share};
 use crate::support::gpu;
@@ -32,7 +32,7 @@ fn twins(
 ) {
     let Some(gpu) = gpu(test) else { return };
     for method in ["none", "serial:10"] {
-        let form = (method, Form::Threads);
+        let form = (method, ClusterMapping::Threads);
         let mut twins = Twins::new(gpu, &bar(), material, form, &prepare);
         let mut other = body(&bar(), &[material]);
         prepare(&mut other);
@@ -69,7 +69,7 @@ fn jacobi_needs_no_multipliers_for_one_iteration() {
     let settings = StepSettings {
         substeps: 10,
         iterations: 1,
-        form: Solving::Sequential,
+        tet_solve: TetSolve::Sequential,
         ..iterated(Method::Jacobi)
     };
     let damped = Material {
@@ -100,7 +100,7 @@ fn chebyshev_leaps() {
 fn chebyshev_leaps_between_handles_and_colliders() {
     let settings = StepSettings {
         colliders: vec![Collider::ground(-0.01, 0.4)],
-        form: Solving::Sequential,
+        tet_solve: TetSolve::Sequential,
         ..iterated(CHEBYSHEV)
     };
     let damped = Material {
@@ -149,7 +149,7 @@ fn large_bodies_gather_as_well() {
         return;
     };
     let mesh = generate(Shape::Sphere, 4000).unwrap();
-    let mut twins = Twins::new(gpu, &mesh, SOFT, ("none", Form::Threads), |_| ());
+    let mut twins = Twins::new(gpu, &mesh, SOFT, ("none", ClusterMapping::Threads), |_| ());
     let settings = StepSettings {
         substeps: 1,
         iterations: 8,
@@ -169,7 +169,7 @@ fn workgroups_do_not_gather() {
     };
     let (schedule, _) = schedules(&bar(), "pressure:128");
     let solver = body(&bar(), &[SOFT]);
-    let mut device = GpuSolver::new(share(gpu), solver, Form::Workgroups).unwrap();
+    let mut device = GpuSolver::new(share(gpu), solver, ClusterMapping::Workgroups).unwrap();
     for method in [Method::Jacobi, CHEBYSHEV] {
         let error = device.step(&schedule, &iterated(method)).unwrap_err();
         assert!(matches!(error, GpuError::Unsupported { .. }), "{error}");

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::{DVec3, dvec3};
-use incise_gpu::{Form, GpuSolver, Measures};
+use incise_gpu::{ClusterMapping, GpuSolver, Measures};
 use incise_graph::{Clustering, ColorId, Coloring, Schedule};
 use incise_mesh::generate::{Shape, generate, kuhn_box};
 use incise_xpbd::{Material, Pose, Solver};
@@ -205,7 +205,7 @@ fn the_host_measures_what_the_device_cannot() {
     let (schedule, _) = schedules(&mesh, "none");
     let mut solver = body(&mesh, &[SOFT]);
     free(&mut solver);
-    let mut device = GpuSolver::new(share(gpu), solver, Form::Threads).unwrap();
+    let mut device = GpuSolver::new(share(gpu), solver, ClusterMapping::Threads).unwrap();
     let before = device.gpu().traffic();
     let measures = device.measure(Some(GRAVITY)).unwrap();
     assert_eq!(device.gpu().traffic().since(before).readbacks, 0);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{DVec3, dvec3};
 use incise_clustering::{Method as Clustered, cluster};
 use incise_coloring::{Order, greedy};
-use incise_gpu::{Form, GpuSolver};
+use incise_gpu::{ClusterMapping, GpuSolver};
 use incise_graph::{Clustering, Incidence, Schedule};
 use incise_mesh::{TetId, TetMesh};
 use incise_xpbd::{DistanceConstraint, Solver, StepSettings, VolumeConstraint};
@@ -161,7 +161,7 @@ fn what_has_no_direction_waits() {
         solver
     };
     let settings = StepSettings::new(0.01);
-    let mut device = GpuSolver::new(share(gpu), make(), Form::Threads).unwrap();
+    let mut device = GpuSolver::new(share(gpu), make(), ClusterMapping::Threads).unwrap();
     let mut twin = make();
     for _ in 0..3 {
         device.step(&Schedule::default(), &settings).unwrap();
@@ -188,7 +188,8 @@ fn constraints_follow_edits_and_are_sent_once() {
     let prepare = |solver: &mut Solver<f32>| set_springs(solver, &mesh, 0.0, false);
     let mut solver = body(&mesh, &[SOFT]);
     prepare(&mut solver);
-    let mut device = GpuSolver::new(Arc::clone(&gpu_of_its_own), solver, Form::Threads).unwrap();
+    let mut device =
+        GpuSolver::new(Arc::clone(&gpu_of_its_own), solver, ClusterMapping::Threads).unwrap();
     let mut twin = body(&mesh, &[SOFT]);
     prepare(&mut twin);
     let mut both = |device: &mut GpuSolver| {

@@ -1,7 +1,7 @@
 //! Bodies of every size at which a kernel could forget a thread, a workgroup or a row of them, against the CPU twin.
 
 use glam::DVec3;
-use incise_gpu::{Form, GpuSolver};
+use incise_gpu::{ClusterMapping, GpuSolver};
 use incise_graph::{ClusterId, Clustering, ColorId, Coloring, Incidence, Schedule};
 use incise_xpbd::{Solver, StepSettings};
 use proptest::prelude::*;
@@ -34,7 +34,7 @@ fn solver(positions: &[DVec3], tets: &[[u32; 4]], pinned: usize) -> Solver<f32> 
 }
 
 /// Solves both ways; the twin's order is that of the device if clusters are single tets.
-fn compare(test: &str, make: impl Fn() -> Solver<f32>, colors: &[u32], form: Form) {
+fn compare(test: &str, make: impl Fn() -> Solver<f32>, colors: &[u32], form: ClusterMapping) {
     let Some(gpu) = gpu(test) else { return };
     let coloring = Coloring::new(colors.iter().map(|&color| ColorId(color)).collect());
     let schedule = Schedule::new(&Clustering::none(colors.len()), &coloring);
@@ -57,7 +57,7 @@ fn compare(test: &str, make: impl Fn() -> Solver<f32>, colors: &[u32], form: For
 }
 
 /// So many tets that share nothing.
-fn apart(test: &str, count: u32, form: Form) {
+fn apart(test: &str, count: u32, form: ClusterMapping) {
     let corners = [DVec3::ZERO, DVec3::Y, DVec3::X, DVec3::NEG_Z].map(|x| x * 0.1);
     let tets: Vec<[u32; 4]> = (0..count)
         .map(|t| [0, 1, 2, 3].map(|k| 4 * t + k))
@@ -83,11 +83,15 @@ fn apart(test: &str, count: u32, form: Form) {
 #[test]
 fn threads_and_workgroups_of_all_sizes() {
     for count in [0, 1, 63, 64, 65, 255, 256, 257] {
-        apart("threads_and_workgroups_of_all_sizes", count, Form::Threads);
         apart(
             "threads_and_workgroups_of_all_sizes",
             count,
-            Form::Workgroups,
+            ClusterMapping::Threads,
+        );
+        apart(
+            "threads_and_workgroups_of_all_sizes",
+            count,
+            ClusterMapping::Workgroups,
         );
     }
 }
@@ -115,7 +119,7 @@ fn a_fan_has_a_color_for_each_tet() {
     for count in [64u32, 360] {
         let (positions, tets) = fan(count);
         let colors: Vec<u32> = (0..count).collect();
-        for form in [Form::Threads, Form::Workgroups] {
+        for form in [ClusterMapping::Threads, ClusterMapping::Workgroups] {
             compare(test, || solver(&positions, &tets, 1), &colors, form);
         }
     }
@@ -135,7 +139,7 @@ fn particles_beyond_one_row_of_workgroups() {
     for p in 0..count {
         falling.set_mass(p, 1.0);
     }
-    let mut device = GpuSolver::new(share(gpu), falling, Form::Threads).unwrap();
+    let mut device = GpuSolver::new(share(gpu), falling, ClusterMapping::Threads).unwrap();
     let settings = StepSettings {
         gravity: Some(DVec3::NEG_Z),
         ..StepSettings::new(0.1)
@@ -174,7 +178,7 @@ proptest! {
         let incidence = Incidence::from_constraints(positions.len(), tets.iter().copied()).unwrap();
         let coloring = incise_coloring::greedy(&incidence, incise_coloring::Order::LargestFirst);
         let colors: Vec<u32> = coloring.colors().iter().map(|color| color.0).collect();
-        for form in [Form::Threads, Form::Workgroups] {
+        for form in [ClusterMapping::Threads, ClusterMapping::Workgroups] {
             compare("random_bodies", || solver(&positions, &tets, pinned), &colors, form);
         }
     }
@@ -193,7 +197,7 @@ fn tiles_full_to_the_last_step() {
         let make = || solver(&positions, &tets, 1);
         let (mut twin, mut device) = (
             make(),
-            GpuSolver::new(share(gpu), make(), Form::Workgroups).unwrap(),
+            GpuSolver::new(share(gpu), make(), ClusterMapping::Workgroups).unwrap(),
         );
         twin.step(&schedule, &settings()).unwrap();
         device.step(&schedule, &settings()).unwrap();

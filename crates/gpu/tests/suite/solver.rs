@@ -5,11 +5,11 @@ use std::sync::Arc;
 use glam::DVec3;
 use incise_clustering::{Method as Clustered, cluster};
 use incise_coloring::{Order, color_within_clusters, greedy};
-use incise_gpu::{Form, GpuContext, GpuSolver};
+use incise_gpu::{ClusterMapping, GpuContext, GpuSolver};
 use incise_graph::{Clustering, ColorId, Coloring, Incidence, Schedule};
 use incise_mesh::generate::{Shape, generate, kuhn_box};
 use incise_mesh::{TetId, TetMesh};
-use incise_xpbd::{Form as Solving, Material, Solver, StepSettings};
+use incise_xpbd::{Material, Solver, StepSettings, TetSolve};
 
 use crate::support::{gpu, skip};
 
@@ -97,15 +97,21 @@ pub(crate) fn settings() -> StepSettings {
     }
 }
 
-fn twins(test: &str, materials: &[Material], settings: &StepSettings, method: &str, form: Form) {
+fn twins(
+    test: &str,
+    materials: &[Material],
+    settings: &StepSettings,
+    method: &str,
+    form: ClusterMapping,
+) {
     let Some(gpu) = gpu(test) else { return };
     let mesh = kuhn_box([6, 3, 3], DVec3::new(1.0, 0.5, 0.5));
     let (schedule, tiled) = schedules(&mesh, method);
     let mut device = GpuSolver::new(share(gpu), body(&mesh, materials), form).unwrap();
     let mut twin = body(&mesh, materials);
     let order = match form {
-        Form::Threads => &schedule,
-        Form::Workgroups => &tiled,
+        ClusterMapping::Threads => &schedule,
+        ClusterMapping::Workgroups => &tiled,
     };
     for _ in 0..10 {
         device.step(&schedule, settings).unwrap();
@@ -125,7 +131,7 @@ fn threads_solve_clusters() {
         &[SOFT],
         &settings(),
         "serial:10",
-        Form::Threads,
+        ClusterMapping::Threads,
     );
 }
 
@@ -137,7 +143,13 @@ fn threads_solve_damped_bodies_of_several_materials() {
         ..SOFT
     };
     let test = "threads_solve_damped_bodies_of_several_materials";
-    twins(test, &[SOFT, stiff], &settings(), "serial:5", Form::Threads);
+    twins(
+        test,
+        &[SOFT, stiff],
+        &settings(),
+        "serial:5",
+        ClusterMapping::Threads,
+    );
 }
 
 #[test]
@@ -152,19 +164,25 @@ fn threads_iterate_with_multipliers() {
         &[SOFT],
         &settings,
         "none",
-        Form::Threads,
+        ClusterMapping::Threads,
     );
 }
 
 #[test]
 fn threads_solve_one_constraint_after_the_other() {
     let settings = StepSettings {
-        form: Solving::Sequential,
+        tet_solve: TetSolve::Sequential,
         relaxation: 0.9,
         ..settings()
     };
     let test = "threads_solve_one_constraint_after_the_other";
-    twins(test, &[SOFT], &settings, "serial:10", Form::Threads);
+    twins(
+        test,
+        &[SOFT],
+        &settings,
+        "serial:10",
+        ClusterMapping::Threads,
+    );
 }
 
 #[test]
@@ -174,7 +192,7 @@ fn workgroups_solve_tiles() {
         &[SOFT],
         &settings(),
         "pressure:128",
-        Form::Workgroups,
+        ClusterMapping::Workgroups,
     );
 }
 
@@ -196,7 +214,7 @@ fn workgroups_solve_damped_tiles_with_multipliers() {
         &[SOFT, stiff],
         &settings,
         "pressure:64",
-        Form::Workgroups,
+        ClusterMapping::Workgroups,
     );
 }
 
@@ -207,13 +225,16 @@ fn colors_of_several_groups() {
         return;
     };
     let mesh = generate(Shape::Sphere, 4000).unwrap();
-    for (method, form) in [("none", Form::Threads), ("pressure:128", Form::Workgroups)] {
+    for (method, form) in [
+        ("none", ClusterMapping::Threads),
+        ("pressure:128", ClusterMapping::Workgroups),
+    ] {
         let (schedule, tiled) = schedules(&mesh, method);
         let mut device = GpuSolver::new(share(gpu), body(&mesh, &[SOFT]), form).unwrap();
         let mut twin = body(&mesh, &[SOFT]);
         for _ in 0..3 {
             device.step(&schedule, &settings()).unwrap();
-            let order = if form == Form::Threads {
+            let order = if form == ClusterMapping::Threads {
                 &schedule
             } else {
                 &tiled
@@ -233,8 +254,8 @@ fn residuals_come_from_the_device() {
     };
     let mesh = kuhn_box([4, 2, 2], DVec3::new(1.0, 0.5, 0.5));
     for (method, form) in [
-        ("serial:10", Form::Threads),
-        ("pressure:128", Form::Workgroups),
+        ("serial:10", ClusterMapping::Threads),
+        ("pressure:128", ClusterMapping::Workgroups),
     ] {
         let (schedule, tiled) = schedules(&mesh, method);
         let mut device = GpuSolver::new(share(gpu), body(&mesh, &[SOFT]), form).unwrap();
@@ -243,7 +264,7 @@ fn residuals_come_from_the_device() {
             device
                 .step_keeping_residuals(&schedule, &settings())
                 .unwrap();
-            let order = if form == Form::Threads {
+            let order = if form == ClusterMapping::Threads {
                 &schedule
             } else {
                 &tiled
@@ -263,7 +284,7 @@ fn residuals_come_from_the_device() {
             "{there:?} {here:?}"
         );
         device.step(&schedule, &settings()).unwrap();
-        let order = if form == Form::Threads {
+        let order = if form == ClusterMapping::Threads {
             &schedule
         } else {
             &tiled
@@ -283,8 +304,8 @@ fn a_frame_reads_nothing_and_sends_nothing() {
     let gpu = share(gpu);
     let mesh = kuhn_box([6, 3, 3], DVec3::new(1.0, 0.5, 0.5));
     for (method, form) in [
-        ("serial:10", Form::Threads),
-        ("pressure:128", Form::Workgroups),
+        ("serial:10", ClusterMapping::Threads),
+        ("pressure:128", ClusterMapping::Workgroups),
     ] {
         let (schedule, _) = schedules(&mesh, method);
         let mut device = GpuSolver::new(Arc::clone(&gpu), body(&mesh, &[SOFT]), form).unwrap();
@@ -311,7 +332,8 @@ fn a_cluster_that_is_too_large_for_a_tile_is_an_error() {
     };
     let mesh = kuhn_box([5, 5, 4], DVec3::ONE);
     let (schedule, _) = schedules(&mesh, "pressure:300");
-    let mut device = GpuSolver::new(share(gpu), body(&mesh, &[SOFT]), Form::Workgroups).unwrap();
+    let mut device =
+        GpuSolver::new(share(gpu), body(&mesh, &[SOFT]), ClusterMapping::Workgroups).unwrap();
     let error = device.step(&schedule, &settings()).unwrap_err();
     assert!(
         matches!(error, incise_gpu::GpuError::Block { limit: 256, .. }),
@@ -338,21 +360,21 @@ fn lavapipe_gives_the_same_bits() {
     };
     for materials in [&[SOFT][..], &[SOFT, stiff]] {
         for (method, form) in [
-            ("serial:10", Form::Threads),
-            ("pressure:64", Form::Workgroups),
-            ("pressure:128", Form::Workgroups),
-            ("pressure:256", Form::Workgroups),
+            ("serial:10", ClusterMapping::Threads),
+            ("pressure:64", ClusterMapping::Workgroups),
+            ("pressure:128", ClusterMapping::Workgroups),
+            ("pressure:256", ClusterMapping::Workgroups),
         ] {
-            for solving in [Solving::Block, Solving::Sequential] {
+            for solving in [TetSolve::Block, TetSolve::Sequential] {
                 let settings = StepSettings {
-                    form: solving,
+                    tet_solve: solving,
                     iterations: 2,
                     ..settings()
                 };
                 let (schedule, tiled) = schedules(&mesh, method);
                 let mut device = GpuSolver::new(share(gpu), body(&mesh, materials), form).unwrap();
                 let mut twin = body(&mesh, materials);
-                let order = if form == Form::Threads {
+                let order = if form == ClusterMapping::Threads {
                     &schedule
                 } else {
                     &tiled

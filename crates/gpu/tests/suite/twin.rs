@@ -1,7 +1,7 @@
 //! A body on the device and its twin on the host, which are done the same to.
 
 use glam::DVec3;
-use incise_gpu::{Form, GpuContext, GpuSolver};
+use incise_gpu::{ClusterMapping, GpuContext, GpuSolver};
 use incise_graph::Schedule;
 use incise_mesh::TetMesh;
 use incise_mesh::generate::kuhn_box;
@@ -10,9 +10,9 @@ use incise_xpbd::{Material, Solver, StepSettings};
 use crate::solver::{body, distance, schedules, share};
 
 /// Both forms with a clustering for each.
-pub(crate) const FORMS: [(&str, Form); 2] = [
-    ("serial:10", Form::Threads),
-    ("pressure:128", Form::Workgroups),
+pub(crate) const FORMS: [(&str, ClusterMapping); 2] = [
+    ("serial:10", ClusterMapping::Threads),
+    ("pressure:128", ClusterMapping::Workgroups),
 ];
 
 /// A bar of 96 tets, 1 m long.
@@ -35,7 +35,7 @@ impl Twins {
         gpu: &'static GpuContext,
         mesh: &TetMesh,
         material: Material,
-        (method, form): (&str, Form),
+        (method, form): (&str, ClusterMapping),
         prepare: impl Fn(&mut Solver<f32>),
     ) -> Self {
         let (schedule, tiled) = schedules(mesh, method);
@@ -45,8 +45,8 @@ impl Twins {
             solver
         });
         let order = match form {
-            Form::Threads => schedule.clone(),
-            Form::Workgroups => tiled,
+            ClusterMapping::Threads => schedule.clone(),
+            ClusterMapping::Workgroups => tiled,
         };
         Self {
             device: GpuSolver::new(share(gpu), there, form).unwrap(),

@@ -4,8 +4,8 @@
 //! and time step. Relaxation, Jacobi and Chebyshev are left out: wherever they were measured (`cargo xtask trade`),
 //! Gauss-Seidel with relaxation 1 was as fast and more accurate.
 
-use crate::method::check_descent;
-use crate::scene::{Form, Method, Precision, Scene, SolverSpec, Substeps};
+use crate::method::check_vbd;
+use crate::scene::{Method, Precision, Scene, SolverSpec, Substeps, TetSolve};
 use crate::{Error, Simulation};
 
 use super::reference::with;
@@ -33,12 +33,12 @@ pub fn candidates(scene: &Scene, substeps: u32) -> Vec<SolverSpec> {
     let of = |method| SolverSpec {
         preset: None,
         kappa_limit: match method {
-            Method::Descent => f64::INFINITY,
+            Method::Vbd => f64::INFINITY,
             _ => scene.solver.kappa_limit,
         },
-        form: Form::Block,
+        tet_solve: TetSolve::Block,
         relaxation: SolverSpec::of(method).relaxation,
-        coarse: false,
+        two_level: false,
         precision: Precision::F32,
         method,
         ..scene.solver.clone()
@@ -62,21 +62,21 @@ pub fn candidates(scene: &Scene, substeps: u32) -> Vec<SolverSpec> {
     add_passes(Precision::F32, &[1, 2, 4, 8, 16, 32, 64], 1);
     add_passes(Precision::F64, &[16, 32, 64], 1);
     add_passes(Precision::F32, &[8, 16, 32], 4);
-    if check_descent(scene).is_ok() {
+    if check_vbd(scene).is_ok() {
         for (substeps, iterations) in [(1, 20), (1, 100), (4, 20)] {
             add(SolverSpec {
                 substeps: Substeps::Fixed(substeps),
                 iterations,
-                ..of(Method::Descent)
+                ..of(Method::Vbd)
             });
         }
         for substeps in [1, 2, 4, 8] {
             add(SolverSpec {
                 substeps: Substeps::Fixed(substeps),
                 iterations: 4,
-                coarse: true,
+                two_level: true,
                 precision: Precision::F64,
-                ..of(Method::Descent)
+                ..of(Method::Vbd)
             });
         }
     }
@@ -99,8 +99,8 @@ pub fn name(spec: &SolverSpec) -> String {
         Method::GaussSeidel => "gauss-seidel",
         Method::Jacobi => "jacobi",
         Method::Chebyshev => "chebyshev",
-        Method::Descent if spec.coarse => "descent with coarse correction",
-        Method::Descent => "descent",
+        Method::Vbd if spec.two_level => "vbd with coarse correction",
+        Method::Vbd => "vbd",
     };
     let substeps = match spec.substeps {
         Substeps::Fixed(n) => n.to_string(),
@@ -114,7 +114,7 @@ pub fn name(spec: &SolverSpec) -> String {
     if spec.method == Method::Chebyshev && spec.spectral_radius != defaults.spectral_radius {
         name += &format!(", spectral radius {}", spec.spectral_radius);
     }
-    if spec.form == Form::Sequential {
+    if spec.tet_solve == TetSolve::Sequential {
         name += ", sequential";
     }
     if spec.clustering != defaults.clustering {
@@ -159,7 +159,7 @@ mod tests {
         for limit in [1.0, f64::INFINITY] {
             scene.solver.kappa_limit = limit;
             let all = candidates(&scene, 30);
-            assert!(all.iter().any(|spec| spec.coarse));
+            assert!(all.iter().any(|spec| spec.two_level));
             for spec in all {
                 let table = solver_table(&spec).unwrap();
                 assert_eq!(Scene::from_toml(&table).unwrap().solver, spec, "{table}");
@@ -167,7 +167,7 @@ mod tests {
         }
     }
 
-    /// No setting is measured twice, each has a name of its own, and what descent would refuse is not proposed.
+    /// No setting is measured twice, each has a name of its own, and what VBD would refuse is not proposed.
     #[test]
     fn candidates_differ() {
         for substeps in [1, 2, 7, 30] {

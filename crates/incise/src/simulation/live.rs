@@ -78,7 +78,7 @@ impl Simulation {
     ///
     /// `compliance` is one over the stiffness by which each particle is held, in m/N, as in
     /// [`HandleSpec`](crate::scene::HandleSpec): 0 holds rigidly, whatever the body does, and a large one lets the
-    /// body pull away from the hand. Descent knows 0 only.
+    /// body pull away from the hand. VBD knows 0 only.
     ///
     /// A body that sleeps wakes. Cuts through what is held leave both sides held.
     ///
@@ -86,7 +86,7 @@ impl Simulation {
     ///
     /// # Errors
     /// If a coordinate is not finite or beyond 1e9 m, `radius` or `compliance` is not from 0 to 1e9, the compliance is not
-    /// 0 with descent, or the device is lost.
+    /// 0 with VBD, or the device is lost.
     ///
     /// # Example
     /// ```

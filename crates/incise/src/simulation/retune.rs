@@ -1,12 +1,12 @@
 //! [`Simulation::retune`]: other settings of the solver for a simulation that runs.
 //!
 //! Mesh, cuts, positions, velocities, pieces, handles, obstacles and strokes stay as they are. From the settings follow
-//! substeps, softened tets, plans, what descent needs and the place: what differs is made anew from the body as it is
+//! substeps, softened tets, plans, what VBD needs and the place: what differs is made anew from the body as it is
 //! now, as a new simulation would make it from such a body, and what does not differ is not touched. Everything that can
 //! fail is made first, beside what is there; only then it takes its place.
 //!
 //! Cost: nothing for iterations, relaxation, form and the methods of XPBD; a pass over the tets for the time of a substep
-//! and the limit of kappa; clustering and coloring for those; a copy of the solvers for descent and for another place.
+//! and the limit of kappa; clustering and coloring for those; a copy of the solvers for VBD and for another place.
 
 use rayon::prelude::*;
 
@@ -65,7 +65,7 @@ impl Simulation {
     /// change nothing.
     ///
     /// Costs what differs: see this module's head in the source; iterations, relaxation, form and methods other than
-    /// descent cost nothing.
+    /// VBD cost nothing.
     ///
     /// # Errors
     /// As [`Simulation::new`] for these settings, and if `precision` differs. Nothing has changed then.
@@ -80,9 +80,9 @@ impl Simulation {
     /// let spec = SolverSpec { iterations: 3, ..simulation.solver_spec().clone() };
     /// simulation.retune(&spec)?;
     /// simulation.step()?;
-    /// simulation.retune(&SolverSpec::of(Method::Descent))?;
+    /// simulation.retune(&SolverSpec::of(Method::Vbd))?;
     /// simulation.step()?;
-    /// assert_eq!(simulation.solver_spec().method, Method::Descent);
+    /// assert_eq!(simulation.solver_spec().method, Method::Vbd);
     /// # Ok::<(), incise::Error>(())
     /// ```
     pub fn retune(&mut self, solver: &SolverSpec) -> Result<(), Error> {
@@ -201,16 +201,16 @@ impl Simulation {
 
 /// Whether a step asks for all that differs, and nothing has been made of it.
 fn is_light(before: &SolverSpec, after: &SolverSpec) -> bool {
-    let is_descent = |spec: &SolverSpec| spec.method == Method::Descent;
+    let is_vbd = |spec: &SolverSpec| spec.method == Method::Vbd;
     let light = SolverSpec {
         preset: before.preset,
         iterations: before.iterations,
-        method: if is_descent(before) == is_descent(after) {
+        method: if is_vbd(before) == is_vbd(after) {
             before.method
         } else {
             after.method
         },
-        form: before.form,
+        tet_solve: before.tet_solve,
         relaxation: before.relaxation,
         spectral_radius: before.spectral_radius,
         delay: before.delay,
@@ -232,9 +232,9 @@ impl Retuned {
     ) -> Result<Self, Error> {
         let after = &scene.solver;
         let soft = || each!(&group.solver, solver => solver.attachments().any(|held| held.compliance > 0.0));
-        if after.method == Method::Descent && soft() {
+        if after.method == Method::Vbd && soft() {
             let range = "another one while something is held by a compliance";
-            return Err(value("solver.method", "descent", range));
+            return Err(value("solver.method", "vbd", range));
         }
         let mesh = group.cuttable.mesh();
         let mut settings = StepSettings {
@@ -269,7 +269,7 @@ impl Retuned {
         if Self::needs_another_solver(group, before, after, limits, place)? {
             let mut copy = group.solver.clone();
             copy.limit_kappa(limits[0], limits[1], mesh)?;
-            copy.end_descent();
+            copy.end_vbd();
             copy.prepare(after, place)?;
             solver = Some(copy);
         }
@@ -282,7 +282,7 @@ impl Retuned {
         })
     }
 
-    /// Whether the solver is in the wrong place or form, or knows not, or wrongly, what descent has to.
+    /// Whether the solver is in the wrong place or form, or knows not, or wrongly, what VBD has to.
     fn needs_another_solver(
         group: &Group,
         before: &SolverSpec,
@@ -294,8 +294,8 @@ impl Retuned {
             return Ok(true);
         }
         let softens = || limits[0] != limits[1] && limits.iter().any(|l| group.solver.exceeds(*l));
-        Ok(after.method == Method::Descent
-            && ((before.method, before.coarse) != (after.method, after.coarse) || softens()))
+        Ok(after.method == Method::Vbd
+            && ((before.method, before.two_level) != (after.method, after.two_level) || softens()))
     }
 
     fn take_effect(self, group: &mut Group, spec: &SolverSpec) -> Result<(), Error> {
@@ -305,8 +305,8 @@ impl Retuned {
                 let [before, after] = self.limits;
                 let mesh = group.cuttable.mesh();
                 group.solver.limit_kappa(before, after, mesh)?;
-                if spec.method != Method::Descent {
-                    group.solver.end_descent();
+                if spec.method != Method::Vbd {
+                    group.solver.end_vbd();
                 }
             }
         }
@@ -344,7 +344,7 @@ mod tests {
 
     /// Not every hold is a handle of the scene.
     #[test]
-    fn descent_is_refused_while_something_is_held_softly() {
+    fn vbd_is_refused_while_something_is_held_softly() {
         let scene = Scene::from_toml("[[body]]\nshape = { kind = \"box\", tets = 200 }").unwrap();
         let mut simulation = Simulation::new(&scene).unwrap();
         let hold = |simulation: &mut Simulation, compliance| -> Result<(), Error> {
@@ -354,13 +354,13 @@ mod tests {
             });
             Ok(())
         };
-        let descent = SolverSpec::of(Method::Descent);
+        let vbd = SolverSpec::of(Method::Vbd);
         hold(&mut simulation, 1e-3).unwrap();
-        let error = simulation.retune(&descent).unwrap_err();
+        let error = simulation.retune(&vbd).unwrap_err();
         assert!(error.to_string().contains("compliance"), "{error}");
         simulation.step().unwrap();
         hold(&mut simulation, 0.0).unwrap();
-        simulation.retune(&descent).unwrap();
+        simulation.retune(&vbd).unwrap();
         simulation.step().unwrap();
     }
 }

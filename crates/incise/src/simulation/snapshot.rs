@@ -5,7 +5,7 @@
 //! has. (Undoing a [`CutDelta`](incise_cutting::CutDelta) takes back a mesh; it does not take back where the body has
 //! moved since, which is why cuts are taken back this way.)
 //!
-//! Cost: a copy of all arrays, 0.25 to 0.4 kB a tet, with descent up to 0.6; the first step after coming back lays out
+//! Cost: a copy of all arrays, 0.25 to 0.4 kB a tet, with VBD up to 0.6; the first step after coming back lays out
 //! all tets, and sends a device everything.
 
 use std::sync::Arc;

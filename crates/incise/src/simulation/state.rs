@@ -189,7 +189,7 @@ impl Simulation {
     /// reports. 0 for tets that take no part and for bodies asleep.
     ///
     /// `None` unless the last frame has reported [`Quantity::Residual`], and after [`Simulation::retune`] until the next
-    /// one does. Descent knows no multipliers and its force is a matter of particles: `None`, too. O(tets).
+    /// one does. VBD knows no multipliers and its force is a matter of particles: `None`, too. O(tets).
     ///
     /// ```
     /// use incise::{Scene, Simulation};
@@ -206,7 +206,7 @@ impl Simulation {
     /// ```
     #[must_use]
     pub fn residuals_of_tets(&self) -> Option<Vec<f64>> {
-        if !self.residuals_kept || self.solver.method == Method::Descent {
+        if !self.residuals_kept || self.solver.method == Method::Vbd {
             return None;
         }
         let groups = self.groups.iter().map(residuals_of_tets);

@@ -277,7 +277,7 @@ fn every_shipped_scene_moves_as_on_the_processor() {
             continue;
         }
         let mut scene = Scene::load(&path).unwrap();
-        if scene.solver.method == Method::Descent {
+        if scene.solver.method == Method::Vbd {
             continue;
         }
         scene.solver.precision = Precision::F32;
@@ -343,7 +343,7 @@ fn other_methods_and_constraints_are_cut_on_a_gpu_too() {
             "method = \"chebyshev\"\niterations = 15\nrelaxation = 0.05\nspectral_radius = 0.9",
             "",
         ),
-        ("form = \"sequential\"", "damping = 0.01"),
+        ("tet_solve = \"sequential\"", "damping = 0.01"),
         ("iterations = 3", "volume_compliance = 1e-7"),
         (
             "recluster = { wear = 1.01, frames = 2 }\nsleep = { speed = 0.5, time = 0.1 }",

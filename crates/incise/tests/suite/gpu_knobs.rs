@@ -214,10 +214,10 @@ fn a_device_is_refused_what_it_does_not_do() {
     };
     let scene = two_bodies();
     let plain = &scene.solver;
-    let descent = SolverSpec::of(Method::Descent);
+    let vbd = SolverSpec::of(Method::Vbd);
     let mut there = Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap();
     there.step().unwrap();
-    let error = there.retune(&on(Backend::Gpu, &descent)).unwrap_err();
+    let error = there.retune(&on(Backend::Gpu, &vbd)).unwrap_err();
     assert!(
         matches!(&error, Error::Value { field, .. } if field == "solver.method"),
         "{error}"
@@ -225,7 +225,7 @@ fn a_device_is_refused_what_it_does_not_do() {
     assert_eq!(there.step().unwrap().backend, "gpu");
     there.check().unwrap();
     // Automatically it goes where it can.
-    there.retune(&on(Backend::Auto, &descent)).unwrap();
+    there.retune(&on(Backend::Auto, &vbd)).unwrap();
     assert!(there.backend_note().unwrap().contains("solver.method"));
     assert_eq!(there.step().unwrap().backend, "cpu");
     there.retune(&on(Backend::Auto, plain)).unwrap();

@@ -60,16 +60,16 @@ fn take(simulation: &mut Simulation, point: DVec3, radius: f64, compliance: f64)
 
 #[test]
 fn what_is_held_goes_there_and_the_body_follows() {
-    let descent = |scene: &Scene| Scene {
+    let vbd = |scene: &Scene| Scene {
         solver: SolverSpec {
             precision: scene.solver.precision,
-            ..SolverSpec::of(Method::Descent)
+            ..SolverSpec::of(Method::Vbd)
         },
         ..scene.clone()
     };
     for precision in [Precision::F32, Precision::F64] {
         let scene = free_box(precision);
-        for scene in [scene.clone(), descent(&scene)] {
+        for scene in [scene.clone(), vbd(&scene)] {
             let mut simulation = simulation(&scene);
             let before = simulation.positions().to_vec();
             let point = dvec3(0.0, 0.0, 0.5);
@@ -462,9 +462,9 @@ fn what_cannot_be_is_refused_by_name() {
     let foreign = take(&mut two, dvec3(3.0, 0.0, 0.0), 0.5, 0.0);
     assert_eq!(field(simulation.release(foreign).unwrap_err()), "grab");
 
-    let mut descent = free_box(Precision::F64);
-    descent.solver = SolverSpec::of(Method::Descent);
-    let mut descent = self::simulation(&descent);
-    let error = descent.grab(DVec3::ZERO, 0.5, 1e-3).unwrap_err();
+    let mut vbd = free_box(Precision::F64);
+    vbd.solver = SolverSpec::of(Method::Vbd);
+    let mut vbd = self::simulation(&vbd);
+    let error = vbd.grab(DVec3::ZERO, 0.5, 1e-3).unwrap_err();
     assert_eq!(field(error), "grab.compliance");
 }

@@ -1,7 +1,7 @@
 //! A scene with everything in it that cuts, holds and is in the way, and settings to solve it with, each in its own way.
 
 use incise::Scene;
-use incise::scene::{Form, Method, ReclusterSpec, SleepSpec, SolverSpec, Substeps};
+use incise::scene::{Method, ReclusterSpec, SleepSpec, SolverSpec, Substeps, TetSolve};
 
 use crate::support::{body, plane, scene, sweep};
 
@@ -36,28 +36,28 @@ pub(crate) fn settings() -> Vec<(&'static str, SolverSpec)> {
             SolverSpec {
                 iterations: 3,
                 relaxation: 0.9,
-                form: Form::Sequential,
+                tet_solve: TetSolve::Sequential,
                 ..plain()
             },
         ),
         ("jacobi", of(Method::Jacobi)),
         ("chebyshev", of(Method::Chebyshev)),
-        ("descent", of(Method::Descent)),
+        ("vbd", of(Method::Vbd)),
         (
-            "descent with a limit",
+            "vbd with a limit",
             SolverSpec {
                 kappa_limit: 0.02,
-                ..of(Method::Descent)
+                ..of(Method::Vbd)
             },
         ),
         (
-            "corrected descent with a limit",
+            "corrected vbd with a limit",
             SolverSpec {
                 substeps: 1.into(),
                 iterations: 3,
-                coarse: true,
+                two_level: true,
                 kappa_limit: 0.05,
-                ..of(Method::Descent)
+                ..of(Method::Vbd)
             },
         ),
         (

@@ -1,7 +1,7 @@
 //! The methods a scene may name: what they default to, that each runs, and what does not go with it.
 
 use incise::mesh::glam::DVec3;
-use incise::scene::{Form, Method, Precision, SolverSpec};
+use incise::scene::{Method, Precision, SolverSpec, TetSolve};
 use incise::{Scene, Simulation};
 
 use crate::support::{body, plane, scene, simulation, state};
@@ -11,7 +11,7 @@ const NAMES: [(&str, Method); 4] = [
     ("gauss-seidel", Method::GaussSeidel),
     ("jacobi", Method::Jacobi),
     ("chebyshev", Method::Chebyshev),
-    ("descent", Method::Descent),
+    ("vbd", Method::Vbd),
 ];
 
 /// A sphere that falls onto the ground and is cut, by the given keys of `[solver]`.
@@ -32,7 +32,7 @@ fn each_method_has_its_defaults_and_named_keys_override_them() {
         assert_eq!(spec(""), SolverSpec::of(method));
         let (iterations, relaxation, limit) = match method {
             Method::GaussSeidel => (1, 1.0, 1.0),
-            Method::Descent => (20, 1.0, f64::INFINITY),
+            Method::Vbd => (20, 1.0, f64::INFINITY),
             _ => (20, 0.1, 1.0),
         };
         let given = spec("");
@@ -41,8 +41,13 @@ fn each_method_has_its_defaults_and_named_keys_override_them() {
             (iterations, relaxation, limit)
         );
         assert_eq!(
-            (given.form, given.spectral_radius, given.delay, given.coarse),
-            (Form::Block, 0.99, 10, false)
+            (
+                given.tet_solve,
+                given.spectral_radius,
+                given.delay,
+                given.two_level
+            ),
+            (TetSolve::Block, 0.99, 10, false)
         );
         // Also a key whose value is that of the plain defaults.
         let given = spec("iterations = 1\nrelaxation = 1.0\nkappa_limit = 1.0");
@@ -60,11 +65,11 @@ fn each_method_has_its_defaults_and_named_keys_override_them() {
 
 #[test]
 fn each_method_runs_through_a_cut_and_does_not_depend_on_threads() {
-    let forms = ["block", "sequential"].map(|form| format!("form = \"{form}\""));
+    let forms = ["block", "sequential"].map(|form| format!("tet_solve = \"{form}\""));
     let mut settings: Vec<String> = Vec::new();
     for (name, method) in NAMES {
         let variants = match method {
-            Method::Descent => [String::new(), "coarse = true".to_owned()],
+            Method::Vbd => [String::new(), "two_level = true".to_owned()],
             _ => forms.clone(),
         };
         settings.extend(variants.map(|keys| format!("method = \"{name}\"\n{keys}")));
@@ -116,7 +121,7 @@ fn chebyshev_without_extrapolation_is_jacobi() {
 
 /// Both follow the same equations, and at a small kappa one pass of Gauss-Seidel solves them nearly.
 #[test]
-fn descent_and_gauss_seidel_agree_at_a_small_kappa() {
+fn vbd_and_gauss_seidel_agree_at_a_small_kappa() {
     let run = |keys: &str| {
         let text = format!(
             "[world]\ngravity = [0.0, 0.0, -9.81]\n[solver]\nprecision = \"f64\"\nsubsteps = 40\nkappa_limit = inf\n{keys}\n{}\
@@ -130,32 +135,32 @@ fn descent_and_gauss_seidel_agree_at_a_small_kappa() {
         assert!(simulation.kappa() < 0.1, "{}", simulation.kappa());
         simulation
     };
-    let (xpbd, descent) = (run(""), run("method = \"descent\""));
-    let corrected = run("method = \"descent\"\ncoarse = true");
+    let (xpbd, vbd) = (run(""), run("method = \"vbd\""));
+    let corrected = run("method = \"vbd\"\ntwo_level = true");
     let distance = |a: &Simulation, b: &Simulation| {
         let pairs = a.positions().iter().zip(b.positions());
         pairs.map(|(x, y)| x.distance(*y)).fold(0.0, f64::max)
     };
     let moved = xpbd.positions().iter().zip(&xpbd.mesh().positions);
     let moved = moved.map(|(x, y)| x.distance(*y)).fold(0.0, f64::max);
-    // The end sags by a third of the beam. Both descents have converged; XPBD leaves out the primal residual.
+    // The end sags by a third of the beam. Both VBD have converged; XPBD leaves out the primal residual.
     assert!(moved > 0.2, "{moved}");
-    let [to_xpbd, to_corrected] = [&xpbd, &corrected].map(|other| distance(&descent, other));
+    let [to_xpbd, to_corrected] = [&xpbd, &corrected].map(|other| distance(&vbd, other));
     assert!(to_xpbd < 0.02 * moved, "{to_xpbd} of {moved}");
     assert!(to_corrected < 1e-3 * moved, "{to_corrected} of {moved}");
 }
 
-/// Force and potential exist for descent, primal and dual residuals do not; more sweeps leave less force.
+/// Force and potential exist for VBD, primal and dual residuals do not; more sweeps leave less force.
 #[test]
-fn descent_reports_the_residuals_that_it_has() {
-    let run = |iterations: u32, coarse: bool| {
+fn vbd_reports_the_residuals_that_it_has() {
+    let run = |iterations: u32, two_level: bool| {
         let mut scene = scene(&format!(
             "[report]\nquantities = [\"residual\"]\n[world]\ngravity = [0.0, 0.0, -9.81]\n\
-             [solver]\nmethod = \"descent\"\nprecision = \"f64\"\n{}\
+             [solver]\nmethod = \"vbd\"\nprecision = \"f64\"\n{}\
              fixed = [{{ half_space = {{ point = [-0.4, 0, 0], normal = [-1, 0, 0] }} }}]\n",
             body("beam", 300, [0.0; 3]),
         ));
-        (scene.solver.iterations, scene.solver.coarse) = (iterations, coarse);
+        (scene.solver.iterations, scene.solver.two_level) = (iterations, two_level);
         let mut simulation = simulation(&scene);
         for _ in 0..3 {
             simulation.step().unwrap();
@@ -184,10 +189,10 @@ fn descent_reports_the_residuals_that_it_has() {
     );
 }
 
-/// A steel ball in one substep: kappa is beyond a million, and descent neither inverts nor loses a tet.
+/// A steel ball in one substep: kappa is beyond a million, and VBD neither inverts nor loses a tet.
 #[test]
-fn descent_is_stable_at_any_stiffness() {
-    let mut scene = falling("method = \"descent\"\nsubsteps = 1");
+fn vbd_is_stable_at_any_stiffness() {
+    let mut scene = falling("method = \"vbd\"\nsubsteps = 1");
     scene.body[0].young_modulus = 2e11;
     let mut simulation = simulation(&scene);
     assert!(simulation.kappa() > 1e6);
@@ -199,11 +204,11 @@ fn descent_is_stable_at_any_stiffness() {
     assert_eq!(simulation.softened().tets, 0);
 }
 
-/// A handle moves what descent solves as what XPBD solves.
+/// A handle moves what VBD solves as what XPBD solves.
 #[test]
-fn a_rigid_handle_goes_with_descent() {
+fn a_rigid_handle_goes_with_vbd() {
     let text = format!(
-        "[solver]\nmethod = \"descent\"\nprecision = \"f64\"\n{}\
+        "[solver]\nmethod = \"vbd\"\nprecision = \"f64\"\n{}\
          [[handle]]\nholds = [{{ half_space = {{ point = [0, 0, 0.3], normal = [0, 0, 1] }} }}]\n\
          frames = [0, 4]\npath = [[0, 0, 0], [0, 0, 0.2]]\n{}",
         body("box", 300, [0.0; 3]),
@@ -226,7 +231,7 @@ fn a_rigid_handle_goes_with_descent() {
     }
 }
 
-/// A change of a sound scene of descent, and the field that an error names.
+/// A change of a sound scene of VBD, and the field that an error names.
 type Mistake = (&'static str, fn(&mut Scene));
 
 const MISTAKES: [Mistake; 10] = [
@@ -245,12 +250,12 @@ const MISTAKES: [Mistake; 10] = [
     ("body[0].volume_compliance is 0", |s| {
         s.body[0].volume_compliance = Some(0.0);
     }),
-    ("solver.form is sequential", |s| {
-        s.solver.form = Form::Sequential;
+    ("solver.tet_solve is sequential", |s| {
+        s.solver.tet_solve = TetSolve::Sequential;
     }),
     ("solver.relaxation is 2", |s| s.solver.relaxation = 2.0),
-    ("solver.coarse is true", |s| {
-        (s.solver.method, s.solver.coarse) = (Method::GaussSeidel, true);
+    ("solver.two_level is true", |s| {
+        (s.solver.method, s.solver.two_level) = (Method::GaussSeidel, true);
     }),
     ("solver.spectral_radius is 1", |s| {
         (s.solver.method, s.solver.spectral_radius) = (Method::Chebyshev, 1.0);
@@ -263,7 +268,7 @@ const MISTAKES: [Mistake; 10] = [
 
 #[test]
 fn what_a_method_does_not_know_is_refused_by_name() {
-    let sound = falling("method = \"descent\"");
+    let sound = falling("method = \"vbd\"");
     simulation(&sound).step().unwrap();
     for (field, mistake) in MISTAKES {
         let mut scene = sound.clone();

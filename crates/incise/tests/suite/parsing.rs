@@ -5,7 +5,7 @@ use std::path::Path;
 
 use incise::mesh::generate::{Shape, generate};
 use incise::mesh::io;
-use incise::scene::{Form, Method, Precision, StrokeSpec};
+use incise::scene::{Method, Precision, StrokeSpec, TetSolve};
 use incise::{Error, Scene, Simulation};
 
 use crate::support::{body, scene};
@@ -26,8 +26,8 @@ fn defaults_are_the_documented_ones() {
         (Method::GaussSeidel, 1.0)
     );
     assert_eq!(
-        (solver.form, solver.spectral_radius, solver.delay),
-        (Form::Block, 0.99, 10)
+        (solver.tet_solve, solver.spectral_radius, solver.delay),
+        (TetSolve::Block, 0.99, 10)
     );
     assert_eq!(
         (solver.clustering.as_str(), solver.coloring.as_str()),
@@ -75,7 +75,7 @@ substeps = "auto"
 max_substeps = 70
 iterations = 2
 method = "chebyshev"
-form = "sequential"
+tet_solve = "sequential"
 relaxation = 0.9
 spectral_radius = 0.9
 delay = 3
@@ -153,7 +153,7 @@ fn an_unknown_key_at_any_level_names_the_nearest() {
         ("max_substeps", "max_substep"),
         ("iterations", "iteration"),
         ("chebyshev", "chebychev"),
-        ("form", "from"),
+        ("tet_solve", "tet_slove"),
         ("sequential", "seqential"),
         ("spectral_radius", "spectral_radios"),
         ("delay", "dealy"),

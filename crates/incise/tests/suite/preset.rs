@@ -1,7 +1,7 @@
 //! Presets are other defaults: what a scene names itself stays.
 
 use incise::Scene;
-use incise::scene::{Form, Method, Preset, SolverSpec};
+use incise::scene::{Method, Preset, SolverSpec, TetSolve};
 
 use crate::support::{body, scene, simulation};
 
@@ -15,7 +15,7 @@ fn the_paper_preset_is_the_papers_setting() {
     assert_eq!(paper, SolverSpec::paper(Method::GaussSeidel));
     assert_eq!((paper.time_step, paper.substeps), (0.016, 1.into()));
     assert_eq!((paper.iterations, paper.relaxation), (500, 0.8));
-    assert_eq!(paper.form, Form::Sequential);
+    assert_eq!(paper.tet_solve, TetSolve::Sequential);
     assert_eq!(
         (paper.clustering.as_str(), paper.coloring.as_str()),
         ("serial:10", "scgc")
@@ -26,17 +26,17 @@ fn the_paper_preset_is_the_papers_setting() {
 #[test]
 fn the_paper_preset_knows_the_other_methods() {
     for (name, method, form, relaxation) in [
-        ("jacobi", Method::Jacobi, Form::Sequential, 0.1),
-        ("chebyshev", Method::Chebyshev, Form::Sequential, 0.1),
-        ("descent", Method::Descent, Form::Block, 1.0),
+        ("jacobi", Method::Jacobi, TetSolve::Sequential, 0.1),
+        ("chebyshev", Method::Chebyshev, TetSolve::Sequential, 0.1),
+        ("vbd", Method::Vbd, TetSolve::Block, 1.0),
     ] {
         let paper = solver(&format!("method = \"{name}\"\npreset = \"paper\""));
         assert_eq!(paper, SolverSpec::paper(method));
-        assert_eq!((paper.form, paper.relaxation), (form, relaxation));
+        assert_eq!((paper.tet_solve, paper.relaxation), (form, relaxation));
         assert_eq!((paper.iterations, paper.method), (500, method));
     }
-    let given = solver("preset = \"paper\"\nmethod = \"jacobi\"\nform = \"block\"");
-    assert_eq!((given.form, given.relaxation), (Form::Block, 0.1));
+    let given = solver("preset = \"paper\"\nmethod = \"jacobi\"\ntet_solve = \"block\"");
+    assert_eq!((given.tet_solve, given.relaxation), (TetSolve::Block, 0.1));
 }
 
 #[test]

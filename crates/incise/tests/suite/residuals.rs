@@ -105,12 +105,12 @@ fn they_are_gone_with_what_they_belong_to() {
     };
     simulation.retune(&iterations).unwrap();
     assert!(simulation.residuals_of_tets().is_none());
-    simulation.retune(&SolverSpec::of(Method::Descent)).unwrap();
+    simulation.retune(&SolverSpec::of(Method::Vbd)).unwrap();
     let always = ReportSpec {
         every: 1,
         quantities: vec![Quantity::Residual],
     };
     simulation.set_report(always).unwrap();
     assert!(simulation.step().unwrap().residual.is_some());
-    assert!(simulation.residuals_of_tets().is_none(), "descent has none");
+    assert!(simulation.residuals_of_tets().is_none(), "vbd has none");
 }

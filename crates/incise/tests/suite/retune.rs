@@ -20,7 +20,7 @@ fn at_the_start_it_is_as_if_set_up_so() {
     let starts = [
         SolverSpec::default(),
         low.clone(),
-        SolverSpec::of(Method::Descent),
+        SolverSpec::of(Method::Vbd),
     ];
     let three = |simulation: &mut Simulation| -> Vec<_> {
         let frames = (0..3).map(|_| {
@@ -70,7 +70,7 @@ fn other_constraints_follow_from_the_start() {
     for (name, solver) in settings() {
         let mut retuned = simulation(&base);
         let refused = retuned.retune(&solver).is_err();
-        assert_eq!(refused, solver.method == Method::Descent, "{name}");
+        assert_eq!(refused, solver.method == Method::Vbd, "{name}");
         if refused {
             continue;
         }
@@ -389,10 +389,10 @@ fn what_is_refused_changes_nothing() {
         ),
         (
             SolverSpec {
-                coarse: true,
+                two_level: true,
                 ..plain()
             },
-            "solver.coarse",
+            "solver.two_level",
         ),
         (
             SolverSpec {
@@ -405,7 +405,7 @@ fn what_is_refused_changes_nothing() {
             "solver.sleep",
         ),
         // The beam is damped.
-        (SolverSpec::of(Method::Descent), "body[0].damping"),
+        (SolverSpec::of(Method::Vbd), "body[0].damping"),
     ];
     for (solver, key) in refused {
         let error = simulation.retune(&solver).unwrap_err();

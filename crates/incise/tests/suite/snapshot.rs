@@ -111,11 +111,11 @@ fn two_bodies(solver: &str) -> Scene {
 #[test]
 fn every_method_goes_on_as_it_did() {
     for solver in [
-        "iterations = 3\nform = \"sequential\"",
+        "iterations = 3\ntet_solve = \"sequential\"",
         "method = \"jacobi\"",
         "method = \"chebyshev\"\nprecision = \"f64\"",
-        "method = \"descent\"\nsubsteps = 2",
-        "method = \"descent\"\nsubsteps = 1\niterations = 2\ncoarse = true\nprecision = \"f64\"",
+        "method = \"vbd\"\nsubsteps = 2",
+        "method = \"vbd\"\nsubsteps = 1\niterations = 2\ntwo_level = true\nprecision = \"f64\"",
         "substeps = \"auto\"\nmax_substeps = 7\nmerge_clusters = false",
         // One falls asleep before the snapshot, and is woken by the blade.
         "sleep = { speed = 10.0, time = 0.02 }",
@@ -240,9 +240,9 @@ fn the_bytes_are_about_those_that_are_asked_for() {
         (doubled("two_bodies"), 6),
         (of("handles"), 70),
         (doubled("links"), 1),
-        (two_bodies("method = \"descent\"\nsubsteps = 1"), 2),
+        (two_bodies("method = \"vbd\"\nsubsteps = 1"), 2),
         (
-            two_bodies("method = \"descent\"\nsubsteps = 1\ncoarse = true\nprecision = \"f64\""),
+            two_bodies("method = \"vbd\"\nsubsteps = 1\ntwo_level = true\nprecision = \"f64\""),
             2,
         ),
         (two_bodies("recluster = { wear = 1.01, frames = 9 }"), 6),

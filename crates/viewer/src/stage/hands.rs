@@ -215,7 +215,7 @@ impl Stage {
         let radius = (self.extent * self.grip.radius).max(1.001 * nearest);
         let compliance = match self.simulation.solver_spec().method {
             // It knows no springs.
-            Method::Descent => 0.0,
+            Method::Vbd => 0.0,
             _ => self.grip.compliance,
         };
         let grab = self.simulation.grab(hit.point, radius, compliance)?;

@@ -29,12 +29,12 @@ point = [0.01, 0, 0]
 normal = [1, 0, 0]
 "#;
 
-fn to_descent() -> Turn {
+fn to_vbd() -> Turn {
     Turn {
         knob: "method",
         from: String::new(),
         to: String::new(),
-        spec: SolverSpec::of(Method::Descent),
+        spec: SolverSpec::of(Method::Vbd),
     }
 }
 
@@ -113,12 +113,12 @@ fn what_was_held_at_a_moment_is_free_when_it_comes_back() {
         stage.step().unwrap();
     }
     stage.let_go();
-    stage.turn(&to_descent()).unwrap();
-    // Held softly at that time, which descent does not know.
+    stage.turn(&to_vbd()).unwrap();
+    // Held softly at that time, which VBD does not know.
     assert_eq!(stage.undo().unwrap(), Some(true));
     assert_eq!((stage.report().pieces, stage.hand()), (1, None));
     stage.step().unwrap();
-    assert_eq!(stage.solver().method, Method::Descent);
+    assert_eq!(stage.solver().method, Method::Vbd);
     // Nothing hangs on a handle any more: the same place can be taken again.
     assert!(stage.take([400.0, 300.0], SIZE).unwrap());
 }
@@ -238,9 +238,9 @@ fn all_colors_can_be_shown_at_any_time() {
         stage.step().unwrap();
         stage.color(by).unwrap();
     }
-    stage.turn(&to_descent()).unwrap();
+    stage.turn(&to_vbd()).unwrap();
     stage.measure(true).unwrap();
     stage.step().unwrap();
     stage.color(residual).unwrap();
-    assert!(stage.legend.is_none(), "descent has none by tets");
+    assert!(stage.legend.is_none(), "vbd has none by tets");
 }

@@ -9,7 +9,7 @@ use crate::layout::Ingredients;
 use crate::neo_hookean::TetConstraint;
 use crate::neo_hookean::tests::{point, rest};
 use crate::real::load;
-use crate::{Form, Material, gauss_seidel};
+use crate::{Material, TetSolve, gauss_seidel};
 use incise_graph::{Clustering, ColorId, Coloring, Schedule};
 
 const RUBBER: Material = Material {
@@ -58,7 +58,7 @@ impl<R: Real> Case<R> {
     }
 
     /// The positions after a pass by the kernel.
-    fn by_lanes(&self, level: Level, damped: bool, form: Form) -> Vec<R::Vector> {
+    fn by_lanes(&self, level: Level, damped: bool, form: TetSolve) -> Vec<R::Vector> {
         self.by_lanes_keeping(level, damped, form, &[])
     }
 
@@ -67,7 +67,7 @@ impl<R: Real> Case<R> {
         &self,
         level: Level,
         damped: bool,
-        form: Form,
+        form: TetSolve,
         multipliers: &[R::Atomic],
     ) -> Vec<R::Vector> {
         let count = self.tets.len();
@@ -177,7 +177,7 @@ proptest! {
         let case = case::<f64>(&tets, time);
         let expected = case.one_by_one(damped);
         for level in levels() {
-            let moved = case.by_lanes(level, damped, Form::Block);
+            let moved = case.by_lanes(level, damped, TetSolve::Block);
             for (a, b) in moved.iter().zip(&expected) {
                 let scale = 1.0 + b.length();
                 prop_assert!(a.distance(*b) <= 1e-9 * scale, "{a} instead of {b}");
@@ -193,7 +193,7 @@ proptest! {
         damped in any::<bool>(),
         sequential in any::<bool>(),
     ) {
-        let form = if sequential { Form::Sequential } else { Form::Block };
+        let form = if sequential { TetSolve::Sequential } else { TetSolve::Block };
         let (single, double) = (case::<f32>(&tets, time), case::<f64>(&tets, time));
         let first = levels()[0];
         let expected = (single.by_lanes(first, damped, form), double.by_lanes(first, damped, form));
@@ -209,7 +209,7 @@ proptest! {
 fn tets_out_of_range_stay_as_they_are() {
     let rest = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
     for size in [1e30, 0.0] {
-        for form in [Form::Block, Form::Sequential] {
+        for form in [TetSolve::Block, TetSolve::Sequential] {
             let case = Case::<f32>::new(&[rest], &[rest.map(|x| x * size)], 1e-3);
             let multipliers: Vec<_> = (0..2 * 16).map(|_| 0.0f32.cell()).collect();
             for level in levels() {

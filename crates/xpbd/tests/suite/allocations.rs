@@ -2,7 +2,7 @@
 
 use glam::{DVec3, dvec3};
 use incise_mesh::generate::kuhn_box;
-use incise_xpbd::{Collider, Form, Method, Pose, Real, StepSettings};
+use incise_xpbd::{Collider, Method, Pose, Real, StepSettings, TetSolve};
 
 use crate::body::{GRAVITY, RUBBER, body, plain};
 
@@ -43,7 +43,7 @@ fn a_frame_asks_for_no_memory() {
         ..jacobi.clone()
     };
     let sequential = StepSettings {
-        form: Form::Sequential,
+        tet_solve: TetSolve::Sequential,
         ..StepSettings::new(2e-3)
     };
     for mut settings in [StepSettings::new(2e-3), sequential, jacobi, chebyshev] {

@@ -5,7 +5,7 @@ use incise_clustering::cluster;
 use incise_coloring::color;
 use incise_graph::{Incidence, Schedule};
 use incise_mesh::{TetId, TetMesh};
-use incise_xpbd::{Form, Material, Real, Solver, StepReport, StepSettings};
+use incise_xpbd::{Material, Real, Solver, StepReport, StepSettings, TetSolve};
 
 /// Rubber of a density that keeps numbers plain.
 pub(crate) const RUBBER: Material = Material {
@@ -68,7 +68,7 @@ pub(crate) fn frames(time: f64, settings: &StepSettings) -> usize {
     (time / settings.time_step).ceil() as usize
 }
 
-/// The ways of solving by XPBD. Descent has its own suite of extremes.
+/// The ways of solving by XPBD. VBD has its own suite of extremes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Method {
     /// Colored Gauss-Seidel, both constraints of a tet at once.
@@ -103,7 +103,7 @@ impl Method {
         let mut settings = settings.clone();
         match self {
             Self::GaussSeidel => {}
-            Self::Sequential => settings.form = Form::Sequential,
+            Self::Sequential => settings.tet_solve = TetSolve::Sequential,
             Self::Jacobi => {
                 settings.method = incise_xpbd::Method::Jacobi;
                 settings.relaxation = 0.1;

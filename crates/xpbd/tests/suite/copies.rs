@@ -5,8 +5,8 @@ use incise_graph::{Clustering, ColorId, Coloring, Schedule};
 use incise_mesh::TetId;
 use incise_mesh::generate::kuhn_box;
 use incise_xpbd::{
-    Collider, Correction, CorrectionSettings, DescentSettings, DistanceConstraint, Material,
-    Method, Pose, Real, Solver, Stars, StepSettings, VolumeConstraint,
+    CoarseCorrection, CoarseCorrectionSettings, Collider, DistanceConstraint, Material, Method,
+    Pose, Real, Solver, StepSettings, VbdSettings, VertexStars, VolumeConstraint,
 };
 
 use crate::body::{GRAVITY, RUBBER, body, disturb, plain};
@@ -121,18 +121,19 @@ fn a_copy_weighs_what_it_says() {
 }
 
 #[test]
-fn what_descent_keeps_weighs_what_it_says() {
+fn what_vbd_keeps_weighs_what_it_says() {
     let mesh = kuhn_box([4, 2, 2], dvec3(0.4, 0.2, 0.2));
     let mut solver = body::<f32>(&mesh, RUBBER);
     let particles = u32::try_from(solver.particle_count()).unwrap();
     // No two particles have the same color, which is fine for few of them.
     let colors = Coloring::new((0..particles).map(ColorId).collect());
     let order = Schedule::new(&Clustering::none(particles as usize), &colors);
-    let mut stars = Stars::new(&solver, &order).unwrap();
-    let mut correction = Correction::new(&stars, CorrectionSettings::default()).unwrap();
-    let settings = DescentSettings::new(0.01, 2);
+    let mut stars = VertexStars::new(&solver, &order).unwrap();
+    let mut correction =
+        CoarseCorrection::new(&stars, CoarseCorrectionSettings::default()).unwrap();
+    let settings = VbdSettings::new(0.01, 2);
     solver
-        .descend_corrected(&mut stars, &mut correction, &settings)
+        .step_vbd_two_level(&mut stars, &mut correction, &settings)
         .unwrap();
     let mut copies = None;
     let asked = allocation_counter::measure(|| copies = Some((stars.clone(), correction.clone())));

@@ -15,9 +15,6 @@ mod conservation;
 mod convergence;
 mod copies;
 mod damping;
-mod descent;
-mod descent_correction;
-mod descent_extremes;
 mod determinism;
 #[cfg(feature = "direct")]
 mod direct;
@@ -37,5 +34,8 @@ mod reference;
 mod refusals;
 mod residuals;
 mod rest;
+mod vbd;
+mod vbd_correction;
+mod vbd_extremes;
 mod vibration;
 mod volumes;

@@ -11,12 +11,12 @@ use incise_mesh::generate::kuhn_box;
 use incise_mesh::{ParticleId, TetMesh};
 use incise_reference::Body;
 use incise_xpbd::{
-    Correction, CorrectionSettings, DescentSettings, Material, Solver, StepSettings,
+    CoarseCorrection, CoarseCorrectionSettings, Material, Solver, StepSettings, VbdSettings,
 };
 
 use crate::body::{body, plain, positions, within};
-use crate::descent::stars;
 use crate::finite_elements;
+use crate::vbd::stars;
 
 /// States of a run that are compared, evenly spaced in time.
 const CHECKPOINTS: usize = 4;
@@ -137,12 +137,13 @@ impl Scene {
         solver
     }
 
-    /// By descent with corrections, each step to the end.
-    fn by_descent(&self, steps: usize) -> Vec<DVec3> {
+    /// By VBD with corrections, each step to the end.
+    fn by_vbd(&self, steps: usize) -> Vec<DVec3> {
         let mut solver = self.solver();
         let mut stars = stars(&solver);
-        let mut correction = Correction::new(&stars, CorrectionSettings::default()).unwrap();
-        let mut settings = DescentSettings::new(self.duration / steps as f64, 100);
+        let mut correction =
+            CoarseCorrection::new(&stars, CoarseCorrectionSettings::default()).unwrap();
+        let mut settings = VbdSettings::new(self.duration / steps as f64, 100);
         settings.step.gravity = Some(self.gravity);
         settings.tolerance = Some(1e-10);
         self.run(steps, |time| {
@@ -152,7 +153,7 @@ impl Scene {
                 }
             }
             let report = solver
-                .descend_corrected(&mut stars, &mut correction, &settings)
+                .step_vbd_two_level(&mut stars, &mut correction, &settings)
                 .unwrap();
             assert!(report.residual.unwrap() <= 1e-10, "{report:?}");
             positions(&solver)
@@ -424,20 +425,20 @@ fn stretched_bar_is_the_closed_form() {
 /// Two solvers that share no code take the same large steps of backward Euler, with kappa 31 and 70: positions agree to
 /// 1e-6 of the body's size, which leaves room for both tolerances. (Measured: at most 5e-9.)
 #[test]
-fn descent_iterated_to_convergence_is_backward_euler() {
+fn vbd_iterated_to_convergence_is_backward_euler() {
     for poisson_ratio in [0.3, 0.45, 0.49] {
         for scene in [
             falling_beam(poisson_ratio),
             twisted_bar(poisson_ratio),
             compressed_block(poisson_ratio),
         ] {
-            let (descent, newton) = (scene.by_descent(4), scene.by_newton(4));
-            let apart = descent.iter().zip(&newton).map(|(a, b)| a.distance(*b));
+            let (vbd, newton) = (scene.by_vbd(4), scene.by_newton(4));
+            let apart = vbd.iter().zip(&newton).map(|(a, b)| a.distance(*b));
             let apart = apart.fold(0.0, f64::max);
             let moved = newton.iter().zip(scene.mesh.positions.iter().cycle());
             let moved = moved.map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
             assert!(moved > 0.05, "the body moves: {moved}");
-            within("descent from Newton", apart, 1e-6);
+            within("vbd from Newton", apart, 1e-6);
         }
     }
 }

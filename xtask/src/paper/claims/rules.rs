@@ -2,7 +2,7 @@
 //!
 //! Each looks at the rows of one table or figure, and holds for all, for some or for none of its cases.
 
-use super::super::convergence::{Setup, Solving};
+use super::super::convergence::{PaperMethod, Setup};
 use super::super::{fig4, fig8, table1, table2};
 use super::{Claim, Evidence, Verdict};
 
@@ -192,14 +192,14 @@ fn clusterings(rows: &[Evidence]) -> Vec<Claim> {
 
 fn convergence(rows: &[Evidence]) -> Vec<Claim> {
     let mut claims = Vec::new();
-    let last = |setup: Setup, solving: Solving| {
+    let last = |setup: Setup, solving: PaperMethod| {
         let mut found = rows.iter().filter_map(|row| match row {
             Evidence::Fig7(row) if (row.setup, row.solving) == (setup, solving) => Some(row),
             _ => None,
         });
         found.next()?.points.last().copied()
     };
-    let sizes = [5, 10, 15, 20, 25].map(Solving::GaussSeidel);
+    let sizes = [5, 10, 15, 20, 25].map(PaperMethod::GaussSeidel);
     for (norm, dual) in [("dual", true), ("force", false)] {
         let value = |setup, solving| {
             let point = last(setup, solving)?;
@@ -208,16 +208,16 @@ fn convergence(rows: &[Evidence]) -> Vec<Claim> {
         let (mut helps, mut beats, mut best) = (Vec::new(), Vec::new(), Vec::new());
         let (mut gains, mut leads) = (Vec::new(), Vec::new());
         for setup in Setup::ALL {
-            let Some(plain) = value(setup, Solving::GaussSeidel(1)) else {
+            let Some(plain) = value(setup, PaperMethod::GaussSeidel(1)) else {
                 continue;
             };
             let clustered = sizes
                 .iter()
                 .filter_map(|&size| Some((size, value(setup, size)?)));
-            let clustered: Vec<(Solving, f64)> = clustered.collect();
+            let clustered: Vec<(PaperMethod, f64)> = clustered.collect();
             helps.extend(clustered.iter().map(|&(_, residual)| residual < plain));
             gains.extend(clustered.iter().map(|&(_, residual)| residual / plain));
-            for other in [Solving::Jacobi, Solving::Chebyshev] {
+            for other in [PaperMethod::Jacobi, PaperMethod::Chebyshev] {
                 for residual in clustered.iter().map(|&(_, r)| r).chain([plain]) {
                     let other = value(setup, other).unwrap_or(f64::MAX);
                     beats.push(residual < other);

@@ -1,6 +1,6 @@
-//! [`Descent`]: what a group that is solved by descent keeps, and how it follows a cut.
+//! [`VBD`]: what a group that is solved by VBD keeps, and how it follows a cut.
 //!
-//! Descent visits particles, so these have colors of their own; tets, clusters and their colors stay as they are for
+//! VBD visits particles, so these have colors of their own; tets, clusters and their colors stay as they are for
 //! everybody who asks for them. Cost: O(tets) after each cut, as the stars of all particles are sorted anew.
 
 use std::time::Instant;
@@ -8,7 +8,8 @@ use std::time::Instant;
 use incise_coloring::auto;
 use incise_graph::{Clustering, Schedule};
 use incise_xpbd::{
-    Correction, CorrectionSettings, DescentReport, Real, Solver, Stars, StepReport, StepSettings,
+    CoarseCorrection, CoarseCorrectionSettings, Real, Solver, StepReport, StepSettings, VbdReport,
+    VertexStars,
 };
 
 use crate::report::{Milliseconds, milliseconds};
@@ -17,31 +18,31 @@ use crate::{Error, method};
 /// Aggregates of a large body: factoring more of them would cost more than they gain.
 const AGGREGATES: usize = 50;
 
-/// The state of descent beside that of the solver.
+/// The state of VBD beside that of the solver.
 #[derive(Clone, Debug)]
-pub(crate) struct Descent<R: Real> {
-    stars: Stars<R>,
+pub(crate) struct Vbd<R: Real> {
+    stars: VertexStars<R>,
     /// Where corrections are asked for.
-    correction: Option<Correction<R>>,
+    correction: Option<CoarseCorrection<R>>,
     /// What the last frame said of itself.
-    pub(crate) last: DescentReport,
+    pub(crate) last: VbdReport,
 }
 
-impl<R: Real> Descent<R> {
-    /// Colors the particles of a solver; `coarse` asks for corrections.
-    pub(crate) fn new(solver: &Solver<R>, coarse: bool) -> Result<Self, Error> {
-        let stars = Stars::new(solver, &schedule(solver, &mut Milliseconds::default()))?;
-        let correction = coarse.then(|| correction(&stars, solver)).transpose()?;
+impl<R: Real> Vbd<R> {
+    /// Colors the particles of a solver; `two_level` asks for the coarse correction.
+    pub(crate) fn new(solver: &Solver<R>, two_level: bool) -> Result<Self, Error> {
+        let stars = VertexStars::new(solver, &schedule(solver, &mut Milliseconds::default()))?;
+        let correction = two_level.then(|| correction(&stars, solver)).transpose()?;
         Ok(Self {
             stars,
             correction,
-            last: DescentReport::default(),
+            last: VbdReport::default(),
         })
     }
 
     /// Bytes of all arrays.
     pub(crate) fn bytes(&self) -> usize {
-        self.stars.bytes() + self.correction.as_ref().map_or(0, Correction::bytes)
+        self.stars.bytes() + self.correction.as_ref().map_or(0, CoarseCorrection::bytes)
     }
 
     /// Follows a cut, after the solver has.
@@ -67,11 +68,11 @@ impl<R: Real> Descent<R> {
         settings: &StepSettings,
         measure: bool,
     ) -> Result<StepReport, incise_xpbd::XpbdError> {
-        let mut settings = method::descent(settings);
+        let mut settings = method::vbd(settings);
         settings.measure = measure;
         self.last = match &mut self.correction {
-            Some(correction) => solver.descend_corrected(&mut self.stars, correction, &settings),
-            None => solver.descend(&mut self.stars, &settings),
+            Some(correction) => solver.step_vbd_two_level(&mut self.stars, correction, &settings),
+            None => solver.step_vbd(&mut self.stars, &settings),
         }?;
         Ok(StepReport {
             repaired: self.last.repaired,
@@ -88,13 +89,16 @@ fn schedule<R: Real>(solver: &Solver<R>, ms: &mut Milliseconds) -> Schedule {
     Schedule::new(&Clustering::none(solver.particle_count()), &coloring)
 }
 
-fn correction<R: Real>(stars: &Stars<R>, solver: &Solver<R>) -> Result<Correction<R>, Error> {
-    let small = CorrectionSettings::default();
-    let settings = CorrectionSettings {
+fn correction<R: Real>(
+    stars: &VertexStars<R>,
+    solver: &Solver<R>,
+) -> Result<CoarseCorrection<R>, Error> {
+    let small = CoarseCorrectionSettings::default();
+    let settings = CoarseCorrectionSettings {
         aggregate: small.aggregate.max(solver.particle_count() / AGGREGATES),
         ..small
     };
-    Correction::new(stars, settings).map_err(|source| Error::Xpbd {
+    CoarseCorrection::new(stars, settings).map_err(|source| Error::Xpbd {
         field: "solver".into(),
         source,
     })

@@ -1,4 +1,4 @@
-//! [`DescentSettings`]: how a frame of descent is computed.
+//! [`VbdSettings`]: how a frame of VBD is computed.
 
 use crate::{StepSettings, XpbdError};
 
@@ -15,12 +15,12 @@ pub enum Guess {
     Adaptive,
 }
 
-/// How one frame of descent is computed.
+/// How one frame of VBD is computed.
 ///
-/// Unlike XPBD, descent converges with `step.iterations` to the backward Euler solution of the substep, at any
+/// Unlike XPBD, VBD converges with `step.iterations` to the backward Euler solution of the substep, at any
 /// stiffness; `step.substeps` then buy accuracy in time. `step.relaxation` above 1 is over-relaxation.
 #[derive(Clone, Debug, PartialEq)]
-pub struct DescentSettings {
+pub struct VbdSettings {
     /// Time, substeps, iterations (sweeps, or rounds of a sweep and a correction), relaxation, forces.
     pub step: StepSettings,
     /// Where the iterations start.
@@ -33,7 +33,7 @@ pub struct DescentSettings {
     pub measure: bool,
 }
 
-impl DescentSettings {
+impl VbdSettings {
     /// One substep of `iterations`, no forces.
     #[must_use]
     pub fn new(time_step: f64, iterations: u32) -> Self {

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{ImplicitStep, Stars};
+use super::{ImplicitStep, VertexStars};
 use crate::collider::{Obstacle, outside};
 use crate::real::{finite, load, store, weight};
 use crate::{Real, Solver};
@@ -26,7 +26,7 @@ impl<R: Real> ImplicitStep<'_, R> {
     /// Moves every free particle once, color after color, and out of colliders.
     ///
     /// Without colliders the potential does not rise, up to rounding. Cost: about 60 operations a pair of particle and
-    /// tet, and three divisions a particle; [`Stars::pair_count`].
+    /// tet, and three divisions a particle; [`VertexStars::pair_count`].
     pub fn sweep(&mut self) {
         let sweep = Sweep {
             time: self.time,
@@ -40,12 +40,12 @@ impl<R: Real> ImplicitStep<'_, R> {
             let places = stars.colors[color]..stars.colors[color + 1];
             let pairs = stars.offsets[places.end] - stars.offsets[places.start];
             if threads == 1 || pairs < PARALLEL_PAIRS {
-                places.for_each(|place| sweep.descend(solver, stars, obstacles, place));
+                places.for_each(|place| sweep.step_vbd(solver, stars, obstacles, place));
             } else {
                 (0..threads).into_par_iter().for_each(|thread| {
                     let share = |part| places.start + places.len() * part / threads;
                     for place in share(thread)..share(thread + 1) {
-                        sweep.descend(solver, stars, obstacles, place);
+                        sweep.step_vbd(solver, stars, obstacles, place);
                     }
                 });
             }
@@ -56,10 +56,10 @@ impl<R: Real> ImplicitStep<'_, R> {
 impl<R: Real> Sweep<R> {
     /// Moves one particle into its minimum.
     #[inline]
-    fn descend(
+    fn step_vbd(
         &self,
         solver: &Solver<R>,
-        stars: &Stars<R>,
+        stars: &VertexStars<R>,
         obstacles: &[Obstacle<R>],
         place: usize,
     ) {
@@ -76,13 +76,13 @@ impl<R: Real> Sweep<R> {
         let mut force = (free - x) * inertia;
         let mut isotropic = inertia;
         let mut h = [R::ZERO; 6];
-        for spoke in stars.of(place) {
-            let [a, b, c] = spoke
+        for term in stars.of(place) {
+            let [a, b, c] = term
                 .others
                 .map(|p| load::<R>(&solver.particles[p as usize]) - x);
-            let [wa, wb, wc] = spoke.pulls;
-            let slope = R::cross(b - a, c - a) * spoke.slope;
-            let excess = R::dot(slope, a) - spoke.target;
+            let [wa, wb, wc] = term.pulls;
+            let slope = R::cross(b - a, c - a) * term.slope;
+            let excess = R::dot(slope, a) - term.target;
             force += slope * excess - (a * wa + b * wb + c * wc);
             isotropic -= wa + wb + wc;
             let [u, v, w] = R::components(slope);

@@ -1,4 +1,4 @@
-//! [`Stars`]: the tets around each particle, in the order in which descent visits them.
+//! [`VertexStars`]: the tets around each particle, in the order in which VBD visits them.
 //!
 //! Particles that share a tet must not move at the same time. So particles play the part that constraints play in
 //! XPBD: each is a constraint on its tets ([`Solver::star_incidence`]), any coloring algorithm colors them, and a
@@ -8,23 +8,23 @@
 
 use incise_graph::{GraphError, Incidence, Schedule};
 
-use super::spoke::Spoke;
+use super::corner_term::CornerTerm;
 use crate::{Real, Solver};
 
-/// What descent needs of the tets, sorted by the particles of a schedule.
+/// What VBD needs of the tets, sorted by the particles of a schedule.
 ///
 /// It belongs to the tets that the solver had when it was made: after a cut, or any other change of tets, make it anew
-/// with [`Stars::rebuild`]. Positions, velocities, masses and what is fixed may change at any time.
+/// with [`VertexStars::rebuild`]. Positions, velocities, masses and what is fixed may change at any time.
 #[derive(Clone, Debug)]
-pub struct Stars<R: Real> {
+pub struct VertexStars<R: Real> {
     /// Particles in solving order.
     pub(super) order: Vec<u32>,
     /// Where each color ends in `order`, a 0 before the first.
     pub(super) colors: Vec<usize>,
-    /// Where the spokes of each particle of `order` end, a 0 before the first.
+    /// Where the terms of each particle of `order` end, a 0 before the first.
     pub(super) offsets: Vec<usize>,
-    pub(super) spokes: Vec<Spoke<R>>,
-    /// The tet of each spoke.
+    pub(super) terms: Vec<CornerTerm<R>>,
+    /// The tet of each term.
     pub(super) tets: Vec<u32>,
     pub(super) tet_count: usize,
     /// The edge of a cube that holds the mean tet at rest, in m: what is small beside it is nothing.
@@ -33,7 +33,7 @@ pub struct Stars<R: Real> {
     pub(super) earlier: Vec<R::Vector>,
 }
 
-impl<R: Real> Stars<R> {
+impl<R: Real> VertexStars<R> {
     /// Sorts the tets of a solver by the particles of a schedule. O(tets).
     ///
     /// # Errors
@@ -44,7 +44,7 @@ impl<R: Real> Stars<R> {
             order: Vec::new(),
             colors: Vec::new(),
             offsets: Vec::new(),
-            spokes: Vec::new(),
+            terms: Vec::new(),
             tets: Vec::new(),
             tet_count: 0,
             size: 0.0,
@@ -57,7 +57,7 @@ impl<R: Real> Stars<R> {
     /// The same in place, after tets have changed; memory is used again. O(tets).
     ///
     /// # Errors
-    /// As [`Stars::new`]; nothing has changed then.
+    /// As [`VertexStars::new`]; nothing has changed then.
     pub fn rebuild(&mut self, solver: &Solver<R>, schedule: &Schedule) -> Result<(), GraphError> {
         let incidence = solver.star_incidence();
         schedule.check(&incidence)?;
@@ -71,18 +71,18 @@ impl<R: Real> Stars<R> {
         }
         self.offsets.clear();
         self.offsets.push(0);
-        self.spokes.clear();
+        self.terms.clear();
         self.tets.clear();
         for p in schedule.order() {
             for &t in incidence.particles_of(p as usize) {
                 let tet = solver.tets[t as usize].to_f64();
                 let corner = tet.particles.iter().position(|&corner| corner == p);
-                if let Some(spoke) = corner.and_then(|corner| Spoke::new(&tet, corner)) {
-                    self.spokes.push(spoke);
+                if let Some(term) = corner.and_then(|corner| CornerTerm::new(&tet, corner)) {
+                    self.terms.push(term);
                     self.tets.push(t);
                 }
             }
-            self.offsets.push(self.spokes.len());
+            self.offsets.push(self.terms.len());
         }
         self.tet_count = solver.tet_count();
         let volume = solver.volumes.iter().sum::<f64>();
@@ -99,7 +99,7 @@ impl<R: Real> Stars<R> {
         size_of_val(&*self.order)
             + size_of_val(&*self.colors)
             + size_of_val(&*self.offsets)
-            + size_of_val(&*self.spokes)
+            + size_of_val(&*self.terms)
             + size_of_val(&*self.tets)
             + size_of_val(&*self.earlier)
     }
@@ -113,13 +113,13 @@ impl<R: Real> Stars<R> {
     /// Number of pairs of a particle and one of its tets: what a sweep costs is this times 10 to 20 ns.
     #[must_use]
     pub fn pair_count(&self) -> usize {
-        self.spokes.len()
+        self.terms.len()
     }
 
-    /// The spokes of the particle at a place in the order.
+    /// The terms of the particle at a place in the order.
     #[inline]
-    pub(super) fn of(&self, place: usize) -> &[Spoke<R>] {
-        &self.spokes[self.offsets[place]..self.offsets[place + 1]]
+    pub(super) fn of(&self, place: usize) -> &[CornerTerm<R>] {
+        &self.terms[self.offsets[place]..self.offsets[place + 1]]
     }
 
     /// Whether these are the stars of as many particles and tets.
@@ -130,7 +130,7 @@ impl<R: Real> Stars<R> {
 
 impl<R: Real> Solver<R> {
     /// Which tets each particle belongs to: particle p is constraint p, the tets take the place of particles. Color and
-    /// schedule this for [`Stars`]. O(tets).
+    /// schedule this for [`VertexStars`]. O(tets).
     ///
     /// # Panics
     /// With more than 2^30 tets.

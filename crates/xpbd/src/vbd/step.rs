@@ -1,13 +1,13 @@
-//! [`Solver::descend`] and [`ImplicitStep`]: a frame, and one substep of it opened up.
+//! [`Solver::step_vbd`] and [`ImplicitStep`]: a frame, and one substep of it opened up.
 
-use super::{DescentSettings, Guess, Stars};
+use super::{Guess, VbdSettings, VertexStars};
 use crate::collider::Obstacle;
 use crate::real::{finite, load, store, weight};
 use crate::{Real, Solver, StepReport, StepSettings, XpbdError};
 
-/// What a frame of descent has to say about itself.
+/// What a frame of VBD has to say about itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct DescentReport {
+pub struct VbdReport {
     /// As in [`StepReport::repaired`].
     pub repaired: usize,
     /// Iterations made, over all substeps.
@@ -21,11 +21,11 @@ pub struct DescentReport {
 }
 
 impl<R: Real> Solver<R> {
-    /// Advances by one frame of `settings.step.time_step` by sweeps of block descent. May take turns with
+    /// Advances by one frame of `settings.step.time_step` by sweeps of block vbd. May take turns with
     /// [`Solver::step`].
     ///
     /// # Errors
-    /// If the settings do not pass [`DescentSettings::check`], or there are constraints that descent does not know:
+    /// If the settings do not pass [`VbdSettings::check`], or there are constraints that VBD does not know:
     /// distances, volumes, soft attachments. Nothing has moved then.
     ///
     /// # Panics
@@ -39,7 +39,7 @@ impl<R: Real> Solver<R> {
     /// ```
     /// use glam::DVec3;
     /// use incise_graph::{Clustering, ColorId, Coloring, Schedule};
-    /// use incise_xpbd::{DescentSettings, Material, Solver, Stars};
+    /// use incise_xpbd::{VbdSettings, Material, Solver, VertexStars};
     ///
     /// let rest = [DVec3::ZERO, DVec3::Y, DVec3::X, DVec3::NEG_Z];
     /// let steel = Material { young_modulus: 2e11, poisson_ratio: 0.3, density: 7800.0, damping: 0.0 };
@@ -53,38 +53,38 @@ impl<R: Real> Solver<R> {
     ///
     /// // Four particles of one tet need four colors.
     /// let colors = Coloring::new([0, 1, 2, 3].map(ColorId).to_vec());
-    /// let mut stars = Stars::new(&solver, &Schedule::new(&Clustering::none(4), &colors))?;
-    /// let mut settings = DescentSettings::new(1.0 / 60.0, 20);
+    /// let mut stars = VertexStars::new(&solver, &Schedule::new(&Clustering::none(4), &colors))?;
+    /// let mut settings = VbdSettings::new(1.0 / 60.0, 20);
     /// settings.step.gravity = Some(DVec3::new(0.0, 0.0, -9.81));
     /// for _ in 0..60 {
-    ///     assert_eq!(solver.descend(&mut stars, &settings)?.repaired, 0);
+    ///     assert_eq!(solver.step_vbd(&mut stars, &settings)?.repaired, 0);
     /// }
     /// assert!((solver.volume().min_ratio - 1.0).abs() < 1e-3);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn descend(
+    pub fn step_vbd(
         &mut self,
-        stars: &mut Stars<R>,
-        settings: &DescentSettings,
-    ) -> Result<DescentReport, XpbdError> {
-        let _span = tracing::debug_span!("xpbd::descend").entered();
-        self.frame_of_descent(stars, settings, |step| {
+        stars: &mut VertexStars<R>,
+        settings: &VbdSettings,
+    ) -> Result<VbdReport, XpbdError> {
+        let _span = tracing::debug_span!("xpbd::step_vbd").entered();
+        self.frame_of_vbd(stars, settings, |step| {
             step.sweep();
             true
         })
     }
 
     /// A frame in which a substep ends early when `iterate` says that it has no more to give.
-    pub(super) fn frame_of_descent(
+    pub(super) fn frame_of_vbd(
         &mut self,
-        stars: &mut Stars<R>,
-        settings: &DescentSettings,
+        stars: &mut VertexStars<R>,
+        settings: &VbdSettings,
         mut iterate: impl FnMut(&mut ImplicitStep<'_, R>) -> bool,
-    ) -> Result<DescentReport, XpbdError> {
+    ) -> Result<VbdReport, XpbdError> {
         settings.check()?;
         self.refuse_soft_constraints()?;
         self.follow_body();
-        let mut report = DescentReport::default();
+        let mut report = VbdReport::default();
         for number in 1..=settings.step.substeps {
             let mut step = ImplicitStep::predicted(self, stars, settings, number);
             step.run(settings, &mut report, &mut iterate);
@@ -94,7 +94,7 @@ impl<R: Real> Solver<R> {
     }
 }
 
-/// One substep of descent between its prediction and its end, for those who choose themselves what to do in it, or
+/// One substep of VBD between its prediction and its end, for those who choose themselves what to do in it, or
 /// want to look at it while it converges.
 ///
 /// The positions of the solver are the iterate. Velocities follow only in [`ImplicitStep::finish`]: a step dropped
@@ -103,7 +103,7 @@ impl<R: Real> Solver<R> {
 #[must_use = "velocities follow in `finish`"]
 pub struct ImplicitStep<'a, R: Real> {
     pub(super) solver: &'a mut Solver<R>,
-    pub(super) stars: &'a mut Stars<R>,
+    pub(super) stars: &'a mut VertexStars<R>,
     pub(super) settings: StepSettings,
     pub(super) obstacles: Vec<Obstacle<R>>,
     /// Whether the frame ends with it.
@@ -117,15 +117,15 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
     /// Begins the last substep of a frame: moves the particles to the initial guess, and handles to where they go.
     ///
     /// # Errors
-    /// If the settings do not pass [`DescentSettings::check`], or there are constraints that descent does not know;
+    /// If the settings do not pass [`VbdSettings::check`], or there are constraints that VBD does not know;
     /// nothing has moved then.
     ///
     /// # Panics
     /// If the stars are those of another number of particles or tets.
     pub fn new(
         solver: &'a mut Solver<R>,
-        stars: &'a mut Stars<R>,
-        settings: &DescentSettings,
+        stars: &'a mut VertexStars<R>,
+        settings: &VbdSettings,
     ) -> Result<Self, XpbdError> {
         settings.check()?;
         solver.refuse_soft_constraints()?;
@@ -139,8 +139,8 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
 
     pub(super) fn predicted(
         solver: &'a mut Solver<R>,
-        stars: &'a mut Stars<R>,
-        settings: &DescentSettings,
+        stars: &'a mut VertexStars<R>,
+        settings: &VbdSettings,
         number: u32,
     ) -> Self {
         assert!(
@@ -171,8 +171,8 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
     /// Iterates until the settings or the tolerance say that it is enough, then measures if asked to.
     pub(super) fn run(
         &mut self,
-        settings: &DescentSettings,
-        report: &mut DescentReport,
+        settings: &VbdSettings,
+        report: &mut VbdReport,
         mut iterate: impl FnMut(&mut Self) -> bool,
     ) {
         let start = settings.tolerance.map(|_| self.free_residual());

@@ -1,4 +1,4 @@
-//! [`Correction`]: a truncated Newton step for the whole body, preconditioned by aggregates.
+//! [`CoarseCorrection`]: a truncated Newton step for the whole body, preconditioned by aggregates.
 //!
 //! What sweeps leave over varies slowly over the body. A correction solves `A d = f` with the semidefinite second
 //! derivatives A (`hessian`) and the forces f left over, by conjugate gradients, and goes along d as far as the
@@ -15,22 +15,22 @@ use super::aggregates::aggregates;
 use super::coarse::Coarse;
 use super::conjugate::{Conjugate, Limits};
 use super::matrix::Blocks;
-use super::{DescentReport, DescentSettings, ImplicitStep, Stars};
+use super::{ImplicitStep, VbdReport, VbdSettings, VertexStars};
 use crate::real::{finite, load, store, weight};
 use crate::{Real, Solver, XpbdError};
 
 /// How thorough a correction is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CorrectionSettings {
+pub struct CoarseCorrectionSettings {
     /// Iterations of conjugate gradients, at most.
     pub iterations: u32,
     /// Ends them once the residual of the linear system, in the norm of the preconditioner, has fallen to this part.
     pub reduction: f64,
-    /// Particles of an aggregate, about: see [`Correction::new`].
+    /// Particles of an aggregate, about: see [`CoarseCorrection::new`].
     pub aggregate: usize,
 }
 
-impl Default for CorrectionSettings {
+impl Default for CoarseCorrectionSettings {
     fn default() -> Self {
         Self {
             iterations: 50,
@@ -42,7 +42,7 @@ impl Default for CorrectionSettings {
 
 /// What a correction did.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct CorrectionReport {
+pub struct CoarseCorrectionReport {
     /// Iterations of conjugate gradients.
     pub iterations: u32,
     /// The part of the direction that was taken; 0 if no part of it lowers the potential.
@@ -51,8 +51,8 @@ pub struct CorrectionReport {
 
 /// Matrix, aggregates and vectors of a correction. It belongs to the stars it was made of.
 #[derive(Clone, Debug)]
-pub struct Correction<R: Real> {
-    settings: CorrectionSettings,
+pub struct CoarseCorrection<R: Real> {
+    settings: CoarseCorrectionSettings,
     matrix: Blocks<R>,
     coarse: Coarse,
     conjugate: Conjugate<R>,
@@ -70,7 +70,7 @@ const IDLE_ROUNDS: u32 = 2;
 /// A gain below this part of the potential is lost in its rounding.
 const ROUNDING: f64 = 1e-11;
 
-impl<R: Real> Correction<R> {
+impl<R: Real> CoarseCorrection<R> {
     /// Bytes of all arrays. O(1).
     #[must_use]
     pub fn bytes(&self) -> usize {
@@ -90,7 +90,10 @@ impl<R: Real> Correction<R> {
     /// # Errors
     /// [`XpbdError::Setting`] if there are no iterations, the reduction is not between 0 and 1 or an aggregate has no
     /// particle.
-    pub fn new(stars: &Stars<R>, settings: CorrectionSettings) -> Result<Self, XpbdError> {
+    pub fn new(
+        stars: &VertexStars<R>,
+        settings: CoarseCorrectionSettings,
+    ) -> Result<Self, XpbdError> {
         let refuse = |what, value, range| Err(XpbdError::Setting { what, value, range });
         if settings.iterations == 0 {
             return refuse("iterations", 0.0, "at least 1");
@@ -122,11 +125,11 @@ impl<R: Real> Correction<R> {
 }
 
 impl<R: Real> Solver<R> {
-    /// As [`Solver::descend`], with a correction after each sweep. A substep also ends when two corrections in a row find
+    /// As [`Solver::step_vbd`], with a correction after each sweep. A substep also ends when two corrections in a row find
     /// nothing to gain: in single precision that is soon so in a stiff body.
     ///
     /// # Errors
-    /// As [`Solver::descend`].
+    /// As [`Solver::step_vbd`].
     ///
     /// # Panics
     /// If stars or correction are those of another number of particles or tets.
@@ -139,7 +142,7 @@ impl<R: Real> Solver<R> {
     /// ```
     /// use glam::DVec3;
     /// use incise_graph::{Clustering, ColorId, Coloring, Schedule};
-    /// use incise_xpbd::{Correction, CorrectionSettings, DescentSettings, Material, Solver, Stars};
+    /// use incise_xpbd::{CoarseCorrection, CoarseCorrectionSettings, VbdSettings, Material, Solver, VertexStars};
     ///
     /// let rest = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE];
     /// let steel = Material { young_modulus: 2e11, poisson_ratio: 0.3, density: 7800.0, damping: 0.0 };
@@ -155,24 +158,24 @@ impl<R: Real> Solver<R> {
     ///
     /// // Particles 0 and 4 share no tet, so they share a color.
     /// let colors = Coloring::new([0, 1, 2, 3, 0].map(ColorId).to_vec());
-    /// let mut stars = Stars::new(&solver, &Schedule::new(&Clustering::none(5), &colors))?;
-    /// let mut correction = Correction::new(&stars, CorrectionSettings::default())?;
-    /// let mut settings = DescentSettings::new(1.0 / 60.0, 20);
+    /// let mut stars = VertexStars::new(&solver, &Schedule::new(&Clustering::none(5), &colors))?;
+    /// let mut correction = CoarseCorrection::new(&stars, CoarseCorrectionSettings::default())?;
+    /// let mut settings = VbdSettings::new(1.0 / 60.0, 20);
     /// settings.step.gravity = Some(DVec3::new(0.0, 0.0, -9.81));
     /// settings.tolerance = Some(1e-9);
-    /// let report = solver.descend_corrected(&mut stars, &mut correction, &settings)?;
+    /// let report = solver.step_vbd_two_level(&mut stars, &mut correction, &settings)?;
     /// assert!(report.iterations < 10);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn descend_corrected(
+    pub fn step_vbd_two_level(
         &mut self,
-        stars: &mut Stars<R>,
-        correction: &mut Correction<R>,
-        settings: &DescentSettings,
-    ) -> Result<DescentReport, XpbdError> {
-        let _span = tracing::debug_span!("xpbd::descend_corrected").entered();
+        stars: &mut VertexStars<R>,
+        correction: &mut CoarseCorrection<R>,
+        settings: &VbdSettings,
+    ) -> Result<VbdReport, XpbdError> {
+        let _span = tracing::debug_span!("xpbd::step_vbd_two_level").entered();
         let mut idle = 0;
-        self.frame_of_descent(stars, settings, |step| {
+        self.frame_of_vbd(stars, settings, |step| {
             step.sweep();
             let taken = step.correct(correction).taken;
             idle = if taken > 0.0 { 0 } else { idle + 1 };
@@ -188,8 +191,8 @@ impl<R: Real> ImplicitStep<'_, R> {
     ///
     /// # Panics
     /// If the correction is that of other stars.
-    pub fn correct(&mut self, correction: &mut Correction<R>) -> CorrectionReport {
-        let Correction {
+    pub fn correct(&mut self, correction: &mut CoarseCorrection<R>) -> CoarseCorrectionReport {
+        let CoarseCorrection {
             settings,
             matrix,
             coarse,
@@ -230,7 +233,7 @@ impl<R: Real> ImplicitStep<'_, R> {
             .sum();
         let taken = self.search(base, direction, slope);
         self.solver.project_to_colliders(&self.obstacles);
-        CorrectionReport { iterations, taken }
+        CoarseCorrectionReport { iterations, taken }
     }
 
     /// Goes from `base` along a direction on which the potential falls by `slope` at first; returns how far.

@@ -1,4 +1,4 @@
-//! A primal method beside XPBD: block descent, particle by particle, on the potential of a backward Euler step.
+//! A primal method beside XPBD: block VBD, particle by particle, on the potential of a backward Euler step.
 //!
 //! A step of backward Euler is the minimum of the incremental potential
 //! `E(x) = ‖x - x̃‖²_M / (2 Δt²) + U(x)`, with `x̃` where the particles would be if they were free and `U` the Stable
@@ -13,25 +13,25 @@
 //! quadratic falls by `ω (2 - ω)` of the most it can.
 //!
 //! Sweeps damp what varies from tet to tet and hardly touch what varies over the body, the more so the stiffer
-//! it is. [`Correction`] adds a truncated Newton step for the whole body, preconditioned by aggregates of particles.
+//! it is. [`CoarseCorrection`] adds a truncated Newton step for the whole body, preconditioned by aggregates of particles.
 //!
-//! Source: Chen, Liu, Yang, Yuksel 2024 (vertex block descent). Cost: see [`Stars`] and [`ImplicitStep::sweep`].
+//! Source: Chen, Liu, Yang, Yuksel 2024 (vertex block VBD). Cost: see [`VertexStars`] and [`ImplicitStep::sweep`].
 
 mod aggregates;
 mod cholesky;
 mod coarse;
 mod conjugate;
+mod corner_term;
 mod correction;
 mod hessian;
 mod matrix;
 mod settings;
-mod spoke;
 mod stars;
 mod state;
 mod step;
 mod sweep;
 
-pub use correction::{Correction, CorrectionReport, CorrectionSettings};
-pub use settings::{DescentSettings, Guess};
-pub use stars::Stars;
-pub use step::{DescentReport, ImplicitStep};
+pub use correction::{CoarseCorrection, CoarseCorrectionReport, CoarseCorrectionSettings};
+pub use settings::{Guess, VbdSettings};
+pub use stars::VertexStars;
+pub use step::{ImplicitStep, VbdReport};

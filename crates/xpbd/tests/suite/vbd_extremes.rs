@@ -1,12 +1,12 @@
-//! Block descent from states nobody sane enters: finite always, and back to shape.
+//! Block VBD from states nobody sane enters: finite always, and back to shape.
 
 use glam::{DVec3, dvec3};
 use incise_mesh::generate::kuhn_box;
-use incise_xpbd::{Collider, DescentSettings, Material, Real};
+use incise_xpbd::{Collider, Material, Real, VbdSettings};
 
 use crate::body::{GRAVITY, Noise, RUBBER, body, within};
-use crate::descent::{falling, stars};
 use crate::extremes::{assert_finite, cases};
+use crate::vbd::{falling, stars};
 
 fn all_survive<R: Real>() {
     for (what, (mesh, material, time_step, prepare)) in cases::<R>() {
@@ -14,12 +14,12 @@ fn all_survive<R: Real>() {
             let mut solver = body::<R>(&mesh, material);
             prepare(&mut solver);
             let mut stars = stars(&solver);
-            let mut settings = DescentSettings::new(time_step, iterations);
+            let mut settings = VbdSettings::new(time_step, iterations);
             settings.step.substeps = substeps;
             settings.step.gravity = Some(GRAVITY);
             settings.step.colliders = vec![Collider::ground(-1.0, 0.5)];
             for _ in 0..10 {
-                solver.descend(&mut stars, &settings).unwrap();
+                solver.step_vbd(&mut stars, &settings).unwrap();
             }
             assert_finite(&solver, &format!("{what}, {substeps} x {iterations}"));
         }
@@ -27,12 +27,12 @@ fn all_survive<R: Real>() {
 }
 
 #[test]
-fn descent_stays_finite_in_single_precision() {
+fn vbd_stays_finite_in_single_precision() {
     all_survive::<f32>();
 }
 
 #[test]
-fn descent_stays_finite_in_double_precision() {
+fn vbd_stays_finite_in_double_precision() {
     all_survive::<f64>();
 }
 
@@ -61,7 +61,7 @@ fn recover<R: Real>(
         settings.step.gravity = None;
     }
     for _ in 0..60 {
-        assert_eq!(solver.descend(&mut stars, &settings).unwrap().repaired, 0);
+        assert_eq!(solver.step_vbd(&mut stars, &settings).unwrap().repaired, 0);
     }
     let volume = solver.volume();
     (volume.inverted, volume.total / volume.rest)

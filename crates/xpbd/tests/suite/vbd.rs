@@ -1,10 +1,10 @@
-//! Block descent: it converges to the backward Euler step, never uphill, the same on any number of threads.
+//! Block VBD: it converges to the backward Euler step, never uphill, the same on any number of threads.
 
 use glam::{DVec3, dvec3};
 use incise_graph::{Clustering, ColorId, Coloring, GraphError, Schedule};
 use incise_mesh::{TetMesh, generate::kuhn_box};
 use incise_xpbd::{
-    Collider, ColliderShape, DescentSettings, Guess, ImplicitStep, Material, Real, Solver, Stars,
+    Collider, ColliderShape, Guess, ImplicitStep, Material, Real, Solver, VbdSettings, VertexStars,
     XpbdError,
 };
 
@@ -14,8 +14,8 @@ use crate::body::{
 use crate::determinism::hash;
 
 /// The stars of a body by greedy coloring.
-pub(crate) fn stars<R: Real>(solver: &Solver<R>) -> Stars<R> {
-    Stars::new(solver, &schedule(solver)).unwrap()
+pub(crate) fn stars<R: Real>(solver: &Solver<R>) -> VertexStars<R> {
+    VertexStars::new(solver, &schedule(solver)).unwrap()
 }
 
 fn schedule<R: Real>(solver: &Solver<R>) -> Schedule {
@@ -37,8 +37,8 @@ pub(crate) fn held_beam<R: Real>(material: Material) -> Solver<R> {
     solver
 }
 
-pub(crate) fn falling(iterations: u32) -> DescentSettings {
-    let mut settings = DescentSettings::new(1.0 / 60.0, iterations);
+pub(crate) fn falling(iterations: u32) -> VbdSettings {
+    let mut settings = VbdSettings::new(1.0 / 60.0, iterations);
     settings.step.gravity = Some(GRAVITY);
     settings
 }
@@ -52,7 +52,7 @@ fn sweeps_converge_to_the_backward_euler_step() {
     let mut settings = falling(5000);
     settings.step.relaxation = 1.7;
     settings.tolerance = Some(1e-9);
-    let report = solver.descend(&mut stars, &settings).unwrap();
+    let report = solver.step_vbd(&mut stars, &settings).unwrap();
     assert!(report.iterations < 5000, "{report:?}");
     within("residual", report.residual.unwrap(), 1e-9);
 }
@@ -67,13 +67,13 @@ fn the_solution_does_not_depend_on_the_way() {
         let colored = incise_coloring::color(coloring.parse().unwrap(), &incidence, 0).unwrap();
         let clusters = Clustering::none(incidence.constraint_count());
         let schedule = Schedule::new(&clusters, &colored.coloring);
-        let mut stars = Stars::new(&solver, &schedule).unwrap();
+        let mut stars = VertexStars::new(&solver, &schedule).unwrap();
         let mut settings = falling(5000);
         settings.guess = guess;
         settings.step.relaxation = relaxation;
         settings.tolerance = Some(1e-10);
         for _ in 0..3 {
-            let report = solver.descend(&mut stars, &settings).unwrap();
+            let report = solver.step_vbd(&mut stars, &settings).unwrap();
             assert!(report.residual.unwrap() <= 1e-10, "{report:?}");
         }
         positions(&solver)
@@ -174,7 +174,7 @@ fn a_body_at_rest_stays_at_rest_at_any_kappa() {
         let time = substep(&solver, kappa).time_step;
         for _ in 0..100 {
             solver
-                .descend(&mut stars, &DescentSettings::new(time, 5))
+                .step_vbd(&mut stars, &VbdSettings::new(time, 5))
                 .unwrap();
         }
         largest_distance(&positions(&solver), &mesh.positions) * 16.0
@@ -194,7 +194,7 @@ fn free_fall_is_the_closed_form() {
     let mut stars = stars(&solver);
     let settings = falling(3);
     for _ in 0..30 {
-        solver.descend(&mut stars, &settings).unwrap();
+        solver.step_vbd(&mut stars, &settings).unwrap();
     }
     let fall = 9.81 * settings.step.time_step.powi(2) * 30.0 * 31.0 / 2.0;
     for (p, x) in mesh.positions.iter().enumerate() {
@@ -206,7 +206,7 @@ fn free_fall_is_the_closed_form() {
     }
 }
 
-/// A beam that has come to rest by large steps of descent goes on by small ones of XPBD, and back. The sag of XPBD is
+/// A beam that has come to rest by large steps of VBD goes on by small ones of XPBD, and back. The sag of XPBD is
 /// too large by a share of kappa, so the tip swings by twice that: 20 % at kappa 0.3, below 3 % at the 0.02 used here.
 #[test]
 fn methods_may_change_between_frames() {
@@ -217,7 +217,7 @@ fn methods_may_change_between_frames() {
     let mut settings = falling(300);
     settings.step.relaxation = 1.6;
     for _ in 0..60 {
-        solver.descend(&mut stars, &settings).unwrap();
+        solver.step_vbd(&mut stars, &settings).unwrap();
     }
     let tip = |solver: &Solver<f64>| solver.position(mesh.positions.len() - 1).z;
     let settled = tip(&solver);
@@ -234,11 +234,11 @@ fn methods_may_change_between_frames() {
             0.03,
         );
     }
-    assert_eq!(solver.descend(&mut stars, &settings).unwrap().repaired, 0);
+    assert_eq!(solver.step_vbd(&mut stars, &settings).unwrap().repaired, 0);
 }
 
 /// Everything a step can do, at once.
-pub(crate) fn everything() -> DescentSettings {
+pub(crate) fn everything() -> VbdSettings {
     let mut settings = falling(4);
     settings.step.substeps = 2;
     settings.step.relaxation = 1.3;
@@ -260,7 +260,7 @@ fn state<R: Real>(threads: usize) -> u64 {
         .unwrap();
     pool.install(|| {
         for _ in 0..2 {
-            solver.descend(&mut stars, &everything()).unwrap();
+            solver.step_vbd(&mut stars, &everything()).unwrap();
         }
     });
     bits(&solver)
@@ -307,7 +307,7 @@ fn bad_settings_and_schedules_are_refused() {
             "tolerance" => settings.tolerance = Some(value),
             _ => settings.step.time_step = value,
         }
-        let error = solver.descend(&mut stars, &settings).unwrap_err();
+        let error = solver.step_vbd(&mut stars, &settings).unwrap_err();
         assert!(
             matches!(error, XpbdError::Setting { what, .. } if what == name),
             "{error}"
@@ -319,7 +319,7 @@ fn bad_settings_and_schedules_are_refused() {
         &Clustering::none(count),
         &Coloring::new(vec![ColorId(0); count]),
     );
-    let error = Stars::new(&solver, &one_color).unwrap_err();
+    let error = VertexStars::new(&solver, &one_color).unwrap_err();
     assert!(
         matches!(error, GraphError::ClustersCollide { .. }),
         "{error}"
@@ -332,7 +332,7 @@ fn stars_of_another_body_are_refused() {
     let mut solver = held_beam::<f32>(RUBBER);
     let mut stars = stars(&solver);
     solver.push_copy(0);
-    let _ = solver.descend(&mut stars, &falling(1));
+    let _ = solver.step_vbd(&mut stars, &falling(1));
 }
 
 /// Held particles stay to the bit, and nothing ends below the ground.
@@ -351,7 +351,7 @@ fn held_particles_stay_and_the_ground_holds() {
     let mut settings = everything();
     settings.step.colliders = vec![Collider::ground(height, 0.3)];
     for _ in 0..60 {
-        solver.descend(&mut stars, &settings).unwrap();
+        solver.step_vbd(&mut stars, &settings).unwrap();
         assert_eq!(
             (solver.position(5), solver.velocity(5)),
             (held, DVec3::ZERO)
@@ -371,7 +371,7 @@ fn stars_follow_a_cut() {
     let mut solver = body::<f64>(&mesh, RUBBER);
     let mut stars = stars(&solver);
     let settings = falling(5);
-    solver.descend(&mut stars, &settings).unwrap();
+    solver.step_vbd(&mut stars, &settings).unwrap();
     // Copies of the particles in the middle plane, for the tets on its right.
     let mut copy_of = vec![None; mesh.positions.len()];
     for (p, copy) in copy_of.iter_mut().enumerate() {
@@ -395,7 +395,7 @@ fn stars_follow_a_cut() {
     }
     let schedule = schedule(&solver);
     stars.rebuild(&solver, &schedule).unwrap();
-    let mut other = Stars::new(&solver, &schedule).unwrap();
+    let mut other = VertexStars::new(&solver, &schedule).unwrap();
     assert_eq!(format!("{stars:?}"), format!("{other:?}"));
     // The right half is pushed; the left one does not feel it.
     let left: Vec<usize> = (0..mesh.positions.len())
@@ -405,7 +405,7 @@ fn stars_follow_a_cut() {
         solver.set_velocity(p, DVec3::X * 0.1);
     }
     for _ in 0..10 {
-        solver.descend(&mut other, &settings).unwrap();
+        solver.step_vbd(&mut other, &settings).unwrap();
     }
     for p in left {
         within("left", solver.velocity(p).x.abs(), 1e-9);

@@ -1,6 +1,6 @@
 //! [`Blocks`]: the matrix of a Newton step, one 3×3 block for each pair of particles with a common tet.
 //!
-//! Rows and columns follow the solving order of the stars, so colors are contiguous and rows are filled from the spokes,
+//! Rows and columns follow the solving order of the stars, so colors are contiguous and rows are filled from the terms,
 //! every row by itself: no two threads write the same block, and each sum has one order. Cost: 9 numbers an edge and
 //! direction; a product is twice as many operations as numbers.
 
@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::Stars;
+use super::VertexStars;
 use super::hessian::held_excess;
 use crate::real::{load, weight};
 use crate::{Real, Solver};
@@ -29,7 +29,7 @@ pub(super) struct Blocks<R: Real> {
     /// The column of each block; the diagonal comes first in its row, the others ascend.
     pub(super) columns: Vec<u32>,
     pub(super) blocks: Vec<Block<R>>,
-    /// For each spoke, the place of its three blocks within its row.
+    /// For each term, the place of its three blocks within its row.
     places: Vec<[u32; 3]>,
     /// The held excess of each tet.
     excess: Vec<R>,
@@ -47,7 +47,7 @@ impl<R: Real> Blocks<R> {
     }
 
     /// The pattern of some stars; no values yet. O(pairs log valence).
-    pub(super) fn new(stars: &Stars<R>) -> Self {
+    pub(super) fn new(stars: &VertexStars<R>) -> Self {
         let rows = stars.order.len();
         let mut row_of = vec![0u32; rows];
         for (row, &p) in (0u32..).zip(&stars.order) {
@@ -56,7 +56,7 @@ impl<R: Real> Blocks<R> {
         let mut offsets = vec![0];
         let mut upper = Vec::with_capacity(rows);
         let mut columns = Vec::new();
-        let mut places = Vec::with_capacity(stars.spokes.len());
+        let mut places = Vec::with_capacity(stars.terms.len());
         let mut neighbors: Vec<u32> = Vec::new();
         for (row, diagonal) in (0..rows).zip(0u32..) {
             neighbors.clear();
@@ -72,8 +72,8 @@ impl<R: Real> Blocks<R> {
             columns.push(diagonal);
             upper.push(columns.len() + neighbors.partition_point(|&column| column < diagonal));
             columns.extend(&neighbors);
-            for spoke in stars.of(row) {
-                places.push(spoke.others.map(|p| {
+            for term in stars.of(row) {
+                places.push(term.others.map(|p| {
                     let found = neighbors.binary_search(&row_of[p as usize]);
                     let place = found.expect("a neighbor is in the list of neighbors") + 1;
                     u32::try_from(place).expect("a row has fewer blocks than there are particles")
@@ -97,7 +97,7 @@ impl<R: Real> Blocks<R> {
     pub(super) fn fill(
         &mut self,
         solver: &Solver<R>,
-        stars: &Stars<R>,
+        stars: &VertexStars<R>,
         time: R,
         held: &[bool],
         force: &mut [R::Vector],
@@ -152,21 +152,21 @@ impl<R: Real> Blocks<R> {
                 let mut isotropic = inertia;
                 let pairs = stars.offsets[row]..stars.offsets[row + 1];
                 for pair in pairs {
-                    let spoke = &stars.spokes[pair];
-                    let [a, b, c] = spoke
+                    let term = &stars.terms[pair];
+                    let [a, b, c] = term
                         .others
                         .map(|p| load::<R>(&solver.particles[p as usize]) - x);
-                    let [wa, wb, wc] = spoke.pulls;
-                    let slope = R::cross(b - a, c - a) * spoke.slope;
-                    let lack = R::dot(slope, a) - spoke.target;
+                    let [wa, wb, wc] = term.pulls;
+                    let slope = R::cross(b - a, c - a) * term.slope;
+                    let lack = R::dot(slope, a) - term.target;
                     *force += slope * lack - (a * wa + b * wb + c * wc);
                     isotropic -= wa + wb + wc;
                     // Gradients of √(lV) det F at this particle (minus slope) and at the others.
-                    let held = spoke.slope * excess[stars.tets[pair] as usize];
+                    let held = term.slope * excess[stars.tets[pair] as usize];
                     add_outer::<R>(&mut blocks[0], slope, slope);
                     let around = [(a, b, c, wa), (b, c, a, wb), (c, a, b, wc)];
                     for ((_, b, c, pull), place) in around.into_iter().zip(places[pair]) {
-                        let gradient = R::cross(b, c) * spoke.slope;
+                        let gradient = R::cross(b, c) * term.slope;
                         let block = &mut blocks[place as usize];
                         add_outer::<R>(block, -slope, gradient);
                         add_isotropic::<R>(block, pull);
@@ -218,8 +218,8 @@ impl<R: Real> Blocks<R> {
     }
 
     /// Whether this is the pattern of as many rows and pairs.
-    pub(super) fn belongs_to(&self, stars: &Stars<R>) -> bool {
-        self.offsets.len() == stars.order.len() + 1 && self.places.len() == stars.spokes.len()
+    pub(super) fn belongs_to(&self, stars: &VertexStars<R>) -> bool {
+        self.offsets.len() == stars.order.len() + 1 && self.places.len() == stars.terms.len()
     }
 
     /// The columns and blocks of a row.
@@ -270,7 +270,7 @@ mod tests {
     use incise_graph::{Clustering, ColorId, Coloring, Schedule};
 
     use super::*;
-    use crate::{DescentSettings, ImplicitStep, Material};
+    use crate::{ImplicitStep, Material, VbdSettings};
 
     /// Where no pressure is held back (a body stretched a little), the matrix is the second derivative of the
     /// potential: differences of the forces with step 1e-6, good to 1e-9 of the stiffness.
@@ -298,10 +298,10 @@ mod tests {
         }
         let colors = Coloring::new([0, 1, 2, 3, 0].map(ColorId).to_vec());
         let schedule = Schedule::new(&Clustering::none(5), &colors);
-        let mut stars = Stars::new(&solver, &schedule).expect("a proper coloring");
+        let mut stars = VertexStars::new(&solver, &schedule).expect("a proper coloring");
         let order = stars.order.clone();
         let mut blocks = Blocks::new(&stars);
-        let settings = DescentSettings::new(0.1, 1);
+        let settings = VbdSettings::new(0.1, 1);
         let step = ImplicitStep::new(&mut solver, &mut stars, &settings).expect("sound");
         let mut forces = vec![DVec3::ZERO; 5];
         blocks.fill(step.solver, step.stars, 0.1, &[false; 5], &mut forces);

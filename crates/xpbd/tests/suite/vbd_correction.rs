@@ -3,23 +3,23 @@
 use glam::{DVec3, dvec3};
 use incise_mesh::generate::kuhn_box;
 use incise_xpbd::{
-    Collider, Correction, CorrectionReport, CorrectionSettings, DescentSettings, ImplicitStep,
-    Material, Real, Solver, Stars, XpbdError,
+    CoarseCorrection, CoarseCorrectionReport, CoarseCorrectionSettings, Collider, ImplicitStep,
+    Material, Real, Solver, VbdSettings, VertexStars, XpbdError,
 };
 
 use crate::body::{GRAVITY, RUBBER, body, disturb, largest_distance, positions, within};
-use crate::descent::{bits, everything, falling, held_beam, stars};
 use crate::extremes::{assert_finite, cases};
+use crate::vbd::{bits, everything, falling, held_beam, stars};
 
 /// Small aggregates, so that a small body has some.
-const SMALL: CorrectionSettings = CorrectionSettings {
+const SMALL: CoarseCorrectionSettings = CoarseCorrectionSettings {
     iterations: 50,
     reduction: 0.03,
     aggregate: 12,
 };
 
-fn correction<R: Real>(stars: &Stars<R>) -> Correction<R> {
-    let correction = Correction::new(stars, SMALL).unwrap();
+fn correction<R: Real>(stars: &VertexStars<R>) -> CoarseCorrection<R> {
+    let correction = CoarseCorrection::new(stars, SMALL).unwrap();
     assert!(correction.aggregate_count() > 3);
     correction
 }
@@ -40,7 +40,7 @@ fn a_stiff_step_converges_in_a_few_rounds() {
     settings.tolerance = Some(1e-9);
     for _ in 0..5 {
         let report = solver
-            .descend_corrected(&mut stars, &mut correction, &settings)
+            .step_vbd_two_level(&mut stars, &mut correction, &settings)
             .unwrap();
         assert!(report.residual.unwrap() <= 1e-9, "{report:?}");
     }
@@ -56,9 +56,9 @@ fn corrections_lead_where_sweeps_lead() {
         settings.tolerance = Some(1e-10);
         for _ in 0..3 {
             let report = if corrected {
-                solver.descend_corrected(&mut stars, &mut correction, &settings)
+                solver.step_vbd_two_level(&mut stars, &mut correction, &settings)
             } else {
-                solver.descend(&mut stars, &settings)
+                solver.step_vbd(&mut stars, &settings)
             };
             assert!(report.unwrap().residual.unwrap() <= 1e-10);
         }
@@ -104,7 +104,7 @@ fn corrections_never_raise_the_potential() {
                 if round % 2 == 1 {
                     step.sweep();
                 }
-                let CorrectionReport { taken, .. } = step.correct(&mut correction);
+                let CoarseCorrectionReport { taken, .. } = step.correct(&mut correction);
                 assert!((0.0..=1.0).contains(&taken));
                 let now = step.potential();
                 within("rise", now - last, 1e-10 * start.abs());
@@ -120,7 +120,8 @@ fn state<R: Real>(threads: usize) -> u64 {
     let mut solver = body::<R>(&mesh, RUBBER);
     disturb(&mut solver, 0.01, 6);
     let mut stars = stars(&solver);
-    let mut correction = Correction::new(&stars, CorrectionSettings::default()).unwrap();
+    let mut correction =
+        CoarseCorrection::new(&stars, CoarseCorrectionSettings::default()).unwrap();
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()
@@ -128,7 +129,7 @@ fn state<R: Real>(threads: usize) -> u64 {
     pool.install(|| {
         for _ in 0..2 {
             solver
-                .descend_corrected(&mut stars, &mut correction, &everything())
+                .step_vbd_two_level(&mut stars, &mut correction, &everything())
                 .unwrap();
         }
     });
@@ -148,13 +149,13 @@ fn all_survive<R: Real>() {
         let mut solver = body::<R>(&mesh, material);
         prepare(&mut solver);
         let mut stars = stars(&solver);
-        let mut correction = Correction::new(&stars, SMALL).unwrap();
-        let mut settings = DescentSettings::new(time_step, 2);
+        let mut correction = CoarseCorrection::new(&stars, SMALL).unwrap();
+        let mut settings = VbdSettings::new(time_step, 2);
         settings.step.gravity = Some(GRAVITY);
         settings.step.colliders = vec![Collider::ground(-1.0, 0.5)];
         for _ in 0..5 {
             solver
-                .descend_corrected(&mut stars, &mut correction, &settings)
+                .step_vbd_two_level(&mut stars, &mut correction, &settings)
                 .unwrap();
         }
         assert_finite(&solver, &what);
@@ -177,12 +178,12 @@ fn the_ground_holds_under_corrections() {
     let mesh = kuhn_box([3, 3, 3], DVec3::splat(0.3));
     let mut solver = body::<f64>(&mesh, RUBBER);
     let mut stars = stars(&solver);
-    let mut correction = Correction::new(&stars, SMALL).unwrap();
+    let mut correction = CoarseCorrection::new(&stars, SMALL).unwrap();
     let mut settings = falling(6);
     settings.step.colliders = vec![Collider::ground(-0.02, 0.5)];
     for _ in 0..120 {
         solver
-            .descend_corrected(&mut stars, &mut correction, &settings)
+            .step_vbd_two_level(&mut stars, &mut correction, &settings)
             .unwrap();
         assert!(positions(&solver).iter().all(|x| x.z >= -0.02));
     }
@@ -215,10 +216,10 @@ fn nothing_couples_separate_pieces() {
         }
     }
     let mut stars = stars(&solver);
-    let mut correction = Correction::new(&stars, SMALL).unwrap();
+    let mut correction = CoarseCorrection::new(&stars, SMALL).unwrap();
     for _ in 0..5 {
         solver
-            .descend_corrected(&mut stars, &mut correction, &DescentSettings::new(0.01, 3))
+            .step_vbd_two_level(&mut stars, &mut correction, &VbdSettings::new(0.01, 3))
             .unwrap();
     }
     for p in 0..count as usize {
@@ -233,34 +234,34 @@ fn bad_settings_are_refused() {
     for (name, settings) in [
         (
             "iterations",
-            CorrectionSettings {
+            CoarseCorrectionSettings {
                 iterations: 0,
                 ..SMALL
             },
         ),
         (
             "reduction",
-            CorrectionSettings {
+            CoarseCorrectionSettings {
                 reduction: 1.0,
                 ..SMALL
             },
         ),
         (
             "reduction",
-            CorrectionSettings {
+            CoarseCorrectionSettings {
                 reduction: f64::NAN,
                 ..SMALL
             },
         ),
         (
             "aggregate",
-            CorrectionSettings {
+            CoarseCorrectionSettings {
                 aggregate: 0,
                 ..SMALL
             },
         ),
     ] {
-        let error = Correction::new(&stars, settings).unwrap_err();
+        let error = CoarseCorrection::new(&stars, settings).unwrap_err();
         assert!(
             matches!(error, XpbdError::Setting { what, .. } if what == name),
             "{error}"

@@ -116,7 +116,7 @@ mod tests {
     use incise_graph::{Clustering, ColorId, Coloring, Schedule};
 
     use super::*;
-    use crate::{DescentSettings, Material, Solver, Stars};
+    use crate::{Material, Solver, VbdSettings, VertexStars};
 
     /// Central differences of the potential with step 1e-6 of a unit tet: 1e-12 of the third derivatives, and rounding
     /// 1e-16 of the potential over the step, together below 1e-8 of the stiffness.
@@ -145,8 +145,8 @@ mod tests {
         }
         let colors = Coloring::new([0, 1, 2, 3, 0].map(ColorId).to_vec());
         let schedule = Schedule::new(&Clustering::none(5), &colors);
-        let mut stars = Stars::new(&solver, &schedule).expect("a proper coloring");
-        let mut settings = DescentSettings::new(0.1, 1);
+        let mut stars = VertexStars::new(&solver, &schedule).expect("a proper coloring");
+        let mut settings = VbdSettings::new(0.1, 1);
         settings.step.gravity = Some(DVec3::NEG_Z);
         let mut step = ImplicitStep::new(&mut solver, &mut stars, &settings).expect("sound");
         step.sweep();

@@ -1,4 +1,4 @@
-//! [`Spoke`]: what one particle sees of one of its tets.
+//! [`CornerTerm`]: what one particle sees of one of its tets.
 //!
 //! With the other corners a, b, c relative to the particle's position and `n = (b - a) × (c - a)`, the determinant of F
 //! is `n · a / 6V`, and the pull of `|F|²` is a weighted sum of a, b and c. So a particle needs eight numbers of a tet,
@@ -12,7 +12,7 @@ pub(super) const OTHERS: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [3, 0, 1], [2,
 
 /// A tet seen from one of its particles: 32 bytes in single precision.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Spoke<R> {
+pub(super) struct CornerTerm<R> {
     /// The other particles, in an order that makes `n · a` positive at rest.
     pub(super) others: [u32; 3],
     /// `μV q · q'` with q' of each other particle: the gradient of `μV/2 |F|²` is the sum of these times a, b, c.
@@ -23,7 +23,7 @@ pub(super) struct Spoke<R> {
     pub(super) target: R,
 }
 
-impl<R: Real> Spoke<R> {
+impl<R: Real> CornerTerm<R> {
     /// What a corner sees of a tet, computed in double precision and rounded once; `None` if the tet takes no part.
     pub(super) fn new(tet: &TetConstraint<f64>, corner: usize) -> Option<Self> {
         if tet.stiffness <= 0.0 {
