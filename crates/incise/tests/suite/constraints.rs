@@ -196,7 +196,7 @@ fn unknown_keys_name_the_nearest() {
             "half_extents",
         ),
         ("[[handle]]\nhold = []", "holds"),
-        ("[[link]]\ntet_solve = 1", "from"),
+        ("[[link]]\nform = 1", "from"),
         ("[[body]]\nvolume_complience = 1", "volume_compliance"),
         ("[[colider]]", "collider"),
     ] {
