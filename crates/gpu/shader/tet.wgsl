@@ -1,4 +1,4 @@
-// The Stable Neo-Hookean constraints of a tet: what moves its corners. Twin: `lanes.rs` of incise-xpbd, which explains
+// The Stable Neo-Hookean constraints of a tet: what moves its corners. Twin: `simd_kernel.rs` of incise-xpbd, which explains
 // the equations; the order of operations is the same.
 
 override DAMPED: bool = false;

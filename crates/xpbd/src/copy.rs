@@ -48,6 +48,8 @@ impl<R: Real> Clone for Solver<R> {
             level: self.level,
             multipliers: Vec::new(),
             kept: self.kept.clone(),
+            kept_form: self.kept_form,
+            shared_velocities: Vec::new(),
             jacobi: None,
             obstacles: Vec::new(),
             predicted: self.predicted.clone(),

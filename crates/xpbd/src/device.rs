@@ -8,8 +8,8 @@ use glam::DVec3;
 use incise_graph::Schedule;
 
 use crate::collider::Obstacle;
-use crate::lanes::STEEP;
 use crate::layout::{CONSTANTS, REST};
+use crate::simd_kernel::MAX_COFACTOR_NORM;
 use crate::{Pose, Real, Solver, StepSettings};
 
 /// A tet as a kernel wants it.
@@ -308,7 +308,7 @@ impl<R: Real> Solver<R> {
 impl Solver<f32> {
     /// The norm of the derivative of det F (√3 at rest) up to which tets resist a change of volume as their material says;
     /// from there on derivative, det F and γ are scaled down to it.
-    pub const STEEP: f64 = STEEP;
+    pub const MAX_COFACTOR_NORM: f64 = MAX_COFACTOR_NORM;
 
     /// The colliders `elapsed` s after the start of the frame, at the end of a substep, relative to the origin, as 20
     /// numbers each.

@@ -6,6 +6,8 @@
 //! near where XPBD would with infinitely many passes (the gap vanishes with kappa), not at the step of backward Euler:
 //! see [`crate::Residuals::force`], and use substeps for accuracy.
 //!
+//! The constraints are those of [`TetSolve::Block`]; damped materials are refused.
+//!
 //! With the rows and columns scaled by the root of stiffness times Δt² the matrix is a positive semidefinite one plus
 //! the identity, so it is regular whatever the state: at rest both gradients of a tet are parallel, and only the
 //! compliance, here the identity, keeps them apart.
@@ -23,7 +25,7 @@ use glam::DVec3;
 use crate::collider::Obstacle;
 use crate::neo_hookean::Evaluation;
 use crate::real::{store, weight};
-use crate::{Real, Solver, StepReport, StepSettings, XpbdError};
+use crate::{Real, Solver, StepReport, StepSettings, TetSolve, XpbdError};
 
 /// What stays the same over a frame: who is coupled with whom, and the order of elimination.
 struct Pattern {
@@ -40,8 +42,6 @@ struct Rows {
     evaluation: Evaluation<f64>,
     /// Roots of stiffness times Δt², the second less where the volume has a steep slope, as in the kernel.
     scales: [f64; 2],
-    /// One over one plus the damping, which is what the identity becomes with it.
-    compliance: f64,
 }
 
 impl Rows {
@@ -87,6 +87,9 @@ impl<R: Real> Solver<R> {
         let _span = tracing::debug_span!("xpbd::step_direct").entered();
         settings.check()?;
         self.refuse_soft_constraints()?;
+        if self.is_damped() {
+            return Err(XpbdError::Unknown { kind: "damping" });
+        }
         let before: Vec<_> = (0..self.particle_count())
             .map(|p| (self.vector(p), self.velocities[p]))
             .collect();
@@ -124,6 +127,7 @@ impl<R: Real> Solver<R> {
                 self.project_to_colliders(&obstacles);
             }
             self.kept.clear();
+            self.kept_form = TetSolve::Block;
             for t in 0..self.tet_count() {
                 let scales = self.scales(t, time);
                 let multiplier = |c| R::from_f64(scales[c] * multipliers[2 * t + c]);
@@ -158,8 +162,7 @@ impl<R: Real> Solver<R> {
         let mut change = faer::Col::<f64>::from_fn(multipliers.len(), |i| {
             let row = &rows[i / 2];
             let values = [row.evaluation.deviatoric, row.evaluation.hydrostatic];
-            let rate = (1.0 / row.compliance - 1.0) * self.rate(i, row);
-            -(row.scales[i % 2] * values[i % 2] + multipliers[i] + rate) * row.compliance
+            -(row.scales[i % 2] * values[i % 2] + multipliers[i])
         });
         factors.solve_in_place(&mut change);
         if !(0..multipliers.len()).all(|i| change[i].is_finite()) {
@@ -188,24 +191,12 @@ impl<R: Real> Solver<R> {
     }
 
     fn rows(&self, tet: usize, time: f64) -> Rows {
-        let damping = self.materials[usize::from(self.material_of[tet])].damping / time;
         let evaluation = self.evaluate(&self.tets[tet].to_f64());
         let [deviatoric, hydrostatic] = self.scales(tet, time);
         Rows {
             scales: [deviatoric, hydrostatic * evaluation.hydrostatic_scale()],
             evaluation,
-            compliance: 1.0 / (1.0 + damping),
         }
-    }
-
-    /// How far a constraint has come in the substep to first order, scaled: what damping resists.
-    fn rate(&self, row: usize, rows: &Rows) -> f64 {
-        let particles = self.tets[row / 2].particles.into_iter().enumerate();
-        let parts = particles.map(|(k, p)| {
-            let motion = self.local(p as usize) - R::to_dvec3(self.previous[p as usize]);
-            rows.gradient(row % 2, k).dot(motion)
-        });
-        parts.sum()
     }
 
     /// `None` if the pattern has more entries than can be counted.
@@ -256,8 +247,7 @@ impl<R: Real> Solver<R> {
 
     /// The values of the lower triangle in the order in which the pattern lists their places.
     fn entries(&self, pattern: &Pattern, rows: &[Rows]) -> Vec<f64> {
-        let diagonal = rows.iter().flat_map(|row| [row.compliance; 2]);
-        let mut entries: Vec<f64> = diagonal.collect();
+        let mut entries = vec![1.0; 2 * rows.len()];
         for p in 0..self.particle_count() {
             let weight = weight::<R>(&self.particles[p]).to_f64();
             let corners = &pattern.corners[pattern.offsets[p]..pattern.offsets[p + 1]];

@@ -5,48 +5,34 @@
 //! and rounds them in the same way whoever solves it, so threads and instruction sets change nothing but the time.
 //! A Jacobi pass goes the same way and writes elsewhere.
 //!
-//! Source: paper sections 3 and 4.1. Cost: see [`crate::lanes`]; a barrier a color.
+//! Source: paper sections 3 and 4.1. Cost: see [`crate::simd_kernel`]; a barrier a color.
 
 use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
 use crate::crew::in_rounds;
-use crate::lanes::{Kind, Pass, solve_block};
+use crate::simd_kernel::{Block, BlockKernel, Damping, Pass, Sequential, Split};
 use crate::{Real, TetSolve};
 
 /// Fewest blocks that a thread is given of a color: about a microsecond of work.
 const BLOCKS_A_THREAD: usize = 4;
 
-struct Plain;
-struct Damped;
-struct Sequential;
-
-impl Kind for Plain {
-    const DAMPED: bool = false;
-    const SEQUENTIAL: bool = false;
-}
-
-impl Kind for Damped {
-    const DAMPED: bool = true;
-    const SEQUENTIAL: bool = false;
-}
-
-impl Kind for Sequential {
-    const DAMPED: bool = true;
-    const SEQUENTIAL: bool = true;
-}
-
-/// Makes a pass.
-pub(crate) fn run<R: Real>(level: Level, damped: bool, form: TetSolve, pass: &Pass<'_, R>) {
-    match (form, damped) {
-        (TetSolve::Block, false) => with::<R, Plain>(level, pass),
-        (TetSolve::Block, true) => with::<R, Damped>(level, pass),
-        (TetSolve::Sequential, _) => with::<R, Sequential>(level, pass),
+/// Solves all tets once.
+pub(crate) fn solve<R: Real>(level: Level, form: TetSolve, pass: &Pass<'_, R>) {
+    match form {
+        TetSolve::Split => with::<R, Split>(level, pass),
+        TetSolve::Block => with::<R, Block>(level, pass),
+        TetSolve::Sequential => with::<R, Sequential>(level, pass),
     }
+}
+
+/// Damps the velocities at the corners of all tets once.
+pub(crate) fn damp<R: Real>(level: Level, pass: &Pass<'_, R>) {
+    with::<R, Damping>(level, pass);
 }
 
 /// Of the instruction sets of x86-64, SSE 4.2 has nothing over SSE 2 that the kernel needs.
 #[cfg(target_arch = "x86_64")]
-fn with<R: Real, K: Kind>(level: Level, pass: &Pass<'_, R>) {
+fn with<R: Real, K: BlockKernel>(level: Level, pass: &Pass<'_, R>) {
     if let Some(simd) = level.as_avx512() {
         colors::<R, _, K>(simd, pass);
     } else if let Some(simd) = level.as_avx2() {
@@ -58,7 +44,7 @@ fn with<R: Real, K: Kind>(level: Level, pass: &Pass<'_, R>) {
 }
 
 #[cfg(not(target_arch = "x86_64"))]
-fn with<R: Real, K: Kind>(level: Level, pass: &Pass<'_, R>) {
+fn with<R: Real, K: BlockKernel>(level: Level, pass: &Pass<'_, R>) {
     dispatch!(level, simd => colors::<R, _, K>(simd, pass));
 }
 
@@ -72,7 +58,7 @@ pub(crate) fn lanes<R: Real>(level: Level) -> usize {
 }
 
 #[inline(always)]
-fn colors<R: Real, S: Simd, K: Kind>(simd: S, pass: &Pass<'_, R>) {
+fn colors<R: Real, S: Simd, K: BlockKernel>(simd: S, pass: &Pass<'_, R>) {
     let layout = pass.layout;
     let threads = rayon::current_num_threads();
     let chunks = |color: usize| match layout.blocks_of(color) {
@@ -91,7 +77,7 @@ fn colors<R: Real, S: Simd, K: Kind>(simd: S, pass: &Pass<'_, R>) {
             || {
                 for &group in groups {
                     for block in layout.blocks(group) {
-                        solve_block::<R, S, K>(simd, pass, block);
+                        K::run(simd, pass, block);
                     }
                 }
             },

@@ -1,14 +1,13 @@
 //! [`TetConstraint`]: what a Stable Neo-Hookean tet is at rest, and its two constraints with their gradients.
 //!
 //! This is the plain form, one tet at a time: measurements use it in double precision, and it is the oracle of the
-//! kernel that steps use, [`crate::lanes`].
+//! kernel that steps use, [`crate::simd_kernel`].
 //!
 //! Source: Macklin and Müller 2021. Cost: 220 operations a tet.
 
 use glam::{DMat3, DVec3};
 
-#[cfg(any(test, feature = "direct"))]
-use crate::lanes::STEEP;
+use crate::simd_kernel::MAX_COFACTOR_NORM;
 use crate::{Material, Real};
 
 /// A tet with what the solver needs of its rest shape: 64 bytes in single precision.
@@ -33,6 +32,14 @@ pub(crate) struct Evaluation<R: Real> {
     /// The square of the norm of the derivative of det F; what only measures has no use for it.
     #[cfg(any(test, feature = "direct"))]
     slope_squared: R,
+}
+
+/// The two parts of the energy of the split form in units of μ.
+struct SplitEnergy<R: Real> {
+    shear: R,
+    derivative: [R::Vector; 3],
+    cofactor: [R::Vector; 3],
+    bulge: R,
 }
 
 impl<R: Real> TetConstraint<R> {
@@ -126,6 +133,63 @@ impl<R: Real> TetConstraint<R> {
         }
     }
 
+    /// Both constraints of [`crate::TetSolve::Split`] and their gradients: `√(2 Ψ_D / μ)`, of which the gradient is 0
+    /// where the constraint is, and `det F - 1`.
+    pub(crate) fn evaluate_split(&self, x: [R::Vector; 4]) -> Evaluation<R> {
+        let split = self.split_energy(x);
+        let twice = split.shear + split.shear;
+        let root = if twice > R::ZERO {
+            twice.sqrt()
+        } else {
+            R::ZERO
+        };
+        let scale = if root > R::ZERO {
+            R::ONE / root
+        } else {
+            R::ZERO
+        };
+        Evaluation {
+            deviatoric: root,
+            hydrostatic: split.bulge,
+            deviatoric_gradients: self.gradients(split.derivative.map(|column| column * scale)),
+            hydrostatic_gradients: self.gradients(split.cofactor),
+            #[cfg(any(test, feature = "direct"))]
+            slope_squared: R::ZERO,
+        }
+    }
+
+    /// `Ψ_D / μ` and its derivative, the derivative of the volume term and `J - 1`, the latter scaled down beyond
+    /// [`MAX_COFACTOR_NORM`].
+    fn split_energy(&self, x: [R::Vector; 4]) -> SplitEnergy<R> {
+        let [a, b, c] = self.deformation(x);
+        let mut cofactor = [R::cross(b, c), R::cross(c, a), R::cross(a, b)];
+        let mut bulge = R::dot(a, cofactor[0]) - R::ONE;
+        let [aa, bb, cc] = [a, b, c].map(|column| R::dot(column, column) - R::ONE);
+        let (ab, ac, bc) = (R::dot(a, b), R::dot(a, c), R::dot(b, c));
+        let second = aa * bb + aa * cc + bb * cc - ab * ab - ac * ac - bc * bc;
+        let third = aa * (bb * cc - bc * bc) - ab * (ab * cc - bc * ac) + ac * (ab * bc - bb * ac);
+        let mut shear = bulge * bulge - (second + third) * R::HALF;
+        let square = cofactor.iter().fold(R::ZERO, |sum, &c| sum + R::dot(c, c));
+        let limit = R::from_f64(MAX_COFACTOR_NORM);
+        if square > limit * limit {
+            let scale = limit / square.sqrt();
+            cofactor = cofactor.map(|column| column * scale);
+            bulge = bulge * scale;
+            shear = (aa + bb + cc) * R::HALF - bulge + bulge * bulge * R::HALF;
+        }
+        let pressure = bulge - R::ONE;
+        SplitEnergy {
+            shear,
+            derivative: [
+                a + cofactor[0] * pressure,
+                b + cofactor[1] * pressure,
+                c + cofactor[2] * pressure,
+            ],
+            cofactor,
+            bulge,
+        }
+    }
+
     /// The gradients at the corners of a function of F with the given derivative.
     #[inline]
     fn gradients(&self, derivative: [R::Vector; 3]) -> [R::Vector; 4] {
@@ -140,9 +204,9 @@ impl<R: Real> TetConstraint<R> {
 
 #[cfg(any(test, feature = "direct"))]
 impl<R: Real> Evaluation<R> {
-    /// What solvers scale the hydrostatic constraint by: 1, or less where det F has a slope beyond [`STEEP`].
+    /// What solvers scale the hydrostatic constraint by: 1, or less where det F has a slope beyond [`MAX_COFACTOR_NORM`].
     pub(crate) fn hydrostatic_scale(&self) -> R {
-        let limit = R::from_f64(STEEP);
+        let limit = R::from_f64(MAX_COFACTOR_NORM);
         if self.slope_squared > limit * limit {
             limit / self.slope_squared.sqrt()
         } else {
@@ -155,8 +219,7 @@ impl<R: Real> Evaluation<R> {
 impl<R: Real> TetConstraint<R> {
     /// The changes of both multipliers that satisfy both constraints to first order, `None` if there is no way to.
     ///
-    /// `rates` are the damped rates `γ ∇C · (x - xₙ)` with `damping` γ; both are zero without damping. The equations
-    /// are multiplied by stiffness and time squared, which makes the matrix one plus numbers of the order of kappa: as
+    /// The equations are multiplied by stiffness and time squared, which makes the matrix one plus numbers of the order of kappa: as
     /// they are usually written, with compliances, they leave the range of single precision for a body of micrometers.
     pub(crate) fn solve(
         &self,
@@ -164,8 +227,6 @@ impl<R: Real> TetConstraint<R> {
         weights: [R; 4],
         multipliers: [R; 2],
         time_squared: R,
-        damping: R,
-        rates: [R; 2],
     ) -> Option<[R; 2]> {
         let stiffness = self.stiffness * time_squared;
         let scale = e.hydrostatic_scale();
@@ -178,10 +239,9 @@ impl<R: Real> TetConstraint<R> {
                 + weights[3] * R::dot(g[3], h[3])
         };
         // The matrix is one plus [m11, m12; ratio · m12, ratio · m22].
-        let damped = R::ONE + damping;
-        let m11 = damped * weighted(&e.deviatoric_gradients, &e.deviatoric_gradients);
-        let m22 = damped * weighted(&e.hydrostatic_gradients, &e.hydrostatic_gradients);
-        let m12 = damped * weighted(&e.deviatoric_gradients, &e.hydrostatic_gradients);
+        let m11 = weighted(&e.deviatoric_gradients, &e.deviatoric_gradients);
+        let m22 = weighted(&e.hydrostatic_gradients, &e.hydrostatic_gradients);
+        let m12 = weighted(&e.deviatoric_gradients, &e.hydrostatic_gradients);
         // At rest the gradients are parallel and only the one keeps the system regular. The difference is not negative
         // (Cauchy-Schwarz); where rounding says otherwise, it is noise. Overflow makes it NaN and stays so.
         let parallel = m11 * m22 - m12 * m12;
@@ -191,11 +251,41 @@ impl<R: Real> TetConstraint<R> {
             parallel
         };
         let inverse = R::ONE / (ratio * (parallel + m22) + m11 + R::ONE);
-        let b1 = -(stiffness * (e.deviatoric + rates[0]) + multipliers[0]);
-        let b2 = -(stiffness * ratio * (e.hydrostatic + rates[1]) + multipliers[1]);
+        let b1 = -(stiffness * e.deviatoric + multipliers[0]);
+        let b2 = -(stiffness * ratio * e.hydrostatic + multipliers[1]);
         let d1 = ((ratio * m22 + R::ONE) * b1 - m12 * b2) * inverse;
         let d2 = ((m11 + R::ONE) * b2 - ratio * m12 * b1) * inverse;
         (d1 + d2).is_finite().then_some([d1, d2])
+    }
+}
+
+#[cfg(test)]
+impl<R: Real> TetConstraint<R> {
+    /// The changes of both multipliers of the split form in a single iteration.
+    pub(crate) fn solve_split(
+        &self,
+        e: &Evaluation<R>,
+        weights: [R; 4],
+        time_squared: R,
+    ) -> [R; 2] {
+        let stiffness = self.stiffness * time_squared;
+        let weighted = |g: &[R::Vector; 4], h: &[R::Vector; 4]| {
+            let products = (0..4).map(|k| weights[k] * R::dot(g[k], h[k]));
+            products.fold(R::ZERO, |sum, product| sum + product)
+        };
+        // The explicit step along √(2 Ψ_D), or the step to the linearized zero of that.
+        let explicit = stiffness * e.deviatoric;
+        let steepness = weighted(&e.deviatoric_gradients, &e.deviatoric_gradients);
+        let zero = e.deviatoric / steepness;
+        let d1 = -(if explicit < zero || steepness <= R::ZERO {
+            explicit
+        } else {
+            zero
+        });
+        let seen = e.hydrostatic + d1 * weighted(&e.deviatoric_gradients, &e.hydrostatic_gradients);
+        let lame = stiffness * (self.ratio - R::ONE);
+        let m = weighted(&e.hydrostatic_gradients, &e.hydrostatic_gradients);
+        [d1, -(lame * seen) / (lame * m + R::ONE)]
     }
 }
 
@@ -301,7 +391,7 @@ pub(crate) mod tests {
             let weights = [0.024; 4];
             let e = tet.evaluate(rest);
             let change = tet
-                .solve(&e, weights, [0.0; 2], time * time, 0.0, [0.0; 2])
+                .solve(&e, weights, [0.0; 2], time * time)
                 .expect("at rest there is a solution");
             let stress = RUBBER.mu() / 6.0 * time * time;
             assert!((change[0] / (-3.0f64.sqrt() * stress) - 1.0).abs() < 1e-9);

@@ -14,7 +14,7 @@ use glam::{DVec3, Vec3};
 
 use crate::TetSolve;
 use crate::gauss_seidel;
-use crate::lanes::Pass;
+use crate::simd_kernel::Pass;
 
 /// A scalar that the solver can compute with: `f32` or `f64`.
 pub trait Real:
@@ -55,6 +55,8 @@ pub trait Real:
     const ZERO: Self;
     /// One.
     const ONE: Self;
+    /// One half.
+    const HALF: Self;
     /// The distance from one to the next larger number.
     const EPSILON: Self;
 
@@ -90,7 +92,11 @@ pub trait Real:
     /// Makes a pass over tets. Here and not where it is called, so that it is compiled once for each precision, not
     /// in every crate that steps a solver.
     #[doc(hidden)]
-    fn solve_tets(level: Level, damped: bool, form: TetSolve, pass: &Pass<'_, Self>);
+    fn solve_tets(level: Level, form: TetSolve, pass: &Pass<'_, Self>);
+
+    /// Makes a damping pass over tets.
+    #[doc(hidden)]
+    fn damp_tets(level: Level, pass: &Pass<'_, Self>);
 
     /// Rounds a vector of doubles to this precision.
     #[inline]
@@ -119,6 +125,7 @@ macro_rules! real {
 
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
+            const HALF: Self = 0.5;
             const EPSILON: Self = <$scalar>::EPSILON;
 
             #[inline]
@@ -166,8 +173,12 @@ macro_rules! real {
                 cell.store(self.to_bits(), Ordering::Relaxed);
             }
             #[inline(never)]
-            fn solve_tets(level: Level, damped: bool, form: TetSolve, pass: &Pass<'_, Self>) {
-                gauss_seidel::run(level, damped, form, pass);
+            fn solve_tets(level: Level, form: TetSolve, pass: &Pass<'_, Self>) {
+                gauss_seidel::solve(level, form, pass);
+            }
+            #[inline(never)]
+            fn damp_tets(level: Level, pass: &Pass<'_, Self>) {
+                gauss_seidel::damp(level, pass);
             }
             #[inline(always)]
             fn particle(values: [Self; 4]) -> Self::Particle {

@@ -12,7 +12,7 @@ use glam::DVec3;
 
 use crate::neo_hookean::{Evaluation, TetConstraint};
 use crate::real::weight;
-use crate::{Real, Solver};
+use crate::{Real, Solver, TetSolve};
 
 /// How far the last substep is from a solution of its equations.
 ///
@@ -79,10 +79,10 @@ impl<R: Real> Solver<R> {
         let mut dual = Vec::new();
         for (t, tet) in self.tets.iter().enumerate() {
             let tet = tet.to_f64();
-            let stiffness = [tet.stiffness, tet.ratio * tet.stiffness];
-            let evaluation = self.evaluate(&tet);
+            let stiffness = self.kept_stiffness(&tet);
+            let evaluation = self.evaluate_kept(&tet);
             let values = [evaluation.deviatoric, evaluation.hydrostatic];
-            potential += tet.energy(&evaluation);
+            potential += tet.energy(&self.evaluate(&tet));
             let multipliers = self.kept[t].map(R::to_f64);
             for (k, &p) in tet.particles.iter().enumerate() {
                 let gradients = [
@@ -151,8 +151,8 @@ impl<R: Real> Solver<R> {
         let time_squared = substep_time * substep_time;
         let of_tet = |(tet, kept): (&TetConstraint<R>, &[R; 2])| {
             let tet = tet.to_f64();
-            let stiffness = [tet.stiffness, tet.ratio * tet.stiffness];
-            let evaluation = self.evaluate(&tet);
+            let stiffness = self.kept_stiffness(&tet);
+            let evaluation = self.evaluate_kept(&tet);
             let values = [evaluation.deviatoric, evaluation.hydrostatic];
             let left = unsatisfied(stiffness, values, kept.map(R::to_f64), time_squared);
             left.map_or(0.0, |left| norm(left.into_iter()))
@@ -174,7 +174,25 @@ impl<R: Real> Solver<R> {
         norm(particles.flat_map(|p| (gravity * self.masses[p]).to_array()))
     }
 
-    /// Both constraints of a tet at the present positions.
+    /// One over the compliances of both constraints, as the last substep solved them.
+    fn kept_stiffness(&self, tet: &TetConstraint<f64>) -> [f64; 2] {
+        let volume = match self.kept_form {
+            TetSolve::Split => tet.ratio - 1.0,
+            TetSolve::Block | TetSolve::Sequential => tet.ratio,
+        };
+        [tet.stiffness, volume * tet.stiffness]
+    }
+
+    /// Both constraints of a tet at the present positions, as the last substep solved them.
+    fn evaluate_kept(&self, tet: &TetConstraint<f64>) -> Evaluation<f64> {
+        let x = tet.particles.map(|p| self.local(p as usize));
+        match self.kept_form {
+            TetSolve::Split => tet.evaluate_split(x),
+            TetSolve::Block | TetSolve::Sequential => tet.evaluate(x),
+        }
+    }
+
+    /// Both constraints of a tet, in the block form, at the present positions.
     pub(crate) fn evaluate(&self, tet: &TetConstraint<f64>) -> Evaluation<f64> {
         tet.evaluate(tet.particles.map(|p| self.local(p as usize)))
     }
@@ -204,8 +222,16 @@ fn unsatisfied(
     time_squared: f64,
 ) -> Option<[f64; 2]> {
     let compliances = stiffness.map(|s| 1.0 / (s * time_squared));
-    let finite = compliances.into_iter().all(f64::is_finite);
-    finite.then(|| [0, 1].map(|c| values[c] + compliances[c] * multipliers[c]))
+    // At Poisson's ratio 0 the volume constraint of the split form has no stiffness, so nothing to satisfy.
+    let of = |c: usize| {
+        if stiffness[c] > 0.0 {
+            values[c] + compliances[c] * multipliers[c]
+        } else {
+            0.0
+        }
+    };
+    let sound = compliances[0].is_finite() && (compliances[1].is_finite() || stiffness[1] <= 0.0);
+    sound.then(|| [of(0), of(1)])
 }
 
 /// The Euclidean norm, without overflow of the squares.

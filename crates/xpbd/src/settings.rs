@@ -24,7 +24,7 @@ pub struct StepSettings {
     pub iterations: u32,
     /// How an iteration is made.
     pub method: Method,
-    /// How the two constraints of a tet are solved.
+    /// How the energy of a tet is solved.
     pub tet_solve: TetSolve,
     /// Factor on each correction, above 0 and at most 2; 1 is none.
     pub relaxation: f64,
@@ -53,13 +53,20 @@ pub enum Method {
     },
 }
 
-/// How the two constraints of a tet are solved.
+/// How the elastic energy of a tet is split into constraints and solved.
+///
+/// All three have the same energy and the same cost within 10%.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TetSolve {
-    /// As one system of two unknowns: a tet at rest stays at rest whatever the stiffness.
+    /// A shear part and a volume part that both vanish at rest. A body at rest stays at rest and a loaded body stays
+    /// bounded at any stiffness, so the number of substeps is a matter of accuracy alone.
     #[default]
+    Split,
+    /// `|F|` and `det F - γ` as one system of two unknowns. Unstable from a kappa of about 2 on, unless tets are softened
+    /// by [`crate::KappaLimit`].
     Block,
-    /// One after the other, deviatoric first, as in the paper and in most implementations. At rest the two fight.
+    /// The constraints of the block form one after the other, deviatoric first, as in the paper and in most
+    /// implementations.
     Sequential,
 }
 
@@ -72,7 +79,7 @@ impl StepSettings {
             substeps: 1,
             iterations: 1,
             method: Method::GaussSeidel,
-            tet_solve: TetSolve::Block,
+            tet_solve: TetSolve::Split,
             relaxation: 1.0,
             gravity: None,
             colliders: Vec::new(),

@@ -17,7 +17,7 @@ use crate::origin::frame_of;
 use crate::real::{finite, load, store};
 use crate::scalar::Constraints;
 use crate::volume::TetVolume;
-use crate::{Changes, KappaLimit, Material, Real, XpbdError};
+use crate::{Changes, KappaLimit, Material, Real, TetSolve, XpbdError};
 
 /// The state of a simulation in one precision.
 ///
@@ -68,8 +68,11 @@ pub struct Solver<R: Real> {
     pub(crate) level: Level,
     /// By place in the layout; only while a step has more than one iteration or is asked for its residuals.
     pub(crate) multipliers: Vec<R::Atomic>,
-    /// The multipliers of each tet after the last substep, for residuals.
+    /// The multipliers of each tet after the last substep, for residuals, and the constraints that they belong to.
     pub(crate) kept: Vec<[R; 2]>,
+    pub(crate) kept_form: TetSolve,
+    /// Copies of the velocities that threads may share, while some material is damped.
+    pub(crate) shared_velocities: Vec<R::Particle>,
     pub(crate) jacobi: Option<Jacobi<R>>,
     /// The colliders of the present substep.
     pub(crate) obstacles: Vec<Obstacle<R>>,
@@ -109,6 +112,8 @@ impl<R: Real> Solver<R> {
             level: Level::new(),
             multipliers: Vec::new(),
             kept: Vec::new(),
+            kept_form: TetSolve::default(),
+            shared_velocities: Vec::new(),
             jacobi: None,
             obstacles: Vec::new(),
             predicted: Vec::new(),

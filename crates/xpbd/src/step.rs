@@ -14,10 +14,10 @@ use rayon::prelude::*;
 use crate::collider::Obstacle;
 use crate::gauss_seidel;
 use crate::jacobi::Jacobi;
-use crate::lanes::Pass;
 use crate::layout::{Ingredients, Layout};
 use crate::neo_hookean::TetConstraint;
 use crate::real::{finite, load, store, weight};
+use crate::simd_kernel::Pass;
 use crate::{Material, Method, Real, Solver, StepSettings, XpbdError};
 
 /// Particles a thread takes at a time.
@@ -165,9 +165,13 @@ impl<R: Real> Solver<R> {
             self.kept = (0..self.tets.len())
                 .map(|t| self.multipliers_of(t))
                 .collect();
+            self.kept_form = settings.tet_solve;
         }
         let repaired = self.update_velocities(R::from_f64(time), factors.per_time);
         self.update_held(factors.per_time);
+        if self.is_damped() {
+            self.damp(&factors);
+        }
         lost + repaired
     }
 
@@ -185,13 +189,13 @@ impl<R: Real> Solver<R> {
         let pass = Pass {
             layout: &self.layout,
             particles: &self.particles,
-            previous: &self.previous,
+            velocities: &[],
             multipliers: &self.multipliers,
             corrections: jacobi.as_ref().map_or(&[], |jacobi| &jacobi.corrections),
+            iterated: settings.iterations > 1,
             factors: *factors,
         };
-        let damped = self.materials.iter().any(|m| m.damping > 0.0);
-        R::solve_tets(self.level, damped, settings.tet_solve, &pass);
+        R::solve_tets(self.level, settings.tet_solve, &pass);
         let Some(jacobi) = jacobi else { return };
         jacobi.apply(&self.particles);
         if let Method::Chebyshev {

@@ -188,7 +188,7 @@ impl Frame {
             per_time: (1.0 / time) as f32,
             relaxation: settings.relaxation as f32,
             one: 1.0,
-            steep: Solver::<f32>::STEEP as f32,
+            steep: Solver::<f32>::MAX_COFACTOR_NORM as f32,
             particles: index(host.particle_count()),
             depth: index(depth),
             obstacles: index(settings.colliders.len()),

@@ -23,7 +23,7 @@ const RUBBER: Material = Material {
 struct Case<R: Real> {
     tets: Vec<TetConstraint<R>>,
     particles: Vec<[R; 4]>,
-    previous: Vec<R::Vector>,
+    velocities: Vec<R::Vector>,
     factors: Factors<R>,
 }
 
@@ -31,7 +31,7 @@ impl<R: Real> Case<R> {
     fn new(rest: &[[DVec3; 4]], moved: &[[DVec3; 4]], time: f64) -> Self {
         let mut tets = Vec::new();
         let mut particles = Vec::new();
-        let mut previous = Vec::new();
+        let mut velocities = Vec::new();
         for (t, (rest, moved)) in rest.iter().zip(moved).enumerate() {
             let first = u32::try_from(4 * t).unwrap();
             let corners = [0, 1, 2, 3].map(|k| first + k);
@@ -41,7 +41,7 @@ impl<R: Real> Case<R> {
                 // One corner of each tet is held.
                 let weight = [0.0, 3.0, 0.5, 1.0][k];
                 particles.push([x, y, z, R::from_f64(weight)]);
-                previous.push(R::from_dvec3(*at_rest));
+                velocities.push(R::from_dvec3(DVec3::from_array([x, y, z].map(R::to_f64)) - *at_rest));
             }
         }
         let factors = Factors {
@@ -52,53 +52,84 @@ impl<R: Real> Case<R> {
         Self {
             tets,
             particles,
-            previous,
+            velocities,
             factors,
         }
     }
 
     /// The positions after a pass by the kernel.
-    fn by_lanes(&self, level: Level, damped: bool, form: TetSolve) -> Vec<R::Vector> {
-        self.by_lanes_keeping(level, damped, form, &[])
+    fn by_lanes(&self, level: Level, form: TetSolve) -> Vec<R::Vector> {
+        self.by_lanes_keeping(level, form, false, &[])
     }
 
-    /// The same with multipliers, two for each lane of a single block.
-    fn by_lanes_keeping(
-        &self,
-        level: Level,
-        damped: bool,
-        form: TetSolve,
-        multipliers: &[R::Atomic],
-    ) -> Vec<R::Vector> {
+    /// The layout of the tets, one cluster each.
+    fn layout(&self, level: Level) -> Layout<R> {
         let count = self.tets.len();
         let coloring = Coloring::new(vec![ColorId(0); count]);
         let schedule = Schedule::new(&Clustering::none(count), &coloring);
-        let particles: Vec<_> = self.particles.iter().map(|v| R::particle(*v)).collect();
         let mut layout = Layout::default();
         let lanes = gauss_seidel::lanes::<R>(level);
-        let damping = if damped { RUBBER.damping } else { 0.0 };
         layout.follow(&schedule, lanes, true, |t| {
             let tet = self.tets[t as usize];
             Ingredients {
                 weights: tet.particles.map(|p| self.particles[p as usize][3]),
-                constants: [tet.ratio, tet.gamma, R::from_f64(damping)],
+                constants: [tet.ratio, tet.gamma, R::from_f64(RUBBER.damping)],
                 tet,
             }
         });
+        layout
+    }
+
+    /// The positions after a pass with multipliers, two for each lane of a single block.
+    fn by_lanes_keeping(
+        &self,
+        level: Level,
+        form: TetSolve,
+        iterated: bool,
+        multipliers: &[R::Atomic],
+    ) -> Vec<R::Vector> {
+        let particles: Vec<_> = self.particles.iter().map(|v| R::particle(*v)).collect();
         let pass = Pass {
-            layout: &layout,
+            layout: &self.layout(level),
             particles: &particles,
-            previous: &self.previous,
+            velocities: &[],
             multipliers,
             corrections: &[],
+            iterated,
             factors: self.factors,
         };
-        R::solve_tets(level, damped, form, &pass);
+        R::solve_tets(level, form, &pass);
         particles.iter().map(load::<R>).collect()
     }
 
-    /// The same by the plain form, one tet at a time, with gradients at the corners.
-    fn one_by_one(&self, damped: bool) -> Vec<R::Vector> {
+    /// The velocities after a damping pass by the kernel.
+    fn damped(&self, level: Level) -> Vec<R::Vector> {
+        let particles: Vec<_> = self.particles.iter().map(|v| R::particle(*v)).collect();
+        let weights = self.particles.iter().map(|v| v[3]);
+        let velocities: Vec<_> = self
+            .velocities
+            .iter()
+            .zip(weights)
+            .map(|(&v, weight)| {
+                let [x, y, z] = R::components(v);
+                R::particle([x, y, z, weight])
+            })
+            .collect();
+        let pass = Pass {
+            layout: &self.layout(level),
+            particles: &particles,
+            velocities: &velocities,
+            multipliers: &[],
+            corrections: &[],
+            iterated: false,
+            factors: self.factors,
+        };
+        R::damp_tets(level, &pass);
+        velocities.iter().map(load::<R>).collect()
+    }
+
+    /// The positions after a pass of plain code, one tet at a time, with gradients at the corners.
+    fn one_by_one(&self, form: TetSolve) -> Vec<R::Vector> {
         let mut moved: Vec<_> = self
             .particles
             .iter()
@@ -108,20 +139,17 @@ impl<R: Real> Case<R> {
             let corners = tet.particles.map(|p| p as usize);
             let x = corners.map(|p| moved[p]);
             let weights = corners.map(|p| self.particles[p][3]);
-            let e = tet.evaluate(x);
-            let (mut damping, mut rates) = (R::ZERO, [R::ZERO; 2]);
-            if damped {
-                damping = R::from_f64(RUBBER.damping) * self.factors.per_time;
-                for k in 0..4 {
-                    let motion = x[k] - self.previous[corners[k]];
-                    rates[0] += damping * R::dot(e.deviatoric_gradients[k], motion);
-                    rates[1] += damping * R::dot(e.hydrostatic_gradients[k], motion);
-                }
-            }
-            let none = [R::ZERO; 2];
+            let e = match form {
+                TetSolve::Split => tet.evaluate_split(x),
+                _ => tet.evaluate(x),
+            };
             let time_squared = self.factors.time_squared;
-            let change = tet.solve(&e, weights, none, time_squared, damping, rates);
-            let change = change.unwrap_or(none).map(|c| c * self.factors.relaxation);
+            let change = match form {
+                TetSolve::Split => Some(tet.solve_split(&e, weights, time_squared)),
+                _ => tet.solve(&e, weights, [R::ZERO; 2], time_squared),
+            };
+            let change = change.unwrap_or([R::ZERO; 2]);
+            let change = change.map(|c| c * self.factors.relaxation);
             for k in 0..4 {
                 let along =
                     e.deviatoric_gradients[k] * change[0] + e.hydrostatic_gradients[k] * change[1];
@@ -172,12 +200,13 @@ proptest! {
     fn lanes_solve_what_the_plain_form_solves(
         tets in tets(),
         time in prop::sample::select(vec![1e-5, 1e-4, 1e-3]),
-        damped in any::<bool>(),
+        split in any::<bool>(),
     ) {
+        let form = if split { TetSolve::Split } else { TetSolve::Block };
         let case = case::<f64>(&tets, time);
-        let expected = case.one_by_one(damped);
+        let expected = case.one_by_one(form);
         for level in levels() {
-            let moved = case.by_lanes(level, damped, TetSolve::Block);
+            let moved = case.by_lanes(level, form);
             for (a, b) in moved.iter().zip(&expected) {
                 let scale = 1.0 + b.length();
                 prop_assert!(a.distance(*b) <= 1e-9 * scale, "{a} instead of {b}");
@@ -190,16 +219,69 @@ proptest! {
     fn instruction_sets_do_not_change_a_bit(
         tets in tets(),
         time in prop::sample::select(vec![1e-5, 1e-2, 1e2]),
-        damped in any::<bool>(),
-        sequential in any::<bool>(),
+        form in prop::sample::select(vec![TetSolve::Split, TetSolve::Block, TetSolve::Sequential]),
+        iterated in any::<bool>(),
     ) {
-        let form = if sequential { TetSolve::Sequential } else { TetSolve::Block };
         let (single, double) = (case::<f32>(&tets, time), case::<f64>(&tets, time));
-        let first = levels()[0];
-        let expected = (single.by_lanes(first, damped, form), double.by_lanes(first, damped, form));
+        let run = |level: Level| {
+            let multipliers: Vec<_> = (0..80 * 16).map(|_| 1e-3f32.cell()).collect();
+            let kept = single.by_lanes_keeping(level, form, iterated, &multipliers);
+            (kept, double.by_lanes(level, form), single.damped(level), double.damped(level))
+        };
+        let expected = run(levels()[0]);
         for level in levels() {
-            let moved = (single.by_lanes(level, damped, form), double.by_lanes(level, damped, form));
-            prop_assert_eq!(&moved, &expected, "{:?}", level);
+            prop_assert_eq!(&run(level), &expected, "{:?}", level);
+        }
+    }
+
+    /// Damping takes kinetic energy away and never gives any, keeps momentum of a free tet, and leaves a rotating tet
+    /// alone.
+    #[test]
+    fn damping_takes_kinetic_energy_away(
+        tets in tets(),
+        time in prop::sample::select(vec![1e-5, 1e-2, 1e2]),
+        spin in point(),
+    ) {
+        let mut case = case::<f64>(&tets, time);
+        for particle in &mut case.particles {
+            particle[3] = if particle[3] == 0.0 { 2.0 } else { particle[3] };
+        }
+        let mass = |p: usize| 1.0 / case.particles[p][3];
+        let damped = case.damped(levels()[0]);
+        for t in 0..tets.len() {
+            let corners = 4 * t..4 * t + 4;
+            let energy = |v: &[DVec3]| -> f64 {
+                corners.clone().map(|p| mass(p) * v[p].length_squared()).sum()
+            };
+            let momentum = |v: &[DVec3]| -> DVec3 { corners.clone().map(|p| v[p] * mass(p)).sum() };
+            let (before, after) = (energy(&case.velocities), energy(&damped));
+            prop_assert!(after <= before * (1.0 + 1e-9) + 1e-12, "{before} -> {after}");
+            let change = momentum(&damped) - momentum(&case.velocities);
+            prop_assert!(change.length() <= 1e-9 * (1.0 + before.sqrt()), "{change}");
+        }
+        let mut turning = case;
+        for (velocity, [x, y, z, _]) in turning.velocities.iter_mut().zip(&turning.particles) {
+            *velocity = spin.cross(DVec3::new(*x, *y, *z));
+        }
+        let damped = turning.damped(levels()[0]);
+        for (a, b) in damped.iter().zip(&turning.velocities) {
+            prop_assert!(a.distance(*b) <= 1e-9 * (1.0 + b.length()), "{a} instead of {b}");
+        }
+    }
+}
+
+/// At rest the split form moves nothing by more than rounding, whatever the stiffness.
+#[test]
+fn the_split_form_leaves_a_tet_at_rest_alone() {
+    let rest = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z * 1e-3];
+    for time in [1e-5, 1e-1, 1e3] {
+        let case = Case::<f64>::new(&[rest], &[rest], time);
+        let multipliers: Vec<_> = (0..2 * 16).map(|_| 0.0f64.cell()).collect();
+        for (iterated, multipliers) in [(false, &[][..]), (true, &multipliers)] {
+            let moved = case.by_lanes_keeping(levels()[0], TetSolve::Split, iterated, multipliers);
+            for (x, at_rest) in moved.iter().zip(rest) {
+                assert!(x.distance(at_rest) <= 1e-14, "{time}: {x} for {at_rest}");
+            }
         }
     }
 }
@@ -209,11 +291,11 @@ proptest! {
 fn tets_out_of_range_stay_as_they_are() {
     let rest = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
     for size in [1e30, 0.0] {
-        for form in [TetSolve::Block, TetSolve::Sequential] {
+        for form in [TetSolve::Split, TetSolve::Block, TetSolve::Sequential] {
             let case = Case::<f32>::new(&[rest], &[rest.map(|x| x * size)], 1e-3);
             let multipliers: Vec<_> = (0..2 * 16).map(|_| 0.0f32.cell()).collect();
-            for level in levels() {
-                let moved = case.by_lanes_keeping(level, true, form, &multipliers);
+            for (level, iterated) in levels().into_iter().flat_map(|l| [(l, false), (l, true)]) {
+                let moved = case.by_lanes_keeping(level, form, iterated, &multipliers);
                 for (x, before) in moved.iter().zip(&case.particles) {
                     assert_eq!(x.to_array(), before[..3], "{size:e}, {form:?}");
                 }

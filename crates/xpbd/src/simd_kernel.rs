@@ -1,0 +1,740 @@
+//! SIMD kernels of a tet: the constraints of the Stable Neo-Hookean energy, and viscous damping of velocities, for
+//! several tets at once, one in each lane of a processor.
+//!
+//! [`TetSolve`] names the three ways to solve a tet.
+//!
+//! **Split** (default). With deformation gradient F, `J = det F` and `E = Fᵀ F - I` the energy density is
+//! `Ψ = Ψ_D + λ/2 (J - 1)²`, where `Ψ_D = μ ((J - 1)² - (I₂(E) + I₃(E)) / 2)` is never negative and 0 only for rotations
+//! (and at F = 0). Both parts and both derivatives vanish at rest, so a body at rest stays at rest at any stiffness. The
+//! shear part moves the corners along its own force by `min(Δt², 2U/S)`, with `U = V Ψ_D` and S the sum of the squared
+//! force over the masses: an explicit step that never goes beyond the linearized zero of `√U`. The volume part is one
+//! XPBD constraint that sees this step. When a substep has several iterations the shear part is an XPBD constraint
+//! `√(2 Ψ_D)` with a multiplier, since an explicit step must not be repeated. E, not F, enters `Ψ_D`: in single
+//! precision `|F|² - 3` loses all digits at a strain of 1e-4.
+//!
+//! **Block**. `C_D = |F|` and `C_H = J - γ` as one 2×2 system. The deviatoric constraint is not 0 at rest, so shear is
+//! explicit without a limit: from a kappa of 2 to 4 on a body at rest becomes unstable.
+//!
+//! **Sequential**. The two constraints of the block form one after the other, as in the paper.
+//!
+//! No form needs gradients at the corners. With `G = Σ w q qᵀ` over the corners (see `Layout`), `Σ w |∇C|²` is
+//! `G : AᵀA` for `A = dC/dF`. A correction is one matrix times the gradients of the barycentric coordinates.
+//!
+//! Products and sums are rounded one by one, not fused, so that every instruction set gives the same bits.
+//!
+//! Source: Smith, de Goes, Kim 2018 (energy), Macklin and Müller 2021 (constraints), Ton-That et al. 2023 (block solve),
+//! paper equations 5 and 6 (the paper prints a minus in its equation 6; its equation 3 gives the plus used here). The
+//! split is derived in `docs/solver.md`.
+//! Cost: about 420 operations and two divisions a tet (split), 330, one square root and two divisions (block); in single
+//! precision 80 bytes of the layout and four corners of 16 bytes, read and written. Moving corners between memory and
+//! lanes is more than half of the instructions.
+
+mod memory;
+
+use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask};
+
+use crate::layout::{CONSTANTS, Layout, REST};
+use crate::step::Factors;
+use crate::{Real, TetSolve};
+use memory::{gather, load_multipliers, scatter, splat, store_multipliers};
+
+/// The input of a pass over the tets. Public only because [`Real`] names it.
+#[expect(unnameable_types, reason = "passes are made by this crate alone")]
+#[derive(Debug)]
+pub struct Pass<'a, R: Real> {
+    pub(crate) layout: &'a Layout<R>,
+    pub(crate) particles: &'a [R::Particle],
+    /// Velocities and inverse masses of the particles; used by [`Damping`] only, else empty.
+    pub(crate) velocities: &'a [R::Particle],
+    /// Block, number, lane: the multipliers; empty if not kept.
+    pub(crate) multipliers: &'a [R::Atomic],
+    /// Sums of the corrections of a Jacobi pass, which leaves the particles unchanged; else empty.
+    pub(crate) corrections: &'a [R::Particle],
+    /// Whether a substep has more than one iteration, so that multipliers accumulate.
+    pub(crate) iterated: bool,
+    pub(crate) factors: Factors<R>,
+}
+
+/// A kernel over a block of tets. Each implementation is compiled on its own; whether multipliers are kept and where
+/// corrections go is decided once a block at run time, which costs nothing measurable.
+pub(crate) trait BlockKernel {
+    /// Processes the tets of a block, which share no particle.
+    fn run<R: Real, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize);
+}
+
+/// [`TetSolve::Split`].
+pub(crate) struct Split;
+/// [`TetSolve::Block`].
+pub(crate) struct Block;
+/// [`TetSolve::Sequential`].
+pub(crate) struct Sequential;
+/// Damping of velocities.
+pub(crate) struct Damping;
+
+impl BlockKernel for Split {
+    #[inline(always)]
+    fn run<R: Real, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize) {
+        solve_block::<R, S>(simd, pass, block, TetSolve::Split);
+    }
+}
+
+impl BlockKernel for Block {
+    #[inline(always)]
+    fn run<R: Real, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize) {
+        solve_block::<R, S>(simd, pass, block, TetSolve::Block);
+    }
+}
+
+impl BlockKernel for Sequential {
+    #[inline(always)]
+    fn run<R: Real, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize) {
+        solve_block::<R, S>(simd, pass, block, TetSolve::Sequential);
+    }
+}
+
+impl BlockKernel for Damping {
+    #[inline(always)]
+    fn run<R: Real, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize) {
+        damp_block::<R, S>(simd, pass, block);
+    }
+}
+
+type Matrix<V> = [[V; 3]; 3];
+
+/// What the hydrostatic constraint is made of.
+struct Volume<V> {
+    /// The derivative of det F.
+    cofactor: Matrix<V>,
+    /// det F.
+    volume: V,
+    gamma: V,
+}
+
+/// The parts of the energy of the split form, divided by μ where they are energies.
+struct Energies<V> {
+    /// `Ψ_D`.
+    shear: V,
+    /// Its derivative.
+    derivative: Matrix<V>,
+    /// The derivative of det F.
+    cofactor: Matrix<V>,
+    /// `det F - 1`.
+    bulge: V,
+}
+
+/// The norm of the derivative of det F, √3 at rest, up to which tets follow their material exactly: that of a tet
+/// stretched two and a half times along each axis, or fifty times along one at constant volume. Beyond it derivative and
+/// value of the volume term are scaled down.
+pub(crate) const MAX_COFACTOR_NORM: f64 = 10.0;
+
+/// The tets of one block.
+struct Tets<'a, R: Real, S: Simd> {
+    simd: S,
+    rest: &'a [R],
+    /// `l/μ`.
+    ratio: R::Lanes<S>,
+    gamma: R::Lanes<S>,
+    /// Damping time over the time of a substep; see [`Damping`].
+    damping: R::Lanes<S>,
+    time_squared: R::Lanes<S>,
+    relaxation: R::Lanes<S>,
+}
+
+/// Solves the constraints of the tets of a block.
+#[inline(always)]
+fn solve_block<R: Real, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize, form: TetSolve) {
+    let lanes = R::Lanes::<S>::LEN;
+    let layout = pass.layout;
+    let active = layout.active[block];
+    let corners = &layout.particles[block * lanes..(block + 1) * lanes];
+    let read = |p: u32| R::read(&pass.particles[p as usize]);
+    let mut x = gather::<R, S>(simd, corners, read);
+    let tets = Tets::<R, S>::new(simd, pass, block);
+    let q = tets.gradients();
+    let f = deformation::<R, S>(&x, &q);
+    let keeps = !pass.multipliers.is_empty();
+    let mut multipliers = if keeps {
+        load_multipliers::<R, S>(simd, pass, block)
+    } else {
+        [splat::<R, S>(simd, R::ZERO); 2]
+    };
+    let jacobi = !pass.corrections.is_empty();
+    let before = x;
+    match form {
+        TetSolve::Split => {
+            let change = if pass.iterated {
+                tets.split_iterated(&f, &mut multipliers)
+            } else {
+                tets.split(&f, keeps, &mut multipliers)
+            };
+            move_corners::<R, S>(&mut x, &change, &q);
+        }
+        TetSolve::Block => {
+            let change = tets.both(&f, &mut multipliers);
+            move_corners::<R, S>(&mut x, &change, &q);
+        }
+        TetSolve::Sequential => {
+            let change = tets.deviatoric(&f, &mut multipliers[0]);
+            move_corners::<R, S>(&mut x, &change, &q);
+            let f = if jacobi {
+                f
+            } else {
+                deformation::<R, S>(&x, &q)
+            };
+            let change = tets.hydrostatic(&f, &mut multipliers[1]);
+            move_corners::<R, S>(&mut x, &change, &q);
+        }
+    }
+    if keeps {
+        store_multipliers::<R, S>(pass, block, multipliers);
+    }
+    if jacobi {
+        for k in 0..4 {
+            for axis in 0..3 {
+                x[k][axis] -= before[k][axis];
+            }
+        }
+        let add = |p: u32, [x, y, z, _]: [R; 4]| {
+            let sum = &pass.corrections[p as usize];
+            let [a, b, c, d] = R::read(sum);
+            R::write(sum, [a + x, b + y, c + z, d]);
+        };
+        scatter::<R, S>(&x, corners, active, add);
+    } else {
+        let write = |p: u32, values| R::write(&pass.particles[p as usize], values);
+        scatter::<R, S>(&x, corners, active, write);
+    }
+}
+
+/// Damps the velocities of the corners of the tets of a block.
+#[inline(always)]
+fn damp_block<R: Real, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize) {
+    let lanes = R::Lanes::<S>::LEN;
+    let layout = pass.layout;
+    let active = layout.active[block];
+    let corners = &layout.particles[block * lanes..(block + 1) * lanes];
+    let x = gather::<R, S>(simd, corners, |p| R::read(&pass.particles[p as usize]));
+    let mut v = gather::<R, S>(simd, corners, |p| R::read(&pass.velocities[p as usize]));
+    let tets = Tets::<R, S>::new(simd, pass, block);
+    let q = tets.gradients();
+    let f = deformation::<R, S>(&x, &q);
+    let change = tets.damped_volume(&f, &deformation::<R, S>(&v, &q));
+    move_corners::<R, S>(&mut v, &change, &q);
+    let change = tets.damped_shear(&f, &deformation::<R, S>(&v, &q));
+    move_corners::<R, S>(&mut v, &change, &q);
+    let write = |p: u32, values| R::write(&pass.velocities[p as usize], values);
+    scatter::<R, S>(&v, corners, active, write);
+}
+
+impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
+    #[inline(always)]
+    fn new(simd: S, pass: &Pass<'a, R>, block: usize) -> Self {
+        let lanes = R::Lanes::<S>::LEN;
+        let layout = pass.layout;
+        let rest = &layout.rest[block * REST * lanes..(block + 1) * REST * lanes];
+        let mut constants = [splat::<R, S>(simd, R::ZERO); CONSTANTS];
+        for (k, constant) in constants.iter_mut().enumerate() {
+            *constant = if layout.constants.is_empty() {
+                splat::<R, S>(simd, layout.constant[k])
+            } else {
+                let start = (block * CONSTANTS + k) * lanes;
+                R::Lanes::<S>::from_slice(simd, &layout.constants[start..start + lanes])
+            };
+        }
+        let [ratio, gamma, damping] = constants;
+        Self {
+            simd,
+            rest,
+            ratio,
+            gamma,
+            damping: damping * splat::<R, S>(simd, pass.factors.per_time),
+            time_squared: splat::<R, S>(simd, pass.factors.time_squared),
+            relaxation: splat::<R, S>(simd, pass.factors.relaxation),
+        }
+    }
+
+    #[inline(always)]
+    fn splat(&self, value: R) -> R::Lanes<S> {
+        splat::<R, S>(self.simd, value)
+    }
+
+    #[inline(always)]
+    fn rest(&self, k: usize) -> R::Lanes<S> {
+        let lanes = R::Lanes::<S>::LEN;
+        R::Lanes::<S>::from_slice(self.simd, &self.rest[k * lanes..(k + 1) * lanes])
+    }
+
+    /// The rows of the inverse rest matrix: the gradients of the barycentric coordinates of corners 1 to 3.
+    #[inline(always)]
+    fn gradients(&self) -> Matrix<R::Lanes<S>> {
+        [
+            [self.rest(0), self.rest(1), self.rest(2)],
+            [self.rest(3), self.rest(4), self.rest(5)],
+            [self.rest(6), self.rest(7), self.rest(8)],
+        ]
+    }
+
+    /// `G : AᵀA` in units of the stiffness times time squared.
+    #[inline(always)]
+    fn weighted(&self, a: &Matrix<R::Lanes<S>>) -> R::Lanes<S> {
+        let [a, b, c] = a;
+        let same = self.rest(9) * dot::<R, S>(a, a)
+            + self.rest(10) * dot::<R, S>(b, b)
+            + self.rest(11) * dot::<R, S>(c, c);
+        let mixed = self.rest(12) * dot::<R, S>(a, b)
+            + self.rest(13) * dot::<R, S>(a, c)
+            + self.rest(14) * dot::<R, S>(b, c);
+        (same + mixed) * self.time_squared
+    }
+
+    /// `G : AᵀB`, the bilinear form of [`Tets::weighted`].
+    #[inline(always)]
+    fn weighted_product(
+        &self,
+        left: &Matrix<R::Lanes<S>>,
+        right: &Matrix<R::Lanes<S>>,
+    ) -> R::Lanes<S> {
+        let [a, b, c] = left;
+        let [d, e, f] = right;
+        let same = self.rest(9) * dot::<R, S>(a, d)
+            + self.rest(10) * dot::<R, S>(b, e)
+            + self.rest(11) * dot::<R, S>(c, f);
+        let mixed = self.rest(12) * (dot::<R, S>(a, e) + dot::<R, S>(b, d))
+            + self.rest(13) * (dot::<R, S>(a, f) + dot::<R, S>(c, d))
+            + self.rest(14) * (dot::<R, S>(b, f) + dot::<R, S>(c, e));
+        (same + mixed * self.splat(R::HALF)) * self.time_squared
+    }
+
+    /// `μV` times the square of the time.
+    #[inline(always)]
+    fn stiffness(&self) -> R::Lanes<S> {
+        self.rest(15) * self.time_squared
+    }
+
+    /// The norm of F and one over it; at F = 0 the gradient has no direction, no correction is finite, and the tet waits
+    /// for its neighbors.
+    #[inline(always)]
+    fn norm(&self, f: &Matrix<R::Lanes<S>>) -> (R::Lanes<S>, R::Lanes<S>) {
+        let square =
+            dot::<R, S>(&f[0], &f[0]) + dot::<R, S>(&f[1], &f[1]) + dot::<R, S>(&f[2], &f[2]);
+        let norm = square.sqrt();
+        (norm, self.splat(R::ONE) / norm)
+    }
+
+    /// The derivative of det F, det F and γ; where the first is longer than [`MAX_COFACTOR_NORM`], all three are scaled down to that.
+    ///
+    /// The stiffness against a change of volume grows with the square of the derivative, which is that of an area. In a
+    /// tet stretched a hundred times it is 10⁸ times what kappa says, and such tets throw their corners away, farther
+    /// each time. A constraint over a number has the same solutions and pulls the same way, less.
+    #[inline(always)]
+    fn volume(&self, f: &Matrix<R::Lanes<S>>) -> Volume<R::Lanes<S>> {
+        let mut cofactor = cofactor::<R, S>(f);
+        let [a, b, c] = &cofactor;
+        let square = dot::<R, S>(a, a) + dot::<R, S>(b, b) + dot::<R, S>(c, c);
+        let mut volume = dot::<R, S>(&f[0], a);
+        let mut gamma = self.gamma;
+        let limit = R::from_f64(MAX_COFACTOR_NORM);
+        let steep = square.simd_gt(self.splat(limit * limit));
+        if steep.any_true() {
+            let scale = self.splat(limit) / square.sqrt();
+            let scale = steep.select(scale, self.splat(R::ONE));
+            for entry in cofactor.as_flattened_mut() {
+                *entry *= scale;
+            }
+            volume *= scale;
+            gamma *= scale;
+        }
+        Volume {
+            cofactor,
+            volume,
+            gamma,
+        }
+    }
+
+    /// The two parts of the energy: `Ψ_D / μ`, its derivative, the derivative of the volume term and `J - 1`.
+    ///
+    /// Beyond [`MAX_COFACTOR_NORM`] the volume terms of *both* parts are scaled down. Scaled in one of them alone the two
+    /// no longer cancel, and torn slivers throw their corners.
+    #[inline(always)]
+    fn energies(&self, f: &Matrix<R::Lanes<S>>) -> Energies<R::Lanes<S>> {
+        let (one, half) = (self.splat(R::ONE), self.splat(R::HALF));
+        let [a, b, c] = f;
+        let mut cofactor = cofactor::<R, S>(f);
+        let mut bulge = dot::<R, S>(a, &cofactor[0]) - one;
+        let [aa, bb, cc] = [a, b, c].map(|column| dot::<R, S>(column, column) - one);
+        let [ab, ac, bc] = [(a, b), (a, c), (b, c)].map(|(l, r)| dot::<R, S>(l, r));
+        let minor = bb * cc - bc * bc;
+        let second = aa * (bb + cc) + minor - ab * ab - ac * ac;
+        let third = aa * minor - ab * (ab * cc - bc * ac) + ac * (ab * bc - bb * ac);
+        let mut shear = bulge * bulge - (second + third) * half;
+        let square = dot::<R, S>(&cofactor[0], &cofactor[0])
+            + dot::<R, S>(&cofactor[1], &cofactor[1])
+            + dot::<R, S>(&cofactor[2], &cofactor[2]);
+        let limit = R::from_f64(MAX_COFACTOR_NORM);
+        let steep = square.simd_gt(self.splat(limit * limit));
+        if steep.any_true() {
+            let scale = self.splat(limit) / square.sqrt();
+            let scale = steep.select(scale, one);
+            for entry in cofactor.as_flattened_mut() {
+                *entry *= scale;
+            }
+            bulge *= scale;
+            let capped = (aa + bb + cc) * half - bulge + bulge * bulge * half;
+            shear = steep.select(capped, shear);
+        }
+        let pressure = bulge - one;
+        let mut derivative = *f;
+        for j in 0..3 {
+            for axis in 0..3 {
+                derivative[j][axis] = f[j][axis] + pressure * cofactor[j][axis];
+            }
+        }
+        Energies {
+            shear,
+            derivative,
+            cofactor,
+            bulge,
+        }
+    }
+
+    /// The change of the corners per weight by a shear step of `along` and the volume constraint that sees it, and that
+    /// of the volume multiplier.
+    #[inline(always)]
+    fn split_change(
+        &self,
+        energies: &Energies<R::Lanes<S>>,
+        along: R::Lanes<S>,
+        multiplier: &mut R::Lanes<S>,
+    ) -> Matrix<R::Lanes<S>> {
+        let (one, zero) = (self.splat(R::ONE), self.splat(R::ZERO));
+        let Energies {
+            derivative,
+            cofactor,
+            bulge,
+            ..
+        } = energies;
+        let lame = self.ratio - one;
+        let mixed = self.weighted_product(derivative, cofactor);
+        let b = -(lame * (self.stiffness() * *bulge + along * mixed) + *multiplier);
+        let d = b / (lame * self.weighted(cofactor) + one);
+        let (along, d) = (along * self.relaxation, d * self.relaxation);
+        let sound = (along + d).is_finite();
+        *multiplier += sound.select(d, zero);
+        let mut change = [[zero; 3]; 3];
+        for j in 0..3 {
+            for axis in 0..3 {
+                let entry = derivative[j][axis] * along + cofactor[j][axis] * d;
+                change[j][axis] = sound.select(entry, zero);
+            }
+        }
+        change
+    }
+
+    /// The change of the corners per weight by the split form in a single iteration. `keeps` asks for multipliers.
+    #[inline(always)]
+    fn split(
+        &self,
+        f: &Matrix<R::Lanes<S>>,
+        keeps: bool,
+        multipliers: &mut [R::Lanes<S>; 2],
+    ) -> Matrix<R::Lanes<S>> {
+        let (one, zero) = (self.splat(R::ONE), self.splat(R::ZERO));
+        let energies = self.energies(f);
+        let twice = energies.shear + energies.shear;
+        let steepness = self.weighted(&energies.derivative);
+        // Up to the linearized zero of the root of the energy, and no farther than the explicit step.
+        let part = twice.simd_lt(steepness).select(twice / steepness, one);
+        let part = energies.shear.simd_gt(zero).select(part, zero);
+        let along = -(self.stiffness() * part);
+        if keeps {
+            let root = twice.max(zero).sqrt();
+            let multiplier = along * root * self.relaxation;
+            multipliers[0] += multiplier.is_finite().select(multiplier, zero);
+        }
+        self.split_change(&energies, along, &mut multipliers[1])
+    }
+
+    /// The change of the corners per weight by an iteration of the split form with accumulating multipliers.
+    #[inline(always)]
+    fn split_iterated(
+        &self,
+        f: &Matrix<R::Lanes<S>>,
+        multipliers: &mut [R::Lanes<S>; 2],
+    ) -> Matrix<R::Lanes<S>> {
+        let (one, zero) = (self.splat(R::ONE), self.splat(R::ZERO));
+        let energies = self.energies(f);
+        let positive = energies.shear.simd_gt(zero);
+        let twice = positive.select(energies.shear + energies.shear, one);
+        let root = twice.sqrt();
+        let m = self.weighted(&energies.derivative) / twice;
+        let d = -((self.stiffness() * root + multipliers[0]) / (m + one));
+        let sound = d.is_finite();
+        let d = sound.select(positive.select(d, zero), zero);
+        multipliers[0] += d * self.relaxation;
+        self.split_change(&energies, d / root, &mut multipliers[1])
+    }
+
+    /// The change of the corners' velocities per weight by the viscosity of the volume: one implicit step.
+    #[inline(always)]
+    fn damped_volume(
+        &self,
+        f: &Matrix<R::Lanes<S>>,
+        rate: &Matrix<R::Lanes<S>>,
+    ) -> Matrix<R::Lanes<S>> {
+        let one = self.splat(R::ONE);
+        let cofactor = self.volume(f).cofactor;
+        let viscosity = (self.ratio - one) * self.damping;
+        let m = viscosity * self.weighted(&cofactor);
+        let d = -(viscosity * self.stiffness() * product::<R, S>(&cofactor, rate)) / (m + one);
+        self.along(&cofactor, d)
+    }
+
+    /// The change of the corners' velocities per weight by the viscosity of shear: one implicit step along its force.
+    ///
+    /// With `D = sym(Fᵀ Ḟ)` the dissipation is `τ V μ |D|²` and its force along `A = F D`. Moving by `-σ w A q` changes D
+    /// by `-σ B`, `B = sym(Fᵀ A G)`; the minimum over σ of kinetic energy and dissipation is taken.
+    #[inline(always)]
+    fn damped_shear(
+        &self,
+        f: &Matrix<R::Lanes<S>>,
+        rate: &Matrix<R::Lanes<S>>,
+    ) -> Matrix<R::Lanes<S>> {
+        let zero = self.splat(R::ZERO);
+        let strain_rate = symmetric::<R, S>(f, rate);
+        let force = times_symmetric::<R, S>(f, &strain_rate);
+        let metric = [
+            self.rest(9),
+            self.rest(10),
+            self.rest(11),
+            self.rest(12) * self.splat(R::HALF),
+            self.rest(13) * self.splat(R::HALF),
+            self.rest(14) * self.splat(R::HALF),
+        ]
+        .map(|entry| entry * self.time_squared);
+        let change = symmetric::<R, S>(f, &times_symmetric::<R, S>(&force, &metric));
+        let [xx, yy, zz, xy, xz, yz] = change;
+        let off = xy * xy + xz * xz + yz * yz;
+        let square = xx * xx + yy * yy + zz * zz + off + off;
+        let steepness = self.weighted(&force);
+        let twice = self.damping + self.damping;
+        let d = twice * self.stiffness() * steepness / (steepness + twice * square);
+        let moving = steepness.simd_gt(zero);
+        self.along(&force, moving.select(-d, zero))
+    }
+
+    /// A matrix times a factor, 0 where the factor is not finite.
+    #[inline(always)]
+    fn along(&self, direction: &Matrix<R::Lanes<S>>, factor: R::Lanes<S>) -> Matrix<R::Lanes<S>> {
+        let zero = self.splat(R::ZERO);
+        let sound = factor.is_finite();
+        let mut change = *direction;
+        for entry in change.as_flattened_mut() {
+            *entry = sound.select(*entry * factor, zero);
+        }
+        change
+    }
+
+    /// The change of F's corners per weight that satisfies both constraints to first order, and of the multipliers.
+    ///
+    /// The equations are multiplied by stiffness and time squared, which makes the matrix one plus numbers of the order
+    /// of kappa: as they are usually written, with compliances, they leave the range of single precision for a body of
+    /// micrometers.
+    #[inline(always)]
+    fn both(
+        &self,
+        f: &Matrix<R::Lanes<S>>,
+        multipliers: &mut [R::Lanes<S>; 2],
+    ) -> Matrix<R::Lanes<S>> {
+        let (one, zero) = (self.splat(R::ONE), self.splat(R::ZERO));
+        let (norm, scale) = self.norm(f);
+        let Volume {
+            cofactor,
+            volume,
+            gamma,
+        } = self.volume(f);
+        let trace = (self.rest(9) + self.rest(10) + self.rest(11)) * self.time_squared;
+        let m11 = self.weighted(f) * scale * scale;
+        let m22 = self.weighted(&cofactor);
+        let m12 = trace * volume * scale;
+        let (deviatoric, hydrostatic) = (norm, volume - gamma);
+        // At rest the gradients are parallel and only the one keeps the system regular. The difference is not negative
+        // (Cauchy-Schwarz); where rounding says otherwise, it is noise. Overflow makes it NaN and stays so.
+        let parallel = m11 * m22 - m12 * m12;
+        let parallel = parallel.simd_lt(zero).select(zero, parallel);
+        let inverse = one / (self.ratio * (parallel + m22) + m11 + one);
+        let stiffness = self.stiffness();
+        let b1 = -(stiffness * deviatoric + multipliers[0]);
+        let b2 = -(stiffness * self.ratio * hydrostatic + multipliers[1]);
+        let d1 = ((self.ratio * m22 + one) * b1 - m12 * b2) * inverse * self.relaxation;
+        let d2 = ((m11 + one) * b2 - self.ratio * m12 * b1) * inverse * self.relaxation;
+        let sound = (d1 + d2).is_finite();
+        let (d1, d2) = (sound.select(d1, zero), sound.select(d2, zero));
+        multipliers[0] += d1;
+        multipliers[1] += d2;
+        let along = d1 * scale;
+        let mut change = [[zero; 3]; 3];
+        for j in 0..3 {
+            for axis in 0..3 {
+                let entry = f[j][axis] * along + cofactor[j][axis] * d2;
+                change[j][axis] = sound.select(entry, zero);
+            }
+        }
+        change
+    }
+
+    /// [`Tets::both`] for the deviatoric constraint alone.
+    #[inline(always)]
+    fn deviatoric(
+        &self,
+        f: &Matrix<R::Lanes<S>>,
+        multiplier: &mut R::Lanes<S>,
+    ) -> Matrix<R::Lanes<S>> {
+        let (norm, scale) = self.norm(f);
+        let m = self.weighted(f) * scale * scale;
+        self.alone(f, scale, self.stiffness(), norm, m, multiplier)
+    }
+
+    /// [`Tets::both`] for the hydrostatic constraint alone.
+    #[inline(always)]
+    fn hydrostatic(
+        &self,
+        f: &Matrix<R::Lanes<S>>,
+        multiplier: &mut R::Lanes<S>,
+    ) -> Matrix<R::Lanes<S>> {
+        let Volume {
+            cofactor,
+            volume,
+            gamma,
+        } = self.volume(f);
+        let constraint = volume - gamma;
+        let m = self.weighted(&cofactor) * self.ratio;
+        let stiffness = self.stiffness() * self.ratio;
+        let one = self.splat(R::ONE);
+        self.alone(&cofactor, one, stiffness, constraint, m, multiplier)
+    }
+
+    /// The change of a multiplier that satisfies its constraint, whose derivative is `scale` times a matrix, times that.
+    #[inline(always)]
+    fn alone(
+        &self,
+        derivative: &Matrix<R::Lanes<S>>,
+        scale: R::Lanes<S>,
+        stiffness: R::Lanes<S>,
+        constraint: R::Lanes<S>,
+        m: R::Lanes<S>,
+        multiplier: &mut R::Lanes<S>,
+    ) -> Matrix<R::Lanes<S>> {
+        let zero = self.splat(R::ZERO);
+        let b = -(stiffness * constraint + *multiplier);
+        let d = b / (m + self.splat(R::ONE)) * self.relaxation;
+        let sound = d.is_finite();
+        *multiplier += sound.select(d, zero);
+        self.along(derivative, d * scale)
+    }
+}
+
+/// The columns of F.
+#[inline(always)]
+fn deformation<R: Real, S: Simd>(
+    x: &[[R::Lanes<S>; 4]; 4],
+    q: &Matrix<R::Lanes<S>>,
+) -> Matrix<R::Lanes<S>> {
+    let mut f = *q;
+    for axis in 0..3 {
+        let [a, b, c] = [
+            x[1][axis] - x[0][axis],
+            x[2][axis] - x[0][axis],
+            x[3][axis] - x[0][axis],
+        ];
+        for j in 0..3 {
+            f[j][axis] = a * q[0][j] + b * q[1][j] + c * q[2][j];
+        }
+    }
+    f
+}
+
+/// Moves the corners by the weight of each times a matrix times the gradient of its barycentric coordinate.
+#[inline(always)]
+fn move_corners<R: Real, S: Simd>(
+    x: &mut [[R::Lanes<S>; 4]; 4],
+    change: &Matrix<R::Lanes<S>>,
+    q: &Matrix<R::Lanes<S>>,
+) {
+    for axis in 0..3 {
+        let row = [change[0][axis], change[1][axis], change[2][axis]];
+        let a = dot::<R, S>(&row, &q[0]);
+        let b = dot::<R, S>(&row, &q[1]);
+        let c = dot::<R, S>(&row, &q[2]);
+        x[0][axis] -= x[0][3] * (a + b + c);
+        x[1][axis] += x[1][3] * a;
+        x[2][axis] += x[2][3] * b;
+        x[3][axis] += x[3][3] * c;
+    }
+}
+
+#[inline(always)]
+fn dot<R: Real, S: Simd>(a: &[R::Lanes<S>; 3], b: &[R::Lanes<S>; 3]) -> R::Lanes<S> {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[inline(always)]
+fn cross<R: Real, S: Simd>(a: &[R::Lanes<S>; 3], b: &[R::Lanes<S>; 3]) -> [R::Lanes<S>; 3] {
+    [
+        a[1] * b[2] - b[1] * a[2],
+        a[2] * b[0] - b[2] * a[0],
+        a[0] * b[1] - b[0] * a[1],
+    ]
+}
+
+/// The derivative of the determinant.
+#[inline(always)]
+fn cofactor<R: Real, S: Simd>([a, b, c]: &Matrix<R::Lanes<S>>) -> Matrix<R::Lanes<S>> {
+    [
+        cross::<R, S>(b, c),
+        cross::<R, S>(c, a),
+        cross::<R, S>(a, b),
+    ]
+}
+
+/// The symmetric part of `AᵀB`: xx, yy, zz, xy, xz, yz.
+#[inline(always)]
+fn symmetric<R: Real, S: Simd>(
+    a: &Matrix<R::Lanes<S>>,
+    b: &Matrix<R::Lanes<S>>,
+) -> [R::Lanes<S>; 6] {
+    let mixed =
+        |i: usize, j: usize| (dot::<R, S>(&a[i], &b[j]) + dot::<R, S>(&a[j], &b[i])) * R::HALF;
+    [
+        dot::<R, S>(&a[0], &b[0]),
+        dot::<R, S>(&a[1], &b[1]),
+        dot::<R, S>(&a[2], &b[2]),
+        mixed(0, 1),
+        mixed(0, 2),
+        mixed(1, 2),
+    ]
+}
+
+/// A matrix times a symmetric one.
+#[inline(always)]
+fn times_symmetric<R: Real, S: Simd>(
+    a: &Matrix<R::Lanes<S>>,
+    [xx, yy, zz, xy, xz, yz]: &[R::Lanes<S>; 6],
+) -> Matrix<R::Lanes<S>> {
+    let mut result = *a;
+    for axis in 0..3 {
+        let (x, y, z) = (a[0][axis], a[1][axis], a[2][axis]);
+        result[0][axis] = x * *xx + y * *xy + z * *xz;
+        result[1][axis] = x * *xy + y * *yy + z * *yz;
+        result[2][axis] = x * *xz + y * *yz + z * *zz;
+    }
+    result
+}
+
+/// The sum of the products of all entries.
+#[inline(always)]
+fn product<R: Real, S: Simd>(a: &Matrix<R::Lanes<S>>, b: &Matrix<R::Lanes<S>>) -> R::Lanes<S> {
+    dot::<R, S>(&a[0], &b[0]) + dot::<R, S>(&a[1], &b[1]) + dot::<R, S>(&a[2], &b[2])
+}
+
+#[cfg(test)]
+mod tests;
