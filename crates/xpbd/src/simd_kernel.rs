@@ -404,6 +404,7 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
         &self,
         energies: &Energies<R::Lanes<S>>,
         along: R::Lanes<S>,
+        iterated: bool,
         multiplier: &mut R::Lanes<S>,
     ) -> Matrix<R::Lanes<S>> {
         let (one, zero) = (self.splat(R::ONE), self.splat(R::ZERO));
@@ -416,7 +417,12 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
         let lame = self.ratio - one;
         let mixed = self.weighted_product(derivative, cofactor);
         let b = -(lame * (self.stiffness() * *bulge + along * mixed) + *multiplier);
-        let d = b / (lame * self.weighted(cofactor) + one);
+        let r = lame * self.weighted(cofactor);
+        let d = if iterated {
+            b / (r + one)
+        } else {
+            b * self.decay(r)
+        };
         let (along, d) = (along * self.relaxation, d * self.relaxation);
         let sound = (along + d).is_finite();
         *multiplier += sound.select(d, zero);
@@ -428,6 +434,13 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
             }
         }
         change
+    }
+
+    /// `(1 - e⁻ʳ) / r` as a quotient that agrees to third order and tends to `1 / r`.
+    #[inline(always)]
+    fn decay(&self, r: R::Lanes<S>) -> R::Lanes<S> {
+        let [four, six] = [4.0, 6.0].map(|value| self.splat(R::from_f64(value)));
+        (six + r) / (six + r * (four + r))
     }
 
     /// The change of the corners per weight by the split form in a single iteration. `keeps` asks for multipliers.
@@ -442,8 +455,7 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
         let energies = self.energies(f);
         let twice = energies.shear + energies.shear;
         let steepness = self.weighted(&energies.derivative);
-        // Up to the linearized zero of the root of the energy, and no farther than the explicit step.
-        let part = twice.simd_lt(steepness).select(twice / steepness, one);
+        let part = self.decay(steepness / twice);
         let part = energies.shear.simd_gt(zero).select(part, zero);
         let along = -(self.stiffness() * part);
         if keeps {
@@ -451,7 +463,7 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
             let multiplier = along * root * self.relaxation;
             multipliers[0] += multiplier.is_finite().select(multiplier, zero);
         }
-        self.split_change(&energies, along, &mut multipliers[1])
+        self.split_change(&energies, along, false, &mut multipliers[1])
     }
 
     /// The change of the corners per weight by an iteration of the split form with accumulating multipliers.
@@ -471,7 +483,7 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
         let sound = d.is_finite();
         let d = sound.select(positive.select(d, zero), zero);
         multipliers[0] += d * self.relaxation;
-        self.split_change(&energies, d / root, &mut multipliers[1])
+        self.split_change(&energies, d / root, true, &mut multipliers[1])
     }
 
     /// The change of the corners' velocities per weight by the viscosity of the volume: one implicit step.

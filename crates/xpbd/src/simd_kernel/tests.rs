@@ -41,7 +41,9 @@ impl<R: Real> Case<R> {
                 // One corner of each tet is held.
                 let weight = [0.0, 3.0, 0.5, 1.0][k];
                 particles.push([x, y, z, R::from_f64(weight)]);
-                velocities.push(R::from_dvec3(DVec3::from_array([x, y, z].map(R::to_f64)) - *at_rest));
+                velocities.push(R::from_dvec3(
+                    DVec3::from_array([x, y, z].map(R::to_f64)) - *at_rest,
+                ));
             }
         }
         let factors = Factors {

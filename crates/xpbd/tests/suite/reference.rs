@@ -442,3 +442,22 @@ fn vbd_iterated_to_convergence_is_backward_euler() {
         }
     }
 }
+
+#[test]
+fn zz_print() {
+    for nu in [0.0, 0.3, 0.45, 0.49] {
+        let scene = falling_beam(nu);
+        let exact = equilibrium(&scene);
+        let way = distance(&exact, &scene.mesh.positions);
+        for kappa in [0.5, 0.35, 0.25, 0.125, 0.0625, 1.0 / 32.0] {
+            let sag = scene.settled(kappa, BEAM_RATE, &scene.mesh.positions);
+            let low = |x: &[DVec3]| x.iter().map(|x| x.z).fold(0.0, f64::min);
+            eprintln!(
+                "nu {nu} kappa {kappa}: {:.4} lowest {:.4} of {:.4}",
+                distance(&sag, &exact) / way,
+                low(&sag),
+                low(&exact)
+            );
+        }
+    }
+}
