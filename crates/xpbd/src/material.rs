@@ -16,11 +16,9 @@ pub struct Material {
     pub poisson_ratio: f64,
     /// Mass density at rest in kg/m³, positive.
     pub density: f64,
-    /// Damping time in s: the rate of each constraint resists by this times its stiffness; 0 is none. At rest both
-    /// constraints change with the volume only, so this is a viscosity `damping · (l + μ/3)` against changes of volume,
-    /// and none against shear. A vibration of volume of angular frequency ω is damped by the fraction
-    /// `damping · ω / 2` of critical, the stretching of a slender bar by `(l + μ/3) (1 - 2ν)² / E` of that (2/3 at
-    /// Poisson's ratio 0, 17 % at 0.3, 4 % at 0.45). Shear is damped by the substep itself.
+    /// Damping time τ in s; 0 is none. A Kelvin-Voigt viscosity of τ times the stiffness (Rayleigh damping with
+    /// `β = τ`): a vibration of angular frequency ω is damped by the fraction `τ ω / 2` of critical, in shear and in
+    /// volume. It acts on strain rates, so it moves no equilibrium and does not resist rotation.
     pub damping: f64,
 }
 

@@ -174,7 +174,7 @@ impl<R: Real> TetConstraint<R> {
         if square > limit * limit {
             let scale = limit / square.sqrt();
             cofactor = cofactor.map(|column| column * scale);
-            bulge = bulge * scale;
+            bulge *= scale;
             shear = (aa + bb + cc) * R::HALF - bulge + bulge * bulge * R::HALF;
         }
         let pressure = bulge - R::ONE;
@@ -273,19 +273,15 @@ impl<R: Real> TetConstraint<R> {
             let products = (0..4).map(|k| weights[k] * R::dot(g[k], h[k]));
             products.fold(R::ZERO, |sum, product| sum + product)
         };
-        // The explicit step along √(2 Ψ_D), or the step to the linearized zero of that.
-        let explicit = stiffness * e.deviatoric;
+        // (1 - e⁻ʳ) / r to third order.
+        let [four, six] = [4.0, 6.0].map(R::from_f64);
+        let decay = |r: R| (six + r) / (six + r * (four + r));
         let steepness = weighted(&e.deviatoric_gradients, &e.deviatoric_gradients);
-        let zero = e.deviatoric / steepness;
-        let d1 = -(if explicit < zero || steepness <= R::ZERO {
-            explicit
-        } else {
-            zero
-        });
+        let d1 = -(stiffness * e.deviatoric * decay(stiffness * steepness));
         let seen = e.hydrostatic + d1 * weighted(&e.deviatoric_gradients, &e.hydrostatic_gradients);
         let lame = stiffness * (self.ratio - R::ONE);
         let m = weighted(&e.hydrostatic_gradients, &e.hydrostatic_gradients);
-        [d1, -(lame * seen) / (lame * m + R::ONE)]
+        [d1, -(lame * seen) * decay(lame * m)]
     }
 }
 

@@ -6,11 +6,14 @@
 //! **Split** (default). With deformation gradient F, `J = det F` and `E = Fᵀ F - I` the energy density is
 //! `Ψ = Ψ_D + λ/2 (J - 1)²`, where `Ψ_D = μ ((J - 1)² - (I₂(E) + I₃(E)) / 2)` is never negative and 0 only for rotations
 //! (and at F = 0). Both parts and both derivatives vanish at rest, so a body at rest stays at rest at any stiffness. The
-//! shear part moves the corners along its own force by `min(Δt², 2U/S)`, with `U = V Ψ_D` and S the sum of the squared
-//! force over the masses: an explicit step that never goes beyond the linearized zero of `√U`. The volume part is one
-//! XPBD constraint that sees this step. When a substep has several iterations the shear part is an XPBD constraint
-//! `√(2 Ψ_D)` with a multiplier, since an explicit step must not be repeated. E, not F, enters `Ψ_D`: in single
-//! precision `|F|² - 3` loses all digits at a strain of 1e-4.
+//! shear part moves the corners along its own force, by `Δt² f(ρ)` with `ρ = Δt² S / (2U)`, `U = V Ψ_D` and S the sum of
+//! the squared force over the masses. The volume part is a constraint `J - 1` that sees this step; its implicit factor
+//! `1 / (1 + r)` is replaced by `f(r)`. Here `f(r) = (1 - e⁻ʳ) / r`, the exact decay over the substep: the implicit
+//! factor makes each tet too soft and the explicit one too stiff, by the same amount to first order, and a colored pass
+//! adds these errors up. With f their first order cancels, so sag at rest is off by kappa squared in place of kappa. As f
+//! is at most 1 and about `1 / ρ` beyond, a step never goes far beyond the linearized zero of `√U`. In a substep of
+//! several iterations both parts are XPBD constraints with multipliers (shear is `√(2 Ψ_D)`), since such steps must not
+//! be repeated. E, not F, enters `Ψ_D`: in single precision `|F|² - 3` loses all digits at a strain of 1e-4.
 //!
 //! **Block**. `C_D = |F|` and `C_H = J - γ` as one 2×2 system. The deviatoric constraint is not 0 at rest, so shear is
 //! explicit without a limit: from a kappa of 2 to 4 on a body at rest becomes unstable.
@@ -25,7 +28,7 @@
 //! Source: Smith, de Goes, Kim 2018 (energy), Macklin and Müller 2021 (constraints), Ton-That et al. 2023 (block solve),
 //! paper equations 5 and 6 (the paper prints a minus in its equation 6; its equation 3 gives the plus used here). The
 //! split is derived in `docs/solver.md`.
-//! Cost: about 420 operations and two divisions a tet (split), 330, one square root and two divisions (block); in single
+//! Cost: about 420 operations and three divisions a tet (split), 330, one square root and two divisions (block); in single
 //! precision 80 bytes of the layout and four corners of 16 bytes, read and written. Moving corners between memory and
 //! lanes is more than half of the instructions.
 
@@ -451,7 +454,7 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
         keeps: bool,
         multipliers: &mut [R::Lanes<S>; 2],
     ) -> Matrix<R::Lanes<S>> {
-        let (one, zero) = (self.splat(R::ONE), self.splat(R::ZERO));
+        let zero = self.splat(R::ZERO);
         let energies = self.energies(f);
         let twice = energies.shear + energies.shear;
         let steepness = self.weighted(&energies.derivative);

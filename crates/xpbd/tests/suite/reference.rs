@@ -253,9 +253,8 @@ fn assert_order(errors: [f64; 4], orders: std::ops::Range<f64>, error: f64) {
     within("the finest run", errors[3], error);
 }
 
-/// Measured from kappa 0.5 on: 3.1, 1.5, 0.8, 0.4 % at Poisson's ratio 0.3, orders 0.96 to 0.98; 3.3, 1.4, 0.7, 0.3 % at
-/// 0.45, orders 0.98 to 1.21. At 0.49 it is 10, 4.5, 1.4, 0.4 % with orders from 1.2 to 1.8, the part of second order;
-/// from kappa 1/128 on, 0.4, 0.15, 0.07, 0.04 %, it is of first order again, 1.38 to 0.97.
+/// Measured from kappa 0.5 on: 2.8, 1.5, 0.8, 0.4 % at Poisson's ratio 0.3; 2.6, 1.3, 0.7, 0.3 % at 0.45. At 0.49 it is
+/// 8.5, 2.1, 0.6, 0.3 %: the part of second order; from kappa 1/128 on it is of first order again.
 #[test]
 fn falling_beam_approaches_the_limit_to_first_order() {
     for (nu, kappa, error) in [
@@ -265,12 +264,11 @@ fn falling_beam_approaches_the_limit_to_first_order() {
     ] {
         assert_order(falling_beam(nu).errors(kappa), 0.7..1.5, error);
     }
-    assert_order(falling_beam(0.49).errors(0.5), 0.7..2.2, 0.006);
+    assert_order(falling_beam(0.49).errors(0.5), 0.7..2.3, 0.006);
 }
 
-/// Measured from kappa 0.5 on: 8.3, 4.3, 2.2, 1.1 % at Poisson's ratio 0.3, 7.7, 4.0, 2.1, 1.1 % at 0.45, orders 0.92 to
-/// 0.96; 6.1, 3.6, 1.6, 0.7 % at 0.49, orders 0.75 to 1.14. At the same step
-/// implicit Euler has the same errors to a fifth.
+/// Measured from kappa 0.5 on: 7.7, 4.2, 2.2, 1.1 % at Poisson's ratio 0.3, 7.3, 4.1, 2.2, 1.1 % at 0.45; 6.2, 2.9, 1.7,
+/// 0.9 % at 0.49. Implicit Euler with the same step has the same errors to a fifth.
 #[test]
 fn twisted_bar_approaches_the_limit_to_first_order() {
     for nu in [0.3, 0.45, 0.49] {
@@ -279,12 +277,12 @@ fn twisted_bar_approaches_the_limit_to_first_order() {
 }
 
 /// The block is compressed over a few of its periods and hardly swings, so there is little to damp, and the part of
-/// second order rules. Measured from kappa 0.5 on: 6.2, 1.6, 0.4, 0.11 % at Poisson's ratio 0.3, 9.7, 2.5, 0.6, 0.16 % at
-/// 0.45, orders 1.86 to 2.0; 16, 5.5, 1.6, 0.4 % at 0.49, orders 1.53 to 1.93.
+/// second order rules. Measured from kappa 0.5 on: 4.4, 1.1, 0.3, 0.09 % at Poisson's ratio 0.3, 7.8, 1.9, 0.5, 0.12 % at
+/// 0.45; 15, 5.9, 1.6, 0.4 % at 0.49, orders 1.39 to 2.02.
 #[test]
 fn compressed_block_approaches_the_limit_to_second_order() {
     for nu in [0.3, 0.45, 0.49] {
-        assert_order(compressed_block(nu).errors(0.5), 1.4..2.2, 0.006);
+        assert_order(compressed_block(nu).errors(0.5), 1.3..2.2, 0.006);
     }
 }
 
@@ -352,16 +350,17 @@ fn small_loads_give_the_equilibrium_of_linear_elasticity() {
     }
 }
 
-/// The tip sinks by up to a third of the length. At kappa 0.5 the solver is off by 1.3 % of that at Poisson's ratio 0, by
-/// 3.5 % at 0.3, by 20 % at 0.45 and by 68 % at 0.49, where the mesh locks and the solver does not follow it; measured at
-/// the smaller kappas: 1.3, 0.9, 0.8, 0.8 %. Half the kappa gives half of it, the last halvings to three digits.
+/// The tip sinks by up to a third of the length. With `(1 - e⁻ʳ) / r` in place of `1 / (1 + r)` the part of the error of
+/// first order in kappa cancels but for an eighth: measured at kappa 0.5, 0.25 and 0.125 1.7, 0.6 and 0.3 % at Poisson's
+/// ratio 0, 2.5, 0.8 and 0.3 % at 0.3, 12.6, 4.2 and 1.3 % at 0.45, 62, 30 and 12 % at 0.49 (4 % at 1/16, 1.2 % at 1/32).
+/// The block form has 1.3, 3.5, 20 and 68 % at kappa 0.5.
 #[test]
 fn sag_under_a_large_load_approaches_equilibrium_with_kappa() {
-    for (nu, coarse, kappa) in [
-        (0.0, 0.016, 0.5),
-        (0.3, 0.04, 0.125),
-        (0.45, 0.22, 1.0 / 64.0),
-        (0.49, 0.75, 1.0 / 256.0),
+    for (nu, kappa, at_start) in [
+        (0.0, 0.5, 0.02),
+        (0.3, 0.5, 0.03),
+        (0.45, 0.5, 0.14),
+        (0.49, 0.125, 0.14),
     ] {
         let scene = falling_beam(nu);
         let exact = equilibrium(&scene);
@@ -370,11 +369,10 @@ fn sag_under_a_large_load_approaches_equilibrium_with_kappa() {
             let sag = scene.settled(kappa, BEAM_RATE, &scene.mesh.positions);
             distance(&sag, &exact) / way
         };
-        within("at kappa 0.5", error(0.5), coarse);
         let errors = [kappa, kappa / 2.0, kappa / 4.0].map(error);
-        within("at a small kappa", errors[0], 0.015);
+        within("largest kappa", errors[0], at_start);
         for pair in errors.windows(2) {
-            within("halving", (pair[1] / pair[0] - 0.5).abs(), 0.03);
+            within("half the kappa", pair[1] / pair[0], 0.5);
         }
     }
 }
@@ -386,7 +384,6 @@ fn uniaxial(material: &Material, s: f64) -> f64 {
     let l = 2.0 * mu * nu / (1.0 - 2.0 * nu) + mu;
     ((1.0 + mu / l - mu / (l * s)) / s).sqrt()
 }
-
 /// The ends are put where the closed form says and the sides have to find their places. Measured at kappa 1/2048: 0.02 to
 /// 0.054 % of the way they have to go; at 1/16 it is 2.8 to 7 %.
 #[test]
@@ -439,25 +436,6 @@ fn vbd_iterated_to_convergence_is_backward_euler() {
             let moved = moved.map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
             assert!(moved > 0.05, "the body moves: {moved}");
             within("vbd from Newton", apart, 1e-6);
-        }
-    }
-}
-
-#[test]
-fn zz_print() {
-    for nu in [0.0, 0.3, 0.45, 0.49] {
-        let scene = falling_beam(nu);
-        let exact = equilibrium(&scene);
-        let way = distance(&exact, &scene.mesh.positions);
-        for kappa in [0.5, 0.35, 0.25, 0.125, 0.0625, 1.0 / 32.0] {
-            let sag = scene.settled(kappa, BEAM_RATE, &scene.mesh.positions);
-            let low = |x: &[DVec3]| x.iter().map(|x| x.z).fold(0.0, f64::min);
-            eprintln!(
-                "nu {nu} kappa {kappa}: {:.4} lowest {:.4} of {:.4}",
-                distance(&sag, &exact) / way,
-                low(&sag),
-                low(&exact)
-            );
         }
     }
 }

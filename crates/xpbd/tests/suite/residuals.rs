@@ -3,7 +3,7 @@
 use glam::{DVec3, dvec3};
 use incise_graph::{Clustering, ColorId, Coloring, Schedule};
 use incise_mesh::generate::kuhn_box;
-use incise_xpbd::{Real, Residuals, Solver, StepSettings};
+use incise_xpbd::{Real, Residuals, Solver, StepSettings, TetSolve};
 
 use crate::body::{GRAVITY, RUBBER, body, disturb, plain, substep, within};
 
@@ -22,12 +22,12 @@ fn residuals(kappa: f64, iterations: u32) -> Residuals {
     solver.residuals(settings.substep_time()).unwrap()
 }
 
-/// Iterating solves for the constraints alone. Measured at kappa 0.3: the dual residual falls to 3e-15 of what one
-/// iteration leaves, the primal one stays where it is to four digits. That is XPBD's missing half, and why substeps
+/// Iterating solves for the constraints alone. Measured at kappa 0.3: the dual residual falls to 1e-14 of what two
+/// iterations leave, the primal one stays where it is to four digits. That is XPBD's missing half, and why substeps
 /// are the way to accuracy.
 #[test]
 fn iterations_drive_the_dual_residual_to_zero_but_not_the_primal_one() {
-    let runs = [1, 4, 16, 64].map(|n| residuals(0.3, n));
+    let runs = [2, 8, 32, 128].map(|n| residuals(0.3, n));
     for pair in runs.windows(2) {
         within("dual", pair[1].dual / pair[0].dual, 0.1);
     }
@@ -193,6 +193,7 @@ fn a_solved_step_has_no_force_residual() {
     solver.set_position(0, dvec3(-0.03, 0.02, -0.01));
     let settings = StepSettings {
         gravity: Some(GRAVITY),
+        tet_solve: TetSolve::Block,
         ..substep(&solver, 30.0)
     };
     let time = settings.substep_time();
@@ -230,6 +231,7 @@ fn a_collapsed_body_cannot_hide_from_the_force_residual() {
     }
     let settings = StepSettings {
         gravity: Some(GRAVITY),
+        tet_solve: TetSolve::Block,
         ..StepSettings::new(1.0 / 60.0)
     };
     for iterations in [100, 100, 100, 3000] {
