@@ -1,10 +1,10 @@
-// One group of clusters, which share no particle: a thread for each, tet by tet (paper section 4.1). Twin:
-// `lanes::solve_block` of incise-xpbd.
+// Solves one group of clusters, which share no particle: a thread for each cluster, tet by tet (paper section 4.1). Twin:
+// `solve_block` in `simd_kernel.rs` of incise-xpbd.
 
-// Whether corrections are gathered elsewhere.
+// Whether corrections are summed in a buffer and particles stay unchanged.
 override JACOBI: bool = false;
 
-@group(0) @binding(9) var<storage, read_write> corrections: array<vec4<f32>>;
+@group(0) @binding(8) var<storage, read_write> corrections: array<vec4<f32>>;
 
 fn solve_group(group: u32, lane: u32) {
     for (var k = 0u; k < settings.depth; k++) {
@@ -15,15 +15,11 @@ fn solve_group(group: u32, lane: u32) {
             return;
         }
         let x = Corners(particles[corner.x], particles[corner.y], particles[corner.z], particles[corner.w]);
-        var before = x;
-        if DAMPED {
-            before = Corners(previous[corner.x], previous[corner.y], previous[corner.z], previous[corner.w]);
-        }
         var multiplier = vec2(0.0);
         if KEEPS {
             multiplier = multipliers[place];
         }
-        let moved = solve_tet(tet_at(place), x, before, JACOBI, &multiplier);
+        let moved = solve_tet(tet_at(place), x, JACOBI, &multiplier);
         if KEEPS {
             multipliers[place] = multiplier;
         }

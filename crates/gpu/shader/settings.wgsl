@@ -9,10 +9,11 @@ struct Settings {
     per_time: f32,
     // Factor on each correction.
     relaxation: f32,
-    // The number 1, and the slope from which on the constraint of volume is scaled down. Not written as literals: some
-    // compilers take sums with literals in another order.
+    // The numbers 1 and 1/2, and the norm of the derivative of det F above which volume terms are scaled down. Not written
+    // as literals: some compilers reorder sums that contain literals.
     one: f32,
-    steep: f32,
+    half: f32,
+    max_cofactor_norm: f32,
     particles: u32,
     // Places that a thread has for tets.
     depth: u32,
@@ -21,7 +22,6 @@ struct Settings {
     handles: u32,
     held: u32,
     hanging: u32,
-    unused: u32,
     // l/mu, gamma and the damping time, where there is but one material; then 0, which compilers must not know.
     material: vec4<f32>,
 }

@@ -1,23 +1,19 @@
-// The tets on the device, and the bindings of the kernels that solve them.
+// The tets on the device, and the bindings that solving and damping share.
 //
-// A place is where a tet's numbers are. Those of 64 places lie side by side, number by number, so that threads next to
-// each other read what is next to each other.
+// A place is where a tet's numbers are. Those of 64 places lie side by side, number by number, so that adjacent threads
+// read adjacent words.
 
-// Whether there is but one material; whether multipliers are kept.
+// Whether the body has a single material.
 override UNIFORM: bool = true;
-override KEEPS: bool = false;
 
 @group(0) @binding(0) var<uniform> settings: Settings;
 @group(0) @binding(1) var<uniform> part: Part;
-@group(0) @binding(2) var<storage, read_write> particles: array<vec4<f32>>;
 // Place -> corners; all 0 where there is no tet.
-@group(0) @binding(3) var<storage, read> corners: array<vec4<u32>>;
-@group(0) @binding(4) var<storage, read> rest: array<f32>;
-@group(0) @binding(5) var<storage, read> constants: array<vec4<f32>>;
-@group(0) @binding(6) var<storage, read> previous: array<vec4<f32>>;
-@group(0) @binding(7) var<storage, read_write> multipliers: array<vec2<f32>>;
+@group(0) @binding(2) var<storage, read> corners: array<vec4<u32>>;
+@group(0) @binding(3) var<storage, read> rest: array<f32>;
+@group(0) @binding(4) var<storage, read> constants: array<vec4<f32>>;
 // The groups or tiles of the colors.
-@group(0) @binding(8) var<storage, read> lists: array<u32>;
+@group(0) @binding(5) var<storage, read> lists: array<u32>;
 
 const NUMBERS: u32 = 16u;
 

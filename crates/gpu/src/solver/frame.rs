@@ -3,13 +3,15 @@
 //! Everything that differs from substep to substep is in buffers before the pass begins, so it needs no break. Twin:
 //! `Solver::substep` of incise-xpbd. Cost: recording a third of a microsecond a dispatch.
 
-use incise_xpbd::{Solver, StepSettings, TetSolve};
+use incise_xpbd::{Solver, StepSettings};
 use wgpu::{Buffer, BufferUsages, SubmissionIndex};
 
 use super::body::Body;
 use super::handles::{self, Handles};
 use super::jacobi::{self, Jacobi};
-use super::kernels::{Bound, CLEAR, Kernels, PREDICT, UPDATE_VELOCITIES, Variant, solve};
+use super::kernels::{
+    Bound, CLEAR, Kernels, PREDICT, UPDATE_VELOCITIES, Variant, damp_tets, solve_tets,
+};
 use super::layout::{ClusterMapping, THREADS};
 use super::numbers::Settings;
 use super::obstacles::Obstacles;
@@ -109,8 +111,8 @@ impl Frame {
             }
             for iteration in 0..settings.iterations {
                 let turn = turns::offset(settings, substep, iteration);
-                body.colors
-                    .run(track.at(Solve), &passes.solve, &passes.tail);
+                let [one, several] = &passes.solve;
+                body.colors.run(track.at(Solve), one, several);
                 if let Some(jacobi) = &passes.jacobi {
                     jacobi.run(track.at(Solve), turn, particles);
                 }
@@ -127,6 +129,9 @@ impl Frame {
             passes.update.run(track.at(Update), &[], particles);
             if let Some(handles) = &passes.handles {
                 handles.update_held(track.at(Other));
+            }
+            if let Some([one, several]) = &passes.damp {
+                body.colors.run(track.at(Damp), one, several);
             }
         }
         track.submit()
@@ -188,14 +193,14 @@ impl Frame {
             per_time: (1.0 / time) as f32,
             relaxation: settings.relaxation as f32,
             one: 1.0,
-            steep: Solver::<f32>::MAX_COFACTOR_NORM as f32,
+            half: 0.5,
+            max_cofactor_norm: Solver::<f32>::MAX_COFACTOR_NORM as f32,
             particles: index(host.particle_count()),
             depth: index(depth),
             obstacles: index(settings.colliders.len()),
             handles: index(body.handles.as_ref().map_or(0, Handles::handle_count)),
             held: index(body.handles.as_ref().map_or(0, Handles::held_count)),
             hanging: index(body.handles.as_ref().map_or(0, Handles::hanging_count)),
-            unused: 0,
             material,
         };
         if self.sent != Some(values) {
@@ -264,10 +269,12 @@ struct Passes<'a> {
     predict: Bound,
     /// Where multipliers are kept.
     clear: Option<Bound>,
-    solve: Bound,
-    tail: Bound,
+    /// For a color of tets, and for a row of small colors.
+    solve: [Bound; 2],
     project: Option<Bound>,
     update: Bound,
+    /// If a material is damped.
+    damp: Option<[Bound; 2]>,
     jacobi: Option<jacobi::Passes>,
     handles: Option<handles::Passes>,
     /// Distances before volumes.
@@ -292,31 +299,41 @@ impl Frame {
         let constants = self.settings.buffer();
         let (particles, previous) = (body.particles.buffer(), body.previous.buffer());
         let velocities = body.velocities.buffer();
+        let several = settings.iterations > 1;
+        let mapping = body.layout.form;
+        let (plain, material) = (
+            Variant::default(),
+            Variant {
+                various: !host.is_uniform(),
+                tile: body.layout.tile(),
+                ..Variant::default()
+            },
+        );
         let variant = Variant {
-            damped: host.is_damped(),
-            sequential: settings.tet_solve == TetSolve::Sequential,
             keeps,
             jacobi: self.jacobi.is_some(),
-            various: !host.is_uniform(),
-            tile: body.layout.tile(),
+            ..material
         };
-        let last = match body.layout.form {
-            ClusterMapping::Threads => body.corrections.buffer(),
-            ClusterMapping::Workgroups => body.tiles.buffer(),
-        };
+        let variant = variant.with_tet_solve(settings.tet_solve, several);
         let tets = [
             constants,
             body.colors.parts.array.buffer(),
-            particles,
             body.corners.buffer(),
             body.rest.buffer(),
             body.constants.buffer(),
-            previous,
-            body.multipliers.buffer(),
             body.colors.lists.array.buffer(),
-            last,
+            particles,
         ];
-        let (form, plain) = (body.layout.form, Variant::default());
+        let multipliers = body.multipliers.buffer();
+        let (solved, damped) = match mapping {
+            ClusterMapping::Threads => ([multipliers, body.corrections.buffer()], vec![velocities]),
+            ClusterMapping::Workgroups => (
+                [multipliers, body.tiles.buffer()],
+                vec![velocities, body.tiles.buffer()],
+            ),
+        };
+        let solved = [&tets[..], &solved].concat();
+        let damped = [&tets[..], &damped].concat();
         let update = [
             constants,
             particles,
@@ -333,7 +350,6 @@ impl Frame {
             velocities,
             repaired: repaired.buffer(),
         });
-        let several = settings.iterations > 1;
         let mut scalars = Vec::new();
         for constraints in body.distances.iter().chain(&body.volumes) {
             let buffers = [constants, particles, previous];
@@ -351,9 +367,24 @@ impl Frame {
                 true => Some(bind(&CLEAR, plain, &[body.multipliers.buffer()])?),
                 false => None,
             },
-            solve: bind(solve(form, false), variant, &tets)?,
-            tail: bind(solve(form, true), variant, &tets)?,
+            solve: {
+                let [one, several] = solve_tets(mapping);
+                [
+                    bind(one, variant, &solved)?,
+                    bind(several, variant, &solved)?,
+                ]
+            },
             update: bind(&UPDATE_VELOCITIES, plain, &update)?,
+            damp: match host.is_damped() {
+                true => {
+                    let [one, several] = damp_tets(mapping);
+                    Some([
+                        bind(one, material, &damped)?,
+                        bind(several, material, &damped)?,
+                    ])
+                }
+                false => None,
+            },
             project: match (&self.obstacles, &shared) {
                 (Some(obstacles), Some(shared)) => Some(obstacles.bind(gpu, kernels, shared)?),
                 _ => None,

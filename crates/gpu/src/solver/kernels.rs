@@ -1,12 +1,13 @@
 //! The kernels of the solver, [`Variant`]: which of their branches are compiled, and [`Bound`]: one with its buffers.
 //!
-//! A scene without damping, without multipliers to keep, of one material, gets kernels that know nothing of them. A
-//! kernel is compiled when the first step needs it.
+//! Branches that a scene does not need (kept multipliers, several materials, damped constraints) are not compiled. A kernel
+//! is compiled when the first step needs it.
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::sync::Arc;
 
+use incise_xpbd::TetSolve;
 use wgpu::{BindGroup, Buffer};
 
 use super::layout::ClusterMapping;
@@ -28,7 +29,8 @@ pub(crate) struct Source {
 #[derive(Clone, Copy, Debug)]
 enum Flag {
     Damped,
-    Sequential,
+    TetSolve,
+    Iterated,
     Keeps,
     Jacobi,
     Uniform,
@@ -46,45 +48,68 @@ macro_rules! text {
 const PART: u64 = 8;
 const TURN: u64 = 16;
 
-/// What kernels that solve tets use.
+/// Bindings of the kernels that solve tets in threads; the last one is the sums of Jacobi corrections.
 const TETS: &[Use] = &[
     Use::Uniform,
     Use::Part(PART),
-    Use::Write,
     Use::Read,
     Use::Read,
     Use::Read,
     Use::Read,
     Use::Write,
+    Use::Write,
+    Use::Write,
+];
+
+/// Bindings of the kernels that solve tets in workgroups; the last one is the tiles.
+const TILES: &[Use] = &[
+    Use::Uniform,
+    Use::Part(PART),
+    Use::Read,
+    Use::Read,
+    Use::Read,
+    Use::Read,
+    Use::Write,
+    Use::Write,
+    Use::Read,
+];
+
+/// Bindings of the kernels that damp tets in threads.
+const DAMPED_TETS: &[Use] = &[
+    Use::Uniform,
+    Use::Part(PART),
+    Use::Read,
+    Use::Read,
+    Use::Read,
+    Use::Read,
     Use::Read,
     Use::Write,
 ];
 
-/// The same with tiles to read instead of corrections to write.
-const TILES: &[Use] = &[
+/// Bindings of the kernels that damp tets in workgroups; the last one is the tiles.
+const DAMPED_TILES: &[Use] = &[
     Use::Uniform,
     Use::Part(PART),
+    Use::Read,
+    Use::Read,
+    Use::Read,
+    Use::Read,
+    Use::Read,
     Use::Write,
-    Use::Read,
-    Use::Read,
-    Use::Read,
-    Use::Read,
-    Use::Write,
-    Use::Read,
     Use::Read,
 ];
 
 const TETS_FLAGS: &[Flag] = &[
-    Flag::Damped,
-    Flag::Sequential,
+    Flag::TetSolve,
+    Flag::Iterated,
     Flag::Keeps,
     Flag::Uniform,
     Flag::Jacobi,
 ];
 
 const TILES_FLAGS: &[Flag] = &[
-    Flag::Damped,
-    Flag::Sequential,
+    Flag::TetSolve,
+    Flag::Iterated,
     Flag::Keeps,
     Flag::Uniform,
     Flag::TileTets,
@@ -111,6 +136,7 @@ const SOLVE_THREADS: Source = Source {
         "settings",
         "tet",
         "tets",
+        "tet_solve",
         "group",
         "solve_threads"
     ),
@@ -125,6 +151,7 @@ const SOLVE_THREADS_TAIL: Source = Source {
         "settings",
         "tet",
         "tets",
+        "tet_solve",
         "group",
         "solve_threads_tail"
     ),
@@ -139,6 +166,8 @@ const SOLVE_WORKGROUPS: Source = Source {
         "settings",
         "tet",
         "tets",
+        "tiles",
+        "tet_solve",
         "tile",
         "solve_workgroups"
     ),
@@ -153,11 +182,75 @@ const SOLVE_WORKGROUPS_TAIL: Source = Source {
         "settings",
         "tet",
         "tets",
+        "tiles",
+        "tet_solve",
         "tile",
         "solve_workgroups_tail"
     ),
     uses: TILES,
     flags: TILES_FLAGS,
+};
+
+const DAMP_THREADS: Source = Source {
+    name: "damp_threads",
+    parts: text!(
+        "common",
+        "settings",
+        "tet",
+        "tets",
+        "tet_damping",
+        "damp_group",
+        "solve_threads"
+    ),
+    uses: DAMPED_TETS,
+    flags: &[Flag::Uniform],
+};
+
+const DAMP_THREADS_TAIL: Source = Source {
+    name: "damp_threads_tail",
+    parts: text!(
+        "common",
+        "settings",
+        "tet",
+        "tets",
+        "tet_damping",
+        "damp_group",
+        "solve_threads_tail"
+    ),
+    uses: DAMPED_TETS,
+    flags: &[Flag::Uniform],
+};
+
+const DAMP_WORKGROUPS: Source = Source {
+    name: "damp_workgroups",
+    parts: text!(
+        "common",
+        "settings",
+        "tet",
+        "tets",
+        "tiles",
+        "tet_damping",
+        "damp_tile",
+        "solve_workgroups"
+    ),
+    uses: DAMPED_TILES,
+    flags: &[Flag::Uniform, Flag::TileTets],
+};
+
+const DAMP_WORKGROUPS_TAIL: Source = Source {
+    name: "damp_workgroups_tail",
+    parts: text!(
+        "common",
+        "settings",
+        "tet",
+        "tets",
+        "tiles",
+        "tet_damping",
+        "damp_tile",
+        "solve_workgroups_tail"
+    ),
+    uses: DAMPED_TILES,
+    flags: &[Flag::Uniform, Flag::TileTets],
 };
 
 pub(crate) const PATCH_TETS: Source = Source {
@@ -354,6 +447,10 @@ pub(crate) const SOURCES: &[Source] = &[
     SOLVE_THREADS_TAIL,
     SOLVE_WORKGROUPS,
     SOLVE_WORKGROUPS_TAIL,
+    DAMP_THREADS,
+    DAMP_THREADS_TAIL,
+    DAMP_WORKGROUPS,
+    DAMP_WORKGROUPS_TAIL,
     PATCH_TETS,
     PATCH_PARTICLES,
     CLEAR,
@@ -371,13 +468,19 @@ pub(crate) const SOURCES: &[Source] = &[
     MEASURE_PARTICLES,
 ];
 
-/// The kernel that solves colors, or a row of colors of one group each.
-pub(crate) fn solve(form: ClusterMapping, tail: bool) -> &'static Source {
-    match (form, tail) {
-        (ClusterMapping::Threads, false) => &SOLVE_THREADS,
-        (ClusterMapping::Threads, true) => &SOLVE_THREADS_TAIL,
-        (ClusterMapping::Workgroups, false) => &SOLVE_WORKGROUPS,
-        (ClusterMapping::Workgroups, true) => &SOLVE_WORKGROUPS_TAIL,
+/// The kernels that solve a color of tets, and a row of colors of one group each.
+pub(crate) fn solve_tets(mapping: ClusterMapping) -> [&'static Source; 2] {
+    match mapping {
+        ClusterMapping::Threads => [&SOLVE_THREADS, &SOLVE_THREADS_TAIL],
+        ClusterMapping::Workgroups => [&SOLVE_WORKGROUPS, &SOLVE_WORKGROUPS_TAIL],
+    }
+}
+
+/// The kernels that damp a color of tets, and a row of colors of one group each.
+pub(crate) fn damp_tets(mapping: ClusterMapping) -> [&'static Source; 2] {
+    match mapping {
+        ClusterMapping::Threads => [&DAMP_THREADS, &DAMP_THREADS_TAIL],
+        ClusterMapping::Workgroups => [&DAMP_WORKGROUPS, &DAMP_WORKGROUPS_TAIL],
     }
 }
 
@@ -392,8 +495,12 @@ pub(crate) fn solve_scalars(kind: Kind) -> [&'static Source; 2] {
 /// Which branches of a kernel are compiled.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Variant {
+    /// Whether constraints of one number are damped.
     pub(crate) damped: bool,
-    pub(crate) sequential: bool,
+    /// A constant of `tet_solve.wgsl`; see [`Variant::with_tet_solve`].
+    pub(crate) tet_solve: u32,
+    /// Whether the split form accumulates multipliers.
+    pub(crate) iterated: bool,
     pub(crate) keeps: bool,
     pub(crate) jacobi: bool,
     /// Whether tets have materials of their own.
@@ -403,11 +510,27 @@ pub(crate) struct Variant {
 }
 
 impl Variant {
+    /// Selects the form of solving a tet. `iterated` says that a substep has several iterations.
+    pub(crate) fn with_tet_solve(self, form: TetSolve, iterated: bool) -> Self {
+        let tet_solve = match form {
+            TetSolve::Split => 0,
+            TetSolve::Block => 1,
+            TetSolve::Sequential => 2,
+        };
+        Self {
+            tet_solve,
+            // The other forms have one kernel for both.
+            iterated: iterated && form == TetSolve::Split,
+            ..self
+        }
+    }
+
     /// The override that a flag is in shaders, with its value.
     fn value(self, flag: Flag) -> (&'static str, f64) {
         let (name, on) = match flag {
             Flag::Damped => ("DAMPED", self.damped),
-            Flag::Sequential => ("SEQUENTIAL", self.sequential),
+            Flag::TetSolve => return ("TET_SOLVE", f64::from(self.tet_solve)),
+            Flag::Iterated => ("ITERATED", self.iterated),
             Flag::Keeps => ("KEEPS", self.keeps),
             Flag::Jacobi => ("JACOBI", self.jacobi),
             Flag::Uniform => ("UNIFORM", !self.various),

@@ -15,14 +15,14 @@ pub(crate) struct Settings {
     pub(crate) per_time: f32,
     pub(crate) relaxation: f32,
     pub(crate) one: f32,
-    pub(crate) steep: f32,
+    pub(crate) half: f32,
+    pub(crate) max_cofactor_norm: f32,
     pub(crate) particles: u32,
     pub(crate) depth: u32,
     pub(crate) obstacles: u32,
     pub(crate) handles: u32,
     pub(crate) held: u32,
     pub(crate) hanging: u32,
-    pub(crate) unused: u32,
     pub(crate) material: [f32; 4],
 }
 

@@ -21,6 +21,7 @@ pub(crate) enum Stage {
     Solve,
     Other,
     Update,
+    Damp,
 }
 
 /// What the stages of a frame took on the device, in ms, summed over its substeps.
@@ -35,13 +36,15 @@ pub struct StageTimes {
     pub other: f64,
     /// Updating velocities.
     pub update: f64,
+    /// Damping velocities; 0 without a damped material.
+    pub damp: f64,
 }
 
 impl StageTimes {
     /// All together.
     #[must_use]
     pub fn total(&self) -> f64 {
-        self.predict + self.solve + self.other + self.update
+        self.predict + self.solve + self.other + self.update + self.damp
     }
 }
 
@@ -116,6 +119,7 @@ impl Clock {
                 Stage::Solve => &mut times.solve,
                 Stage::Other => &mut times.other,
                 Stage::Update => &mut times.update,
+                Stage::Damp => &mut times.damp,
             };
             // A device may set its clock back.
             *sum += ends[1].saturating_sub(ends[0]) as f64 * milliseconds;

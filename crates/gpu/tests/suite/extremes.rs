@@ -9,6 +9,7 @@ use incise_xpbd::{Collider, ColliderShape, Material, Method, Pose, Solver, StepS
 use crate::scalars::{set_springs, set_volumes};
 use crate::solver::{SOFT, body, schedules, settings, share};
 use crate::support::gpu;
+use crate::tet_solve::TET_SOLVES;
 use crate::twin::FORMS;
 
 const RUBBER: Material = Material {
@@ -21,7 +22,7 @@ fn small() -> TetMesh {
     kuhn_box([3, 2, 2], dvec3(1.0, 0.5, 0.5))
 }
 
-/// Thirty frames, after which every number is finite.
+/// Runs thirty frames with each form of solving a tet, after which every number is finite.
 fn survive(
     test: &str,
     material: Material,
@@ -30,7 +31,14 @@ fn survive(
     prepare: impl Fn(&mut Solver<f32>),
 ) {
     let Some(gpu) = gpu(test) else { return };
-    for &(method, form) in forms {
+    let all = TET_SOLVES
+        .into_iter()
+        .flat_map(|tet_solve| forms.iter().map(move |&form| (tet_solve, form)));
+    for (tet_solve, (method, form)) in all {
+        let settings = &StepSettings {
+            tet_solve,
+            ..settings.clone()
+        };
         let mesh = small();
         let (schedule, _) = schedules(&mesh, method);
         let mut solver = body(&mesh, &[material]);
@@ -45,7 +53,7 @@ fn survive(
             let (x, v) = (solver.position(p), solver.velocity(p));
             assert!(
                 x.is_finite() && v.is_finite(),
-                "{test}, {form:?}: {p} {x} {v}, {repaired}"
+                "{test}, {tet_solve:?}, {form:?}: {p} {x} {v}, {repaired}"
             );
         }
         let energy = solver.energy(None);

@@ -21,4 +21,5 @@ mod sizes;
 mod solver;
 mod stages;
 mod support;
+mod tet_solve;
 mod twin;

@@ -12,6 +12,7 @@ use incise_mesh::{TetId, TetMesh};
 use incise_xpbd::{Material, Solver, StepSettings, TetSolve};
 
 use crate::support::{gpu, skip};
+use crate::tet_solve::TET_SOLVES;
 
 pub(crate) const SOFT: Material = Material {
     young_modulus: 1e5,
@@ -257,41 +258,43 @@ fn residuals_come_from_the_device() {
         ("serial:10", ClusterMapping::Threads),
         ("pressure:128", ClusterMapping::Workgroups),
     ] {
-        let (schedule, tiled) = schedules(&mesh, method);
-        let mut device = GpuSolver::new(share(gpu), body(&mesh, &[SOFT]), form).unwrap();
-        let mut twin = body(&mesh, &[SOFT]);
-        for _ in 0..3 {
-            device
-                .step_keeping_residuals(&schedule, &settings())
-                .unwrap();
-            let order = if form == ClusterMapping::Threads {
-                &schedule
-            } else {
-                &tiled
-            };
-            twin.step_keeping_residuals(order, &settings()).unwrap();
+        for tet_solve in TET_SOLVES {
+            for iterations in [1, 2] {
+                let settings = StepSettings {
+                    tet_solve,
+                    iterations,
+                    ..settings()
+                };
+                let what = format!("{method}, {tet_solve:?}, {iterations} iterations");
+                let (schedule, tiled) = schedules(&mesh, method);
+                let mut device = GpuSolver::new(share(gpu), body(&mesh, &[SOFT]), form).unwrap();
+                let mut twin = body(&mesh, &[SOFT]);
+                let order = match form {
+                    ClusterMapping::Threads => &schedule,
+                    ClusterMapping::Workgroups => &tiled,
+                };
+                for _ in 0..3 {
+                    device.step_keeping_residuals(&schedule, &settings).unwrap();
+                    twin.step_keeping_residuals(order, &settings).unwrap();
+                }
+                let time = settings.substep_time();
+                let there = device.host().unwrap().residuals(time).unwrap();
+                let here = twin.residuals(time).unwrap();
+                // Single precision over the square of the time of a substep.
+                assert!(
+                    (there.force / here.force - 1.0).abs() < 1e-2,
+                    "{what}: {there:?} {here:?}"
+                );
+                assert!(
+                    (there.dual / here.dual - 1.0).abs() < 1e-2,
+                    "{what}: {there:?} {here:?}"
+                );
+                device.step(&schedule, &settings).unwrap();
+                twin.step(order, &settings).unwrap();
+                // A step that keeps nothing has no residuals, as on the host.
+                assert_eq!(device.host().unwrap().residuals(time), twin.residuals(time));
+            }
         }
-        let time = settings().substep_time();
-        let there = device.host().unwrap().residuals(time).unwrap();
-        let here = twin.residuals(time).unwrap();
-        // Single precision over the square of the time of a substep.
-        assert!(
-            (there.force / here.force - 1.0).abs() < 1e-2,
-            "{there:?} {here:?}"
-        );
-        assert!(
-            (there.dual / here.dual - 1.0).abs() < 1e-2,
-            "{there:?} {here:?}"
-        );
-        device.step(&schedule, &settings()).unwrap();
-        let order = if form == ClusterMapping::Threads {
-            &schedule
-        } else {
-            &tiled
-        };
-        twin.step(order, &settings()).unwrap();
-        // Of a step that kept nothing nothing is known, as on the processor.
-        assert_eq!(device.host().unwrap().residuals(time), twin.residuals(time));
     }
 }
 
@@ -365,10 +368,13 @@ fn lavapipe_gives_the_same_bits() {
             ("pressure:128", ClusterMapping::Workgroups),
             ("pressure:256", ClusterMapping::Workgroups),
         ] {
-            for solving in [TetSolve::Block, TetSolve::Sequential] {
+            for (tet_solve, iterations) in TET_SOLVES
+                .into_iter()
+                .flat_map(|form| [(form, 1), (form, 2)])
+            {
                 let settings = StepSettings {
-                    tet_solve: solving,
-                    iterations: 2,
+                    tet_solve,
+                    iterations,
                     ..settings()
                 };
                 let (schedule, tiled) = schedules(&mesh, method);
@@ -388,7 +394,7 @@ fn lavapipe_gives_the_same_bits() {
                     assert_eq!(
                         host.particle_data(p),
                         twin.particle_data(p),
-                        "{method} {solving:?}"
+                        "{method} {tet_solve:?} {iterations}"
                     );
                 }
             }

@@ -6,7 +6,7 @@ use std::time::Instant;
 use glam::{DVec3, dvec3};
 use incise_gpu::{GpuSolver, StageTimes};
 use incise_mesh::generate::kuhn_box;
-use incise_xpbd::{Collider, Pose, Solver, StepSettings};
+use incise_xpbd::{Collider, Material, Pose, Solver, StepSettings};
 
 use crate::solver::{SOFT, body, schedules, settings, share};
 use crate::support::{gpu, skip};
@@ -21,7 +21,13 @@ fn timed(device: &mut GpuSolver, step: impl Fn(&mut GpuSolver), passes: f64) -> 
     gpu.wait().unwrap();
     let wall = 1e3 * start.elapsed().as_secs_f64();
     let times = device.stage_times().unwrap().expect("the step was timed");
-    for time in [times.predict, times.solve, times.other, times.update] {
+    for time in [
+        times.predict,
+        times.solve,
+        times.other,
+        times.update,
+        times.damp,
+    ] {
         assert!(time.is_finite() && time >= 0.0, "{times:?}");
     }
     // Clocks of devices tick once a microsecond or more often.
@@ -50,11 +56,18 @@ fn stages_are_timed_and_nothing_changes() {
             solver.attach(p, handle, compliance, 0.0).unwrap();
         }
     };
-    for (method, form) in FORMS {
+    let damped = Material {
+        damping: 0.01,
+        ..SOFT
+    };
+    let all = FORMS
+        .into_iter()
+        .flat_map(|form| [SOFT, damped].map(|material| (form, material)));
+    for ((method, form), material) in all {
         let gpu = share(gpu);
         let (schedule, _) = schedules(&mesh, method);
         let [mut device, mut other] = [(); 2].map(|()| {
-            let mut solver = body(&mesh, &[SOFT]);
+            let mut solver = body(&mesh, &[material]);
             hang(&mut solver);
             GpuSolver::new(Arc::clone(&gpu), solver, form).unwrap()
         });
@@ -69,11 +82,14 @@ fn stages_are_timed_and_nothing_changes() {
         assert_eq!(device.stage_times().unwrap(), None, "nothing was timed yet");
         for _ in 0..3 {
             let before = gpu.traffic();
-            let times = timed(&mut device, step, 32.0);
-            // In each of four substeps: predict, other, twice solve and other, update, other. The copy of predictions
-            // lies between two of them.
-            assert_eq!(gpu.traffic().since(before).passes, 4 * 8);
+            let times = timed(&mut device, step, 36.0);
+            // In each of four substeps: predict, other, twice solve and other, update, other, and damp with a damped
+            // material. The copy of predictions lies between two of them.
+            let is_damped = material.damping > 0.0;
+            let passes = 8 + u64::from(is_damped);
+            assert_eq!(gpu.traffic().since(before).passes, 4 * passes);
             assert!(times.solve > 0.0 && times.other > 0.0, "{times:?}");
+            assert_eq!(times.damp > 0.0, is_damped, "{times:?}");
             step(&mut other);
         }
         device.time_stages(false).unwrap();
@@ -116,5 +132,6 @@ fn long_frames_take_several_query_sets() {
     let all = timed(&mut device, step, 2100.0);
     // Three a substep in each of two steps, and one that sent the tets.
     assert_eq!(device.gpu().traffic().passes, 2 * 2100 + 1);
-    assert!(all.predict > 0.0 && all.update > 0.0 && all.other == 0.0);
+    assert!(all.predict > 0.0 && all.update > 0.0);
+    assert!(all.other == 0.0 && all.damp == 0.0);
 }

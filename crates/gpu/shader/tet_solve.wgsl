@@ -1,0 +1,227 @@
+// The three forms of solving a tet. Each moves the corners and changes both multipliers. Twin: `simd_kernel.rs` of
+// incise-xpbd, which explains the equations; the order of operations is the same.
+//
+// The energy of the split form is written so that nothing cancels near rest. An algebraically equal form, such as one in
+// |F|^2 - 3, loses all digits there.
+
+const SPLIT: u32 = 0u;
+const BLOCK: u32 = 1u;
+const SEQUENTIAL: u32 = 2u;
+
+override TET_SOLVE: u32 = SPLIT;
+// Whether a substep has several iterations, for the split form.
+override ITERATED: bool = false;
+// Whether multipliers are kept.
+override KEEPS: bool = false;
+
+@group(0) @binding(6) var<storage, read_write> particles: array<vec4<f32>>;
+@group(0) @binding(7) var<storage, read_write> multipliers: array<vec2<f32>>;
+
+// The change of F per weight by one constraint, and the change of its multiplier.
+struct Change {
+    derivative: Columns,
+    multiplier: f32,
+}
+
+// The parts of the energy of the split form.
+struct Energies {
+    // Psi_D / mu.
+    shear: f32,
+    // Its derivative.
+    derivative: Columns,
+    // The derivative of det F.
+    cofactor: Columns,
+    // det F - 1.
+    bulge: f32,
+}
+
+fn energies_of(f: Columns) -> Energies {
+    var cofactor = cofactor_of(f);
+    var bulge = dot(f.a, cofactor.a) - settings.one;
+    let aa = dot(f.a, f.a) - settings.one;
+    let bb = dot(f.b, f.b) - settings.one;
+    let cc = dot(f.c, f.c) - settings.one;
+    let ab = dot(f.a, f.b);
+    let ac = dot(f.a, f.c);
+    let bc = dot(f.b, f.c);
+    let minor = bb * cc - bc * bc;
+    let second = aa * (bb + cc) + minor - ab * ab - ac * ac;
+    let third = aa * minor - ab * (ab * cc - bc * ac) + ac * (ab * bc - bb * ac);
+    var shear = bulge * bulge - (second + third) * settings.half;
+    let square = product(cofactor, cofactor);
+    if square > settings.max_cofactor_norm * settings.max_cofactor_norm {
+        let scale = settings.max_cofactor_norm / sqrt(square);
+        cofactor = scaled(cofactor, scale);
+        bulge *= scale;
+        shear = (aa + bb + cc) * settings.half - bulge + bulge * bulge * settings.half;
+    }
+    let pressure = bulge - settings.one;
+    let derivative = Columns(
+        f.a + pressure * cofactor.a,
+        f.b + pressure * cofactor.b,
+        f.c + pressure * cofactor.c,
+    );
+    return Energies(shear, derivative, cofactor, bulge);
+}
+
+// G : A^T B, the bilinear form of `weighted`.
+fn weighted_product(tet: Tet, m: Columns, n: Columns) -> f32 {
+    let same = tet.same.x * dot(m.a, n.a) + tet.same.y * dot(m.b, n.b) + tet.same.z * dot(m.c, n.c);
+    let mixed = tet.mixed.x * (dot(m.a, n.b) + dot(m.b, n.a))
+        + tet.mixed.y * (dot(m.a, n.c) + dot(m.c, n.a))
+        + tet.mixed.z * (dot(m.b, n.c) + dot(m.c, n.b));
+    return (same + mixed * settings.half) * settings.time_squared;
+}
+
+// Moves the corners by a shear step of `shear_step` and by the volume constraint that sees this step.
+fn move_split(
+    tet: Tet,
+    x: Corners,
+    energies: Energies,
+    shear_step: f32,
+    multipliers: ptr<function, vec2<f32>>,
+) -> Corners {
+    let lame = tet.ratio - settings.one;
+    let mixed = weighted_product(tet, energies.derivative, energies.cofactor);
+    let b = -(lame * (tet.stiffness * energies.bulge + shear_step * mixed) + (*multipliers).y);
+    let change = b / (lame * weighted(tet, energies.cofactor) + settings.one);
+    let along = shear_step * settings.relaxation;
+    let d = change * settings.relaxation;
+    if !is_finite(along + d) {
+        return x;
+    }
+    (*multipliers).y += d;
+    let moved = Columns(
+        energies.derivative.a * along + energies.cofactor.a * d,
+        energies.derivative.b * along + energies.cofactor.b * d,
+        energies.derivative.c * along + energies.cofactor.c * d,
+    );
+    return move_corners(tet, x, moved);
+}
+
+// The split form with an explicit shear step, for a single iteration.
+fn solve_split(tet: Tet, x: Corners, f: Columns, multipliers: ptr<function, vec2<f32>>) -> Corners {
+    let energies = energies_of(f);
+    let twice = energies.shear + energies.shear;
+    let steepness = weighted(tet, energies.derivative);
+    // The step ends at the linearized zero of the root of the energy.
+    var fraction = settings.one;
+    if twice < steepness {
+        fraction = twice / steepness;
+    }
+    if !(energies.shear > 0.0) {
+        fraction = 0.0;
+    }
+    let shear_step = -(tet.stiffness * fraction);
+    if KEEPS {
+        let change = shear_step * sqrt(max(twice, 0.0)) * settings.relaxation;
+        if is_finite(change) {
+            (*multipliers).x += change;
+        }
+    }
+    return move_split(tet, x, energies, shear_step, multipliers);
+}
+
+// The split form with accumulating multipliers, for several iterations.
+fn solve_split_iterated(tet: Tet, x: Corners, f: Columns, multipliers: ptr<function, vec2<f32>>) -> Corners {
+    let energies = energies_of(f);
+    let positive = energies.shear > 0.0;
+    let twice = select(settings.one, energies.shear + energies.shear, positive);
+    let root = sqrt(twice);
+    let m = weighted(tet, energies.derivative) / twice;
+    var d = -((tet.stiffness * root + (*multipliers).x) / (m + settings.one));
+    if !positive || !is_finite(d) {
+        d = 0.0;
+    }
+    (*multipliers).x += d * settings.relaxation;
+    return move_split(tet, x, energies, d / root, multipliers);
+}
+
+// Prevents compilers from reordering the factors of a product. At rest the determinant of the block form is a difference
+// of equal products, and each order of factors has other rounding errors.
+fn pinned(x: f32) -> f32 {
+    return bitcast<f32>(bitcast<u32>(x) ^ bitcast<u32>(settings.material.w));
+}
+
+// The block form: both constraints as one system.
+fn solve_block(tet: Tet, x: Corners, f: Columns, multipliers: ptr<function, vec2<f32>>) -> Corners {
+    let norm = sqrt(product(f, f));
+    // At F = 0 the gradient has no direction, and the tet waits for its neighbors.
+    let directed = norm > 0.0;
+    let scale = settings.one / select(settings.one, norm, directed);
+    let v = volume(tet, f);
+    let trace = (tet.same.x + tet.same.y + tet.same.z) * settings.time_squared;
+    let m11 = pinned(weighted(tet, f) * scale * scale);
+    let m22 = weighted(tet, v.cofactor);
+    let m12 = trace * v.volume * scale;
+    let hydrostatic = v.volume - v.gamma;
+    let parallel = m11 * m22 - m12 * m12;
+    // A negative value is rounding noise. An overflow is kept, and the tet does not move.
+    let rest = select(parallel, 0.0, parallel < 0.0);
+    let inverse = settings.one / (tet.ratio * (rest + m22) + m11 + settings.one);
+    let b1 = -(tet.stiffness * norm + (*multipliers).x);
+    let b2 = -(tet.stiffness * tet.ratio * hydrostatic + (*multipliers).y);
+    let d1 = ((tet.ratio * m22 + settings.one) * b1 - m12 * b2) * inverse * settings.relaxation;
+    let d2 = ((m11 + settings.one) * b2 - tet.ratio * m12 * b1) * inverse * settings.relaxation;
+    if !directed || !is_finite(d1 + d2) {
+        return x;
+    }
+    *multipliers += vec2(d1, d2);
+    let along = d1 * scale;
+    let change = Columns(
+        f.a * along + v.cofactor.a * d2,
+        f.b * along + v.cofactor.b * d2,
+        f.c * along + v.cofactor.c * d2,
+    );
+    return move_corners(tet, x, change);
+}
+
+// The change of a multiplier that satisfies its constraint, whose derivative is `scale` times a matrix.
+fn alone(derivative: Columns, scale: f32, stiffness: f32, constraint: f32, m: f32, multiplier: f32) -> Change {
+    let b = -(stiffness * constraint + multiplier);
+    let d = b / (m + settings.one) * settings.relaxation;
+    if !is_finite(d) {
+        return Change(zero(), 0.0);
+    }
+    return Change(scaled(derivative, d * scale), d);
+}
+
+fn solve_deviatoric(tet: Tet, x: Corners, f: Columns, multipliers: ptr<function, vec2<f32>>) -> Corners {
+    let norm = sqrt(product(f, f));
+    if !(norm > 0.0) {
+        return x;
+    }
+    let scale = settings.one / norm;
+    let m = weighted(tet, f) * scale * scale;
+    let change = alone(f, scale, tet.stiffness, norm, m, (*multipliers).x);
+    (*multipliers).x += change.multiplier;
+    return move_corners(tet, x, change.derivative);
+}
+
+fn solve_hydrostatic(tet: Tet, x: Corners, f: Columns, multipliers: ptr<function, vec2<f32>>) -> Corners {
+    let v = volume(tet, f);
+    let constraint = v.volume - v.gamma;
+    let m = weighted(tet, v.cofactor) * tet.ratio;
+    let change = alone(v.cofactor, settings.one, tet.stiffness * tet.ratio, constraint, m, (*multipliers).y);
+    (*multipliers).y += change.multiplier;
+    return move_corners(tet, x, change.derivative);
+}
+
+// The corners of a tet after one solve. In a Jacobi pass all constraints see the corners `x`.
+fn solve_tet(tet: Tet, x: Corners, jacobi: bool, multipliers: ptr<function, vec2<f32>>) -> Corners {
+    let f = deformation(tet, x);
+    if TET_SOLVE == SEQUENTIAL {
+        let moved = solve_deviatoric(tet, x, f, multipliers);
+        if jacobi {
+            return solve_hydrostatic(tet, moved, f, multipliers);
+        }
+        return solve_hydrostatic(tet, moved, deformation(tet, moved), multipliers);
+    }
+    if TET_SOLVE == BLOCK {
+        return solve_block(tet, x, f, multipliers);
+    }
+    if ITERATED {
+        return solve_split_iterated(tet, x, f, multipliers);
+    }
+    return solve_split(tet, x, f, multipliers);
+}
