@@ -10,7 +10,7 @@ use incise_graph::Schedule;
 use crate::collider::Obstacle;
 use crate::layout::{CONSTANTS, REST};
 use crate::simd_kernel::MAX_COFACTOR_NORM;
-use crate::{Pose, Real, Solver, StepSettings};
+use crate::{Pose, Real, Solver, StepSettings, TetSolve};
 
 /// A tet as a kernel wants it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -242,11 +242,17 @@ impl<R: Real> Solver<R> {
     }
 
     /// Takes over what [`Solver::residuals`] needs of a last substep that was made elsewhere: the positions before the
-    /// constraints were solved (the fourth number is ignored), and the two multipliers of each tet.
+    /// constraints were solved (the fourth number is ignored), the two multipliers of each tet, and the form that solved
+    /// the tets.
     ///
     /// # Panics
     /// If there is not one of the first for every particle and one of the second for every tet.
-    pub fn load_last_substep(&mut self, predicted: &[[R; 4]], multipliers: &[[R; 2]]) {
+    pub fn load_last_substep(
+        &mut self,
+        predicted: &[[R; 4]],
+        multipliers: &[[R; 2]],
+        tet_solve: TetSolve,
+    ) {
         assert_eq!(predicted.len(), self.particle_count());
         assert_eq!(multipliers.len(), self.tet_count());
         self.predicted.clear();
@@ -254,6 +260,7 @@ impl<R: Real> Solver<R> {
         self.predicted.extend(vectors);
         self.kept.clear();
         self.kept.extend_from_slice(multipliers);
+        self.kept_form = tet_solve;
     }
 
     /// What hangs on handles, ascending by particle.

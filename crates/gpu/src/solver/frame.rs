@@ -3,7 +3,7 @@
 //! Everything that differs from substep to substep is in buffers before the pass begins, so it needs no break. Twin:
 //! `Solver::substep` of incise-xpbd. Cost: recording a third of a microsecond a dispatch.
 
-use incise_xpbd::{Solver, StepSettings};
+use incise_xpbd::{Solver, StepSettings, TetSolve};
 use wgpu::{Buffer, BufferUsages, SubmissionIndex};
 
 use super::body::Body;
@@ -34,8 +34,8 @@ pub(crate) struct Frame {
     jacobi: Option<Jacobi>,
     /// Positions before the constraints of the last substep; empty unless a step keeps them.
     predicted: Array<[f32; 4]>,
-    /// Whether the last step kept what residuals need.
-    kept: bool,
+    /// The form that solved the tets, if the last step kept what residuals need.
+    kept: Option<TetSolve>,
     /// If stages are timed.
     clock: Option<Clock>,
 }
@@ -59,7 +59,7 @@ impl Frame {
             obstacles: None,
             jacobi: None,
             predicted: Array::zeros(gpu, "predicted positions", 0)?,
-            kept: false,
+            kept: None,
             clock: None,
         })
     }
@@ -77,7 +77,7 @@ impl Frame {
         if keep {
             self.predicted.resize(gpu, host.particle_count())?;
         }
-        self.kept = keep;
+        self.kept = keep.then_some(settings.tet_solve);
         let passes = self.bind(
             gpu,
             scene.kernels,
@@ -230,26 +230,31 @@ impl Frame {
     }
 
     /// Records copies of what residuals need, if the last step kept it.
-    #[expect(
-        clippy::type_complexity,
-        reason = "predicted positions and multipliers"
-    )]
     pub(crate) fn copy_last_substep(
         &self,
         gpu: &GpuContext,
         encoder: &mut wgpu::CommandEncoder,
         body: &Body,
-    ) -> Result<Option<(Copy<[f32; 4]>, Copy<[f32; 2]>)>, GpuError> {
-        if !self.kept {
+    ) -> Result<Option<LastSubstep>, GpuError> {
+        let Some(tet_solve) = self.kept else {
             return Ok(None);
-        }
-        let predicted = self
-            .predicted
-            .copy_out(gpu, encoder, self.predicted.len())?;
-        let multipliers = &body.multipliers;
-        let multipliers = multipliers.copy_out(gpu, encoder, multipliers.len())?;
-        Ok(Some((predicted, multipliers)))
+        };
+        let (predicted, multipliers) = (&self.predicted, &body.multipliers);
+        Ok(Some(LastSubstep {
+            predicted: predicted.copy_out(gpu, encoder, predicted.len())?,
+            multipliers: multipliers.copy_out(gpu, encoder, multipliers.len())?,
+            tet_solve,
+        }))
     }
+}
+
+/// Copies of what residuals need of the last substep.
+#[derive(Debug)]
+pub(crate) struct LastSubstep {
+    pub(crate) predicted: Copy<[f32; 4]>,
+    /// Place -> multipliers.
+    pub(crate) multipliers: Copy<[f32; 2]>,
+    pub(crate) tet_solve: TetSolve,
 }
 
 /// The buffers that what is not a tet may need.

@@ -313,21 +313,23 @@ impl GpuSolver {
         let positions = positions.handed_over(&submission);
         let velocities = velocities.handed_over(&submission);
         let repaired = repaired.handed_over(&submission);
-        let last = last.map(|(predicted, multipliers)| {
+        let last = last.map(|last| {
             (
-                predicted.handed_over(&submission),
-                multipliers.handed_over(&submission),
+                last.predicted.handed_over(&submission),
+                last.multipliers.handed_over(&submission),
+                last.tet_solve,
             )
         });
         let (positions, velocities) = (positions.collect(gpu)?, velocities.collect(gpu)?);
         self.host.load_state(&positions, &velocities);
         self.known_repaired = repaired.collect(gpu)?[0];
-        if let Some((predicted, multipliers)) = last {
+        if let Some((predicted, multipliers, tet_solve)) = last {
             let (predicted, multipliers) = (predicted.collect(gpu)?, multipliers.collect(gpu)?);
             let place = |tet| self.body.layout.place(tet);
             let of_tet = |tet| place(tet).map_or([0.0; 2], |place| multipliers[place]);
             let multipliers: Vec<_> = (0..self.host.tet_count()).map(of_tet).collect();
-            self.host.load_last_substep(&predicted, &multipliers);
+            self.host
+                .load_last_substep(&predicted, &multipliers, tet_solve);
         }
         self.ahead = false;
         Ok(())

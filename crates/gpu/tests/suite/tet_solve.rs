@@ -1,7 +1,10 @@
 //! The three forms of solving a tet, and damping, on the device against the host.
 
+use std::collections::{HashMap, HashSet};
+
 use glam::{DVec3, dvec3};
 use incise_gpu::{ClusterMapping, GpuSolver};
+use incise_mesh::generate::{Shape, generate};
 use incise_xpbd::{Material, Method, Solver, StepSettings, TetSolve};
 
 use crate::solver::{SOFT, body, schedules, settings, share};
@@ -92,7 +95,7 @@ fn jacobi_and_chebyshev() {
     }
 }
 
-/// The kernels of the forms differ, so a form that is selected but not used shows.
+/// Each combination of form, iterations and damping gives its own positions.
 #[test]
 fn the_selected_form_is_used() {
     let Some(gpu) = gpu("the_selected_form_is_used") else {
@@ -121,13 +124,13 @@ fn the_selected_form_is_used() {
     }
     for (k, one) in solvers.iter().enumerate() {
         for other in &solvers[k + 1..] {
-            // Ten times the deviation that other tests allow between the twins.
-            assert!(crate::solver::distance(one, other) > 1e-4);
+            // Five times the deviation that other tests allow between the twins.
+            assert!(crate::solver::distance(one, other) > 5e-5);
         }
     }
 }
 
-/// A stiff free body that was cut stays at rest in the split form, and the device as close to it as the host.
+/// A stiff free body stays at rest in the split form after a cut, on the device and on the host.
 #[test]
 fn a_cut_body_stays_at_rest() {
     let Some(gpu) = gpu("a_cut_body_stays_at_rest") else {
@@ -149,7 +152,7 @@ fn a_cut_body_stays_at_rest() {
                     iterations,
                     ..still.clone()
                 };
-                let mesh = bar();
+                let mesh = generate(Shape::Sphere, 200).unwrap();
                 let mut twins = Twins::new(gpu, &mesh, stiff, mapping, free);
                 for _ in 0..5 {
                     twins.step(&still);
@@ -162,47 +165,53 @@ fn a_cut_body_stays_at_rest() {
                 assert!(far < 1e-6, "{mapping:?}: {far}");
                 for (p, rest) in mesh.positions.iter().enumerate() {
                     let moved = twins.host.position(p).distance(*rest);
-                    assert!(moved < 1e-5, "{mapping:?}: {moved}");
+                    // A free body drifts by the rounding of its velocities: 6e-8 m over 4 ms, for 0.7 s.
+                    assert!(moved < 1e-4, "{mapping:?}: {moved}");
                 }
             }
         }
     }
 }
 
-/// Separates the tets on both sides of the plane x = 0.5.
+/// Separates the tets on both sides of the plane x = 0.
 fn cut(solver: &mut Solver<f32>) {
-    let mut copies = vec![None; solver.particle_count()];
-    for tet in 0..solver.tet_count() {
-        let mut corners = solver.tet_particles(tet);
-        let center: f64 = corners
+    let low = |solver: &Solver<f32>, tet| {
+        let corners = solver.tet_particles(tet);
+        corners
+            .map(|p| solver.position(p as usize).x)
             .iter()
-            .map(|&p| 0.25 * solver.position(p as usize).x)
-            .sum();
-        if center < 0.5 {
-            continue;
-        }
-        for corner in &mut corners {
-            let p = *corner as usize;
-            if (solver.position(p).x - 0.5).abs() < 1e-3 {
-                *corner = *copies[p].get_or_insert_with(|| {
-                    let copy = u32::try_from(solver.particle_count()).unwrap();
-                    solver.push_copy(p);
-                    copy
-                });
+            .sum::<f64>()
+            < 0.0
+    };
+    let (lower, upper): (Vec<_>, Vec<_>) =
+        (0..solver.tet_count()).partition(|&tet| low(solver, tet));
+    let kept: HashSet<u32> = lower
+        .iter()
+        .flat_map(|&t| solver.tet_particles(t))
+        .collect();
+    let mut copies = HashMap::new();
+    for tet in upper {
+        let corners = solver.tet_particles(tet).map(|p| {
+            if !kept.contains(&p) {
+                return p;
             }
-        }
+            *copies.entry(p).or_insert_with(|| {
+                let copy = solver.particle_count();
+                solver.push_copy(p as usize);
+                u32::try_from(copy).unwrap()
+            })
+        });
         solver.relink_tet(tet, corners);
     }
-    for (p, copy) in copies.iter().enumerate() {
-        if let Some(copy) = *copy {
-            let half = 0.5 * solver.mass(p);
-            solver.set_mass(p, half);
-            solver.set_mass(copy as usize, half);
-        }
+    assert!(!copies.is_empty());
+    for (p, copy) in copies {
+        let half = 0.5 * solver.mass(p as usize);
+        solver.set_mass(p as usize, half);
+        solver.set_mass(copy as usize, half);
     }
 }
 
-/// One substep from states far from rest; the deviation is relative to the size of the state.
+/// One substep from states far from rest. Deviations are relative to the size of the state.
 #[test]
 fn states_far_from_rest() {
     let Some(gpu) = gpu("states_far_from_rest") else {
