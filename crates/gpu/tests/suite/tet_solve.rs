@@ -4,10 +4,11 @@ use std::collections::{HashMap, HashSet};
 
 use glam::{DVec3, dvec3};
 use incise_gpu::{ClusterMapping, GpuSolver};
+use incise_graph::Incidence;
 use incise_mesh::generate::{Shape, generate};
 use incise_xpbd::{Material, Method, Solver, StepSettings, TetSolve};
 
-use crate::solver::{SOFT, body, schedules, settings, share};
+use crate::solver::{SOFT, body, clusters, schedules, settings, share, tiled};
 use crate::support::gpu;
 use crate::twin::{FORMS, Twins, bar, free};
 
@@ -158,6 +159,15 @@ fn a_cut_body_stays_at_rest() {
                     twins.step(&still);
                 }
                 twins.edit(cut);
+                // The cut changes the steps of tiles.
+                if mapping.1 == ClusterMapping::Workgroups {
+                    let host = &twins.host;
+                    let corners = (0..host.tet_count()).map(|t| host.tet_particles(t));
+                    let incidence =
+                        Incidence::from_constraints(host.particle_count(), corners).unwrap();
+                    let (clustering, coloring) = clusters(&mesh, mapping.0);
+                    twins.order = tiled(&incidence, &clustering, &coloring);
+                }
                 for _ in 0..40 {
                     twins.step(&still);
                 }
