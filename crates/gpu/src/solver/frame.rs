@@ -306,20 +306,18 @@ impl Frame {
         let velocities = body.velocities.buffer();
         let several = settings.iterations > 1;
         let mapping = body.layout.form;
-        let (plain, material) = (
-            Variant::default(),
-            Variant {
-                various: !host.is_uniform(),
-                tile: body.layout.tile(),
-                ..Variant::default()
-            },
-        );
-        let variant = Variant {
+        let plain = Variant::default();
+        let damping = Variant {
+            various: !host.is_uniform(),
+            tile: body.layout.tile(),
+            ..plain
+        };
+        let solving = Variant {
             keeps,
             jacobi: self.jacobi.is_some(),
-            ..material
+            ..damping
         };
-        let variant = variant.with_tet_solve(settings.tet_solve, several);
+        let solving = solving.with_tet_solve(settings.tet_solve, several);
         let tets = [
             constants,
             body.colors.parts.array.buffer(),
@@ -330,15 +328,12 @@ impl Frame {
             particles,
         ];
         let multipliers = body.multipliers.buffer();
-        let (solved, damped) = match mapping {
-            ClusterMapping::Threads => ([multipliers, body.corrections.buffer()], vec![velocities]),
-            ClusterMapping::Workgroups => (
-                [multipliers, body.tiles.buffer()],
-                vec![velocities, body.tiles.buffer()],
-            ),
+        let (corrections, tiles) = (body.corrections.buffer(), body.tiles.buffer());
+        let (solved, damped): (&[_], &[_]) = match mapping {
+            ClusterMapping::Threads => (&[multipliers, corrections], &[velocities]),
+            ClusterMapping::Workgroups => (&[multipliers, tiles], &[velocities, tiles]),
         };
-        let solved = [&tets[..], &solved].concat();
-        let damped = [&tets[..], &damped].concat();
+        let (solved, damped) = ([&tets, solved].concat(), [&tets, damped].concat());
         let update = [
             constants,
             particles,
@@ -375,8 +370,8 @@ impl Frame {
             solve: {
                 let [one, several] = solve_tets(mapping);
                 [
-                    bind(one, variant, &solved)?,
-                    bind(several, variant, &solved)?,
+                    bind(one, solving, &solved)?,
+                    bind(several, solving, &solved)?,
                 ]
             },
             update: bind(&UPDATE_VELOCITIES, plain, &update)?,
@@ -384,8 +379,8 @@ impl Frame {
                 true => {
                     let [one, several] = damp_tets(mapping);
                     Some([
-                        bind(one, material, &damped)?,
-                        bind(several, material, &damped)?,
+                        bind(one, damping, &damped)?,
+                        bind(several, damping, &damped)?,
                     ])
                 }
                 false => None,

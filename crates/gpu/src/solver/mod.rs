@@ -2,14 +2,14 @@
 //!
 //! A [`Solver`] on the host stays where tets, masses, materials and what holds particles are edited; the device has a
 //! copy of all of it and the state. A step is recorded as one pass and handed over in one submit: predict, put what is
-//! held to its handles, solve color by color, pull at attachments, solve distances and volumes, collide, update
+//! held to its handles, solve color by color, pull at attachments, solve distances and volumes, collide, update and damp
 //! velocities, substep by substep. What a scene does not have takes no memory and no dispatch. Nothing is read back:
 //! whoever wants to know something asks ([`GpuSolver::host`], [`GpuSolver::measure`]), and that waits for the device.
 //!
 //! Twin: `Solver::step` of incise-xpbd, with the same schedule in the form [`ClusterMapping::Threads`]. Positions agree up to the
 //! rounding of sums, which compilers of shaders may take in another order or fuse.
-//! Cost: a dispatch a color and two or three a substep, one more for each other thing in the scene; uploads only of what
-//! edits changed and of handles and colliders that move.
+//! Cost: a dispatch a color and two or three a substep, with damping another one a color, one more for each other thing
+//! in the scene; uploads only of what edits changed and of handles and colliders that move.
 
 mod body;
 mod check;

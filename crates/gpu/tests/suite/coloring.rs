@@ -183,7 +183,7 @@ fn tets(cells: [usize; 3]) -> Incidence {
     Incidence::from_constraints(mesh.positions.len(), tets).unwrap()
 }
 
-/// VertexStars with so many leaves each.
+/// Star graphs with the given numbers of leaves.
 fn stars(count: u32, leaves: u32) -> ConstraintGraph {
     let star = |s: u32| (1..=leaves).map(move |leaf| (s * (leaves + 1), s * (leaves + 1) + leaf));
     let edges: Vec<(u32, u32)> = (0..count).flat_map(star).collect();
