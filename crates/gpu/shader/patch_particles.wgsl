@@ -6,7 +6,7 @@ struct ParticlePatch {
     index: u32,
 }
 
-@group(0) @binding(0) var<uniform> part: Part;
+@group(0) @binding(0) var<uniform> dispatch_range: DispatchRange;
 @group(0) @binding(1) var<storage, read> patches: array<ParticlePatch>;
 @group(0) @binding(2) var<storage, read_write> particles: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read_write> velocities: array<vec4<f32>>;
@@ -18,7 +18,7 @@ fn main(
     @builtin(num_workgroups) count: vec3<u32>,
 ) {
     let index = workgroup_index(id, count) * THREADS + lane;
-    if index >= part.count {
+    if index >= dispatch_range.count {
         return;
     }
     let patch_ = patches[index];

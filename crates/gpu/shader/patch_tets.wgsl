@@ -8,7 +8,7 @@ struct TetPatch {
     constants: vec4<f32>,
 }
 
-@group(0) @binding(0) var<uniform> part: Part;
+@group(0) @binding(0) var<uniform> dispatch_range: DispatchRange;
 @group(0) @binding(1) var<storage, read> patches: array<TetPatch>;
 @group(0) @binding(2) var<storage, read_write> corners: array<vec4<u32>>;
 @group(0) @binding(3) var<storage, read_write> rest: array<f32>;
@@ -25,7 +25,7 @@ fn main(
     @builtin(num_workgroups) count: vec3<u32>,
 ) {
     let index = workgroup_index(id, count) * THREADS + lane;
-    if index >= part.count {
+    if index >= dispatch_range.count {
         return;
     }
     let place = patches[index].place;

@@ -6,7 +6,7 @@ override DAMPED: bool = false;
 override KEEPS: bool = false;
 
 @group(0) @binding(0) var<uniform> settings: Settings;
-@group(0) @binding(1) var<uniform> part: Part;
+@group(0) @binding(1) var<uniform> dispatch_range: DispatchRange;
 @group(0) @binding(2) var<storage, read_write> particles: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read> previous: array<vec4<f32>>;
 // Constraint -> particles, and for a distance of two whether it acts only when it is longer.

@@ -26,8 +26,8 @@ struct Settings {
     material: vec4<f32>,
 }
 
-// What one dispatch works on: so many entries of a list, from one on.
-struct Part {
+// The entries of a list that one dispatch processes.
+struct DispatchRange {
     first: u32,
     count: u32,
 }

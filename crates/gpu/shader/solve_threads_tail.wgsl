@@ -3,8 +3,8 @@
 
 @compute @workgroup_size(64)
 fn main(@builtin(local_invocation_index) lane: u32) {
-    for (var index = 0u; index < part.count; index++) {
-        solve_group(lists[part.first + index], lane);
+    for (var index = 0u; index < dispatch_range.count; index++) {
+        solve_group(lists[dispatch_range.first + index], lane);
         storageBarrier();
     }
 }

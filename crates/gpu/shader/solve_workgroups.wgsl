@@ -7,8 +7,8 @@ fn main(
     @builtin(num_workgroups) count: vec3<u32>,
 ) {
     let index = workgroup_index(id, count);
-    if index >= part.count {
+    if index >= dispatch_range.count {
         return;
     }
-    solve_tile(lists[part.first + index], lane);
+    solve_tile(lists[dispatch_range.first + index], lane);
 }

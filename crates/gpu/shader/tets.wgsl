@@ -7,7 +7,7 @@
 override UNIFORM: bool = true;
 
 @group(0) @binding(0) var<uniform> settings: Settings;
-@group(0) @binding(1) var<uniform> part: Part;
+@group(0) @binding(1) var<uniform> dispatch_range: DispatchRange;
 // Place -> corners; all 0 where there is no tet.
 @group(0) @binding(2) var<storage, read> corners: array<vec4<u32>>;
 @group(0) @binding(3) var<storage, read> rest: array<f32>;

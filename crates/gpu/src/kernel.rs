@@ -9,17 +9,17 @@ use wgpu::{BindGroup, Buffer, ComputePass, ComputePipeline};
 use crate::traffic::count;
 use crate::{GpuContext, GpuError};
 
-/// How a kernel uses a buffer.
+/// The kind of a buffer binding of a kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Use {
+pub(crate) enum BindingKind {
     /// Storage that is read.
     Read,
     /// Storage that is read and written.
     Write,
     /// Numbers that are the same for all threads.
     Uniform,
-    /// The same, of which each dispatch sees another part of this many bytes; see [`STRIDE`].
-    Part(u64),
+    /// A uniform buffer of which each dispatch sees this many bytes at a dynamic offset; see [`STRIDE`].
+    DynamicUniform(u64),
 }
 
 /// Distance in bytes between the parts that dispatches see: WebGPU's largest alignment.
@@ -33,7 +33,7 @@ const WIDEST: u32 = 65_535;
 pub(crate) struct Kernel {
     pipeline: ComputePipeline,
     layout: wgpu::BindGroupLayout,
-    uses: Vec<Use>,
+    uses: Vec<BindingKind>,
 }
 
 impl Kernel {
@@ -46,7 +46,7 @@ impl Kernel {
         gpu: &GpuContext,
         name: &str,
         parts: &[&str],
-        uses: &[Use],
+        uses: &[BindingKind],
         constants: &[(&str, f64)],
     ) -> Result<Self, GpuError> {
         let device = gpu.device();
@@ -107,11 +107,13 @@ impl Kernel {
             .map(|(binding, (&buffer, &usage))| wgpu::BindGroupEntry {
                 binding,
                 resource: match usage {
-                    Use::Part(bytes) => wgpu::BindingResource::Buffer(wgpu::BufferBinding {
-                        buffer,
-                        offset: 0,
-                        size: wgpu::BufferSize::new(bytes),
-                    }),
+                    BindingKind::DynamicUniform(bytes) => {
+                        wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+                            buffer,
+                            offset: 0,
+                            size: wgpu::BufferSize::new(bytes),
+                        })
+                    }
                     _ => buffer.as_entire_binding(),
                 },
             })
@@ -124,20 +126,20 @@ impl Kernel {
     }
 }
 
-fn binding_type(usage: Use) -> wgpu::BindingType {
+fn binding_type(usage: BindingKind) -> wgpu::BindingType {
     let (ty, has_dynamic_offset, size) = match usage {
-        Use::Read => (
+        BindingKind::Read => (
             wgpu::BufferBindingType::Storage { read_only: true },
             false,
             None,
         ),
-        Use::Write => (
+        BindingKind::Write => (
             wgpu::BufferBindingType::Storage { read_only: false },
             false,
             None,
         ),
-        Use::Uniform => (wgpu::BufferBindingType::Uniform, false, None),
-        Use::Part(bytes) => (
+        BindingKind::Uniform => (wgpu::BufferBindingType::Uniform, false, None),
+        BindingKind::DynamicUniform(bytes) => (
             wgpu::BufferBindingType::Uniform,
             true,
             wgpu::BufferSize::new(bytes),
@@ -174,7 +176,8 @@ impl<'a> Recorder<'a> {
         Self { gpu, pass }
     }
 
-    /// Runs a kernel in so many workgroups; none is nothing. `offsets` are in bytes, one for each [`Use::Part`].
+    /// Runs a kernel in so many workgroups; none is nothing. `offsets` are in bytes, one for each
+    /// [`BindingKind::DynamicUniform`].
     ///
     /// More than 65,535 workgroups become a grid: `workgroup_index` in the shaders' common part numbers them, and the
     /// last row may be longer than asked for.

@@ -4,7 +4,8 @@ use std::mem::offset_of;
 
 use crate::coloring::{Round, SEARCH_WORDS, VivaceSettings, WAIT_WORDS, WlcWork, Work};
 use crate::solver::{
-    Attachment, Part, ParticlePatch, ParticleSums, Settings, TetPatch, TetSums, Turn, Units,
+    Attachment, DispatchRange, ParticlePatch, ParticleSums, Settings, TetPatch, TetSums, Turn,
+    Units,
 };
 use crate::{coloring, solver};
 
@@ -117,7 +118,7 @@ pub fn shared_structs() -> Vec<SharedStruct> {
             hanging,
             material
         }),
-        shared!(Part { first, count }),
+        shared!(DispatchRange { first, count }),
         shared!(Turn {
             substep,
             iteration,

@@ -10,7 +10,7 @@ use wgpu::{BindGroup, Buffer, BufferUsages};
 
 use super::rounds::PART;
 use crate::array::Array;
-use crate::kernel::{Kernel, Use};
+use crate::kernel::{BindingKind, Kernel};
 use crate::{GpuContext, GpuError};
 
 /// The text of a kernel and how it uses its buffers.
@@ -18,7 +18,7 @@ use crate::{GpuContext, GpuError};
 pub(crate) struct Source {
     pub(crate) name: &'static str,
     pub(crate) parts: &'static [&'static str],
-    uses: &'static [Use],
+    uses: &'static [BindingKind],
 }
 
 /// Compiled kernels and work arrays of all colorings, for one device.
@@ -34,7 +34,7 @@ pub struct ColoringKernels {
 
 /// A kernel with its buffers.
 #[derive(Debug)]
-pub(super) struct Bound {
+pub(super) struct BoundKernel {
     pub(super) kernel: Arc<Kernel>,
     pub(super) group: BindGroup,
 }
@@ -46,7 +46,7 @@ impl ColoringKernels {
         gpu: &GpuContext,
         source: &Source,
         buffers: &[&Buffer],
-    ) -> Result<Bound, GpuError> {
+    ) -> Result<BoundKernel, GpuError> {
         let kernel = match self.compiled.get(source.name) {
             Some(kernel) => Arc::clone(kernel),
             None => {
@@ -57,7 +57,7 @@ impl ColoringKernels {
             }
         };
         let group = kernel.bind(gpu, buffers);
-        Ok(Bound { kernel, group })
+        Ok(BoundKernel { kernel, group })
     }
 
     /// A work array with room for so many numbers, which are anything.
@@ -123,7 +123,7 @@ macro_rules! source {
     };
 }
 
-use Use::{Read, Uniform, Write};
+use BindingKind::{Read, Uniform, Write};
 
 source!(
     NEXT,

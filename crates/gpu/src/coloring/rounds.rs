@@ -8,9 +8,9 @@ use bytemuck::{Pod, Zeroable};
 use wgpu::{Buffer, BufferUsages};
 
 use super::DeviceColoring;
-use super::kernels::{Bound, ColoringKernels, NEXT};
+use super::kernels::{BoundKernel, ColoringKernels, NEXT};
 use crate::array::Array;
-use crate::kernel::{Recorder, STRIDE, Use};
+use crate::kernel::{BindingKind, Recorder, STRIDE};
 use crate::{GpuContext, GpuError};
 
 /// Rounds per submit.
@@ -28,7 +28,7 @@ pub(crate) struct Round {
 }
 
 /// How rounds see it.
-pub(super) const PART: Use = Use::Part(size_of::<Round>() as u64);
+pub(super) const PART: BindingKind = BindingKind::DynamicUniform(size_of::<Round>() as u64);
 
 /// `Work` of the shaders, up to the lists.
 #[repr(C)]
@@ -71,9 +71,9 @@ pub(super) struct Rounds<'a> {
     /// Arrays that start as zeros, and their words.
     pub(super) clear: Vec<(&'a Buffer, usize)>,
     /// Kernels over all vertices that come first; the last of them fills the list.
-    pub(super) first: Vec<Bound>,
+    pub(super) first: Vec<BoundKernel>,
     /// Kernels over the list; the last of them fills the next list.
-    pub(super) round: Vec<Bound>,
+    pub(super) round: Vec<BoundKernel>,
 }
 
 /// The worklists of a graph of so many vertices, as a work array.
@@ -110,14 +110,14 @@ impl Rounds<'_> {
             let mut recorder = Recorder::new(gpu, &mut encoder, self.algorithm, None);
             if recorded == 0 {
                 // As if after an odd round, so that what is kept goes to the first list.
-                for Bound { kernel, group } in &self.first {
+                for BoundKernel { kernel, group } in &self.first {
                     recorder.dispatch(kernel, group, &[STRIDE], groups);
                 }
                 recorder.dispatch(&next.kernel, &next.group, &[STRIDE], 1);
             }
             for round in recorded..recorded + chunk {
                 let part = [if round % 2 == 0 { 0 } else { STRIDE }];
-                for Bound { kernel, group } in &self.round {
+                for BoundKernel { kernel, group } in &self.round {
                     recorder.dispatch_indirect(kernel, group, &part, &arguments, 0);
                 }
                 recorder.dispatch(&next.kernel, &next.group, &part, 1);

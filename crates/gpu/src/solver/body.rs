@@ -8,10 +8,10 @@ use incise_graph::Schedule;
 use incise_xpbd::{Changes, Solver};
 
 use super::colors::Colors;
+use super::gpu_types::{DispatchRange, NUMBERS, ParticlePatch, TetPatch};
 use super::handles::Handles;
 use super::kernels::{Kernels, PATCH_PARTICLES, PATCH_TETS, Variant};
 use super::layout::{ClusterMapping, Layout, THREADS};
-use super::numbers::{NUMBERS, Part, ParticlePatch, TetPatch};
 use super::scalars::{Kind, Scalars};
 use super::tile::number_count;
 use crate::array::Array;
@@ -46,7 +46,7 @@ pub(crate) struct Body {
     pub(crate) volumes: Option<Scalars>,
     tet_patches: Array<TetPatch>,
     particle_patches: Array<ParticlePatch>,
-    part: Array<Part>,
+    range: Array<DispatchRange>,
 }
 
 impl Body {
@@ -68,7 +68,7 @@ impl Body {
             volumes: None,
             tet_patches: Array::zeros(gpu, "patches of tets", 0)?,
             particle_patches: Array::zeros(gpu, "patches of particles", 0)?,
-            part: Array::with_usage(gpu, "size of a patch", 1, wgpu::BufferUsages::UNIFORM)?,
+            range: Array::with_usage(gpu, "size of a patch", 1, wgpu::BufferUsages::UNIFORM)?,
         })
     }
 
@@ -121,14 +121,14 @@ impl Body {
                 ..Variant::default()
             };
             let buffers = [
-                self.part.buffer(),
+                self.range.buffer(),
                 self.tet_patches.buffer(),
                 self.corners.buffer(),
                 self.rest.buffer(),
                 self.constants.buffer(),
             ];
             let bound = kernels.bind(gpu, &PATCH_TETS, variant, &buffers)?;
-            self.part.write(gpu, 0, &[count(patches.len())]);
+            self.range.write(gpu, 0, &[count(patches.len())]);
             let mut encoder = gpu.encoder("patch tets");
             let mut pass = Recorder::new(gpu, &mut encoder, "patch tets", None);
             bound.run(&mut pass, &[], patches.len().div_ceil(THREADS));
@@ -178,13 +178,13 @@ impl Body {
                 .collect();
             self.particle_patches.replace(gpu, &patches)?;
             let buffers = [
-                self.part.buffer(),
+                self.range.buffer(),
                 self.particle_patches.buffer(),
                 self.particles.buffer(),
                 self.velocities.buffer(),
             ];
             let bound = kernels.bind(gpu, &PATCH_PARTICLES, Variant::default(), &buffers)?;
-            self.part.write(gpu, 0, &[count(patches.len())]);
+            self.range.write(gpu, 0, &[count(patches.len())]);
             let mut encoder = gpu.encoder("patch particles");
             let mut pass = Recorder::new(gpu, &mut encoder, "patch particles", None);
             bound.run(&mut pass, &[], patches.len().div_ceil(THREADS));
@@ -209,7 +209,7 @@ impl Body {
             self.tet_patches.buffer(),
             self.particle_patches.buffer(),
             self.colors.lists.array.buffer(),
-            self.colors.parts.array.buffer(),
+            self.colors.ranges.array.buffer(),
         ]
         .into_iter()
         .map(wgpu::Buffer::size)
@@ -220,8 +220,8 @@ impl Body {
     }
 }
 
-fn count(patches: usize) -> Part {
-    Part {
+fn count(patches: usize) -> DispatchRange {
+    DispatchRange {
         first: 0,
         count: u32::try_from(patches).expect("patches are sent in chunks"),
     }

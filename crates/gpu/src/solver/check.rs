@@ -6,8 +6,8 @@
 use incise_graph::Schedule;
 
 use super::GpuSolver;
+use super::gpu_types::NUMBERS;
 use super::layout::{ClusterMapping, THREADS};
-use super::numbers::NUMBERS;
 use super::tile::number_count;
 use crate::GpuError;
 
@@ -19,7 +19,7 @@ struct Copy {
     constants: Vec<[f32; 4]>,
     tiles: Vec<u32>,
     lists: Vec<u32>,
-    parts: Vec<u32>,
+    ranges: Vec<u32>,
 }
 
 impl GpuSolver {
@@ -37,7 +37,7 @@ impl GpuSolver {
             constants: body.constants.read(gpu)?,
             tiles: body.tiles.read(gpu)?,
             lists: body.colors.lists.array.read(gpu)?,
-            parts: body.colors.parts.array.read(gpu)?,
+            ranges: body.colors.ranges.array.read(gpu)?,
         };
         self.check_particles(&copy)?;
         for color in 0..schedule.color_count() {
@@ -103,7 +103,7 @@ impl GpuSolver {
         let mut now = 0;
         for run in &self.body.colors.runs {
             let at = run.offset as usize / size_of::<u32>();
-            let [first, count] = [copy.parts[at], copy.parts[at + 1]].map(|n| n as usize);
+            let [first, count] = [copy.ranges[at], copy.ranges[at + 1]].map(|n| n as usize);
             let groups = &copy.lists[first..first + count];
             for groups in groups.chunks(if run.tail { 1 } else { count }) {
                 for place in groups.iter().flat_map(|&group| self.places(group, copy)) {

@@ -12,8 +12,8 @@ use crate::array::Array;
 use crate::kernel::{Recorder, STRIDE};
 use crate::{GpuContext, GpuError};
 
-use super::kernels::Bound;
-use super::numbers::Part;
+use super::gpu_types::DispatchRange;
+use super::kernels::BoundKernel;
 
 /// Numbers that are compared and sent together.
 const PIECE: usize = 64;
@@ -21,7 +21,7 @@ const PIECE: usize = 64;
 /// One dispatch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Run {
-    /// Where its part is in the buffer of parts, in bytes.
+    /// Where its range is in the buffer of ranges, in bytes.
     pub(crate) offset: u32,
     /// Workgroups, if it is one color; several colors have one.
     pub(crate) groups: usize,
@@ -36,7 +36,7 @@ pub(crate) struct Colors {
     /// The groups, color by color, then those of tails.
     pub(crate) lists: Followed,
     /// What each run works on, [`STRIDE`] bytes each.
-    pub(crate) parts: Followed,
+    pub(crate) ranges: Followed,
     /// Color -> room in the lists.
     rooms: Vec<usize>,
 }
@@ -47,7 +47,7 @@ impl Colors {
         Ok(Self {
             runs: Vec::new(),
             lists: Followed::new(gpu, "lists of groups", storage)?,
-            parts: Followed::new(gpu, "parts of dispatches", uniform)?,
+            ranges: Followed::new(gpu, "ranges of dispatches", uniform)?,
             rooms: Vec::new(),
         })
     }
@@ -60,7 +60,7 @@ impl Colors {
     ) -> Result<(), GpuError> {
         let colors = groups_of.row_count();
         self.rooms.resize(colors, 0);
-        let (mut lists, mut parts) = (Vec::new(), Vec::new());
+        let (mut lists, mut ranges) = (Vec::new(), Vec::new());
         self.runs.clear();
         let mut alone: Vec<u32> = Vec::new();
         let mut tails: Vec<(usize, Vec<u32>)> = Vec::new();
@@ -72,9 +72,9 @@ impl Colors {
             if groups.len() == 1 {
                 alone.push(groups[0]);
             } else if !groups.is_empty() {
-                self.close(&mut alone, &mut tails, &mut parts);
+                self.close(&mut alone, &mut tails, &mut ranges);
                 self.runs.push(Run {
-                    offset: part(&mut parts, lists.len(), groups.len()),
+                    offset: range(&mut ranges, lists.len(), groups.len()),
                     groups: groups.len(),
                     tail: false,
                 });
@@ -83,17 +83,17 @@ impl Colors {
             lists.extend_from_slice(groups);
             lists.resize(end, 0);
         }
-        self.close(&mut alone, &mut tails, &mut parts);
+        self.close(&mut alone, &mut tails, &mut ranges);
         for (at, groups) in tails {
-            parts[at] = index(lists.len());
+            ranges[at] = index(lists.len());
             lists.extend(groups);
         }
         self.lists.set(gpu, lists)?;
-        self.parts.set(gpu, parts)
+        self.ranges.set(gpu, ranges)
     }
 
     /// Records a pass, with the kernel for one color and that for several.
-    pub(crate) fn run(&self, pass: &mut Recorder<'_>, one: &Bound, several: &Bound) {
+    pub(crate) fn run(&self, pass: &mut Recorder<'_>, one: &BoundKernel, several: &BoundKernel) {
         for run in &self.runs {
             let solve = if run.tail { several } else { one };
             solve.run(pass, &[run.offset], run.groups);
@@ -105,14 +105,14 @@ impl Colors {
         &mut self,
         alone: &mut Vec<u32>,
         tails: &mut Vec<(usize, Vec<u32>)>,
-        parts: &mut Vec<u32>,
+        ranges: &mut Vec<u32>,
     ) {
         if alone.is_empty() {
             return;
         }
-        let (at, groups) = (parts.len(), std::mem::take(alone));
+        let (at, groups) = (ranges.len(), std::mem::take(alone));
         self.runs.push(Run {
-            offset: part(parts, 0, groups.len()),
+            offset: range(ranges, 0, groups.len()),
             groups: 1,
             tail: true,
         });
@@ -120,15 +120,15 @@ impl Colors {
     }
 }
 
-/// Appends a part; returns where it is, in bytes.
-fn part(parts: &mut Vec<u32>, first: usize, count: usize) -> u32 {
-    let offset = index(parts.len() * size_of::<u32>());
-    let part = Part {
+/// Appends a range; returns where it is, in bytes.
+fn range(ranges: &mut Vec<u32>, first: usize, count: usize) -> u32 {
+    let offset = index(ranges.len() * size_of::<u32>());
+    let range = DispatchRange {
         first: index(first),
         count: index(count),
     };
-    parts.extend_from_slice(bytemuck::cast_slice(&[part]));
-    parts.resize((offset + STRIDE) as usize / size_of::<u32>(), 0);
+    ranges.extend_from_slice(bytemuck::cast_slice(&[range]));
+    ranges.resize((offset + STRIDE) as usize / size_of::<u32>(), 0);
     offset
 }
 

@@ -7,13 +7,13 @@ use incise_xpbd::{Solver, StepSettings, TetSolve};
 use wgpu::{Buffer, BufferUsages, SubmissionIndex};
 
 use super::body::Body;
+use super::gpu_types::Settings;
 use super::handles::{self, Handles};
 use super::jacobi::{self, Jacobi};
 use super::kernels::{
-    Bound, CLEAR, Kernels, PREDICT, UPDATE_VELOCITIES, Variant, damp_tets, solve_tets,
+    BoundKernel, CLEAR, Kernels, PREDICT, UPDATE_VELOCITIES, Variant, damp_tets, solve_tets,
 };
 use super::layout::{ClusterMapping, THREADS};
-use super::numbers::Settings;
 use super::obstacles::Obstacles;
 use super::scalars;
 use super::stages::{Clock, Stage::*, Track};
@@ -271,15 +271,15 @@ pub(crate) struct Shared<'a> {
 /// The kernels of a step, in the order of a substep; those that it does not need are not there.
 #[derive(Debug)]
 struct Passes<'a> {
-    predict: Bound,
+    predict: BoundKernel,
     /// Where multipliers are kept.
-    clear: Option<Bound>,
+    clear: Option<BoundKernel>,
     /// For a color of tets, and for a row of small colors.
-    solve: [Bound; 2],
-    project: Option<Bound>,
-    update: Bound,
+    solve: [BoundKernel; 2],
+    project: Option<BoundKernel>,
+    update: BoundKernel,
     /// If a material is damped.
-    damp: Option<[Bound; 2]>,
+    damp: Option<[BoundKernel; 2]>,
     jacobi: Option<jacobi::Passes>,
     handles: Option<handles::Passes>,
     /// Distances before volumes.
@@ -320,7 +320,7 @@ impl Frame {
         let solving = solving.with_tet_solve(settings.tet_solve, several);
         let tets = [
             constants,
-            body.colors.parts.array.buffer(),
+            body.colors.ranges.array.buffer(),
             body.corners.buffer(),
             body.rest.buffer(),
             body.constants.buffer(),

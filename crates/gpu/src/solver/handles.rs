@@ -13,9 +13,9 @@ use glam::{DMat3, DVec3, Vec3};
 use incise_xpbd::{AttachmentData, Changes, Solver, StepSettings};
 
 use super::frame::Shared;
-use super::kernels::{Bound, Kernels, MOVE_HELD, SOLVE_ATTACHMENTS, UPDATE_HELD, Variant};
+use super::gpu_types::Attachment;
+use super::kernels::{BoundKernel, Kernels, MOVE_HELD, SOLVE_ATTACHMENTS, UPDATE_HELD, Variant};
 use super::layout::THREADS;
-use super::numbers::Attachment;
 use crate::array::Array;
 use crate::kernel::Recorder;
 use crate::{GpuContext, GpuError};
@@ -222,8 +222,8 @@ impl Handles {
 /// The kernels for what hangs on handles, with their workgroups.
 #[derive(Debug, Default)]
 pub(crate) struct Passes {
-    held: Option<(Bound, Bound, usize)>,
-    hanging: Option<(Bound, usize)>,
+    held: Option<(BoundKernel, BoundKernel, usize)>,
+    hanging: Option<(BoundKernel, usize)>,
 }
 
 impl Passes {

@@ -12,7 +12,7 @@ use wgpu::Buffer;
 
 use super::body::Body;
 use super::frame::Shared;
-use super::kernels::{APPLY_CORRECTIONS, Bound, EXTRAPOLATE_MULTIPLIERS, Kernels, Variant};
+use super::kernels::{APPLY_CORRECTIONS, BoundKernel, EXTRAPOLATE_MULTIPLIERS, Kernels, Variant};
 use super::layout::{ClusterMapping, THREADS};
 use crate::array::Array;
 use crate::kernel::Recorder;
@@ -107,9 +107,9 @@ impl Jacobi {
 /// The kernels that end an iteration over the tets.
 #[derive(Debug)]
 pub(crate) struct Passes {
-    apply: Bound,
+    apply: BoundKernel,
     /// Where multipliers are kept and extrapolated.
-    extrapolate: Option<(Bound, usize)>,
+    extrapolate: Option<(BoundKernel, usize)>,
 }
 
 impl Passes {

@@ -1,4 +1,4 @@
-//! The kernels of the solver, [`Variant`]: which of their branches are compiled, and [`Bound`]: one with its buffers.
+//! The kernels of the solver, [`Variant`]: which of their branches are compiled, and [`BoundKernel`]: one with its buffers.
 //!
 //! Branches that a scene does not need (kept multipliers, several materials, damped constraints) are not compiled. A kernel
 //! is compiled when the first step needs it.
@@ -12,7 +12,7 @@ use wgpu::{BindGroup, Buffer};
 
 use super::layout::ClusterMapping;
 use super::scalars::Kind;
-use crate::kernel::{Kernel, Recorder, Use};
+use crate::kernel::{BindingKind, Kernel, Recorder};
 use crate::{GpuContext, GpuError};
 
 /// The text of a kernel and how it uses its buffers.
@@ -20,7 +20,7 @@ use crate::{GpuContext, GpuError};
 pub(crate) struct Source {
     pub(crate) name: &'static str,
     pub(crate) parts: &'static [&'static str],
-    pub(crate) uses: &'static [Use],
+    pub(crate) uses: &'static [BindingKind],
     /// The branches that it has.
     flags: &'static [Flag],
 }
@@ -44,59 +44,59 @@ macro_rules! text {
     };
 }
 
-/// Bytes of a part, and of a turn.
-const PART: u64 = 8;
+/// Bytes of a dispatch range, and of a turn.
+const DISPATCH_RANGE: u64 = 8;
 const TURN: u64 = 16;
 
 /// Bindings of the kernels that solve tets in threads; the last one is the sums of Jacobi corrections.
-const TETS: &[Use] = &[
-    Use::Uniform,
-    Use::Part(PART),
-    Use::Read,
-    Use::Read,
-    Use::Read,
-    Use::Read,
-    Use::Write,
-    Use::Write,
-    Use::Write,
+const TETS: &[BindingKind] = &[
+    BindingKind::Uniform,
+    BindingKind::DynamicUniform(DISPATCH_RANGE),
+    BindingKind::Read,
+    BindingKind::Read,
+    BindingKind::Read,
+    BindingKind::Read,
+    BindingKind::Write,
+    BindingKind::Write,
+    BindingKind::Write,
 ];
 
 /// Bindings of the kernels that solve tets in workgroups; the last one is the tiles.
-const TILES: &[Use] = &[
-    Use::Uniform,
-    Use::Part(PART),
-    Use::Read,
-    Use::Read,
-    Use::Read,
-    Use::Read,
-    Use::Write,
-    Use::Write,
-    Use::Read,
+const TILES: &[BindingKind] = &[
+    BindingKind::Uniform,
+    BindingKind::DynamicUniform(DISPATCH_RANGE),
+    BindingKind::Read,
+    BindingKind::Read,
+    BindingKind::Read,
+    BindingKind::Read,
+    BindingKind::Write,
+    BindingKind::Write,
+    BindingKind::Read,
 ];
 
 /// Bindings of the kernels that damp tets in threads.
-const DAMPED_TETS: &[Use] = &[
-    Use::Uniform,
-    Use::Part(PART),
-    Use::Read,
-    Use::Read,
-    Use::Read,
-    Use::Read,
-    Use::Read,
-    Use::Write,
+const DAMPED_TETS: &[BindingKind] = &[
+    BindingKind::Uniform,
+    BindingKind::DynamicUniform(DISPATCH_RANGE),
+    BindingKind::Read,
+    BindingKind::Read,
+    BindingKind::Read,
+    BindingKind::Read,
+    BindingKind::Read,
+    BindingKind::Write,
 ];
 
 /// Bindings of the kernels that damp tets in workgroups; the last one is the tiles.
-const DAMPED_TILES: &[Use] = &[
-    Use::Uniform,
-    Use::Part(PART),
-    Use::Read,
-    Use::Read,
-    Use::Read,
-    Use::Read,
-    Use::Read,
-    Use::Write,
-    Use::Read,
+const DAMPED_TILES: &[BindingKind] = &[
+    BindingKind::Uniform,
+    BindingKind::DynamicUniform(DISPATCH_RANGE),
+    BindingKind::Read,
+    BindingKind::Read,
+    BindingKind::Read,
+    BindingKind::Read,
+    BindingKind::Read,
+    BindingKind::Write,
+    BindingKind::Read,
 ];
 
 const TETS_FLAGS: &[Flag] = &[
@@ -118,14 +118,25 @@ const TILES_FLAGS: &[Flag] = &[
 pub(crate) const PREDICT: Source = Source {
     name: "predict",
     parts: text!("common", "settings", "predict"),
-    uses: &[Use::Uniform, Use::Write, Use::Write, Use::Write],
+    uses: &[
+        BindingKind::Uniform,
+        BindingKind::Write,
+        BindingKind::Write,
+        BindingKind::Write,
+    ],
     flags: &[],
 };
 
 pub(crate) const UPDATE_VELOCITIES: Source = Source {
     name: "update_velocities",
     parts: text!("common", "settings", "update_velocities"),
-    uses: &[Use::Uniform, Use::Write, Use::Read, Use::Write, Use::Write],
+    uses: &[
+        BindingKind::Uniform,
+        BindingKind::Write,
+        BindingKind::Read,
+        BindingKind::Write,
+        BindingKind::Write,
+    ],
     flags: &[],
 };
 
@@ -256,21 +267,32 @@ const DAMP_WORKGROUPS_TAIL: Source = Source {
 pub(crate) const PATCH_TETS: Source = Source {
     name: "patch_tets",
     parts: text!("common", "settings", "patch_tets"),
-    uses: &[Use::Uniform, Use::Read, Use::Write, Use::Write, Use::Write],
+    uses: &[
+        BindingKind::Uniform,
+        BindingKind::Read,
+        BindingKind::Write,
+        BindingKind::Write,
+        BindingKind::Write,
+    ],
     flags: &[Flag::Uniform],
 };
 
 pub(crate) const PATCH_PARTICLES: Source = Source {
     name: "patch_particles",
     parts: text!("common", "settings", "patch_particles"),
-    uses: &[Use::Uniform, Use::Read, Use::Write, Use::Write],
+    uses: &[
+        BindingKind::Uniform,
+        BindingKind::Read,
+        BindingKind::Write,
+        BindingKind::Write,
+    ],
     flags: &[],
 };
 
 pub(crate) const CLEAR: Source = Source {
     name: "clear",
     parts: text!("common", "clear"),
-    uses: &[Use::Write],
+    uses: &[BindingKind::Write],
     flags: &[],
 };
 
@@ -284,11 +306,11 @@ pub(crate) const PROJECT_TO_COLLIDERS: Source = Source {
         "project_to_colliders"
     ),
     uses: &[
-        Use::Uniform,
-        Use::Part(TURN),
-        Use::Write,
-        Use::Read,
-        Use::Read,
+        BindingKind::Uniform,
+        BindingKind::DynamicUniform(TURN),
+        BindingKind::Write,
+        BindingKind::Read,
+        BindingKind::Read,
     ],
     flags: &[],
 };
@@ -297,12 +319,12 @@ pub(crate) const MOVE_HELD: Source = Source {
     name: "move_held",
     parts: text!("common", "settings", "turn", "attachments", "move_held"),
     uses: &[
-        Use::Uniform,
-        Use::Part(TURN),
-        Use::Write,
-        Use::Read,
-        Use::Read,
-        Use::Write,
+        BindingKind::Uniform,
+        BindingKind::DynamicUniform(TURN),
+        BindingKind::Write,
+        BindingKind::Read,
+        BindingKind::Read,
+        BindingKind::Write,
     ],
     flags: &[],
 };
@@ -317,13 +339,13 @@ pub(crate) const SOLVE_ATTACHMENTS: Source = Source {
         "solve_attachments"
     ),
     uses: &[
-        Use::Uniform,
-        Use::Part(TURN),
-        Use::Write,
-        Use::Read,
-        Use::Read,
-        Use::Read,
-        Use::Write,
+        BindingKind::Uniform,
+        BindingKind::DynamicUniform(TURN),
+        BindingKind::Write,
+        BindingKind::Read,
+        BindingKind::Read,
+        BindingKind::Read,
+        BindingKind::Write,
     ],
     flags: &[Flag::Keeps],
 };
@@ -331,7 +353,13 @@ pub(crate) const SOLVE_ATTACHMENTS: Source = Source {
 pub(crate) const UPDATE_HELD: Source = Source {
     name: "update_held",
     parts: text!("common", "settings", "attachments", "update_held"),
-    uses: &[Use::Uniform, Use::Read, Use::Read, Use::Write, Use::Read],
+    uses: &[
+        BindingKind::Uniform,
+        BindingKind::Read,
+        BindingKind::Read,
+        BindingKind::Write,
+        BindingKind::Read,
+    ],
     flags: &[],
 };
 
@@ -339,11 +367,11 @@ pub(crate) const APPLY_CORRECTIONS: Source = Source {
     name: "apply_corrections",
     parts: text!("common", "settings", "turn", "apply_corrections"),
     uses: &[
-        Use::Uniform,
-        Use::Part(TURN),
-        Use::Write,
-        Use::Write,
-        Use::Write,
+        BindingKind::Uniform,
+        BindingKind::DynamicUniform(TURN),
+        BindingKind::Write,
+        BindingKind::Write,
+        BindingKind::Write,
     ],
     flags: &[Flag::Keeps],
 };
@@ -351,7 +379,11 @@ pub(crate) const APPLY_CORRECTIONS: Source = Source {
 pub(crate) const EXTRAPOLATE_MULTIPLIERS: Source = Source {
     name: "extrapolate_multipliers",
     parts: text!("common", "turn", "extrapolate_multipliers"),
-    uses: &[Use::Write, Use::Part(TURN), Use::Write],
+    uses: &[
+        BindingKind::Write,
+        BindingKind::DynamicUniform(TURN),
+        BindingKind::Write,
+    ],
     flags: &[],
 };
 
@@ -359,14 +391,14 @@ pub(crate) const MEASURE_TETS: Source = Source {
     name: "measure_tets",
     parts: text!("common", "settings", "measure_tets"),
     uses: &[
-        Use::Uniform,
-        Use::Uniform,
-        Use::Read,
-        Use::Read,
-        Use::Read,
-        Use::Read,
-        Use::Read,
-        Use::Write,
+        BindingKind::Uniform,
+        BindingKind::Uniform,
+        BindingKind::Read,
+        BindingKind::Read,
+        BindingKind::Read,
+        BindingKind::Read,
+        BindingKind::Read,
+        BindingKind::Write,
     ],
     flags: &[Flag::Uniform, Flag::Tiled, Flag::TileTets],
 };
@@ -374,21 +406,27 @@ pub(crate) const MEASURE_TETS: Source = Source {
 pub(crate) const MEASURE_PARTICLES: Source = Source {
     name: "measure_particles",
     parts: text!("common", "settings", "measure_particles"),
-    uses: &[Use::Uniform, Use::Read, Use::Read, Use::Read, Use::Write],
+    uses: &[
+        BindingKind::Uniform,
+        BindingKind::Read,
+        BindingKind::Read,
+        BindingKind::Read,
+        BindingKind::Write,
+    ],
     flags: &[],
 };
 
 /// What kernels that solve constraints of one number use.
-const SCALARS: &[Use] = &[
-    Use::Uniform,
-    Use::Part(PART),
-    Use::Write,
-    Use::Read,
-    Use::Read,
-    Use::Read,
-    Use::Read,
-    Use::Write,
-    Use::Read,
+const SCALARS: &[BindingKind] = &[
+    BindingKind::Uniform,
+    BindingKind::DynamicUniform(DISPATCH_RANGE),
+    BindingKind::Write,
+    BindingKind::Read,
+    BindingKind::Read,
+    BindingKind::Read,
+    BindingKind::Read,
+    BindingKind::Write,
+    BindingKind::Read,
 ];
 
 const SOLVE_DISTANCES: Source = Source {
@@ -574,21 +612,21 @@ impl Kernels {
         source: &Source,
         variant: Variant,
         buffers: &[&Buffer],
-    ) -> Result<Bound, GpuError> {
+    ) -> Result<BoundKernel, GpuError> {
         let kernel = self.get(gpu, source, variant)?;
         let group = kernel.bind(gpu, buffers);
-        Ok(Bound { kernel, group })
+        Ok(BoundKernel { kernel, group })
     }
 }
 
 /// A kernel with its buffers.
 #[derive(Debug)]
-pub(crate) struct Bound {
+pub(crate) struct BoundKernel {
     kernel: Arc<Kernel>,
     group: BindGroup,
 }
 
-impl Bound {
+impl BoundKernel {
     pub(crate) fn run(&self, pass: &mut Recorder<'_>, offsets: &[u32], groups: usize) {
         pass.dispatch(&self.kernel, &self.group, offsets, groups);
     }

@@ -10,7 +10,7 @@
 use incise_graph::{ClusterId, Schedule};
 use incise_xpbd::{Changes, Solver};
 
-use super::numbers::TetPatch;
+use super::gpu_types::TetPatch;
 use super::seats::{Moved, Seats};
 use super::tile::{self, Tile};
 use crate::GpuError;

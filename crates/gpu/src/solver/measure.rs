@@ -11,9 +11,9 @@ use incise_xpbd::{Energy, Solver, Volume};
 use wgpu::BufferUsages;
 
 use super::GpuSolver;
+use super::gpu_types::{ParticleSums, TetSums, Units};
 use super::kernels::{MEASURE_PARTICLES, MEASURE_TETS, Variant};
 use super::layout::{THREADS, slope};
-use super::numbers::{ParticleSums, TetSums, Units};
 use crate::array::Array;
 use crate::kernel::Recorder;
 use crate::{GpuContext, GpuError};

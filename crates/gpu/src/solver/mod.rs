@@ -15,12 +15,12 @@ mod body;
 mod check;
 mod colors;
 mod frame;
+mod gpu_types;
 mod handles;
 mod jacobi;
 mod kernels;
 mod layout;
 mod measure;
-mod numbers;
 mod obstacles;
 mod readback;
 mod scalars;
@@ -44,8 +44,9 @@ pub use measure::Measures;
 pub use readback::Readback;
 pub use stages::StageTimes;
 
-pub(crate) use numbers::{
-    Attachment, Part, ParticlePatch, ParticleSums, Settings, TetPatch, TetSums, Turn, Units,
+pub(crate) use gpu_types::{
+    Attachment, DispatchRange, ParticlePatch, ParticleSums, Settings, TetPatch, TetSums, Turn,
+    Units,
 };
 
 use crate::array::Array;

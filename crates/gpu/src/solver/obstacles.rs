@@ -7,7 +7,7 @@
 use incise_xpbd::{Solver, StepSettings};
 
 use super::frame::Shared;
-use super::kernels::{Bound, Kernels, PROJECT_TO_COLLIDERS, Variant};
+use super::kernels::{BoundKernel, Kernels, PROJECT_TO_COLLIDERS, Variant};
 use crate::array::Array;
 use crate::{GpuContext, GpuError};
 
@@ -59,7 +59,7 @@ impl Obstacles {
         gpu: &GpuContext,
         kernels: &mut Kernels,
         shared: &Shared<'_>,
-    ) -> Result<Bound, GpuError> {
+    ) -> Result<BoundKernel, GpuError> {
         let buffers = [
             shared.settings,
             shared.turns,

@@ -9,7 +9,7 @@ use incise_xpbd::Solver;
 use wgpu::Buffer;
 
 use super::colors::Colors;
-use super::kernels::{Bound, CLEAR, Kernels, Variant, solve_scalars};
+use super::kernels::{BoundKernel, CLEAR, Kernels, Variant, solve_scalars};
 use super::layout::THREADS;
 use crate::array::Array;
 use crate::kernel::Recorder;
@@ -124,7 +124,7 @@ impl Scalars {
         };
         let buffers = [
             settings,
-            self.colors.parts.array.buffer(),
+            self.colors.ranges.array.buffer(),
             particles,
             previous,
             self.corners.buffer(),
@@ -157,7 +157,7 @@ impl Scalars {
             self.ranges.buffer(),
             self.multipliers.buffer(),
             self.colors.lists.array.buffer(),
-            self.colors.parts.array.buffer(),
+            self.colors.ranges.array.buffer(),
         ];
         buffers.into_iter().map(Buffer::size).sum()
     }
@@ -186,10 +186,10 @@ impl Kind {
 #[derive(Debug)]
 pub(crate) struct Passes<'a> {
     colors: &'a Colors,
-    one: Bound,
-    several: Bound,
+    one: BoundKernel,
+    several: BoundKernel,
     /// Where multipliers are kept.
-    clear: Option<(Bound, usize)>,
+    clear: Option<(BoundKernel, usize)>,
 }
 
 impl Passes<'_> {

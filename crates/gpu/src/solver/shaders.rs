@@ -3,9 +3,9 @@
 use naga::{AddressSpace, Module, StorageAccess};
 
 use super::SOURCES;
-use crate::kernel::Use;
+use crate::kernel::BindingKind;
 
-fn modules() -> impl Iterator<Item = (&'static str, &'static [Use], Module)> {
+fn modules() -> impl Iterator<Item = (&'static str, &'static [BindingKind], Module)> {
     SOURCES.iter().map(|source| {
         let text = source.parts.concat();
         let module = naga::front::wgsl::parse_str(&text);
@@ -25,11 +25,13 @@ fn shaders_use_what_the_host_binds() {
             };
             let usage = uses[binding.binding as usize];
             let fits = match variable.space {
-                AddressSpace::Uniform => matches!(usage, Use::Uniform | Use::Part(_)),
-                AddressSpace::Storage { access } if access.contains(StorageAccess::STORE) => {
-                    usage == Use::Write
+                AddressSpace::Uniform => {
+                    matches!(usage, BindingKind::Uniform | BindingKind::DynamicUniform(_))
                 }
-                AddressSpace::Storage { .. } => usage == Use::Read,
+                AddressSpace::Storage { access } if access.contains(StorageAccess::STORE) => {
+                    usage == BindingKind::Write
+                }
+                AddressSpace::Storage { .. } => usage == BindingKind::Read,
                 _ => false,
             };
             assert!(fits, "{name}, {:?}: {usage:?}", variable.name);

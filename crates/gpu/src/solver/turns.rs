@@ -7,7 +7,7 @@
 use incise_xpbd::{Method, StepSettings};
 use wgpu::{Buffer, BufferUsages};
 
-use super::numbers::Turn;
+use super::gpu_types::Turn;
 use crate::array::Array;
 use crate::kernel::STRIDE;
 use crate::{GpuContext, GpuError};

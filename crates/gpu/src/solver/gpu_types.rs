@@ -26,10 +26,10 @@ pub(crate) struct Settings {
     pub(crate) material: [f32; 4],
 }
 
-/// `Part` in `settings.wgsl`.
+/// `DispatchRange` in `settings.wgsl`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
-pub(crate) struct Part {
+pub(crate) struct DispatchRange {
     pub(crate) first: u32,
     pub(crate) count: u32,
 }
