@@ -90,6 +90,9 @@ pub(crate) struct RunArguments {
     /// Recompute and compare everything after every cut; slow.
     #[arg(long)]
     pub(crate) check: bool,
+    /// Simulate all frames even if the solution diverges; without this the run ends there with exit code 1.
+    #[arg(long)]
+    pub(crate) keep_going: bool,
     /// Print nothing but errors.
     #[arg(long)]
     pub(crate) quiet: bool,

@@ -1,10 +1,11 @@
 //! `incise run`: simulates a scene.
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use anyhow::anyhow;
 use incise::scene::{Backend, Method, Precision, Quantity};
-use incise::{Error, Scene, Simulation};
+use incise::{Error, Scene, Simulation, Warning};
 use incise_render::{ColorBy, Film};
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::ThreadPoolBuilder;
@@ -54,6 +55,8 @@ fn simulate(arguments: &RunArguments) -> Result<(), Failure> {
     let mut summary = Summary::new(simulation.report());
     let mut checked = 0;
     let progress = progress(frames, arguments.quiet);
+    let mut warned = HashSet::new();
+    let mut failed = None;
     for _ in 0..frames {
         let report = simulation
             .step()
@@ -63,12 +66,29 @@ fn simulate(arguments: &RunArguments) -> Result<(), Failure> {
             report.tets, report.pieces, report.colors
         ));
         summary.add(report);
+        for warning in report.warnings() {
+            // Each kind once for each part of the scene; the file has all.
+            if warned.insert((warning.code, warning.location.clone())) && !arguments.quiet {
+                progress.suspend(|| print_warning(warning));
+            }
+        }
+        if !arguments.keep_going
+            && let Some(warning) = report.warnings().iter().find(|w| w.is_failure())
+        {
+            failed = Some(anyhow!(
+                "frame {}: {warning} (--keep-going simulates on)",
+                report.frame
+            ));
+        }
         if arguments.check && report.cut.is_some() {
             simulation.check()?;
             checked += 1;
         }
         output.frame(&mut simulation).map_err(Failure::Run)?;
         progress.inc(1);
+        if failed.is_some() {
+            break;
+        }
     }
     progress.finish_and_clear();
     // Without a surface of the last frame nothing has asked for it yet.
@@ -94,7 +114,13 @@ fn simulate(arguments: &RunArguments) -> Result<(), Failure> {
             print(drawn)?;
         }
     }
-    Ok(())
+    failed.map_or(Ok(()), |error| Err(Failure::Run(error)))
+}
+
+/// Prints a warning to stderr.
+#[expect(clippy::print_stderr, reason = "warnings of a run go to stderr")]
+fn print_warning(warning: &Warning) {
+    eprintln!("warning: {warning}");
 }
 
 /// The scene of a file, or the built-in one.

@@ -84,7 +84,11 @@ fn move_split(
     let lame = tet.ratio - settings.one;
     let mixed = weighted_product(tet, energies.derivative, energies.cofactor);
     let b = -(lame * (tet.stiffness * energies.bulge + shear_step * mixed) + (*multipliers).y);
-    let change = b / (lame * weighted(tet, energies.cofactor) + settings.one);
+    let r = lame * weighted(tet, energies.cofactor);
+    var change = b * decay(r);
+    if ITERATED {
+        change = b / (r + settings.one);
+    }
     let along = shear_step * settings.relaxation;
     let d = change * settings.relaxation;
     if !is_finite(along + d) {
@@ -99,16 +103,17 @@ fn move_split(
     return move_corners(tet, x, moved);
 }
 
-// The split form with an explicit shear step, for a single iteration.
+// (1 - e^-r) / r to third order.
+fn decay(r: f32) -> f32 {
+    return (6.0 + r) / (6.0 + r * (4.0 + r));
+}
+
+// The split form in a single iteration.
 fn solve_split(tet: Tet, x: Corners, f: Columns, multipliers: ptr<function, vec2<f32>>) -> Corners {
     let energies = energies_of(f);
     let twice = energies.shear + energies.shear;
     let steepness = weighted(tet, energies.derivative);
-    // The step ends at the linearized zero of the root of the energy.
-    var fraction = settings.one;
-    if twice < steepness {
-        fraction = twice / steepness;
-    }
+    var fraction = decay(steepness / twice);
     if !(energies.shear > 0.0) {
         fraction = 0.0;
     }

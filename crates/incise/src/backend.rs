@@ -111,7 +111,7 @@ impl AnySolver {
     ) -> Result<Self, Error> {
         let positions = &cuttable.mesh().positions;
         let mut any = match precision {
-            Precision::F32 => Self::Single(Backend::new(positions)),
+            Precision::F32 | Precision::Auto => Self::Single(Backend::new(positions)),
             Precision::F64 => Self::Double(Backend::new(positions)),
         };
         let mesh = cuttable.mesh();
@@ -219,6 +219,16 @@ impl AnySolver {
                     max_speed: Some(measures.max_speed),
                 })
             }
+        }
+    }
+
+    /// The largest speed in m/s, unless the state is on a device.
+    pub(crate) fn host_max_speed(&self) -> Option<f64> {
+        match self {
+            Self::Single(backend) => Some(backend.solver.max_speed()),
+            Self::Double(backend) => Some(backend.solver.max_speed()),
+            #[cfg(feature = "gpu")]
+            Self::Device(_) => None,
         }
     }
 

@@ -9,20 +9,23 @@ use std::time::Instant;
 use glam::DVec3;
 use incise_cutting::{CutDelta, CuttableMesh, PieceEvent, PieceTracker};
 use incise_mesh::signed_volume;
-use incise_xpbd::{KappaLimit, StepReport, StepSettings};
+use incise_xpbd::{KappaLimit, Real, Solver, StepReport, StepSettings, shortest_substep_of_f32};
 
+use crate::accuracy::{DEFAULT_ACCURACY, OutsideVolume, largest_kappas};
 use crate::backend::{AnySolver, each, each_mut};
 use crate::grab::Hand;
 use crate::handle::Handle;
-use crate::joined::Joined;
+use crate::joined::{Joined, demands, substeps};
+use crate::method::tet_solve;
 use crate::place::Place;
 use crate::plan::Plan;
 use crate::recluster::Recluster;
 use crate::report::{Milliseconds, milliseconds};
-use crate::scene::{Quantity, SolverSpec};
+use crate::scene::{Method, Precision, Quantity, SolverSpec, Substeps};
 use crate::sleep::Rest;
-use crate::substeps::Choice;
+use crate::substeps::{Choice, evaluate};
 use crate::volume::Volumes;
+use crate::warning::{self, Warning, WarningCode};
 use crate::{Error, Scene, collider, link};
 
 /// Bodies that are solved together. A copy has the state as it is known here, and its solver on the processor.
@@ -50,6 +53,12 @@ pub(crate) struct Group {
     pub(crate) removed_volume: f64,
     /// What was chosen, if the scene left it open.
     pub(crate) choice: Option<Choice>,
+    /// The longest side of the box around its bodies at rest in m.
+    size: f64,
+    /// What is solved less accurately than asked for.
+    pub(crate) outside: OutsideVolume,
+    /// Warnings for the next report.
+    pub(crate) warnings: Vec<Warning>,
     /// What the last cut did to kappa, if that is to be reported.
     pub(crate) cut_kappa: Option<CutKappa>,
     /// Whether it sleeps, in a scene where bodies may.
@@ -76,10 +85,37 @@ pub(crate) fn kappa_limit(solver: &SolverSpec, settings: &StepSettings) -> Optio
     limit.kappa.is_finite().then_some(limit)
 }
 
+/// The part of a body's volume outside the accuracy wanted from which a user is told.
+const OUTSIDE_FRACTION: f64 = 0.01;
+
+/// The longest side of the box around points, 0 without points.
+fn longest_side(points: &[DVec3]) -> f64 {
+    let (low, high) = points
+        .iter()
+        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), x| {
+            (low.min(*x), high.max(*x))
+        });
+    (high - low).max_element().max(0.0)
+}
+
+/// Material, kappa and volume of a tet.
+fn accuracy_data<R: Real>(
+    solver: &Solver<R>,
+    tet: usize,
+    settings: &StepSettings,
+) -> (u16, f64, f64) {
+    (
+        solver.material_of(tet),
+        solver.kappa_of(tet, settings.substep_time()),
+        solver.rest_volume(tet),
+    )
+}
+
 impl Group {
     pub(crate) fn new(
         scene: &Scene,
         place: &Place,
+        precision: Precision,
         mut settings: StepSettings,
         mut joined: Joined,
     ) -> Result<Self, Error> {
@@ -88,7 +124,7 @@ impl Group {
             field: "body".into(),
             source,
         })?;
-        let mut solver = AnySolver::new(scene.solver.precision, &joined, &cuttable)?;
+        let mut solver = AnySolver::new(precision, &joined, &cuttable)?;
         let (substeps, choice) = joined.substeps(scene, &solver, &cuttable);
         settings.substeps = substeps;
         let limit = kappa_limit(&scene.solver, &settings);
@@ -104,6 +140,7 @@ impl Group {
         }
         solver.prepare(&scene.solver, place)?;
         let recluster = scene.solver.recluster;
+        let size = longest_side(&cuttable.mesh().positions);
         let mut group = Self {
             recluster: recluster.map(Recluster::new),
             solver,
@@ -119,11 +156,111 @@ impl Group {
             cuttable,
             bodies: joined.bodies,
             choice,
+            size,
+            outside: OutsideVolume::default(),
+            warnings: Vec::new(),
             cut_kappa: None,
             rest: scene.solver.sleep.map(Rest::new),
         };
         group.solver.positions(&mut group.positions);
+        group.judge_settings(&scene.solver);
         Ok(group)
+    }
+
+    /// Judges the accuracy of the present settings and notes warnings. O(tets log tets).
+    pub(crate) fn judge_settings(&mut self, spec: &SolverSpec) {
+        self.warnings.clear();
+        let form = tet_solve(spec.tet_solve);
+        if self.is_too_short_for_f32() && each!(&self.solver, solver => solver.is_single()) {
+            let shortest = shortest_substep_of_f32(self.size);
+            let message = format!(
+                "a substep of {:.1e} s is too short for single precision, which needs {shortest:.1e} s: set precision = \"f64\"",
+                self.settings.substep_time()
+            );
+            self.warn(WarningCode::ShortSubstepF32, message);
+        }
+        if spec.method != Method::GaussSeidel {
+            self.outside = OutsideVolume::default();
+            return;
+        }
+        let substeps = self.settings.substeps;
+        let mesh = self.cuttable.mesh();
+        let judged = evaluate(
+            demands(spec, &self.solver, mesh, |_| true),
+            |_| substeps,
+            form,
+        );
+        let chosen = self.choice.is_some();
+        self.warnings.extend(warning::of_substeps(
+            &self.bodies,
+            &judged,
+            chosen,
+            spec.accuracy,
+        ));
+        let softened = each!(&self.solver, solver => solver.softened());
+        if softened.tets > 0 {
+            let message = format!(
+                "{} of {} tets ({:.1}% of the volume) are softened to kappa_limit",
+                softened.tets,
+                self.cuttable.mesh().tets.len(),
+                100.0 * softened.volume_fraction
+            );
+            self.warn(WarningCode::Softened, message);
+        }
+        let accuracy = spec.accuracy.unwrap_or(DEFAULT_ACCURACY);
+        self.outside = each!(&self.solver, solver => {
+            let limits = largest_kappas(accuracy, solver.materials(), form);
+            let tets = (0..solver.tet_count()).map(|t| accuracy_data(solver, t, &self.settings));
+            OutsideVolume::new(limits, tets)
+        });
+    }
+
+    fn warn(&mut self, code: WarningCode, message: String) {
+        self.warnings
+            .push(Warning::new(code, &self.bodies, message));
+    }
+
+    /// Whether the substep is too short for single precision.
+    pub(crate) fn is_too_short_for_f32(&self) -> bool {
+        self.settings.substep_time() < 0.999 * shortest_substep_of_f32(self.size)
+    }
+
+    /// After cuts: chooses substeps again where too much of the body is outside the accuracy, or warns.
+    pub(crate) fn judge_cut(&mut self, asked: &[Substeps], spec: &SolverSpec) {
+        let fraction = self.outside.outside / self.cuttable.mesh().total_volume();
+        if spec.method != Method::GaussSeidel
+            || fraction <= OUTSIDE_FRACTION
+            || self.outside.outside <= 2.0 * self.outside.at_choice
+        {
+            return;
+        }
+        let before = self.settings.substeps;
+        if self.choice.is_some() && !spec.kappa_limit.is_finite() {
+            let (chosen, choice) = substeps(asked, spec, &self.solver, self.cuttable.mesh());
+            self.settings.substeps = chosen.max(before);
+            self.choice = choice;
+            self.judge_settings(spec);
+        }
+        self.outside.at_choice = self.outside.outside;
+        let fraction = self.outside.outside / self.cuttable.mesh().total_volume();
+        if fraction > OUTSIDE_FRACTION {
+            let message = format!(
+                "after cuts {:.1}% of the volume is in tets too small for the accuracy wanted with {} substeps",
+                100.0 * fraction,
+                self.settings.substeps
+            );
+            self.warn(WarningCode::OutsideAccuracy, message);
+        }
+    }
+
+    /// Whether a speed in m/s is beyond anything that the material, gravity and moving parts can cause.
+    pub(crate) fn is_absurd(&self, speed: f64, elapsed: f64) -> bool {
+        let wave = each!(&self.solver, solver => {
+            let waves = solver.materials().iter().map(|m| (m.young_modulus / m.density).sqrt());
+            waves.fold(0.0, f64::max)
+        });
+        let fall = self.settings.gravity.map_or(0.0, |g| g.length() * elapsed);
+        !(speed <= 100.0 * wave + 2.0 * fall + 10.0 * self.size / self.settings.time_step)
     }
 
     /// Whether it is not solved until it is woken.
@@ -193,7 +330,18 @@ impl Group {
         for tet in &delta.deleted {
             self.removed_volume += signed_volume(tet.corners.map(|p| positions[p.index()]));
         }
+        let settings = &self.settings;
+        for tet in delta.removed.iter().chain(&delta.deleted) {
+            let data =
+                each!(&self.solver, solver => accuracy_data(solver, tet.tet.index(), settings));
+            self.outside.remove(data);
+        }
         self.solver.follow(delta, &self.cuttable, ms)?;
+        for tet in &delta.added {
+            let data =
+                each!(&self.solver, solver => accuracy_data(solver, tet.tet.index(), settings));
+            self.outside.add(data);
+        }
         let events = self.pieces.follow(&self.cuttable, delta);
         self.plan.follow(delta, &self.cuttable, ms)?;
         if let Some(recluster) = &mut self.recluster {

@@ -9,12 +9,14 @@ use incise_cutting::CuttableMesh;
 use incise_mesh::{ParticleId, TetId, TetMesh};
 use incise_xpbd::{DistanceConstraint, Material};
 
+use crate::accuracy::{DEFAULT_ACCURACY, largest_kappas};
 use crate::backend::{AnySolver, each};
 use crate::body::Body;
 use crate::handle::Handle;
 use crate::limits::{existing, value};
+use crate::method::tet_solve;
 use crate::scene::{SolverSpec, Substeps};
-use crate::substeps::{Choice, choose};
+use crate::substeps::{Choice, TetDemand, choose};
 use crate::volume::Volumes;
 use crate::{Error, Scene, link};
 
@@ -126,12 +128,37 @@ pub(crate) fn substeps(
     if !asked.contains(&Substeps::Auto) {
         return (most, None);
     }
-    let tets: Vec<(f64, f64)> = each!(solver, solver => {
-        let auto = |t: &usize| asked[usize::from(solver.material_of(*t))] == Substeps::Auto;
-        let kappa = |t: usize| solver.kappa_of(t, spec.time_step);
-        let tets = (0..mesh.tets.len()).filter(auto);
-        tets.map(|t| (kappa(t), mesh.volume(TetId::new(t)))).collect()
-    });
-    let choice = choose(tets, spec.max_substeps, spec.kappa_limit.is_finite());
+    let choice = choose(
+        demands(spec, solver, mesh, |material| {
+            asked[usize::from(material)] == Substeps::Auto
+        }),
+        spec.max_substeps,
+        tet_solve(spec.tet_solve),
+    );
     (most.max(choice.substeps), Some(choice))
+}
+
+/// What the tets of some materials need for the accuracy of a scene.
+pub(crate) fn demands(
+    spec: &SolverSpec,
+    solver: &AnySolver,
+    mesh: &TetMesh,
+    concerns: impl Fn(u16) -> bool,
+) -> Vec<TetDemand> {
+    let accuracy = spec.accuracy.unwrap_or(DEFAULT_ACCURACY);
+    let limits = each!(solver, solver => {
+        largest_kappas(accuracy, solver.materials(), tet_solve(spec.tet_solve))
+    });
+    each!(solver, solver => {
+        let concerned = |t: &usize| concerns(solver.material_of(*t));
+        let kappa = |t: usize| solver.kappa_of(t, spec.time_step);
+        let tets = (0..mesh.tets.len()).filter(concerned);
+        tets.map(|t| TetDemand {
+            kappa: kappa(t),
+            largest_kappa: limits[usize::from(solver.material_of(t))],
+            poisson_ratio: solver.material(solver.material_of(t)).poisson_ratio,
+            volume: mesh.volume(TetId::new(t)),
+        })
+        .collect()
+    })
 }

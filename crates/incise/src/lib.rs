@@ -20,6 +20,7 @@
 //! # Ok::<(), incise::Error>(())
 //! ```
 
+mod accuracy;
 #[cfg(feature = "advise")]
 pub mod advise;
 mod backend;
@@ -55,6 +56,7 @@ mod substeps;
 mod tool;
 mod vbd;
 mod volume;
+mod warning;
 mod whole;
 
 pub use error::Error;
@@ -70,6 +72,7 @@ pub use incise_xpbd as xpbd;
 pub use report::FrameReport;
 pub use scene::Scene;
 pub use simulation::{Simulation, Snapshot};
+pub use warning::{Warning, WarningCode};
 
 /// The example of the README, run as a test.
 #[cfg(doctest)]

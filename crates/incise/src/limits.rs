@@ -63,6 +63,11 @@ pub(crate) fn within(field: &str, number: f64, low: f64, high: f64) -> Result<f6
 
 /// Refuses limits that are none.
 pub(crate) fn check(scene: &Scene) -> Result<(), Error> {
+    if let Some(accuracy) = scene.solver.accuracy
+        && !(accuracy > 0.0 && accuracy <= 1.0)
+    {
+        return Err(value("solver.accuracy", accuracy, "above 0 and at most 1"));
+    }
     let kappa = scene.solver.kappa_limit;
     if kappa.is_nan() || kappa <= 0.0 {
         return Err(value("solver.kappa_limit", kappa, "positive"));

@@ -29,13 +29,15 @@ pub enum Method {
     Vbd,
 }
 
-/// How the two constraints of a tet are solved.
+/// How the elastic energy of a tet is solved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum TetSolve {
-    /// As one system of two unknowns.
+    /// A shear part and a volume part that vanish at rest: bounded at any stiffness.
     #[default]
+    Split,
+    /// `|F|` and `det F` as one system of two unknowns: unstable from a kappa of about 2 on unless `kappa_limit` softens.
     Block,
     /// One after the other, as in the paper.
     Sequential,
@@ -45,8 +47,7 @@ impl SolverSpec {
     /// The defaults that go with a method: those of [`SolverSpec::default`], but
     ///
     /// * all methods but Gauss-Seidel take 20 `iterations`, as one of theirs does little;
-    /// * Jacobi and Chebyshev have a `relaxation` of 0.1: with 1 they overshoot where more than two tets meet;
-    /// * VBD has no `kappa_limit`: it is stable without.
+    /// * Jacobi and Chebyshev have a `relaxation` of 0.1: with 1 they overshoot where more than two tets meet.
     ///
     /// ```
     /// let scene = incise::Scene::from_toml("[solver]\nmethod = \"jacobi\"\niterations = 7")?;
@@ -62,9 +63,18 @@ impl SolverSpec {
         match method {
             Method::GaussSeidel => {}
             Method::Jacobi | Method::Chebyshev => (spec.iterations, spec.relaxation) = (20, 0.1),
-            Method::Vbd => (spec.iterations, spec.kappa_limit) = (20, f64::INFINITY),
+            Method::Vbd => spec.iterations = 20,
         }
         spec
+    }
+}
+
+/// The solver's name of a form.
+pub(crate) fn tet_solve(form: TetSolve) -> incise_xpbd::TetSolve {
+    match form {
+        TetSolve::Split => incise_xpbd::TetSolve::Split,
+        TetSolve::Block => incise_xpbd::TetSolve::Block,
+        TetSolve::Sequential => incise_xpbd::TetSolve::Sequential,
     }
 }
 
@@ -88,10 +98,7 @@ pub(crate) fn settings(scene: &Scene) -> Result<StepSettings, Error> {
             // VBD does not ask.
             Method::GaussSeidel | Method::Vbd => incise_xpbd::Method::GaussSeidel,
         },
-        tet_solve: match solver.tet_solve {
-            TetSolve::Block => incise_xpbd::TetSolve::Block,
-            TetSolve::Sequential => incise_xpbd::TetSolve::Sequential,
-        },
+        tet_solve: tet_solve(solver.tet_solve),
         relaxation: solver.relaxation,
         gravity: gravity
             .map(|g| coordinates("world.gravity", g))
@@ -123,8 +130,8 @@ pub(crate) fn vbd(settings: &StepSettings) -> VbdSettings {
 
 /// Refuses what VBD would silently leave out.
 pub(crate) fn check_vbd(scene: &Scene) -> Result<(), Error> {
-    if scene.solver.tet_solve != TetSolve::Block {
-        return Err(refused("solver.tet_solve", "sequential", "block where"));
+    if scene.solver.tet_solve != TetSolve::Split {
+        return Err(refused("solver.tet_solve", "not split", "split where"));
     }
     if !scene.link.is_empty() {
         return Err(refused("link", "given", "absent where"));

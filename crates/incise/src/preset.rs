@@ -38,7 +38,7 @@ impl SolverSpec {
         let (tet_solve, relaxation) = match method {
             Method::GaussSeidel => (TetSolve::Sequential, 0.8),
             Method::Jacobi | Method::Chebyshev => (TetSolve::Sequential, 0.1),
-            Method::Vbd => (TetSolve::Block, 1.0),
+            Method::Vbd => (TetSolve::Split, 1.0),
         };
         Self {
             preset: Some(Preset::Paper),

@@ -9,6 +9,7 @@ use incise_xpbd::Softened;
 use serde::Serialize;
 
 pub use crate::substeps::{Choice, Missed};
+use crate::warning::Warning;
 
 /// What a frame did.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -70,6 +71,9 @@ pub struct FrameReport {
     /// are known in the frames that ask it for something (a blade, a quantity of the state), for all frames since.
     #[serde(skip_serializing_if = "is_zero")]
     pub repaired: usize,
+    /// What must be known about the frame; absent if nothing. See [`Warning`].
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<Warning>,
     /// Groups of joined bodies whose clusters and colors were made anew in the background and taken in this frame; absent
     /// if none.
     #[serde(skip_serializing_if = "is_zero")]
@@ -78,6 +82,14 @@ pub struct FrameReport {
     pub backend: &'static str,
     /// In which precision: `f32` or `f64`.
     pub precision: &'static str,
+}
+
+impl FrameReport {
+    /// What must be known about the frame; empty in most frames.
+    #[must_use]
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
 }
 
 fn is_zero(count: &usize) -> bool {

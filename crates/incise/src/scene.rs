@@ -34,7 +34,7 @@ pub use crate::substeps::Substeps;
 ///     "#,
 /// )?;
 /// assert_eq!(scene.body.len(), 1);
-/// assert_eq!(scene.solver.substeps, 5.into());
+/// assert_eq!(scene.solver.substeps, incise::scene::Substeps::Auto);
 /// # Ok::<(), incise::Error>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -142,7 +142,12 @@ pub struct SolverSpec {
     pub preset: Option<Preset>,
     /// Time of a frame in s.
     pub time_step: f64,
-    /// Equal parts of a frame: a number, or `auto`, which chooses for each body.
+    /// The largest error wanted, as a fraction of the motion, above 0 and at most 1; absent: 0.1. Decides what
+    /// `substeps = "auto"` takes. If given, and `max_substeps` do not reach it by Gauss-Seidel, the scene is solved by
+    /// two-level VBD.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accuracy: Option<f64>,
+    /// Equal parts of a frame: a number, or `auto`, which chooses for each body by the accuracy.
     pub substeps: Substeps,
     /// The most substeps that `auto` takes.
     pub max_substeps: u32,
@@ -150,7 +155,7 @@ pub struct SolverSpec {
     pub iterations: u32,
     /// How a pass is made.
     pub method: Method,
-    /// How the two constraints of a tet are solved. VBD has no constraints.
+    /// How the elastic energy of a tet is solved. VBD has no constraints.
     pub tet_solve: TetSolve,
     /// Factor on each correction.
     pub relaxation: f64,
@@ -181,7 +186,8 @@ pub struct SolverSpec {
     /// ones, up to 256, that of a workgroup.
     #[serde(skip_serializing_if = "Backend::is_cpu")]
     pub backend: Backend,
-    /// Largest kappa of a tet, positive: stiffer ones, as cuts leave them, are softened to it. `inf` softens none.
+    /// Largest kappa of a tet, positive: stiffer ones, as cuts leave them, are softened to it. `inf`, the default,
+    /// softens none.
     pub kappa_limit: f64,
     /// Bodies at rest are not solved until they are cut or something moves them; absent: all are always solved.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -193,11 +199,12 @@ impl Default for SolverSpec {
         Self {
             preset: None,
             time_step: 0.016,
-            substeps: Substeps::Fixed(5),
+            accuracy: None,
+            substeps: Substeps::Auto,
             max_substeps: 200,
             iterations: 1,
             method: Method::GaussSeidel,
-            tet_solve: TetSolve::Block,
+            tet_solve: TetSolve::Split,
             relaxation: 1.0,
             spectral_radius: 0.99,
             delay: 10,
@@ -206,9 +213,9 @@ impl Default for SolverSpec {
             merge_clusters: true,
             recluster: None,
             coloring: "auto".to_owned(),
-            precision: Precision::F32,
+            precision: Precision::Auto,
             backend: Backend::Cpu,
-            kappa_limit: 1.0,
+            kappa_limit: f64::INFINITY,
             sleep: None,
         }
     }
@@ -218,8 +225,10 @@ impl Default for SolverSpec {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Precision {
-    /// Single: 32 bits.
+    /// Single on a GPU and wherever the substep is long enough for it, else double.
     #[default]
+    Auto,
+    /// Single: 32 bits.
     F32,
     /// Double: 64 bits.
     F64,
@@ -230,6 +239,7 @@ impl Precision {
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
+            Self::Auto => "auto",
             Self::F32 => "f32",
             Self::F64 => "f64",
         }

@@ -34,6 +34,7 @@ use crate::report::{
 };
 use crate::scene::{Precision, Quantity, SolverSpec, StrokeSpec};
 use crate::strokes::Timeline;
+use crate::warning::{Warning, WarningCode};
 use crate::whole::Whole;
 use crate::{Error, Scene, link};
 
@@ -143,30 +144,41 @@ impl Simulation {
         if scene.report.every == 0 {
             return Err(value("report.every", 0, "at least 1"));
         }
-        let precision = scene.solver.precision;
-        let mut timeline = Timeline::new(match precision {
-            Precision::F32 => 1e-5,
-            Precision::F64 => 1e-9,
-        });
-        for stroke in &scene.stroke {
-            timeline.add(stroke)?;
-        }
         limits::check(scene)?;
         let bodies = Body::all(scene)?;
         let islands = islands(bodies.len(), &link::pairs(scene, bodies.len())?);
         let several = islands.iter().any(|&island| island > 0);
         let whole = several.then(|| Whole::new(&bodies, &islands));
         let joined = Joined::all(scene, bodies, &islands)?;
-        let make_groups = || {
-            let groups = joined.into_par_iter();
-            groups
-                .map(|joined| Group::new(scene, &place, settings.clone(), joined))
-                .collect::<Result<Vec<_>, _>>()
+        let make_groups = |precision: Precision, joined: Vec<Joined>| {
+            let make = || {
+                let groups = joined.into_par_iter();
+                groups
+                    .map(|joined| Group::new(scene, &place, precision, settings.clone(), joined))
+                    .collect::<Result<Vec<_>, _>>()
+            };
+            match &pool {
+                Some(pool) => pool.install(make),
+                None => make(),
+            }
         };
-        let groups = match &pool {
-            Some(pool) => pool.install(make_groups),
-            None => make_groups(),
-        }?;
+        let mut precision = match scene.solver.precision {
+            Precision::Auto => Precision::F32,
+            given => given,
+        };
+        let mut groups = make_groups(precision, joined)?;
+        let short = || groups.iter().any(Group::is_too_short_for_f32);
+        if scene.solver.precision == Precision::Auto && !place.is_device() && short() {
+            precision = Precision::F64;
+            groups = make_groups(precision, Joined::all(scene, Body::all(scene)?, &islands)?)?;
+        }
+        let mut timeline = Timeline::new(match precision {
+            Precision::F32 | Precision::Auto => 1e-5,
+            Precision::F64 => 1e-9,
+        });
+        for stroke in &scene.stroke {
+            timeline.add(stroke)?;
+        }
         let mut simulation = Self {
             scene: Arc::new(scene.clone()),
             solver: scene.solver.clone(),
@@ -250,6 +262,9 @@ impl Simulation {
             repaired += self.fetch(&mut ms)?;
         }
         let cut = self.carry_out_strokes(&mut detached, &mut ms)?;
+        if cut.is_some() {
+            self.judge_cuts();
+        }
         let mut reclustered = 0;
         for group in &mut self.groups {
             reclustered += usize::from(group.renew_plan(self.next_frame, &mut ms)?);
@@ -279,12 +294,52 @@ impl Simulation {
         };
         self.measure(&mut ms)?;
         self.count();
+        self.collect_warnings();
         ms.total = milliseconds(start.elapsed());
         ms.other = ms.total
             - (ms.cut + ms.cluster + ms.color + ms.schedule + ms.upload + ms.solve + ms.readback);
         self.report.ms = ms;
         self.next_frame += 1;
         Ok(())
+    }
+
+    /// Lets groups that were cut choose substeps again where that is due.
+    fn judge_cuts(&mut self) {
+        for group in &mut self.groups {
+            let bodies = group.bodies.iter().map(|&body| &self.scene.body[body]);
+            let asked: Vec<_> = bodies
+                .map(|body| body.substeps.unwrap_or(self.solver.substeps))
+                .collect();
+            group.judge_cut(&asked, &self.solver);
+        }
+    }
+
+    /// Puts the warnings of all groups into the report, and looks for divergence.
+    fn collect_warnings(&mut self) {
+        let elapsed = self.report.time_s;
+        for group in &mut self.groups {
+            self.report.warnings.append(&mut group.warnings);
+            let speed = match group.solver.host_max_speed() {
+                Some(speed) => speed,
+                None => self.report.max_speed.unwrap_or(0.0),
+            };
+            if group.is_absurd(speed, elapsed) {
+                let message = format!(
+                    "the solution has diverged: a particle moves at {speed:.1e} m/s; check method, relaxation and substeps"
+                );
+                let warning = Warning::new(WarningCode::Diverged, &group.bodies, message);
+                self.report.warnings.push(warning);
+            }
+        }
+        if self.report.repaired > 0 {
+            let bodies: Vec<usize> = self.groups.iter().flat_map(|g| g.bodies.clone()).collect();
+            let message = format!(
+                "{} particle(s) would have become infinite and were put back: use more substeps",
+                self.report.repaired
+            );
+            let warning = Warning::new(WarningCode::Repaired, &bodies, message);
+            self.report.warnings.push(warning);
+        }
     }
 
     /// Whether the frame to come is to report a quantity.

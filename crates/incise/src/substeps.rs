@@ -1,24 +1,22 @@
 //! [`Substeps`]: how many substeps a frame has, and how `auto` chooses them for a body.
 //!
-//! A substep is accurate while kappa, `E Δt² / (ρ h²)` with h the smallest altitude of a tet, is at most 0.5. As kappa
-//! falls with the square of the number of substeps, one pass over the tets at rest tells the number that every tet
-//! wants, and the largest decides, but for two exceptions, which are reported. No more than a cap is taken. And a few
-//! slivers do not make the whole body wait: tets that want more than twice the substeps of all others, together less
-//! than a thousandth of the volume, are left to the limit of kappa, which softens them. Without such a limit they
-//! decide, for nothing else keeps them stable.
-//!
-//! The number is chosen once. What a cut leaves is small tets of little volume: the limit of kappa softens them, too.
+//! The error of a substep grows with kappa, `E Δt² / (ρ h²)` with h the smallest altitude of a tet, and with Poisson's
+//! ratio (`accuracy.rs`). Kappa falls with the square of the number of substeps, so one pass over the tets at rest tells
+//! the number that every tet needs for the accuracy wanted, and the largest decides, with two exceptions, which are
+//! reported. No more than a cap is taken. And a few slivers do not decide for the whole body: tets that need more than
+//! twice the substeps of all others, together less than a thousandth of the volume, are solved less accurately.
 //!
 //! Source: kappa is the square of a Courant number; that substeps and not iterations make XPBD accurate, Macklin et al.
-//! 2019. Cost: O(n log n) once.
+//! 2019. Cost: O(n log n) for each choice.
 
 use std::fmt;
 
 use serde::de::{Unexpected, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// Up to this kappa a substep is accurate.
-pub(crate) const ACCURATE_KAPPA: f64 = 0.5;
+use incise_xpbd::TetSolve;
+
+use crate::accuracy::{expected_error, is_nearly_incompressible};
 
 /// Slivers are less than this share of a body's volume...
 const SLIVER_VOLUME: f64 = 1e-3;
@@ -40,8 +38,8 @@ const SLIVER_KAPPA: f64 = 4.0;
 pub enum Substeps {
     /// This many, at least 1.
     Fixed(u32),
-    /// For each body the fewest that bring the kappa of its tets at rest to 0.5, few slivers left aside, but no more
-    /// than `max_substeps`. Cuts do not change the number.
+    /// For each body the fewest that solve its tets with the accuracy wanted, few slivers left aside, but no more than
+    /// `max_substeps`. The number rises when cuts leave more than 1% of the volume outside that accuracy.
     Auto,
 }
 
@@ -108,8 +106,11 @@ pub enum Missed {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Choice {
-    /// The substeps that would bring the kappa of every tet at rest to 0.5.
+    /// The substeps that would solve every tet with the accuracy wanted.
     pub substeps_wanted: u32,
+    /// The substeps that would solve all tets but slivers with it.
+    #[serde(skip)]
+    pub(crate) substeps_needed: u32,
     /// The number that was chosen; that of the body is larger if it is joined to one with more.
     #[serde(skip)]
     pub substeps: u32,
@@ -119,32 +120,71 @@ pub struct Choice {
     pub sliver_tets: usize,
     /// Their share of the volume at rest.
     pub sliver_volume_fraction: f64,
+    /// The expected error of all other tets with the chosen number, as a fraction of the motion.
+    pub expected_error: f64,
+    /// Whether that error comes from a Poisson's ratio near 0.5.
+    #[serde(skip)]
+    pub(crate) nearly_incompressible: bool,
 }
 
-/// Chooses substeps for tets given by their kappa at one substep and their volume. `spare_slivers` says whether slivers
-/// are left aside.
-pub(crate) fn choose(mut tets: Vec<(f64, f64)>, max_substeps: u32, spare_slivers: bool) -> Choice {
-    tets.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
-    let stiffest = tets.first().map_or(0.0, |tet| tet.0);
-    let total: f64 = tets.iter().map(|tet| tet.1).sum();
-    let (mut slivers, mut volume) = (0, 0.0);
-    if spare_slivers {
-        // The first tet that belongs to the bulk however the slivers are counted.
-        let mut sum = 0.0;
-        let bulk = tets.iter().find(|tet| {
-            sum += tet.1;
-            sum >= SLIVER_VOLUME * total
-        });
-        let limit = bulk.map_or(stiffest, |tet| SLIVER_KAPPA * tet.0);
-        slivers = tets.partition_point(|tet| tet.0 > limit);
-        volume = tets[..slivers].iter().map(|tet| tet.1).sum();
+/// A tet as the choice of substeps sees it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TetDemand {
+    /// At one substep.
+    pub(crate) kappa: f64,
+    /// The largest kappa of the accuracy wanted.
+    pub(crate) largest_kappa: f64,
+    pub(crate) poisson_ratio: f64,
+    pub(crate) volume: f64,
+}
+
+impl TetDemand {
+    /// Kappa at one substep over the largest accurate one: the square of the substeps needed.
+    fn excess(&self) -> f64 {
+        self.kappa / self.largest_kappa
     }
-    let decisive = tets.get(slivers).map_or(0.0, |tet| tet.0);
+}
+
+/// Chooses substeps.
+pub(crate) fn choose(tets: Vec<TetDemand>, max_substeps: u32, form: TetSolve) -> Choice {
+    evaluate(tets, |needed| needed.min(max_substeps), form)
+}
+
+/// What a number of substeps, taken from the needed one, means for tets.
+pub(crate) fn evaluate(
+    mut tets: Vec<TetDemand>,
+    take: impl FnOnce(u32) -> u32,
+    form: TetSolve,
+) -> Choice {
+    tets.sort_unstable_by(|a, b| b.excess().total_cmp(&a.excess()));
+    let stiffest = tets.first().map_or(0.0, TetDemand::excess);
+    let total: f64 = tets.iter().map(|tet| tet.volume).sum();
+    // The first tet that belongs to the bulk however the slivers are counted.
+    let mut sum = 0.0;
+    let bulk = tets.iter().find(|tet| {
+        sum += tet.volume;
+        sum >= SLIVER_VOLUME * total
+    });
+    let limit = bulk.map_or(stiffest, |tet| SLIVER_KAPPA * tet.excess());
+    let slivers = tets.partition_point(|tet| tet.excess() > limit);
+    let volume: f64 = tets[..slivers].iter().map(|tet| tet.volume).sum();
+    let decisive = tets.get(slivers).map_or(0.0, TetDemand::excess);
     let (wanted, chosen) = (wanted(stiffest), wanted(decisive));
+    let substeps = take(chosen);
+    let error = |tet: &TetDemand| {
+        let kappa = tet.kappa / f64::from(substeps).powi(2);
+        let error = expected_error(kappa, tet.poisson_ratio, form);
+        let near = is_nearly_incompressible(kappa, tet.poisson_ratio, form);
+        (error, near)
+    };
+    let errors = tets[slivers..].iter().map(error);
+    let (expected_error, nearly_incompressible) =
+        errors.fold((0.0, false), |a, b| if b.0 > a.0 { b } else { a });
     Choice {
         substeps_wanted: wanted,
-        substeps: chosen.min(max_substeps),
-        missed: if chosen > max_substeps {
+        substeps_needed: chosen,
+        substeps,
+        missed: if chosen > substeps {
             Some(Missed::Cap)
         } else if wanted > chosen {
             Some(Missed::Sliver)
@@ -153,19 +193,21 @@ pub(crate) fn choose(mut tets: Vec<(f64, f64)>, max_substeps: u32, spare_slivers
         },
         sliver_tets: slivers,
         sliver_volume_fraction: if slivers > 0 { volume / total } else { 0.0 },
+        expected_error,
+        nearly_incompressible,
     }
 }
 
-/// The smallest number of substeps that brings a kappa at one substep to [`ACCURATE_KAPPA`].
-fn wanted(kappa: f64) -> u32 {
+/// The smallest number of substeps whose square is at least this.
+fn wanted(square: f64) -> u32 {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "the cast saturates, and no cap is as large"
     )]
-    let mut substeps = ((kappa / ACCURATE_KAPPA).sqrt().ceil() as u32).max(1);
+    let mut substeps = (square.sqrt().ceil() as u32).max(1);
     // The root may be rounded down.
-    while substeps < u32::MAX && kappa / f64::from(substeps).powi(2) > ACCURATE_KAPPA {
+    while substeps < u32::MAX && square > f64::from(substeps).powi(2) {
         substeps += 1;
     }
     substeps
@@ -177,20 +219,34 @@ mod tests {
 
     use super::*;
 
+    fn demand(kappa: f64, volume: f64) -> TetDemand {
+        TetDemand {
+            kappa,
+            largest_kappa: 0.5,
+            poisson_ratio: 0.3,
+            volume,
+        }
+    }
+
+    fn choice(tets: &[(f64, f64)], cap: u32) -> Choice {
+        let tets = tets.iter().map(|&(kappa, volume)| demand(kappa, volume));
+        choose(tets.collect(), cap, TetSolve::Split)
+    }
+
     #[test]
     fn the_smallest_sufficient_number_is_wanted() {
-        for (kappa, substeps) in [
+        for (square, substeps) in [
             (0.0, 1),
-            (0.5, 1),
-            (0.500_000_1, 2),
-            (2.0, 2),
-            (4.5, 3),
-            (4.500_000_1, 4),
-            (5e5, 1000),
+            (1.0, 1),
+            (1.000_000_1, 2),
+            (4.0, 2),
+            (9.0, 3),
+            (9.000_000_1, 4),
+            (1e6, 1000),
             (1e300, u32::MAX),
             (f64::INFINITY, u32::MAX),
         ] {
-            assert_eq!(wanted(kappa), substeps, "{kappa}");
+            assert_eq!(wanted(square), substeps, "{square}");
         }
     }
 
@@ -202,21 +258,20 @@ mod tests {
             tets
         };
         // 90 slivers are 0.09 % of the volume, 200 are 0.2 %.
-        let few = choose(body(90), 200, true);
+        let few = choice(&body(90), 200);
         assert_eq!((few.substeps, few.substeps_wanted), (4, 40));
         assert_eq!((few.missed, few.sliver_tets), (Some(Missed::Sliver), 90));
         assert!((few.sliver_volume_fraction - 0.9 / 1000.9).abs() < 1e-12);
-        let many = choose(body(200), 200, true);
+        let many = choice(&body(200), 200);
         assert_eq!((many.substeps, many.missed), (40, None));
-        let unlimited = choose(body(90), 200, false);
-        assert_eq!((unlimited.substeps, unlimited.missed), (40, None));
-        // Tets just smaller than the others are no slivers: they are served.
-        let graded = choose(vec![(8.0, 1000.0), (30.0, 0.1)], 200, true);
+        // Tets just smaller than the others are no slivers.
+        let graded = choice(&[(8.0, 1000.0), (30.0, 0.1)], 200);
         assert_eq!((graded.substeps, graded.missed), (8, None));
-        // The cap is told before the slivers.
-        let capped = choose(body(90), 3, true);
+        // The cap is reported before the slivers.
+        let capped = choice(&body(90), 3);
         assert_eq!((capped.substeps, capped.missed), (3, Some(Missed::Cap)));
-        assert_eq!(choose(Vec::new(), 200, true).substeps, 1);
+        assert!(capped.expected_error > few.expected_error);
+        assert_eq!(choice(&[], 200).substeps, 1);
     }
 
     proptest! {
@@ -228,9 +283,9 @@ mod tests {
         ) {
             let tets: Vec<(f64, f64)> =
                 tets.into_iter().map(|(k, v)| (10f64.powf(k), 10f64.powf(v))).collect();
-            let choice = choose(tets.clone(), cap, true);
+            let choice = choice(&tets, cap);
             let total: f64 = tets.iter().map(|t| t.1).sum();
-            let served = |n: u32| tets.iter().filter(move |t| t.0 / f64::from(n).powi(2) <= 0.5);
+            let served = |n: u32| tets.iter().filter(move |t| t.0 / 0.5 <= f64::from(n).powi(2));
             let missed = |n: u32| total - served(n).map(|t| t.1).sum::<f64>();
             prop_assert!(choice.substeps <= cap);
             if choice.missed == Some(Missed::Cap) {

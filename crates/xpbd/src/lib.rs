@@ -79,7 +79,7 @@ pub use material::Material;
 pub use measure::{Energy, Softened, Volume};
 pub use real::Real;
 pub use residuals::Residuals;
-pub use settings::{Method, StepSettings, TetSolve};
+pub use settings::{Method, StepSettings, TetSolve, shortest_substep_of_f32};
 pub use solver::Solver;
 pub use step::StepReport;
 pub use vbd::{

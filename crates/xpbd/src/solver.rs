@@ -257,6 +257,27 @@ impl<R: Real> Solver<R> {
         assert!(particles.iter().all(exists), "the particles of a tet exist");
     }
 
+    /// Whether the solver computes in single precision.
+    #[must_use]
+    pub fn is_single(&self) -> bool {
+        size_of::<R>() == size_of::<f32>()
+    }
+
+    /// The materials, by number.
+    #[must_use]
+    pub fn materials(&self) -> &[Material] {
+        &self.materials
+    }
+
+    /// The material of a number.
+    ///
+    /// # Panics
+    /// If the material does not exist.
+    #[must_use]
+    pub fn material(&self, material: u16) -> &Material {
+        &self.materials[usize::from(material)]
+    }
+
     /// The material of a tet.
     ///
     /// # Panics

@@ -30,7 +30,7 @@ pub(super) struct Ours {
 /// Measures ours, in clusters of ten as scenes have them.
 pub(super) fn ours(cells: [usize; 3], frames: u32, precision: Precision) -> anyhow::Result<Ours> {
     match precision {
-        Precision::F32 => in_precision::<f32>(cells, frames),
+        Precision::F32 | Precision::Auto => in_precision::<f32>(cells, frames),
         Precision::F64 => in_precision::<f64>(cells, frames),
     }
 }

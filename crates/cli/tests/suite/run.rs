@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::support::{Place, SCENE, keys, names};
 
 const ALWAYS: &str =
-    "frame, time_s, particles, tets, clusters, colors, pieces, cut, ms, backend, precision";
+    "frame, time_s, particles, tets, clusters, colors, pieces, cut, bodies, ms, backend, precision";
 
 /// The objects of a file of lines.
 fn frames(place: &Place, file: &str) -> Vec<Value> {
@@ -107,7 +107,7 @@ fn reports_appear_when_asked_for() {
     ]);
     let frames = frames(&place, "out/frames.jsonl");
     let all = format!(
-        "{ALWAYS}, residual, energy, volume, volume_error, min_volume_ratio, max_speed, inverted_tets, kappa, softened, bodies"
+        "{ALWAYS}, residual, energy, volume, volume_error, min_volume_ratio, max_speed, inverted_tets, kappa, softened"
     );
     let cut = format!("{ALWAYS}, detached");
     for (frame, expected) in frames.iter().zip([&all, &cut, &all]) {
@@ -128,13 +128,48 @@ fn chosen_substeps_are_in_the_table_and_in_every_line() {
     let place = Place::new();
     let solver = "[solver]\nsubsteps = \"auto\"\nmax_substeps = 2\n";
     place.write("scene.toml", SCENE.replace("1e4", "1e6") + solver);
-    let table = place.good(&["run", "scene.toml", "--frames", "3", "--no-pictures"]);
+    let outcome = place.incise(&["run", "scene.toml", "--frames", "3", "--no-pictures"]);
+    assert_eq!(outcome.code, 0);
+    let warning = outcome.stderr;
+    assert!(
+        warning.starts_with("warning: body 0: the expected error is"),
+        "{warning}"
+    );
+    assert_eq!(warning.lines().count(), 1, "{warning}");
+    let lines = frames(&place, "out/frames.jsonl");
+    assert_eq!(lines[0]["warnings"][0]["code"], "substeps_capped");
+    assert_eq!(lines[0]["warnings"][0]["where"], "body 0");
+    assert!(lines[1].get("warnings").is_none());
+    let table = outcome.stdout;
     assert!(table.contains("substeps of body 0"), "{table}");
     assert!(table.contains("2 (the cap; "), "{table}");
     for frame in frames(&place, "out/frames.jsonl") {
         assert_eq!(frame["bodies"][0]["substeps"], 2);
         assert_eq!(frame["bodies"][0]["missed"], "cap");
     }
+}
+
+/// Chebyshev with too large a relaxation diverges: the run ends in that frame with exit code 1, unless it is told to go on.
+#[test]
+fn a_diverged_run_fails() {
+    let place = Place::new();
+    let solver = "[solver]\nmethod = \"chebyshev\"\nrelaxation = 1.9\nsubsteps = 1\n";
+    place.write("scene.toml", SCENE.to_owned() + solver);
+    let run = [
+        "run",
+        "scene.toml",
+        "--frames",
+        "60",
+        "--no-pictures",
+        "--quiet",
+    ];
+    let outcome = place.incise(&run);
+    assert_eq!(outcome.code, 1, "{outcome:?}");
+    assert!(outcome.stderr.contains("diverged"), "{outcome:?}");
+    assert!(frames(&place, "out/frames.jsonl").len() < 60);
+    let outcome = place.incise(&[&run[..], &["--keep-going"]].concat());
+    assert_eq!((outcome.code, outcome.stderr.as_str()), (0, ""));
+    assert_eq!(frames(&place, "out/frames.jsonl").len(), 60);
 }
 
 #[test]

@@ -21,7 +21,7 @@ use crate::method::settings;
 use crate::place::Place;
 use crate::plan::{Plan, Recipe};
 use crate::recluster::Recluster;
-use crate::scene::{Method, SolverSpec};
+use crate::scene::{Method, Precision, SolverSpec};
 use crate::sleep::Rest;
 use crate::substeps::Choice;
 use crate::{Error, Scene};
@@ -51,7 +51,7 @@ impl Simulation {
     /// * `time_step`: handles and strokes go by frames, so they pass through the world faster or slower; obstacles keep
     ///   their velocities; the simulated time goes on from where it is.
     /// * `substeps`, `max_substeps`: `auto` chooses anew, from the tets as they are now, if one of these, `time_step` or
-    ///   whether there is a limit of kappa changes. Substeps that bodies ask for themselves stay.
+    ///   `accuracy`, `tet_solve` changes. Substeps that bodies ask for themselves stay.
     /// * `kappa_limit`, or another time of a substep: tets are softened to the new limit, and those that need not be any
     ///   more are what their material says.
     /// * `clustering`, `coloring`, `merge_clusters`: clusters and colors of all tets are made anew.
@@ -89,7 +89,7 @@ impl Simulation {
         if *solver == self.solver {
             return Ok(());
         }
-        if solver.precision != self.precision {
+        if solver.precision != Precision::Auto && solver.precision != self.precision {
             let range = format!(
                 "{}, as when the simulation was set up",
                 self.precision.name()
@@ -134,6 +134,7 @@ impl Simulation {
         // Nothing fails from here on: what is on a device has been fetched.
         for (group, retuned) in self.groups.iter_mut().zip(retuned) {
             retuned.take_effect(group, solver)?;
+            group.judge_settings(solver);
         }
         if settings.time_step.to_bits() != self.time_step.to_bits() {
             self.epoch = (self.next_frame, self.time_at(self.next_frame));
@@ -328,12 +329,12 @@ impl Retuned {
 
 /// What the substeps of a group follow from.
 fn substeps_follow_from(spec: &SolverSpec) -> impl PartialEq + use<> {
-    let limited = spec.kappa_limit.is_finite();
     (
         spec.time_step.to_bits(),
+        spec.accuracy.map(f64::to_bits),
+        spec.tet_solve,
         spec.substeps,
         spec.max_substeps,
-        limited,
     )
 }
 

@@ -195,7 +195,11 @@ fn quantities_are_those_of_all_bodies() {
     let report =
         "[report]\nquantities = [\"residual\", \"energy\", \"volume\", \"speed\", \"kappa\"]\n";
     let run = |bodies: &str| {
-        let mut simulation = simulation(&scene(&format!("{report}{WORLD}{bodies}{}", strokes())));
+        let solver = "[solver]\nsubsteps = 5\nkappa_limit = 1.0\n";
+        let mut simulation = simulation(&scene(&format!(
+            "{report}{solver}{WORLD}{bodies}{}",
+            strokes()
+        )));
         (0..3).for_each(|_| drop(simulation.step().unwrap().clone()));
         simulation.report().clone()
     };

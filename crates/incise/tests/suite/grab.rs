@@ -16,7 +16,7 @@ fn free_box(precision: Precision) -> Scene {
 /// One unit of the last place of numbers around 1, times what sums and frames add up.
 fn rounding(precision: Precision) -> f64 {
     match precision {
-        Precision::F32 => 1e-5,
+        Precision::F32 | Precision::Auto => 1e-5,
         Precision::F64 => 1e-12,
     }
 }

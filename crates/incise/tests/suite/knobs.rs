@@ -16,7 +16,7 @@ pub(crate) fn two_bodies() -> Scene {
     );
     let plane = plane(3, [-0.1, 0.0, 0.0], [1.0, 0.2, 0.0]);
     scene(&format!(
-        "[world]\ngravity = [0.0, 0.0, -9.81]\nground = {{ height = -0.6, friction = 0.4 }}\n\
+        "[solver]\nsubsteps = 5\n[world]\ngravity = [0.0, 0.0, -9.81]\nground = {{ height = -0.6, friction = 0.4 }}\n\
          {beam}fixed = [{{ half_space = {{ point = [-0.45, 0.0, 0.0], normal = [-1.0, 0.0, 0.0] }} }}]\n\
          {cube}{sweep}{plane}\n\
          [[collider]]\nkind = \"sphere\"\ncenter = [0.2, 0.0, 0.5]\nradius = 0.1\nvelocity = [0.0, 0.0, -1.0]\n\
@@ -25,10 +25,14 @@ pub(crate) fn two_bodies() -> Scene {
     ))
 }
 
-/// Settings that differ from the defaults, each in something else, by name.
+/// Settings that differ from those of [`two_bodies`], each in something else, by name. The number of substeps is given:
+/// a chosen one may rise with cuts, and later settings would start from that.
 pub(crate) fn settings() -> Vec<(&'static str, SolverSpec)> {
-    let of = SolverSpec::of;
-    let plain = SolverSpec::default;
+    let of = |method| SolverSpec {
+        substeps: 5.into(),
+        ..SolverSpec::of(method)
+    };
+    let plain = || of(Method::GaussSeidel);
     vec![
         ("nothing", plain()),
         (

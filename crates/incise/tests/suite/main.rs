@@ -31,6 +31,7 @@ mod recluster;
 mod regions;
 mod reports;
 mod residuals;
+mod rest_after_cuts;
 mod retune;
 mod scenarios;
 mod sleep;

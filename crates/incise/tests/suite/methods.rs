@@ -31,9 +31,9 @@ fn each_method_has_its_defaults_and_named_keys_override_them() {
         let spec = |keys: &str| scene(&format!("[solver]\nmethod = \"{name}\"\n{keys}")).solver;
         assert_eq!(spec(""), SolverSpec::of(method));
         let (iterations, relaxation, limit) = match method {
-            Method::GaussSeidel => (1, 1.0, 1.0),
+            Method::GaussSeidel => (1, 1.0, f64::INFINITY),
             Method::Vbd => (20, 1.0, f64::INFINITY),
-            _ => (20, 0.1, 1.0),
+            _ => (20, 0.1, f64::INFINITY),
         };
         let given = spec("");
         assert_eq!(
@@ -47,7 +47,7 @@ fn each_method_has_its_defaults_and_named_keys_override_them() {
                 given.delay,
                 given.two_level
             ),
-            (TetSolve::Block, 0.99, 10, false)
+            (TetSolve::Split, 0.99, 10, false)
         );
         // Also a key whose value is that of the plain defaults.
         let given = spec("iterations = 1\nrelaxation = 1.0\nkappa_limit = 1.0");
@@ -250,7 +250,7 @@ const MISTAKES: [Mistake; 10] = [
     ("body[0].volume_compliance is 0", |s| {
         s.body[0].volume_compliance = Some(0.0);
     }),
-    ("solver.tet_solve is sequential", |s| {
+    ("solver.tet_solve is not split", |s| {
         s.solver.tet_solve = TetSolve::Sequential;
     }),
     ("solver.relaxation is 2", |s| s.solver.relaxation = 2.0),

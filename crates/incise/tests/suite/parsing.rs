@@ -19,7 +19,7 @@ fn defaults_are_the_documented_ones() {
     let solver = &parsed.solver;
     assert_eq!(
         (solver.time_step, solver.substeps, solver.iterations),
-        (0.016, 5.into(), 1)
+        (0.016, incise::scene::Substeps::Auto, 1)
     );
     assert_eq!(
         (solver.method, solver.relaxation),
@@ -27,7 +27,7 @@ fn defaults_are_the_documented_ones() {
     );
     assert_eq!(
         (solver.tet_solve, solver.spectral_radius, solver.delay),
-        (TetSolve::Block, 0.99, 10)
+        (TetSolve::Split, 0.99, 10)
     );
     assert_eq!(
         (solver.clustering.as_str(), solver.coloring.as_str()),
@@ -35,7 +35,7 @@ fn defaults_are_the_documented_ones() {
     );
     assert_eq!(
         (solver.precision, solver.kappa_limit),
-        (Precision::F32, 1.0)
+        (Precision::Auto, f64::INFINITY)
     );
     assert_eq!(solver.max_substeps, 200);
     assert_eq!((parsed.world.gravity, parsed.world.ground), (None, None));

@@ -28,7 +28,7 @@ fn the_paper_preset_knows_the_other_methods() {
     for (name, method, form, relaxation) in [
         ("jacobi", Method::Jacobi, TetSolve::Sequential, 0.1),
         ("chebyshev", Method::Chebyshev, TetSolve::Sequential, 0.1),
-        ("vbd", Method::Vbd, TetSolve::Block, 1.0),
+        ("vbd", Method::Vbd, TetSolve::Split, 1.0),
     ] {
         let paper = solver(&format!("method = \"{name}\"\npreset = \"paper\""));
         assert_eq!(paper, SolverSpec::paper(method));

@@ -8,6 +8,14 @@ use crate::knobs::{settings, two_bodies, with};
 use crate::snapshot::{everything, halving};
 use crate::support::{body, scene, simulation};
 
+/// The defaults with a number of substeps: a chosen one may rise with cuts, and later settings then start from that.
+fn five() -> SolverSpec {
+    SolverSpec {
+        substeps: 5.into(),
+        ..SolverSpec::default()
+    }
+}
+
 #[test]
 fn at_the_start_it_is_as_if_set_up_so() {
     let mut base = two_bodies();
@@ -17,11 +25,7 @@ fn at_the_start_it_is_as_if_set_up_so() {
     let (_, low) = all.iter().find(|(name, _)| *name == "low limit").unwrap();
     let softened = simulation(&with(&base, low)).softened();
     assert!(softened.tets > 100, "{softened:?}");
-    let starts = [
-        SolverSpec::default(),
-        low.clone(),
-        SolverSpec::of(Method::Vbd),
-    ];
+    let starts = [five(), low.clone(), SolverSpec::of(Method::Vbd)];
     let three = |simulation: &mut Simulation| -> Vec<_> {
         let frames = (0..3).map(|_| {
             let words = everything(simulation);
@@ -140,7 +144,7 @@ fn obstacles_go_on_from_where_they_are() {
     for time_step in [0.016, 0.008, 0.016] {
         let solver = SolverSpec {
             time_step,
-            ..SolverSpec::default()
+            ..five()
         };
         simulation.retune(&solver).unwrap();
         for _ in 0..20 {
@@ -165,7 +169,7 @@ fn softened_tets_of_a_cut_body_are_restored() {
     let limits = |kappa_limit, substeps: u32| SolverSpec {
         kappa_limit,
         substeps: substeps.into(),
-        ..SolverSpec::default()
+        ..five()
     };
     // Nothing moves but by the cut, which is the same: so are the meshes.
     let [mut here, mut there] =
@@ -229,7 +233,7 @@ fn auto_chooses_from_the_body_as_it_is() {
     let auto = |max_substeps| SolverSpec {
         substeps: Substeps::Auto,
         max_substeps,
-        ..SolverSpec::default()
+        ..five()
     };
     simulation.retune(&auto(200)).unwrap();
     let chosen = |simulation: &mut Simulation| {
@@ -259,7 +263,7 @@ fn auto_chooses_from_the_body_as_it_is() {
             .iter()
             .all(|(substeps, _)| *substeps == 2)
     );
-    simulation.retune(&SolverSpec::default()).unwrap();
+    simulation.retune(&five()).unwrap();
     assert!(simulation.step().unwrap().bodies.is_empty());
 }
 
@@ -298,7 +302,7 @@ fn worn_clusters_are_renewed_once_that_is_asked_for() {
             wear,
             frames: std::num::NonZeroU32::MIN,
         }),
-        ..SolverSpec::default()
+        ..five()
     };
     simulation.retune(&recluster(1.01)).unwrap();
     assert_eq!(simulation.step().unwrap().reclustered, 0);
@@ -425,10 +429,7 @@ fn a_device_is_refused_where_there_is_no_path_to_one() {
     use incise::Error;
     use incise::scene::Backend;
     let mut simulation = simulation(&two_bodies());
-    let on = |backend| SolverSpec {
-        backend,
-        ..SolverSpec::default()
-    };
+    let on = |backend| SolverSpec { backend, ..five() };
     let error = simulation.retune(&on(Backend::Gpu)).unwrap_err();
     assert!(matches!(error, Error::NoGpuPath), "{error}");
     assert!(simulation.backend_note().is_none());
@@ -456,7 +457,7 @@ fn a_snapshot_outlives_other_settings() {
         simulation.retune(&solver).unwrap();
         simulation.step().unwrap();
         simulation.restore(&snapshot).unwrap();
-        assert_eq!(simulation.solver_spec(), &SolverSpec::default());
+        assert_eq!(simulation.solver_spec(), &five());
         assert!(frames(&mut simulation) == then, "{name}");
         simulation.restore(&snapshot).unwrap();
         simulation.retune(&solver).unwrap();

@@ -140,7 +140,7 @@ fn everything_removed() {
 fn mistakes_name_the_key() {
     let refuse = |stroke: &str, expected: &str| {
         let text =
-            format!("[[body]]\nshape = {{ kind = \"sphere\", tets = 100 }}\n[[stroke]]\n{stroke}");
+            format!("[[body]]\nshape = {{ kind = \"sphere\", tets = 200 }}\n[[stroke]]\n{stroke}");
         let error = Simulation::new(&Scene::from_toml(&text).unwrap()).unwrap_err();
         assert!(error.to_string().contains(expected), "{error}");
     };

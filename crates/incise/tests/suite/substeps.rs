@@ -111,11 +111,9 @@ fn the_cap_is_kept_and_reported_and_the_result_finite() {
             assert_eq!(report.repaired, 0);
         }
         assert!(simulation.positions().iter().all(|x| x.is_finite()));
-        // What the cap leaves is softened to the limit of 1, which is twice what would be accurate.
-        let wanted = f64::from(bodies(&simulation)[0].choice.unwrap().substeps_wanted);
-        let excess = 0.5 * (wanted / 8.0).powi(2);
-        let softened = simulation.softened().strongest / excess;
-        assert!(softened > 0.9 && softened < 1.01, "{softened}");
+        // Nothing is softened, and what the cap leaves undone is a warning.
+        assert_eq!(simulation.softened().tets, 0);
+        assert!(bodies(&simulation)[0].choice.unwrap().expected_error > 0.1);
     }
 }
 
@@ -150,8 +148,8 @@ fn a_sliver_does_not_decide_and_is_reported() {
     assert_eq!(choice.sliver_tets, 1);
     assert!(choice.sliver_volume_fraction > 0.0 && choice.sliver_volume_fraction < 1e-3);
     assert!(choice.substeps_wanted > 20 * report.substeps);
-    // It is the only one softened, and the body rests.
-    assert_eq!(simulation.softened().tets, 1);
+    // It is not softened, and the body rests all the same.
+    assert_eq!(simulation.softened().tets, 0);
     let start = simulation.positions().to_vec();
     for _ in 0..5 {
         assert_eq!(simulation.step().unwrap().repaired, 0);
@@ -159,15 +157,6 @@ fn a_sliver_does_not_decide_and_is_reported() {
     for (x, from) in simulation.positions().iter().zip(&start) {
         assert!(x.distance(*from) < 1e-5);
     }
-    // Without a limit that softens it, it decides.
-    let unlimited = text.replace(
-        "\"auto\"\n",
-        "\"auto\"\nkappa_limit = inf\nmax_substeps = 100000\n",
-    );
-    let unlimited = crate::support::simulation(&scene(&unlimited));
-    let decided = &bodies(&unlimited)[0];
-    assert_eq!(decided.choice.unwrap().missed, None);
-    assert_eq!(decided.substeps, choice.substeps_wanted);
 }
 
 fn cut_scene(report: &str, solver: &str) -> Scene {
@@ -177,7 +166,7 @@ fn cut_scene(report: &str, solver: &str) -> Scene {
 }
 
 #[test]
-fn a_cut_keeps_the_substeps_and_shows_what_it_did_to_kappa() {
+fn a_cut_shows_what_it_did_to_kappa() {
     let report = "[report]\nquantities = [\"kappa\"]\n";
     let mut simulation = simulation(&cut_scene(report, AUTO));
     let before = simulation.step().unwrap().clone();
@@ -190,13 +179,15 @@ fn a_cut_keeps_the_substeps_and_shows_what_it_did_to_kappa() {
     let cut = simulation.step().unwrap().clone();
     assert!(cut.cut.is_some());
     let body = &cut.bodies[0];
-    assert_eq!(body.substeps, before.bodies[0].substeps);
-    assert_eq!(body.kappa_before_cut, before.bodies[0].kappa);
-    assert!(before.bodies[0].kappa.unwrap() <= 0.5);
+    assert!(body.substeps >= before.bodies[0].substeps);
+    if body.substeps == before.bodies[0].substeps {
+        assert_eq!(body.kappa_before_cut, before.bodies[0].kappa);
+    }
+    assert!(before.bodies[0].choice.unwrap().expected_error <= 0.1);
     // Children are smaller than their parent, so the stiffest is a new one.
     assert_eq!(body.kappa_of_new_tets, body.kappa);
     assert!(body.kappa > body.kappa_before_cut);
-    assert!(body.softened.unwrap().tets > 0);
+    assert_eq!(body.softened.unwrap().tets, 0);
     assert_eq!(cut.kappa, body.kappa);
     // The other body was not met.
     assert_eq!(cut.bodies[1].kappa_before_cut, None);
@@ -230,13 +221,15 @@ fn the_keys_of_a_body_are_the_promised_ones() {
         "substeps",
     ];
     let choice = [
+        "expected_error",
         "missed",
         "sliver_tets",
         "sliver_volume_fraction",
         "substeps_wanted",
     ];
-    assert_eq!(keys(&cut_scene("", "")), Vec::<String>::new());
-    assert_eq!(keys(&cut_scene(kappa, "")), asked);
+    let five = "[solver]\nsubsteps = 5\n";
+    assert_eq!(keys(&cut_scene("", five)), Vec::<String>::new());
+    assert_eq!(keys(&cut_scene(kappa, five)), asked);
     asked.extend(choice);
     asked.sort_unstable();
     assert_eq!(keys(&cut_scene(kappa, AUTO)), asked);
@@ -250,6 +243,8 @@ fn the_keys_of_a_body_are_the_promised_ones() {
 #[test]
 fn auto_is_the_number_it_chooses() {
     let mut named = cut_scene("", AUTO);
+    // Cuts may raise a chosen number, but no named one.
+    named.stroke.clear();
     let mut auto = simulation(&named);
     for (body, report) in named.body.iter_mut().zip(bodies(&auto)) {
         body.substeps = Some(Substeps::Fixed(report.substeps));

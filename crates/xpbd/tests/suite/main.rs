@@ -29,6 +29,7 @@ mod kappa;
 mod large_deformations;
 mod layout;
 mod origin;
+mod precision;
 mod recovery;
 mod reference;
 mod refusals;

@@ -1,0 +1,122 @@
+//! [`Warning`]: what a user of a result must know about it.
+//!
+//! Warnings of the settings come with the first frame and whenever settings change, those of a cut or of the motion with
+//! the frame in which they begin. Cost: a pass over the particles a frame for the largest speed; the others cost what
+//! sets them off.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use crate::accuracy::DEFAULT_ACCURACY;
+use crate::substeps::{Choice, Missed};
+
+/// The kind of a [`Warning`], written in JSON as `substeps_capped` and so on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum WarningCode {
+    /// The accuracy wanted needs more substeps than `max_substeps`.
+    SubstepsCapped,
+    /// The given number of substeps leaves an expected error of more than a tenth of the motion.
+    Inaccurate,
+    /// As [`WarningCode::Inaccurate`] or [`WarningCode::SubstepsCapped`], because Poisson's ratio is near 0.5.
+    NearlyIncompressible,
+    /// Cuts have left more than 1% of a body's volume in tets that are solved less accurately than asked for.
+    OutsideAccuracy,
+    /// The substep is too short for single precision.
+    ShortSubstepF32,
+    /// Tets were softened to keep `kappa_limit`.
+    Softened,
+    /// Particles would have become infinite and were put back: the frame cannot be trusted.
+    Repaired,
+    /// The largest speed is absurd: the solution has diverged.
+    Diverged,
+}
+
+/// What a user of a result must know about it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct Warning {
+    /// Its kind.
+    pub code: WarningCode,
+    /// One sentence: what is wrong and what helps.
+    pub message: String,
+    /// The part of the scene, as in `body 0`.
+    #[serde(rename = "where")]
+    pub location: String,
+}
+
+impl Warning {
+    pub(crate) fn new(code: WarningCode, bodies: &[usize], message: String) -> Self {
+        let numbers: Vec<String> = bodies.iter().map(ToString::to_string).collect();
+        let noun = if bodies.len() == 1 { "body" } else { "bodies" };
+        Self {
+            code,
+            message,
+            location: format!("{noun} {}", numbers.join(", ")),
+        }
+    }
+
+    /// Whether the frame cannot be trusted: the code is [`WarningCode::Diverged`] or [`WarningCode::Repaired`].
+    #[must_use]
+    pub fn is_failure(&self) -> bool {
+        matches!(self.code, WarningCode::Diverged | WarningCode::Repaired)
+    }
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.location, self.message)
+    }
+}
+
+/// The warning about the substeps of bodies, if their expected error is too large. `wanted` is the accuracy that the
+/// scene states.
+pub(crate) fn of_substeps(
+    bodies: &[usize],
+    choice: &Choice,
+    chosen: bool,
+    wanted: Option<f64>,
+) -> Option<Warning> {
+    let accuracy = wanted.unwrap_or(DEFAULT_ACCURACY);
+    if choice.expected_error <= accuracy * (1.0 + 1e-9) {
+        return None;
+    }
+    let percent = 100.0 * choice.expected_error;
+    let needed = choice.substeps_needed;
+    let error = format!(
+        "the expected error is {percent:.0}% of the motion with {} substeps; {needed} are needed for {:.0}%",
+        choice.substeps,
+        100.0 * accuracy
+    );
+    let capped = chosen && choice.missed == Some(Missed::Cap);
+    let (code, fix) = if choice.nearly_incompressible {
+        let fix =
+            "Poisson's ratio is near 0.5: lower it, or set method = \"vbd\" and two_level = true";
+        (WarningCode::NearlyIncompressible, fix)
+    } else if capped {
+        let fix = "raise max_substeps, or set method = \"vbd\" and two_level = true";
+        (WarningCode::SubstepsCapped, fix)
+    } else {
+        (WarningCode::Inaccurate, "set substeps = \"auto\"")
+    };
+    Some(Warning::new(code, bodies, format!("{error}; {fix}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn warnings_name_their_bodies() {
+        let of = |bodies: &[usize]| Warning::new(WarningCode::Softened, bodies, "soft".to_owned());
+        assert_eq!(of(&[0]).to_string(), "body 0: soft");
+        assert_eq!(of(&[1, 2]).to_string(), "bodies 1, 2: soft");
+        let json = serde_json::to_string(&of(&[3])).unwrap();
+        assert_eq!(
+            json,
+            r#"{"code":"softened","message":"soft","where":"body 3"}"#
+        );
+    }
+}

@@ -1,0 +1,51 @@
+//! Single against double precision over many substeps.
+
+use glam::{DVec3, dvec3};
+use incise_mesh::generate::kuhn_box;
+use incise_xpbd::{Material, Real, StepSettings};
+
+use crate::body::{GRAVITY, body, plain, within};
+
+/// The mean kinetic and elastic energy of a held beam over the last tenth of a number of substeps.
+fn energy<R: Real>(size: f64, substep: f64, substeps: u32) -> f64 {
+    let mesh = kuhn_box([10, 3, 3], dvec3(1.0, 0.3, 0.3) * size);
+    let stuff = Material {
+        young_modulus: 1e6,
+        poisson_ratio: 0.45,
+        density: 1000.0,
+        damping: 0.0,
+    };
+    let mut solver = body::<R>(&mesh, stuff);
+    for (p, x) in mesh.positions.iter().enumerate() {
+        solver.set_fixed(p, x.x == 0.0);
+    }
+    let settings = StepSettings {
+        substeps: 100,
+        gravity: Some(GRAVITY),
+        ..StepSettings::new(100.0 * substep)
+    };
+    let schedule = plain(&mesh);
+    let (frames, mut sum, mut count) = (substeps / 100, 0.0, 0);
+    for frame in 0..frames {
+        solver.step(&schedule, &settings).unwrap();
+        if frame >= frames - frames / 10 {
+            let energy = solver.energy(None::<DVec3>);
+            sum += energy.kinetic + energy.elastic;
+            count += 1;
+        }
+    }
+    sum / f64::from(count)
+}
+
+/// Down to a substep of `√(6e-8 · size / g)`, here 7.8e-5 s and 2.5e-5 s, single precision neither heats nor cools the
+/// beam: its mean energy after 100,000 substeps is that of double precision. Measured: 3 % apart; 4 times the energy at a
+/// quarter of that substep, 90 times at an eighth.
+#[test]
+fn single_precision_keeps_the_energy_down_to_a_stated_substep() {
+    for size in [1.0, 0.1] {
+        let substep = incise_xpbd::shortest_substep_of_f32(size);
+        let single = energy::<f32>(size, substep, 100_000);
+        let double = energy::<f64>(size, substep, 100_000);
+        within(&format!("size {size}"), (single / double - 1.0).abs(), 0.05);
+    }
+}
