@@ -165,7 +165,7 @@ impl<R: Real> Local<R> {
         let [a, b, c] = [x, y, z].map(|v| v * factor);
         let entries = [a * x, a * y, a * z, b * y, b * z, c * z];
         for (entry, value) in self.h.iter_mut().zip(entries) {
-            *entry = *entry + value;
+            *entry += value;
         }
     }
 
@@ -510,18 +510,18 @@ impl<R: Real> ConstraintTerms<R> {
                             let part = geometric(excess, value + distance.length());
                             if bound {
                                 let part = if part > R::ONE { part } else { R::ONE };
-                                local.isotropic = local.isotropic + spring.stiffness * part;
+                                local.isotropic += spring.stiffness * part;
                             } else if excess != R::ZERO || !spring.one_sided {
                                 let outer = if part < R::ONE {
                                     R::ONE - part
                                 } else {
                                     R::ZERO
                                 };
-                                local.isotropic = local.isotropic + spring.stiffness * part;
+                                local.isotropic += spring.stiffness * part;
                                 local.add_outer(along, spring.stiffness * outer);
                             }
                         }
-                        None if bound => local.isotropic = local.isotropic + spring.stiffness,
+                        None if bound => local.isotropic += spring.stiffness,
                         None => {}
                     }
                 }
@@ -539,7 +539,7 @@ impl<R: Real> ConstraintTerms<R> {
         }
         if let Some(anchor) = self.anchor(p) {
             local.force += (anchor.position - x) * anchor.stiffness;
-            local.isotropic = local.isotropic + anchor.stiffness;
+            local.isotropic += anchor.stiffness;
         }
         curved
     }

@@ -163,7 +163,7 @@ pub(super) fn solve<R: Real>(isotropic: R, h: [R; 6], force: R::Vector) -> R::Ve
 pub(super) fn add_symmetric<R: Real>(h: &mut [R; 6], block: &Block<R>) {
     let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = block.map(R::components);
     for (entry, value) in h.iter_mut().zip([xx, xy, xz, yy, yz, zz]) {
-        *entry = *entry + value;
+        *entry += value;
     }
 }
 

@@ -119,7 +119,8 @@ impl<R: Real> Viscosity<R> {
                     let blocks = &mut blocks[offsets[row] - first..offsets[row + 1] - first];
                     blocks.fill([R::Vector::default(); 3]);
                     let p = stars.order[row];
-                    for pair in stars.offsets[row]..stars.offsets[row + 1] {
+                    let pairs = stars.offsets[row]..stars.offsets[row + 1];
+                    for (pair, places) in pairs.clone().zip(&places[pairs]) {
                         let t = stars.tets[pair] as usize;
                         let corners = solver.tets[t].particles;
                         let Some(own) = corners.iter().position(|&corner| corner == p) else {
@@ -137,7 +138,7 @@ impl<R: Real> Viscosity<R> {
                         };
                         add(0, own, -(wa + wb + wc));
                         for (k, pull) in [wa, wb, wc].into_iter().enumerate() {
-                            add(places[pair][k], OTHERS[own][k], pull);
+                            add(places[k], OTHERS[own][k], pull);
                         }
                     }
                 }

@@ -284,9 +284,9 @@ fn linked<R: Real>(material: Material, hard: bool) -> Solver<R> {
             });
         }
     }
-    for p in 0..at.len() {
+    for (p, x) in at.iter().enumerate() {
         solver.set_mass(p, 0.1 + 0.01 * p as f64);
-        solver.set_fixed(p, at[p].x == 0.0);
+        solver.set_fixed(p, x.x == 0.0);
     }
     solver.set_fixed(count as usize, true);
     fill(&mut solver, &volumes);
