@@ -56,6 +56,8 @@ pub(super) struct ConstraintTerms<R: Real> {
     elastic: Vec<f64>,
     distance_count: usize,
     volume_count: usize,
+    /// Whether each constraint is named by its schedule: after a cut, those of tets that are gone are not.
+    scheduled: Vec<bool>,
     /// The constraints in the present substep, distances before volumes.
     springs: Vec<Spring<R>>,
     anchors: Vec<Anchor<R>>,
@@ -122,6 +124,7 @@ impl<R: Real> Default for ConstraintTerms<R> {
             elastic: Vec::new(),
             distance_count: 0,
             volume_count: 0,
+            scheduled: Vec::new(),
             springs: Vec::new(),
             anchors: Vec::new(),
             anchor_of: Vec::new(),
@@ -189,6 +192,7 @@ impl<R: Real> ConstraintTerms<R> {
             + size_of_val(&*self.terms)
             + size_of_val(&*self.row_of)
             + size_of_val(&*self.elastic)
+            + size_of_val(&*self.scheduled)
             + size_of_val(&*self.springs)
             + size_of_val(&*self.anchors)
             + size_of_val(&*self.anchor_of)
@@ -200,6 +204,7 @@ impl<R: Real> ConstraintTerms<R> {
         self.terms.clear();
         self.row_of.clear();
         self.elastic.clear();
+        self.scheduled.clear();
         self.springs.clear();
         self.anchors.clear();
         self.anchor_of.clear();
@@ -209,6 +214,8 @@ impl<R: Real> ConstraintTerms<R> {
             return;
         }
         self.offsets.push(0);
+        self.scheduled
+            .resize(self.distance_count + self.volume_count, false);
         self.row_of.resize(order.len(), 0);
         for (row, &p) in (0u32..).zip(order) {
             self.row_of[p as usize] = row;
@@ -216,6 +223,7 @@ impl<R: Real> ConstraintTerms<R> {
             let tets = list.partition_point(|&c| (c as usize) < solver.tet_count());
             for &element in &list[tets..] {
                 let constraint = element as usize - solver.tet_count();
+                self.scheduled[constraint] = true;
                 let corners = self.particles(solver, constraint);
                 let corner = (0u32..).zip(corners).find(|&(_, q)| q == p);
                 if let (Some((corner, _)), Ok(constraint)) = (corner, u32::try_from(constraint)) {
@@ -298,7 +306,7 @@ impl<R: Real> ConstraintTerms<R> {
                     volume.slope_squared(),
                     (solver, time, penalty),
                 ),
-                None => Spring {
+                _ => Spring {
                     stiffness: R::ZERO,
                     target: R::ZERO,
                     per_penalty: R::ZERO,

@@ -219,13 +219,16 @@ impl<R: Real> ImplicitStep<'_, R> {
         force.clear();
         force.resize(rows, R::Vector::default());
         matrix.fill(self.solver, self.stars, self.time, held, force);
-        coarse.place(|row| R::to_dvec3(base[row]), held);
-        coarse.assemble(matrix);
+        if coarse.is_stale() {
+            coarse.place(|row| R::to_dvec3(base[row]));
+            coarse.assemble(matrix, held);
+        }
         let limits = Limits {
             iterations: settings.iterations,
             reduction: settings.reduction,
         };
         let iterations = conjugate.solve(matrix, coarse, &self.stars.colors, force, held, limits);
+        coarse.note(iterations, settings.iterations);
         let direction = conjugate.solution();
         let slope: f64 = force
             .iter()

@@ -191,6 +191,7 @@ impl<R: Real> Solver<R> {
     }
 
     /// Visits tets, distances and volumes with their number and their particles, each once; returns how many there are.
+    /// Volumes that their schedule does not name (those of tets that a cut has removed) have none.
     fn each_element(&self, mut visit: impl FnMut(u32, &[u32])) -> usize {
         let mut number = 0u32;
         let mut visit = |corners: &[u32]| {
@@ -212,8 +213,15 @@ impl<R: Real> Solver<R> {
         for distance in self.distances.iter().flat_map(|d| &d.list) {
             visit(&distance.particles());
         }
-        for volume in self.volume_constraints.iter().flat_map(|v| &v.list) {
-            visit(&volume.particles());
+        if let Some(volumes) = &self.volume_constraints {
+            let mut scheduled = vec![false; volumes.list.len()];
+            for index in volumes.schedule.order() {
+                scheduled[index as usize] = true;
+            }
+            for (volume, scheduled) in volumes.list.iter().zip(scheduled) {
+                let particles = volume.particles();
+                visit(if scheduled { &particles } else { &[] });
+            }
         }
         number as usize
     }
