@@ -13,13 +13,8 @@ use crate::backend::{AnySolver, each_mut};
 use crate::report::Milliseconds;
 
 impl AnySolver {
-    /// Follows a cut. Costs what the cut touched; VBD sorts its stars anew, O(tets).
-    pub(crate) fn follow(
-        &mut self,
-        delta: &CutDelta,
-        cuttable: &CuttableMesh,
-        ms: &mut Milliseconds,
-    ) -> Result<(), Error> {
+    /// Applies a cut to particles, tets and masses. Costs what the cut touched.
+    pub(crate) fn follow(&mut self, delta: &CutDelta, cuttable: &CuttableMesh) {
         let mesh = cuttable.mesh();
         each_mut!(self, solver => {
             for point in &delta.points {
@@ -58,6 +53,10 @@ impl AnySolver {
                 }
             }
         });
+    }
+
+    /// Updates what VBD keeps after a cut, once tets and volume constraints have been.
+    pub(crate) fn update_vbd(&mut self, ms: &mut Milliseconds) -> Result<(), Error> {
         match self {
             Self::Single(backend) => backend.follow(ms),
             Self::Double(backend) => backend.follow(ms),

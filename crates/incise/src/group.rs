@@ -193,7 +193,7 @@ impl Group {
         for tet in &delta.deleted {
             self.removed_volume += signed_volume(tet.corners.map(|p| positions[p.index()]));
         }
-        self.solver.follow(delta, &self.cuttable, ms)?;
+        self.solver.follow(delta, &self.cuttable);
         let events = self.pieces.follow(&self.cuttable, delta);
         self.plan.follow(delta, &self.cuttable, ms)?;
         if let Some(recluster) = &mut self.recluster {
@@ -202,6 +202,7 @@ impl Group {
         if let Some(volumes) = &self.volumes {
             volumes.follow(&mut self.solver, delta, &self.cuttable, &self.plan.schedule)?;
         }
+        self.solver.update_vbd(ms)?;
         self.solver.lay_out(&self.plan.schedule, ms)?;
         Ok(events)
     }

@@ -323,7 +323,7 @@ fn what_is_refused_changes_nothing() {
         other
     };
     let plain = SolverSpec::default;
-    let refused: [(SolverSpec, &str); 12] = [
+    let refused: [(SolverSpec, &str); 11] = [
         (
             SolverSpec {
                 precision: Precision::F64,
@@ -404,8 +404,6 @@ fn what_is_refused_changes_nothing() {
             },
             "solver.sleep",
         ),
-        // The beam is damped.
-        (SolverSpec::of(Method::Vbd), "body[0].damping"),
     ];
     for (solver, key) in refused {
         let error = simulation.retune(&solver).unwrap_err();
