@@ -232,16 +232,6 @@ impl AnySolver {
         }
     }
 
-    /// Whether it is solved by VBD, which holds rigidly only.
-    pub(crate) fn descends(&self) -> bool {
-        match self {
-            Self::Single(backend) => backend.vbd.is_some(),
-            Self::Double(backend) => backend.vbd.is_some(),
-            #[cfg(feature = "gpu")]
-            Self::Device(_) => false,
-        }
-    }
-
     /// Says where a handle is at the end of the next frame.
     pub(crate) fn move_handle(&mut self, handle: u32, pose: Pose) {
         match self {

@@ -13,12 +13,11 @@ use crate::backend::{AnySolver, each_mut};
 use crate::report::Milliseconds;
 
 impl AnySolver {
-    /// Follows a cut. Costs what the cut touched; VBD sorts its stars anew, O(tets).
+    /// Applies a cut to particles, tets and masses. Costs what the cut touched.
     pub(crate) fn follow(
         &mut self,
         delta: &CutDelta,
         cuttable: &CuttableMesh,
-        ms: &mut Milliseconds,
     ) -> Result<(), Error> {
         let mesh = cuttable.mesh();
         each_mut!(self, solver => {
@@ -58,6 +57,11 @@ impl AnySolver {
                 }
             }
         });
+        Ok(())
+    }
+
+    /// Updates what VBD keeps after a cut, once tets and volume constraints have been.
+    pub(crate) fn update_vbd(&mut self, ms: &mut Milliseconds) -> Result<(), Error> {
         match self {
             Self::Single(backend) => backend.follow(ms),
             Self::Double(backend) => backend.follow(ms),

@@ -336,7 +336,7 @@ impl Group {
                 each!(&self.solver, solver => accuracy_data(solver, tet.tet.index(), settings));
             self.outside.remove(data);
         }
-        self.solver.follow(delta, &self.cuttable, ms)?;
+        self.solver.follow(delta, &self.cuttable)?;
         for tet in &delta.added {
             let data =
                 each!(&self.solver, solver => accuracy_data(solver, tet.tet.index(), settings));
@@ -350,6 +350,7 @@ impl Group {
         if let Some(volumes) = &self.volumes {
             volumes.follow(&mut self.solver, delta, &self.cuttable, &self.plan.schedule)?;
         }
+        self.solver.update_vbd(ms)?;
         self.solver.lay_out(&self.plan.schedule, ms)?;
         Ok(events)
     }

@@ -1,8 +1,7 @@
 //! [`Method`]: how a substep is solved, and which keys of a scene go with it.
 //!
-//! Gauss-Seidel, Jacobi and Chebyshev are ways through the same constraints of XPBD. VBD knows no constraints: it
-//! lowers the potential of the implicit step, so what XPBD adds as constraints (links, soft handles, volumes) or as
-//! damping does not exist for it, and scenes that ask for both are refused.
+//! Gauss-Seidel, Jacobi and Chebyshev are ways through the same constraints of XPBD. VBD lowers the potential of the
+//! implicit step, in which damping, links, soft handles and volume constraints are terms, so it takes every scene.
 
 use incise_xpbd::{StepSettings, VbdSettings};
 use serde::{Deserialize, Serialize};
@@ -24,8 +23,7 @@ pub enum Method {
     /// Jacobi, extrapolated: see `incise_xpbd::Method::Chebyshev`.
     Chebyshev,
     /// No XPBD: particle by particle into the minimum of the implicit step's potential, see
-    /// `incise_xpbd::Solver::step_vbd`. Stable at any stiffness. Neither damping nor links, soft handles and volume
-    /// constraints go with it.
+    /// `incise_xpbd::Solver::step_vbd`. Stable at any stiffness.
     Vbd,
 }
 
@@ -128,29 +126,10 @@ pub(crate) fn vbd(settings: &StepSettings) -> VbdSettings {
     }
 }
 
-/// Refuses what VBD would silently leave out.
+/// Refuses keys that VBD does not have.
 pub(crate) fn check_vbd(scene: &Scene) -> Result<(), Error> {
     if scene.solver.tet_solve != TetSolve::Split {
         return Err(refused("solver.tet_solve", "not split", "split where"));
-    }
-    if !scene.link.is_empty() {
-        return Err(refused("link", "given", "absent where"));
-    }
-    for (i, handle) in scene.handle.iter().enumerate() {
-        if handle.compliance != 0.0 {
-            let field = format!("handle[{i}].compliance");
-            return Err(refused(&field, handle.compliance, "0 where"));
-        }
-    }
-    for (i, body) in scene.body.iter().enumerate() {
-        if body.damping != 0.0 {
-            let field = format!("body[{i}].damping");
-            return Err(refused(&field, body.damping, "0 where"));
-        }
-        if let Some(compliance) = body.volume_compliance {
-            let field = format!("body[{i}].volume_compliance");
-            return Err(refused(&field, compliance, "absent where"));
-        }
     }
     Ok(())
 }

@@ -1,12 +1,14 @@
 //! [`VBD`]: what a group that is solved by VBD keeps, and how it follows a cut.
 //!
 //! VBD visits particles, so these have colors of their own; tets, clusters and their colors stay as they are for
-//! everybody who asks for them. Cost: O(tets) after each cut, as the stars of all particles are sorted anew.
+//! everybody who asks for them. After a cut particles keep their colors; only new ones, and those that now share a tet
+//! with one of their color, are colored again. Cost: O(tets) after each cut, as the stars of all particles are sorted
+//! again and all tets are checked.
 
 use std::time::Instant;
 
 use incise_coloring::auto;
-use incise_graph::{Clustering, Schedule};
+use incise_graph::{Clustering, ColorId, Coloring, Incidence, Schedule};
 use incise_xpbd::{
     CoarseCorrection, CoarseCorrectionSettings, Real, Solver, StepReport, StepSettings, VbdReport,
     VertexStars,
@@ -18,10 +20,16 @@ use crate::{Error, method};
 /// Aggregates of a large body: factoring more of them would cost more than they gain.
 const AGGREGATES: usize = 50;
 
+/// Colors that cuts may add before all particles are colored again.
+const MORE_COLORS: usize = 3;
+
 /// The state of VBD beside that of the solver.
 #[derive(Clone, Debug)]
 pub(crate) struct Vbd<R: Real> {
     stars: VertexStars<R>,
+    /// The color of each particle, and how many there were when all were colored.
+    colors: Vec<Option<u32>>,
+    color_count: usize,
     /// Where corrections are asked for.
     correction: Option<CoarseCorrection<R>>,
     /// What the last frame said of itself.
@@ -31,10 +39,13 @@ pub(crate) struct Vbd<R: Real> {
 impl<R: Real> Vbd<R> {
     /// Colors the particles of a solver; `two_level` asks for the coarse correction.
     pub(crate) fn new(solver: &Solver<R>, two_level: bool) -> Result<Self, Error> {
-        let stars = VertexStars::new(solver, &schedule(solver, &mut Milliseconds::default()))?;
+        let coloring = auto(&solver.star_incidence()).coloring;
+        let stars = VertexStars::new(solver, &schedule(&coloring))?;
         let correction = two_level.then(|| correction(&stars, solver)).transpose()?;
         Ok(Self {
             stars,
+            colors: numbers(&coloring),
+            color_count: coloring.color_count(),
             correction,
             last: VbdReport::default(),
         })
@@ -51,7 +62,16 @@ impl<R: Real> Vbd<R> {
         solver: &Solver<R>,
         ms: &mut Milliseconds,
     ) -> Result<(), Error> {
-        let schedule = schedule(solver, ms);
+        let start = Instant::now();
+        let incidence = solver.star_incidence();
+        let mut coloring = recolor(&mut self.colors, &incidence);
+        if coloring.color_count() > self.color_count + MORE_COLORS {
+            coloring = auto(&incidence).coloring;
+            self.colors = numbers(&coloring);
+            self.color_count = coloring.color_count();
+        }
+        let schedule = schedule(&coloring);
+        ms.color += milliseconds(start.elapsed());
         let start = Instant::now();
         self.stars.rebuild(solver, &schedule)?;
         if let Some(old) = &mut self.correction {
@@ -82,11 +102,46 @@ impl<R: Real> Vbd<R> {
 }
 
 /// The particles in the order of their colors.
-fn schedule<R: Real>(solver: &Solver<R>, ms: &mut Milliseconds) -> Schedule {
-    let start = Instant::now();
-    let coloring = auto(&solver.star_incidence()).coloring;
-    ms.color += milliseconds(start.elapsed());
-    Schedule::new(&Clustering::none(solver.particle_count()), &coloring)
+fn schedule(coloring: &Coloring) -> Schedule {
+    Schedule::new(&Clustering::none(coloring.colors().len()), coloring)
+}
+
+/// The number of each color.
+fn numbers(coloring: &Coloring) -> Vec<Option<u32>> {
+    coloring
+        .colors()
+        .iter()
+        .map(|color| Some(color.0))
+        .collect()
+}
+
+/// Colors particles after a cut: those without a color and one of each pair that is in conflict get the smallest color
+/// that is free. `incidence` is that of the stars, with particles as constraints on tets. O(pairs).
+fn recolor(colors: &mut Vec<Option<u32>>, incidence: &Incidence) -> Coloring {
+    colors.resize(incidence.constraint_count(), None);
+    for element in 0..incidence.particle_count() {
+        let corners = incidence.constraints_of(element);
+        for (k, &p) in corners.iter().enumerate() {
+            let color = colors[p as usize];
+            let meets = |&q: &u32| color.is_some() && colors[q as usize] == color;
+            if corners[..k].iter().any(meets) {
+                colors[p as usize] = None;
+            }
+        }
+    }
+    let mut taken = Vec::new();
+    for p in 0..colors.len() {
+        if colors[p].is_some() {
+            continue;
+        }
+        taken.clear();
+        for &element in incidence.particles_of(p) {
+            let corners = incidence.constraints_of(element as usize).iter();
+            taken.extend(corners.filter_map(|&q| colors[q as usize]));
+        }
+        colors[p] = (0..).find(|color| !taken.contains(color));
+    }
+    Coloring::new(colors.iter().map(|c| ColorId(c.unwrap_or(0))).collect())
 }
 
 fn correction<R: Real>(

@@ -72,17 +72,17 @@ struct Handle {
 
 /// A particle's place on a handle.
 #[derive(Clone, Copy, Debug)]
-struct Attachment<R: Real> {
-    particle: u32,
+pub(crate) struct Attachment<R: Real> {
+    pub(crate) particle: u32,
     handle: u32,
     /// The place in the handle's frame.
     place: DVec3,
     /// In m/N; 0 is rigid.
-    compliance: f64,
-    damping: f64,
+    pub(crate) compliance: f64,
+    pub(crate) damping: f64,
     /// Where the place is in the world at the end of the substep, and at its start.
-    target: R::Vector,
-    before: R::Vector,
+    pub(crate) target: R::Vector,
+    pub(crate) before: R::Vector,
     /// 0 at the start of every substep.
     multiplier: R::Vector,
 }
@@ -130,6 +130,11 @@ impl<R: Real> Attachments<R> {
     /// Whether some attachment is not rigid.
     pub(crate) fn is_soft(&self) -> bool {
         self.list.iter().any(|a| a.compliance > 0.0)
+    }
+
+    /// The attachments that are not rigid.
+    pub(crate) fn soft(&self) -> impl Iterator<Item = &Attachment<R>> {
+        self.list.iter().filter(|a| a.compliance > 0.0)
     }
 
     /// Whether a particle is where its handle says, whatever pulls on it.

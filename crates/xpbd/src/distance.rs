@@ -69,6 +69,25 @@ impl<R: Real> Distance<R> {
     }
 }
 
+impl<R: Real> Distance<R> {
+    /// The distance at rest.
+    #[inline]
+    pub(crate) fn length(&self) -> R {
+        self.length
+    }
+
+    /// The constraint in double precision.
+    pub(crate) fn to_f64(self) -> Distance<f64> {
+        Distance {
+            particles: self.particles,
+            length: self.length.to_f64(),
+            compliance: self.compliance.to_f64(),
+            damping: self.damping.to_f64(),
+            only_when_longer: self.only_when_longer,
+        }
+    }
+}
+
 impl<R: Real> Scalar<R, 2> for Distance<R> {
     #[inline]
     fn particles(&self) -> [u32; 2] {

@@ -416,6 +416,7 @@ impl<R: Real> Solver<R> {
     }
 
     /// For methods that solve nothing but tets and what is held rigidly.
+    #[cfg(feature = "direct")]
     pub(crate) fn refuse_soft_constraints(&self) -> Result<(), XpbdError> {
         let unknown = |kind| Err(XpbdError::Unknown { kind });
         if self.distances.is_some() {

@@ -99,6 +99,26 @@ impl<R: Real> TetVolume<R> {
     }
 }
 
+impl<R: Real> TetVolume<R> {
+    /// The constraint in double precision.
+    pub(crate) fn to_f64(self) -> TetVolume<f64> {
+        TetVolume {
+            particles: self.particles,
+            per_six_volumes: self.per_six_volumes.to_f64(),
+            compliance: self.compliance.to_f64(),
+            damping: self.damping.to_f64(),
+        }
+    }
+}
+
+impl TetVolume<f64> {
+    /// The square of the gradient at a corner of a regular tet of this volume at rest: one over the altitude squared.
+    pub(crate) fn slope_squared(&self) -> f64 {
+        // V = √3/8 h³.
+        (0.75f64.sqrt() * 1.5 * self.per_six_volumes).cbrt().powi(2)
+    }
+}
+
 impl<R: Real> Scalar<R, 4> for TetVolume<R> {
     #[inline]
     fn particles(&self) -> [u32; 4] {

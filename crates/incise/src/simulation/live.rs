@@ -8,7 +8,6 @@ use glam::DVec3;
 
 use super::Simulation;
 use crate::limits::{coordinates, value, within};
-use crate::method::refused;
 use crate::{Error, Grab};
 
 impl Simulation {
@@ -115,10 +114,6 @@ impl Simulation {
         coordinates("grab.point", point.to_array())?;
         within("grab.radius", radius, 0.0, 1e9)?;
         within("grab.compliance", compliance, 0.0, 1e9)?;
-        let descends = self.groups.iter().any(|group| group.solver.descends());
-        if descends && compliance != 0.0 {
-            return Err(refused("grab.compliance", compliance, "0 where"));
-        }
         self.read_back()?;
         let groups = self.groups.iter().enumerate();
         let nearest = groups.filter_map(|(g, group)| {

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use incise_xpbd::{KappaLimit, StepSettings};
 
 use super::Simulation;
-use crate::backend::{AnySolver, each};
+use crate::backend::AnySolver;
 use crate::group::{Group, kappa_limit};
 use crate::joined::substeps;
 use crate::limits::{self, value};
@@ -232,11 +232,6 @@ impl Retuned {
         place: &Place,
     ) -> Result<Self, Error> {
         let after = &scene.solver;
-        let soft = || each!(&group.solver, solver => solver.attachments().any(|held| held.compliance > 0.0));
-        if after.method == Method::Vbd && soft() {
-            let range = "another one while something is held by a compliance";
-            return Err(value("solver.method", "vbd", range));
-        }
         let mesh = group.cuttable.mesh();
         let mut settings = StepSettings {
             substeps: group.settings.substeps,

@@ -3,12 +3,22 @@
 //! An aggregate has twelve motions: `δx = u₀ + (r₁ u₁ + r₂ u₂ + r₃ u₃)` with r the place of the particle relative to the
 //! aggregate's center over its radius. They contain its turns, stretches and shears, of which bending and bulging of
 //! the body are made. A block of A between two particles contributes itself times the products of their r: no more
-//! than 16 scaled copies. The matrix is dense, because aggregates are few. Cost: 144 operations a block, then a
-//! factorization of 12 unknowns an aggregate.
+//! than 16 scaled copies. The matrix is dense, because aggregates are few.
+//!
+//! The factor is kept from one correction to the next until conjugate gradients need a quarter more iterations than when it
+//! was new: a preconditioner need not be that of the present matrix, only symmetric and positive. Affine motions also stay
+//! what they are when the body turns. Cost: 144 operations a block, then a factorization of 12 unknowns an aggregate, in
+//! the first correction after a cut and where the factor has aged.
 
 use super::cholesky::Cholesky;
 use super::matrix::Blocks;
 use crate::Real;
+
+/// A factor is stale when a solution takes this part more iterations than the first one with it: one in four.
+const AGED: u32 = 4;
+
+/// Solutions after which a factor is stale in any case: it may be that of a state that was worse to begin with.
+const OLDEST: u32 = 32;
 
 /// Motions of an aggregate: four vectors.
 const VECTORS: usize = 4;
@@ -19,10 +29,22 @@ pub(super) struct Coarse {
     /// The aggregate of each row.
     of: Vec<u32>,
     count: usize,
-    /// 1, r₁, r₂, r₃ of each row; all zero if the row is held.
+    /// 1, r₁, r₂, r₃ of each row, at the positions that the factor is of.
     weights: Vec<[f64; VECTORS]>,
     cholesky: Cholesky,
     values: Vec<f64>,
+    age: Age,
+}
+
+/// How well the factor still does.
+#[derive(Clone, Copy, Debug, Default)]
+struct Age {
+    /// Iterations of conjugate gradients with the new factor; `None` before there are any.
+    first: Option<u32>,
+    /// Solutions with it.
+    solutions: u32,
+    /// Whether there is a factor that has not become too old.
+    usable: bool,
 }
 
 impl Coarse {
@@ -42,6 +64,7 @@ impl Coarse {
             weights,
             cholesky: Cholesky::default(),
             values: Vec::new(),
+            age: Age::default(),
         }
     }
 
@@ -49,8 +72,23 @@ impl Coarse {
         self.count
     }
 
+    /// Whether motions and factor are to be made anew for the next solution.
+    pub(super) fn is_stale(&self) -> bool {
+        !self.age.usable
+    }
+
+    /// Notes how many iterations of at most `limit` a solution with this factor took. If some more than the first one did,
+    /// or if they say nothing, or after many solutions, it is stale.
+    pub(super) fn note(&mut self, iterations: u32, limit: u32) {
+        let first = *self.age.first.get_or_insert(iterations);
+        self.age.solutions += 1;
+        self.age.usable = (1..limit).contains(&iterations)
+            && iterations <= first + first / AGED + 1
+            && self.age.solutions < OLDEST;
+    }
+
     /// Takes the motions at the positions `x` of the rows.
-    pub(super) fn place(&mut self, x: impl Fn(usize) -> glam::DVec3, held: &[bool]) {
+    pub(super) fn place(&mut self, x: impl Fn(usize) -> glam::DVec3) {
         let mut centers = vec![(glam::DVec3::ZERO, 0.0); self.count];
         for (row, &a) in self.of.iter().enumerate() {
             let center = &mut centers[a as usize];
@@ -66,28 +104,24 @@ impl Coarse {
             let (center, radius) = (centers[a as usize], radii[a as usize]);
             let r = (x(row) - center.0 / center.1) / radius;
             let r = if r.is_finite() { r } else { glam::DVec3::ZERO };
-            self.weights[row] = if held[row] {
-                [0.0; VECTORS]
-            } else {
-                [1.0, r.x, r.y, r.z]
-            };
+            self.weights[row] = [1.0, r.x, r.y, r.z];
         }
     }
 
-    /// Assembles and factors the matrix.
-    pub(super) fn assemble<R: Real>(&mut self, matrix: &Blocks<R>) {
+    /// Assembles and factors the matrix; held rows take no part.
+    pub(super) fn assemble<R: Real>(&mut self, matrix: &Blocks<R>, held: &[bool]) {
         const WIDTH: usize = 3 * VECTORS;
         self.cholesky.reset(WIDTH * self.count);
         for (row, &a) in self.of.iter().enumerate() {
             let left = self.weights[row];
-            if left[0] == 0.0 {
+            if held[row] {
                 continue;
             }
             for (column, block) in matrix.row(row) {
                 let b = self.of[column];
                 let right = self.weights[column];
                 // The lower triangle is enough.
-                if b > a || right[0] == 0.0 {
+                if b > a || held[column] {
                     continue;
                 }
                 // By rows.
@@ -107,13 +141,22 @@ impl Coarse {
             }
         }
         self.cholesky.factor();
+        self.age = Age {
+            usable: true,
+            ..Age::default()
+        };
     }
 
-    /// Adds the coarse correction for the forces `r` to `z`.
-    pub(super) fn correct<R: Real>(&mut self, r: &[R::Vector], z: &mut [R::Vector]) {
+    /// Adds the coarse correction for the forces `r` to `z`, but in held rows.
+    ///
+    /// With the rows left out on both sides this is symmetric and semidefinite whatever matrix the factor is of.
+    pub(super) fn correct<R: Real>(&mut self, r: &[R::Vector], z: &mut [R::Vector], held: &[bool]) {
         self.values.clear();
         self.values.resize(3 * VECTORS * self.count, 0.0);
         for (row, &a) in self.of.iter().enumerate() {
+            if held[row] {
+                continue;
+            }
             let target = &mut self.values[3 * VECTORS * a as usize..][..3 * VECTORS];
             let force = R::components(r[row]).map(R::to_f64);
             for (j, weight) in self.weights[row].into_iter().enumerate() {
@@ -124,6 +167,9 @@ impl Coarse {
         }
         self.cholesky.solve(&mut self.values);
         for (row, &a) in self.of.iter().enumerate() {
+            if held[row] {
+                continue;
+            }
             let source = &self.values[3 * VECTORS * a as usize..][..3 * VECTORS];
             let mut motion = [0.0; 3];
             for (j, weight) in self.weights[row].into_iter().enumerate() {

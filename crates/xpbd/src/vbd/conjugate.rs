@@ -80,7 +80,7 @@ impl<R: Real> Conjugate<R> {
         let mut last = 0.0;
         let mut first = 0.0;
         for iteration in 0..limits.iterations {
-            self.precondition(matrix, coarse, colors);
+            self.precondition(matrix, coarse, colors, held);
             let now = dot::<R>(&self.residual, &self.preconditioned);
             if iteration == 0 {
                 first = now;
@@ -111,7 +111,13 @@ impl<R: Real> Conjugate<R> {
     }
 
     /// One cycle for the residual.
-    fn precondition(&mut self, matrix: &Blocks<R>, coarse: &mut Coarse, colors: &[usize]) {
+    fn precondition(
+        &mut self,
+        matrix: &Blocks<R>,
+        coarse: &mut Coarse,
+        colors: &[usize],
+        held: &[bool],
+    ) {
         let Self {
             inverses,
             residual,
@@ -126,7 +132,7 @@ impl<R: Real> Conjugate<R> {
             });
         }
         matrix.multiply_upper(z, product);
-        coarse.correct::<R>(product, z);
+        coarse.correct::<R>(product, z, held);
         for color in colors.windows(2).rev() {
             relax(matrix, inverses, residual, z, color[0]..color[1], |row| {
                 matrix.beside(row)

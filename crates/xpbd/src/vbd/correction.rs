@@ -14,6 +14,7 @@
 use super::aggregates::aggregates;
 use super::coarse::Coarse;
 use super::conjugate::{Conjugate, Limits};
+use super::constraints::CORRECTION_PENALTY;
 use super::matrix::Blocks;
 use super::{ImplicitStep, VbdReport, VbdSettings, VertexStars};
 use crate::real::{finite, load, store, weight};
@@ -175,7 +176,7 @@ impl<R: Real> Solver<R> {
     ) -> Result<VbdReport, XpbdError> {
         let _span = tracing::debug_span!("xpbd::step_vbd_two_level").entered();
         let mut idle = 0;
-        self.frame_of_vbd(stars, settings, |step| {
+        self.frame_of_vbd(stars, settings, CORRECTION_PENALTY, |step| {
             step.sweep();
             let taken = step.correct(correction).taken;
             idle = if taken > 0.0 { 0 } else { idle + 1 };
@@ -218,13 +219,16 @@ impl<R: Real> ImplicitStep<'_, R> {
         force.clear();
         force.resize(rows, R::Vector::default());
         matrix.fill(self.solver, self.stars, self.time, held, force);
-        coarse.place(|row| R::to_dvec3(base[row]), held);
-        coarse.assemble(matrix);
+        if coarse.is_stale() {
+            coarse.place(|row| R::to_dvec3(base[row]));
+            coarse.assemble(matrix, held);
+        }
         let limits = Limits {
             iterations: settings.iterations,
             reduction: settings.reduction,
         };
         let iterations = conjugate.solve(matrix, coarse, &self.stars.colors, force, held, limits);
+        coarse.note(iterations, settings.iterations);
         let direction = conjugate.solution();
         let slope: f64 = force
             .iter()

@@ -30,7 +30,7 @@ pub(super) struct Blocks<R: Real> {
     pub(super) columns: Vec<u32>,
     pub(super) blocks: Vec<Block<R>>,
     /// For each term, the place of its three blocks within its row.
-    places: Vec<[u32; 3]>,
+    pub(super) places: Vec<[u32; 3]>,
     /// The held excess of each tet.
     excess: Vec<R>,
 }
@@ -66,6 +66,12 @@ impl<R: Real> Blocks<R> {
                     .iter()
                     .flat_map(|s| s.others)
                     .map(|p| row_of[p as usize]),
+            );
+            let linked = stars.constraints.neighbors(row);
+            neighbors.extend(
+                linked
+                    .map(|p| row_of[p as usize])
+                    .filter(|&q| q != diagonal),
             );
             neighbors.sort_unstable();
             neighbors.dedup();
@@ -113,31 +119,26 @@ impl<R: Real> Blocks<R> {
         .collect_into_vec(&mut self.excess);
         let Self {
             offsets,
+            columns,
             blocks,
             places,
             excess,
             ..
         } = self;
         let per_time_squared = R::ONE / (time * time);
-        // One slice a thread: each begins where the one before ends.
-        let rows = stars.order.len();
-        let parts = rayon::current_num_threads()
-            .min(rows.div_ceil(PARALLEL_ROWS))
-            .max(1);
-        let mut rest = (&mut blocks[..], &mut force[..]);
-        let mut slices = Vec::with_capacity(parts);
-        for part in 0..parts {
-            let (start, end) = (rows * part / parts, rows * (part + 1) / parts);
-            let (blocks, later_blocks) = rest.0.split_at_mut(offsets[end] - offsets[start]);
-            let (force, later_force) = rest.1.split_at_mut(end - start);
-            rest = (later_blocks, later_force);
-            slices.push((start, blocks, force));
-        }
-        slices.into_par_iter().for_each(|(start, blocks, force)| {
-            for (k, force) in force.iter_mut().enumerate() {
-                let row = start + k;
-                let from = offsets[start];
-                let blocks = &mut blocks[offsets[row] - from..offsets[row + 1] - from];
+        let mut rest = &mut force[..];
+        let slices: Vec<_> = row_slices(offsets, blocks)
+            .into_iter()
+            .map(|(range, blocks)| {
+                let (force, later) = std::mem::take(&mut rest).split_at_mut(range.len());
+                rest = later;
+                (range, blocks, force)
+            })
+            .collect();
+        slices.into_par_iter().for_each(|(range, blocks, force)| {
+            let first = offsets[range.start];
+            for (row, force) in range.zip(force) {
+                let blocks = &mut blocks[offsets[row] - first..offsets[row + 1] - first];
                 blocks.fill([R::Vector::default(); 3]);
                 *force = R::Vector::default();
                 if held[row] {
@@ -175,6 +176,17 @@ impl<R: Real> Blocks<R> {
                     }
                 }
                 add_isotropic::<R>(&mut blocks[0], isotropic);
+                if let Some(viscosity) = &stars.viscosity {
+                    viscosity.add_blocks(row, blocks);
+                    *force += viscosity.force(row, &stars.order, |p| {
+                        load::<R>(&solver.particles[p]) - solver.previous[p]
+                    });
+                }
+                if !stars.constraints.is_empty() {
+                    let columns = &columns[offsets[row]..offsets[row + 1]];
+                    let terms = &stars.constraints;
+                    terms.add_row(solver, &stars.order, row, columns, blocks, force);
+                }
             }
         });
     }
@@ -233,6 +245,25 @@ impl<R: Real> Blocks<R> {
     }
 }
 
+/// The rows of a matrix in one slice a thread, each with its blocks.
+pub(super) fn row_slices<'a, B>(
+    offsets: &[usize],
+    mut blocks: &'a mut [B],
+) -> Vec<(Range<usize>, &'a mut [B])> {
+    let rows = offsets.len() - 1;
+    let parts = rayon::current_num_threads()
+        .min(rows.div_ceil(PARALLEL_ROWS))
+        .max(1);
+    let mut slices = Vec::with_capacity(parts);
+    for part in 0..parts {
+        let (start, end) = (rows * part / parts, rows * (part + 1) / parts);
+        let (own, later) = blocks.split_at_mut(offsets[end] - offsets[start]);
+        blocks = later;
+        slices.push((start..end, own));
+    }
+    slices
+}
+
 #[inline]
 pub(super) fn apply<R: Real>(block: &Block<R>, x: R::Vector) -> R::Vector {
     let [a, b, c] = R::components(x);
@@ -241,7 +272,7 @@ pub(super) fn apply<R: Real>(block: &Block<R>, x: R::Vector) -> R::Vector {
 
 /// Adds `u vᵀ`.
 #[inline]
-fn add_outer<R: Real>(block: &mut Block<R>, u: R::Vector, v: R::Vector) {
+pub(super) fn add_outer<R: Real>(block: &mut Block<R>, u: R::Vector, v: R::Vector) {
     let v = R::components(v);
     for k in 0..3 {
         block[k] += u * v[k];
@@ -249,7 +280,7 @@ fn add_outer<R: Real>(block: &mut Block<R>, u: R::Vector, v: R::Vector) {
 }
 
 #[inline]
-fn add_isotropic<R: Real>(block: &mut Block<R>, value: R) {
+pub(super) fn add_isotropic<R: Real>(block: &mut Block<R>, value: R) {
     block[0] += R::vector(value, R::ZERO, R::ZERO);
     block[1] += R::vector(R::ZERO, value, R::ZERO);
     block[2] += R::vector(R::ZERO, R::ZERO, value);
@@ -270,7 +301,7 @@ mod tests {
     use incise_graph::{Clustering, ColorId, Coloring, Schedule};
 
     use super::*;
-    use crate::{ImplicitStep, Material, VbdSettings};
+    use crate::{DistanceConstraint, ImplicitStep, Material, Pose, VbdSettings};
 
     /// Where no pressure is held back (a body stretched a little), the matrix is the second derivative of the
     /// potential: differences of the forces with step 1e-6, good to 1e-9 of the stiffness.
@@ -282,7 +313,7 @@ mod tests {
             young_modulus: 1e4,
             poisson_ratio: 0.3,
             density: 1e3,
-            damping: 0.0,
+            damping: 0.02,
         };
         solver.add_material(stuff).expect("a sound material");
         for tet in [[0, 1, 2, 3], [1, 4, 2, 3]] {
@@ -296,7 +327,19 @@ mod tests {
                 DVec3::new(1.05 * x.x + 0.02 * x.y, 1.04 * x.y, 1.06 * x.z),
             );
         }
-        let colors = Coloring::new([0, 1, 2, 3, 0].map(ColorId).to_vec());
+        let distances = [1e-3, 0.0].map(|compliance| DistanceConstraint {
+            particles: [0, 4],
+            length: 0.5,
+            compliance,
+            damping: 0.05,
+            only_when_longer: false,
+        });
+        let order = Coloring::new(vec![ColorId(0), ColorId(1)]);
+        let order = Schedule::new(&Clustering::none(2), &order);
+        solver.set_distances(&distances, order).expect("sound");
+        let handle = solver.add_handle(Pose::at(DVec3::ZERO));
+        solver.attach(2, handle, 1e-3, 0.2).expect("sound");
+        let colors = Coloring::new([0, 1, 2, 3, 4].map(ColorId).to_vec());
         let schedule = Schedule::new(&Clustering::none(5), &colors);
         let mut stars = VertexStars::new(&solver, &schedule).expect("a proper coloring");
         let order = stars.order.clone();

@@ -21,6 +21,7 @@ mod aggregates;
 mod cholesky;
 mod coarse;
 mod conjugate;
+mod constraints;
 mod corner_term;
 mod correction;
 mod hessian;
@@ -30,6 +31,7 @@ mod stars;
 mod state;
 mod step;
 mod sweep;
+mod viscosity;
 
 pub use correction::{CoarseCorrection, CoarseCorrectionReport, CoarseCorrectionSettings};
 pub use settings::{Guess, VbdSettings};

@@ -8,13 +8,17 @@
 
 use incise_graph::{GraphError, Incidence, Schedule};
 
+use super::constraints::ConstraintTerms;
 use super::corner_term::CornerTerm;
+use super::viscosity::Viscosity;
+use crate::scalar::Scalar;
 use crate::{Real, Solver};
 
 /// What VBD needs of the tets, sorted by the particles of a schedule.
 ///
-/// It belongs to the tets that the solver had when it was made: after a cut, or any other change of tets, make it anew
-/// with [`VertexStars::rebuild`]. Positions, velocities, masses and what is fixed may change at any time.
+/// It belongs to the tets, distances and volume constraints that the solver had when it was made: after a cut, or any
+/// other change of these, make it anew with [`VertexStars::rebuild`]. Positions, velocities, masses, attachments and what
+/// is fixed may change at any time.
 #[derive(Clone, Debug)]
 pub struct VertexStars<R: Real> {
     /// Particles in solving order.
@@ -31,6 +35,10 @@ pub struct VertexStars<R: Real> {
     pub(super) size: f64,
     /// Velocities a substep ago, kept only for [`super::Guess::Adaptive`].
     pub(super) earlier: Vec<R::Vector>,
+    /// Distances, volumes and attachments.
+    pub(super) constraints: ConstraintTerms<R>,
+    /// Made by the first substep in which a material is damped.
+    pub(super) viscosity: Option<Box<Viscosity<R>>>,
 }
 
 impl<R: Real> VertexStars<R> {
@@ -49,6 +57,8 @@ impl<R: Real> VertexStars<R> {
             tet_count: 0,
             size: 0.0,
             earlier: Vec::new(),
+            constraints: ConstraintTerms::default(),
+            viscosity: None,
         };
         stars.rebuild(solver, schedule)?;
         Ok(stars)
@@ -75,7 +85,11 @@ impl<R: Real> VertexStars<R> {
         self.tets.clear();
         for p in schedule.order() {
             for &t in incidence.particles_of(p as usize) {
-                let tet = solver.tets[t as usize].to_f64();
+                // What comes after the tets are distances and volumes.
+                let Some(tet) = solver.tets.get(t as usize) else {
+                    break;
+                };
+                let tet = tet.to_f64();
                 let corner = tet.particles.iter().position(|&corner| corner == p);
                 if let Some(term) = corner.and_then(|corner| CornerTerm::new(&tet, corner)) {
                     self.terms.push(term);
@@ -90,6 +104,8 @@ impl<R: Real> VertexStars<R> {
             .max(0.0)
             .cbrt();
         self.earlier.clear();
+        self.constraints.rebuild(solver, &self.order, &incidence);
+        self.viscosity = None;
         Ok(())
     }
 
@@ -102,6 +118,8 @@ impl<R: Real> VertexStars<R> {
             + size_of_val(&*self.terms)
             + size_of_val(&*self.tets)
             + size_of_val(&*self.earlier)
+            + self.constraints.bytes()
+            + self.viscosity.as_ref().map_or(0, |v| v.bytes())
     }
 
     /// Number of colors.
@@ -122,43 +140,89 @@ impl<R: Real> VertexStars<R> {
         &self.terms[self.offsets[place]..self.offsets[place + 1]]
     }
 
-    /// Whether these are the stars of as many particles and tets.
+    /// Whether these are the stars of as many particles, tets and constraints.
     pub(super) fn fits(&self, solver: &Solver<R>) -> bool {
-        self.order.len() == solver.particle_count() && self.tet_count == solver.tet_count()
+        self.order.len() == solver.particle_count()
+            && self.tet_count == solver.tet_count()
+            && self.constraints.fits(solver)
+    }
+
+    /// Prepares what is constant in a substep: constraints and viscosity.
+    pub(super) fn begin(&mut self, solver: &Solver<R>, time: f64, penalty: f64) {
+        self.constraints.begin(solver, time, penalty);
+        if !solver.materials.iter().any(|m| m.damping > 0.0) {
+            self.viscosity = None;
+            return;
+        }
+        let viscosity = self.viscosity.take();
+        let mut viscosity = viscosity.unwrap_or_else(|| Box::new(Viscosity::new(self)));
+        viscosity.fill(solver, self, time);
+        self.viscosity = Some(viscosity);
     }
 }
 
 impl<R: Real> Solver<R> {
-    /// Which tets each particle belongs to: particle p is constraint p, the tets take the place of particles. Color and
-    /// schedule this for [`VertexStars`]. O(tets).
+    /// The tets, distances and volume constraints that each particle belongs to. Particle p is constraint p of the result;
+    /// its particles are the tets, then the distances, then the volume constraints. Color and schedule this for
+    /// [`VertexStars`]: particles of one color share none of them. O(tets + constraints).
     ///
     /// # Panics
     /// With more than 2^30 tets.
     #[must_use]
     pub fn star_incidence(&self) -> Incidence {
-        let corners = |tet: [u32; 4]| {
-            // A tet that names a particle twice counts once.
-            (0..4)
-                .filter(move |&k| !tet[..k].contains(&tet[k]))
-                .map(move |k| tet[k] as usize)
-        };
         let mut offsets = vec![0u32; self.particle_count() + 1];
-        for tet in &self.tets {
-            for p in corners(tet.particles) {
-                offsets[p + 1] += 1;
+        self.each_element(|_, corners| {
+            for &p in corners {
+                offsets[p as usize + 1] += 1;
             }
-        }
+        });
         for p in 0..self.particle_count() {
             offsets[p + 1] += offsets[p];
         }
         let mut next = offsets.clone();
-        let mut tets = vec![0; offsets[self.particle_count()] as usize];
-        for (t, tet) in (0u32..).zip(&self.tets) {
-            for p in corners(tet.particles) {
-                tets[next[p] as usize] = t;
-                next[p] += 1;
+        let mut elements = vec![0; offsets[self.particle_count()] as usize];
+        let count = self.each_element(|element, corners| {
+            for &p in corners {
+                elements[next[p as usize] as usize] = element;
+                next[p as usize] += 1;
+            }
+        });
+        Incidence::new(count, offsets, elements).expect("the lists are sorted and in range")
+    }
+
+    /// Visits tets, distances and volumes with their number and their particles, each once; returns how many there are.
+    /// Volumes that their schedule does not name (those of tets that a cut has removed) have none.
+    fn each_element(&self, mut visit: impl FnMut(u32, &[u32])) -> usize {
+        let mut number = 0u32;
+        let mut visit = |corners: &[u32]| {
+            let mut distinct = [0; 4];
+            let mut count = 0;
+            // An element that names a particle twice counts once.
+            for &p in corners {
+                if !distinct[..count].contains(&p) {
+                    distinct[count] = p;
+                    count += 1;
+                }
+            }
+            visit(number, &distinct[..count]);
+            number += 1;
+        };
+        for tet in &self.tets {
+            visit(&tet.particles);
+        }
+        for distance in self.distances.iter().flat_map(|d| &d.list) {
+            visit(&distance.particles());
+        }
+        if let Some(volumes) = &self.volume_constraints {
+            let mut scheduled = vec![false; volumes.list.len()];
+            for index in volumes.schedule.order() {
+                scheduled[index as usize] = true;
+            }
+            for (volume, scheduled) in volumes.list.iter().zip(scheduled) {
+                let particles = volume.particles();
+                visit(if scheduled { &particles } else { &[] });
             }
         }
-        Incidence::new(self.tet_count(), offsets, tets).expect("the lists are sorted and in range")
+        number as usize
     }
 }

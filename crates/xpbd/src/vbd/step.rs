@@ -1,5 +1,6 @@
 //! [`Solver::step_vbd`] and [`ImplicitStep`]: a frame, and one substep of it opened up.
 
+use super::constraints::SWEEP_PENALTY;
 use super::{Guess, VbdSettings, VertexStars};
 use crate::collider::Obstacle;
 use crate::real::{finite, load, store, weight};
@@ -21,15 +22,18 @@ pub struct VbdReport {
 }
 
 impl<R: Real> Solver<R> {
-    /// Advances by one frame of `settings.step.time_step` by sweeps of block vbd. May take turns with
+    /// Advances by one frame of `settings.step.time_step` by sweeps of vertex block descent. May take turns with
     /// [`Solver::step`].
     ///
+    /// Damping, distances, volume constraints and attachments mean what they mean to [`Solver::step`]: both go to the same
+    /// motion with smaller substeps. Hard constraints (compliance 0) are met by multipliers that each iteration
+    /// improves; with few iterations a part of their violation is left.
+    ///
     /// # Errors
-    /// If the settings do not pass [`VbdSettings::check`], or there are constraints that VBD does not know:
-    /// distances, volumes, soft attachments. Nothing has moved then.
+    /// If the settings do not pass [`VbdSettings::check`]; nothing has moved then.
     ///
     /// # Panics
-    /// If the stars are those of another number of particles or tets.
+    /// If the stars are those of another number of particles, tets or constraints.
     ///
     /// # Determinism
     /// Bit-identical for any number of threads.
@@ -68,7 +72,7 @@ impl<R: Real> Solver<R> {
         settings: &VbdSettings,
     ) -> Result<VbdReport, XpbdError> {
         let _span = tracing::debug_span!("xpbd::step_vbd").entered();
-        self.frame_of_vbd(stars, settings, |step| {
+        self.frame_of_vbd(stars, settings, SWEEP_PENALTY, |step| {
             step.sweep();
             true
         })
@@ -79,14 +83,14 @@ impl<R: Real> Solver<R> {
         &mut self,
         stars: &mut VertexStars<R>,
         settings: &VbdSettings,
+        penalty: f64,
         mut iterate: impl FnMut(&mut ImplicitStep<'_, R>) -> bool,
     ) -> Result<VbdReport, XpbdError> {
         settings.check()?;
-        self.refuse_soft_constraints()?;
         self.follow_body();
         let mut report = VbdReport::default();
         for number in 1..=settings.step.substeps {
-            let mut step = ImplicitStep::predicted(self, stars, settings, number);
+            let mut step = ImplicitStep::predicted(self, stars, settings, penalty, number);
             step.run(settings, &mut report, &mut iterate);
             report.repaired += step.finish().repaired;
         }
@@ -117,22 +121,21 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
     /// Begins the last substep of a frame: moves the particles to the initial guess, and handles to where they go.
     ///
     /// # Errors
-    /// If the settings do not pass [`VbdSettings::check`], or there are constraints that VBD does not know;
-    /// nothing has moved then.
+    /// If the settings do not pass [`VbdSettings::check`]; nothing has moved then.
     ///
     /// # Panics
-    /// If the stars are those of another number of particles or tets.
+    /// If the stars are those of another number of particles, tets or constraints.
     pub fn new(
         solver: &'a mut Solver<R>,
         stars: &'a mut VertexStars<R>,
         settings: &VbdSettings,
     ) -> Result<Self, XpbdError> {
         settings.check()?;
-        solver.refuse_soft_constraints()?;
         Ok(Self::predicted(
             solver,
             stars,
             settings,
+            SWEEP_PENALTY,
             settings.step.substeps,
         ))
     }
@@ -141,16 +144,18 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
         solver: &'a mut Solver<R>,
         stars: &'a mut VertexStars<R>,
         settings: &VbdSettings,
+        penalty: f64,
         number: u32,
     ) -> Self {
         assert!(
             stars.fits(solver),
-            "the stars belong to these particles and tets"
+            "the stars belong to these particles, tets and constraints"
         );
         let time = R::from_f64(settings.step.substep_time());
         solver.predict(&settings.step, time);
         let ended = f64::from(number) / f64::from(settings.step.substeps);
         let lost = solver.move_held(ended);
+        stars.begin(solver, settings.step.substep_time(), penalty);
         let elapsed = ended * settings.step.time_step;
         let obstacles = Obstacle::place(&settings.step, elapsed, solver.origin).collect();
         let mut step = Self {
@@ -178,6 +183,7 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
         let start = settings.tolerance.map(|_| self.free_residual());
         for _ in 0..settings.step.iterations {
             let more = iterate(self);
+            self.update_multipliers();
             report.iterations += 1;
             if let (Some(tolerance), Some(start)) = (settings.tolerance, start) {
                 let residual = self.residual();
@@ -198,6 +204,13 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
             report.force = Some(self.residual());
             report.potential = Some(self.potential());
         }
+    }
+
+    /// Brings the multipliers of hard constraints to the forces that these exert at the present positions, as
+    /// [`Solver::step_vbd`] does after each iteration; nothing happens without hard constraints. It changes the potential
+    /// and the forces, which are zero only where the constraints are met as well.
+    pub fn update_multipliers(&mut self) {
+        self.stars.constraints.update_multipliers(self.solver);
     }
 
     /// Takes back the part of gravity that the last substep did not show.

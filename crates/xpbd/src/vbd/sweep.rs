@@ -2,6 +2,8 @@
 
 use rayon::prelude::*;
 
+use super::constraints::Local;
+use super::matrix::Block;
 use super::{ImplicitStep, VertexStars};
 use crate::collider::{Obstacle, outside};
 use crate::real::{finite, load, store, weight};
@@ -93,9 +95,29 @@ impl<R: Real> Sweep<R> {
             h[4] += v * w;
             h[5] += w * w;
         }
-        let mut step = solve(isotropic, h, force) * self.relaxation;
+        let collapsed = h[0] + h[3] + h[5] == R::ZERO && !stars.of(place).is_empty();
+        if let Some(viscosity) = &stars.viscosity {
+            let motion = |p: usize| load::<R>(&solver.particles[p]) - solver.previous[p];
+            force += viscosity.force(place, &stars.order, motion);
+            viscosity.add_diagonal(place, &mut h);
+        }
+        let mut step = if stars.constraints.is_empty() {
+            solve(isotropic, h, force) * self.relaxation
+        } else {
+            let tets = Local {
+                isotropic,
+                h,
+                force,
+            };
+            let (step, local) =
+                stars
+                    .constraints
+                    .minimize(solver, &stars.order, place, &tets, self.relaxation);
+            (isotropic, h) = (local.isotropic, local.h);
+            step
+        };
         // All its tets lie on lines: a tiny push out of them, if that is unstable, grows from sweep to sweep.
-        if h[0] + h[3] + h[5] == R::ZERO && !stars.of(place).is_empty() {
+        if collapsed {
             step += push_of::<R>(p) * self.nudge;
         }
         let mut moved = x + step;
@@ -134,6 +156,15 @@ pub(super) fn solve<R: Real>(isotropic: R, h: [R; 6], force: R::Vector) -> R::Ve
     let y = y1 * d1 - l3 * z;
     let x = f0 * d0 - l1 * y - l2 * z;
     R::vector(x, y, z)
+}
+
+/// Adds a symmetric block to a matrix that is given as xx, xy, xz, yy, yz, zz.
+#[inline]
+pub(super) fn add_symmetric<R: Real>(h: &mut [R; 6], block: &Block<R>) {
+    let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = block.map(R::components);
+    for (entry, value) in h.iter_mut().zip([xx, xy, xz, yy, yz, zz]) {
+        *entry += value;
+    }
 }
 
 /// A direction that differs from particle to particle: each coordinate in -1 .. 1, by the mixing step of `SplitMix64`.

@@ -439,3 +439,70 @@ fn vbd_iterated_to_convergence_is_backward_euler() {
         }
     }
 }
+
+/// A beam whose far half is a hundred times stiffer, heavier and nearly incompressible: the large steps of VBD are those of
+/// backward Euler, to the same tolerance as with one material.
+#[test]
+fn vbd_of_two_materials_is_backward_euler() {
+    let scene = falling_beam(0.3);
+    let stiff = Material {
+        young_modulus: 1e8,
+        density: 3000.0,
+        ..rubber(0.49)
+    };
+    let of = |t: usize| {
+        let corners = scene.mesh.corners(incise_mesh::TetId::new(t));
+        let center = corners.iter().map(|x| x.x).sum::<f64>() / 4.0;
+        if center > 1.5 { stiff } else { scene.material }
+    };
+    let tets: Vec<[u32; 4]> = scene
+        .mesh
+        .tets
+        .iter()
+        .map(|tet| tet.map(|ParticleId(p)| p))
+        .collect();
+    let mut newton = Body::new(&scene.mesh.positions, &tets, |t| {
+        incise_reference::Material {
+            young_modulus: of(t).young_modulus,
+            poisson_ratio: of(t).poisson_ratio,
+            density: of(t).density,
+        }
+    })
+    .unwrap();
+    let mut solver = Solver::<f64>::new(&scene.mesh.positions);
+    let materials = [scene.material, stiff].map(|m| solver.add_material(m).unwrap());
+    for (t, &tet) in tets.iter().enumerate() {
+        let material = materials[usize::from(of(t) == stiff)];
+        solver.push_tet(
+            tet,
+            scene.mesh.corners(incise_mesh::TetId::new(t)),
+            material,
+        );
+    }
+    for (p, &mass) in newton.masses().to_vec().iter().enumerate() {
+        solver.set_mass(p, mass);
+        newton.fixed[p] = scene.mesh.positions[p].x == 0.0;
+        solver.set_fixed(p, newton.fixed[p]);
+    }
+    let mut stars = stars(&solver);
+    let mut correction =
+        CoarseCorrection::new(&stars, CoarseCorrectionSettings::default()).unwrap();
+    let mut settings = VbdSettings::new(0.05, 100);
+    settings.step.gravity = Some(scene.gravity);
+    settings.tolerance = Some(1e-10);
+    for _ in 0..4 {
+        let report = solver
+            .step_vbd_two_level(&mut stars, &mut correction, &settings)
+            .unwrap();
+        assert!(report.residual.unwrap() <= 1e-10, "{report:?}");
+        newton.step(0.05, scene.gravity).unwrap();
+        let apart = positions(&solver)
+            .iter()
+            .zip(&newton.positions)
+            .map(|(a, b)| a.distance(*b))
+            .fold(0.0, f64::max);
+        within("vbd from Newton", apart, 1e-6);
+    }
+    let moved = distance(&newton.positions, &scene.mesh.positions);
+    assert!(moved > 0.05, "the body moves: {moved}");
+}

@@ -18,7 +18,7 @@ pub(crate) fn stars<R: Real>(solver: &Solver<R>) -> VertexStars<R> {
     VertexStars::new(solver, &schedule(solver)).unwrap()
 }
 
-fn schedule<R: Real>(solver: &Solver<R>) -> Schedule {
+pub(crate) fn schedule<R: Real>(solver: &Solver<R>) -> Schedule {
     let incidence = solver.star_incidence();
     let colored = incise_coloring::color("greedy".parse().unwrap(), &incidence, 0).unwrap();
     Schedule::new(
@@ -327,7 +327,7 @@ fn bad_settings_and_schedules_are_refused() {
 }
 
 #[test]
-#[should_panic(expected = "the stars belong to these particles and tets")]
+#[should_panic(expected = "the stars belong to these particles, tets and constraints")]
 fn stars_of_another_body_are_refused() {
     let mut solver = held_beam::<f32>(RUBBER);
     let mut stars = stars(&solver);
