@@ -103,7 +103,7 @@ fn move_split(
     return move_corners(tet, x, moved);
 }
 
-// (1 - e^-r) / r to third order.
+// (1 - e^-r) / r, as a quotient that agrees up to r^2.
 fn decay(r: f32) -> f32 {
     return (6.0 + r) / (6.0 + r * (4.0 + r));
 }

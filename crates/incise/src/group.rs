@@ -238,6 +238,12 @@ impl Group {
         if self.choice.is_some() && !spec.kappa_limit.is_finite() {
             let (chosen, choice) = substeps(asked, spec, &self.solver, self.cuttable.mesh());
             self.settings.substeps = chosen.max(before);
+            let ratio = f64::from(before) / f64::from(self.settings.substeps);
+            if let Some(noted) = &mut self.cut_kappa {
+                // Kappa goes with the square of the substep.
+                noted.before = noted.before.map(|kappa| kappa * ratio * ratio);
+                noted.new_tets *= ratio * ratio;
+            }
             self.choice = choice;
             self.judge_settings(spec);
         }

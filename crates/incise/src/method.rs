@@ -45,7 +45,8 @@ impl SolverSpec {
     /// The defaults that go with a method: those of [`SolverSpec::default`], but
     ///
     /// * all methods but Gauss-Seidel take 20 `iterations`, as one of theirs does little;
-    /// * Jacobi and Chebyshev have a `relaxation` of 0.1: with 1 they overshoot where more than two tets meet.
+    /// * Jacobi and Chebyshev have a `relaxation` of 0.1: with 1 they overshoot where more than two tets meet;
+    /// * VBD takes one substep, as it is stable at any stiffness.
     ///
     /// ```
     /// let scene = incise::Scene::from_toml("[solver]\nmethod = \"jacobi\"\niterations = 7")?;
@@ -61,7 +62,7 @@ impl SolverSpec {
         match method {
             Method::GaussSeidel => {}
             Method::Jacobi | Method::Chebyshev => (spec.iterations, spec.relaxation) = (20, 0.1),
-            Method::Vbd => spec.iterations = 20,
+            Method::Vbd => (spec.substeps, spec.iterations) = (1.into(), 20),
         }
         spec
     }

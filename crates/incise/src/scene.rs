@@ -143,8 +143,7 @@ pub struct SolverSpec {
     /// Time of a frame in s.
     pub time_step: f64,
     /// The largest error wanted, as a fraction of the motion, above 0 and at most 1; absent: 0.1. Decides what
-    /// `substeps = "auto"` takes. If given, and `max_substeps` do not reach it by Gauss-Seidel, the scene is solved by
-    /// two-level VBD.
+    /// `substeps = "auto"` takes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accuracy: Option<f64>,
     /// Equal parts of a frame: a number, or `auto`, which chooses for each body by the accuracy.

@@ -273,7 +273,7 @@ impl<R: Real> TetConstraint<R> {
             let products = (0..4).map(|k| weights[k] * R::dot(g[k], h[k]));
             products.fold(R::ZERO, |sum, product| sum + product)
         };
-        // (1 - e⁻ʳ) / r to third order.
+        // (1 - e⁻ʳ) / r as in the kernel.
         let [four, six] = [4.0, 6.0].map(R::from_f64);
         let decay = |r: R| (six + r) / (six + r * (four + r));
         let steepness = weighted(&e.deviatoric_gradients, &e.deviatoric_gradients);

@@ -66,7 +66,7 @@ pub enum Method {
 
 /// How the elastic energy of a tet is split into constraints and solved.
 ///
-/// All three have the same energy and the same cost within 10%.
+/// All three have the same energy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TetSolve {
     /// A shear part and a volume part that both vanish at rest. A body at rest stays at rest and a loaded body stays

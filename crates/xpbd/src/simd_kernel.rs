@@ -439,7 +439,7 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
         change
     }
 
-    /// `(1 - e⁻ʳ) / r` as a quotient that agrees to third order and tends to `1 / r`.
+    /// `(1 - e⁻ʳ) / r` as a quotient that agrees up to `r²` and tends to `1 / r`; times r it is at most 1.1.
     #[inline(always)]
     fn decay(&self, r: R::Lanes<S>) -> R::Lanes<S> {
         let [four, six] = [4.0, 6.0].map(|value| self.splat(R::from_f64(value)));

@@ -332,31 +332,3 @@ fn substeps_follow_from(spec: &SolverSpec) -> impl PartialEq + use<> {
         spec.max_substeps,
     )
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::backend::each_mut;
-
-    /// Not every hold is a handle of the scene.
-    #[test]
-    fn vbd_is_refused_while_something_is_held_softly() {
-        let scene = Scene::from_toml("[[body]]\nshape = { kind = \"box\", tets = 200 }").unwrap();
-        let mut simulation = Simulation::new(&scene).unwrap();
-        let hold = |simulation: &mut Simulation, compliance| -> Result<(), Error> {
-            each_mut!(&mut simulation.groups[0].solver, solver => {
-                let handle = solver.add_handle(incise_xpbd::Pose::at(glam::DVec3::ZERO));
-                solver.attach(0, handle, compliance, 0.0).unwrap();
-            });
-            Ok(())
-        };
-        let vbd = SolverSpec::of(Method::Vbd);
-        hold(&mut simulation, 1e-3).unwrap();
-        let error = simulation.retune(&vbd).unwrap_err();
-        assert!(error.to_string().contains("compliance"), "{error}");
-        simulation.step().unwrap();
-        hold(&mut simulation, 0.0).unwrap();
-        simulation.retune(&vbd).unwrap();
-        simulation.step().unwrap();
-    }
-}

@@ -50,7 +50,7 @@ fn each_method_has_its_defaults_and_named_keys_override_them() {
             (TetSolve::Split, 0.99, 10, false)
         );
         // Also a key whose value is that of the plain defaults.
-        let given = spec("iterations = 1\nrelaxation = 1.0\nkappa_limit = 1.0");
+        let given = spec("iterations = 1\nrelaxation = 1.0\nsubsteps = \"auto\"");
         assert_eq!(
             given,
             SolverSpec {

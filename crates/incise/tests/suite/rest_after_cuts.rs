@@ -31,8 +31,9 @@ fn scene(shape: &str, strokes: usize, snap: f64, precision: Precision, seed: u64
     for frame in 0..strokes {
         let [a, b, path] = [0.15, 0.15, 0.2].map(|size| random.vector(size));
         text += &format!(
-            "[[stroke]]\nkind = \"sweep\"\nframes = [{frame}, {frame}]\nblade = [{a:?}, {b:?}]\n\
-             path = [[0.0, 0.0, 0.0], {path:?}]\nsnap = {snap}\n"
+            "[[stroke]]\nkind = \"sweep\"\nframes = [{frame}, {}]\nblade = [{a:?}, {b:?}]\n\
+             path = [[0.0, 0.0, 0.0], {path:?}]\nsnap = {snap}\n",
+            frame + 1
         );
     }
     Scene::from_toml(&text).unwrap()

@@ -322,7 +322,7 @@ fn what_is_refused_changes_nothing() {
         other.restore(&snapshot).unwrap();
         other
     };
-    let plain = SolverSpec::default;
+    let plain = five;
     let refused: [(SolverSpec, &str); 11] = [
         (
             SolverSpec {
