@@ -39,31 +39,29 @@ fn scene(shape: &str, strokes: usize, snap: f64, precision: Precision, seed: u64
     Scene::from_toml(&text).unwrap()
 }
 
-/// Measured after 10 strokes: at most 3e-13 m/s in double and 2e-5 m/s in single precision. With the block form and
+/// Measured after 10 strokes: at most 2e-11 m/s in double and 2e-4 m/s in single precision, with snapping of 0, 0.1
+/// and 0.2 each. With the block form and
 /// tets softened to kappa 1 bodies cut like this shook themselves apart at meters a second.
 #[test]
 fn random_strokes_leave_a_body_at_rest_alone() {
-    for (shape, seed) in [("liver", 1), ("sphere", 2), ("box", 3)] {
-        for snap in [0.0, 0.1, 0.2] {
-            for (precision, bound) in [(Precision::F64, 1e-9), (Precision::F32, 1e-2)] {
-                let scene = scene(shape, 10, snap, precision, seed);
-                let mut simulation = Simulation::new(&scene).unwrap();
-                let (mut speeds, mut inverted) = ([0.0_f64; 2], 0);
-                for frame in 0..150 {
-                    let report = simulation.step().unwrap();
-                    let speed = report.max_speed.unwrap();
-                    speeds[usize::from(frame >= 80)] = speeds[usize::from(frame >= 80)].max(speed);
-                    inverted += report.inverted_tets.unwrap();
-                    assert!(!report.warnings().iter().any(|w| w.is_failure()));
-                }
-                let what = format!("{shape}, snap {snap}, {}: {speeds:?}", precision.name());
-                assert!(simulation.mesh().tets.len() > 3000, "{what}");
-                assert_eq!(inverted, 0, "{what}");
-                assert!(speeds[0] < bound && speeds[1] < bound, "{what}");
-                // It does not grow: what is left is rounding.
-                assert!(speeds[1] <= 2.0 * speeds[0], "{what}");
-                eprintln!("{what}, {} tets", simulation.mesh().tets.len());
+    for (shape, snap, seed) in [("liver", 0.0, 1), ("sphere", 0.1, 2), ("box", 0.2, 3)] {
+        for (precision, bound) in [(Precision::F64, 1e-9), (Precision::F32, 1e-2)] {
+            let scene = scene(shape, 10, snap, precision, seed);
+            let mut simulation = Simulation::new(&scene).unwrap();
+            let (mut speeds, mut inverted) = ([0.0_f64; 2], 0);
+            for frame in 0..80 {
+                let report = simulation.step().unwrap();
+                let part = &mut speeds[usize::from(frame >= 45)];
+                *part = part.max(report.max_speed.unwrap());
+                inverted += report.inverted_tets.unwrap();
+                assert!(!report.warnings().iter().any(|w| w.is_failure()));
             }
+            let what = format!("{shape}, snap {snap}, {}: {speeds:?}", precision.name());
+            assert!(simulation.mesh().tets.len() > 2000, "{what}");
+            assert_eq!(inverted, 0, "{what}");
+            assert!(speeds[0] < bound && speeds[1] < bound, "{what}");
+            // It does not grow: what is left is rounding.
+            assert!(speeds[1] <= 2.0 * speeds[0], "{what}");
         }
     }
 }
