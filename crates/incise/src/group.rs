@@ -266,7 +266,8 @@ impl Group {
             waves.fold(0.0, f64::max)
         });
         let fall = self.settings.gravity.map_or(0.0, |g| g.length() * elapsed);
-        !(speed <= 100.0 * wave + 2.0 * fall + 10.0 * self.size / self.settings.time_step)
+        let plausible = 100.0 * wave + 2.0 * fall + 10.0 * self.size / self.settings.time_step;
+        speed.is_nan() || speed > plausible
     }
 
     /// Whether it is not solved until it is woken.

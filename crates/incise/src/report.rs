@@ -224,7 +224,7 @@ pub struct Milliseconds {
     pub schedule: f64,
     /// Sending to a device.
     pub upload: f64,
-    /// TetSolve. On a device: telling it what to do, after waiting for the frame before the last one if that is not done; it
+    /// Solving. On a device: telling it what to do, after waiting for the frame before the last one if that is not done; it
     /// works on by itself.
     pub solve: f64,
     /// Waiting for a device and fetching from it, where somebody asked: a blade, a reported quantity.

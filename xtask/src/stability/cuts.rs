@@ -26,22 +26,28 @@ pub(crate) enum Cut {
     SlowBlade,
     /// A body that falls past a blade that hardly moves.
     FastBody,
+    /// So many random strokes into a free body at rest without gravity, one a frame; then it is left alone.
+    AtRest(u64),
 }
 
 impl Cut {
-    pub(crate) const ALL: [Self; 4] = [
+    pub(crate) const ALL: [Self; 7] = [
         Self::Strokes,
         Self::FastBlade,
         Self::SlowBlade,
         Self::FastBody,
+        Self::AtRest(1),
+        Self::AtRest(10),
+        Self::AtRest(30),
     ];
 
-    pub(crate) fn id(self) -> &'static str {
+    pub(crate) fn id(self) -> String {
         match self {
-            Self::Strokes => "cut-strokes",
-            Self::FastBlade => "cut-fast-blade",
-            Self::SlowBlade => "cut-slow-blade",
-            Self::FastBody => "cut-fast-body",
+            Self::Strokes => "cut-strokes".to_owned(),
+            Self::FastBlade => "cut-fast-blade".to_owned(),
+            Self::SlowBlade => "cut-slow-blade".to_owned(),
+            Self::FastBody => "cut-fast-body".to_owned(),
+            Self::AtRest(strokes) => format!("cut-at-rest-{strokes}"),
         }
     }
 
@@ -51,6 +57,8 @@ impl Cut {
             Self::FastBlade => "a blade through the body within a frame".to_owned(),
             Self::SlowBlade => "a blade of 1/100 edge a frame".to_owned(),
             Self::FastBody => "a body that falls past a blade".to_owned(),
+            Self::AtRest(1) => "a free body at rest after 1 cut".to_owned(),
+            Self::AtRest(strokes) => format!("a free body at rest after {strokes} cuts"),
         }
     }
 
@@ -60,6 +68,8 @@ impl Cut {
             (Self::Strokes, true) => 25,
             (Self::SlowBlade, false) => 500,
             (Self::FastBlade | Self::FastBody, false) => 120,
+            (Self::AtRest(strokes), false) => strokes + 300,
+            (Self::AtRest(strokes), true) => strokes + 20,
             (_, true) => 30,
         }
     }
@@ -71,9 +81,10 @@ impl Cut {
         };
         scene.report.quantities = vec![Quantity::Energy, Quantity::Volume, Quantity::Kappa];
         let gravity = if self == Self::FastBody { 1e2 } else { 9.81 };
-        scene.world.gravity = Some([0.0, 0.0, -gravity]);
+        let at_rest = matches!(self, Self::AtRest(_));
+        scene.world.gravity = (!at_rest).then_some([0.0, 0.0, -gravity]);
         // What falls past the blade falls on, and is not crushed.
-        scene.world.ground = (self != Self::FastBody).then_some(GroundSpec {
+        scene.world.ground = (self != Self::FastBody && !at_rest).then_some(GroundSpec {
             height: -1.0,
             friction: 0.5,
         });
@@ -95,7 +106,7 @@ impl Cut {
             damping: 0.0,
             volume_compliance: None,
             substeps: None,
-            fixed: if self == Self::FastBody {
+            fixed: if self == Self::FastBody || at_rest {
                 Vec::new()
             } else {
                 vec![held]
@@ -110,7 +121,7 @@ impl Cut {
             snap: 0.0,
         };
         scene.stroke = match self {
-            Self::Strokes => Vec::new(),
+            Self::Strokes | Self::AtRest(_) => Vec::new(),
             Self::FastBlade => vec![sweep([2, 3], blade(1.0), -3.0)],
             // From inside, since it would be long in coming.
             Self::SlowBlade => vec![sweep([2, last], blade(-0.1), -6e-4 * last as f64)],
@@ -141,6 +152,10 @@ pub(crate) fn run(
                 simulation = fresh()?;
                 watch.unit = None;
             }
+            let stroke = random_stroke(&simulation, &mut noise);
+            simulation.cut(stroke)?;
+        }
+        if matches!(cut, Cut::AtRest(strokes) if frame < strokes) {
             let stroke = random_stroke(&simulation, &mut noise);
             simulation.cut(stroke)?;
         }

@@ -17,7 +17,7 @@ pub(super) struct Explanation {
     pub(super) text: &'static str,
 }
 
-use Method::{Block, Chebyshev, Corrected, Jacobi, Paper, Substeps, Vbd};
+use Method::{Block, Chebyshev, Corrected, Jacobi, Paper, Softened, Split, Vbd};
 use Verdict::{Bent, Collapsed, FewInverted, Gains, Inverted, Off, Repaired};
 
 /// One step of twenty iterations through constraints.
@@ -43,11 +43,12 @@ const TABLE: &[Explanation] = &[
     },
     Explanation {
         extremes: &["cut"],
-        methods: &[Substeps, Block, Jacobi, Chebyshev],
+        methods: &[Split, Softened, Block, Jacobi, Chebyshev],
         verdicts: &[Inverted, FewInverted, Off],
         kappa: 1.0,
-        text: "What random strokes without snapping leave are slivers, softened to kappa 1: soft enough to be turned over \
-            by what pulls at them. Snapping avoids most of them.",
+        text: "Random strokes without snapping leave slivers. In the columns of the block form they are softened to kappa \
+            1, in the split column they are solved less accurately: in both they can be turned over by their neighbors. \
+            Snapping avoids most of them.",
     },
     Explanation {
         extremes: &["cut"],
@@ -96,15 +97,15 @@ const TABLE: &[Explanation] = &[
             "mass-1e-6",
             "mass-1e-3",
         ],
-        methods: &[Substeps],
+        methods: &[Split, Softened],
         verdicts: &[Collapsed, Inverted, FewInverted, Gains, Off, Bent],
         kappa: 0.6,
-        text: "More than 200 substeps would be needed; at 200 tets are softened to kappa 1, and a body that is softer than \
-            its material gives way more.",
+        text: "More than 200 substeps would be needed. At 200 the split form is softer than its material, and so are the \
+            tets that the other column softens to kappa 1, so the body gives way more.",
     },
     Explanation {
         extremes: &["poisson-0.49", "poisson-0.499", "poisson-0.4999"],
-        methods: &[Substeps],
+        methods: &[Split, Softened],
         verdicts: &[Gains, Off],
         kappa: 0.0,
         text: "Kappa speaks of E and not of how stiff a nearly incompressible body is against changes of volume: its error \
@@ -128,7 +129,7 @@ const TABLE: &[Explanation] = &[
     },
     Explanation {
         extremes: STATES,
-        methods: &[Substeps],
+        methods: &[Split, Softened],
         verdicts: &[FewInverted, Off, Bent],
         kappa: 0.0,
         text: "Not at rest yet: so violent a start leaves vibrations, which substeps keep, and this body has no damping. Of a \

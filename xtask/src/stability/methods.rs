@@ -1,8 +1,9 @@
 //! The columns of the matrix: methods with the settings that they are looked at with, precisions, backends.
 //!
 //! All but *substeps* take a frame in one step of twenty iterations (five with corrections), which is what a user does who knows nothing of kappa
-//! and what the paper does. *Substeps* is what `substeps = "auto"` does: as many as bring kappa to 0.5, at most 200, and
-//! tets that are still too stiff softened to kappa 1.
+//! and what the paper does. *Split* is the default form with as many substeps as bring kappa to 0.5, at most 200, and
+//! nothing softened. *Softened* is the block form with the same substeps, tets that are still too stiff softened to kappa
+//! 1.
 
 use incise::mesh::glam::DVec3;
 use incise::scene::{self, SolverSpec, Substeps, TetSolve as SceneTetSolve};
@@ -26,8 +27,10 @@ const ROUNDS: u32 = 5;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Method {
-    /// XPBD in block form, one iteration a substep, substeps by kappa.
-    Substeps,
+    /// XPBD in split form, one iteration a substep, substeps by kappa, nothing softened: the default.
+    Split,
+    /// XPBD in block form, one iteration a substep, substeps by kappa, softened to a kappa of 1.
+    Softened,
     /// XPBD in block form, one step of 20 iterations.
     Block,
     /// The paper's: one constraint of a tet after the other, clusters of 10, relaxation 0.8.
@@ -42,14 +45,17 @@ pub(crate) enum Method {
     Corrected,
 }
 
-use Method::{Block, Chebyshev, Corrected, Jacobi, Paper, Substeps as ByKappa, Vbd};
+use Method::{Block, Chebyshev, Corrected, Jacobi, Paper, Softened, Split, Vbd};
 
 impl Method {
-    pub(crate) const ALL: [Self; 7] = [ByKappa, Block, Paper, Jacobi, Chebyshev, Vbd, Corrected];
+    pub(crate) const ALL: [Self; 8] = [
+        Split, Softened, Block, Paper, Jacobi, Chebyshev, Vbd, Corrected,
+    ];
 
     pub(crate) fn name(self) -> &'static str {
         match self {
-            ByKappa => "substeps",
+            Split => "split",
+            Softened => "softened",
             Block => "block",
             Paper => "paper",
             Jacobi => "Jacobi",
@@ -67,7 +73,7 @@ impl Method {
     /// Iterations, sweeps or rounds of a substep.
     fn iterations(self) -> u32 {
         match self {
-            ByKappa => 1,
+            Split | Softened => 1,
             Corrected => ROUNDS,
             _ => ITERATIONS,
         }
@@ -81,14 +87,14 @@ impl Method {
     )]
     pub(crate) fn substeps(self, kappa: f64) -> u32 {
         match self {
-            ByKappa => (kappa / KAPPA).sqrt().ceil().clamp(1.0, MOST_SUBSTEPS) as u32,
+            Split | Softened => (kappa / KAPPA).sqrt().ceil().clamp(1.0, MOST_SUBSTEPS) as u32,
             _ => 1,
         }
     }
 
     /// The limit to which a body is softened.
     pub(crate) fn limit(self, substep_time: f64) -> Option<KappaLimit> {
-        (self == ByKappa).then_some(KappaLimit {
+        (self == Softened).then_some(KappaLimit {
             kappa: KAPPA_LIMIT,
             substep_time,
         })
@@ -107,10 +113,10 @@ impl Method {
                 },
                 _ => XpbdMethod::GaussSeidel,
             },
-            tet_solve: if self == Paper {
-                TetSolve::Sequential
-            } else {
-                TetSolve::Block
+            tet_solve: match self {
+                Paper => TetSolve::Sequential,
+                Split => TetSolve::Split,
+                _ => TetSolve::Block,
             },
             relaxation: match self {
                 Paper => 0.8,
@@ -138,10 +144,10 @@ impl Method {
         }
     }
 
-    /// The settings of a scene, with all defaults that a scene has: above all, what a cut leaves too stiff is softened.
+    /// The settings of a scene. What a cut leaves too stiff is softened in the columns of the block form.
     pub(crate) fn spec(self, column: Column) -> SolverSpec {
         let method = match self {
-            ByKappa | Block | Paper => scene::Method::GaussSeidel,
+            Split | Softened | Block | Paper => scene::Method::GaussSeidel,
             Jacobi => scene::Method::Jacobi,
             Chebyshev => scene::Method::Chebyshev,
             Vbd | Corrected => scene::Method::Vbd,
@@ -151,11 +157,14 @@ impl Method {
             _ => SolverSpec::of(method),
         };
         spec.substeps = match self {
-            ByKappa => Substeps::Auto,
+            Split | Softened => Substeps::Auto,
             _ => Substeps::Fixed(1),
         };
         spec.iterations = self.iterations();
-        debug_assert_eq!(self == Paper, spec.tet_solve == SceneTetSolve::Sequential);
+        if matches!(self, Softened | Block | Jacobi | Chebyshev) {
+            spec.tet_solve = SceneTetSolve::Block;
+            spec.kappa_limit = KAPPA_LIMIT;
+        }
         spec.time_step = 1.0 / 60.0;
         spec.two_level = self == Corrected;
         spec.precision = match column.precision {

@@ -59,7 +59,7 @@ fn experiment(quick: bool, backend: Backend) -> anyhow::Result<Experiment<Row>> 
             let outcomes = columns.par_iter();
             let outcomes = outcomes.map(|&column| cuts::run(cut, column, gpu, quick));
             Ok(Row {
-                id: cut.id().to_owned(),
+                id: cut.id(),
                 name: cut.name(quick),
                 is_state: false,
                 outcomes: outcomes.collect::<anyhow::Result<_>>()?,

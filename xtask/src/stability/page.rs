@@ -11,8 +11,9 @@ A beam of 1 m × 0.25 m × 0.25 m, E = 1e6 Pa, Poisson's ratio 0.45, with one th
 are left alone without gravity, one end held or none; all others are held at one end and fall from rest. Those of cutting \
 are scenes with a softer beam (E = 1e4 Pa), in which everything is recomputed and compared after each stroke.
 
-*substeps* is XPBD in block form by as many substeps of one iteration as bring kappa to 0.5, at most 200, tets that are \
-still too stiff softened to kappa 1, as in scenes. All others take a frame in one step of 20 iterations: *block*, XPBD in \
+*split*, the default, is XPBD in split form by as many substeps of one iteration as bring kappa to 0.5, at most 200, \
+nothing softened; *softened* is the block form with the same substeps, tets that are still too stiff softened to kappa 1. \
+All others take a frame in one step of 20 iterations: *block*, XPBD in \
 block form; *paper*, one constraint of a tet after the other, relaxation 0.8, clusters of 10; *Jacobi* and *Chebyshev* \
 (spectral radius 0.9) with relaxation 0.1; *vbd*, 20 sweeps; *corrected*, 5 sweeps, a correction of the whole body after each.
 

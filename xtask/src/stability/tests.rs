@@ -73,9 +73,11 @@ fn substeps_by_kappa_hold_a_body_together() {
         if !kept.iter().any(|id| extreme.id.starts_with(id)) {
             continue;
         }
-        for precision in [Precision::F32, Precision::F64] {
+        let methods = [Method::Split, Method::Softened];
+        let precisions = [Precision::F32, Precision::F64];
+        for (method, precision) in methods.into_iter().flat_map(|m| precisions.map(|p| (m, p))) {
             let column = Column {
-                method: Method::Substeps,
+                method,
                 precision,
                 gpu: false,
             };
