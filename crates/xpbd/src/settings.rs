@@ -33,16 +33,16 @@ pub struct StepSettings {
 
 /// The shortest substep in s in which single precision is sound for a body whose longest side is `size` m.
 ///
-/// A position is rounded to 6e-8 of the body's size. Over a shorter substep gravity moves a particle by less than that,
-/// and each rounding becomes a kick to its velocity: the body heats up, at a quarter of this substep to several times its
-/// energy within 100,000 substeps. Use double precision below it.
+/// A position is rounded to 6e-8 of the body's size. Over a shorter substep gravity moves a particle by less than four
+/// times that, and each rounding becomes a kick to its velocity: the body heats up, at an eighth of this substep to several
+/// times its energy within 100,000 substeps. Use double precision below it.
 ///
 /// ```
-/// assert!((incise_xpbd::shortest_substep_of_f32(1.0) - 7.8e-5).abs() < 1e-6);
+/// assert!((incise_xpbd::shortest_substep_of_f32(1.0) - 1.56e-4).abs() < 1e-6);
 /// ```
 #[must_use]
 pub fn shortest_substep_of_f32(size: f64) -> f64 {
-    (6e-8 * size / 9.81).sqrt()
+    (2.4e-7 * size / 9.81).sqrt()
 }
 
 /// How an iteration over the constraints is made.

@@ -41,7 +41,6 @@ fn what_needs_no_memory_takes_none() {
     for (feature, state) in [
         ("gravity", State::Used),
         ("fixed particles", State::Used),
-        ("damping", State::Used),
         ("relaxation", State::Used),
         ("sequential form", State::Used),
         ("kappa limit", State::Used),
