@@ -53,6 +53,8 @@ pub(crate) struct Group {
     pub(crate) removed_volume: f64,
     /// What was chosen, if the scene left it open.
     pub(crate) choice: Option<Choice>,
+    /// The substeps before all cuts.
+    first_substeps: u32,
     /// The longest side of the box around its bodies at rest in m.
     size: f64,
     /// What is solved less accurately than asked for.
@@ -87,6 +89,10 @@ pub(crate) fn kappa_limit(solver: &SolverSpec, settings: &StepSettings) -> Optio
 
 /// The part of a body's volume outside the accuracy wanted from which a user is told.
 const OUTSIDE_FRACTION: f64 = 0.01;
+
+/// Cuts raise a chosen number of substeps to at most so many times what it was before them: a live scene must not become
+/// slower without end.
+const MOST_GROWTH: u32 = 2;
 
 /// The longest side of the box around points, 0 without points.
 fn longest_side(points: &[DVec3]) -> f64 {
@@ -156,6 +162,7 @@ impl Group {
             cuttable,
             bodies: joined.bodies,
             choice,
+            first_substeps: substeps,
             size,
             outside: OutsideVolume::default(),
             warnings: Vec::new(),
@@ -225,6 +232,13 @@ impl Group {
         self.settings.substep_time() < 0.999 * shortest_substep_of_f32(self.size)
     }
 
+    /// Takes over substeps that settings have changed: cuts raise them from there.
+    pub(crate) fn set_first_substeps(&mut self, substeps: u32) {
+        if substeps != self.settings.substeps {
+            self.first_substeps = substeps;
+        }
+    }
+
     /// After cuts: chooses substeps again where too much of the body is outside the accuracy, or warns.
     pub(crate) fn judge_cut(&mut self, asked: &[Substeps], spec: &SolverSpec) {
         let fraction = self.outside.outside / self.cuttable.mesh().total_volume();
@@ -237,7 +251,8 @@ impl Group {
         let before = self.settings.substeps;
         if self.choice.is_some() && !spec.kappa_limit.is_finite() {
             let (chosen, choice) = substeps(asked, spec, &self.solver, self.cuttable.mesh());
-            self.settings.substeps = chosen.max(before);
+            let most = MOST_GROWTH.saturating_mul(self.first_substeps);
+            self.settings.substeps = chosen.min(most).max(before);
             let ratio = f64::from(before) / f64::from(self.settings.substeps);
             if let Some(noted) = &mut self.cut_kappa {
                 // Kappa goes with the square of the substep.

@@ -39,7 +39,8 @@ pub enum Substeps {
     /// This many, at least 1.
     Fixed(u32),
     /// For each body the fewest that solve its tets with the accuracy wanted, few slivers left aside, but no more than
-    /// `max_substeps`. The number rises when cuts leave more than 1% of the volume outside that accuracy.
+    /// `max_substeps`. The number rises, at most to twice itself, when cuts leave more than 1% of the
+    /// volume outside that accuracy.
     Auto,
 }
 

@@ -83,10 +83,14 @@ pub(crate) fn of_substeps(
     if choice.expected_error <= accuracy * (1.0 + 1e-9) {
         return None;
     }
-    let percent = 100.0 * choice.expected_error;
+    let percent = match 100.0 * choice.expected_error {
+        // The law was measured up to there.
+        percent if percent > 100.0 => "more than 100".to_owned(),
+        percent => format!("{percent:.0}"),
+    };
     let needed = choice.substeps_needed;
     let error = format!(
-        "the expected error is {percent:.0}% of the motion with {} substeps; {needed} are needed for {:.0}%",
+        "the expected error is {percent}% of the motion with {} substeps; {needed} are needed for {:.0}%",
         choice.substeps,
         100.0 * accuracy
     );

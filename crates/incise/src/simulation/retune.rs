@@ -316,6 +316,7 @@ impl Retuned {
             (spec, _) => spec.map(Recluster::new),
         };
         group.rest = spec.sleep.map(Rest::new);
+        group.set_first_substeps(self.settings.substeps);
         group.settings = self.settings;
         group.choice = self.choice;
         Ok(())
