@@ -1,7 +1,7 @@
 //! How a solver follows a cut of its mesh.
 //!
 //! Tets keep the numbers of the mesh's, new particles come between two others or as copies, and masses are summed anew
-//! where tets have changed. Cost: what the cut touched; VBD sorts its stars anew, O(tets).
+//! where tets have changed. Cost: what the cut touched; VBD rebuilds its stars, O(tets).
 
 use glam::DVec3;
 use incise_cutting::{CutDelta, CuttableMesh};

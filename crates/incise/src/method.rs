@@ -117,7 +117,7 @@ pub(crate) fn settings(scene: &Scene) -> Result<StepSettings, Error> {
     Ok(settings)
 }
 
-/// The same for VBD.
+/// The settings of VBD for a scene's settings.
 pub(crate) fn vbd(settings: &StepSettings) -> VbdSettings {
     VbdSettings {
         // What lies or hangs starts where it is, so that few sweeps do.

@@ -20,7 +20,7 @@ pub enum WarningCode {
     SubstepsCapped,
     /// The given number of substeps leaves an expected error of more than a tenth of the motion.
     Inaccurate,
-    /// As [`WarningCode::Inaccurate`] or [`WarningCode::SubstepsCapped`], because Poisson's ratio is near 0.5.
+    /// The expected error is too large because Poisson's ratio is near 0.5.
     NearlyIncompressible,
     /// Cuts have left more than 1% of a body's volume in tets that are solved less accurately than asked for.
     OutsideAccuracy,

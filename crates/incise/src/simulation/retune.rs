@@ -1,7 +1,7 @@
 //! [`Simulation::retune`]: other settings of the solver for a simulation that runs.
 //!
 //! Mesh, cuts, positions, velocities, pieces, handles, obstacles and strokes stay as they are. From the settings follow
-//! substeps, softened tets, plans, what VBD needs and the place: what differs is made anew from the body as it is
+//! substeps, softened tets, plans, what VBD needs and the place: what differs is rebuilt from the body as it is
 //! now, as a new simulation would make it from such a body, and what does not differ is not touched. Everything that can
 //! fail is made first, beside what is there; only then it takes its place.
 //!

@@ -72,7 +72,7 @@ impl Coarse {
         self.count
     }
 
-    /// Whether motions and factor are to be made anew for the next solution.
+    /// Whether motions and factor are rebuilt for the next solution.
     pub(super) fn is_stale(&self) -> bool {
         !self.age.usable
     }

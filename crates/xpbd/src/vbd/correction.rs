@@ -126,11 +126,11 @@ impl<R: Real> CoarseCorrection<R> {
 }
 
 impl<R: Real> Solver<R> {
-    /// As [`Solver::step_vbd`], with a correction after each sweep. A substep also ends when two corrections in a row find
+    /// Advances by one frame of VBD with a coarse correction after each sweep. A substep also ends when two corrections in a row find
     /// nothing to gain: in single precision that is soon so in a stiff body.
     ///
     /// # Errors
-    /// As [`Solver::step_vbd`].
+    /// Those of [`Solver::step_vbd`].
     ///
     /// # Panics
     /// If stars or correction are those of another number of particles or tets.

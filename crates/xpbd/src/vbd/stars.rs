@@ -17,7 +17,7 @@ use crate::{Real, Solver};
 /// What VBD needs of the tets, sorted by the particles of a schedule.
 ///
 /// It belongs to the tets, distances and volume constraints that the solver had when it was made: after a cut, or any
-/// other change of these, make it anew with [`VertexStars::rebuild`]. Positions, velocities, masses, attachments and what
+/// other change of these, update it with [`VertexStars::rebuild`]. Positions, velocities, masses, attachments and what
 /// is fixed may change at any time.
 #[derive(Clone, Debug)]
 pub struct VertexStars<R: Real> {
@@ -64,10 +64,10 @@ impl<R: Real> VertexStars<R> {
         Ok(stars)
     }
 
-    /// The same in place, after tets have changed; memory is used again. O(tets).
+    /// Rebuilds the stars in place after tets have changed; memory is used again. O(tets).
     ///
     /// # Errors
-    /// As [`VertexStars::new`]; nothing has changed then.
+    /// Those of [`VertexStars::new`]; nothing has changed then.
     pub fn rebuild(&mut self, solver: &Solver<R>, schedule: &Schedule) -> Result<(), GraphError> {
         let incidence = solver.star_incidence();
         schedule.check(&incidence)?;

@@ -1,4 +1,4 @@
-//! Block VBD from states nobody sane enters: finite always, and back to shape.
+//! VBD from extreme states: always finite, and back to shape.
 
 use glam::{DVec3, dvec3};
 use incise_mesh::generate::kuhn_box;
