@@ -60,17 +60,22 @@ impl<R: Real> VertexStars<R> {
             constraints: ConstraintTerms::default(),
             viscosity: None,
         };
-        stars.rebuild(solver, schedule)?;
+        stars.rebuild(solver, &solver.star_incidence(), schedule)?;
         Ok(stars)
     }
 
-    /// Rebuilds the stars in place after tets have changed; memory is used again. O(tets).
+    /// Rebuilds the stars in place after tets have changed, given the [`Solver::star_incidence`] of the present tets; memory
+    /// is used again. O(tets).
     ///
     /// # Errors
     /// Those of [`VertexStars::new`]; nothing has changed then.
-    pub fn rebuild(&mut self, solver: &Solver<R>, schedule: &Schedule) -> Result<(), GraphError> {
-        let incidence = solver.star_incidence();
-        schedule.check(&incidence)?;
+    pub fn rebuild(
+        &mut self,
+        solver: &Solver<R>,
+        incidence: &Incidence,
+        schedule: &Schedule,
+    ) -> Result<(), GraphError> {
+        schedule.check(incidence)?;
         self.order.clear();
         self.order.extend(schedule.order());
         self.colors.clear();
@@ -104,7 +109,7 @@ impl<R: Real> VertexStars<R> {
             .max(0.0)
             .cbrt();
         self.earlier.clear();
-        self.constraints.rebuild(solver, &self.order, &incidence);
+        self.constraints.rebuild(solver, &self.order, incidence);
         self.viscosity = None;
         Ok(())
     }
