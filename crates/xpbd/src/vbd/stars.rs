@@ -10,6 +10,7 @@ use incise_graph::{GraphError, Incidence, Schedule};
 
 use super::constraints::ConstraintTerms;
 use super::corner_term::CornerTerm;
+use super::history::History;
 use super::viscosity::Viscosity;
 use crate::scalar::Scalar;
 use crate::{Real, Solver};
@@ -35,6 +36,8 @@ pub struct VertexStars<R: Real> {
     pub(super) size: f64,
     /// Velocities a substep ago, kept only for [`super::Guess::Adaptive`].
     pub(super) earlier: Vec<R::Vector>,
+    /// Kept only for [`super::Integrator::Bdf2`].
+    pub(super) history: History<R>,
     /// Distances, volumes and attachments.
     pub(super) constraints: ConstraintTerms<R>,
     /// Made by the first substep in which a material is damped.
@@ -57,6 +60,7 @@ impl<R: Real> VertexStars<R> {
             tet_count: 0,
             size: 0.0,
             earlier: Vec::new(),
+            history: History::default(),
             constraints: ConstraintTerms::default(),
             viscosity: None,
         };
@@ -123,6 +127,7 @@ impl<R: Real> VertexStars<R> {
             + size_of_val(&*self.terms)
             + size_of_val(&*self.tets)
             + size_of_val(&*self.earlier)
+            + self.history.bytes()
             + self.constraints.bytes()
             + self.viscosity.as_ref().map_or(0, |v| v.bytes())
     }
