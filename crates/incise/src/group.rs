@@ -13,6 +13,7 @@ use incise_xpbd::{KappaLimit, Real, Solver, StepReport, StepSettings, shortest_s
 
 use crate::accuracy::{DEFAULT_ACCURACY, OutsideVolume, largest_kappas};
 use crate::backend::{AnySolver, each, each_mut};
+use crate::budget::{self, Budget};
 use crate::grab::Hand;
 use crate::handle::Handle;
 use crate::joined::{Joined, demands, substeps};
@@ -57,6 +58,8 @@ pub(crate) struct Group {
     pub(crate) choice: Option<Choice>,
     /// The substeps before all cuts.
     first_substeps: u32,
+    /// What it costs and may cost, where there is a budget.
+    pub(crate) budget: Option<Budget>,
     /// The longest side of the box around its bodies at rest in m.
     size: f64,
     /// What is solved less accurately than asked for.
@@ -176,6 +179,7 @@ impl Group {
             bodies: joined.bodies,
             choice,
             first_substeps: settings.substeps,
+            budget: None,
             spec,
             size,
             outside: OutsideVolume::default(),
@@ -256,6 +260,12 @@ impl Group {
         self.settings.substep_time() < 0.999 * shortest_substep_of_f32(self.size)
     }
 
+    /// Takes a number of substeps, from which cuts raise it.
+    pub(crate) fn set_substeps(&mut self, substeps: u32) {
+        self.settings.substeps = substeps;
+        self.first_substeps = substeps;
+    }
+
     /// Takes over substeps that settings have changed: cuts raise them from there.
     pub(crate) fn set_first_substeps(&mut self, substeps: u32) {
         if substeps != self.settings.substeps {
@@ -265,6 +275,9 @@ impl Group {
 
     /// After cuts: chooses substeps again where too much of the body is outside the accuracy, or warns.
     pub(crate) fn judge_cut(&mut self, asked: &[Substeps]) {
+        if budget::keep(self) {
+            return;
+        }
         let spec = &self.spec.clone();
         let fraction = self.outside.outside / self.cuttable.mesh().total_volume();
         if spec.method != Method::GaussSeidel
@@ -274,7 +287,7 @@ impl Group {
             return;
         }
         let before = self.settings.substeps;
-        if self.choice.is_some() && !spec.kappa_limit.is_finite() {
+        if self.choice.is_some() && self.budget.is_none() && !spec.kappa_limit.is_finite() {
             let (chosen, choice) = substeps(asked, spec, &self.solver, self.cuttable.mesh());
             let most = MOST_GROWTH.saturating_mul(self.first_substeps);
             self.settings.substeps = chosen.min(most).max(before);

@@ -25,6 +25,7 @@ mod accuracy;
 pub mod advise;
 mod backend;
 mod body;
+mod budget;
 mod collider;
 #[cfg(feature = "gpu")]
 mod device;

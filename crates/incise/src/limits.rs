@@ -68,6 +68,11 @@ pub(crate) fn check(scene: &Scene) -> Result<(), Error> {
     {
         return Err(value("solver.accuracy", accuracy, "above 0 and at most 1"));
     }
+    if let Some(budget) = scene.solver.budget_ms
+        && !(budget.is_finite() && budget > 0.0)
+    {
+        return Err(value("solver.budget_ms", budget, "positive and finite"));
+    }
     let kappa = scene.solver.kappa_limit;
     if kappa.is_nan() || kappa <= 0.0 {
         return Err(value("solver.kappa_limit", kappa, "positive"));

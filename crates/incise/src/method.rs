@@ -138,23 +138,35 @@ pub(crate) fn resolve(
         return (own, choice);
     }
     own.method = Method::GaussSeidel;
-    let defaults = SolverSpec::default();
-    let is_open = (spec.iterations, spec.relaxation, spec.tet_solve)
-        == (defaults.iterations, defaults.relaxation, defaults.tet_solve)
-        && !spec.kappa_limit.is_finite()
-        && is_open;
     match choice {
-        Some(capped) if is_open && capped.missed == Some(Missed::Cap) => {
+        Some(capped) if is_open && leaves_open(spec) && capped.missed == Some(Missed::Cap) => {
             let accuracy = spec.accuracy.unwrap_or(DEFAULT_ACCURACY);
-            let rounds = rounds_for(accuracy);
-            own.method = Method::Vbd;
-            own.two_level = true;
-            own.substeps = Substeps::Fixed(1);
-            own.iterations = rounds;
-            (own, Some(capped.solved_by_vbd(error_of_rounds(rounds))))
+            let (own, choice) = with_vbd(spec, capped, rounds_for(accuracy));
+            (own, Some(choice))
         }
         _ => (own, choice),
     }
+}
+
+/// Whether settings leave the method open and name nothing that only Gauss-Seidel has.
+pub(crate) fn leaves_open(spec: &SolverSpec) -> bool {
+    let defaults = SolverSpec::default();
+    spec.method == Method::Auto
+        && (spec.iterations, spec.relaxation, spec.tet_solve)
+            == (defaults.iterations, defaults.relaxation, defaults.tet_solve)
+        && !spec.kappa_limit.is_finite()
+}
+
+/// The settings with two-level VBD of one step a frame and some rounds, and what becomes of the choice of substeps.
+pub(crate) fn with_vbd(spec: &SolverSpec, choice: Choice, rounds: u32) -> (SolverSpec, Choice) {
+    let own = SolverSpec {
+        method: Method::Vbd,
+        two_level: true,
+        substeps: Substeps::Fixed(1),
+        iterations: rounds,
+        ..spec.clone()
+    };
+    (own, choice.solved_by_vbd(error_of_rounds(rounds)))
 }
 
 /// The settings of VBD for a scene's settings.

@@ -145,6 +145,9 @@ pub(crate) fn check(scene: &Scene) -> Result<(), Error> {
         let range = "gauss-seidel, jacobi or chebyshev on a GPU";
         return Err(value("solver.method", "vbd", range));
     }
+    if let Some(budget) = solver.budget_ms {
+        return Err(value("solver.budget_ms", budget, "absent on a GPU"));
+    }
     let method: incise_clustering::Method = solver.clustering.parse()?;
     let limit = method.max_size().get();
     if limit > 256 {

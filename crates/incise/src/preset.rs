@@ -35,10 +35,14 @@ impl SolverSpec {
     /// ```
     #[must_use]
     pub fn paper(method: Method) -> Self {
+        let method = match method {
+            Method::Auto => Method::GaussSeidel,
+            named => named,
+        };
         let (tet_solve, relaxation) = match method {
-            Method::Auto | Method::GaussSeidel => (TetSolve::Sequential, 0.8),
+            Method::GaussSeidel => (TetSolve::Sequential, 0.8),
             Method::Jacobi | Method::Chebyshev => (TetSolve::Sequential, 0.1),
-            Method::Vbd => (TetSolve::Split, 1.0),
+            Method::Auto | Method::Vbd => (TetSolve::Split, 1.0),
         };
         Self {
             preset: Some(Preset::Paper),

@@ -146,6 +146,11 @@ pub struct SolverSpec {
     /// `substeps = "auto"` and `method = "auto"` take.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accuracy: Option<f64>,
+    /// The time in ms that a frame may take on this machine, positive; absent: no limit. Substeps that are chosen, and the
+    /// method, are fitted to it: with `accuracy` no more than that needs, without it as many as fit. Runs then differ from
+    /// each other. Not on a GPU.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub budget_ms: Option<f64>,
     /// Equal parts of a frame: a number, or `auto`, which chooses for each body by the accuracy.
     pub substeps: Substeps,
     /// The most substeps that `auto` takes.
@@ -199,6 +204,7 @@ impl Default for SolverSpec {
             preset: None,
             time_step: 0.016,
             accuracy: None,
+            budget_ms: None,
             substeps: Substeps::Auto,
             max_substeps: 200,
             iterations: 1,

@@ -21,6 +21,7 @@ use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use crate::body::Body;
+use crate::budget;
 use crate::group::Group;
 use crate::islands::islands;
 use crate::joined::Joined;
@@ -175,6 +176,13 @@ impl Simulation {
         if scene.solver.precision == Precision::Auto && !place.is_device() && short() {
             precision = Precision::F64;
             groups = make_groups(precision, Joined::all(scene, Body::all(scene)?, &islands)?)?;
+        }
+        if let Some(budget) = scene.solver.budget_ms {
+            let mut fit = || budget::fit(&mut groups, &scene.solver, budget);
+            match &pool {
+                Some(pool) => pool.install(fit),
+                None => fit(),
+            }?;
         }
         let mut timeline = Timeline::new(match precision {
             Precision::F32 | Precision::Auto => 1e-5,

@@ -99,6 +99,8 @@ impl<'de> Deserialize<'de> for Substeps {
 pub enum Missed {
     /// They want more than `max_substeps`.
     Cap,
+    /// They want more than `budget_ms` allows.
+    Budget,
     /// Those that want more are few slivers.
     Sliver,
 }

@@ -19,6 +19,8 @@ use crate::substeps::{Choice, Missed};
 pub enum WarningCode {
     /// The accuracy wanted needs more substeps than `max_substeps`.
     SubstepsCapped,
+    /// The accuracy wanted needs more substeps than fit into `budget_ms`.
+    BudgetTooSmall,
     /// The given number of substeps leaves an expected error of more than a tenth of the motion.
     Inaccurate,
     /// The expected error is too large because Poisson's ratio is near 0.5.
@@ -103,6 +105,9 @@ pub(crate) fn of_substeps(
         let fix =
             "Poisson's ratio is near 0.5: lower it, or set method = \"vbd\" and two_level = true";
         (WarningCode::NearlyIncompressible, fix)
+    } else if choice.missed == Some(Missed::Budget) {
+        let fix = "raise budget_ms, use fewer tets or a softer material";
+        (WarningCode::BudgetTooSmall, fix)
     } else if capped {
         let fix = "raise max_substeps, or set method = \"vbd\" and two_level = true";
         (WarningCode::SubstepsCapped, fix)

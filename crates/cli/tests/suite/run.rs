@@ -126,7 +126,7 @@ fn reports_appear_when_asked_for() {
 #[test]
 fn chosen_substeps_are_in_the_table_and_in_every_line() {
     let place = Place::new();
-    let solver = "[solver]\nsubsteps = \"auto\"\nmax_substeps = 2\n";
+    let solver = "[solver]\nmethod = \"gauss-seidel\"\nmax_substeps = 2\n";
     place.write("scene.toml", SCENE.replace("1e4", "1e6") + solver);
     let outcome = place.incise(&["run", "scene.toml", "--frames", "3", "--no-pictures"]);
     assert_eq!(outcome.code, 0);

@@ -88,7 +88,7 @@ pub fn candidates(scene: &Scene, substeps: u32) -> Vec<SolverSpec> {
 /// ```
 /// use incise::{Scene, advise::name};
 ///
-/// let scene = Scene::from_toml("[solver]\nsubsteps = 20\nprecision = \"f32\"\nrelaxation = 0.8")?;
+/// let scene = Scene::from_toml("[solver]\nmethod = \"gauss-seidel\"\nsubsteps = 20\nprecision = \"f32\"\nrelaxation = 0.8")?;
 /// assert_eq!(name(&scene.solver), "gauss-seidel 20 x 1 f32, relaxation 0.8");
 /// # Ok::<(), incise::Error>(())
 /// ```

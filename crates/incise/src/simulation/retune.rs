@@ -14,6 +14,7 @@ use incise_xpbd::{KappaLimit, StepSettings};
 
 use super::Simulation;
 use crate::backend::AnySolver;
+use crate::budget;
 use crate::group::{Group, adopt, kappa_limit};
 use crate::joined::substeps;
 use crate::limits::{self, value};
@@ -61,6 +62,7 @@ impl Simulation {
     ///   unless they are those of other settings.
     /// * `backend`, and with `auto` also `method` and `clustering`: the state goes over to a device or comes back. The
     ///   device is the present one, or that of `offer_device`, or one that the simulation has left, or else it is opened.
+    /// * `precision = "auto"`: the width stays what it was when the simulation was set up.
     /// * `preset`: a name only. Its defaults are applied when a scene is read.
     ///
     /// Any difference wakes all bodies, for they were at rest under the settings before. Settings equal to those before
@@ -137,6 +139,13 @@ impl Simulation {
         for (group, retuned) in self.groups.iter_mut().zip(retuned) {
             retuned.take_effect(group)?;
             group.judge_settings();
+        }
+        if let Some(budget) = solver.budget_ms {
+            let mut fit = || budget::fit(&mut self.groups, solver, budget);
+            match &self.pool {
+                Some(pool) => pool.install(fit),
+                None => fit(),
+            }?;
         }
         if settings.time_step.to_bits() != self.time_step.to_bits() {
             self.epoch = (self.next_frame, self.time_at(self.next_frame));
@@ -352,6 +361,7 @@ impl Retuned {
         group.settings = self.settings;
         group.choice = self.choice;
         group.spec = spec;
+        group.budget = None;
         Ok(())
     }
 }
@@ -363,7 +373,7 @@ fn substeps_follow_from(spec: &SolverSpec) -> impl PartialEq + use<> {
         spec.accuracy.map(f64::to_bits),
         (spec.method, spec.iterations, spec.relaxation.to_bits()),
         spec.kappa_limit.to_bits(),
-        spec.backend,
+        (spec.backend, spec.budget_ms.map(f64::to_bits)),
         spec.tet_solve,
         spec.substeps,
         spec.max_substeps,

@@ -4,6 +4,7 @@
 
 #[cfg(feature = "advise")]
 mod advise;
+mod auto_method;
 mod bodies;
 mod conservation;
 mod constraints;

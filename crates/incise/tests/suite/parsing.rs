@@ -21,10 +21,7 @@ fn defaults_are_the_documented_ones() {
         (solver.time_step, solver.substeps, solver.iterations),
         (0.016, incise::scene::Substeps::Auto, 1)
     );
-    assert_eq!(
-        (solver.method, solver.relaxation),
-        (Method::GaussSeidel, 1.0)
-    );
+    assert_eq!((solver.method, solver.relaxation), (Method::Auto, 1.0));
     assert_eq!(
         (solver.tet_solve, solver.spectral_radius, solver.delay),
         (TetSolve::Split, 0.99, 10)

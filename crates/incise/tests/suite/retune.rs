@@ -227,6 +227,7 @@ fn auto_chooses_from_the_body_as_it_is() {
     let mut simulation = simulation(&two_bodies());
     (0..5).for_each(|_| assert!(simulation.step().is_ok()));
     let auto = |max_substeps| SolverSpec {
+        method: Method::GaussSeidel,
         substeps: Substeps::Auto,
         max_substeps,
         ..five()
