@@ -222,6 +222,16 @@ impl AnySolver {
         }
     }
 
+    /// The error that the last frame of two-level VBD left over.
+    pub(crate) fn vbd_error(&self) -> Option<f64> {
+        match self {
+            Self::Single(backend) => backend.vbd_error(),
+            Self::Double(backend) => backend.vbd_error(),
+            #[cfg(feature = "gpu")]
+            Self::Device(_) => None,
+        }
+    }
+
     /// The largest speed in m/s, unless the state is on a device.
     pub(crate) fn host_max_speed(&self) -> Option<f64> {
         match self {
@@ -398,7 +408,7 @@ impl<R: Real> Backend<R> {
 
     fn prepare(&mut self, spec: &SolverSpec) -> Result<(), Error> {
         if spec.method == Method::Vbd {
-            self.vbd = Some(Vbd::new(&self.solver, spec.two_level)?);
+            self.vbd = Some(Vbd::new(&self.solver, spec)?);
         }
         Ok(())
     }
@@ -424,6 +434,11 @@ impl<R: Real> Backend<R> {
             volume: asks(Quantity::Volume).then(|| solver.volume()),
             max_speed: asks(Quantity::Speed).then(|| solver.max_speed()),
         }
+    }
+
+    /// The error that the last frame of two-level VBD left over.
+    fn vbd_error(&self) -> Option<f64> {
+        self.vbd.as_ref().and_then(|vbd| vbd.last.error)
     }
 
     fn last_substep(&self, substep_time: f64) -> Option<LastSubstep> {

@@ -11,7 +11,6 @@ use std::time::Instant;
 use incise_xpbd::{StepSettings, TetSolve};
 
 use crate::Error;
-use crate::accuracy::error_of_rounds;
 use crate::group::{Group, adopt};
 use crate::joined::demands;
 use crate::method::{leaves_open, tet_solve, with_vbd};
@@ -152,8 +151,8 @@ fn try_vbd(group: &mut Group, spec: &SolverSpec, share: f64) -> Result<(), Error
     let Some(choice) = group.choice else {
         return Ok(());
     };
-    let (own, chosen) = with_vbd(spec, choice, 1);
-    if choice.expected_error <= error_of_rounds(1) {
+    let (own, chosen) = with_vbd(spec, choice);
+    if choice.expected_error <= chosen.expected_error {
         return Ok(());
     }
     let mut settings = group.settings.clone();

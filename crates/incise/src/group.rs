@@ -24,7 +24,7 @@ use crate::recluster::Recluster;
 use crate::report::{Milliseconds, milliseconds};
 use crate::scene::{Method, Precision, Quantity, SolverSpec, Substeps};
 use crate::sleep::Rest;
-use crate::substeps::{Choice, evaluate};
+use crate::substeps::{Choice, Missed, evaluate};
 use crate::volume::Volumes;
 use crate::warning::{self, Warning, WarningCode};
 use crate::{Error, Scene, collider, link};
@@ -64,6 +64,8 @@ pub(crate) struct Group {
     size: f64,
     /// What is solved less accurately than asked for.
     pub(crate) outside: OutsideVolume,
+    /// Whether the last frame of VBD missed the accuracy wanted.
+    misses_accuracy: bool,
     /// Warnings for the next report.
     pub(crate) warnings: Vec<Warning>,
     /// What the last cut did to kappa, if that is to be reported.
@@ -92,7 +94,7 @@ pub(crate) fn kappa_limit(solver: &SolverSpec, settings: &StepSettings) -> Optio
     limit.kappa.is_finite().then_some(limit)
 }
 
-/// Puts the iterations of settings, and the substep of VBD, into those of a step.
+/// Puts what `auto` chose into the settings of a step: the iterations, and the substep of VBD.
 pub(crate) fn adopt(settings: &mut StepSettings, spec: &SolverSpec) {
     settings.iterations = spec.iterations;
     if let (Method::Vbd, Substeps::Fixed(substeps)) = (spec.method, spec.substeps) {
@@ -148,7 +150,9 @@ impl Group {
         settings.substeps = substeps;
         let is_open = joined.leaves_substeps_open() && !place.is_device();
         let (spec, choice) = resolve(&scene.solver, choice, is_open);
-        adopt(&mut settings, &spec);
+        if scene.solver.method == Method::Auto {
+            adopt(&mut settings, &spec);
+        }
         let limit = kappa_limit(&scene.solver, &settings);
         solver.limit_kappa(None, limit, cuttable.mesh())?;
         for handle in &mut joined.handles {
@@ -183,6 +187,7 @@ impl Group {
             spec,
             size,
             outside: OutsideVolume::default(),
+            misses_accuracy: false,
             warnings: Vec::new(),
             cut_kappa: None,
             rest: scene.solver.sleep.map(Rest::new),
@@ -194,7 +199,7 @@ impl Group {
 
     /// Whether VBD was chosen for it.
     pub(crate) fn chose_vbd(&self) -> bool {
-        self.spec.method == Method::Vbd && self.choice.is_some()
+        self.choice.is_some_and(|choice| choice.by_vbd)
     }
 
     /// Judges the accuracy of the present settings and notes warnings. O(tets log tets).
@@ -220,11 +225,17 @@ impl Group {
         }
         let substeps = self.settings.substeps;
         let mesh = self.cuttable.mesh();
-        let judged = evaluate(
+        let mut judged = evaluate(
             demands(spec, &self.solver, mesh, |_| true),
             |_| substeps,
             form,
         );
+        if self
+            .choice
+            .is_some_and(|c| c.missed == Some(Missed::Budget))
+        {
+            judged.missed = Some(Missed::Budget);
+        }
         let chosen = self.choice.is_some();
         self.warnings.extend(warning::of_substeps(
             &self.bodies,
@@ -353,6 +364,7 @@ impl Group {
         }
         let (schedule, settings) = (&self.plan.schedule, &self.settings);
         let step = self.solver.step(schedule, settings, keeping_residuals)?;
+        self.judge_step();
         collider::advance(&mut self.settings);
         self.hand.arrive();
         let time = self.settings.time_step;
@@ -368,6 +380,26 @@ impl Group {
             }
         }
         Ok(step)
+    }
+
+    /// Warns when VBD begins to miss the accuracy wanted.
+    fn judge_step(&mut self) {
+        let wanted = self.spec.accuracy.filter(|_| self.chose_vbd());
+        let (Some(wanted), Some(error)) = (wanted, self.solver.vbd_error()) else {
+            return;
+        };
+        let misses = error > wanted;
+        if misses && !self.misses_accuracy {
+            let message = format!(
+                "{} rounds of two-level VBD leave an estimated error of {:.0}% of the motion, where {:.0}% are wanted; use \
+                 more, smaller frames or a Poisson's ratio farther from 0.5",
+                self.settings.iterations,
+                100.0 * error.min(1e6),
+                100.0 * wanted
+            );
+            self.warn(WarningCode::NotConverged, message);
+        }
+        self.misses_accuracy = misses;
     }
 
     /// Whether a handle, a hand or a collider moves in a frame.

@@ -9,7 +9,7 @@
 use incise_xpbd::{StepSettings, VbdSettings};
 use serde::{Deserialize, Serialize};
 
-use crate::accuracy::{DEFAULT_ACCURACY, error_of_rounds, rounds_for};
+use crate::accuracy::DEFAULT_ACCURACY;
 use crate::limits::{coordinates, value, within};
 use crate::scene::{SolverSpec, Substeps};
 use crate::substeps::{Choice, Missed};
@@ -77,6 +77,9 @@ impl SolverSpec {
     }
 }
 
+/// Rounds of two-level VBD in a frame, at most: what has not converged then is reported.
+const MOST_ROUNDS: u32 = 20;
+
 /// The solver's name of a form.
 pub(crate) fn tet_solve(form: TetSolve) -> incise_xpbd::TetSolve {
     match form {
@@ -140,8 +143,7 @@ pub(crate) fn resolve(
     own.method = Method::GaussSeidel;
     match choice {
         Some(capped) if is_open && leaves_open(spec) && capped.missed == Some(Missed::Cap) => {
-            let accuracy = spec.accuracy.unwrap_or(DEFAULT_ACCURACY);
-            let (own, choice) = with_vbd(spec, capped, rounds_for(accuracy));
+            let (own, choice) = with_vbd(spec, capped);
             (own, Some(choice))
         }
         _ => (own, choice),
@@ -157,16 +159,19 @@ pub(crate) fn leaves_open(spec: &SolverSpec) -> bool {
         && !spec.kappa_limit.is_finite()
 }
 
-/// The settings with two-level VBD of one step a frame and some rounds, and what becomes of the choice of substeps.
-pub(crate) fn with_vbd(spec: &SolverSpec, choice: Choice, rounds: u32) -> (SolverSpec, Choice) {
+/// The settings with two-level VBD of one step a frame, and what becomes of the choice of substeps. Rounds end when their
+/// estimated error is the accuracy wanted.
+pub(crate) fn with_vbd(spec: &SolverSpec, choice: Choice) -> (SolverSpec, Choice) {
+    let accuracy = spec.accuracy.unwrap_or(DEFAULT_ACCURACY);
     let own = SolverSpec {
         method: Method::Vbd,
         two_level: true,
         substeps: Substeps::Fixed(1),
-        iterations: rounds,
+        iterations: MOST_ROUNDS,
+        accuracy: Some(accuracy),
         ..spec.clone()
     };
-    (own, choice.solved_by_vbd(error_of_rounds(rounds)))
+    (own, choice.solved_by_vbd(accuracy))
 }
 
 /// The settings of VBD for a scene's settings.

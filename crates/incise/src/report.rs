@@ -118,7 +118,7 @@ pub struct BodyReport {
     /// The method, where substeps or method are `auto`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub method: Option<ChosenMethod>,
-    /// Iterations of a substep, where substeps or method are `auto`.
+    /// Iterations of a substep, for VBD the most of them, where substeps or method are `auto`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub iterations: Option<u32>,
     /// Whether it is at rest and not solved, in a scene where bodies may sleep.

@@ -128,6 +128,9 @@ pub struct Choice {
     /// Whether that error comes from a Poisson's ratio near 0.5.
     #[serde(skip)]
     pub(crate) nearly_incompressible: bool,
+    /// Whether VBD takes the place of substeps.
+    #[serde(skip)]
+    pub(crate) by_vbd: bool,
 }
 
 impl Choice {
@@ -140,6 +143,7 @@ impl Choice {
             sliver_volume_fraction: 0.0,
             expected_error,
             nearly_incompressible: false,
+            by_vbd: true,
             ..self
         }
     }
@@ -213,6 +217,7 @@ pub(crate) fn evaluate(
         sliver_volume_fraction: if slivers > 0 { volume / total } else { 0.0 },
         expected_error,
         nearly_incompressible,
+        by_vbd: false,
     }
 }
 

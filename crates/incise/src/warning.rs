@@ -19,6 +19,8 @@ use crate::substeps::{Choice, Missed};
 pub enum WarningCode {
     /// The accuracy wanted needs more substeps than `max_substeps`.
     SubstepsCapped,
+    /// Two-level VBD has not reached the accuracy wanted in a frame.
+    NotConverged,
     /// The accuracy wanted needs more substeps than fit into `budget_ms`.
     BudgetTooSmall,
     /// The given number of substeps leaves an expected error of more than a tenth of the motion.
@@ -121,8 +123,8 @@ pub(crate) fn of_substeps(
 pub(crate) fn of_vbd(bodies: &[usize], choice: &Choice, spec: &SolverSpec) -> Warning {
     let step = 1e3 * spec.time_step;
     let message = format!(
-        "{} substeps would be needed, so it is solved by two-level VBD with one step a frame: accurate at rest and in slow \
-         motion (expected error {:.1}%), but vibrations of periods below {:.0} ms lose more than a tenth of their amplitude each \
+        "{} substeps would be needed, so it is solved by two-level VBD with one step a frame: accurate to {:.1}% at rest and in \
+         slow motion, but vibrations of periods below {:.0} ms lose more than a tenth of their amplitude each \
          period; set method = \"gauss-seidel\" and max_substeps = {} to resolve them",
         choice.substeps_needed,
         100.0 * choice.expected_error,

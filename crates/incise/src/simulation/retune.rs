@@ -283,7 +283,9 @@ impl Retuned {
             }
             _ => (after.clone(), choice),
         };
-        adopt(&mut settings, &own);
+        if after.method == Method::Auto {
+            adopt(&mut settings, &own);
+        }
         let (before, after) = (&group.spec, &own);
         let limits = [
             kappa_limit(before, &group.settings),

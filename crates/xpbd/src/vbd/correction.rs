@@ -48,7 +48,15 @@ pub struct CoarseCorrectionReport {
     pub iterations: u32,
     /// The part of the direction that was taken; 0 if no part of it lowers the potential.
     pub taken: f64,
+    /// The distance to the solution after the correction, as a part of the state's own energy: the root of the energy that
+    /// is estimated to be left to gain over that of the tets and a ten-thousandth of that of the motion. Infinite for a
+    /// state without energy that is no solution.
+    pub error: f64,
 }
+
+/// The weight of the energy of the motion in the measure of an error: what is lost of a motion in one step adds up in the
+/// steps to come.
+const MOTION: f64 = 1e-4;
 
 /// Matrix, aggregates and vectors of a correction. It belongs to the stars it was made of.
 #[derive(Clone, Debug)]
@@ -138,8 +146,9 @@ impl<R: Real> CoarseCorrection<R> {
 }
 
 impl<R: Real> Solver<R> {
-    /// Advances by one frame of VBD with a coarse correction after each sweep. A substep also ends when two corrections in a row find
-    /// nothing to gain: in single precision that is soon so in a stiff body.
+    /// Advances by one frame of VBD with a coarse correction after each sweep. A substep also ends when the accuracy of the
+    /// settings is reached, or when two corrections in a row find nothing to gain: in single precision that is soon so in a
+    /// stiff body.
     ///
     /// # Errors
     /// Those of [`Solver::step_vbd`].
@@ -187,12 +196,13 @@ impl<R: Real> Solver<R> {
         settings: &VbdSettings,
     ) -> Result<VbdReport, XpbdError> {
         let _span = tracing::debug_span!("xpbd::step_vbd_two_level").entered();
-        let mut idle = 0;
+        let (mut idle, accuracy) = (0, settings.accuracy);
         self.frame_of_vbd(stars, settings, CORRECTION_PENALTY, |step| {
             step.sweep();
-            let taken = step.correct(correction).taken;
-            idle = if taken > 0.0 { 0 } else { idle + 1 };
-            idle < IDLE_ROUNDS
+            let report = step.correct(correction);
+            idle = if report.taken > 0.0 { 0 } else { idle + 1 };
+            step.error = Some(report.error);
+            idle < IDLE_ROUNDS && accuracy.is_none_or(|accuracy| report.error > accuracy)
         })
     }
 }
@@ -253,13 +263,32 @@ impl<R: Real> ImplicitStep<'_, R> {
             .zip(direction)
             .map(|(f, d)| R::to_dvec3(*f).dot(R::to_dvec3(*d)))
             .sum();
-        let taken = self.search(base, direction, slope);
+        let (taken, elastic) = self.search(base, direction, slope);
         self.solver.project_to_colliders(&self.obstacles);
-        CoarseCorrectionReport { iterations, taken }
+        // Newton's method gains half of the slope; conjugate gradients leave the square of their reduction of it.
+        let is_solved = iterations < settings.iterations && taken == 1.0;
+        let part = if is_solved {
+            settings.reduction.powi(2)
+        } else {
+            1.0
+        };
+        let left = 0.5 * slope.max(0.0) * part;
+        let energy = elastic + MOTION * self.kinetic();
+        let error = if left > 0.0 {
+            (left / energy).sqrt()
+        } else {
+            0.0
+        };
+        CoarseCorrectionReport {
+            iterations,
+            taken,
+            error,
+        }
     }
 
-    /// Goes from `base` along a direction on which the potential falls by `slope` at first; returns how far.
-    fn search(&self, base: &[R::Vector], direction: &[R::Vector], slope: f64) -> f64 {
+    /// Goes from `base` along a direction on which the potential falls by `slope` at first; returns how far, and the energy
+    /// of the tets there.
+    fn search(&self, base: &[R::Vector], direction: &[R::Vector], slope: f64) -> (f64, f64) {
         let place = |part: f64| {
             let part = R::from_f64(part);
             let mut sound = true;
@@ -273,18 +302,19 @@ impl<R: Real> ImplicitStep<'_, R> {
             }
             sound
         };
+        let (start, elastic_at_start) = self.potentials();
         if !(slope.is_finite() && slope > 0.0) {
-            return 0.0;
+            return (0.0, elastic_at_start);
         }
-        let start = self.potential();
         let mut part = 1.0;
         for _ in 0..HALVINGS {
             let sound = place(part);
-            let rise = self.potential() - start;
+            let (potential, elastic) = self.potentials();
+            let rise = potential - start;
             // Below its own rounding the potential says nothing, and so close to the solution Newton is right.
             let drowned = part == 1.0 && 0.5 * slope < ROUNDING * start.abs();
             if sound && (rise < 0.0 || drowned) {
-                return part;
+                return (part, elastic);
             }
             // The minimum of the parabola through what is known, within reason.
             let parabola = slope * part * part / (2.0 * (rise + slope * part));
@@ -295,6 +325,6 @@ impl<R: Real> ImplicitStep<'_, R> {
             };
         }
         place(0.0);
-        0.0
+        (0.0, elastic_at_start)
     }
 }

@@ -46,6 +46,9 @@ pub struct VbdSettings {
     /// Ends a substep before its last iteration once the force residual has fallen to this fraction of its value at
     /// the free motion. Costs [`crate::ImplicitStep::residual`] each iteration.
     pub tolerance: Option<f64>,
+    /// Ends a substep of [`crate::Solver::step_vbd_two_level`] before its last iteration once the estimated error
+    /// ([`crate::CoarseCorrectionReport::error`]) is at most this.
+    pub accuracy: Option<f64>,
     /// Whether to report what the last iterate of the frame is worth. Costs [`crate::ImplicitStep::residual`] and
     /// [`crate::ImplicitStep::potential`] once a frame.
     pub measure: bool,
@@ -63,6 +66,7 @@ impl VbdSettings {
             integrator: Integrator::ImplicitEuler,
             guess: Guess::Inertia,
             tolerance: None,
+            accuracy: None,
             measure: false,
         }
     }
@@ -76,6 +80,11 @@ impl VbdSettings {
         let refuse = |what, value, range| Err(XpbdError::Setting { what, value, range });
         if self.step.relaxation >= 2.0 {
             return refuse("relaxation", self.step.relaxation, "above 0 and below 2");
+        }
+        if let Some(value) = self.accuracy
+            && !(value.is_finite() && value > 0.0)
+        {
+            return refuse("accuracy", value, "positive and finite");
         }
         match self.tolerance {
             Some(value) if !(value.is_finite() && value > 0.0) => {

@@ -19,6 +19,11 @@ impl<R: Real> ImplicitStep<'_, R> {
     /// constraints are in it with their present multipliers, see [`ImplicitStep::update_multipliers`].
     #[must_use]
     pub fn potential(&self) -> f64 {
+        self.potentials().0
+    }
+
+    /// [`ImplicitStep::potential`], and the part of it in the tets.
+    pub(super) fn potentials(&self) -> (f64, f64) {
         let solver = &*self.solver;
         let per_time_squared = self.time.to_f64().powi(-2);
         let elastic = |tets: &[TetConstraint<R>]| -> f64 {
@@ -36,6 +41,7 @@ impl<R: Real> ImplicitStep<'_, R> {
             0.5 * per_time_squared * solver.mass(p) * lag.length_squared()
         };
         let mut parts: Vec<f64> = solver.tets.par_chunks(PARALLEL_TETS).map(elastic).collect();
+        let elastic = parts.iter().sum();
         parts.extend((0..solver.particle_count()).map(inertia));
         if let Some(viscosity) = &self.stars.viscosity {
             let motion = |p: usize| solver.local(p) - R::to_dvec3(solver.previous[p]);
@@ -51,7 +57,18 @@ impl<R: Real> ImplicitStep<'_, R> {
         if !constraints.is_empty() {
             parts.push(constraints.energy(solver, &|p| solver.local(p as usize)));
         }
-        parts.into_iter().sum()
+        (parts.into_iter().sum(), elastic)
+    }
+
+    /// The energy in J of the motion in the substep.
+    pub(super) fn kinetic(&self) -> f64 {
+        let per_time_squared = self.time.to_f64().powi(-2);
+        let solver = &*self.solver;
+        let each = (0..solver.particle_count()).map(|p| {
+            let way = solver.local(p) - R::to_dvec3(solver.previous[p]);
+            solver.mass(p) * way.length_squared()
+        });
+        0.5 * per_time_squared * each.sum::<f64>()
     }
 
     /// The forces in N that are left over, `M (x̃ - x) / Δt² - ∇U(x)` with the energy U of tets, damping and constraints;

@@ -15,6 +15,9 @@ pub struct VbdReport {
     pub iterations: u32,
     /// With a tolerance: the force residual at the end of the last substep, as a fraction of that at the free motion.
     pub residual: Option<f64>,
+    /// With coarse corrections: the largest error that the last one of a substep left over, see
+    /// [`crate::CoarseCorrectionReport::error`].
+    pub error: Option<f64>,
     /// If measured: [`ImplicitStep::residual`] in N at the end of the frame.
     pub force: Option<f64>,
     /// If measured: [`ImplicitStep::potential`] in J at the end of the frame.
@@ -92,6 +95,10 @@ impl<R: Real> Solver<R> {
         for number in 1..=settings.step.substeps {
             let mut step = ImplicitStep::predicted(self, stars, settings, penalty, number);
             step.run(settings, &mut report, &mut iterate);
+            report.error = match (report.error, step.error) {
+                (Some(a), Some(b)) => Some(a.max(b)),
+                (a, b) => a.or(b),
+            };
             report.repaired += step.finish().repaired;
         }
         Ok(report)
@@ -115,6 +122,8 @@ pub struct ImplicitStep<'a, R: Real> {
     /// The Δt of the implicit Euler substep that is solved; BDF2 makes it 2/3 of the substep.
     pub(super) time: R,
     integrator: Integrator,
+    /// What the last coarse correction left over.
+    pub(super) error: Option<f64>,
     /// Held particles that could not follow their handle.
     lost: usize,
 }
@@ -179,6 +188,7 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
             settings: settings.step.clone(),
             time,
             integrator: settings.integrator,
+            error: None,
             lost,
         };
         if let (Guess::Adaptive, Some(gravity)) = (settings.guess, settings.step.gravity) {
