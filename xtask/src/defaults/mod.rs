@@ -62,7 +62,7 @@ fn experiment(arguments: &ExperimentArguments) -> anyhow::Result<Experiment<Row>
 fn newton_cells(quick: bool, folder: &Path) -> Vec<Cell<Row>> {
     let shapes = [Shape::Beam, Shape::Box, Shape::Liver];
     let (shapes, tets): (&[Shape], usize) = if quick {
-        (&shapes[..1], 150)
+        (&shapes[..1], 200)
     } else {
         (&shapes, 400)
     };
