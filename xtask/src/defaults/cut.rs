@@ -45,10 +45,29 @@ impl CutBody {
     }
 }
 
+/// When strokes are made into a falling body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) enum Strokes {
+    /// In free fall, before the ground loads the body.
+    Before,
+    /// While the body falls on the ground and lies there.
+    During,
+}
+
+impl Strokes {
+    /// The distance to the ground in m: twenty frames of 0.01 s take 0.2 m.
+    const fn drop(self) -> f64 {
+        match self {
+            Self::Before => 0.25,
+            Self::During => 0.05,
+        }
+    }
+}
+
 /// A body under load after 20 strokes.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct LoadRow {
-    pub(super) body: String,
+    pub(super) strokes: Strokes,
     pub(super) young_modulus: f64,
     pub(super) substeps: u32,
     pub(super) precision: String,
@@ -171,24 +190,25 @@ fn ends(mesh: &TetMesh) -> (DVec3, DVec3) {
     })
 }
 
-/// Twenty strokes without snapping into a body that falls on a ground 5 cm below, one a frame of 0.01 s.
+/// Strokes without snapping into a body that falls on a ground, one a frame of 0.01 s.
 pub(super) fn load(
     body: &CutBody,
     file: PathBuf,
     young_modulus: f64,
     substeps: u32,
     precision: Precision,
-    frames: u64,
+    strokes: Strokes,
+    [count, frames]: [u64; 2],
 ) -> anyhow::Result<LoadRow> {
     let mesh = body
         .mesh()?
         .context("the body of this scene is generated")?;
     let mut scene = scene(file, &mesh, young_modulus, precision);
     let (low, high) = ends(&mesh);
-    let height = (high.z - low.z) * scene.body[0].scale + 0.05;
+    let height = (high.z - low.z) * scene.body[0].scale + strokes.drop();
     scene.world.gravity = Some([0.0, 0.0, -9.81]);
     scene.world.ground = Some(GroundSpec {
-        height: low.z * scene.body[0].scale - 0.05,
+        height: low.z * scene.body[0].scale - strokes.drop(),
         friction: 0.5,
     });
     scene.solver.time_step = 0.01;
@@ -196,7 +216,7 @@ pub(super) fn load(
     let mut simulation = Simulation::with_threads(&scene, 1)?;
     let mut random = Random(18);
     let mut row = LoadRow {
-        body: body.name(),
+        strokes,
         young_modulus,
         substeps,
         precision: precision.name().to_owned(),
@@ -213,7 +233,7 @@ pub(super) fn load(
     };
     let mut is_failure = false;
     for frame in 0..frames {
-        if frame < 20 {
+        if frame < count {
             let stroke = random_stroke(&simulation, &mut random, 0.0);
             simulation.cut(stroke)?;
         }

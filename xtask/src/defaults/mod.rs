@@ -21,7 +21,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::experiment::{Cell, Experiment, ExperimentArguments};
-use cut::{CutBody, LoadRow, RestRow};
+use cut::{CutBody, LoadRow, RestRow, Strokes};
 use newton::{Case, Load, NewtonRow};
 
 /// The codes of the warnings of a run.
@@ -110,19 +110,31 @@ fn file_of(body: &CutBody, folder: &Path) -> anyhow::Result<Option<PathBuf>> {
 }
 
 fn load_cells(quick: bool, folder: &Path) -> Vec<Cell<Row>> {
-    let (exponents, substeps, tets, frames): (&[i32], &[u32], usize, u64) = if quick {
-        (&[3, 6, 12], &[5, 20], 300, 60)
+    let before = if quick {
+        vec![3, 6, 12]
     } else {
-        (
-            &[3, 4, 5, 6, 7, 8, 9, 10, 11, 12],
-            &[5, 10, 20, 50],
-            5000,
-            150,
-        )
+        (3..=12).collect()
     };
-    let cell = |&exponent: &i32| {
-        let (folder, substeps) = (folder.to_owned(), substeps.to_vec());
-        Cell::new(format!("load-1e{exponent}"), move || {
+    let before = before.into_iter().map(|e| (Strokes::Before, e));
+    let during: &[i32] = if quick { &[] } else { &[3, 6, 9, 12] };
+    let during = during.iter().map(|&e| (Strokes::During, e));
+    let (tets, lengths) = if quick {
+        (600, [6, 80])
+    } else {
+        (5000, [20, 150])
+    };
+    let cell = |(strokes, exponent): (Strokes, i32)| {
+        let folder = folder.to_owned();
+        let substeps: &[u32] = match (strokes, quick) {
+            (Strokes::During, _) => &[20],
+            (Strokes::Before, true) => &[5, 20],
+            (Strokes::Before, false) => &[5, 10, 20, 50],
+        };
+        let name = match strokes {
+            Strokes::Before => "before",
+            Strokes::During => "during",
+        };
+        Cell::new(format!("load-{name}-1e{exponent}"), move || {
             let body = CutBody::Liver(tets);
             let Some(file) = file_of(&body, &folder)? else {
                 return Ok(Row::Skipped(body.name()));
@@ -133,12 +145,13 @@ fn load_cells(quick: bool, folder: &Path) -> Vec<Cell<Row>> {
                 .collect();
             let rows = runs.par_iter().map(|&(precision, n)| {
                 let young_modulus = 10f64.powi(exponent);
-                cut::load(&body, file.clone(), young_modulus, n, precision, frames)
+                let file = file.clone();
+                cut::load(&body, file, young_modulus, n, precision, strokes, lengths)
             });
             Ok(Row::Load(rows.collect::<anyhow::Result<_>>()?))
         })
     };
-    exponents.iter().map(cell).collect()
+    before.chain(during).map(cell).collect()
 }
 
 fn rest_cells(quick: bool, folder: &Path, file: Option<PathBuf>) -> Vec<Cell<Row>> {
