@@ -64,7 +64,7 @@ fn newton_cells(quick: bool, folder: &Path) -> Vec<Cell<Row>> {
     let (shapes, tets): (&[Shape], usize) = if quick {
         (&shapes[..1], 200)
     } else {
-        (&shapes, 400)
+        (&shapes, 300)
     };
     let (stiffnesses, ratios): (&[f64], &[f64]) = if quick {
         (&[1e5, 1e9], &[0.3, 0.4999])

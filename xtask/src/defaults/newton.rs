@@ -28,7 +28,7 @@ const DENSITY: f64 = 1000.0;
 /// The press of a handle, as a fraction of the side it moves along.
 const PRESS: f64 = 0.1;
 /// Implicit steps of a period at the coarsest of three step sizes.
-const STEPS: f64 = 48.0;
+const STEPS: f64 = 24.0;
 
 /// What acts on a body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -493,7 +493,7 @@ impl Span {
             Load::Hanging | Load::Pressed => (STEPS, 2.0),
         };
         let stride = count(period / frame / steps_wanted);
-        // No more than 48 steps a frame: of vibrations faster than that the reference is not converged, which is stated.
+        // No more than 24 steps a frame: of vibrations faster than that the reference is not converged, which is stated.
         let steps = count((steps_wanted * frame / period).ceil().min(STEPS));
         let strides = |periods: f64| count((periods * period / frame / stride as f64).ceil());
         let ramp = if load == Load::Pressed {

@@ -15,7 +15,7 @@ in bold and listed below. The text describes the full form; `--quick` runs fewer
 const NEWTON: &str = "\
 ## Default scenes against Newton
 
-Bodies of 400 tets, longest side 0.2 m, density 1000 kg/m³, no damping, frames of 0.016 s.
+Bodies of 300 tets, longest side 0.2 m, density 1000 kg/m³, no damping, frames of 0.016 s.
 
 - *Hanging*: held at the end of smallest x (15% of the length), gravity from the first frame on, 9.81 m/s² for \
 E of at least 5e5 Pa and E / 5e5 Pa times that below, since softer bodies of this size collapse under their weight.
@@ -28,7 +28,7 @@ has no initial velocity, so this one runs in `incise_xpbd::Solver` with the subs
 
 *Settled*: mean positions over six periods and at least 48 frames (Hann window), since a default scene is not damped, against \
 the equilibrium by Newton's method. *Motion*: hanging, two periods from rest; pressed, the handle's motion and one more \
-period; spinning, one turn; at least four frames. The reference is implicit Euler at 48 or more steps a period (at most 48 a \
+period; spinning, one turn; at least four frames. The reference is implicit Euler at 24 or more steps a period (at most 24 a \
 frame), twice and four times as many, extrapolated twice; where the last extrapolation changed it by more than 2% of the \
 motion the cell states that as \"ref ±\". Error: root of the mean squared distance of all free particles, over that of the \
 displacement. The reference has the same mesh and energy, so the error of the mesh does not count.
