@@ -74,7 +74,7 @@ const EXPERIMENTS: &[(&str, Run)] = &[
     }),
     ("trade", trade::trade),
     ("stability", stability::stability),
-    ("defaults", defaults::defaults),
+    ("defaults", defaults::all),
     ("lean", lean::run),
     ("peers", peers::usual),
 ];
@@ -88,7 +88,7 @@ enum Command {
     /// What a cut costs by stage and size of the mesh, and what snapping trades.
     Cutting(cutting::CuttingArguments),
     /// Default settings: errors against Newton's method, and bodies after cuts, under load and at rest.
-    Defaults(ExperimentArguments),
+    Defaults(defaults::DefaultsArguments),
     /// Check the kernels on a GPU, time colorings, iterations and frames there, and write a page and JSON.
     GpuSweep(gpu::GpuArguments),
     /// Repeat the tables and figures of the paper, its numbers and ours side by side.

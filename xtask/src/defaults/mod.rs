@@ -13,6 +13,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use clap::{Args, ValueEnum};
 use incise::FrameReport;
 use incise::mesh::generate::Shape;
 use incise::mesh::io;
@@ -38,20 +39,55 @@ pub(crate) enum Row {
 }
 
 /// The runs of a cell are measured in parallel, since nothing is timed.
-pub(crate) fn defaults(arguments: &ExperimentArguments) -> anyhow::Result<()> {
-    experiment(arguments)?.run(arguments)
+pub(crate) fn all(arguments: &ExperimentArguments) -> anyhow::Result<()> {
+    experiment(arguments, None)?.run(arguments)
 }
 
-fn experiment(arguments: &ExperimentArguments) -> anyhow::Result<Experiment<Row>> {
+#[derive(Debug, Args)]
+pub(crate) struct DefaultsArguments {
+    #[command(flatten)]
+    experiment: ExperimentArguments,
+    /// Measure one part only, and write its page.
+    #[arg(long, value_enum)]
+    only: Option<Only>,
+}
+
+/// A part of the page.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Only {
+    /// Default scenes against Newton's method.
+    Newton,
+    /// Bodies under load after cuts.
+    Load,
+    /// Bodies at rest after cuts.
+    Rest,
+}
+
+pub(crate) fn defaults(arguments: &DefaultsArguments) -> anyhow::Result<()> {
+    experiment(&arguments.experiment, arguments.only)?.run(&arguments.experiment)
+}
+
+fn experiment(
+    arguments: &ExperimentArguments,
+    only: Option<Only>,
+) -> anyhow::Result<Experiment<Row>> {
+    let wanted = |part| only.is_none_or(|only| only == part);
     let quick = arguments.quick;
     let folder = arguments.out.join("defaults-scenes");
     fs::create_dir_all(&folder)?;
-    let mut cells = newton_cells(quick, &folder);
+    let mut cells = Vec::new();
+    if wanted(Only::Newton) {
+        cells.extend(newton_cells(quick, &folder));
+    }
     let file = arguments.models.as_ref();
     let file = file.map(|models| models.join("liver_11k.vtk"));
     let file = file.filter(|file| file.exists());
-    cells.extend(load_cells(quick, &folder));
-    cells.extend(rest_cells(quick, &folder, file));
+    if wanted(Only::Load) {
+        cells.extend(load_cells(quick, &folder));
+    }
+    if wanted(Only::Rest) {
+        cells.extend(rest_cells(quick, &folder, file));
+    }
     Ok(Experiment {
         name: "defaults",
         cells,
@@ -113,7 +149,7 @@ fn load_cells(quick: bool, folder: &Path) -> Vec<Cell<Row>> {
     let before = if quick {
         vec![3, 6, 12]
     } else {
-        (3..=12).collect()
+        vec![3, 4, 5, 6, 7, 8, 9, 10, 11, 12]
     };
     let before = before.into_iter().map(|e| (Strokes::Before, e));
     let during: &[i32] = if quick { &[] } else { &[3, 6, 9, 12] };
@@ -121,7 +157,7 @@ fn load_cells(quick: bool, folder: &Path) -> Vec<Cell<Row>> {
     let (tets, lengths) = if quick {
         (600, [6, 80])
     } else {
-        (5000, [20, 150])
+        (1500, [20, 120])
     };
     let cell = |(strokes, exponent): (Strokes, i32)| {
         let folder = folder.to_owned();
@@ -161,7 +197,7 @@ fn rest_cells(quick: bool, folder: &Path, file: Option<PathBuf>) -> Vec<Cell<Row
         vec![
             CutBody::File(file),
             CutBody::Liver(5000),
-            CutBody::Irregular(3000),
+            CutBody::Irregular(1000),
         ]
     };
     let lengths = if quick { [5, 50] } else { [30, 500] };

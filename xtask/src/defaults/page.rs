@@ -27,7 +27,7 @@ has no initial velocity, so this one runs in `incise_xpbd::Solver` with the subs
 `Simulation` gives to its scene.
 
 *Settled*: mean positions over six periods and at least 48 frames (Hann window), since a default scene is not damped, against \
-the equilibrium by Newton's method. *Motion*: hanging, two periods from rest; pressed, the handle's motion and one more \
+the equilibrium by Newton's method. The mean of a large swing differs from the equilibrium, by about 1% for the soft beam. *Motion*: hanging, two periods from rest; pressed, the handle's motion and one more \
 period; spinning, one turn; at least four frames. The reference is implicit Euler at 24 or more steps a period (at most 24 a \
 frame), twice and four times as many, extrapolated twice; where the last extrapolation changed it by more than 2% of the \
 motion the cell states that as \"ref ±\". Error: root of the mean squared distance of all free particles, over that of the \
@@ -40,8 +40,8 @@ Bar: at most 10%, or a warning. Warnings are printed by code; **no warning** mar
 const LOAD: &str = "\
 ## Bodies under load after cuts
 
-A generated liver of 5,000 tets and 0.25 m, Poisson's ratio 0.45, falls on a ground (friction 0.5) while 20 random \
-rectangles without snapping cut it, one in each of the first 20 frames; 150 frames of 0.01 s. *Before*: the ground is \
+A generated liver of 1,500 tets and 0.25 m, Poisson's ratio 0.45, falls on a ground (friction 0.5) while 20 random \
+rectangles without snapping cut it, one in each of the first 20 frames; 120 frames of 0.01 s. *Before*: the ground is \
 0.25 m below, so all strokes are made in free fall and the load follows. *During*: it is 0.05 m below, so half of the strokes \
 cut the body while the ground deforms it. Precision and substeps are given, all else is default. Bounded: no particle put \
 back, no divergence reported, largest speed below ten times and in the last 50 frames below three times the speed of a fall \
@@ -68,19 +68,27 @@ pub(super) fn page(rows: &[Row]) -> anyhow::Result<Page> {
         Part::Text(INTRODUCTION.to_owned()),
         Part::Table(summary(&newton, &load, &rest)),
         Part::Text(misses(&newton, &load, &rest)),
-        Part::Text(NEWTON.to_owned()),
     ];
-    parts.extend(newton_tables(&newton));
-    parts.push(Part::Text(LOAD.to_owned()));
-    parts.push(Part::Table(load_table(&load)));
-    parts.push(Part::Text(REST.to_owned()));
+    if !newton.is_empty() {
+        parts.push(Part::Text(NEWTON.to_owned()));
+        parts.extend(newton_tables(&newton));
+    }
+    if !load.is_empty() {
+        parts.push(Part::Text(LOAD.to_owned()));
+        parts.push(Part::Table(load_table(&load)));
+    }
+    if !rest.is_empty() || !skipped.is_empty() {
+        parts.push(Part::Text(REST.to_owned()));
+    }
     let mut table = rest_table(&rest);
     for name in skipped {
         let mut cells = vec![name.clone(), "skipped: no mesh, see --models".to_owned()];
         cells.resize(table.header.len(), "-".to_owned());
         table.push(cells);
     }
-    parts.push(Part::Table(table));
+    if !table.rows.is_empty() {
+        parts.push(Part::Table(table));
+    }
     Ok(Page {
         title: "What default settings give".to_owned(),
         parts,

@@ -16,7 +16,7 @@ fn the_quick_form_holds_its_bars() {
         out: out.clone(),
         shard: None,
     };
-    let cells = experiment(&arguments).unwrap().cells;
+    let cells = experiment(&arguments, None).unwrap().cells;
     let rows: Vec<Row> = cells.iter().map(|c| (c.measure)().unwrap()).collect();
     let (mut errors, mut skipped) = (0, 0);
     for row in &rows {
