@@ -81,8 +81,8 @@ fn random_sweeps(count: usize, snap: f64, seed: u64) -> String {
 fn an_irregular_body_stays_at_rest_at_every_snap_distance() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("irregular.vtk");
-    io::write(&file, &irregular(Shape::Torus, 300, 5).unwrap()).unwrap();
-    let (strokes, frames) = (8, 40);
+    io::write(&file, &irregular(Shape::Torus, 600, 5).unwrap()).unwrap();
+    let (strokes, frames) = (12, 60);
     for snap in [0.0, 0.1, 0.2] {
         for (precision, bound) in [(Precision::F64, 1e-9), (Precision::F32, 1e-2)] {
             let text = format!(
