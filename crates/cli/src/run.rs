@@ -153,6 +153,9 @@ fn scene(arguments: &RunArguments) -> Result<Scene, Failure> {
             let why = "--color-by residual needs constraints: the scene is solved by vbd";
             return Err(Failure::Input(anyhow!(why)));
         }
+        if scene.solver.method == Method::Auto {
+            scene.solver.method = Method::GaussSeidel;
+        }
         scene.report.every = 1;
         if !scene.report.quantities.contains(&Quantity::Residual) {
             scene.report.quantities.push(Quantity::Residual);

@@ -16,7 +16,7 @@ use crate::backend::{AnySolver, each, each_mut};
 use crate::grab::Hand;
 use crate::handle::Handle;
 use crate::joined::{Joined, demands, substeps};
-use crate::method::tet_solve;
+use crate::method::{resolve, tet_solve};
 use crate::place::Place;
 use crate::plan::Plan;
 use crate::recluster::Recluster;
@@ -39,6 +39,8 @@ pub(crate) struct Group {
     pub(crate) plan: Plan,
     /// Its colliders are where they are at the start of the next frame.
     pub(crate) settings: StepSettings,
+    /// The settings of the solver as a scene says them, with the method that was chosen.
+    pub(crate) spec: SolverSpec,
     pub(crate) handles: Vec<Handle>,
     /// What somebody holds.
     pub(crate) hand: Hand,
@@ -87,6 +89,14 @@ pub(crate) fn kappa_limit(solver: &SolverSpec, settings: &StepSettings) -> Optio
     limit.kappa.is_finite().then_some(limit)
 }
 
+/// Puts the iterations of settings, and the substep of VBD, into those of a step.
+pub(crate) fn adopt(settings: &mut StepSettings, spec: &SolverSpec) {
+    settings.iterations = spec.iterations;
+    if let (Method::Vbd, Substeps::Fixed(substeps)) = (spec.method, spec.substeps) {
+        settings.substeps = substeps;
+    }
+}
+
 /// The part of a body's volume outside the accuracy wanted from which a user is told.
 const OUTSIDE_FRACTION: f64 = 0.01;
 
@@ -133,6 +143,9 @@ impl Group {
         let mut solver = AnySolver::new(precision, &joined, &cuttable)?;
         let (substeps, choice) = joined.substeps(scene, &solver, &cuttable);
         settings.substeps = substeps;
+        let is_open = joined.leaves_substeps_open() && !place.is_device();
+        let (spec, choice) = resolve(&scene.solver, choice, is_open);
+        adopt(&mut settings, &spec);
         let limit = kappa_limit(&scene.solver, &settings);
         solver.limit_kappa(None, limit, cuttable.mesh())?;
         for handle in &mut joined.handles {
@@ -144,14 +157,14 @@ impl Group {
         if let Some(volumes) = &volumes {
             volumes.constrain(&mut solver, &cuttable, &plan.schedule)?;
         }
-        solver.prepare(&scene.solver, place)?;
+        solver.prepare(&spec, place)?;
         let recluster = scene.solver.recluster;
         let size = longest_side(&cuttable.mesh().positions);
         let mut group = Self {
             recluster: recluster.map(Recluster::new),
             solver,
             plan,
-            settings,
+            settings: settings.clone(),
             handles: joined.handles,
             hand: Hand::default(),
             volumes,
@@ -162,7 +175,8 @@ impl Group {
             cuttable,
             bodies: joined.bodies,
             choice,
-            first_substeps: substeps,
+            first_substeps: settings.substeps,
+            spec,
             size,
             outside: OutsideVolume::default(),
             warnings: Vec::new(),
@@ -170,13 +184,19 @@ impl Group {
             rest: scene.solver.sleep.map(Rest::new),
         };
         group.solver.positions(&mut group.positions);
-        group.judge_settings(&scene.solver);
+        group.judge_settings();
         Ok(group)
     }
 
+    /// Whether VBD was chosen for it.
+    pub(crate) fn chose_vbd(&self) -> bool {
+        self.spec.method == Method::Vbd && self.choice.is_some()
+    }
+
     /// Judges the accuracy of the present settings and notes warnings. O(tets log tets).
-    pub(crate) fn judge_settings(&mut self, spec: &SolverSpec) {
+    pub(crate) fn judge_settings(&mut self) {
         self.warnings.clear();
+        let spec = &self.spec.clone();
         let form = tet_solve(spec.tet_solve);
         if self.is_too_short_for_f32() && each!(&self.solver, solver => solver.is_single()) {
             let shortest = shortest_substep_of_f32(self.size);
@@ -185,6 +205,10 @@ impl Group {
                 self.settings.substep_time()
             );
             self.warn(WarningCode::ShortSubstepF32, message);
+        }
+        if let Some(choice) = self.choice.filter(|_| self.chose_vbd()) {
+            let warning = warning::of_vbd(&self.bodies, &choice, spec);
+            self.warnings.push(warning);
         }
         if spec.method != Method::GaussSeidel {
             self.outside = OutsideVolume::default();
@@ -240,7 +264,8 @@ impl Group {
     }
 
     /// After cuts: chooses substeps again where too much of the body is outside the accuracy, or warns.
-    pub(crate) fn judge_cut(&mut self, asked: &[Substeps], spec: &SolverSpec) {
+    pub(crate) fn judge_cut(&mut self, asked: &[Substeps]) {
+        let spec = &self.spec.clone();
         let fraction = self.outside.outside / self.cuttable.mesh().total_volume();
         if spec.method != Method::GaussSeidel
             || fraction <= OUTSIDE_FRACTION
@@ -260,7 +285,7 @@ impl Group {
                 noted.new_tets *= ratio * ratio;
             }
             self.choice = choice;
-            self.judge_settings(spec);
+            self.judge_settings();
         }
         self.outside.at_choice = self.outside.outside;
         let fraction = self.outside.outside / self.cuttable.mesh().total_volume();

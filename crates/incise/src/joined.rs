@@ -97,6 +97,11 @@ impl Joined {
         Ok(())
     }
 
+    /// Whether substeps are chosen for all of its bodies.
+    pub(crate) fn leaves_substeps_open(&self) -> bool {
+        self.substeps.iter().all(|s| *s == Substeps::Auto)
+    }
+
     /// The volume constraints of the group, if a body asks for them.
     pub(crate) fn volumes(&self) -> Option<Volumes> {
         Volumes::new(self.volume_compliances.clone())

@@ -9,8 +9,8 @@ use incise_xpbd::{Energy, Volume};
 use crate::Error;
 use crate::backend::{LastSubstep, each};
 use crate::group::Group;
-use crate::report::{BodyReport, EnergyReport, ResidualReport, SoftenedReport};
-use crate::scene::Quantity;
+use crate::report::{BodyReport, ChosenMethod, EnergyReport, ResidualReport, SoftenedReport};
+use crate::scene::{Method, Quantity};
 
 /// What the state of a group is worth, as far as somebody asked.
 #[derive(Clone, Copy, Debug, Default)]
@@ -93,6 +93,9 @@ pub(crate) fn residuals_of_tets(group: &Group) -> Option<Vec<f64>> {
     if group.asleep() {
         return Some(vec![0.0; group.cuttable.mesh().tets.len()]);
     }
+    if group.spec.method == Method::Vbd {
+        return None;
+    }
     let time = group.settings.substep_time();
     group.solver.residuals_of_tets(time)
 }
@@ -170,6 +173,11 @@ pub(crate) fn by_body(groups: &mut [Group], with_kappa: bool) -> Vec<BodyReport>
         BodyReport {
             bodies: group.bodies.clone(),
             substeps: group.settings.substeps,
+            method: group.choice.map(|_| match group.spec.method {
+                Method::Vbd => ChosenMethod::TwoLevelVbd,
+                _ => ChosenMethod::GaussSeidel,
+            }),
+            iterations: group.choice.map(|_| group.settings.iterations),
             asleep: group.rest.map(|rest| rest.asleep()),
             choice: group.choice,
             kappa: with_kappa.then(|| group.kappa()),

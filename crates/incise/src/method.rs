@@ -2,12 +2,17 @@
 //!
 //! Gauss-Seidel, Jacobi and Chebyshev are ways through the same constraints of XPBD. VBD lowers the potential of the
 //! implicit step, in which damping, links, soft handles and volume constraints are terms, so it takes every scene.
+//!
+//! `auto` takes Gauss-Seidel wherever `max_substeps` are enough for the accuracy wanted, and two-level VBD with one step
+//! a frame for bodies that are too stiff for that.
 
 use incise_xpbd::{StepSettings, VbdSettings};
 use serde::{Deserialize, Serialize};
 
+use crate::accuracy::{DEFAULT_ACCURACY, error_of_rounds, rounds_for};
 use crate::limits::{coordinates, value, within};
 use crate::scene::{SolverSpec, Substeps};
+use crate::substeps::{Choice, Missed};
 use crate::{Error, Scene, collider};
 
 /// How a substep is solved.
@@ -15,8 +20,12 @@ use crate::{Error, Scene, collider};
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Method {
-    /// Color after color, each constraint seeing the corrections before it.
+    /// Gauss-Seidel, and two-level VBD for each body of which the accuracy needs more than `max_substeps`. VBD is taken
+    /// only where `substeps`, `iterations`, `relaxation`, `tet_solve` and `kappa_limit` have their defaults, and not on a
+    /// GPU.
     #[default]
+    Auto,
+    /// Color after color, each constraint seeing the corrections before it.
     GaussSeidel,
     /// All constraints at once, corrections added up: see `incise_xpbd::Method::Jacobi`.
     Jacobi,
@@ -44,7 +53,7 @@ pub enum TetSolve {
 impl SolverSpec {
     /// The defaults that go with a method: those of [`SolverSpec::default`], but
     ///
-    /// * all methods but Gauss-Seidel take 20 `iterations`, as one of theirs does little;
+    /// * Jacobi, Chebyshev and VBD take 20 `iterations`, as one of theirs does little;
     /// * Jacobi and Chebyshev have a `relaxation` of 0.1: with 1 they overshoot where more than two tets meet;
     /// * VBD takes one substep, as it is stable at any stiffness.
     ///
@@ -60,7 +69,7 @@ impl SolverSpec {
             ..Self::default()
         };
         match method {
-            Method::GaussSeidel => {}
+            Method::Auto | Method::GaussSeidel => {}
             Method::Jacobi | Method::Chebyshev => (spec.iterations, spec.relaxation) = (20, 0.1),
             Method::Vbd => (spec.substeps, spec.iterations) = (1.into(), 20),
         }
@@ -95,7 +104,7 @@ pub(crate) fn settings(scene: &Scene) -> Result<StepSettings, Error> {
             },
             Method::Jacobi => incise_xpbd::Method::Jacobi,
             // VBD does not ask.
-            Method::GaussSeidel | Method::Vbd => incise_xpbd::Method::GaussSeidel,
+            Method::Auto | Method::GaussSeidel | Method::Vbd => incise_xpbd::Method::GaussSeidel,
         },
         tet_solve: tet_solve(solver.tet_solve),
         relaxation: solver.relaxation,
@@ -117,11 +126,43 @@ pub(crate) fn settings(scene: &Scene) -> Result<StepSettings, Error> {
     Ok(settings)
 }
 
+/// The settings of one group, in which `auto` is replaced by the method for it. `choice` is that of its substeps, which
+/// becomes that of VBD where VBD is taken: where `is_open` says that no number of substeps is given, and no device solves.
+pub(crate) fn resolve(
+    spec: &SolverSpec,
+    choice: Option<Choice>,
+    is_open: bool,
+) -> (SolverSpec, Option<Choice>) {
+    let mut own = spec.clone();
+    if spec.method != Method::Auto {
+        return (own, choice);
+    }
+    own.method = Method::GaussSeidel;
+    let defaults = SolverSpec::default();
+    let is_open = (spec.iterations, spec.relaxation, spec.tet_solve)
+        == (defaults.iterations, defaults.relaxation, defaults.tet_solve)
+        && !spec.kappa_limit.is_finite()
+        && is_open;
+    match choice {
+        Some(capped) if is_open && capped.missed == Some(Missed::Cap) => {
+            let accuracy = spec.accuracy.unwrap_or(DEFAULT_ACCURACY);
+            let rounds = rounds_for(accuracy);
+            own.method = Method::Vbd;
+            own.two_level = true;
+            own.substeps = Substeps::Fixed(1);
+            own.iterations = rounds;
+            (own, Some(capped.solved_by_vbd(error_of_rounds(rounds))))
+        }
+        _ => (own, choice),
+    }
+}
+
 /// The settings of VBD for a scene's settings.
 pub(crate) fn vbd(settings: &StepSettings) -> VbdSettings {
     VbdSettings {
         // What lies or hangs starts where it is, so that few sweeps do.
         guess: incise_xpbd::Guess::Adaptive,
+        integrator: incise_xpbd::Integrator::Bdf2,
         step: settings.clone(),
         ..VbdSettings::new(settings.time_step, settings.iterations)
     }

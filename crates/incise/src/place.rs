@@ -151,7 +151,7 @@ pub(crate) fn check(scene: &Scene) -> Result<(), Error> {
         let range = "of at most 256 tets on a GPU";
         return Err(value("solver.clustering", &solver.clustering, range));
     }
-    if limit > 32 && solver.method != Method::GaussSeidel {
+    if limit > 32 && !matches!(solver.method, Method::Auto | Method::GaussSeidel) {
         let range = "of at most 32 tets with this method on a GPU";
         return Err(value("solver.clustering", &solver.clustering, range));
     }

@@ -36,7 +36,7 @@ impl SolverSpec {
     #[must_use]
     pub fn paper(method: Method) -> Self {
         let (tet_solve, relaxation) = match method {
-            Method::GaussSeidel => (TetSolve::Sequential, 0.8),
+            Method::Auto | Method::GaussSeidel => (TetSolve::Sequential, 0.8),
             Method::Jacobi | Method::Chebyshev => (TetSolve::Sequential, 0.1),
             Method::Vbd => (TetSolve::Split, 1.0),
         };

@@ -96,6 +96,17 @@ fn is_zero(count: &usize) -> bool {
     *count == 0
 }
 
+/// The method that was chosen for a body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum ChosenMethod {
+    /// The one that the scene names, which is Gauss-Seidel for `auto`.
+    GaussSeidel,
+    /// VBD with a coarse correction after each sweep.
+    TwoLevelVbd,
+}
+
 /// A body's substeps and kappa, or those of bodies that are joined and therefore solved together.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
@@ -104,6 +115,12 @@ pub struct BodyReport {
     pub bodies: Vec<usize>,
     /// Substeps of a frame.
     pub substeps: u32,
+    /// The method, where substeps or method are `auto`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub method: Option<ChosenMethod>,
+    /// Iterations of a substep, where substeps or method are `auto`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub iterations: Option<u32>,
     /// Whether it is at rest and not solved, in a scene where bodies may sleep.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub asleep: Option<bool>,

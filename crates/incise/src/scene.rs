@@ -143,7 +143,7 @@ pub struct SolverSpec {
     /// Time of a frame in s.
     pub time_step: f64,
     /// The largest error wanted, as a fraction of the motion, above 0 and at most 1; absent: 0.1. Decides what
-    /// `substeps = "auto"` takes.
+    /// `substeps = "auto"` and `method = "auto"` take.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accuracy: Option<f64>,
     /// Equal parts of a frame: a number, or `auto`, which chooses for each body by the accuracy.
@@ -152,7 +152,7 @@ pub struct SolverSpec {
     pub max_substeps: u32,
     /// Passes over the constraints in a substep, or sweeps of VBD. With Gauss-Seidel 1 is what converges.
     pub iterations: u32,
-    /// How a pass is made.
+    /// How a substep is solved: `auto`, `gauss-seidel`, `jacobi`, `chebyshev` or `vbd`.
     pub method: Method,
     /// How the elastic energy of a tet is solved. VBD has no constraints.
     pub tet_solve: TetSolve,
@@ -202,7 +202,7 @@ impl Default for SolverSpec {
             substeps: Substeps::Auto,
             max_substeps: 200,
             iterations: 1,
-            method: Method::GaussSeidel,
+            method: Method::Auto,
             tet_solve: TetSolve::Split,
             relaxation: 1.0,
             spectral_radius: 0.99,
@@ -224,7 +224,8 @@ impl Default for SolverSpec {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Precision {
-    /// Single on a GPU and wherever the substep is long enough for it, else double.
+    /// Single on a GPU and wherever the substep is long enough for it, else double; double also where `method = "auto"`
+    /// takes VBD.
     #[default]
     Auto,
     /// Single: 32 bits.

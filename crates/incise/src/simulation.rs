@@ -167,7 +167,11 @@ impl Simulation {
             given => given,
         };
         let mut groups = make_groups(precision, joined)?;
-        let short = || groups.iter().any(Group::is_too_short_for_f32);
+        let short = || {
+            groups
+                .iter()
+                .any(|g| g.is_too_short_for_f32() || g.chose_vbd())
+        };
         if scene.solver.precision == Precision::Auto && !place.is_device() && short() {
             precision = Precision::F64;
             groups = make_groups(precision, Joined::all(scene, Body::all(scene)?, &islands)?)?;
@@ -310,7 +314,7 @@ impl Simulation {
             let asked: Vec<_> = bodies
                 .map(|body| body.substeps.unwrap_or(self.solver.substeps))
                 .collect();
-            group.judge_cut(&asked, &self.solver);
+            group.judge_cut(&asked);
         }
     }
 

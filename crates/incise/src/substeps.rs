@@ -128,6 +128,21 @@ pub struct Choice {
     pub(crate) nearly_incompressible: bool,
 }
 
+impl Choice {
+    /// What becomes of it where two-level VBD with this expected error takes the place of too many substeps.
+    pub(crate) fn solved_by_vbd(self, expected_error: f64) -> Self {
+        Self {
+            substeps: 1,
+            missed: None,
+            sliver_tets: 0,
+            sliver_volume_fraction: 0.0,
+            expected_error,
+            nearly_incompressible: false,
+            ..self
+        }
+    }
+}
+
 /// A tet as the choice of substeps sees it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TetDemand {

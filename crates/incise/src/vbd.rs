@@ -1,7 +1,7 @@
 //! [`VBD`]: what a group that is solved by VBD keeps, and how it follows a cut.
 //!
 //! VBD visits particles, so these have colors of their own; tets, clusters and their colors stay as they are for
-//! everybody who asks for them. After a cut particles keep their colors; only new ones, and those that now share a tet
+//! reports and renderers. After a cut particles keep their colors; only new ones, and those that now share a tet
 //! with one of their color, are colored again. Cost: O(tets) after each cut, as the stars of all particles are sorted
 //! again and all tets are checked.
 
@@ -19,6 +19,11 @@ use crate::{Error, method};
 
 /// Aggregates of a large body: factoring more of them would cost more than they gain.
 const AGGREGATES: usize = 50;
+
+/// How far conjugate gradients lower the residual of a correction: what the forces change within a step leaves about as
+/// much. Measured on a liver of 11,363 tets, E = 1e7 Pa, Poisson's ratio 0.49, pulled by 3 cm: 1.6% largest error in place
+/// of 0.9% with 0.01, in 7 iterations in place of 16.
+const REDUCTION: f64 = 0.1;
 
 /// Colors that cuts may add before all particles are colored again.
 const MORE_COLORS: usize = 3;
@@ -73,9 +78,9 @@ impl<R: Real> Vbd<R> {
         let schedule = schedule(&coloring);
         ms.color += milliseconds(start.elapsed());
         let start = Instant::now();
-        self.stars.rebuild(solver, &schedule)?;
-        if let Some(old) = &mut self.correction {
-            *old = correction(&self.stars, solver)?;
+        self.stars.rebuild(solver, &incidence, &schedule)?;
+        if let Some(correction) = &mut self.correction {
+            correction.follow(&self.stars);
         }
         ms.schedule += milliseconds(start.elapsed());
         Ok(())
@@ -151,6 +156,7 @@ fn correction<R: Real>(
     let small = CoarseCorrectionSettings::default();
     let settings = CoarseCorrectionSettings {
         aggregate: small.aggregate.max(solver.particle_count() / AGGREGATES),
+        reduction: REDUCTION,
         ..small
     };
     CoarseCorrection::new(stars, settings).map_err(|source| Error::Xpbd {

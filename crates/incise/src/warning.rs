@@ -9,6 +9,7 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::accuracy::DEFAULT_ACCURACY;
+use crate::scene::SolverSpec;
 use crate::substeps::{Choice, Missed};
 
 /// The kind of a [`Warning`], written in JSON as `substeps_capped` and so on.
@@ -22,6 +23,9 @@ pub enum WarningCode {
     Inaccurate,
     /// The expected error is too large because Poisson's ratio is near 0.5.
     NearlyIncompressible,
+    /// The accuracy wanted needs more substeps than `max_substeps`, so the body is solved by two-level VBD with one step a
+    /// frame: states at rest are accurate, vibrations are damped.
+    VibrationsDamped,
     /// Cuts have left more than 1% of a body's volume in tets that are solved less accurately than asked for.
     OutsideAccuracy,
     /// The substep is too short for single precision.
@@ -106,6 +110,22 @@ pub(crate) fn of_substeps(
         (WarningCode::Inaccurate, "set substeps = \"auto\"")
     };
     Some(Warning::new(code, bodies, format!("{error}; {fix}")))
+}
+
+/// The notice that bodies are solved by VBD in place of many substeps.
+pub(crate) fn of_vbd(bodies: &[usize], choice: &Choice, spec: &SolverSpec) -> Warning {
+    let step = 1e3 * spec.time_step;
+    let message = format!(
+        "{} substeps would be needed, so it is solved by two-level VBD with one step a frame: accurate at rest and in slow \
+         motion (expected error {:.1}%), but vibrations of periods below {:.0} ms lose more than a tenth of their amplitude each \
+         period; set method = \"gauss-seidel\" and max_substeps = {} to resolve them",
+        choice.substeps_needed,
+        100.0 * choice.expected_error,
+        // exp(-π z³ / 2) with z = 2π Δt / T is 0.9 at 15.5 steps a period.
+        15.5 * step,
+        choice.substeps_needed,
+    );
+    Warning::new(WarningCode::VibrationsDamped, bodies, message)
 }
 
 #[cfg(test)]

@@ -16,7 +16,8 @@ pub(crate) struct Turn {
     pub(crate) spec: SolverSpec,
 }
 
-const METHODS: [Method; 4] = [
+const METHODS: [Method; 5] = [
+    Method::Auto,
     Method::GaussSeidel,
     Method::Jacobi,
     Method::Chebyshev,
@@ -27,6 +28,7 @@ const CLUSTERINGS: [&str; 4] = ["none", "serial", "greedy-k", "pressure"];
 
 fn method_name(method: Method) -> &'static str {
     match method {
+        Method::Auto => "Auto",
         Method::GaussSeidel => "Gauss-Seidel",
         Method::Jacobi => "Jacobi",
         Method::Chebyshev => "Chebyshev",

@@ -84,7 +84,7 @@ pub use solver::Solver;
 pub use step::StepReport;
 pub use vbd::{
     CoarseCorrection, CoarseCorrectionReport, CoarseCorrectionSettings, Guess, ImplicitStep,
-    VbdReport, VbdSettings, VertexStars,
+    Integrator, VbdReport, VbdSettings, VertexStars,
 };
 pub use volume::VolumeConstraint;
 

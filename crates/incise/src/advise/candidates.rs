@@ -19,7 +19,7 @@ pub fn accurate_substeps(scene: &Scene) -> Result<u32, Error> {
         substeps: Substeps::Auto,
         max_substeps: 100_000,
         time_step: scene.solver.time_step,
-        ..SolverSpec::default()
+        ..SolverSpec::of(Method::GaussSeidel)
     };
     let simulation = Simulation::with_threads(&with(scene, &solver), 1)?;
     let bodies = simulation.report().bodies.iter();
@@ -96,6 +96,7 @@ pub fn candidates(scene: &Scene, substeps: u32) -> Vec<SolverSpec> {
 pub fn name(spec: &SolverSpec) -> String {
     let defaults = SolverSpec::of(spec.method);
     let method = match spec.method {
+        Method::Auto => "auto",
         Method::GaussSeidel => "gauss-seidel",
         Method::Jacobi => "jacobi",
         Method::Chebyshev => "chebyshev",

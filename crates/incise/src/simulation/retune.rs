@@ -14,14 +14,14 @@ use incise_xpbd::{KappaLimit, StepSettings};
 
 use super::Simulation;
 use crate::backend::AnySolver;
-use crate::group::{Group, kappa_limit};
+use crate::group::{Group, adopt, kappa_limit};
 use crate::joined::substeps;
 use crate::limits::{self, value};
-use crate::method::settings;
+use crate::method::{resolve, settings};
 use crate::place::Place;
 use crate::plan::{Plan, Recipe};
 use crate::recluster::Recluster;
-use crate::scene::{Method, Precision, SolverSpec};
+use crate::scene::{Method, Precision, SolverSpec, Substeps};
 use crate::sleep::Rest;
 use crate::substeps::Choice;
 use crate::{Error, Scene};
@@ -30,6 +30,8 @@ use crate::{Error, Scene};
 #[derive(Debug)]
 struct Retuned {
     settings: StepSettings,
+    /// With the method that was chosen.
+    spec: SolverSpec,
     choice: Option<Choice>,
     /// The limit of kappa before and from now on.
     limits: [Option<KappaLimit>; 2],
@@ -133,8 +135,8 @@ impl Simulation {
 
         // Nothing fails from here on: what is on a device has been fetched.
         for (group, retuned) in self.groups.iter_mut().zip(retuned) {
-            retuned.take_effect(group, solver)?;
-            group.judge_settings(solver);
+            retuned.take_effect(group)?;
+            group.judge_settings();
         }
         if settings.time_step.to_bits() != self.time_step.to_bits() {
             self.epoch = (self.next_frame, self.time_at(self.next_frame));
@@ -239,13 +241,41 @@ impl Retuned {
             ..settings.clone()
         };
         let mut choice = group.choice;
-        if substeps_follow_from(before) != substeps_follow_from(after) {
-            let bodies = group.bodies.iter().map(|&body| &scene.body[body]);
-            let asked: Vec<_> = bodies
-                .map(|body| body.substeps.unwrap_or(after.substeps))
-                .collect();
+        let bodies = group.bodies.iter().map(|&body| &scene.body[body]);
+        let asked: Vec<_> = bodies
+            .map(|body| body.substeps.unwrap_or(after.substeps))
+            .collect();
+        let chosen_anew = substeps_follow_from(before) != substeps_follow_from(after);
+        if chosen_anew {
             (settings.substeps, choice) = substeps(&asked, after, &group.solver, mesh);
         }
+        let (own, choice) = match after.method {
+            Method::Auto if chosen_anew => {
+                let is_open = asked.iter().all(|s| *s == Substeps::Auto) && !place.is_device();
+                resolve(after, choice, is_open)
+            }
+            // What was chosen stays, with everything else that differs.
+            Method::Auto => {
+                let SolverSpec {
+                    method,
+                    two_level,
+                    substeps,
+                    iterations,
+                    ..
+                } = group.spec.clone();
+                let own = SolverSpec {
+                    method,
+                    two_level,
+                    substeps,
+                    iterations,
+                    ..after.clone()
+                };
+                (own, choice)
+            }
+            _ => (after.clone(), choice),
+        };
+        adopt(&mut settings, &own);
+        let (before, after) = (&group.spec, &own);
         let limits = [
             kappa_limit(before, &group.settings),
             kappa_limit(after, &settings),
@@ -271,6 +301,7 @@ impl Retuned {
         }
         Ok(Self {
             settings,
+            spec: own,
             choice,
             limits,
             plan,
@@ -294,7 +325,8 @@ impl Retuned {
             && ((before.method, before.two_level) != (after.method, after.two_level) || softens()))
     }
 
-    fn take_effect(self, group: &mut Group, spec: &SolverSpec) -> Result<(), Error> {
+    fn take_effect(self, group: &mut Group) -> Result<(), Error> {
+        let spec = self.spec;
         match self.solver {
             Some(solver) => group.solver = solver,
             None => {
@@ -319,6 +351,7 @@ impl Retuned {
         group.set_first_substeps(self.settings.substeps);
         group.settings = self.settings;
         group.choice = self.choice;
+        group.spec = spec;
         Ok(())
     }
 }
@@ -328,6 +361,9 @@ fn substeps_follow_from(spec: &SolverSpec) -> impl PartialEq + use<> {
     (
         spec.time_step.to_bits(),
         spec.accuracy.map(f64::to_bits),
+        (spec.method, spec.iterations, spec.relaxation.to_bits()),
+        spec.kappa_limit.to_bits(),
+        spec.backend,
         spec.tet_solve,
         spec.substeps,
         spec.max_substeps,

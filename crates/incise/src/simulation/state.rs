@@ -13,7 +13,7 @@ use crate::measure::{
     by_body, energy, kappa, max_speed, residual, residuals_of_tets, softened, states, volume,
 };
 use crate::report::{FrameReport, Milliseconds, milliseconds};
-use crate::scene::{Method, Quantity};
+use crate::scene::Quantity;
 
 impl Simulation {
     /// Computes the quantities that this frame reports.
@@ -206,7 +206,7 @@ impl Simulation {
     /// ```
     #[must_use]
     pub fn residuals_of_tets(&self) -> Option<Vec<f64>> {
-        if !self.residuals_kept || self.solver.method == Method::Vbd {
+        if !self.residuals_kept {
             return None;
         }
         let groups = self.groups.iter().map(residuals_of_tets);

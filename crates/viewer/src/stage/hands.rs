@@ -6,7 +6,6 @@
 use std::collections::VecDeque;
 
 use incise::mesh::glam::DVec3;
-use incise::scene::Method;
 
 use super::{Hold, Stage};
 use crate::history::Moment;
@@ -213,12 +212,9 @@ impl Stage {
             .map(|p| positions[p.index()].distance(hit.point));
         let nearest = corners.into_iter().fold(f64::INFINITY, f64::min);
         let radius = (self.extent * self.grip.radius).max(1.001 * nearest);
-        let compliance = match self.simulation.solver_spec().method {
-            // It knows no springs.
-            Method::Vbd => 0.0,
-            _ => self.grip.compliance,
-        };
-        let grab = self.simulation.grab(hit.point, radius, compliance)?;
+        let grab = self
+            .simulation
+            .grab(hit.point, radius, self.grip.compliance)?;
         self.hold = grab.map(|grab| Hold {
             grab,
             depth: (hit.point - origin).dot(self.camera.forward()),

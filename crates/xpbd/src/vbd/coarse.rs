@@ -7,8 +7,9 @@
 //!
 //! The factor is kept from one correction to the next until conjugate gradients need a quarter more iterations than when it
 //! was new: a preconditioner need not be that of the present matrix, only symmetric and positive. Affine motions also stay
-//! what they are when the body turns. Cost: 144 operations a block, then a factorization of 12 unknowns an aggregate, in
-//! the first correction after a cut and where the factor has aged.
+//! what they are when the body turns. A cut changes neither aggregates nor factor: new particles join the aggregates of
+//! their neighbors, and all aggregates are grown again once the factor has aged. Cost: 36 operations a block, then a
+//! factorization of 12 unknowns an aggregate, only where the factor has aged.
 
 use super::cholesky::Cholesky;
 use super::matrix::Blocks;
@@ -19,6 +20,9 @@ const AGED: u32 = 4;
 
 /// Solutions after which a factor is stale in any case: it may be that of a state that was worse to begin with.
 const OLDEST: u32 = 32;
+
+/// The aggregate of a row that has none yet.
+const NONE: u32 = u32::MAX;
 
 /// Motions of an aggregate: four vectors.
 const VECTORS: usize = 4;
@@ -34,6 +38,8 @@ pub(super) struct Coarse {
     cholesky: Cholesky,
     values: Vec<f64>,
     age: Age,
+    /// Whether the mesh has changed since the aggregates were grown.
+    worn: bool,
 }
 
 /// How well the factor still does.
@@ -65,6 +71,60 @@ impl Coarse {
             cholesky: Cholesky::default(),
             values: Vec::new(),
             age: Age::default(),
+            worn: false,
+        }
+    }
+
+    /// Whether the mesh has changed since the aggregates were grown.
+    pub(super) fn is_worn(&self) -> bool {
+        self.worn
+    }
+
+    /// Follows another order of the particles, of which some are new: these join aggregates of their neighbors, with the
+    /// mean of their motions. O(blocks).
+    pub(super) fn follow<R: Real>(&mut self, old: &[u32], new: &[u32], matrix: &Blocks<R>) {
+        self.worn = true;
+        let mut before = vec![(NONE, [0.0; VECTORS]); new.len()];
+        for ((&p, &a), &weight) in old.iter().zip(&self.of).zip(&self.weights) {
+            before[p as usize] = (a, weight);
+        }
+        self.of.clear();
+        self.weights.clear();
+        for &p in new {
+            let (a, weight) = before[p as usize];
+            self.of.push(a);
+            self.weights.push(weight);
+        }
+        let mut joining: Vec<usize> = (0..new.len()).filter(|&row| self.of[row] == NONE).collect();
+        while !joining.is_empty() {
+            let waiting = joining.len();
+            let mut sums: Vec<(usize, u32, [f64; VECTORS])> = Vec::new();
+            joining.retain(|&row| {
+                let around = matrix.row(row).map(|(column, _)| column);
+                let host = around.clone().map(|column| self.of[column]).min();
+                let Some(host) = host.filter(|&host| host != NONE) else {
+                    return true;
+                };
+                let hosts = around.filter(|&column| self.of[column] == host);
+                let mut weight = [0.0; VECTORS];
+                for column in hosts {
+                    for (sum, part) in weight.iter_mut().zip(self.weights[column]) {
+                        *sum += part;
+                    }
+                }
+                // The first motion, a shift, is 1 everywhere and counts the neighbors.
+                let count = weight[0].max(1.0);
+                sums.push((row, host, weight.map(|sum| sum / count)));
+                false
+            });
+            for (row, host, weight) in sums {
+                (self.of[row], self.weights[row]) = (host, weight);
+            }
+            // A piece of new particles only.
+            if joining.len() == waiting {
+                self.age.usable = false;
+                return;
+            }
         }
     }
 
@@ -112,29 +172,43 @@ impl Coarse {
     pub(super) fn assemble<R: Real>(&mut self, matrix: &Blocks<R>, held: &[bool]) {
         const WIDTH: usize = 3 * VECTORS;
         self.cholesky.reset(WIDTH * self.count);
+        // The blocks of a row, times the motions of their columns, by aggregate: three rows of twelve numbers each.
+        let mut sums: Vec<(u32, [[f64; WIDTH]; 3])> = Vec::new();
         for (row, &a) in self.of.iter().enumerate() {
             let left = self.weights[row];
             if held[row] {
                 continue;
             }
+            sums.clear();
             for (column, block) in matrix.row(row) {
                 let b = self.of[column];
-                let right = self.weights[column];
                 // The lower triangle is enough.
                 if b > a || held[column] {
                     continue;
                 }
+                let k = sums.iter().position(|sum| sum.0 == b).unwrap_or(sums.len());
+                if k == sums.len() {
+                    sums.push((b, [[0.0; WIDTH]; 3]));
+                }
                 // By rows.
                 let [x, y, z] = block.map(|v| R::components(v).map(R::to_f64));
-                let block: [[f64; 3]; 3] = std::array::from_fn(|k| [x[k], y[k], z[k]]);
+                let right = self.weights[column];
+                for (k, sums) in sums[k].1.iter_mut().enumerate() {
+                    let entries = [x[k], y[k], z[k]];
+                    for (sums, right) in sums.chunks_exact_mut(3).zip(right) {
+                        for (sum, entry) in sums.iter_mut().zip(entries) {
+                            *sum += right * entry;
+                        }
+                    }
+                }
+            }
+            for (b, sums) in &sums {
                 for (i, left) in left.into_iter().enumerate() {
-                    for (k, entries) in block.iter().enumerate() {
+                    for (k, sums) in sums.iter().enumerate() {
                         let at = WIDTH * a as usize + 3 * i + k;
-                        let target = self.cholesky.row_mut(at, WIDTH * b as usize);
-                        for (target, right) in target.chunks_exact_mut(3).zip(right) {
-                            for (target, entry) in target.iter_mut().zip(entries) {
-                                *target += left * right * entry;
-                            }
+                        let target = self.cholesky.row_mut(at, WIDTH * *b as usize);
+                        for (target, sum) in target.iter_mut().zip(sums) {
+                            *target += left * sum;
                         }
                     }
                 }

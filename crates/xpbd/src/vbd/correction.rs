@@ -54,6 +54,8 @@ pub struct CoarseCorrectionReport {
 #[derive(Clone, Debug)]
 pub struct CoarseCorrection<R: Real> {
     settings: CoarseCorrectionSettings,
+    /// The particle of each row.
+    order: Vec<u32>,
     matrix: Blocks<R>,
     coarse: Coarse,
     conjugate: Conjugate<R>,
@@ -76,6 +78,7 @@ impl<R: Real> CoarseCorrection<R> {
     #[must_use]
     pub fn bytes(&self) -> usize {
         self.matrix.bytes()
+            + size_of_val(&*self.order)
             + self.coarse.bytes()
             + self.conjugate.bytes()
             + size_of_val(&*self.held)
@@ -109,6 +112,7 @@ impl<R: Real> CoarseCorrection<R> {
         let (of, count) = aggregates(&matrix.offsets, &matrix.columns, settings.aggregate);
         Ok(Self {
             settings,
+            order: stars.order.clone(),
             matrix,
             coarse: Coarse::new(of, count),
             conjugate: Conjugate::default(),
@@ -116,6 +120,14 @@ impl<R: Real> CoarseCorrection<R> {
             force: Vec::new(),
             base: Vec::new(),
         })
+    }
+
+    /// Follows stars that were rebuilt, after a cut for example. Particles keep their aggregates, new ones join those
+    /// around them, and the factor stays in use. Aggregates are grown again when it has aged. O(pairs).
+    pub fn follow(&mut self, stars: &VertexStars<R>) {
+        let old = std::mem::replace(&mut self.order, stars.order.clone());
+        self.matrix = Blocks::new(stars);
+        self.coarse.follow(&old, &self.order, &self.matrix);
     }
 
     /// Number of aggregates.
@@ -201,6 +213,7 @@ impl<R: Real> ImplicitStep<'_, R> {
             held,
             force,
             base,
+            ..
         } = correction;
         let rows = self.stars.order.len();
         assert!(
@@ -220,6 +233,11 @@ impl<R: Real> ImplicitStep<'_, R> {
         force.resize(rows, R::Vector::default());
         matrix.fill(self.solver, self.stars, self.time, held, force);
         if coarse.is_stale() {
+            if coarse.is_worn() {
+                let size = settings.aggregate;
+                let (of, count) = aggregates(&matrix.offsets, &matrix.columns, size);
+                *coarse = Coarse::new(of, count);
+            }
             coarse.place(|row| R::to_dvec3(base[row]));
             coarse.assemble(matrix, held);
         }

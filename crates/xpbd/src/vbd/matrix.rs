@@ -1,8 +1,8 @@
 //! [`Blocks`]: the matrix of a Newton step, one 3×3 block for each pair of particles with a common tet.
 //!
 //! Rows and columns follow the solving order of the stars, so colors are contiguous and rows are filled from the terms,
-//! every row by itself: no two threads write the same block, and each sum has one order. Cost: 9 numbers an edge and
-//! direction; a product is twice as many operations as numbers.
+//! every row by itself: no two threads write the same block, and each sum has one order. What is right of the diagonal is
+//! copied from the left. Cost: 9 numbers an edge and direction; a product is twice as many operations as numbers.
 
 use std::ops::Range;
 
@@ -26,6 +26,8 @@ pub(super) struct Blocks<R: Real> {
     pub(super) offsets: Vec<usize>,
     /// Where the blocks right of the diagonal begin in each row.
     upper: Vec<usize>,
+    /// Where the transpose of each block right of the diagonal is, row by row.
+    mirrors: Vec<u32>,
     /// The column of each block; the diagonal comes first in its row, the others ascend.
     pub(super) columns: Vec<u32>,
     pub(super) blocks: Vec<Block<R>>,
@@ -40,57 +42,66 @@ impl<R: Real> Blocks<R> {
     pub(super) fn bytes(&self) -> usize {
         size_of_val(&*self.offsets)
             + size_of_val(&*self.upper)
+            + size_of_val(&*self.mirrors)
             + size_of_val(&*self.columns)
             + size_of_val(&*self.blocks)
             + size_of_val(&*self.places)
             + size_of_val(&*self.excess)
     }
 
-    /// The pattern of some stars; no values yet. O(pairs log valence).
+    /// The pattern of some stars; no values yet. O(pairs + blocks log valence).
     pub(super) fn new(stars: &VertexStars<R>) -> Self {
         let rows = stars.order.len();
         let mut row_of = vec![0u32; rows];
         for (row, &p) in (0u32..).zip(&stars.order) {
             row_of[p as usize] = row;
         }
-        let mut offsets = vec![0];
+        let mut offsets = Vec::with_capacity(rows + 1);
+        offsets.push(0);
         let mut upper = Vec::with_capacity(rows);
-        let mut columns = Vec::new();
+        let mut columns: Vec<u32> = Vec::with_capacity(stars.terms.len());
         let mut places = Vec::with_capacity(stars.terms.len());
-        let mut neighbors: Vec<u32> = Vec::new();
+        // Which row has seen a column last, and where the column's block is in that row.
+        let mut seen = vec![(u32::MAX, 0u32); rows];
         for (row, diagonal) in (0..rows).zip(0u32..) {
-            neighbors.clear();
-            neighbors.extend(
-                stars
-                    .of(row)
-                    .iter()
-                    .flat_map(|s| s.others)
-                    .map(|p| row_of[p as usize]),
-            );
-            let linked = stars.constraints.neighbors(row);
-            neighbors.extend(
-                linked
-                    .map(|p| row_of[p as usize])
-                    .filter(|&q| q != diagonal),
-            );
-            neighbors.sort_unstable();
-            neighbors.dedup();
+            let first = columns.len();
             columns.push(diagonal);
-            upper.push(columns.len() + neighbors.partition_point(|&column| column < diagonal));
-            columns.extend(&neighbors);
-            for term in stars.of(row) {
-                places.push(term.others.map(|p| {
-                    let found = neighbors.binary_search(&row_of[p as usize]);
-                    let place = found.expect("a neighbor is in the list of neighbors") + 1;
-                    u32::try_from(place).expect("a row has fewer blocks than there are particles")
-                }));
+            seen[row].0 = diagonal;
+            let of_tets = stars.of(row).iter().flat_map(|term| term.others);
+            for p in of_tets.chain(stars.constraints.neighbors(row)) {
+                let column = row_of[p as usize];
+                let mark = &mut seen[column as usize].0;
+                if *mark != diagonal {
+                    *mark = diagonal;
+                    columns.push(column);
+                }
             }
+            let beside = &mut columns[first + 1..];
+            beside.sort_unstable();
+            upper.push(first + 1 + beside.partition_point(|&column| column < diagonal));
+            for (place, &column) in (1u32..).zip(&*beside) {
+                seen[column as usize].1 = place;
+            }
+            let terms = stars.of(row).iter();
+            places
+                .extend(terms.map(|term| term.others.map(|p| seen[row_of[p as usize] as usize].1)));
             offsets.push(columns.len());
         }
         let blocks = vec![[R::Vector::default(); 3]; columns.len()];
+        // Rows come in ascending order, so the transposes in a row are met from its first block on.
+        let mut next: Vec<usize> = offsets[..rows].iter().map(|first| first + 1).collect();
+        let mut mirrors = Vec::with_capacity(columns.len() / 2);
+        for (row, &from) in upper.iter().enumerate() {
+            for &column in &columns[from..offsets[row + 1]] {
+                let place = &mut next[column as usize];
+                mirrors.push(u32::try_from(*place).expect("blocks are numbered in 32 bits"));
+                *place += 1;
+            }
+        }
         Self {
             offsets,
             upper,
+            mirrors,
             columns,
             blocks,
             places,
@@ -119,6 +130,7 @@ impl<R: Real> Blocks<R> {
         .collect_into_vec(&mut self.excess);
         let Self {
             offsets,
+            upper,
             columns,
             blocks,
             places,
@@ -151,6 +163,7 @@ impl<R: Real> Blocks<R> {
                 let free = solver.previous[p] + solver.velocities[p] * time;
                 *force = (free - x) * inertia;
                 let mut isotropic = inertia;
+                let lower = upper[row] - offsets[row];
                 let pairs = stars.offsets[row]..stars.offsets[row + 1];
                 for pair in pairs {
                     let term = &stars.terms[pair];
@@ -167,6 +180,9 @@ impl<R: Real> Blocks<R> {
                     add_outer::<R>(&mut blocks[0], slope, slope);
                     let around = [(a, b, c, wa), (b, c, a, wb), (c, a, b, wc)];
                     for ((_, b, c, pull), place) in around.into_iter().zip(places[pair]) {
+                        if place as usize >= lower {
+                            continue;
+                        }
                         let gradient = R::cross(b, c) * term.slope;
                         let block = &mut blocks[place as usize];
                         add_outer::<R>(block, -slope, gradient);
@@ -189,6 +205,25 @@ impl<R: Real> Blocks<R> {
                 }
             }
         });
+        self.mirror(held);
+    }
+
+    /// Copies what is left of the diagonal to its right, but in rows of particles that are held.
+    fn mirror(&mut self, held: &[bool]) {
+        let mut mirrors = self.mirrors.iter();
+        for (row, &held) in held.iter().enumerate() {
+            let right = self.upper[row]..self.offsets[row + 1];
+            for (block, &mirror) in right.zip(&mut mirrors) {
+                if !held {
+                    let [a, b, c] = self.blocks[mirror as usize].map(R::components);
+                    self.blocks[block] = [
+                        R::vector(a[0], b[0], c[0]),
+                        R::vector(a[1], b[1], c[1]),
+                        R::vector(a[2], b[2], c[2]),
+                    ];
+                }
+            }
+        }
     }
 
     /// `y = A x`.
@@ -236,7 +271,7 @@ impl<R: Real> Blocks<R> {
 
     /// The columns and blocks of a row.
     #[inline]
-    pub(super) fn row(&self, row: usize) -> impl Iterator<Item = (usize, &Block<R>)> {
+    pub(super) fn row(&self, row: usize) -> impl Iterator<Item = (usize, &Block<R>)> + Clone {
         let range = self.offsets[row]..self.offsets[row + 1];
         self.columns[range.clone()]
             .iter()

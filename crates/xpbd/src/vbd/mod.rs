@@ -25,6 +25,7 @@ mod constraints;
 mod corner_term;
 mod correction;
 mod hessian;
+mod history;
 mod matrix;
 mod settings;
 mod stars;
@@ -34,6 +35,6 @@ mod sweep;
 mod viscosity;
 
 pub use correction::{CoarseCorrection, CoarseCorrectionReport, CoarseCorrectionSettings};
-pub use settings::{Guess, VbdSettings};
+pub use settings::{Guess, Integrator, VbdSettings};
 pub use stars::VertexStars;
 pub use step::{ImplicitStep, VbdReport};

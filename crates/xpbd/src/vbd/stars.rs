@@ -10,6 +10,7 @@ use incise_graph::{GraphError, Incidence, Schedule};
 
 use super::constraints::ConstraintTerms;
 use super::corner_term::CornerTerm;
+use super::history::History;
 use super::viscosity::Viscosity;
 use crate::scalar::Scalar;
 use crate::{Real, Solver};
@@ -35,6 +36,8 @@ pub struct VertexStars<R: Real> {
     pub(super) size: f64,
     /// Velocities a substep ago, kept only for [`super::Guess::Adaptive`].
     pub(super) earlier: Vec<R::Vector>,
+    /// Kept only for [`super::Integrator::Bdf2`].
+    pub(super) history: History<R>,
     /// Distances, volumes and attachments.
     pub(super) constraints: ConstraintTerms<R>,
     /// Made by the first substep in which a material is damped.
@@ -57,20 +60,26 @@ impl<R: Real> VertexStars<R> {
             tet_count: 0,
             size: 0.0,
             earlier: Vec::new(),
+            history: History::default(),
             constraints: ConstraintTerms::default(),
             viscosity: None,
         };
-        stars.rebuild(solver, schedule)?;
+        stars.rebuild(solver, &solver.star_incidence(), schedule)?;
         Ok(stars)
     }
 
-    /// Rebuilds the stars in place after tets have changed; memory is used again. O(tets).
+    /// Rebuilds the stars in place after tets have changed, given the [`Solver::star_incidence`] of the present tets; memory
+    /// is used again. O(tets).
     ///
     /// # Errors
     /// Those of [`VertexStars::new`]; nothing has changed then.
-    pub fn rebuild(&mut self, solver: &Solver<R>, schedule: &Schedule) -> Result<(), GraphError> {
-        let incidence = solver.star_incidence();
-        schedule.check(&incidence)?;
+    pub fn rebuild(
+        &mut self,
+        solver: &Solver<R>,
+        incidence: &Incidence,
+        schedule: &Schedule,
+    ) -> Result<(), GraphError> {
+        schedule.check(incidence)?;
         self.order.clear();
         self.order.extend(schedule.order());
         self.colors.clear();
@@ -104,7 +113,7 @@ impl<R: Real> VertexStars<R> {
             .max(0.0)
             .cbrt();
         self.earlier.clear();
-        self.constraints.rebuild(solver, &self.order, &incidence);
+        self.constraints.rebuild(solver, &self.order, incidence);
         self.viscosity = None;
         Ok(())
     }
@@ -118,6 +127,7 @@ impl<R: Real> VertexStars<R> {
             + size_of_val(&*self.terms)
             + size_of_val(&*self.tets)
             + size_of_val(&*self.earlier)
+            + self.history.bytes()
             + self.constraints.bytes()
             + self.viscosity.as_ref().map_or(0, |v| v.bytes())
     }

@@ -1,7 +1,7 @@
 //! [`Solver::step_vbd`] and [`ImplicitStep`]: a frame, and one substep of it opened up.
 
 use super::constraints::SWEEP_PENALTY;
-use super::{Guess, VbdSettings, VertexStars};
+use super::{Guess, Integrator, VbdSettings, VertexStars};
 use crate::collider::Obstacle;
 use crate::real::{finite, load, store, weight};
 use crate::{Real, Solver, StepReport, StepSettings, XpbdError};
@@ -112,7 +112,9 @@ pub struct ImplicitStep<'a, R: Real> {
     pub(super) obstacles: Vec<Obstacle<R>>,
     /// Whether the frame ends with it.
     last: bool,
+    /// The Δt of the implicit Euler substep that is solved; BDF2 makes it 2/3 of the substep.
     pub(super) time: R,
+    integrator: Integrator,
     /// Held particles that could not follow their handle.
     lost: usize,
 }
@@ -151,11 +153,22 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
             stars.fits(solver),
             "the stars belong to these particles, tets and constraints"
         );
-        let time = R::from_f64(settings.step.substep_time());
+        let substep_time = settings.step.substep_time();
+        let implicit_time = match settings.integrator {
+            Integrator::ImplicitEuler => {
+                stars.history.clear();
+                substep_time
+            }
+            Integrator::Bdf2 => {
+                let gravity = settings.step.gravity;
+                stars.history.begin(solver, substep_time, gravity)
+            }
+        };
+        let time = R::from_f64(implicit_time);
         solver.predict(&settings.step, time);
         let ended = f64::from(number) / f64::from(settings.step.substeps);
         let lost = solver.move_held(ended);
-        stars.begin(solver, settings.step.substep_time(), penalty);
+        stars.begin(solver, implicit_time, penalty);
         let elapsed = ended * settings.step.time_step;
         let obstacles = Obstacle::place(&settings.step, elapsed, solver.origin).collect();
         let mut step = Self {
@@ -165,6 +178,7 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
             last: number == settings.step.substeps,
             settings: settings.step.clone(),
             time,
+            integrator: settings.integrator,
             lost,
         };
         if let (Guess::Adaptive, Some(gravity)) = (settings.guess, settings.step.gravity) {
@@ -250,6 +264,10 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
         let per_time = R::ONE / self.time;
         let repaired = self.solver.update_velocities(self.time, per_time);
         self.solver.update_held(per_time);
+        if self.integrator == Integrator::Bdf2 {
+            let touches = |x| self.obstacles.iter().any(|o| o.touched_at(x).is_some());
+            self.stars.history.end(self.solver, touches);
+        }
         if self.last {
             self.solver.arrive();
         }

@@ -36,6 +36,7 @@ mod refusals;
 mod residuals;
 mod rest;
 mod vbd;
+mod vbd_bdf2;
 mod vbd_constraints;
 mod vbd_correction;
 mod vbd_damping;

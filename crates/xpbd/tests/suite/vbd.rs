@@ -394,7 +394,9 @@ fn stars_follow_a_cut() {
         }
     }
     let schedule = schedule(&solver);
-    stars.rebuild(&solver, &schedule).unwrap();
+    stars
+        .rebuild(&solver, &solver.star_incidence(), &schedule)
+        .unwrap();
     let mut other = VertexStars::new(&solver, &schedule).unwrap();
     assert_eq!(format!("{stars:?}"), format!("{other:?}"));
     // The right half is pushed; the left one does not feel it.
