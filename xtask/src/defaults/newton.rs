@@ -13,7 +13,8 @@ use incise::mesh::generate::{Shape, generate};
 use incise::mesh::glam::DVec3;
 use incise::mesh::{ParticleId, TetMesh};
 use incise::scene::{BodySpec, HandleSpec, Region, ShapeSpec};
-use incise::xpbd::{Material, Real, StepSettings};
+use incise::report::ChosenMethod;
+use incise::xpbd::{Integrator, Material, Real, StepSettings, VbdSettings};
 use incise::{Scene, Simulation};
 use incise_reference::Body;
 use serde::{Deserialize, Serialize};
@@ -71,6 +72,8 @@ pub(crate) struct NewtonRow {
     pub(super) young_modulus: f64,
     pub(super) poisson_ratio: f64,
     pub(super) tets: usize,
+    /// What `auto` chose.
+    pub(super) method: String,
     pub(super) substeps: u32,
     pub(super) precision: String,
     /// Frames of 0.016 s over which the motion is compared.
@@ -138,6 +141,7 @@ pub(super) fn measure(case: Case, folder: &Path) -> anyhow::Result<NewtonRow> {
         young_modulus: case.young_modulus,
         poisson_ratio: case.poisson_ratio,
         tets: setup.mesh.tets.len(),
+        method: run.method,
         substeps: run.substeps,
         precision: run.precision,
         frames: span.stride * span.motion,
@@ -155,6 +159,7 @@ struct Run {
     motion: Vec<Vec<DVec3>>,
     /// Mean positions of the settled state.
     mean: Vec<DVec3>,
+    method: String,
     substeps: u32,
     precision: String,
     warned: Warned,
@@ -383,18 +388,23 @@ impl Setup {
             motion: Vec::new(),
             mean: vec![DVec3::ZERO; self.mesh.positions.len()],
             substeps: 0,
+            method: String::new(),
             precision: String::new(),
             warned: Warned::new(),
         };
         let report = simulation.step()?;
         warnings(report, &mut run.warned);
-        run.substeps = report.bodies.first().map_or(0, |body| body.substeps);
+        let chosen = report.bodies.first().context("the choice is reported")?;
+        run.substeps = chosen.substeps;
+        let is_vbd = chosen.method == Some(ChosenMethod::TwoLevelVbd);
+        let rounds = is_vbd.then_some(chosen.iterations.unwrap_or(1));
+        run.method = if is_vbd { "vbd" } else { "gauss-seidel" }.to_owned();
         report.precision.clone_into(&mut run.precision);
         if case.load == Load::Spinning {
             run.motion = if run.precision == "f32" {
-                self.spun::<f32>(case, span, run.substeps)?
+                self.spun::<f32>(case, span, run.substeps, rounds)?
             } else {
-                self.spun::<f64>(case, span, run.substeps)?
+                self.spun::<f64>(case, span, run.substeps, rounds)?
             };
             return Ok(run);
         }
@@ -424,13 +434,14 @@ impl Setup {
         Ok(run)
     }
 
-    /// The motion of a body that spins at the start, which no scene can say, with the substeps and the precision that
-    /// its scene has.
+    /// The motion of a body that spins at the start, which no scene can say, with the substeps, the precision and the rounds
+    /// of two-level VBD that its scene has.
     fn spun<R: Real>(
         &self,
         case: Case,
         span: &Span,
         substeps: u32,
+        rounds: Option<u32>,
     ) -> anyhow::Result<Vec<Vec<DVec3>>> {
         let material = Material {
             young_modulus: case.young_modulus,
@@ -446,9 +457,15 @@ impl Setup {
             substeps,
             ..StepSettings::new(self.scene.solver.time_step)
         };
-        let recipe = Recipe::Xpbd {
-            clustering: "serial:10",
-            settings,
+        let recipe = match rounds {
+            Some(rounds) => Recipe::Corrected(VbdSettings {
+                integrator: Integrator::Bdf2,
+                ..VbdSettings::new(self.scene.solver.time_step, rounds)
+            }),
+            None => Recipe::Xpbd {
+                clustering: "serial:10",
+                settings,
+            },
         };
         let mut runner = Runner::new(solver, &self.mesh, &recipe)?;
         let mut motion = Vec::new();
