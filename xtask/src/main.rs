@@ -4,6 +4,7 @@
 
 mod coloring;
 mod cutting;
+mod defaults;
 mod experiment;
 mod gpu;
 mod lean;
@@ -73,6 +74,7 @@ const EXPERIMENTS: &[(&str, Run)] = &[
     }),
     ("trade", trade::trade),
     ("stability", stability::stability),
+    ("defaults", defaults::all),
     ("lean", lean::run),
     ("peers", peers::usual),
 ];
@@ -85,6 +87,8 @@ enum Command {
     Coloring(coloring::ColoringArguments),
     /// What a cut costs by stage and size of the mesh, and what snapping trades.
     Cutting(cutting::CuttingArguments),
+    /// Default settings: errors against Newton's method, and bodies after cuts, under load and at rest.
+    Defaults(defaults::DefaultsArguments),
     /// Check the kernels on a GPU, time colorings, iterations and frames there, and write a page and JSON.
     GpuSweep(gpu::GpuArguments),
     /// Repeat the tables and figures of the paper, its numbers and ours side by side.
@@ -119,6 +123,7 @@ fn main() -> anyhow::Result<()> {
         Command::All(arguments) => EXPERIMENTS.iter().try_for_each(|(_, run)| run(&arguments)),
         Command::Coloring(arguments) => coloring::coloring(&arguments),
         Command::Cutting(arguments) => cutting::cutting(&arguments),
+        Command::Defaults(arguments) => defaults::defaults(&arguments),
         Command::GpuSweep(arguments) => gpu::sweep(&arguments),
         Command::Paper(arguments) => paper::paper(&arguments),
         Command::Merge(arguments) => experiment::merge(&arguments)?

@@ -1,6 +1,8 @@
-//! A body at rest stays at rest however it is cut, with the default settings.
+//! Bodies after random cuts, with the default settings: at rest they stay at rest, under load they stay bounded.
 
 use incise::Simulation;
+use incise::mesh::generate::{Shape, irregular};
+use incise::mesh::io;
 use incise::scene::{Precision, Scene};
 
 /// Random numbers from 0 to below 1 (`SplitMix64`).
@@ -22,20 +24,12 @@ impl Random {
 
 /// A free body of 25 cm without gravity, and random strokes of a blade through it, one in each frame.
 fn scene(shape: &str, strokes: usize, snap: f64, precision: Precision, seed: u64) -> Scene {
-    let mut random = Random(seed);
-    let mut text = format!(
+    let text = format!(
         "[report]\nquantities = [\"speed\", \"volume\"]\n[solver]\ntime_step = 0.01\nprecision = \"{}\"\n\
-         [[body]]\nshape = {{ kind = \"{shape}\", tets = 1500 }}\nscale = 0.25\nyoung_modulus = 1e5\n",
-        precision.name()
+         [[body]]\nshape = {{ kind = \"{shape}\", tets = 1500 }}\nscale = 0.25\nyoung_modulus = 1e5\n{}",
+        precision.name(),
+        random_sweeps(strokes, snap, seed)
     );
-    for frame in 0..strokes {
-        let [a, b, path] = [0.15, 0.15, 0.2].map(|size| random.vector(size));
-        text += &format!(
-            "[[stroke]]\nkind = \"sweep\"\nframes = [{frame}, {}]\nblade = [{a:?}, {b:?}]\n\
-             path = [[0.0, 0.0, 0.0], {path:?}]\nsnap = {snap}\n",
-            frame + 1
-        );
-    }
     Scene::from_toml(&text).unwrap()
 }
 
@@ -62,6 +56,100 @@ fn random_strokes_leave_a_body_at_rest_alone() {
             assert!(speeds[0] < bound && speeds[1] < bound, "{what}");
             // It does not grow: what is left is rounding.
             assert!(speeds[1] <= 2.0 * speeds[0], "{what}");
+        }
+    }
+}
+
+/// Random sweeps of a blade through a body of 25 cm, one in each of the first frames.
+fn random_sweeps(count: usize, snap: f64, seed: u64) -> String {
+    let mut random = Random(seed);
+    let mut text = String::new();
+    for frame in 0..count {
+        let [a, b, path] = [0.15, 0.15, 0.2].map(|size| random.vector(size));
+        text += &format!(
+            "[[stroke]]\nkind = \"sweep\"\nframes = [{frame}, {}]\nblade = [{a:?}, {b:?}]\n\
+             path = [[0.0, 0.0, 0.0], {path:?}]\nsnap = {snap}\n",
+            frame + 1
+        );
+    }
+    text
+}
+
+/// A Delaunay mesh of scattered points has no regular neighborhoods. All three snap distances in both precisions; the
+/// full bar, 30 strokes and 500 frames, is `cargo xtask defaults`.
+#[test]
+fn an_irregular_body_stays_at_rest_at_every_snap_distance() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("irregular.vtk");
+    io::write(&file, &irregular(Shape::Torus, 600, 5).unwrap()).unwrap();
+    let (strokes, frames) = (12, 60);
+    for snap in [0.0, 0.1, 0.2] {
+        for (precision, bound) in [(Precision::F64, 1e-9), (Precision::F32, 1e-2)] {
+            let text = format!(
+                "[report]\nquantities = [\"speed\", \"volume\"]\n[solver]\nprecision = \"{}\"\n\
+                 [[body]]\nmesh = {file:?}\nscale = 0.25\nyoung_modulus = 1e5\n{}",
+                precision.name(),
+                random_sweeps(strokes, snap, 7)
+            );
+            let mut simulation = Simulation::new(&Scene::from_toml(&text).unwrap()).unwrap();
+            let tets = simulation.mesh().tets.len();
+            let (mut speeds, mut inverted) = ([0.0_f64; 2], 0);
+            for frame in 0..strokes + frames {
+                let report = simulation.step().unwrap();
+                inverted += report.inverted_tets.unwrap();
+                // The strokes end one frame after the last one begins.
+                if frame > strokes {
+                    let part = &mut speeds[usize::from(frame >= strokes + frames / 2)];
+                    *part = part.max(report.max_speed.unwrap());
+                }
+            }
+            let what = format!("snap {snap}, {}: {speeds:?}", precision.name());
+            assert!(simulation.mesh().tets.len() > 3 * tets / 2, "{what}");
+            assert_eq!(inverted, 0, "{what}");
+            assert!(speeds[0] < bound && speeds[1] < bound, "{what}");
+            assert!(speeds[1] <= 2.0 * speeds[0], "{what}");
+        }
+    }
+}
+
+/// Slivers of cuts under load, from a body that collapses under its weight to one that is rigid, by few and by many
+/// substeps, nothing softened. All of E and substeps: `cargo xtask defaults`.
+#[test]
+fn a_cut_body_that_falls_on_a_ground_stays_bounded_at_every_stiffness() {
+    for young_modulus in ["1e3", "1e6", "1e9", "1e12"] {
+        for (substeps, precision) in [
+            (5, Precision::F32),
+            (5, Precision::F64),
+            (20, Precision::F32),
+            (20, Precision::F64),
+        ] {
+            let text = format!(
+                "[report]\nquantities = [\"speed\", \"kappa\"]\n[world]\ngravity = [0.0, 0.0, -9.81]\n\
+                 ground = {{ height = -0.15, friction = 0.5 }}\n[solver]\ntime_step = 0.01\nsubsteps = {substeps}\n\
+                 precision = \"{}\"\n[[body]]\nshape = {{ kind = \"liver\", tets = 300 }}\nscale = 0.25\n\
+                 young_modulus = {young_modulus}\n{}",
+                precision.name(),
+                random_sweeps(12, 0.0, 18)
+            );
+            let mut simulation = Simulation::new(&Scene::from_toml(&text).unwrap()).unwrap();
+            let (mut fastest, mut at_end) = (0.0_f64, 0.0_f64);
+            for frame in 0..80 {
+                let report = simulation.step().unwrap();
+                let what = format!("{young_modulus}, {substeps}, {}", precision.name());
+                let speed = report.max_speed.unwrap();
+                fastest = fastest.max(speed);
+                if frame >= 50 {
+                    at_end = at_end.max(speed);
+                }
+                assert_eq!(report.softened.map_or(0, |s| s.tets), 0, "{what}");
+                assert!(!report.warnings().iter().any(|w| w.is_failure()), "{what}");
+            }
+            // A fall from the top of the body to the ground reaches 2.5 m/s.
+            let what = format!(
+                "{young_modulus}, {substeps}, {}: {fastest}, {at_end}",
+                precision.name()
+            );
+            assert!(fastest < 25.0 && at_end < 8.0, "{what}");
         }
     }
 }
