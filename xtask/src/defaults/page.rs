@@ -286,7 +286,10 @@ fn newton_tables(rows: &[&NewtonRow]) -> Vec<Part> {
                 text
             });
             add("method, substeps, frames", &|row| {
-                format!("{} {} {}, {}", row.method, row.substeps, row.precision, row.frames)
+                format!(
+                    "{} {} {}, {}",
+                    row.method, row.substeps, row.precision, row.frames
+                )
             });
         }
         parts.push(Part::Table(table));

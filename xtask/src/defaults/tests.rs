@@ -68,6 +68,7 @@ fn the_page_shows_what_misses_its_bar() {
             young_modulus: 1e5,
             poisson_ratio: 0.3,
             tets: 1,
+            method: "gauss-seidel".to_owned(),
             substeps: 7,
             precision: "f32".to_owned(),
             frames: 4,
