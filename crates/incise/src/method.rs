@@ -36,6 +36,32 @@ pub enum Method {
     Vbd,
 }
 
+/// The rule by which VBD advances in time: see `incise_xpbd::Integrator`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Integrator {
+    /// The backward differentiation formula of two steps, second order.
+    #[default]
+    Bdf2,
+    /// Implicit Euler, first order: it damps vibrations much more.
+    ImplicitEuler,
+}
+
+impl Integrator {
+    pub(crate) fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// The solver's name of it.
+    pub(crate) fn of_solver(self) -> incise_xpbd::Integrator {
+        match self {
+            Self::Bdf2 => incise_xpbd::Integrator::Bdf2,
+            Self::ImplicitEuler => incise_xpbd::Integrator::ImplicitEuler,
+        }
+    }
+}
+
 /// How the elastic energy of a tet is solved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -179,7 +205,6 @@ pub(crate) fn vbd(settings: &StepSettings) -> VbdSettings {
     VbdSettings {
         // What lies or hangs starts where it is, so that few sweeps do.
         guess: incise_xpbd::Guess::Adaptive,
-        integrator: incise_xpbd::Integrator::Bdf2,
         step: settings.clone(),
         ..VbdSettings::new(settings.time_step, settings.iterations)
     }

@@ -11,7 +11,7 @@ use crate::Error;
 pub use crate::collider::{ColliderSpec, RotationSpec};
 pub use crate::handle::{HandleSpec, TurnSpec};
 pub use crate::link::{EndSpec, LinkSpec};
-pub use crate::method::{Method, TetSolve};
+pub use crate::method::{Integrator, Method, TetSolve};
 pub use crate::place::Backend;
 pub use crate::preset::Preset;
 pub use crate::recluster::ReclusterSpec;
@@ -143,7 +143,7 @@ pub struct SolverSpec {
     /// Time of a frame in s.
     pub time_step: f64,
     /// The largest error wanted, as a fraction of the motion, above 0 and at most 1; absent: 0.1. Decides what
-    /// `substeps = "auto"` and `method = "auto"` take.
+    /// `substeps = "auto"` and `method = "auto"` take, and, if given, ends the rounds of two-level VBD.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accuracy: Option<f64>,
     /// The time in ms that a frame may take on this machine, positive; absent: no limit. Substeps that are chosen, and the
@@ -172,6 +172,9 @@ pub struct SolverSpec {
     /// For VBD: whether each sweep is followed by a correction of the whole body, which costs some 100 sweeps.
     #[serde(skip_serializing_if = "is_false")]
     pub two_level: bool,
+    /// For VBD: how a substep advances in time, `bdf2` or `implicit-euler`.
+    #[serde(skip_serializing_if = "Integrator::is_default")]
+    pub integrator: Integrator,
     /// How constraints are put together: `none` or `serial:K`.
     pub clustering: String,
     /// Whether clusters that a cut leaves small are merged with neighbors. It makes a cut a little dearer, and all frames
@@ -214,6 +217,7 @@ impl Default for SolverSpec {
             spectral_radius: 0.99,
             delay: 10,
             two_level: false,
+            integrator: Integrator::Bdf2,
             clustering: "serial:10".to_owned(),
             merge_clusters: true,
             recluster: None,

@@ -10,8 +10,8 @@ use std::time::Instant;
 use incise_coloring::auto;
 use incise_graph::{Clustering, ColorId, Coloring, Incidence, Schedule};
 use incise_xpbd::{
-    CoarseCorrection, CoarseCorrectionSettings, Real, Solver, StepReport, StepSettings, VbdReport,
-    VertexStars,
+    CoarseCorrection, CoarseCorrectionSettings, Integrator, Real, Solver, StepReport, StepSettings,
+    VbdReport, VertexStars,
 };
 
 use crate::report::{Milliseconds, milliseconds};
@@ -43,6 +43,7 @@ pub(crate) struct Vbd<R: Real> {
     correction: Option<CoarseCorrection<R>>,
     /// Where rounds end before the last one.
     accuracy: Option<f64>,
+    integrator: Integrator,
     /// What the last frame said of itself.
     pub(crate) last: VbdReport,
 }
@@ -62,6 +63,7 @@ impl<R: Real> Vbd<R> {
             color_count: coloring.color_count(),
             correction,
             accuracy: spec.accuracy,
+            integrator: spec.integrator.of_solver(),
             last: VbdReport::default(),
         })
     }
@@ -105,6 +107,7 @@ impl<R: Real> Vbd<R> {
     ) -> Result<StepReport, incise_xpbd::XpbdError> {
         let mut settings = method::vbd(settings);
         settings.accuracy = self.accuracy;
+        settings.integrator = self.integrator;
         settings.measure = measure;
         self.last = match &mut self.correction {
             Some(correction) => solver.step_vbd_two_level(&mut self.stars, correction, &settings),

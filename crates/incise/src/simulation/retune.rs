@@ -331,9 +331,12 @@ impl Retuned {
         if !group.solver.is_at(place, after)? {
             return Ok(true);
         }
+        let prepared = |spec: &SolverSpec| {
+            let accuracy = spec.accuracy.map(f64::to_bits);
+            (spec.method, spec.two_level, spec.integrator, accuracy)
+        };
         let softens = || limits[0] != limits[1] && limits.iter().any(|l| group.solver.exceeds(*l));
-        Ok(after.method == Method::Vbd
-            && ((before.method, before.two_level) != (after.method, after.two_level) || softens()))
+        Ok(after.method == Method::Vbd && (prepared(before) != prepared(after) || softens()))
     }
 
     fn take_effect(self, group: &mut Group) -> Result<(), Error> {
