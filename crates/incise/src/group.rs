@@ -64,6 +64,8 @@ pub(crate) struct Group {
     size: f64,
     /// What is solved less accurately than asked for.
     pub(crate) outside: OutsideVolume,
+    /// The kappa of a new tet from which single precision is judged again.
+    stiffest: f64,
     /// Whether the last frame of VBD missed the accuracy wanted.
     misses_accuracy: bool,
     /// Warnings for the next report.
@@ -108,6 +110,10 @@ const OUTSIDE_FRACTION: f64 = 0.01;
 /// Cuts raise a chosen number of substeps to at most so many times what it was before them: a live scene must not become
 /// slower without end.
 const MOST_GROWTH: u32 = 2;
+
+/// The largest kappa in single precision. Measured on cut bodies under load (`cargo xtask defaults --only load`): bounded to
+/// 1e6, thrown apart by rounding from 1e8 on; double precision is bounded at 1e17.
+const LARGEST_KAPPA_OF_F32: f64 = 1e7;
 
 /// The longest side of the box around points, 0 without points.
 fn longest_side(points: &[DVec3]) -> f64 {
@@ -187,6 +193,7 @@ impl Group {
             spec,
             size,
             outside: OutsideVolume::default(),
+            stiffest: 0.0,
             misses_accuracy: false,
             warnings: Vec::new(),
             cut_kappa: None,
@@ -215,6 +222,7 @@ impl Group {
             );
             self.warn(WarningCode::ShortSubstepF32, message);
         }
+        self.judge_f32(self.kappa());
         if let Some(choice) = self.choice.filter(|_| self.chose_vbd()) {
             let warning = warning::of_vbd(&self.bodies, &choice, spec);
             self.warnings.push(warning);
@@ -261,9 +269,27 @@ impl Group {
         });
     }
 
+    /// Warns of a largest kappa that single precision does not bear.
+    fn judge_f32(&mut self, kappa: f64) {
+        let is_single = each!(&self.solver, solver => solver.is_single());
+        if !is_single || self.spec.method == Method::Vbd || kappa <= LARGEST_KAPPA_OF_F32 {
+            return;
+        }
+        let message = format!(
+            "the largest kappa is {kappa:.0e}, and single precision throws bodies apart from about {LARGEST_KAPPA_OF_F32:.0e} on: \
+             set precision = \"f64\", or raise snap where cuts leave such thin tets"
+        );
+        self.warn(WarningCode::KappaF32, message);
+    }
+
     fn warn(&mut self, code: WarningCode, message: String) {
         self.warnings
             .push(Warning::new(code, &self.bodies, message));
+    }
+
+    /// Whether its tets are too stiff for single precision.
+    pub(crate) fn is_too_stiff_for_f32(&self) -> bool {
+        self.spec.method != Method::Vbd && self.kappa() > LARGEST_KAPPA_OF_F32
     }
 
     /// Whether the substep is too short for single precision.
@@ -429,10 +455,16 @@ impl Group {
             self.outside.remove(data);
         }
         self.solver.follow(delta, &self.cuttable)?;
+        let mut stiffest = 0.0_f64;
         for tet in &delta.added {
             let data =
                 each!(&self.solver, solver => accuracy_data(solver, tet.tet.index(), settings));
+            stiffest = stiffest.max(data.1);
             self.outside.add(data);
+        }
+        if stiffest > self.stiffest {
+            self.stiffest = 10.0 * stiffest;
+            self.judge_f32(stiffest);
         }
         let events = self.pieces.follow(&self.cuttable, delta);
         self.plan.follow(delta, &self.cuttable, ms)?;

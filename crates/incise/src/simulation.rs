@@ -169,9 +169,9 @@ impl Simulation {
         };
         let mut groups = make_groups(precision, joined)?;
         let short = || {
-            groups
-                .iter()
-                .any(|g| g.is_too_short_for_f32() || g.chose_vbd())
+            let needs =
+                |g: &Group| g.is_too_short_for_f32() || g.is_too_stiff_for_f32() || g.chose_vbd();
+            groups.iter().any(needs)
         };
         if scene.solver.precision == Precision::Auto && !place.is_device() && short() {
             precision = Precision::F64;

@@ -23,6 +23,9 @@ use super::{Warned, warnings};
 use crate::solver::body::body;
 use crate::solver::runner::{Recipe, Runner};
 
+/// Positions of all particles, state after state.
+type States = Vec<Vec<DVec3>>;
+
 /// Longest side of a body in m, and its density in kg/m³.
 const SIZE: f64 = 0.2;
 const DENSITY: f64 = 1000.0;
@@ -156,7 +159,7 @@ pub(super) fn measure(case: Case, folder: &Path) -> anyhow::Result<NewtonRow> {
 /// What a run of a scene gave.
 struct Run {
     /// Positions after each stride of the compared motion.
-    motion: Vec<Vec<DVec3>>,
+    motion: States,
     /// Mean positions of the settled state.
     mean: Vec<DVec3>,
     method: String,
@@ -318,7 +321,7 @@ impl Setup {
         case: Case,
         span: &Span,
         frame: f64,
-    ) -> anyhow::Result<(Vec<Vec<DVec3>>, Vec<Vec<DVec3>>)> {
+    ) -> anyhow::Result<(States, States)> {
         let motion = |steps| self.implicit_motion(case, span, frame, steps);
         let levels = [
             motion(span.steps)?,
@@ -329,7 +332,7 @@ impl Setup {
             let frames = a.iter().zip(b);
             frames
                 .map(|(a, b)| a.iter().zip(b).map(|(a, b)| *a * wa + *b * wb).collect())
-                .collect::<Vec<Vec<DVec3>>>()
+                .collect::<States>()
         };
         let coarse = combined(&levels[1], 2.0, &levels[0], -1.0);
         let fine = combined(&levels[2], 2.0, &levels[1], -1.0);
@@ -343,7 +346,7 @@ impl Setup {
         span: &Span,
         frame: f64,
         steps: u32,
-    ) -> anyhow::Result<Vec<Vec<DVec3>>> {
+    ) -> anyhow::Result<States> {
         let mut body = self.body(case)?;
         let mut motion = Vec::new();
         let time_step = frame * span.stride as f64 / f64::from(steps);
@@ -442,7 +445,7 @@ impl Setup {
         span: &Span,
         substeps: u32,
         rounds: Option<u32>,
-    ) -> anyhow::Result<Vec<Vec<DVec3>>> {
+    ) -> anyhow::Result<States> {
         let material = Material {
             young_modulus: case.young_modulus,
             poisson_ratio: case.poisson_ratio,

@@ -46,7 +46,8 @@ rectangles without snapping cut it, one in each of the first 20 frames; 120 fram
 0.25 m below, so all strokes are made in free fall and the load follows. *During*: it is 0.05 m below, so half of the strokes \
 cut the body while the ground deforms it. Precision and substeps are given, all else is default. Bounded: no particle put \
 back, no divergence reported, largest speed below ten times and in the last 50 frames below three times the speed of a fall \
-from the top of the body to the ground. At 1e3 Pa the body collapses under its weight. Bar: bounded, 0 softened tets.";
+from the top of the body to the ground. At 1e3 Pa the body collapses under its weight. Single precision does not bear a kappa above 1e7, of which the \
+warning `kappa_f32` tells; it is not the default there. Bar: bounded, 0 softened tets.";
 
 const REST: &str = "\
 ## Bodies at rest after 30 strokes

@@ -35,9 +35,10 @@ fn the_quick_form_holds_its_bars() {
             }
             Row::Load(rows) => {
                 for row in rows {
-                    // Jelly of 1e3 Pa in 5 substeps throws corners for some frames, and the run warns.
-                    assert!(row.is_bounded || !row.warned.is_empty(), "{row:?}");
-                    assert!(row.softened == 0 && row.fastest < 1e3, "{row:?}");
+                    // Single precision does not bear the slivers that these strokes leave, and the run says so.
+                    let warns = row.precision == "f32" && row.warned.contains("kappa_f32");
+                    assert!(row.is_bounded || warns, "{row:?}");
+                    assert!(row.softened == 0, "{row:?}");
                 }
             }
             Row::Rest(rows) => {
