@@ -111,6 +111,9 @@ const OUTSIDE_FRACTION: f64 = 0.01;
 /// slower without end.
 const MOST_GROWTH: u32 = 2;
 
+/// How much weaker than on earth gravity may be and still count for the precision.
+const WEAKEST: f64 = 1e4;
+
 /// The largest kappa in single precision. Measured on cut bodies under load (`cargo xtask defaults --only load`): bounded to
 /// 1e6, thrown apart by rounding from 1e8 on; double precision is bounded at 1e17.
 const LARGEST_KAPPA_OF_F32: f64 = 1e7;
@@ -215,7 +218,7 @@ impl Group {
         let spec = &self.spec.clone();
         let form = tet_solve(spec.tet_solve);
         if self.is_too_short_for_f32() && each!(&self.solver, solver => solver.is_single()) {
-            let shortest = shortest_substep_of_f32(self.size);
+            let shortest = self.shortest_substep_of_f32();
             let message = format!(
                 "a substep of {:.1e} s is too short for single precision, which needs {shortest:.1e} s: set precision = \"f64\"",
                 self.settings.substep_time()
@@ -294,7 +297,18 @@ impl Group {
 
     /// Whether the substep is too short for single precision.
     pub(crate) fn is_too_short_for_f32(&self) -> bool {
-        self.settings.substep_time() < 0.999 * shortest_substep_of_f32(self.size)
+        self.settings.substep_time() < 0.999 * self.shortest_substep_of_f32()
+    }
+
+    /// The shortest substep of single precision in s: under weak gravity bodies move more slowly than its rule supposes.
+    fn shortest_substep_of_f32(&self) -> f64 {
+        let gravity = self.settings.gravity.map_or(0.0, |g| g.length());
+        let weakness = if gravity > 0.0 {
+            (9.81 / gravity).clamp(1.0, WEAKEST)
+        } else {
+            1.0
+        };
+        shortest_substep_of_f32(self.size) * weakness.sqrt()
     }
 
     /// Takes a number of substeps, from which cuts raise it.

@@ -48,6 +48,20 @@ fn stiff_bodies_are_solved_by_vbd_and_soft_ones_are_not() {
     assert_eq!(codes, [WarningCode::VibrationsDamped]);
 }
 
+/// A beam of jelly in weak gravity moves by less than single precision resolves in a substep, which the same beam does not
+/// in earth's.
+#[test]
+fn weak_gravity_takes_double_precision() {
+    let mut scene = beam("1e4", "accuracy = 0.02");
+    let precision = |scene: &Scene| {
+        let mut simulation = simulation(scene);
+        simulation.step().unwrap().precision
+    };
+    assert_eq!(precision(&scene), "f32");
+    scene.world.gravity = Some([0.0, 0.0, -0.005]);
+    assert_eq!(precision(&scene), "f64");
+}
+
 /// Numbers and methods that a scene names are kept.
 #[test]
 fn what_is_named_is_not_chosen() {
