@@ -157,7 +157,8 @@ impl Group {
         let mut solver = AnySolver::new(precision, &joined, &cuttable)?;
         let (substeps, choice) = joined.substeps(scene, &solver, &cuttable);
         settings.substeps = substeps;
-        let is_open = joined.leaves_substeps_open() && !place.is_device();
+        let is_open =
+            joined.leaves_substeps_open() && !place.is_device() && settings.colliders.is_empty();
         let (spec, choice) = resolve(&scene.solver, choice, is_open);
         if scene.solver.method == Method::Auto {
             adopt(&mut settings, &spec);

@@ -21,8 +21,8 @@ use crate::{Error, Scene, collider};
 #[non_exhaustive]
 pub enum Method {
     /// Gauss-Seidel, and two-level VBD for each body of which the accuracy needs more than `max_substeps`. VBD is taken
-    /// only where `substeps`, `iterations`, `relaxation`, `tet_solve` and `kappa_limit` have their defaults, and not on a
-    /// GPU.
+    /// only where `substeps`, `iterations`, `relaxation`, `tet_solve` and `kappa_limit` have their defaults, not on a GPU, and
+    /// not in scenes with colliders: an impact of a stiff body does not converge in a frame.
     #[default]
     Auto,
     /// Color after color, each constraint seeing the corrections before it.
@@ -156,7 +156,7 @@ pub(crate) fn settings(scene: &Scene) -> Result<StepSettings, Error> {
 }
 
 /// The settings of one group, in which `auto` is replaced by the method for it. `choice` is that of its substeps, which
-/// becomes that of VBD where VBD is taken: where `is_open` says that no number of substeps is given, and no device solves.
+/// becomes that of VBD where VBD is taken: where `is_open` says that no number of substeps is given, no device solves and there are no colliders.
 pub(crate) fn resolve(
     spec: &SolverSpec,
     choice: Option<Choice>,

@@ -260,7 +260,9 @@ impl Retuned {
         }
         let (own, choice) = match after.method {
             Method::Auto if chosen_anew => {
-                let is_open = asked.iter().all(|s| *s == Substeps::Auto) && !place.is_device();
+                let is_open = asked.iter().all(|s| *s == Substeps::Auto)
+                    && !place.is_device()
+                    && settings.colliders.is_empty();
                 resolve(after, choice, is_open)
             }
             // What was chosen stays, with everything else that differs.

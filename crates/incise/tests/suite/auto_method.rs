@@ -1,7 +1,7 @@
 //! What `method = "auto"` and `budget_ms` choose, and what follows from it.
 
 use incise::report::{ChosenMethod, Missed};
-use incise::scene::{Method, Precision};
+use incise::scene::{GroundSpec, Method, Precision};
 use incise::{Scene, Simulation, WarningCode};
 
 use crate::support::{body, plane, scene, simulation, state};
@@ -79,6 +79,16 @@ fn what_is_named_is_not_chosen() {
             |body: &incise::report::BodyReport| body.method == Some(ChosenMethod::TwoLevelVbd);
         assert!(!report.bodies.iter().any(vbd), "{keys}");
     }
+    let mut grounded = beam("1e9", "");
+    grounded.world.ground = Some(GroundSpec {
+        height: -1.0,
+        friction: 0.0,
+    });
+    assert_eq!(
+        chosen(&simulation(&grounded)).0,
+        ChosenMethod::GaussSeidel,
+        "colliders"
+    );
     let mut own = beam("1e9", "");
     own.body[0].substeps = Some(7.into());
     assert!(simulation(&own).report().bodies.is_empty());
@@ -111,7 +121,7 @@ fn bodies_have_their_own_methods() {
     let stiff =
         body("sphere", 200, [0.0, 2.0, 0.0]).replace("young_modulus = 1e4", "young_modulus = 1e9");
     let scene = scene(&format!(
-        "[world]\ngravity = [0.0, 0.0, -9.81]\nground = {{ height = -0.6 }}\n{}{stiff}{}",
+        "[world]\ngravity = [0.0, 0.0, -9.81]\n{}{stiff}{}",
         body("sphere", 200, [0.0; 3]),
         plane(2, [0.0, 0.0, 0.05], [0.0, 0.1, 1.0])
     ));
