@@ -19,7 +19,7 @@ use incise::coloring::scgc;
 use incise::graph::{Clustering, Schedule};
 use incise::mesh::TetId;
 use incise::mesh::glam::DVec3;
-use incise::xpbd::{Material, Real, Solver, StepSettings};
+use incise::xpbd::{Material, Real, Solver, StepSettings, TetSolve};
 use incise_benches::{Bench, Case};
 use plain::Plain;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -102,6 +102,8 @@ fn plain_substeps(bench: &mut Bench<'_, '_>, name: &str, schedule: &Schedule) {
     let mut plain = Plain::new(&positions, &weights, &tets, schedule, stiffness, time);
     let settings = StepSettings {
         substeps: SUBSTEPS,
+        // The plain kernel solves that form.
+        tet_solve: TetSolve::Block,
         gravity: Some(GRAVITY),
         ..StepSettings::new(time * f64::from(SUBSTEPS))
     };
