@@ -5,8 +5,8 @@
 //! With `x = kappa · λ/E` (λ is Lamé's first constant) a state at rest is off by at most
 //! `0.03 kappa + 0.07 kappa² + 0.085 x² / (1 + 0.6 x)` of the displacement, and a motion over some periods, which a
 //! substep damps, by at most `0.13 √kappa` (`cargo xtask defaults`). Beyond a Poisson's ratio of 0.49 the error at rest is
-//! taken to grow with λ/E as well: at 0.4999 a beam that should be off by 10% was off by 33%. The block and sequential forms have `0.03 kappa + 0.1 x` at rest. The larger
-//! of both is the expected error. Cost: O(1) a tet.
+//! taken to grow with λ/E as well: at 0.4999 a beam that should be off by 10% was off by 33%. The block and sequential
+//! forms have `0.03 kappa + 0.1 x` at rest. The larger of both is the expected error; beyond 1 it says only that. Cost: O(1) a tet.
 
 use incise_xpbd::{Material, TetSolve};
 

@@ -1,6 +1,6 @@
 //! `solver.budget_ms`: substeps and method from the time that a frame may take.
 //!
-//! Copies of the solvers take a few frames, which tells what a substep of Gauss-Seidel and a round of two-level VBD cost
+//! Copies of the solvers take a few frames, which tells what a substep of Gauss-Seidel and a frame of two-level VBD cost
 //! here. All groups together may use [`SHARE`] of the budget; what each gets goes with what its accuracy needs. Without a
 //! stated accuracy what is left over buys more substeps. After cuts the cost grows with the number of tets, and substeps
 //! are reduced where they no longer fit. The choice depends on the speed of the machine, unlike everything else here:
@@ -8,15 +8,16 @@
 
 use std::time::Instant;
 
-use incise_xpbd::{StepSettings, TetSolve};
+use incise_xpbd::StepSettings;
 
 use crate::Error;
 use crate::group::{Group, adopt};
 use crate::joined::demands;
-use crate::method::{leaves_open, tet_solve, with_vbd};
+use crate::method::{tet_solve, with_vbd};
 use crate::place::Place;
+use crate::report::{Milliseconds, milliseconds};
 use crate::scene::{Method, SolverSpec};
-use crate::substeps::{Missed, evaluate};
+use crate::substeps::{Missed, choose, evaluate};
 
 /// The part of the budget that solving may take; the rest is for cuts, positions and reports.
 const SHARE: f64 = 0.75;
@@ -59,16 +60,13 @@ fn measure(group: &Group, spec: &SolverSpec, settings: &StepSettings) -> Result<
     let mut solver = group.solver.clone();
     solver.end_vbd();
     solver.prepare(spec, &Place::default())?;
-    solver.lay_out(
-        &group.plan.schedule,
-        &mut crate::report::Milliseconds::default(),
-    )?;
+    solver.lay_out(&group.plan.schedule, &mut Milliseconds::default())?;
     let mut fastest = f64::INFINITY;
     for frame in 0..=FRAMES {
         let start = Instant::now();
         solver.step(&group.plan.schedule, settings, false)?;
         if frame > 0 {
-            fastest = fastest.min(1e3 * start.elapsed().as_secs_f64());
+            fastest = fastest.min(milliseconds(start.elapsed()));
         }
     }
     Ok(fastest)
@@ -87,7 +85,8 @@ pub(crate) fn fit(groups: &mut [Group], spec: &SolverSpec, budget: f64) -> Resul
         let of_one = measure(group, &group.spec, &few)? / f64::from(few.substeps);
         costs.push((of_one, of_one * f64::from(settings.substeps)));
     }
-    let open = |group: &Group| group.choice.is_some() && !group.chose_vbd();
+    // A number that a scene names, of a joined body too, stays, and so does VBD.
+    let open = |group: &Group| group.leaves_substeps_open && !group.chose_vbd();
     let of = |wanted: bool| -> f64 {
         let each = groups.iter().zip(&costs);
         let those = each.filter(|(group, _)| open(group) == wanted);
@@ -116,7 +115,7 @@ pub(crate) fn fit(groups: &mut [Group], spec: &SolverSpec, budget: f64) -> Resul
         let missed = group
             .choice
             .is_some_and(|choice| choice.missed == Some(Missed::Budget));
-        if missed && leaves_open(spec) {
+        if missed && group.leaves_method_open {
             try_vbd(group, spec, limits.share)?;
         }
         group.judge_settings();
@@ -131,12 +130,12 @@ fn finest_substeps(group: &Group, spec: &SolverSpec) -> u32 {
         ..spec.clone()
     };
     let tets = demands(&finest, &group.solver, group.cuttable.mesh(), |_| true);
-    crate::substeps::choose(tets, spec.max_substeps, tet_solve(spec.tet_solve)).substeps
+    choose(tets, spec.max_substeps, tet_solve(spec.tet_solve)).substeps
 }
 
 /// Gives a group a number of substeps, with the error to expect of it.
 fn take(group: &mut Group, substeps: u32) {
-    let form: TetSolve = tet_solve(group.spec.tet_solve);
+    let form = tet_solve(group.spec.tet_solve);
     let tets = demands(&group.spec, &group.solver, group.cuttable.mesh(), |_| true);
     let mut choice = evaluate(tets, |_| substeps, form);
     if choice.missed == Some(Missed::Cap) {
@@ -146,7 +145,7 @@ fn take(group: &mut Group, substeps: u32) {
     group.set_substeps(substeps);
 }
 
-/// Two-level VBD in place of too few substeps, if a round fits and promises a smaller error.
+/// Two-level VBD in place of too few substeps, if a frame of it fits and promises a smaller error.
 fn try_vbd(group: &mut Group, spec: &SolverSpec, share: f64) -> Result<(), Error> {
     let Some(choice) = group.choice else {
         return Ok(());

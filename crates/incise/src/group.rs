@@ -17,7 +17,7 @@ use crate::budget::{self, Budget};
 use crate::grab::Hand;
 use crate::handle::Handle;
 use crate::joined::{Joined, demands, substeps};
-use crate::method::{resolve, tet_solve};
+use crate::method::{leaves_open, resolve, tet_solve};
 use crate::place::Place;
 use crate::plan::Plan;
 use crate::recluster::Recluster;
@@ -42,6 +42,10 @@ pub(crate) struct Group {
     pub(crate) settings: StepSettings,
     /// The settings of the solver as a scene says them, with the method that was chosen.
     pub(crate) spec: SolverSpec,
+    /// Whether no body of it names a number of substeps.
+    pub(crate) leaves_substeps_open: bool,
+    /// Whether VBD may be chosen for it.
+    pub(crate) leaves_method_open: bool,
     pub(crate) handles: Vec<Handle>,
     /// What somebody holds.
     pub(crate) hand: Hand,
@@ -157,8 +161,12 @@ impl Group {
         let mut solver = AnySolver::new(precision, &joined, &cuttable)?;
         let (substeps, choice) = joined.substeps(scene, &solver, &cuttable);
         settings.substeps = substeps;
-        let is_open =
-            joined.leaves_substeps_open() && !place.is_device() && settings.colliders.is_empty();
+        let is_open = leaves_open(
+            &scene.solver,
+            &joined.substeps,
+            &settings,
+            place.is_device(),
+        );
         let (spec, choice) = resolve(&scene.solver, choice, is_open);
         if scene.solver.method == Method::Auto {
             adopt(&mut settings, &spec);
@@ -195,6 +203,8 @@ impl Group {
             first_substeps: settings.substeps,
             budget: None,
             spec,
+            leaves_substeps_open: joined.substeps.iter().all(|s| *s == Substeps::Auto),
+            leaves_method_open: is_open,
             size,
             outside: OutsideVolume::default(),
             stiffest: 0.0,
@@ -216,8 +226,7 @@ impl Group {
     /// Judges the accuracy of the present settings and notes warnings. O(tets log tets).
     pub(crate) fn judge_settings(&mut self) {
         self.warnings.clear();
-        let spec = &self.spec.clone();
-        let form = tet_solve(spec.tet_solve);
+        (self.stiffest, self.misses_accuracy) = (0.0, false);
         if self.is_too_short_for_f32() && each!(&self.solver, solver => solver.is_single()) {
             let shortest = self.shortest_substep_of_f32();
             let message = format!(
@@ -228,13 +237,16 @@ impl Group {
         }
         self.judge_f32(self.kappa());
         if let Some(choice) = self.choice.filter(|_| self.chose_vbd()) {
-            let warning = warning::of_vbd(&self.bodies, &choice, spec);
+            let warning = warning::of_vbd(&self.bodies, &choice, &self.spec);
             self.warnings.push(warning);
         }
+        let spec = &self.spec;
         if spec.method != Method::GaussSeidel {
             self.outside = OutsideVolume::default();
             return;
         }
+        let form = tet_solve(spec.tet_solve);
+        let accuracy = spec.accuracy.unwrap_or(DEFAULT_ACCURACY);
         let substeps = self.settings.substeps;
         let mesh = self.cuttable.mesh();
         let mut judged = evaluate(
@@ -265,7 +277,6 @@ impl Group {
             );
             self.warn(WarningCode::Softened, message);
         }
-        let accuracy = spec.accuracy.unwrap_or(DEFAULT_ACCURACY);
         self.outside = each!(&self.solver, solver => {
             let limits = largest_kappas(accuracy, solver.materials(), form);
             let tets = (0..solver.tet_count()).map(|t| accuracy_data(solver, t, &self.settings));
@@ -281,7 +292,7 @@ impl Group {
         }
         let message = format!(
             "the largest kappa is {kappa:.0e}, and single precision throws bodies apart from about {LARGEST_KAPPA_OF_F32:.0e} on: \
-             set precision = \"f64\", or raise snap where cuts leave such thin tets"
+             use more substeps, precision = \"f64\" on the CPU, or more snap where cuts leave such thin tets"
         );
         self.warn(WarningCode::KappaF32, message);
     }
@@ -330,17 +341,16 @@ impl Group {
         if budget::keep(self) {
             return;
         }
-        let spec = &self.spec.clone();
         let fraction = self.outside.outside / self.cuttable.mesh().total_volume();
-        if spec.method != Method::GaussSeidel
+        if self.spec.method != Method::GaussSeidel
             || fraction <= OUTSIDE_FRACTION
             || self.outside.outside <= 2.0 * self.outside.at_choice
         {
             return;
         }
         let before = self.settings.substeps;
-        if self.choice.is_some() && self.budget.is_none() && !spec.kappa_limit.is_finite() {
-            let (chosen, choice) = substeps(asked, spec, &self.solver, self.cuttable.mesh());
+        if self.choice.is_some() && self.budget.is_none() && !self.spec.kappa_limit.is_finite() {
+            let (chosen, choice) = substeps(asked, &self.spec, &self.solver, self.cuttable.mesh());
             let most = MOST_GROWTH.saturating_mul(self.first_substeps);
             self.settings.substeps = chosen.min(most).max(before);
             let ratio = f64::from(before) / f64::from(self.settings.substeps);
@@ -477,6 +487,9 @@ impl Group {
             stiffest = stiffest.max(data.1);
             self.outside.add(data);
         }
+        if let Some(noted) = &mut self.cut_kappa {
+            noted.new_tets = noted.new_tets.max(stiffest);
+        }
         if stiffest > self.stiffest {
             self.stiffest = 10.0 * stiffest;
             self.judge_f32(stiffest);
@@ -518,29 +531,15 @@ impl Group {
         volumes.follow(&mut self.solver, &nothing, &self.cuttable, schedule)
     }
 
-    /// Notes the largest kappa before the first cut of a frame. O(tets).
-    pub(crate) fn note_kappa_before(&mut self) {
+    /// Has [`Group::follow`] note the largest kappa of the tets that the cuts of a frame make, and that of all tets before the
+    /// first of them if it is wanted, which is O(tets).
+    pub(crate) fn note_kappa(&mut self, before: bool) {
         if self.cut_kappa.is_none() {
             self.cut_kappa = Some(CutKappa {
-                before: Some(self.kappa()),
+                before: before.then(|| self.kappa()),
                 new_tets: 0.0,
             });
         }
-    }
-
-    /// Notes the largest kappa of the tets that a cut has made. Costs what the cut touched.
-    pub(crate) fn note_kappa_of(&mut self, delta: &CutDelta) {
-        let time = self.settings.substep_time();
-        let kappas = delta
-            .added
-            .iter()
-            .map(|tet| each!(&self.solver, solver => solver.kappa_of(tet.tet.index(), time)));
-        let largest = kappas.fold(0.0, f64::max);
-        let noted = self.cut_kappa.get_or_insert(CutKappa {
-            before: None,
-            new_tets: 0.0,
-        });
-        noted.new_tets = noted.new_tets.max(largest);
     }
 
     /// The largest kappa of a tet, had none been softened. O(tets).

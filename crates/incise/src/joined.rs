@@ -34,7 +34,7 @@ pub(crate) struct Joined {
     pub(crate) links: Vec<DistanceConstraint>,
     /// What each body asks for.
     volume_compliances: Vec<Option<f64>>,
-    substeps: Vec<Substeps>,
+    pub(crate) substeps: Vec<Substeps>,
 }
 
 impl Joined {
@@ -95,11 +95,6 @@ impl Joined {
         self.volume_compliances.push(body.volume_compliance);
         self.substeps.push(body.substeps);
         Ok(())
-    }
-
-    /// Whether substeps are chosen for all of its bodies.
-    pub(crate) fn leaves_substeps_open(&self) -> bool {
-        self.substeps.iter().all(|s| *s == Substeps::Auto)
     }
 
     /// The volume constraints of the group, if a body asks for them.

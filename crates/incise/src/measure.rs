@@ -173,10 +173,7 @@ pub(crate) fn by_body(groups: &mut [Group], with_kappa: bool) -> Vec<BodyReport>
         BodyReport {
             bodies: group.bodies.clone(),
             substeps: group.settings.substeps,
-            method: group.choice.map(|_| match group.spec.method {
-                Method::Vbd => ChosenMethod::TwoLevelVbd,
-                _ => ChosenMethod::GaussSeidel,
-            }),
+            method: group.choice.map(|_| ChosenMethod::of(&group.spec)),
             iterations: group.choice.map(|_| group.settings.iterations),
             asleep: group.rest.map(|rest| rest.asleep()),
             choice: group.choice,

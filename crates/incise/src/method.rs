@@ -156,7 +156,7 @@ pub(crate) fn settings(scene: &Scene) -> Result<StepSettings, Error> {
 }
 
 /// The settings of one group, in which `auto` is replaced by the method for it. `choice` is that of its substeps, which
-/// becomes that of VBD where VBD is taken: where `is_open` says that no number of substeps is given, no device solves and there are no colliders.
+/// becomes that of VBD where VBD is taken; `is_open` is [`leaves_open`].
 pub(crate) fn resolve(
     spec: &SolverSpec,
     choice: Option<Choice>,
@@ -168,7 +168,7 @@ pub(crate) fn resolve(
     }
     own.method = Method::GaussSeidel;
     match choice {
-        Some(capped) if is_open && leaves_open(spec) && capped.missed == Some(Missed::Cap) => {
+        Some(capped) if is_open && capped.missed == Some(Missed::Cap) => {
             let (own, choice) = with_vbd(spec, capped);
             (own, Some(choice))
         }
@@ -176,10 +176,19 @@ pub(crate) fn resolve(
     }
 }
 
-/// Whether settings leave the method open and name nothing that only Gauss-Seidel has.
-pub(crate) fn leaves_open(spec: &SolverSpec) -> bool {
+/// Whether VBD may be taken for bodies that ask for these substeps: settings leave the method open and name nothing that
+/// only Gauss-Seidel has, no device solves and there are no colliders.
+pub(crate) fn leaves_open(
+    spec: &SolverSpec,
+    asked: &[Substeps],
+    settings: &StepSettings,
+    on_device: bool,
+) -> bool {
     let defaults = SolverSpec::default();
     spec.method == Method::Auto
+        && asked.iter().all(|s| *s == Substeps::Auto)
+        && settings.colliders.is_empty()
+        && !on_device
         && (spec.iterations, spec.relaxation, spec.tet_solve)
             == (defaults.iterations, defaults.relaxation, defaults.tet_solve)
         && !spec.kappa_limit.is_finite()

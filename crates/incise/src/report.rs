@@ -8,6 +8,7 @@ use incise_cutting::CutDelta;
 use incise_xpbd::Softened;
 use serde::Serialize;
 
+use crate::scene::{Method, SolverSpec};
 pub use crate::substeps::{Choice, Missed};
 use crate::warning::Warning;
 
@@ -96,15 +97,34 @@ fn is_zero(count: &usize) -> bool {
     *count == 0
 }
 
-/// The method that was chosen for a body.
+/// The method that solves a body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum ChosenMethod {
-    /// The one that the scene names, which is Gauss-Seidel for `auto`.
+    /// Gauss-Seidel.
     GaussSeidel,
+    /// Jacobi, as the scene names it.
+    Jacobi,
+    /// Chebyshev, as the scene names it.
+    Chebyshev,
+    /// VBD, as the scene names it.
+    Vbd,
     /// VBD with a coarse correction after each sweep.
     TwoLevelVbd,
+}
+
+impl ChosenMethod {
+    /// The method of settings; `auto` is replaced before.
+    pub(crate) fn of(spec: &SolverSpec) -> Self {
+        match spec.method {
+            Method::Auto | Method::GaussSeidel => Self::GaussSeidel,
+            Method::Jacobi => Self::Jacobi,
+            Method::Chebyshev => Self::Chebyshev,
+            Method::Vbd if spec.two_level => Self::TwoLevelVbd,
+            Method::Vbd => Self::Vbd,
+        }
+    }
 }
 
 /// A body's substeps and kappa, or those of bodies that are joined and therefore solved together.

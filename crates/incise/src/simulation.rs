@@ -391,16 +391,13 @@ impl Simulation {
         let mut report: Option<CutReport> = None;
         let mut measuring = 0.0;
         timeline.advance(self.next_frame, groups, |number, group, delta| {
-            if wants_kappa {
+            if notes_kappa {
                 let start = Instant::now();
-                group.note_kappa_before();
+                group.note_kappa(wants_kappa);
                 measuring += milliseconds(start.elapsed());
             }
             let events = group.follow(delta, ms)?;
             pieces.follow(number, &events, detached);
-            if notes_kappa {
-                group.note_kappa_of(delta);
-            }
             report.get_or_insert_default().add(delta);
             let of_whole = whole.as_mut().map(|whole| whole.follow(number, delta));
             let delta = of_whole.as_ref().unwrap_or(delta);

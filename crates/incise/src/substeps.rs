@@ -123,7 +123,7 @@ pub struct Choice {
     pub sliver_tets: usize,
     /// Their share of the volume at rest.
     pub sliver_volume_fraction: f64,
-    /// The expected error of all other tets with the chosen number, as a fraction of the motion.
+    /// The expected error of all other tets with the chosen number, as a fraction of the motion; 1 stands for 1 or more.
     pub expected_error: f64,
     /// Whether that error comes from a Poisson's ratio near 0.5.
     #[serde(skip)]
@@ -215,7 +215,7 @@ pub(crate) fn evaluate(
         },
         sliver_tets: slivers,
         sliver_volume_fraction: if slivers > 0 { volume / total } else { 0.0 },
-        expected_error,
+        expected_error: expected_error.min(1.0),
         nearly_incompressible,
         by_vbd: false,
     }

@@ -95,8 +95,7 @@ pub(crate) fn of_substeps(
         return None;
     }
     let percent = match 100.0 * choice.expected_error {
-        // The law was measured up to there.
-        percent if percent > 100.0 => "more than 100".to_owned(),
+        percent if percent >= 100.0 => "100 or more".to_owned(),
         percent => format!("{percent:.0}"),
     };
     let needed = choice.substeps_needed;

@@ -7,6 +7,9 @@ use crate::experiment::{Page, Part, Table};
 
 /// The largest error without a warning.
 const BAR: f64 = 0.1;
+/// The warning that is about vibrations alone, and the largest error that their loss explains.
+const DAMPED: &str = "vibrations_damped";
+const ALL_OF_IT: f64 = 1.0;
 
 const INTRODUCTION: &str = "\
 Scenes with default settings: no key of `[solver]` is set, unless a table says so. A result that misses its bar is printed \
@@ -22,9 +25,7 @@ E of at least 5e5 Pa and E / 5e5 Pa times that below, since softer bodies of thi
 - *Pressed*: no gravity. The block and the liver are held at the bottom, a rigid handle moves the top down by 10% of the \
 height; the beam is held at one end, a handle moves the other end down by 10% of the length. The handle's path is smooth \
 and takes two periods of the slowest vibration, at least four frames.
-- *Spinning*: free, no gravity, rigid rotation about z at the start, at √(0.24 E/ρ)/0.2 m and at most 10 rad/s. A scene \
-has no initial velocity, so this one runs in `incise_xpbd::Solver` with the method, the substeps, the precision and the warnings that \
-`Simulation` gives to its scene.
+- *Spinning*: free, no gravity, rigid rotation about z at the start, at √(0.24 E/ρ)/0.2 m and at most 10 rad/s.
 
 *Settled*: mean positions over six periods and at least 48 frames (Hann window), since a default scene is not damped, against \
 the equilibrium by Newton's method. The mean of a large swing can differ from the equilibrium. *Motion*: hanging, two periods from rest; pressed, the handle's motion and one more \
@@ -32,11 +33,13 @@ period; spinning, one turn; at least four frames. The reference is implicit Eule
 frame), twice and four times as many, extrapolated twice; where the last extrapolation changed it by more than 2% of the \
 motion the cell states that as \"ref ±\". Where a period is far below a frame (E = 1e9 Pa, pressed bodies from 1e7 Pa on) the \
 reference damps the vibrations too, and what is compared is the slow motion. Error: root of the mean squared distance of all free particles, over that of the \
-displacement. The reference has the same mesh and energy, so the error of the mesh does not count.
+displacement, for the motion at least over that of the equilibrium, since frames may meet a vibration where it comes back to \
+its start. The reference has the same mesh and energy, so the error of the mesh does not count.
 
 Left out to keep the command below some ten minutes on two cores: E of 1e4, 1e6 and 1e8 Pa, Poisson's ratio 0.499.
 
-Bar: at most 10%, or a warning. Warnings are printed by code; **no warning** marks a miss.";
+Bar: at most 10%, or a warning that explains it: `vibrations_damped` explains no error of a settled state or of a turn, and \
+none above 100%. Warnings are printed by code; **no warning** marks a miss.";
 
 const LOAD: &str = "\
 ## Bodies under load after cuts
@@ -115,6 +118,22 @@ fn standing(error: f64, warned: &Warned) -> Standing {
     }
 }
 
+/// The warnings of a row that explain an error of its motion.
+fn of_motion(row: &NewtonRow) -> Warned {
+    match row.load {
+        Load::Hanging | Load::Pressed if row.motion <= ALL_OF_IT => row.warned.clone(),
+        // A turn is no vibration, and one that is damped away is off by itself.
+        _ => of_state(row),
+    }
+}
+
+/// The warnings of a row that explain an error of a settled state: vibrations that are damped settle where others do.
+fn of_state(row: &NewtonRow) -> Warned {
+    let mut warned = row.warned.clone();
+    warned.remove(DAMPED);
+    warned
+}
+
 fn load_passes(row: &LoadRow) -> bool {
     row.is_bounded && row.softened == 0
 }
@@ -129,6 +148,10 @@ fn summary(newton: &[&NewtonRow], load: &[&LoadRow], rest: &[&RestRow]) -> Table
     ];
     let mut table = Table::new("Results by part", header);
     let mut add = |name: &str, standings: Vec<Standing>| {
+        // Another part of the page was asked for.
+        if standings.is_empty() {
+            return;
+        }
         let count = |of| standings.iter().filter(|&&s| s == of).count();
         let missed = match count(Standing::Missed) {
             0 => "0".to_owned(),
@@ -144,12 +167,12 @@ fn summary(newton: &[&NewtonRow], load: &[&LoadRow], rest: &[&RestRow]) -> Table
     };
     for load in Load::ALL {
         let of = || newton.iter().filter(|row| row.load == load);
-        let settled = of().filter_map(|row| Some(standing(row.settled?, &row.warned)));
+        let settled = of().filter_map(|row| Some(standing(row.settled?, &of_state(row))));
         let settled: Vec<Standing> = settled.collect();
         if !settled.is_empty() {
             add(&format!("{}, settled", load.name()), settled);
         }
-        let motion = of().map(|row| standing(row.motion, &row.warned));
+        let motion = of().map(|row| standing(row.motion, &of_motion(row)));
         add(&format!("{}, motion", load.name()), motion.collect());
     }
     let passed = |passes: bool| {
@@ -170,8 +193,8 @@ fn summary(newton: &[&NewtonRow], load: &[&LoadRow], rest: &[&RestRow]) -> Table
 fn misses(newton: &[&NewtonRow], load: &[&LoadRow], rest: &[&RestRow]) -> String {
     let mut lines = Vec::new();
     for row in newton {
-        let mut add = |what: &str, error: f64| {
-            if standing(error, &row.warned) == Standing::Missed {
+        let mut add = |what: &str, error: f64, warned: &Warned| {
+            if standing(error, warned) == Standing::Missed {
                 lines.push(format!(
                     "- {} {}, E = {:.0e} Pa, Poisson's ratio {}: {what} {}, no warning ({}, {} substeps, {})",
                     row.shape,
@@ -186,9 +209,9 @@ fn misses(newton: &[&NewtonRow], load: &[&LoadRow], rest: &[&RestRow]) -> String
             }
         };
         if let Some(error) = row.settled {
-            add("settled state off by", error);
+            add("settled state off by", error, &of_state(row));
         }
-        add("motion off by", row.motion);
+        add("motion off by", row.motion, &of_motion(row));
     }
     for row in load.iter().filter(|row| !load_passes(row)) {
         lines.push(format!(
@@ -276,11 +299,11 @@ fn newton_tables(rows: &[&NewtonRow]) -> Vec<Part> {
             if load != Load::Spinning {
                 add("settled state", &|row| {
                     row.settled
-                        .map_or(String::new(), |error| cell(error, &row.warned))
+                        .map_or(String::new(), |error| cell(error, &of_state(row)))
                 });
             }
             add("motion", &|row| {
-                let mut text = cell(row.motion, &row.warned);
+                let mut text = cell(row.motion, &of_motion(row));
                 if row.reference > 0.02 {
                     text += &format!(", ref ±{}", percent(row.reference));
                 }

@@ -1,5 +1,5 @@
-//! Hands in a [`Simulation`]: blades and grabs whose future is not known, as a viewer, a haptic device or a controller
-//! moves them.
+//! Hands in a [`Simulation`]: blades, grabs and velocities whose future is not known, as a viewer, a haptic device or a
+//! controller gives them.
 //!
 //! What moves is told between two frames and carried out in the next one. Cost: that of cuts and of handles. On a device a
 //! frame with a live blade waits for the positions, and so do taking hold and letting go; moving a grab does not.
@@ -7,6 +7,7 @@
 use glam::DVec3;
 
 use super::Simulation;
+use crate::backend::{each, each_mut};
 use crate::limits::{coordinates, value, within};
 use crate::{Error, Grab};
 
@@ -159,6 +160,58 @@ impl Simulation {
             false => Err(unknown(grab)),
         }
     }
+
+    /// Gives each particle that nothing holds a velocity in m/s, as a function of its position in m, and wakes what sleeps.
+    ///
+    /// Without a call bodies begin at rest. The next frame starts with these velocities. O(particles); on a device the
+    /// positions are fetched.
+    ///
+    /// # Errors
+    /// If a velocity is not finite or a component is beyond 1e9 m/s, in which case all stay as they were; or if the device
+    /// is lost.
+    ///
+    /// # Example
+    /// A box that spins once a second about an axis through its middle.
+    /// ```
+    /// use std::f64::consts::TAU;
+    ///
+    /// use incise::mesh::glam::DVec3;
+    /// use incise::{Scene, Simulation};
+    ///
+    /// let scene = Scene::from_toml(
+    ///     "[world]\ngravity = [0.0, 0.0, 0.0]\n[[body]]\nshape = { kind = \"box\", tets = 200 }",
+    /// )?;
+    /// let mut simulation = Simulation::new(&scene)?;
+    /// let corner = simulation.positions()[0];
+    /// simulation.set_velocities(|x| DVec3::Z.cross(x) * TAU)?;
+    /// while simulation.report().time < 0.5 {
+    ///     simulation.step()?;
+    /// }
+    /// let turned = DVec3::new(-corner.x, -corner.y, corner.z);
+    /// assert!(simulation.positions()[0].distance(turned) < 0.1 * corner.length());
+    /// # Ok::<(), incise::Error>(())
+    /// ```
+    pub fn set_velocities(&mut self, velocity: impl Fn(DVec3) -> DVec3) -> Result<(), Error> {
+        self.read_back()?;
+        for group in &self.groups {
+            each!(&group.solver, solver => {
+                for p in 0..solver.particle_count() {
+                    coordinates("velocity", velocity(solver.position(p)).to_array())?;
+                }
+            });
+        }
+        for group in &mut self.groups {
+            group.wake();
+            each_mut!(&mut group.solver, solver => {
+                for p in 0..solver.particle_count() {
+                    if !solver.is_fixed(p) {
+                        solver.set_velocity(p, velocity(solver.position(p)));
+                    }
+                }
+            });
+        }
+        Ok(())
+    }
 }
 
 fn unknown(grab: Grab) -> Error {
@@ -168,7 +221,6 @@ fn unknown(grab: Grab) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::backend::each;
     use crate::scene::Precision;
     use crate::{Scene, Simulation};
 

@@ -18,7 +18,7 @@ use crate::budget;
 use crate::group::{Group, adopt, kappa_limit};
 use crate::joined::substeps;
 use crate::limits::{self, value};
-use crate::method::{resolve, settings};
+use crate::method::{leaves_open, resolve, settings};
 use crate::place::Place;
 use crate::plan::{Plan, Recipe};
 use crate::recluster::Recluster;
@@ -33,6 +33,10 @@ struct Retuned {
     settings: StepSettings,
     /// With the method that was chosen.
     spec: SolverSpec,
+    /// Whether no body names a number of substeps.
+    leaves_substeps_open: bool,
+    /// Whether VBD may be chosen.
+    leaves_method_open: bool,
     choice: Option<Choice>,
     /// The limit of kappa before and from now on.
     limits: [Option<KappaLimit>; 2],
@@ -258,13 +262,9 @@ impl Retuned {
         if chosen_anew {
             (settings.substeps, choice) = substeps(&asked, after, &group.solver, mesh);
         }
+        let is_open = leaves_open(after, &asked, &settings, place.is_device());
         let (own, choice) = match after.method {
-            Method::Auto if chosen_anew => {
-                let is_open = asked.iter().all(|s| *s == Substeps::Auto)
-                    && !place.is_device()
-                    && settings.colliders.is_empty();
-                resolve(after, choice, is_open)
-            }
+            Method::Auto if chosen_anew => resolve(after, choice, is_open),
             // What was chosen stays, with everything else that differs.
             Method::Auto => {
                 let SolverSpec {
@@ -315,6 +315,8 @@ impl Retuned {
         Ok(Self {
             settings,
             spec: own,
+            leaves_substeps_open: asked.iter().all(|s| *s == Substeps::Auto),
+            leaves_method_open: is_open,
             choice,
             limits,
             plan,
@@ -368,6 +370,8 @@ impl Retuned {
         group.settings = self.settings;
         group.choice = self.choice;
         group.spec = spec;
+        group.leaves_substeps_open = self.leaves_substeps_open;
+        group.leaves_method_open = self.leaves_method_open;
         group.budget = None;
         Ok(())
     }

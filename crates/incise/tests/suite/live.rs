@@ -224,3 +224,47 @@ fn particles_are_found_in_their_groups() {
     assert_eq!((alone.time_step(), alone.next_frame()), (0.016, 0));
     assert_eq!(simulation.next_frame(), 3);
 }
+
+/// Velocities reach what nothing holds, wake who sleeps, and are refused together.
+#[test]
+fn velocities_are_set_between_frames() {
+    for precision in [Precision::F32, Precision::F64] {
+        let mut scene = scene(vec![body(200)]);
+        scene.world.gravity = Some([0.0; 3]);
+        scene.solver.precision = precision;
+        scene.solver.sleep = Some(SleepSpec::default());
+        let held = Region::HalfSpace {
+            point: [-0.4, 0.0, 0.0],
+            normal: [-1.0, 0.0, 0.0],
+        };
+        let mut holding = scene.clone();
+        holding.body[0].fixed = vec![held.clone()];
+        let mut free = Simulation::new(&scene).unwrap();
+        while !free.report().bodies[0].asleep.unwrap() {
+            free.step().unwrap();
+        }
+        let before = free.positions().to_vec();
+        assert!(free.set_velocities(|x| x / 0.0).is_err());
+        free.step().unwrap();
+        assert_eq!(free.positions(), before);
+        free.set_velocities(|_| DVec3::new(1.0, 2.0, 3.0)).unwrap();
+        free.step().unwrap();
+        let way = DVec3::new(1.0, 2.0, 3.0) * free.time_step();
+        for (x, before) in free.positions().iter().zip(&before) {
+            assert!(x.distance(*before + way) < 1e-5, "{x} from {before}");
+        }
+        let mut held = Simulation::new(&holding).unwrap();
+        let before = held.positions().to_vec();
+        held.set_velocities(|_| DVec3::X).unwrap();
+        held.step().unwrap();
+        let mut moved = 0;
+        for (x, before) in held.positions().iter().zip(&before) {
+            if before.x <= -0.4 {
+                assert_eq!(x, before);
+            } else {
+                moved += usize::from(x.x > before.x);
+            }
+        }
+        assert!(moved > 10);
+    }
+}

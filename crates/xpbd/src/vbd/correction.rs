@@ -25,7 +25,8 @@ use crate::{Real, Solver, XpbdError};
 pub struct CoarseCorrectionSettings {
     /// Iterations of conjugate gradients, at most.
     pub iterations: u32,
-    /// Ends them once the residual of the linear system, in the norm of the preconditioner, has fallen to this part.
+    /// Ends them once the distance to the solution of the linear system, in the norm of the energy, is estimated to have
+    /// fallen to this part.
     pub reduction: f64,
     /// Particles of an aggregate, about: see [`CoarseCorrection::new`].
     pub aggregate: usize,
@@ -71,6 +72,9 @@ pub struct CoarseCorrection<R: Real> {
     force: Vec<R::Vector>,
     base: Vec<R::Vector>,
 }
+
+/// The part of the accuracy wanted that conjugate gradients may use up.
+const SHARE: f64 = 0.25;
 
 /// Halvings of a direction that does not lower the potential.
 const HALVINGS: usize = 8;
@@ -251,27 +255,27 @@ impl<R: Real> ImplicitStep<'_, R> {
             coarse.place(|row| R::to_dvec3(base[row]));
             coarse.assemble(matrix, held);
         }
+        let (potential, elastic) = self.potentials();
+        let scale = elastic + MOTION * self.kinetic();
         let limits = Limits {
             iterations: settings.iterations,
             reduction: settings.reduction,
+            energy: self
+                .accuracy
+                .map_or(0.0, |wanted| (SHARE * wanted).powi(2) * scale),
         };
-        let iterations = conjugate.solve(matrix, coarse, &self.stars.colors, force, held, limits);
-        coarse.note(iterations, settings.iterations);
+        let solved = conjugate.solve(matrix, coarse, &self.stars.colors, force, held, limits);
+        coarse.note(solved.iterations, settings.iterations);
         let direction = conjugate.solution();
         let slope: f64 = force
             .iter()
             .zip(direction)
             .map(|(f, d)| R::to_dvec3(*f).dot(R::to_dvec3(*d)))
             .sum();
-        let (taken, elastic) = self.search(base, direction, slope);
+        let (taken, elastic) = self.search((potential, elastic), base, direction, slope);
         self.solver.project_to_colliders(&self.obstacles);
-        // Newton's method gains half of the slope; conjugate gradients leave the square of their reduction of it.
-        let is_solved = iterations < settings.iterations && taken == 1.0;
-        let part = if is_solved {
-            settings.reduction.powi(2)
-        } else {
-            1.0
-        };
+        // Newton's method gains half of the slope, all of it in a full step, and leaves what the iteration left.
+        let part = if taken == 1.0 { solved.left } else { 1.0 };
         let left = 0.5 * slope.max(0.0) * part;
         let energy = elastic + MOTION * self.kinetic();
         let error = if left > 0.0 {
@@ -280,15 +284,21 @@ impl<R: Real> ImplicitStep<'_, R> {
             0.0
         };
         CoarseCorrectionReport {
-            iterations,
+            iterations: solved.iterations,
             taken,
             error,
         }
     }
 
-    /// Goes from `base` along a direction on which the potential falls by `slope` at first; returns how far, and the energy
-    /// of the tets there.
-    fn search(&self, base: &[R::Vector], direction: &[R::Vector], slope: f64) -> (f64, f64) {
+    /// Goes from `base`, where potential and energy of the tets are `start`, along a direction on which the potential falls by
+    /// `slope` at first; returns how far, and the energy of the tets there.
+    fn search(
+        &self,
+        (start, elastic_at_start): (f64, f64),
+        base: &[R::Vector],
+        direction: &[R::Vector],
+        slope: f64,
+    ) -> (f64, f64) {
         let place = |part: f64| {
             let part = R::from_f64(part);
             let mut sound = true;
@@ -302,7 +312,6 @@ impl<R: Real> ImplicitStep<'_, R> {
             }
             sound
         };
-        let (start, elastic_at_start) = self.potentials();
         if !(slope.is_finite() && slope > 0.0) {
             return (0.0, elastic_at_start);
         }

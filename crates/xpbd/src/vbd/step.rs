@@ -92,17 +92,42 @@ impl<R: Real> Solver<R> {
         settings.check()?;
         self.follow_body();
         let mut report = VbdReport::default();
-        for number in 1..=settings.step.substeps {
-            let mut step = ImplicitStep::predicted(self, stars, settings, penalty, number);
-            step.run(settings, &mut report, &mut iterate);
-            report.error = match (report.error, step.error) {
-                (Some(a), Some(b)) => Some(a.max(b)),
-                (a, b) => a.or(b),
-            };
-            report.repaired += step.finish().repaired;
+        let (count, time) = (settings.step.substeps, settings.step.substep_time());
+        for number in 1..=count {
+            let is_bdf2 = settings.integrator == Integrator::Bdf2;
+            let start = stars.history.parts(time).filter(|_| is_bdf2);
+            if let Some(parts) = start {
+                stars.history.start(self, time, parts);
+            }
+            let parts = start.unwrap_or(1);
+            for part in 1..=parts {
+                let place = Place {
+                    number: (number - 1) * parts + part,
+                    of: count * parts,
+                    starts: start.is_some(),
+                };
+                let mut step = ImplicitStep::predicted(self, stars, settings, penalty, place);
+                step.run(settings, &mut report, &mut iterate);
+                report.error = match (report.error, step.error) {
+                    (Some(a), Some(b)) => Some(a.max(b)),
+                    (a, b) => a.or(b),
+                };
+                report.repaired += step.finish().repaired;
+            }
         }
         Ok(report)
     }
+}
+
+/// Which part of a frame a substep is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    /// From 1.
+    number: u32,
+    /// How many there are, all as long.
+    of: u32,
+    /// Whether it begins a history of BDF2.
+    starts: bool,
 }
 
 /// One substep of VBD between its prediction and its end, for those who choose themselves what to do in it, or
@@ -119,9 +144,11 @@ pub struct ImplicitStep<'a, R: Real> {
     pub(super) obstacles: Vec<Obstacle<R>>,
     /// Whether the frame ends with it.
     last: bool,
-    /// The Δt of the implicit Euler substep that is solved; BDF2 makes it 2/3 of the substep.
+    /// The Δt of the implicit Euler substep that is solved; BDF2 makes it 2/3 of the substep, or less at the start.
     pub(super) time: R,
     integrator: Integrator,
+    /// The error at which it may end.
+    pub(super) accuracy: Option<f64>,
     /// What the last coarse correction left over.
     pub(super) error: Option<f64>,
     /// Held particles that could not follow their handle.
@@ -142,12 +169,22 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
         settings: &VbdSettings,
     ) -> Result<Self, XpbdError> {
         settings.check()?;
+        let (of, time) = (settings.step.substeps, settings.step.substep_time());
+        let starts = stars.history.parts(time).is_some();
+        if starts {
+            stars.history.start(solver, time, 1);
+        }
+        let place = Place {
+            number: of,
+            of,
+            starts,
+        };
         Ok(Self::predicted(
             solver,
             stars,
             settings,
             SWEEP_PENALTY,
-            settings.step.substeps,
+            place,
         ))
     }
 
@@ -156,42 +193,45 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
         stars: &'a mut VertexStars<R>,
         settings: &VbdSettings,
         penalty: f64,
-        number: u32,
+        place: Place,
     ) -> Self {
         assert!(
             stars.fits(solver),
             "the stars belong to these particles, tets and constraints"
         );
-        let substep_time = settings.step.substep_time();
+        let own = StepSettings {
+            substeps: place.of,
+            ..settings.step.clone()
+        };
+        let own_time = own.substep_time();
         let implicit_time = match settings.integrator {
             Integrator::ImplicitEuler => {
                 stars.history.clear();
-                substep_time
+                own_time
             }
-            Integrator::Bdf2 => {
-                let gravity = settings.step.gravity;
-                stars.history.begin(solver, substep_time, gravity)
-            }
+            Integrator::Bdf2 if place.starts => own_time,
+            Integrator::Bdf2 => stars.history.begin(solver, own_time, own.gravity),
         };
         let time = R::from_f64(implicit_time);
-        solver.predict(&settings.step, time);
-        let ended = f64::from(number) / f64::from(settings.step.substeps);
+        solver.predict(&own, time);
+        let ended = f64::from(place.number) / f64::from(place.of);
         let lost = solver.move_held(ended);
         stars.begin(solver, implicit_time, penalty);
-        let elapsed = ended * settings.step.time_step;
-        let obstacles = Obstacle::place(&settings.step, elapsed, solver.origin).collect();
+        let elapsed = ended * own.time_step;
+        let obstacles = Obstacle::place(&own, elapsed, solver.origin).collect();
         let mut step = Self {
             solver,
             stars,
             obstacles,
-            last: number == settings.step.substeps,
-            settings: settings.step.clone(),
+            last: place.number == place.of,
+            settings: own,
             time,
             integrator: settings.integrator,
+            accuracy: settings.accuracy,
             error: None,
             lost,
         };
-        if let (Guess::Adaptive, Some(gravity)) = (settings.guess, settings.step.gravity) {
+        if let (Guess::Adaptive, Some(gravity)) = (settings.guess, step.settings.gravity) {
             step.start_where_gravity_led(R::from_dvec3(gravity));
         }
         step
