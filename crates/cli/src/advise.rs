@@ -2,7 +2,7 @@
 
 use comfy_table::Table;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
-use incise::advise::{Advice, Against, Measured, Question, ReferenceKind};
+use incise::advise::{Advice, Against, Measured, Question, ReferenceKind, horizon};
 
 use crate::args::AdviseArguments;
 use crate::failure::Failure;
@@ -13,7 +13,7 @@ pub(crate) fn advise(arguments: &AdviseArguments) -> Result<(), Failure> {
     let scene = load(arguments.scene.as_deref())?;
     let question = Question {
         budget_ms: arguments.budget_ms,
-        frames: arguments.frames,
+        frames: arguments.frames.unwrap_or_else(|| horizon(&scene)),
         threads: arguments.threads.map(usize::from),
     };
     let advice = incise::advise::advise(&scene, &question)?;
@@ -63,8 +63,8 @@ fn reference(advice: &Advice) -> String {
         text += &format!(" (order {order:.1})");
     }
     text += &format!(
-        ", whose own error is about {} % of the positions and {} % of the volume",
-        digits(left.largest),
+        ", whose own error is about {}% of the motion and {}% of the volume",
+        digits(left.motion),
         digits(left.volume)
     );
     if let Some(why) = why_not_newton {
@@ -80,9 +80,10 @@ fn table(advice: &Advice) -> Table {
         "setting",
         "ms a frame",
         "slowest frame",
-        "error in % of the size",
+        "error in % of the motion",
+        "of the size, at most",
         "at the end",
-        "of the volume in %",
+        "of the volume",
         "",
     ]);
     for (i, row) in advice.measured.iter().enumerate() {
@@ -99,6 +100,7 @@ fn table(advice: &Advice) -> Table {
         let numbers = [
             row.ms,
             row.slowest_ms,
+            error.motion,
             error.largest,
             error.end,
             error.volume,
@@ -117,9 +119,10 @@ fn words(advice: &Advice) -> String {
     let row = |i: Option<usize>| i.and_then(|i| advice.measured.get(i));
     let what = |m: &Measured| {
         format!(
-            "{}: {} ms a frame, error {} % (volume {} %)",
+            "{}: {} ms a frame, error {}% of the motion, {}% of the size, {}% of the volume",
             m.name,
             digits(m.ms),
+            digits(m.error.motion),
             digits(m.error.largest),
             digits(m.error.volume)
         )

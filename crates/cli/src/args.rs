@@ -146,9 +146,10 @@ pub(crate) struct AdviseArguments {
     /// Time of a frame in ms that may be spent.
     #[arg(long, value_name = "X")]
     pub(crate) budget_ms: f64,
-    /// Number of frames that are measured, from the first on. More take longer and see more of the scene.
-    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    pub(crate) frames: u32,
+    /// Number of frames that are measured, from the first on [default: those of half a second and of all strokes and handles,
+    /// at most 100]. More take longer and see more of the scene.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub(crate) frames: Option<u32>,
     /// Number of threads, at most 1024 [default: one for each core].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) threads: Option<u16>,

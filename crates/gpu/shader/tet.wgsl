@@ -1,4 +1,4 @@
-// A tet: deformation gradient, metric and volume term, shared by the kernels that solve tets and the one that damps them.
+// A tet: deformation gradient, root of the metric and volume term, shared by the kernels that solve tets and the one that damps them.
 // Twin: `simd_kernel.rs` of incise-xpbd, which explains the equations; the order of operations is the same.
 
 struct Tet {
@@ -6,9 +6,9 @@ struct Tet {
     q1: vec3<f32>,
     q2: vec3<f32>,
     q3: vec3<f32>,
-    // The weighted metric: diagonal, and twice xy, xz, yz.
-    same: vec3<f32>,
-    mixed: vec3<f32>,
+    // The root L of the weighted metric G: its diagonal, then yx, zx, zy.
+    diagonal: vec3<f32>,
+    below: vec3<f32>,
     // mu V times the square of the time.
     stiffness: f32,
     ratio: f32,
@@ -61,11 +61,19 @@ fn move_corners(tet: Tet, x: Corners, change: Columns) -> Corners {
     );
 }
 
-// G : A^T A in units of the stiffness times time squared.
+// A L.
+fn rooted(tet: Tet, m: Columns) -> Columns {
+    return Columns(
+        tet.diagonal.x * m.a + tet.below.x * m.b + tet.below.y * m.c,
+        tet.diagonal.y * m.b + tet.below.z * m.c,
+        tet.diagonal.z * m.c,
+    );
+}
+
+// G : A^T A = |A L|^2 in units of the stiffness times time squared.
 fn weighted(tet: Tet, m: Columns) -> f32 {
-    let same = tet.same.x * dot(m.a, m.a) + tet.same.y * dot(m.b, m.b) + tet.same.z * dot(m.c, m.c);
-    let mixed = tet.mixed.x * dot(m.a, m.b) + tet.mixed.y * dot(m.a, m.c) + tet.mixed.z * dot(m.b, m.c);
-    return (same + mixed) * settings.time_squared;
+    let root = rooted(tet, m);
+    return product(root, root) * settings.time_squared;
 }
 
 fn product(m: Columns, n: Columns) -> f32 {

@@ -1,8 +1,7 @@
 // The three forms of solving a tet. Each moves the corners and changes both multipliers. Twin: `simd_kernel.rs` of
 // incise-xpbd, which explains the equations; the order of operations is the same.
 //
-// The energy of the split form is written so that nothing cancels near rest. An algebraically equal form, such as one in
-// |F|^2 - 3, loses all digits there.
+// The energy of the split form is written in two ways, so that nothing cancels near rest nor far from it.
 
 const SPLIT: u32 = 0u;
 const BLOCK: u32 = 1u;
@@ -22,6 +21,9 @@ struct Change {
     derivative: Columns,
     multiplier: f32,
 }
+
+// The trace of E beyond which the energy of shear is computed from it.
+const LARGE_STRAIN: f32 = 2.0;
 
 // The parts of the energy of the split form.
 struct Energies {
@@ -48,12 +50,16 @@ fn energies_of(f: Columns) -> Energies {
     let second = aa * (bb + cc) + minor - ab * ab - ac * ac;
     let third = aa * minor - ab * (ab * cc - bc * ac) + ac * (ab * bc - bb * ac);
     var shear = bulge * bulge - (second + third) * settings.half;
+    let trace = aa + bb + cc;
     let square = product(cofactor, cofactor);
-    if square > settings.max_cofactor_norm * settings.max_cofactor_norm {
+    let steep = square > settings.max_cofactor_norm * settings.max_cofactor_norm;
+    if steep {
         let scale = settings.max_cofactor_norm / sqrt(square);
         cofactor = scaled(cofactor, scale);
         bulge *= scale;
-        shear = (aa + bb + cc) * settings.half - bulge + bulge * bulge * settings.half;
+    }
+    if steep || trace > LARGE_STRAIN {
+        shear = trace * settings.half - bulge + bulge * bulge * settings.half;
     }
     let pressure = bulge - settings.one;
     let derivative = Columns(
@@ -64,27 +70,21 @@ fn energies_of(f: Columns) -> Energies {
     return Energies(shear, derivative, cofactor, bulge);
 }
 
-// G : A^T B, the bilinear form of `weighted`.
-fn weighted_product(tet: Tet, m: Columns, n: Columns) -> f32 {
-    let same = tet.same.x * dot(m.a, n.a) + tet.same.y * dot(m.b, n.b) + tet.same.z * dot(m.c, n.c);
-    let mixed = tet.mixed.x * (dot(m.a, n.b) + dot(m.b, n.a))
-        + tet.mixed.y * (dot(m.a, n.c) + dot(m.c, n.a))
-        + tet.mixed.z * (dot(m.b, n.c) + dot(m.c, n.b));
-    return (same + mixed * settings.half) * settings.time_squared;
-}
-
-// Moves the corners by a shear step of `shear_step` and by the volume constraint that sees this step.
+// Moves the corners by a shear step of `shear_step` and by the volume constraint that sees this step. `root` is `rooted` of
+// the derivative of the shear energy.
 fn move_split(
     tet: Tet,
     x: Corners,
     energies: Energies,
+    root: Columns,
     shear_step: f32,
     multipliers: ptr<function, vec2<f32>>,
 ) -> Corners {
     let lame = tet.ratio - settings.one;
-    let mixed = weighted_product(tet, energies.derivative, energies.cofactor);
+    let steep = rooted(tet, energies.cofactor);
+    let mixed = product(root, steep) * settings.time_squared;
     let b = -(lame * (tet.stiffness * energies.bulge + shear_step * mixed) + (*multipliers).y);
-    let r = lame * weighted(tet, energies.cofactor);
+    let r = lame * (product(steep, steep) * settings.time_squared);
     var change = b * decay(r);
     if ITERATED {
         change = b / (r + settings.one);
@@ -112,7 +112,8 @@ fn decay(r: f32) -> f32 {
 fn solve_split(tet: Tet, x: Corners, f: Columns, multipliers: ptr<function, vec2<f32>>) -> Corners {
     let energies = energies_of(f);
     let twice = energies.shear + energies.shear;
-    let steepness = weighted(tet, energies.derivative);
+    let root = rooted(tet, energies.derivative);
+    let steepness = product(root, root) * settings.time_squared;
     var fraction = decay(steepness / twice);
     if !(energies.shear > 0.0) {
         fraction = 0.0;
@@ -124,7 +125,7 @@ fn solve_split(tet: Tet, x: Corners, f: Columns, multipliers: ptr<function, vec2
             (*multipliers).x += change;
         }
     }
-    return move_split(tet, x, energies, shear_step, multipliers);
+    return move_split(tet, x, energies, root, shear_step, multipliers);
 }
 
 // The split form with accumulating multipliers, for several iterations.
@@ -132,14 +133,15 @@ fn solve_split_iterated(tet: Tet, x: Corners, f: Columns, multipliers: ptr<funct
     let energies = energies_of(f);
     let positive = energies.shear > 0.0;
     let twice = select(settings.one, energies.shear + energies.shear, positive);
-    let root = sqrt(twice);
-    let m = weighted(tet, energies.derivative) / twice;
-    var d = -((tet.stiffness * root + (*multipliers).x) / (m + settings.one));
+    let constraint = sqrt(twice);
+    let root = rooted(tet, energies.derivative);
+    let m = product(root, root) * settings.time_squared / twice;
+    var d = -((tet.stiffness * constraint + (*multipliers).x) / (m + settings.one));
     if !positive || !is_finite(d) {
         d = 0.0;
     }
     (*multipliers).x += d * settings.relaxation;
-    return move_split(tet, x, energies, d / root, multipliers);
+    return move_split(tet, x, energies, root, d / constraint, multipliers);
 }
 
 // Prevents compilers from reordering the factors of a product. At rest the determinant of the block form is a difference
@@ -155,7 +157,9 @@ fn solve_block(tet: Tet, x: Corners, f: Columns, multipliers: ptr<function, vec2
     let directed = norm > 0.0;
     let scale = settings.one / select(settings.one, norm, directed);
     let v = volume(tet, f);
-    let trace = (tet.same.x + tet.same.y + tet.same.z) * settings.time_squared;
+    let d = tet.diagonal;
+    let n = tet.below;
+    let trace = (d.x * d.x + (n.x * n.x + d.y * d.y) + (n.y * n.y + n.z * n.z + d.z * d.z)) * settings.time_squared;
     let m11 = pinned(weighted(tet, f) * scale * scale);
     let m22 = weighted(tet, v.cofactor);
     let m12 = trace * v.volume * scale;

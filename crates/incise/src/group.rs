@@ -68,8 +68,6 @@ pub(crate) struct Group {
     size: f64,
     /// What is solved less accurately than asked for.
     pub(crate) outside: OutsideVolume,
-    /// The kappa of a new tet from which single precision is judged again.
-    stiffest: f64,
     /// Whether the last frame of VBD missed the accuracy wanted.
     misses_accuracy: bool,
     /// Warnings for the next report.
@@ -117,10 +115,6 @@ const MOST_GROWTH: u32 = 2;
 
 /// How much weaker than on earth gravity may be and still count for the precision.
 const WEAKEST: f64 = 1e4;
-
-/// The largest kappa in single precision. Measured on cut bodies under load (`cargo xtask defaults --only load`): bounded to
-/// 1e6, thrown apart by rounding from 1e8 on; double precision is bounded at 1e17.
-const LARGEST_KAPPA_OF_F32: f64 = 1e7;
 
 /// The longest side of the box around points, 0 without points.
 fn longest_side(points: &[DVec3]) -> f64 {
@@ -207,7 +201,6 @@ impl Group {
             leaves_method_open: is_open,
             size,
             outside: OutsideVolume::default(),
-            stiffest: 0.0,
             misses_accuracy: false,
             warnings: Vec::new(),
             cut_kappa: None,
@@ -226,7 +219,7 @@ impl Group {
     /// Judges the accuracy of the present settings and notes warnings. O(tets log tets).
     pub(crate) fn judge_settings(&mut self) {
         self.warnings.clear();
-        (self.stiffest, self.misses_accuracy) = (0.0, false);
+        self.misses_accuracy = false;
         if self.is_too_short_for_f32() && each!(&self.solver, solver => solver.is_single()) {
             let shortest = self.shortest_substep_of_f32();
             let message = format!(
@@ -235,7 +228,6 @@ impl Group {
             );
             self.warn(WarningCode::ShortSubstepF32, message);
         }
-        self.judge_f32(self.kappa());
         if let Some(choice) = self.choice.filter(|_| self.chose_vbd()) {
             let warning = warning::of_vbd(&self.bodies, &choice, &self.spec);
             self.warnings.push(warning);
@@ -284,27 +276,9 @@ impl Group {
         });
     }
 
-    /// Warns of a largest kappa that single precision does not bear.
-    fn judge_f32(&mut self, kappa: f64) {
-        let is_single = each!(&self.solver, solver => solver.is_single());
-        if !is_single || self.spec.method == Method::Vbd || kappa <= LARGEST_KAPPA_OF_F32 {
-            return;
-        }
-        let message = format!(
-            "the largest kappa is {kappa:.0e}, and single precision throws bodies apart from about {LARGEST_KAPPA_OF_F32:.0e} on: \
-             use more substeps, precision = \"f64\" on the CPU, or more snap where cuts leave such thin tets"
-        );
-        self.warn(WarningCode::KappaF32, message);
-    }
-
     fn warn(&mut self, code: WarningCode, message: String) {
         self.warnings
             .push(Warning::new(code, &self.bodies, message));
-    }
-
-    /// Whether its tets are too stiff for single precision.
-    pub(crate) fn is_too_stiff_for_f32(&self) -> bool {
-        self.spec.method != Method::Vbd && self.kappa() > LARGEST_KAPPA_OF_F32
     }
 
     /// Whether the substep is too short for single precision.
@@ -489,10 +463,6 @@ impl Group {
         }
         if let Some(noted) = &mut self.cut_kappa {
             noted.new_tets = noted.new_tets.max(stiffest);
-        }
-        if stiffest > self.stiffest {
-            self.stiffest = 10.0 * stiffest;
-            self.judge_f32(stiffest);
         }
         let events = self.pieces.follow(&self.cuttable, delta);
         self.plan.follow(delta, &self.cuttable, ms)?;

@@ -169,9 +169,8 @@ impl Simulation {
         };
         let mut groups = make_groups(precision, joined)?;
         let short = || {
-            let needs =
-                |g: &Group| g.is_too_short_for_f32() || g.is_too_stiff_for_f32() || g.chose_vbd();
-            groups.iter().any(needs)
+            let mut groups = groups.iter();
+            groups.any(|group| group.is_too_short_for_f32() || group.chose_vbd())
         };
         if scene.solver.precision == Precision::Auto && !place.is_device() && short() {
             precision = Precision::F64;

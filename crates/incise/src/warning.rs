@@ -34,9 +34,6 @@ pub enum WarningCode {
     OutsideAccuracy,
     /// The substep is too short for single precision.
     ShortSubstepF32,
-    /// Tets are so stiff or thin for the substep that single precision throws bodies apart.
-    #[serde(rename = "kappa_f32")]
-    KappaF32,
     /// Tets were softened to keep `kappa_limit`.
     Softened,
     /// Particles would have become infinite and were put back: the frame cannot be trusted.

@@ -16,13 +16,13 @@ mod follow;
 
 use std::ops::Range;
 
-use glam::DVec3;
+use glam::DVec4;
 use incise_graph::{ClusterId, Rows, Schedule};
 
 use crate::Real;
 use crate::neo_hookean::TetConstraint;
 
-/// Numbers a lane has in [`Layout::rest`]: the inverse rest matrix, the weighted metric, the stiffness.
+/// Numbers a lane has in [`Layout::rest`]: the inverse rest matrix, the root of the weighted metric, the stiffness.
 pub(crate) const REST: usize = 9 + 6 + 1;
 /// Numbers a lane has in [`Layout::constants`]: `l/μ`, `γ` and the damping time.
 pub(crate) const CONSTANTS: usize = 3;
@@ -225,30 +225,32 @@ impl<R: Real> Layout<R> {
     }
 }
 
-/// `μV Σ w q qᵀ` over the corners with inverse mass w and gradient q of the barycentric coordinate; off the diagonal
-/// twice. With it the matrix of a tet's 2×2 system needs no gradients at the corners: `Σ w |∇C|²` is `G : AᵀA` for
-/// `A = dC/dF`. In double precision, since the masses of a cut tet's corners differ by orders.
+/// The lower triangle L with `L Lᵀ = G = μV Σ w q qᵀ` over the corners with inverse mass w and gradient q of the barycentric
+/// coordinate: its diagonal, then yx, zx, zy.
+///
+/// With it `Σ w |∇C|²` needs no gradients at the corners: it is `|A L|²` for `A = dC/dF`. A sum of squares loses nothing to
+/// rounding; `G : AᵀA`, which is the same, loses all of a sliver whose steep direction A hardly sees. L comes from an
+/// orthogonalization of the weighted gradients in double precision, since G itself would lose as much.
 fn metric<R: Real>(tet: &TetConstraint<R>, weights: [R; 4]) -> [R; 6] {
     let q = tet.inverse_rest.map(R::to_f64);
-    let [a, b, c] = [0, 1, 2].map(|i| DVec3::new(q[3 * i], q[3 * i + 1], q[3 * i + 2]));
-    let corners = [-(a + b + c), a, b, c];
     let stiffness = tet.stiffness.to_f64();
-    let entry = |i: usize, j: usize, times: f64| {
-        let sum: f64 = corners
-            .iter()
-            .zip(weights)
-            .map(|(q, w)| w.to_f64() * q[i] * q[j])
-            .sum();
-        R::from_f64(sum * stiffness * times)
-    };
-    [
-        entry(0, 0, 1.0),
-        entry(1, 1, 1.0),
-        entry(2, 2, 1.0),
-        entry(0, 1, 2.0),
-        entry(0, 2, 2.0),
-        entry(1, 2, 2.0),
-    ]
+    let roots = weights.map(|w| (w.to_f64() * stiffness).sqrt());
+    let mut columns = [0, 1, 2].map(|axis| {
+        let [a, b, c] = [q[axis], q[3 + axis], q[6 + axis]];
+        DVec4::new(-(a + b + c), a, b, c) * DVec4::from_array(roots)
+    });
+    let mut triangle = [[0.0; 3]; 3];
+    for j in 0..3 {
+        let length = columns[j].length();
+        triangle[j][j] = length;
+        let direction = columns[j].normalize_or_zero();
+        for i in j + 1..3 {
+            triangle[i][j] = direction.dot(columns[i]);
+            columns[i] -= direction * triangle[i][j];
+        }
+    }
+    let [[xx, ..], [yx, yy, _], [zx, zy, zz]] = triangle;
+    [xx, yy, zz, yx, zx, zy].map(R::from_f64)
 }
 
 fn index(value: usize) -> u32 {

@@ -7,7 +7,7 @@
 
 use glam::{DMat3, DVec3};
 
-use crate::simd_kernel::MAX_COFACTOR_NORM;
+use crate::simd_kernel::{LARGE_STRAIN, MAX_COFACTOR_NORM};
 use crate::{Material, Real};
 
 /// A tet with what the solver needs of its rest shape: 64 bytes in single precision.
@@ -169,13 +169,17 @@ impl<R: Real> TetConstraint<R> {
         let second = aa * bb + aa * cc + bb * cc - ab * ab - ac * ac - bc * bc;
         let third = aa * (bb * cc - bc * bc) - ab * (ab * cc - bc * ac) + ac * (ab * bc - bb * ac);
         let mut shear = bulge * bulge - (second + third) * R::HALF;
+        let trace = aa + bb + cc;
         let square = cofactor.iter().fold(R::ZERO, |sum, &c| sum + R::dot(c, c));
         let limit = R::from_f64(MAX_COFACTOR_NORM);
-        if square > limit * limit {
+        let is_steep = square > limit * limit;
+        if is_steep {
             let scale = limit / square.sqrt();
             cofactor = cofactor.map(|column| column * scale);
             bulge *= scale;
-            shear = (aa + bb + cc) * R::HALF - bulge + bulge * bulge * R::HALF;
+        }
+        if is_steep || trace > R::from_f64(LARGE_STRAIN) {
+            shear = trace * R::HALF - bulge + bulge * bulge * R::HALF;
         }
         let pressure = bulge - R::ONE;
         SplitEnergy {

@@ -21,7 +21,7 @@
 //! **Sequential**. The two constraints of the block form one after the other, as in the paper.
 //!
 //! No form needs gradients at the corners. With `G = Σ w q qᵀ` over the corners (see `Layout`), `Σ w |∇C|²` is
-//! `G : AᵀA` for `A = dC/dF`. A correction is one matrix times the gradients of the barycentric coordinates.
+//! `G : AᵀA = |A L|²` for `A = dC/dF` and `G = L Lᵀ`. A correction is one matrix times the gradients of the barycentric coordinates.
 //!
 //! Products and sums are rounded one by one, not fused, so that every instruction set gives the same bits.
 //!
@@ -129,6 +129,10 @@ struct Energies<V> {
 /// stretched two and a half times along each axis, or fifty times along one at constant volume. Beyond it derivative and
 /// value of the volume term are scaled down.
 pub(crate) const MAX_COFACTOR_NORM: f64 = 10.0;
+
+/// The trace of E beyond which `Ψ_D` is computed as `tr E / 2 - (J - 1) + (J - 1)² / 2`. Near rest that loses all digits, and
+/// far from it the form without `tr E` does, in which terms of sixth degree cancel.
+pub(crate) const LARGE_STRAIN: f64 = 2.0;
 
 /// The tets of one block.
 struct Tets<'a, R: Real, S: Simd> {
@@ -277,35 +281,31 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
         ]
     }
 
-    /// `G : AᵀA` in units of the stiffness times time squared.
+    /// `A L`, with the root L of G.
     #[inline(always)]
-    fn weighted(&self, a: &Matrix<R::Lanes<S>>) -> R::Lanes<S> {
-        let [a, b, c] = a;
-        let same = self.rest(9) * dot::<R, S>(a, a)
-            + self.rest(10) * dot::<R, S>(b, b)
-            + self.rest(11) * dot::<R, S>(c, c);
-        let mixed = self.rest(12) * dot::<R, S>(a, b)
-            + self.rest(13) * dot::<R, S>(a, c)
-            + self.rest(14) * dot::<R, S>(b, c);
-        (same + mixed) * self.time_squared
+    fn rooted(&self, m: &Matrix<R::Lanes<S>>) -> Matrix<R::Lanes<S>> {
+        let [a, b, c] = m;
+        let [xx, yy, zz, yx, zx, zy] = self.root();
+        let mut rooted = *m;
+        for axis in 0..3 {
+            rooted[0][axis] = xx * a[axis] + yx * b[axis] + zx * c[axis];
+            rooted[1][axis] = yy * b[axis] + zy * c[axis];
+            rooted[2][axis] = zz * c[axis];
+        }
+        rooted
     }
 
-    /// `G : AᵀB`, the bilinear form of [`Tets::weighted`].
+    /// L: its diagonal, then yx, zx, zy.
     #[inline(always)]
-    fn weighted_product(
-        &self,
-        left: &Matrix<R::Lanes<S>>,
-        right: &Matrix<R::Lanes<S>>,
-    ) -> R::Lanes<S> {
-        let [a, b, c] = left;
-        let [d, e, f] = right;
-        let same = self.rest(9) * dot::<R, S>(a, d)
-            + self.rest(10) * dot::<R, S>(b, e)
-            + self.rest(11) * dot::<R, S>(c, f);
-        let mixed = self.rest(12) * (dot::<R, S>(a, e) + dot::<R, S>(b, d))
-            + self.rest(13) * (dot::<R, S>(a, f) + dot::<R, S>(c, d))
-            + self.rest(14) * (dot::<R, S>(b, f) + dot::<R, S>(c, e));
-        (same + mixed * self.splat(R::HALF)) * self.time_squared
+    fn root(&self) -> [R::Lanes<S>; 6] {
+        [9, 10, 11, 12, 13, 14].map(|number| self.rest(number))
+    }
+
+    /// `G : AᵀA = |A L|²` in units of the stiffness times time squared.
+    #[inline(always)]
+    fn weighted(&self, a: &Matrix<R::Lanes<S>>) -> R::Lanes<S> {
+        let rooted = self.rooted(a);
+        product::<R, S>(&rooted, &rooted) * self.time_squared
     }
 
     /// `μV` times the square of the time.
@@ -370,6 +370,7 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
         let second = aa * (bb + cc) + minor - ab * ab - ac * ac;
         let third = aa * minor - ab * (ab * cc - bc * ac) + ac * (ab * bc - bb * ac);
         let mut shear = bulge * bulge - (second + third) * half;
+        let trace = aa + bb + cc;
         let square = dot::<R, S>(&cofactor[0], &cofactor[0])
             + dot::<R, S>(&cofactor[1], &cofactor[1])
             + dot::<R, S>(&cofactor[2], &cofactor[2]);
@@ -382,9 +383,10 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
                 *entry *= scale;
             }
             bulge *= scale;
-            let capped = (aa + bb + cc) * half - bulge + bulge * bulge * half;
-            shear = steep.select(capped, shear);
         }
+        let direct = trace * half - bulge + bulge * bulge * half;
+        let large = steep | trace.simd_gt(self.splat(R::from_f64(LARGE_STRAIN)));
+        shear = large.select(direct, shear);
         let pressure = bulge - one;
         let mut derivative = *f;
         for j in 0..3 {
@@ -401,11 +403,12 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
     }
 
     /// The change of the corners per weight by a shear step of `along` and the volume constraint that sees it, and that
-    /// of the volume multiplier.
+    /// of the volume multiplier. `rooted` is that of the derivative of the shear energy.
     #[inline(always)]
     fn split_change(
         &self,
         energies: &Energies<R::Lanes<S>>,
+        rooted: &Matrix<R::Lanes<S>>,
         along: R::Lanes<S>,
         iterated: bool,
         multiplier: &mut R::Lanes<S>,
@@ -418,9 +421,10 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
             ..
         } = energies;
         let lame = self.ratio - one;
-        let mixed = self.weighted_product(derivative, cofactor);
+        let steep = self.rooted(cofactor);
+        let mixed = product::<R, S>(rooted, &steep) * self.time_squared;
         let b = -(lame * (self.stiffness() * *bulge + along * mixed) + *multiplier);
-        let r = lame * self.weighted(cofactor);
+        let r = lame * (product::<R, S>(&steep, &steep) * self.time_squared);
         let d = if iterated {
             b / (r + one)
         } else {
@@ -457,7 +461,8 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
         let zero = self.splat(R::ZERO);
         let energies = self.energies(f);
         let twice = energies.shear + energies.shear;
-        let steepness = self.weighted(&energies.derivative);
+        let rooted = self.rooted(&energies.derivative);
+        let steepness = product::<R, S>(&rooted, &rooted) * self.time_squared;
         let part = self.decay(steepness / twice);
         let part = energies.shear.simd_gt(zero).select(part, zero);
         let along = -(self.stiffness() * part);
@@ -466,7 +471,7 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
             let multiplier = along * root * self.relaxation;
             multipliers[0] += multiplier.is_finite().select(multiplier, zero);
         }
-        self.split_change(&energies, along, false, &mut multipliers[1])
+        self.split_change(&energies, &rooted, along, false, &mut multipliers[1])
     }
 
     /// The change of the corners per weight by an iteration of the split form with accumulating multipliers.
@@ -481,12 +486,13 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
         let positive = energies.shear.simd_gt(zero);
         let twice = positive.select(energies.shear + energies.shear, one);
         let root = twice.sqrt();
-        let m = self.weighted(&energies.derivative) / twice;
+        let rooted = self.rooted(&energies.derivative);
+        let m = product::<R, S>(&rooted, &rooted) * self.time_squared / twice;
         let d = -((self.stiffness() * root + multipliers[0]) / (m + one));
         let sound = d.is_finite();
         let d = sound.select(positive.select(d, zero), zero);
         multipliers[0] += d * self.relaxation;
-        self.split_change(&energies, d / root, true, &mut multipliers[1])
+        self.split_change(&energies, &rooted, d / root, true, &mut multipliers[1])
     }
 
     /// The change of the corners' velocities per weight by the viscosity of the volume: one implicit step.
@@ -517,20 +523,20 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
         let zero = self.splat(R::ZERO);
         let strain_rate = symmetric::<R, S>(f, rate);
         let force = times_symmetric::<R, S>(f, &strain_rate);
-        let metric = [
-            self.rest(9),
-            self.rest(10),
-            self.rest(11),
-            self.rest(12) * self.splat(R::HALF),
-            self.rest(13) * self.splat(R::HALF),
-            self.rest(14) * self.splat(R::HALF),
-        ]
-        .map(|entry| entry * self.time_squared);
-        let change = symmetric::<R, S>(f, &times_symmetric::<R, S>(&force, &metric));
+        let rooted = self.rooted(&force);
+        let [xx, yy, zz, yx, zx, zy] = self.root();
+        let [a, b, c] = &rooted;
+        let mut weighted = rooted;
+        for axis in 0..3 {
+            weighted[0][axis] = xx * a[axis] * self.time_squared;
+            weighted[1][axis] = (yx * a[axis] + yy * b[axis]) * self.time_squared;
+            weighted[2][axis] = (zx * a[axis] + zy * b[axis] + zz * c[axis]) * self.time_squared;
+        }
+        let change = symmetric::<R, S>(f, &weighted);
         let [xx, yy, zz, xy, xz, yz] = change;
         let off = xy * xy + xz * xz + yz * yz;
         let square = xx * xx + yy * yy + zz * zz + off + off;
-        let steepness = self.weighted(&force);
+        let steepness = product::<R, S>(&rooted, &rooted) * self.time_squared;
         let twice = self.damping + self.damping;
         let d = twice * self.stiffness() * steepness / (steepness + twice * square);
         let moving = steepness.simd_gt(zero);
@@ -567,7 +573,9 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
             volume,
             gamma,
         } = self.volume(f);
-        let trace = (self.rest(9) + self.rest(10) + self.rest(11)) * self.time_squared;
+        let [xx, yy, zz, yx, zx, zy] = self.root();
+        let trace = xx * xx + (yx * yx + yy * yy) + (zx * zx + zy * zy + zz * zz);
+        let trace = trace * self.time_squared;
         let m11 = self.weighted(f) * scale * scale;
         let m22 = self.weighted(&cofactor);
         let m12 = trace * volume * scale;

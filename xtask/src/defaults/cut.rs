@@ -71,6 +71,7 @@ pub(crate) struct LoadRow {
     pub(super) young_modulus: f64,
     pub(super) substeps: u32,
     pub(super) precision: String,
+    pub(super) snap: f64,
     pub(super) tets: usize,
     /// The largest kappa of a tet.
     pub(super) kappa: f64,
@@ -190,14 +191,14 @@ fn ends(mesh: &TetMesh) -> (DVec3, DVec3) {
     })
 }
 
-/// Strokes without snapping into a body that falls on a ground, one a frame of 0.01 s.
+/// Strokes into a body that falls on a ground, one a frame of 0.01 s.
 pub(super) fn load(
     body: &CutBody,
     file: PathBuf,
     young_modulus: f64,
     substeps: u32,
     precision: Precision,
-    strokes: Strokes,
+    (strokes, snap): (Strokes, f64),
     [count, frames]: [u64; 2],
 ) -> anyhow::Result<LoadRow> {
     let mesh = body
@@ -220,6 +221,7 @@ pub(super) fn load(
         young_modulus,
         substeps,
         precision: precision.name().to_owned(),
+        snap,
         tets: 0,
         kappa: 0.0,
         fastest: 0.0,
@@ -234,7 +236,7 @@ pub(super) fn load(
     let mut is_failure = false;
     for frame in 0..frames {
         if frame < count {
-            let stroke = random_stroke(&simulation, &mut random, 0.0);
+            let stroke = random_stroke(&simulation, &mut random, snap);
             simulation.cut(stroke)?;
         }
         let report = simulation.step()?;

@@ -146,31 +146,36 @@ fn file_of(body: &CutBody, folder: &Path) -> anyhow::Result<Option<PathBuf>> {
 }
 
 fn load_cells(quick: bool, folder: &Path) -> Vec<Cell<Row>> {
-    let before = if quick {
-        vec![3, 6, 12]
+    let before: &[i32] = if quick {
+        &[3, 6, 12]
     } else {
-        vec![3, 4, 5, 6, 7, 8, 9, 10, 11, 12]
+        &[3, 4, 5, 6, 7, 8, 9, 10, 11, 12]
     };
-    let before = before.into_iter().map(|e| (Strokes::Before, e));
-    let during: &[i32] = if quick { &[] } else { &[3, 6, 9, 12] };
-    let during = during.iter().map(|&e| (Strokes::During, e));
     let (tets, lengths) = if quick {
         (600, [6, 80])
     } else {
-        (1500, [20, 120])
+        (11_000, [20, 120])
     };
-    let cell = |(strokes, exponent): (Strokes, i32)| {
+    let with = |strokes: Strokes, snap: f64| move |&e: &i32| (strokes, snap, e);
+    let without_snapping: &[i32] = if quick { before } else { &[3, 6, 9, 12] };
+    let during: &[i32] = if quick { &[] } else { &[3, 6, 9, 12] };
+    let scenes = [
+        (before, with(Strokes::Before, 0.1)),
+        (during, with(Strokes::During, 0.1)),
+        (without_snapping, with(Strokes::Before, 0.0)),
+    ];
+    let cell = |(strokes, snap, exponent): (Strokes, f64, i32)| {
         let folder = folder.to_owned();
         let substeps: &[u32] = match (strokes, quick) {
             (Strokes::During, _) => &[20],
             (Strokes::Before, true) => &[5, 20],
-            (Strokes::Before, false) => &[5, 10, 20, 50],
+            (Strokes::Before, false) => &[5, 20, 50],
         };
         let name = match strokes {
             Strokes::Before => "before",
             Strokes::During => "during",
         };
-        Cell::new(format!("load-{name}-1e{exponent}"), move || {
+        Cell::new(format!("load-{name}-{snap}-1e{exponent}"), move || {
             let body = CutBody::Liver(tets);
             let Some(file) = file_of(&body, &folder)? else {
                 return Ok(Row::Skipped(body.name()));
@@ -182,12 +187,23 @@ fn load_cells(quick: bool, folder: &Path) -> Vec<Cell<Row>> {
             let rows = runs.par_iter().map(|&(precision, n)| {
                 let young_modulus = 10f64.powi(exponent);
                 let file = file.clone();
-                cut::load(&body, file, young_modulus, n, precision, strokes, lengths)
+                cut::load(
+                    &body,
+                    file,
+                    young_modulus,
+                    n,
+                    precision,
+                    (strokes, snap),
+                    lengths,
+                )
             });
             Ok(Row::Load(rows.collect::<anyhow::Result<_>>()?))
         })
     };
-    before.chain(during).map(cell).collect()
+    let scenes = scenes
+        .into_iter()
+        .flat_map(|(exponents, scene)| exponents.iter().map(scene));
+    scenes.map(cell).collect()
 }
 
 fn rest_cells(quick: bool, folder: &Path, file: Option<PathBuf>) -> Vec<Cell<Row>> {

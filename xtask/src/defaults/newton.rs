@@ -441,7 +441,9 @@ impl Setup {
         let (mut off, mut moved) = (0.0, 0.0);
         for (state, exact) in states.iter().zip(exact) {
             let free = self.free();
-            off += free.map(|p| state[p].distance_squared(exact[p])).sum::<f64>();
+            off += free
+                .map(|p| state[p].distance_squared(exact[p]))
+                .sum::<f64>();
             moved += self.moved(exact).max(sag).powi(2);
         }
         // JSON has no infinity.
@@ -450,7 +452,9 @@ impl Setup {
 
     /// The root of the summed squares of the displacements of all free particles.
     fn moved(&self, state: &[DVec3]) -> f64 {
-        let squares = self.free().map(|p| self.mesh.positions[p].distance_squared(state[p]));
+        let squares = self
+            .free()
+            .map(|p| self.mesh.positions[p].distance_squared(state[p]));
         squares.sum::<f64>().sqrt()
     }
 

@@ -10,6 +10,9 @@ use crate::{Error, Simulation};
 
 use super::reference::with;
 
+/// Accuracies that `auto` is asked for.
+const ACCURACIES: [f64; 4] = [0.2, 0.1, 0.05, 0.02];
+
 /// The substeps that `auto` wants for a scene, without its cap: the most of all its bodies.
 ///
 /// # Errors
@@ -32,6 +35,8 @@ pub fn accurate_substeps(scene: &Scene) -> Result<u32, Error> {
 pub fn candidates(scene: &Scene, substeps: u32) -> Vec<SolverSpec> {
     let of = |method| SolverSpec {
         preset: None,
+        accuracy: None,
+        budget_ms: None,
         kappa_limit: match method {
             Method::Vbd => f64::INFINITY,
             _ => scene.solver.kappa_limit,
@@ -60,8 +65,18 @@ pub fn candidates(scene: &Scene, substeps: u32) -> Vec<SolverSpec> {
         }
     };
     add_passes(Precision::F32, &[1, 2, 4, 8, 16, 32, 64], 1);
-    add_passes(Precision::F64, &[16, 32, 64], 1);
+    add_passes(Precision::F64, &[16, 32, 64, 128, 256, 512], 1);
     add_passes(Precision::F32, &[8, 16, 32], 4);
+    for accuracy in ACCURACIES {
+        add(SolverSpec {
+            substeps: Substeps::Auto,
+            iterations: 1,
+            kappa_limit: f64::INFINITY,
+            precision: Precision::Auto,
+            accuracy: Some(accuracy),
+            ..of(Method::Auto)
+        });
+    }
     if check_vbd(scene).is_ok() {
         for (substeps, iterations) in [(1, 20), (1, 100), (4, 20)] {
             add(SolverSpec {
@@ -70,7 +85,16 @@ pub fn candidates(scene: &Scene, substeps: u32) -> Vec<SolverSpec> {
                 ..of(Method::Vbd)
             });
         }
-        for (substeps, iterations) in [(1, 1), (2, 1), (1, 4), (2, 4), (4, 4), (8, 4)] {
+        for (substeps, iterations) in [
+            (1, 1),
+            (2, 1),
+            (1, 4),
+            (2, 4),
+            (4, 4),
+            (8, 4),
+            (16, 4),
+            (32, 4),
+        ] {
             add(SolverSpec {
                 substeps: Substeps::Fixed(substeps),
                 iterations,
@@ -95,6 +119,11 @@ pub fn candidates(scene: &Scene, substeps: u32) -> Vec<SolverSpec> {
 #[must_use]
 pub fn name(spec: &SolverSpec) -> String {
     let defaults = SolverSpec::of(spec.method);
+    if let (Method::Auto, Substeps::Auto, Some(accuracy)) =
+        (spec.method, spec.substeps, spec.accuracy)
+    {
+        return format!("auto, accuracy {accuracy}");
+    }
     let method = match spec.method {
         Method::Auto => "auto",
         Method::GaussSeidel => "gauss-seidel",

@@ -4,8 +4,9 @@
 //! takes the time of each and its [`Deviation`] from a [`Reference`], and picks the most accurate that meets a budget.
 //! The parts are public, since sweeps over settings need the same ones.
 //!
-//! Errors are of positions, as a part of the body's size, and of the volume. Settings whose errors are below what is
-//! left of the reference's own cannot be told apart; of those the fastest is taken.
+//! Errors are of positions, as a part of the motion and of the body's size, and of the volume; settings are compared by the
+//! first. Settings whose errors are below what is left of the reference's own cannot be told apart; of those the fastest is
+//! taken.
 //!
 //! Cost: seven runs of the reference's coarsest, and each candidate three times, those far beyond the budget for two
 //! frames only.
@@ -25,6 +26,10 @@ use serde::Serialize;
 
 use crate::scene::Scene;
 use crate::{Error, Simulation};
+
+/// Frames that are measured unless told otherwise: at most so many, and at least these seconds.
+const MOST_FRAMES: u32 = 100;
+const SECONDS: f64 = 0.5;
 
 /// Tets times frames up to which Newton's method is asked, some ten seconds.
 const NEWTON_WORK: usize = 60_000;
@@ -101,6 +106,21 @@ pub struct Advice {
     pub best: Option<usize>,
     /// The fastest that is more accurate than the best, or, without one, the fastest of all.
     pub next: Option<usize>,
+}
+
+/// Frames that show a scene's strokes and handles and half a second, of at most [`MOST_FRAMES`].
+#[must_use]
+pub fn horizon(scene: &Scene) -> u32 {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "clamped"
+    )]
+    let frames = (SECONDS / scene.solver.time_step)
+        .ceil()
+        .clamp(1.0, f64::from(MOST_FRAMES)) as u32;
+    let needed = u32::try_from(scene.frames_needed()).unwrap_or(u32::MAX);
+    frames.max(needed).min(MOST_FRAMES)
 }
 
 /// Measures what settings of a scene's solver cost and are worth on this machine, and picks.
@@ -199,10 +219,10 @@ pub fn advise(scene: &Scene, question: &Question) -> Result<Advice, Error> {
         });
     }
     measured.sort_by(|a, b| a.ms.total_cmp(&b.ms));
-    let floor = reference.left.largest;
+    let floor = reference.left.motion;
     let points: Vec<[f64; 2]> = measured
         .iter()
-        .map(|m| [m.ms, m.error.largest.max(floor)])
+        .map(|m| [m.ms, m.error.motion.max(floor)])
         .collect();
     let front = non_dominated(&points);
     for &i in &front {

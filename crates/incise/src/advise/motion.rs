@@ -19,7 +19,9 @@ use crate::{Error, Scene, Simulation};
 pub struct Motion {
     /// The longest side of the box around all particles at rest, in m.
     pub size: f64,
-    /// The positions of the compared particles in m, frame by frame.
+    /// The positions of the compared particles in m at the start.
+    pub start: Vec<DVec3>,
+    /// Their positions in m, frame by frame.
     pub positions: Vec<DVec3>,
     /// The volume after each frame, as a part of that at rest.
     pub volumes: Vec<f64>,
@@ -30,6 +32,9 @@ pub struct Motion {
 /// How far a motion is from another one, in %.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Deviation {
+    /// Of the positions: the root mean square distance of all particles in all frames, as a part of that of what it is
+    /// compared with from its start.
+    pub motion: f64,
     /// Of the positions, the largest of all frames: the root mean square distance of the particles, as a part of the
     /// size of what moves.
     pub largest: f64,
@@ -52,8 +57,8 @@ impl Motion {
             Some(threads) => Simulation::with_threads(scene, threads)?,
             None => Simulation::new(scene)?,
         };
-        let mut motion = Self::still(simulation.mesh());
         let particles = simulation.positions().len();
+        let mut motion = Self::still(simulation.mesh(), particles);
         for _ in 0..frames {
             let start = Instant::now();
             simulation.step()?;
@@ -69,8 +74,8 @@ impl Motion {
         Ok(motion)
     }
 
-    /// Of no frames.
-    pub(super) fn still(mesh: &TetMesh) -> Self {
+    /// Of no frames, with the first `particles` of a mesh.
+    pub(super) fn still(mesh: &TetMesh, particles: usize) -> Self {
         let low = mesh
             .positions
             .iter()
@@ -81,6 +86,7 @@ impl Motion {
             .fold(DVec3::NEG_INFINITY, |a, x| a.max(*x));
         Self {
             size: (high - low).max_element(),
+            start: mesh.positions[..particles].to_vec(),
             positions: Vec::new(),
             volumes: Vec::new(),
             ms: Vec::new(),
@@ -136,11 +142,18 @@ impl Motion {
             .zip(from.positions.chunks(particles));
         let percent = |part: f64| (100.0 * part).min(f64::MAX);
         let distance = |(a, b): (&[DVec3], &[DVec3])| {
-            let squares = a.iter().zip(b).map(|(x, y)| x.distance_squared(*y));
-            percent((squares.sum::<f64>() / particles as f64).sqrt() / from.size)
+            percent((squares(a, b) / particles as f64).sqrt() / from.size)
         };
         let volumes = self.volumes.iter().zip(&from.volumes);
+        let moved = from.positions.chunks(particles);
+        let moved: f64 = moved.map(|frame| squares(frame, &from.start)).sum();
+        let off = squares(&self.positions, &from.positions);
         let mut deviation = Deviation {
+            motion: if off > 0.0 {
+                percent((off / moved).sqrt())
+            } else {
+                0.0
+            },
             volume: volumes.fold(0.0, |most, (v, w)| f64::max(most, percent((v - w).abs()))),
             ..Deviation::default()
         };
@@ -157,11 +170,18 @@ impl Motion {
         let volumes = self.volumes.iter().zip(&other.volumes);
         Self {
             size: self.size,
+            start: self.start.clone(),
             positions: positions.map(|(x, y)| *x * a + *y * b).collect(),
             volumes: volumes.map(|(v, w)| v * a + w * b).collect(),
             ms: Vec::new(),
         }
     }
+}
+
+/// The sum of the squared distances of particles.
+fn squares(a: &[DVec3], b: &[DVec3]) -> f64 {
+    let pairs = a.iter().zip(b);
+    pairs.map(|(x, y)| x.distance_squared(*y)).sum()
 }
 
 /// The volume of a mesh at some positions, as a part of that at rest; 1 if nothing is left.

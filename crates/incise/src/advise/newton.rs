@@ -94,7 +94,7 @@ impl Newton {
     /// The motion over some frames of `steps` steps each.
     pub(super) fn motion(&self, frames: u32, steps: u32) -> Result<Motion, ReferenceError> {
         let mesh = self.simulation.mesh();
-        let mut motion = Motion::still(mesh);
+        let mut motion = Motion::still(mesh, self.particles);
         let mut bodies = self
             .parts
             .iter()

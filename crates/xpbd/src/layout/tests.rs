@@ -1,6 +1,6 @@
 //! What following costs, counted in tets filled in, and that blocks stay well used.
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use incise_graph::{ClusterId, Clustering, ColorId, Coloring, Schedule};
 
 use super::*;
@@ -158,4 +158,44 @@ fn another_schedule_is_laid_out() {
     plan.layout.forget();
     assert!(!plan.layout.fits(&equal));
     assert_eq!(plan.layout.follow(&equal, LANES, true, ingredients), 250);
+}
+
+/// A sliver a hundred-thousandth as thick as wide that nobody moves along its thin direction, in which its gradients are that
+/// much longer: `G : AᵀA` with G in single precision was off by any factor, and below zero.
+#[test]
+fn the_root_of_the_metric_bears_slivers_in_single_precision() {
+    let rubber = Material {
+        young_modulus: 1e6,
+        poisson_ratio: 0.45,
+        density: 1e3,
+        damping: 0.0,
+    };
+    let turn = DQuat::from_axis_angle(DVec3::new(0.3, -0.5, 0.8).normalize(), 1.1);
+    let flat = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::new(0.3, 0.3, 1e-5)];
+    let tet = TetConstraint::<f32>::new([0, 1, 2, 3], flat.map(|x| turn * (x * 0.01)), &rubber);
+    let weights = [1e6, 1.0, 1.0, 1e3];
+    // The columns of a matrix that takes the thin direction to nothing, up to rounding.
+    let thin = turn * DVec3::Z;
+    let a = DVec3::AXES.map(|axis| (axis - thin * thin.dot(axis)).as_vec3());
+    let [xx, yy, zz, yx, zx, zy] = metric(&tet, weights);
+    let rooted = [
+        a[0] * xx + a[1] * yx + a[2] * zx,
+        a[1] * yy + a[2] * zy,
+        a[2] * zz,
+    ];
+    let found: f32 = rooted.iter().map(|column| column.length_squared()).sum();
+    let q = tet.inverse_rest.map(f64::from);
+    let gradients = [0, 1, 2].map(|k| DVec3::from_slice(&q[3 * k..3 * k + 3]));
+    let first = -(gradients[0] + gradients[1] + gradients[2]);
+    let corners = [first, gradients[0], gradients[1], gradients[2]];
+    let exact: f64 = corners
+        .into_iter()
+        .zip(weights)
+        .map(|(q, w)| {
+            let moved = (0..3).map(|axis| a[axis].as_dvec3() * q[axis]);
+            f64::from(w) * moved.sum::<DVec3>().length_squared()
+        })
+        .sum();
+    let ratio = f64::from(found) / (exact * f64::from(tet.stiffness));
+    assert!((ratio - 1.0).abs() < 0.1, "{ratio}");
 }
