@@ -3,7 +3,10 @@
 
 use std::fmt::Write;
 
-use incise::advise::{Motion, Reference, ReferenceKind, accurate_substeps, newton_motion, with};
+use incise::advise::{
+    Measured, Motion, Question, Reference, ReferenceKind, accurate_substeps, advise, horizon,
+    newton_motion, with,
+};
 use incise::mesh::generate::kuhn_box;
 use incise::mesh::glam::{DQuat, DVec3};
 use incise::mesh::io;
@@ -67,6 +70,50 @@ fn errors_fall_with_substeps() {
         "{apart}, {:?}",
         own.left
     );
+}
+
+/// The table that is advised, pasted into the scene, gives the error that was promised, in % of the motion and of the size.
+#[test]
+fn the_advised_scene_is_as_accurate_as_it_says() {
+    let frames = 6;
+    let question = Question {
+        budget_ms: 1e3,
+        frames,
+        threads: Some(1),
+    };
+    let advice = advise(&scene(BEAM), &question).unwrap();
+    assert_eq!(advice.reference.kind, ReferenceKind::Newton);
+    let reference = Reference::newton(&scene(BEAM), frames, 4).unwrap();
+    for m in &advice.measured {
+        let advised = scene(&format!("{BEAM}{}", m.solver));
+        let motion = Motion::of(&advised, frames, Some(1)).unwrap();
+        assert_eq!(motion.deviation(&reference.motion), m.error, "{}", m.name);
+        assert!(
+            m.error.motion > m.error.largest,
+            "a beam does not move by its size"
+        );
+    }
+    let best = &advice.measured[advice.best.unwrap()];
+    let least = |least: f64, m: &Measured| least.min(m.error.motion);
+    let least = advice.measured.iter().fold(f64::MAX, least);
+    assert!(best.error.motion <= least.max(advice.reference.left.motion));
+    assert!(
+        advice
+            .measured
+            .iter()
+            .any(|m| m.name == "auto, accuracy 0.02")
+    );
+}
+
+/// Half a second, or until the last stroke, but not for ever.
+#[test]
+fn advice_looks_far_enough() {
+    let mut scene = scene(BEAM);
+    assert_eq!(horizon(&scene), 32);
+    scene.solver.time_step = 0.1;
+    assert_eq!(horizon(&scene), 5);
+    scene.solver.time_step = 1e-4;
+    assert_eq!(horizon(&scene), 100);
 }
 
 /// A body all of whose particles a handle turns moves as a rigid one.
