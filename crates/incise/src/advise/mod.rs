@@ -108,7 +108,7 @@ pub struct Advice {
     pub next: Option<usize>,
 }
 
-/// Frames that show a scene's strokes and handles and half a second, of at most [`MOST_FRAMES`].
+/// Frames enough for a scene's strokes and handles and for half a second, at most 100.
 #[must_use]
 pub fn horizon(scene: &Scene) -> u32 {
     #[expect(

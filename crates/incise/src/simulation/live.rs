@@ -171,10 +171,8 @@ impl Simulation {
     /// is lost.
     ///
     /// # Example
-    /// A box that spins once a second about an axis through its middle.
+    /// A box flies at 2 m/s. One that spins has `|x| rate.cross(x - center)`.
     /// ```
-    /// use std::f64::consts::TAU;
-    ///
     /// use incise::mesh::glam::DVec3;
     /// use incise::{Scene, Simulation};
     ///
@@ -182,13 +180,13 @@ impl Simulation {
     ///     "[world]\ngravity = [0.0, 0.0, 0.0]\n[[body]]\nshape = { kind = \"box\", tets = 200 }",
     /// )?;
     /// let mut simulation = Simulation::new(&scene)?;
-    /// let corner = simulation.positions()[0];
-    /// simulation.set_velocities(|x| DVec3::Z.cross(x) * TAU)?;
-    /// while simulation.report().time < 0.5 {
+    /// let start = simulation.positions()[0];
+    /// simulation.set_velocities(|_| DVec3::X * 2.0)?;
+    /// for _ in 0..10 {
     ///     simulation.step()?;
     /// }
-    /// let turned = DVec3::new(-corner.x, -corner.y, corner.z);
-    /// assert!(simulation.positions()[0].distance(turned) < 0.1 * corner.length());
+    /// let way = DVec3::X * 2.0 * 10.0 * simulation.time_step();
+    /// assert!(simulation.positions()[0].distance(start + way) < 1e-4);
     /// # Ok::<(), incise::Error>(())
     /// ```
     pub fn set_velocities(&mut self, velocity: impl Fn(DVec3) -> DVec3) -> Result<(), Error> {

@@ -79,8 +79,8 @@ fn results_are_those_of_the_last_version() {
          {body}damping = 0.001\n{strokes}"
     ));
     for (precision, golden) in [
-        (Precision::F32, 0x8157_b598_3ae8_6e9e),
-        (Precision::F64, 0x5678_fc5b_2595_f294),
+        (Precision::F32, 0x0407_7d70_8837_f692),
+        (Precision::F64, 0x7d2e_5944_7220_1652),
     ] {
         scene.solver.precision = precision;
         for threads in 1..=3 {
