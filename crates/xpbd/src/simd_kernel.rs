@@ -376,17 +376,17 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
             + dot::<R, S>(&cofactor[2], &cofactor[2]);
         let limit = R::from_f64(MAX_COFACTOR_NORM);
         let steep = square.simd_gt(self.splat(limit * limit));
-        if steep.any_true() {
+        let large = steep | trace.simd_gt(self.splat(R::from_f64(LARGE_STRAIN)));
+        if large.any_true() {
             let scale = self.splat(limit) / square.sqrt();
             let scale = steep.select(scale, one);
             for entry in cofactor.as_flattened_mut() {
                 *entry *= scale;
             }
             bulge *= scale;
+            let direct = trace * half - bulge + bulge * bulge * half;
+            shear = large.select(direct, shear);
         }
-        let direct = trace * half - bulge + bulge * bulge * half;
-        let large = steep | trace.simd_gt(self.splat(R::from_f64(LARGE_STRAIN)));
-        shear = large.select(direct, shear);
         let pressure = bulge - one;
         let mut derivative = *f;
         for j in 0..3 {
