@@ -14,8 +14,9 @@
 //!
 //! Along one particle volumes and attachments are quadratic. A distance is not: a particle takes three Newton steps with
 //! the geometric term clamped at 0; if they raise the energy of its star, it takes one step with a quadratic that bounds
-//! the energy from above (`K |x|² / 2` in place of the distance, since the length is convex). So no sweep raises the
-//! potential.
+//! the energy from above (`K |x|² / 2` in place of the distance, since the length is convex). The energy of a distance
+//! under tension has a kink where its particles coincide; there a particle moves only if the other forces exceed the
+//! tension. So no sweep raises the potential.
 //!
 //! Source: method of multipliers after Hestenes 1969 and Powell 1969; in VBD after Giles, Diaz, Yuksel 2025 (without their
 //! ramps). Cost: 60 operations a distance and particle and Newton step, 150 a volume, 10 an attachment.
@@ -26,6 +27,7 @@ use incise_graph::Incidence;
 use super::corner_term::{OTHERS, rows};
 use super::matrix::{Block, add_isotropic, add_outer};
 use super::sweep::solve;
+use crate::direction::direction;
 use crate::distance::Distance;
 use crate::real::{load, weight};
 use crate::scalar::Scalar;
@@ -98,6 +100,17 @@ struct Anchor<R: Real> {
     position: R::Vector,
 }
 
+/// A distance seen from one of its particles.
+#[derive(Clone, Copy, Debug)]
+struct Stretch<R: Real> {
+    /// As [`Spring::excess`].
+    excess: R,
+    /// The gradient of the length.
+    along: R::Vector,
+    /// The geometric term over K, `(r - r₀) / r` with the length r and r₀ where it exerts no force; at least 0.
+    geometric: R,
+}
+
 /// Force and matrix of one particle: `isotropic I + h` with h as xx, xy, xz, yy, yz, zz.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Local<R: Real> {
@@ -159,6 +172,16 @@ impl<R: Real> Local<R> {
     #[inline]
     fn solve(&self) -> R::Vector {
         solve(self.isotropic, self.h, self.force)
+    }
+
+    /// The minimum along the force of the quadratic plus `tension · |step|`: 0 if the force does not exceed the tension.
+    fn solve_against(&self, tension: R) -> R::Vector {
+        let size = R::dot(self.force, self.force).sqrt();
+        if !(size > tension) {
+            return R::Vector::default();
+        }
+        let along = self.force * (R::ONE / size);
+        along * ((size - tension) / R::dot(along, self.apply(along)))
     }
 
     /// Adds `factor · u uᵀ`.
@@ -487,7 +510,57 @@ impl<R: Real> ConstraintTerms<R> {
         }
         let mut bound = *tets;
         self.add(solver, place, p, x, Curvature::Bound, &mut bound);
-        (bound.solve() * relaxation, start)
+        let tension = self.tension_at_zero_length(solver, place, x);
+        let step = if tension > R::ZERO {
+            bound.solve_against(tension)
+        } else {
+            bound.solve()
+        };
+        (step * relaxation, start)
+    }
+
+    /// The tension of those distances of the particle at a place of the order, now at `x`, whose particles coincide. It
+    /// resists a step in any direction.
+    fn tension_at_zero_length(&self, solver: &Solver<R>, place: usize, x: R::Vector) -> R {
+        let mut sum = R::ZERO;
+        for term in self.terms(place) {
+            let index = term.constraint as usize;
+            if index >= self.distance_count {
+                continue;
+            }
+            let spring = &self.springs[index];
+            let tension = spring.stiffness * spring.excess(-distance(solver, index).length());
+            let own = term.corner as usize;
+            if tension > R::ZERO && self.stretch(solver, index, own, x).is_none() {
+                sum += tension;
+            }
+        }
+        sum
+    }
+
+    /// A distance whose particle `own` is at `x`; `None` where its particles coincide, for it has no direction there.
+    #[inline]
+    fn stretch(
+        &self,
+        solver: &Solver<R>,
+        index: usize,
+        own: usize,
+        x: R::Vector,
+    ) -> Option<Stretch<R>> {
+        let distance = distance(solver, index);
+        let [a, b] = corners(solver, distance, own, x);
+        let (length, along) = direction::<R>(a - b)?;
+        let excess = self.springs[index].excess(length - distance.length());
+        let geometric = excess / length;
+        geometric.is_finite().then_some(Stretch {
+            excess,
+            along: if own == 0 { along } else { -along },
+            geometric: if geometric > R::ZERO {
+                geometric
+            } else {
+                R::ZERO
+            },
+        })
     }
 
     /// Adds force and matrix of the constraints of a particle that is at `x`; returns whether one is no quadratic.
@@ -508,14 +581,15 @@ impl<R: Real> ConstraintTerms<R> {
             match index.checked_sub(self.distance_count) {
                 None => {
                     curved = true;
-                    let distance = distance(solver, index);
                     let bound = curvature == Curvature::Bound;
-                    match distance.evaluate(corners(solver, distance, own, x)) {
-                        Some((value, gradients)) => {
-                            let excess = spring.excess(value);
-                            let along = gradients[own];
+                    match self.stretch(solver, index, own, x) {
+                        Some(stretch) => {
+                            let Stretch {
+                                excess,
+                                along,
+                                geometric: part,
+                            } = stretch;
                             local.force += along * -(spring.stiffness * excess);
-                            let part = geometric(excess, value + distance.length());
                             if bound {
                                 let part = if part > R::ONE { part } else { R::ONE };
                                 local.isotropic += spring.stiffness * part;
@@ -607,20 +681,19 @@ impl<R: Real> ConstraintTerms<R> {
             let own = term.corner as usize;
             match index.checked_sub(self.distance_count) {
                 None => {
-                    let distance = distance(solver, index);
-                    let Some((value, gradients)) =
-                        distance.evaluate(corners(solver, distance, own, x))
-                    else {
+                    let Some(stretch) = self.stretch(solver, index, own, x) else {
                         continue;
                     };
-                    let excess = spring.excess(value);
-                    let along = gradients[own];
+                    let Stretch {
+                        excess,
+                        along,
+                        geometric: part,
+                    } = stretch;
                     *force += along * -(spring.stiffness * excess);
                     if excess == R::ZERO && spring.one_sided {
                         continue;
                     }
-                    let part = geometric(excess, value + distance.length());
-                    let other = place_of(distance.particles()[1 - own]);
+                    let other = place_of(distance(solver, index).particles()[1 - own]);
                     let outer = along * (spring.stiffness * (R::ONE - part));
                     let isotropic = spring.stiffness * part;
                     add_outer::<R>(&mut blocks[0], outer, along);
@@ -666,17 +739,6 @@ impl Spring<f64> {
         for (p, gradient) in particles.into_iter().zip(gradients) {
             out[p as usize] -= gradient * force;
         }
-    }
-}
-
-/// The geometric term of a distance over K, `(r - r₀) / r` with the length r and r₀ where it exerts no force; at least 0.
-#[inline]
-fn geometric<R: Real>(excess: R, length: R) -> R {
-    let part = excess / length;
-    if part > R::ZERO && part.is_finite() {
-        part
-    } else {
-        R::ZERO
     }
 }
 

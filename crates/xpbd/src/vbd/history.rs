@@ -5,9 +5,9 @@
 //! of length τ from other positions and velocities. After it `w` becomes `(2 v₁ + w) / 3`, so no positions are kept, whose
 //! rounding over a short substep would show.
 //!
-//! Without a history a substep is made of [`PARTS`] shorter ones of implicit Euler. One of its whole length would take
-//! `(ω Δt)²` of the angular momentum of a spinning body for good. Cost: a pass over the particles before and after each
-//! substep, and a first substep that takes as long as some.
+//! A substep without a history is split into [`STARTUP_SUBSTEPS`] substeps of implicit Euler: a single one would cost a
+//! spinning body a part of `(ω Δt)²` of its angular momentum. Cost: a pass over the particles before and after each
+//! substep; the first substep costs [`STARTUP_SUBSTEPS`] times as much.
 
 use glam::DVec3;
 
@@ -20,12 +20,19 @@ pub(super) struct History<R: Real> {
     particles: Vec<Past<R>>,
     /// The length of the last substep in s.
     time: f64,
-    /// The implicit Euler substeps that the present one is made of, if it has no history.
-    parts: Option<u32>,
+    /// The startup that the present substep belongs to, if any.
+    startup: Option<Startup>,
 }
 
-/// Substeps of implicit Euler that one without a history is made of.
-const PARTS: u32 = 4;
+/// Substeps of implicit Euler that replace a substep without a history.
+const STARTUP_SUBSTEPS: u32 = 4;
+
+/// The progress through the substeps of implicit Euler that begin a history.
+#[derive(Clone, Copy, Debug)]
+struct Startup {
+    count: u32,
+    done: u32,
+}
 
 /// What is known of a particle at the end of a substep, in m/s.
 #[derive(Clone, Copy, Debug)]
@@ -54,7 +61,7 @@ impl<R: Real> Default for History<R> {
         Self {
             particles: Vec::new(),
             time: 0.0,
-            parts: None,
+            startup: None,
         }
     }
 }
@@ -70,15 +77,15 @@ impl<R: Real> History<R> {
         self.particles.clear();
     }
 
-    /// How many substeps of implicit Euler the next substep of a length is made of, if it has no history.
-    pub(super) fn parts(&self, time: f64) -> Option<u32> {
+    /// The number of implicit Euler substeps that replace the next substep of length `time`: `None` if it has a history.
+    pub(super) fn startup_substeps(&self, time: f64) -> Option<u32> {
         let has_history = !self.particles.is_empty() && self.time.to_bits() == time.to_bits();
-        (!has_history).then_some(PARTS)
+        (!has_history).then_some(STARTUP_SUBSTEPS)
     }
 
-    /// Begins a history with so many substeps of implicit Euler, the first of which is next.
-    pub(super) fn start(&mut self, solver: &Solver<R>, time: f64, parts: u32) {
-        (self.time, self.parts) = (time, Some(parts));
+    /// Begins a history: the next `count` substeps are implicit Euler and make up one of length `time`.
+    pub(super) fn start(&mut self, solver: &Solver<R>, time: f64, count: u32) {
+        (self.time, self.startup) = (time, Some(Startup { count, done: 0 }));
         self.particles.clear();
         let before = solver.velocities.iter().map(|&before| Past {
             mean: R::Vector::default(),
@@ -101,7 +108,7 @@ impl<R: Real> History<R> {
     ) -> f64 {
         let third = R::from_f64(1.0 / 3.0);
         let fall = R::from_dvec3(gravity.unwrap_or(DVec3::ZERO) * time);
-        self.parts = None;
+        self.startup = None;
         self.particles.truncate(solver.particle_count());
         let velocities = &solver.velocities[self.particles.len()..];
         self.particles
@@ -125,16 +132,24 @@ impl<R: Real> History<R> {
     /// Takes in the velocities after a substep; what `touches` a collider moves steadily from then on.
     pub(super) fn end(&mut self, solver: &Solver<R>, touches: impl Fn(R::Vector) -> bool) {
         let [one, two] = [1.0 / 3.0, 2.0 / 3.0].map(R::from_f64);
-        let share = self.parts.map(|parts| R::from_f64(1.0 / f64::from(parts)));
+        // The part of a startup substep, and of the startup that has passed.
+        let startup = self.startup.as_mut().map(|startup| {
+            startup.done += 1;
+            let part = |number: u32| R::from_f64(f64::from(number) / f64::from(startup.count));
+            [part(1), part(startup.done)]
+        });
         for (p, past) in self.particles.iter_mut().enumerate() {
             let velocity = solver.velocities[p];
             if touches(load::<R>(&solver.particles[p])) {
                 *past = Past::steady(velocity);
+                if let Some([_, passed]) = startup {
+                    past.mean = velocity * passed;
+                }
                 continue;
             }
             past.after = velocity;
-            past.mean = match share {
-                Some(share) => past.mean + velocity * share,
+            past.mean = match startup {
+                Some([part, _]) => past.mean + velocity * part,
                 None => velocity * two + past.mean * one,
             };
         }

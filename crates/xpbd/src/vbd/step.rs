@@ -95,18 +95,18 @@ impl<R: Real> Solver<R> {
         let (count, time) = (settings.step.substeps, settings.step.substep_time());
         for number in 1..=count {
             let is_bdf2 = settings.integrator == Integrator::Bdf2;
-            let start = stars.history.parts(time).filter(|_| is_bdf2);
-            if let Some(parts) = start {
+            let startup = stars.history.startup_substeps(time).filter(|_| is_bdf2);
+            if let Some(parts) = startup {
                 stars.history.start(self, time, parts);
             }
-            let parts = start.unwrap_or(1);
+            let parts = startup.unwrap_or(1);
             for part in 1..=parts {
-                let place = Place {
+                let substep = Substep {
                     number: (number - 1) * parts + part,
-                    of: count * parts,
-                    starts: start.is_some(),
+                    count: count * parts,
+                    is_startup: startup.is_some(),
                 };
-                let mut step = ImplicitStep::predicted(self, stars, settings, penalty, place);
+                let mut step = ImplicitStep::predicted(self, stars, settings, penalty, substep);
                 step.run(settings, &mut report, &mut iterate);
                 report.error = match (report.error, step.error) {
                     (Some(a), Some(b)) => Some(a.max(b)),
@@ -119,15 +119,14 @@ impl<R: Real> Solver<R> {
     }
 }
 
-/// Which part of a frame a substep is.
+/// A substep of a frame of `count` equal ones.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(super) struct Substep {
     /// From 1.
     number: u32,
-    /// How many there are, all as long.
-    of: u32,
-    /// Whether it begins a history of BDF2.
-    starts: bool,
+    count: u32,
+    /// Whether it is one of the implicit Euler substeps that begin a history of BDF2.
+    is_startup: bool,
 }
 
 /// One substep of VBD between its prediction and its end, for those who choose themselves what to do in it, or
@@ -169,22 +168,22 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
         settings: &VbdSettings,
     ) -> Result<Self, XpbdError> {
         settings.check()?;
-        let (of, time) = (settings.step.substeps, settings.step.substep_time());
-        let starts = stars.history.parts(time).is_some();
-        if starts {
+        let (count, time) = (settings.step.substeps, settings.step.substep_time());
+        let is_startup = stars.history.startup_substeps(time).is_some();
+        if is_startup {
             stars.history.start(solver, time, 1);
         }
-        let place = Place {
-            number: of,
-            of,
-            starts,
+        let substep = Substep {
+            number: count,
+            count,
+            is_startup,
         };
         Ok(Self::predicted(
             solver,
             stars,
             settings,
             SWEEP_PENALTY,
-            place,
+            substep,
         ))
     }
 
@@ -193,14 +192,14 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
         stars: &'a mut VertexStars<R>,
         settings: &VbdSettings,
         penalty: f64,
-        place: Place,
+        substep: Substep,
     ) -> Self {
         assert!(
             stars.fits(solver),
             "the stars belong to these particles, tets and constraints"
         );
         let own = StepSettings {
-            substeps: place.of,
+            substeps: substep.count,
             ..settings.step.clone()
         };
         let own_time = own.substep_time();
@@ -209,12 +208,12 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
                 stars.history.clear();
                 own_time
             }
-            Integrator::Bdf2 if place.starts => own_time,
+            Integrator::Bdf2 if substep.is_startup => own_time,
             Integrator::Bdf2 => stars.history.begin(solver, own_time, own.gravity),
         };
         let time = R::from_f64(implicit_time);
         solver.predict(&own, time);
-        let ended = f64::from(place.number) / f64::from(place.of);
+        let ended = f64::from(substep.number) / f64::from(substep.count);
         let lost = solver.move_held(ended);
         stars.begin(solver, implicit_time, penalty);
         let elapsed = ended * own.time_step;
@@ -223,7 +222,7 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
             solver,
             stars,
             obstacles,
-            last: place.number == place.of,
+            last: substep.number == substep.count,
             settings: own,
             time,
             integrator: settings.integrator,

@@ -167,6 +167,36 @@ fn an_impact_adds_no_energy() {
     assert!(fastest > 1.0, "it falls: {fastest}");
 }
 
+/// A ground that leaves a body during its first substep does not change how fast the body moves along the ground.
+#[test]
+fn contact_at_the_start_keeps_the_sliding_velocity() {
+    let mesh = kuhn_box([3, 2, 2], dvec3(0.3, 0.2, 0.2));
+    let mut solver = body::<f64>(&mesh, RUBBER);
+    for p in 0..mesh.positions.len() {
+        solver.set_velocity(p, DVec3::X);
+    }
+    let mut stars = stars(&solver);
+    let mut settings = settings(Integrator::Bdf2, 0.01, 60);
+    // At 1e-4 m above the body's lower side after a quarter of the substep, below it afterwards.
+    let mut ground = Collider::ground(0.0026, 0.0);
+    ground.velocity = DVec3::NEG_Z;
+    settings.step.colliders.push(ground);
+    for _ in 0..5 {
+        solver.step_vbd(&mut stars, &settings).unwrap();
+        settings.step.colliders.clear();
+    }
+    let center = |x: &dyn Fn(usize) -> DVec3| {
+        let all = (0..mesh.positions.len()).map(|p| x(p) * solver.mass(p));
+        all.sum::<DVec3>()
+            / (0..mesh.positions.len())
+                .map(|p| solver.mass(p))
+                .sum::<f64>()
+    };
+    let way = center(&|p| solver.position(p)) - center(&|p| mesh.positions[p]);
+    within("way", way.x - 0.05, 1e-5);
+    assert!(way.z > 0.0, "it was touched: {way}");
+}
+
 /// A velocity set from outside, another time step and a pause under another rule start the history again.
 #[test]
 fn interruptions_leave_no_trace() {
