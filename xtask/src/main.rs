@@ -11,6 +11,7 @@ mod lean;
 mod models;
 mod paper;
 mod peers;
+mod random;
 mod soak;
 mod solver;
 mod stability;

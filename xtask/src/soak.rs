@@ -6,6 +6,7 @@
 //! compared (`Simulation::check`), positions must be finite and what the deltas say must be what the mesh is. Cutting
 //! only ever adds tets, so a body that has grown threefold is replaced by a fresh one. All is determined by the seed.
 
+use crate::random::Random;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -274,33 +275,4 @@ fn due(mut stroke: StrokeSpec, now: u64) -> StrokeSpec {
         StrokeSpec::Sweep { frames, .. } => *frames = [now, now + frames[1] - frames[0]],
     }
     stroke
-}
-
-/// Splitmix64.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut x = self.0;
-        x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        x ^ (x >> 31)
-    }
-
-    /// In 0..1.
-    fn unit(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn below(&mut self, count: usize) -> usize {
-        usize::try_from(self.next() % count as u64).unwrap_or(0)
-    }
-
-    fn direction(&mut self) -> DVec3 {
-        let coordinate = |random: &mut Self| 2.0 * random.unit() - 1.0;
-        let x = coordinate(self);
-        let (y, z) = (coordinate(self), coordinate(self));
-        DVec3::new(x, y, z).normalize_or(DVec3::Z)
-    }
 }

@@ -2,7 +2,7 @@
 
 use comfy_table::Table;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
-use incise::advise::{Advice, Against, Measured, Question, ReferenceKind, horizon};
+use incise::advise::{Advice, Against, Measured, Question, ReferenceKind, default_frames};
 
 use crate::args::AdviseArguments;
 use crate::failure::Failure;
@@ -13,7 +13,7 @@ pub(crate) fn advise(arguments: &AdviseArguments) -> Result<(), Failure> {
     let scene = load(arguments.scene.as_deref())?;
     let question = Question {
         budget_ms: arguments.budget_ms,
-        frames: arguments.frames.unwrap_or_else(|| horizon(&scene)),
+        frames: arguments.frames.unwrap_or_else(|| default_frames(&scene)),
         threads: arguments.threads.map(usize::from),
     };
     let advice = incise::advise::advise(&scene, &question)?;

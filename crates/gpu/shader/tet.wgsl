@@ -1,4 +1,5 @@
-// A tet: deformation gradient, root of the metric and volume term, shared by the kernels that solve tets and the one that damps them.
+// A tet: deformation gradient, Cholesky factor of the metric and volume term.
+// Shared by the kernels that solve tets and the one that damps them.
 // Twin: `simd_kernel.rs` of incise-xpbd, which explains the equations; the order of operations is the same.
 
 struct Tet {
@@ -6,7 +7,7 @@ struct Tet {
     q1: vec3<f32>,
     q2: vec3<f32>,
     q3: vec3<f32>,
-    // The root L of the weighted metric G: its diagonal, then yx, zx, zy.
+    // The Cholesky factor L of the weighted metric G: its diagonal, then yx, zx, zy.
     diagonal: vec3<f32>,
     below: vec3<f32>,
     // mu V times the square of the time.
@@ -62,7 +63,7 @@ fn move_corners(tet: Tet, x: Corners, change: Columns) -> Corners {
 }
 
 // A L.
-fn rooted(tet: Tet, m: Columns) -> Columns {
+fn times_factor(tet: Tet, m: Columns) -> Columns {
     return Columns(
         tet.diagonal.x * m.a + tet.below.x * m.b + tet.below.y * m.c,
         tet.diagonal.y * m.b + tet.below.z * m.c,
@@ -72,8 +73,8 @@ fn rooted(tet: Tet, m: Columns) -> Columns {
 
 // G : A^T A = |A L|^2 in units of the stiffness times time squared.
 fn weighted(tet: Tet, m: Columns) -> f32 {
-    let root = rooted(tet, m);
-    return product(root, root) * settings.time_squared;
+    let factored = times_factor(tet, m);
+    return product(factored, factored) * settings.time_squared;
 }
 
 fn product(m: Columns, n: Columns) -> f32 {

@@ -52,16 +52,16 @@ fn damped_volume(tet: Tet, f: Columns, rate: Columns) -> Columns {
 // The change of velocities per weight by the viscosity of shear.
 fn damped_shear(tet: Tet, f: Columns, rate: Columns) -> Columns {
     let force = times_symmetric(f, symmetric(f, rate));
-    let root = rooted(tet, force);
+    let factored = times_factor(tet, force);
     let weighted = Columns(
-        tet.diagonal.x * root.a * settings.time_squared,
-        (tet.below.x * root.a + tet.diagonal.y * root.b) * settings.time_squared,
-        (tet.below.y * root.a + tet.below.z * root.b + tet.diagonal.z * root.c) * settings.time_squared,
+        tet.diagonal.x * factored.a * settings.time_squared,
+        (tet.below.x * factored.a + tet.diagonal.y * factored.b) * settings.time_squared,
+        (tet.below.y * factored.a + tet.below.z * factored.b + tet.diagonal.z * factored.c) * settings.time_squared,
     );
     let change = symmetric(f, weighted);
     let off = dot(change.mixed, change.mixed);
     let square = dot(change.same, change.same) + off + off;
-    let steepness = product(root, root) * settings.time_squared;
+    let steepness = product(factored, factored) * settings.time_squared;
     let twice = tet.damping + tet.damping;
     let d = twice * tet.stiffness * steepness / (steepness + twice * square);
     if !(steepness > 0.0) {

@@ -70,19 +70,19 @@ fn energies_of(f: Columns) -> Energies {
     return Energies(shear, derivative, cofactor, bulge);
 }
 
-// Moves the corners by a shear step of `shear_step` and by the volume constraint that sees this step. `root` is `rooted` of
+// Moves the corners by a shear step of `shear_step` and by the volume constraint that sees this step. `factored` is A L for
 // the derivative of the shear energy.
 fn move_split(
     tet: Tet,
     x: Corners,
     energies: Energies,
-    root: Columns,
+    factored: Columns,
     shear_step: f32,
     multipliers: ptr<function, vec2<f32>>,
 ) -> Corners {
     let lame = tet.ratio - settings.one;
-    let steep = rooted(tet, energies.cofactor);
-    let mixed = product(root, steep) * settings.time_squared;
+    let steep = times_factor(tet, energies.cofactor);
+    let mixed = product(factored, steep) * settings.time_squared;
     let b = -(lame * (tet.stiffness * energies.bulge + shear_step * mixed) + (*multipliers).y);
     let r = lame * (product(steep, steep) * settings.time_squared);
     var change = b * decay(r);
@@ -112,8 +112,8 @@ fn decay(r: f32) -> f32 {
 fn solve_split(tet: Tet, x: Corners, f: Columns, multipliers: ptr<function, vec2<f32>>) -> Corners {
     let energies = energies_of(f);
     let twice = energies.shear + energies.shear;
-    let root = rooted(tet, energies.derivative);
-    let steepness = product(root, root) * settings.time_squared;
+    let factored = times_factor(tet, energies.derivative);
+    let steepness = product(factored, factored) * settings.time_squared;
     var fraction = decay(steepness / twice);
     if !(energies.shear > 0.0) {
         fraction = 0.0;
@@ -125,7 +125,7 @@ fn solve_split(tet: Tet, x: Corners, f: Columns, multipliers: ptr<function, vec2
             (*multipliers).x += change;
         }
     }
-    return move_split(tet, x, energies, root, shear_step, multipliers);
+    return move_split(tet, x, energies, factored, shear_step, multipliers);
 }
 
 // The split form with accumulating multipliers, for several iterations.
@@ -134,14 +134,14 @@ fn solve_split_iterated(tet: Tet, x: Corners, f: Columns, multipliers: ptr<funct
     let positive = energies.shear > 0.0;
     let twice = select(settings.one, energies.shear + energies.shear, positive);
     let constraint = sqrt(twice);
-    let root = rooted(tet, energies.derivative);
-    let m = product(root, root) * settings.time_squared / twice;
+    let factored = times_factor(tet, energies.derivative);
+    let m = product(factored, factored) * settings.time_squared / twice;
     var d = -((tet.stiffness * constraint + (*multipliers).x) / (m + settings.one));
     if !positive || !is_finite(d) {
         d = 0.0;
     }
     (*multipliers).x += d * settings.relaxation;
-    return move_split(tet, x, energies, root, d / constraint, multipliers);
+    return move_split(tet, x, energies, factored, d / constraint, multipliers);
 }
 
 // Prevents compilers from reordering the factors of a product. At rest the determinant of the block form is a difference

@@ -22,7 +22,7 @@ use incise_graph::{ClusterId, Rows, Schedule};
 use crate::Real;
 use crate::neo_hookean::TetConstraint;
 
-/// Numbers a lane has in [`Layout::rest`]: the inverse rest matrix, the root of the weighted metric, the stiffness.
+/// Numbers a lane has in [`Layout::rest`]: the inverse rest matrix, the Cholesky factor of the weighted metric, the stiffness.
 pub(crate) const REST: usize = 9 + 6 + 1;
 /// Numbers a lane has in [`Layout::constants`]: `l/μ`, `γ` and the damping time.
 pub(crate) const CONSTANTS: usize = 3;
@@ -123,7 +123,7 @@ impl<R: Real> Ingredients<R> {
     pub(crate) fn rest(&self) -> [R; REST] {
         let mut rest = [self.tet.stiffness; REST];
         rest[..9].copy_from_slice(&self.tet.inverse_rest);
-        rest[9..15].copy_from_slice(&metric(&self.tet, self.weights));
+        rest[9..15].copy_from_slice(&metric_factor(&self.tet, self.weights));
         rest
     }
 }
@@ -225,13 +225,13 @@ impl<R: Real> Layout<R> {
     }
 }
 
-/// The lower triangle L with `L Lᵀ = G = μV Σ w q qᵀ` over the corners with inverse mass w and gradient q of the barycentric
-/// coordinate: its diagonal, then yx, zx, zy.
+/// The lower triangle L of the Cholesky factorization `G = L Lᵀ` of `G = μV Σ w q qᵀ`, the sum over the corners with inverse
+/// mass w and gradient q of the barycentric coordinate. In this order: its diagonal, then yx, zx, zy.
 ///
 /// With it `Σ w |∇C|²` needs no gradients at the corners: it is `|A L|²` for `A = dC/dF`. A sum of squares loses nothing to
 /// rounding; `G : AᵀA`, which is the same, loses all of a sliver whose steep direction A hardly sees. L comes from an
 /// orthogonalization of the weighted gradients in double precision, since G itself would lose as much.
-fn metric<R: Real>(tet: &TetConstraint<R>, weights: [R; 4]) -> [R; 6] {
+fn metric_factor<R: Real>(tet: &TetConstraint<R>, weights: [R; 4]) -> [R; 6] {
     let q = tet.inverse_rest.map(R::to_f64);
     let stiffness = tet.stiffness.to_f64();
     let roots = weights.map(|w| (w.to_f64() * stiffness).sqrt());

@@ -281,31 +281,31 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
         ]
     }
 
-    /// `A L`, with the root L of G.
+    /// `A L`, with the Cholesky factor L of G.
     #[inline(always)]
-    fn rooted(&self, m: &Matrix<R::Lanes<S>>) -> Matrix<R::Lanes<S>> {
+    fn times_factor(&self, m: &Matrix<R::Lanes<S>>) -> Matrix<R::Lanes<S>> {
         let [a, b, c] = m;
-        let [xx, yy, zz, yx, zx, zy] = self.root();
-        let mut rooted = *m;
+        let [xx, yy, zz, yx, zx, zy] = self.metric_factor();
+        let mut factored = *m;
         for axis in 0..3 {
-            rooted[0][axis] = xx * a[axis] + yx * b[axis] + zx * c[axis];
-            rooted[1][axis] = yy * b[axis] + zy * c[axis];
-            rooted[2][axis] = zz * c[axis];
+            factored[0][axis] = xx * a[axis] + yx * b[axis] + zx * c[axis];
+            factored[1][axis] = yy * b[axis] + zy * c[axis];
+            factored[2][axis] = zz * c[axis];
         }
-        rooted
+        factored
     }
 
     /// L: its diagonal, then yx, zx, zy.
     #[inline(always)]
-    fn root(&self) -> [R::Lanes<S>; 6] {
+    fn metric_factor(&self) -> [R::Lanes<S>; 6] {
         [9, 10, 11, 12, 13, 14].map(|number| self.rest(number))
     }
 
     /// `G : AᵀA = |A L|²` in units of the stiffness times time squared.
     #[inline(always)]
     fn weighted(&self, a: &Matrix<R::Lanes<S>>) -> R::Lanes<S> {
-        let rooted = self.rooted(a);
-        product::<R, S>(&rooted, &rooted) * self.time_squared
+        let factored = self.times_factor(a);
+        product::<R, S>(&factored, &factored) * self.time_squared
     }
 
     /// `μV` times the square of the time.
@@ -403,12 +403,12 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
     }
 
     /// The change of the corners per weight by a shear step of `along` and the volume constraint that sees it, and that
-    /// of the volume multiplier. `rooted` is that of the derivative of the shear energy.
+    /// of the volume multiplier. `factored` is `A L` of the derivative of the shear energy.
     #[inline(always)]
     fn split_change(
         &self,
         energies: &Energies<R::Lanes<S>>,
-        rooted: &Matrix<R::Lanes<S>>,
+        factored: &Matrix<R::Lanes<S>>,
         along: R::Lanes<S>,
         iterated: bool,
         multiplier: &mut R::Lanes<S>,
@@ -421,8 +421,8 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
             ..
         } = energies;
         let lame = self.ratio - one;
-        let steep = self.rooted(cofactor);
-        let mixed = product::<R, S>(rooted, &steep) * self.time_squared;
+        let steep = self.times_factor(cofactor);
+        let mixed = product::<R, S>(factored, &steep) * self.time_squared;
         let b = -(lame * (self.stiffness() * *bulge + along * mixed) + *multiplier);
         let r = lame * (product::<R, S>(&steep, &steep) * self.time_squared);
         let d = if iterated {
@@ -461,8 +461,8 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
         let zero = self.splat(R::ZERO);
         let energies = self.energies(f);
         let twice = energies.shear + energies.shear;
-        let rooted = self.rooted(&energies.derivative);
-        let steepness = product::<R, S>(&rooted, &rooted) * self.time_squared;
+        let factored = self.times_factor(&energies.derivative);
+        let steepness = product::<R, S>(&factored, &factored) * self.time_squared;
         let part = self.decay(steepness / twice);
         let part = energies.shear.simd_gt(zero).select(part, zero);
         let along = -(self.stiffness() * part);
@@ -471,7 +471,7 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
             let multiplier = along * root * self.relaxation;
             multipliers[0] += multiplier.is_finite().select(multiplier, zero);
         }
-        self.split_change(&energies, &rooted, along, false, &mut multipliers[1])
+        self.split_change(&energies, &factored, along, false, &mut multipliers[1])
     }
 
     /// The change of the corners per weight by an iteration of the split form with accumulating multipliers.
@@ -486,13 +486,13 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
         let positive = energies.shear.simd_gt(zero);
         let twice = positive.select(energies.shear + energies.shear, one);
         let root = twice.sqrt();
-        let rooted = self.rooted(&energies.derivative);
-        let m = product::<R, S>(&rooted, &rooted) * self.time_squared / twice;
+        let factored = self.times_factor(&energies.derivative);
+        let m = product::<R, S>(&factored, &factored) * self.time_squared / twice;
         let d = -((self.stiffness() * root + multipliers[0]) / (m + one));
         let sound = d.is_finite();
         let d = sound.select(positive.select(d, zero), zero);
         multipliers[0] += d * self.relaxation;
-        self.split_change(&energies, &rooted, d / root, true, &mut multipliers[1])
+        self.split_change(&energies, &factored, d / root, true, &mut multipliers[1])
     }
 
     /// The change of the corners' velocities per weight by the viscosity of the volume: one implicit step.
@@ -523,10 +523,10 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
         let zero = self.splat(R::ZERO);
         let strain_rate = symmetric::<R, S>(f, rate);
         let force = times_symmetric::<R, S>(f, &strain_rate);
-        let rooted = self.rooted(&force);
-        let [xx, yy, zz, yx, zx, zy] = self.root();
-        let [a, b, c] = &rooted;
-        let mut weighted = rooted;
+        let factored = self.times_factor(&force);
+        let [xx, yy, zz, yx, zx, zy] = self.metric_factor();
+        let [a, b, c] = &factored;
+        let mut weighted = factored;
         for axis in 0..3 {
             weighted[0][axis] = xx * a[axis] * self.time_squared;
             weighted[1][axis] = (yx * a[axis] + yy * b[axis]) * self.time_squared;
@@ -536,7 +536,7 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
         let [xx, yy, zz, xy, xz, yz] = change;
         let off = xy * xy + xz * xz + yz * yz;
         let square = xx * xx + yy * yy + zz * zz + off + off;
-        let steepness = product::<R, S>(&rooted, &rooted) * self.time_squared;
+        let steepness = product::<R, S>(&factored, &factored) * self.time_squared;
         let twice = self.damping + self.damping;
         let d = twice * self.stiffness() * steepness / (steepness + twice * square);
         let moving = steepness.simd_gt(zero);
@@ -573,7 +573,7 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
             volume,
             gamma,
         } = self.volume(f);
-        let [xx, yy, zz, yx, zx, zy] = self.root();
+        let [xx, yy, zz, yx, zx, zy] = self.metric_factor();
         let trace = xx * xx + (yx * yx + yy * yy) + (zx * zx + zy * zy + zz * zz);
         let trace = trace * self.time_squared;
         let m11 = self.weighted(f) * scale * scale;

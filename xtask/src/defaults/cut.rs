@@ -1,5 +1,6 @@
 //! Bodies after random strokes: falling on a ground, and free at rest.
 
+use crate::random::Random;
 use std::path::PathBuf;
 
 use anyhow::Context;
@@ -123,23 +124,6 @@ impl RestRow {
     }
 }
 
-/// Random numbers from 0 to below 1 (`SplitMix64`).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn vector(&mut self) -> DVec3 {
-        DVec3::from_array([(); 3].map(|()| 2.0 * self.next() - 1.0))
-    }
-}
-
 /// A rectangle of two to eight tenths of the body, at a random particle as it is now.
 fn random_stroke(simulation: &Simulation, random: &mut Random, snap: f64) -> StrokeSpec {
     let positions = simulation.positions();
@@ -148,8 +132,8 @@ fn random_stroke(simulation: &Simulation, random: &mut Random, snap: f64) -> Str
         clippy::cast_sign_loss,
         reason = "a fraction of the number of particles, rounded down"
     )]
-    let center = positions[(random.next() * positions.len() as f64) as usize];
-    let size = SIZE * (0.1 + 0.3 * random.next());
+    let center = positions[(random.unit() * positions.len() as f64) as usize];
+    let size = SIZE * (0.1 + 0.3 * random.unit());
     let u = random.vector().normalize_or(DVec3::X);
     let v = random.vector().cross(u);
     let v = v.normalize_or(u.any_orthonormal_vector());

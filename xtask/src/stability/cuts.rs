@@ -11,9 +11,9 @@ use incise::mesh::glam::DVec3;
 use incise::scene::{BodySpec, GroundSpec, Quantity, Region, ShapeSpec, StrokeSpec};
 use incise::{Scene, Simulation};
 
-use super::extremes::Noise;
 use super::methods::Column;
 use super::outcome::Outcome;
+use crate::random::Random;
 
 /// A way to cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -144,7 +144,7 @@ pub(crate) fn run(
         None => Simulation::new(&scene),
     };
     let mut simulation = fresh()?;
-    let (at_start, mut noise) = (simulation.mesh().tets.len(), Noise(29));
+    let (at_start, mut noise) = (simulation.mesh().tets.len(), Random(29));
     let mut watch = Watch::new(column);
     for frame in 0..cut.frames(quick) {
         if cut == Cut::Strokes {
@@ -175,16 +175,16 @@ pub(crate) fn run(
 }
 
 /// A rectangle half an edge to three edges large at a random particle, now.
-fn random_stroke(simulation: &Simulation, noise: &mut Noise) -> StrokeSpec {
+fn random_stroke(simulation: &Simulation, noise: &mut Random) -> StrokeSpec {
     let positions = simulation.positions();
-    let share = 0.5 * (noise.scalar() + 1.0) * positions.len() as f64;
+    let share = 0.5 * (noise.signed() + 1.0) * positions.len() as f64;
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "a part of the number of particles, rounded down"
     )]
     let center = positions[(share as usize).min(positions.len() - 1)];
-    let size = 0.06 * (1.75 + 1.25 * noise.scalar());
+    let size = 0.06 * (1.75 + 1.25 * noise.signed());
     let u = noise.vector().normalize_or(DVec3::X);
     let v = noise
         .vector()

@@ -4,6 +4,7 @@
 //! state are left alone, without gravity, one end held or none, so that the shape at rest is what they should come back
 //! to. All others are held at one end and fall from rest under gravity, which no method that loses its stiffness survives.
 
+use crate::random::Random;
 use incise::mesh::generate::kuhn_box;
 use incise::mesh::glam::DVec3;
 use incise::mesh::{TetId, TetMesh};
@@ -19,7 +20,7 @@ const FRAME: f64 = 1.0 / 60.0;
 const MOST_FRAMES: f64 = 1000.0;
 
 /// Where a particle is put at the start.
-type Place = fn(&mut Noise, DVec3) -> DVec3;
+type Place = fn(&mut Random, DVec3) -> DVec3;
 
 /// A body, its surroundings and its start.
 #[derive(Clone)]
@@ -203,7 +204,7 @@ impl Extreme {
                 solver.replace_tet(t, solver.tet_particles(t), self.mesh.corners(TetId::new(t)));
             }
         }
-        let mut noise = Noise(17);
+        let mut noise = Random(17);
         for (p, &x) in self.mesh.positions.iter().enumerate() {
             if !solver.is_fixed(p) {
                 solver.set_position(p, (self.place)(&mut noise, x));
@@ -223,24 +224,5 @@ impl Extreme {
     )]
     pub(crate) fn frames(&self) -> usize {
         (self.time / self.time_step).round().clamp(1.0, MOST_FRAMES) as usize
-    }
-}
-
-/// Seeded noise (`SplitMix64`), the same everywhere.
-pub(crate) struct Noise(pub(crate) u64);
-
-impl Noise {
-    /// Uniform in -1 .. 1.
-    pub(crate) fn scalar(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-
-    /// Uniform in the cube from -1 to 1.
-    pub(crate) fn vector(&mut self) -> DVec3 {
-        DVec3::new(self.scalar(), self.scalar(), self.scalar())
     }
 }

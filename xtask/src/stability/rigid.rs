@@ -80,7 +80,7 @@ mod tests {
     use super::*;
 
     fn points() -> Vec<DVec3> {
-        let mut noise = crate::stability::extremes::Noise(3);
+        let mut noise = crate::random::Random(3);
         (0..20)
             .map(|_| noise.vector() * DVec3::new(3.0, 2.0, 1.0))
             .collect()
@@ -90,14 +90,14 @@ mod tests {
     #[test]
     fn rigid_motions_are_no_distance() {
         let rest = points();
-        let mut noise = crate::stability::extremes::Noise(5);
+        let mut noise = crate::random::Random(5);
         let mut turns: Vec<DQuat> = [DVec3::X, DVec3::Y, DVec3::Z]
             .map(|axis| DQuat::from_axis_angle(axis, std::f64::consts::PI))
             .to_vec();
         for _ in 0..20 {
             turns.push(DQuat::from_axis_angle(
                 noise.vector().normalize(),
-                4.0 * noise.scalar(),
+                4.0 * noise.signed(),
             ));
         }
         for turn in turns {

@@ -24,7 +24,7 @@ pub use reference::{Reference, ReferenceKind, newton_motion, with};
 
 use serde::Serialize;
 
-use crate::scene::Scene;
+use crate::scene::{Method, Scene, SolverSpec};
 use crate::{Error, Simulation};
 
 /// Frames that are measured unless told otherwise: at most so many, and at least these seconds.
@@ -108,9 +108,20 @@ pub struct Advice {
     pub next: Option<usize>,
 }
 
+/// Settings with the accuracy that they have by default, for comparison with those that name it.
+fn stated(spec: &SolverSpec) -> SolverSpec {
+    let is_default = spec.method == Method::Auto && spec.budget_ms.is_none();
+    SolverSpec {
+        accuracy: spec
+            .accuracy
+            .or(is_default.then_some(crate::accuracy::DEFAULT_ACCURACY)),
+        ..spec.clone()
+    }
+}
+
 /// Frames enough for a scene's strokes and handles and for half a second, at most 100.
 #[must_use]
-pub fn horizon(scene: &Scene) -> u32 {
+pub fn default_frames(scene: &Scene) -> u32 {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -171,7 +182,7 @@ pub fn advise(scene: &Scene, question: &Question) -> Result<Advice, Error> {
     specs.extend(
         candidates(scene, substeps)
             .into_iter()
-            .filter(|spec| *spec != scene.solver),
+            .filter(|spec| *spec != stated(&scene.solver)),
     );
     let (mut kept, mut left_out) = (Vec::new(), Vec::new());
     for (i, spec) in specs.iter().enumerate() {

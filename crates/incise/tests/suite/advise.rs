@@ -4,8 +4,8 @@
 use std::fmt::Write;
 
 use incise::advise::{
-    Measured, Motion, Question, Reference, ReferenceKind, accurate_substeps, advise, horizon,
-    newton_motion, with,
+    Measured, Motion, Question, Reference, ReferenceKind, accurate_substeps, advise,
+    default_frames, newton_motion, with,
 };
 use incise::mesh::generate::kuhn_box;
 use incise::mesh::glam::{DQuat, DVec3};
@@ -109,11 +109,11 @@ fn the_advised_scene_is_as_accurate_as_it_says() {
 #[test]
 fn advice_looks_far_enough() {
     let mut scene = scene(BEAM);
-    assert_eq!(horizon(&scene), 32);
+    assert_eq!(default_frames(&scene), 32);
     scene.solver.time_step = 0.1;
-    assert_eq!(horizon(&scene), 5);
+    assert_eq!(default_frames(&scene), 5);
     scene.solver.time_step = 1e-4;
-    assert_eq!(horizon(&scene), 100);
+    assert_eq!(default_frames(&scene), 100);
 }
 
 /// A body all of whose particles a handle turns moves as a rigid one.

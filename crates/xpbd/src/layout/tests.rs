@@ -160,10 +160,10 @@ fn another_schedule_is_laid_out() {
     assert_eq!(plan.layout.follow(&equal, LANES, true, ingredients), 250);
 }
 
-/// A sliver a hundred-thousandth as thick as wide that nobody moves along its thin direction, in which its gradients are that
-/// much longer: `G : AᵀA` with G in single precision was off by any factor, and below zero.
+/// A sliver a hundred thousand times as wide as thick does not move along its thin direction, in which its gradients are
+/// that much longer. Computed as `G : AᵀA` in single precision, the sum was wrong by any factor, and even negative.
 #[test]
-fn the_root_of_the_metric_bears_slivers_in_single_precision() {
+fn the_metric_factor_bears_slivers_in_single_precision() {
     let rubber = Material {
         young_modulus: 1e6,
         poisson_ratio: 0.45,
@@ -177,13 +177,13 @@ fn the_root_of_the_metric_bears_slivers_in_single_precision() {
     // The columns of a matrix that takes the thin direction to nothing, up to rounding.
     let thin = turn * DVec3::Z;
     let a = DVec3::AXES.map(|axis| (axis - thin * thin.dot(axis)).as_vec3());
-    let [xx, yy, zz, yx, zx, zy] = metric(&tet, weights);
-    let rooted = [
+    let [xx, yy, zz, yx, zx, zy] = metric_factor(&tet, weights);
+    let factored = [
         a[0] * xx + a[1] * yx + a[2] * zx,
         a[1] * yy + a[2] * zy,
         a[2] * zz,
     ];
-    let found: f32 = rooted.iter().map(|column| column.length_squared()).sum();
+    let found: f32 = factored.iter().map(|column| column.length_squared()).sum();
     let q = tet.inverse_rest.map(f64::from);
     let gradients = [0, 1, 2].map(|k| DVec3::from_slice(&q[3 * k..3 * k + 3]));
     let first = -(gradients[0] + gradients[1] + gradients[2]);

@@ -30,9 +30,9 @@ pub(super) struct Limits {
     pub(super) energy: f64,
 }
 
-/// What an iteration came to.
+/// How a solution ended.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Solved {
+pub(super) struct CgReport {
     pub(super) iterations: u32,
     /// The estimated energy between where it is and the solution, as a part of what was gained.
     pub(super) left: f64,
@@ -79,7 +79,7 @@ impl<R: Real> Conjugate<R> {
         b: &[R::Vector],
         held: &[bool],
         limits: Limits,
-    ) -> Solved {
+    ) -> CgReport {
         let rows = b.len();
         for v in [
             &mut self.solution,
@@ -100,7 +100,7 @@ impl<R: Real> Conjugate<R> {
         let mut last = 0.0;
         let mut gained = 0.0;
         let mut gains = [f64::INFINITY; DELAY];
-        let mut solved = Solved {
+        let mut solved = CgReport {
             iterations: 0,
             left: 1.0,
         };

@@ -177,11 +177,12 @@ impl<R: Real> Local<R> {
     /// The minimum along the force of the quadratic plus `tension · |step|`: 0 if the force does not exceed the tension.
     fn solve_against(&self, tension: R) -> R::Vector {
         let size = R::dot(self.force, self.force).sqrt();
-        if !(size > tension) {
-            return R::Vector::default();
+        if size > tension {
+            let along = self.force * (R::ONE / size);
+            along * ((size - tension) / R::dot(along, self.apply(along)))
+        } else {
+            R::Vector::default()
         }
-        let along = self.force * (R::ONE / size);
-        along * ((size - tension) / R::dot(along, self.apply(along)))
     }
 
     /// Adds `factor · u uᵀ`.

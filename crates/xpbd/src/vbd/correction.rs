@@ -74,7 +74,7 @@ pub struct CoarseCorrection<R: Real> {
 }
 
 /// The part of the accuracy wanted that conjugate gradients may use up.
-const SHARE: f64 = 0.25;
+const CG_ERROR_SHARE: f64 = 0.25;
 
 /// Halvings of a direction that does not lower the potential.
 const HALVINGS: usize = 8;
@@ -262,7 +262,7 @@ impl<R: Real> ImplicitStep<'_, R> {
             reduction: settings.reduction,
             energy: self
                 .accuracy
-                .map_or(0.0, |wanted| (SHARE * wanted).powi(2) * scale),
+                .map_or(0.0, |wanted| (CG_ERROR_SHARE * wanted).powi(2) * scale),
         };
         let solved = conjugate.solve(matrix, coarse, &self.stars.colors, force, held, limits);
         coarse.note(solved.iterations, settings.iterations);
