@@ -5,21 +5,24 @@
 //! the body are made. A block of A between two particles contributes itself times the products of their r: no more
 //! than 16 scaled copies. The matrix is dense, because aggregates are few.
 //!
-//! The factor is kept from one correction to the next until conjugate gradients need a quarter more iterations than when it
-//! was new: a preconditioner need not be that of the present matrix, only symmetric and positive. Affine motions also stay
-//! what they are when the body turns. A cut changes neither aggregates nor factor: new particles join the aggregates of
-//! their neighbors, and all aggregates are grown again once the factor has aged. Cost: 36 operations a block, then a
-//! factorization of 12 unknowns an aggregate, only where the factor has aged.
+//! The factor is kept from one correction to the next until conjugate gradients converge at less than [`AGED`] of the rate
+//! that they had when it was new: a preconditioner need not be that of the present matrix, only symmetric and positive.
+//! Affine motions also stay what they are when the body turns. A cut changes neither aggregates nor factor: new particles
+//! join the aggregates of their neighbors, and all aggregates are grown again once the factor has aged. Cost: 36 operations
+//! a block, then a factorization of 12 unknowns an aggregate, only where the factor has aged.
 
 use super::cholesky::Cholesky;
 use super::matrix::Blocks;
 use crate::Real;
 
-/// A factor is stale when a solution takes this part more iterations than the first one with it: one in four.
-const AGED: u32 = 4;
+/// A factor is stale when conjugate gradients converge at less than this part of the rate that they had when it was new.
+const AGED: f64 = 0.75;
+
+/// Iterations from which the rate of a solution says something about the factor.
+const TELLING: u32 = 8;
 
 /// Solutions after which a factor is stale in any case: it may be that of a state that was worse to begin with.
-const OLDEST: u32 = 32;
+const OLDEST: u32 = 128;
 
 /// The aggregate of a row that has none yet.
 const NONE: u32 = u32::MAX;
@@ -45,8 +48,8 @@ pub(super) struct Coarse {
 /// How well the factor still does.
 #[derive(Clone, Copy, Debug, Default)]
 struct Age {
-    /// Iterations of conjugate gradients with the new factor; `None` before there are any.
-    first: Option<u32>,
+    /// The rate of conjugate gradients with the new factor; `None` before it is known.
+    first: Option<f64>,
     /// Solutions with it.
     solutions: u32,
     /// Whether there is a factor that has not become too old.
@@ -137,14 +140,14 @@ impl Coarse {
         !self.age.usable
     }
 
-    /// Notes how many iterations of at most `limit` a solution with this factor took. If some more than the first one did,
-    /// or if they say nothing, or after many solutions, it is stale.
-    pub(super) fn note(&mut self, iterations: u32, limit: u32) {
-        let first = *self.age.first.get_or_insert(iterations);
+    /// Notes that a solution with this factor took `iterations` to bring the energy that is left to the part `left`.
+    pub(super) fn note(&mut self, iterations: u32, left: f64) {
         self.age.solutions += 1;
-        self.age.usable = (1..limit).contains(&iterations)
-            && iterations <= first + first / AGED + 1
-            && self.age.solutions < OLDEST;
+        self.age.usable = self.age.solutions < OLDEST;
+        if iterations >= TELLING {
+            let rate = -left.ln() / f64::from(iterations);
+            self.age.usable &= rate >= AGED * *self.age.first.get_or_insert(rate);
+        }
     }
 
     /// Takes the motions at the positions `x` of the rows.

@@ -658,6 +658,19 @@ impl<R: Real> ConstraintTerms<R> {
         sum
     }
 
+    /// The force of the constraints on the particle at a place of the order.
+    pub(super) fn force(&self, solver: &Solver<R>, order: &[u32], place: usize) -> R::Vector {
+        let p = order[place] as usize;
+        let x = load::<R>(&solver.particles[p]);
+        let mut local = Local {
+            isotropic: R::ZERO,
+            h: [R::ZERO; 6],
+            force: R::Vector::default(),
+        };
+        self.add(solver, place, p, x, Curvature::Newton, &mut local);
+        local.force
+    }
+
     /// Adds force and blocks of the constraints of the particle at a place of the order; `columns` are those of its row,
     /// the diagonal first.
     pub(super) fn add_row(

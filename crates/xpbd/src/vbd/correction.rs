@@ -6,10 +6,13 @@
 //! with the affine motions of aggregates in between (`coarse`): a two-level cycle. Nothing of the mesh is
 //! factored, only the aggregates, so after a cut a new pattern is all that has to be made.
 //!
+//! Where an accuracy is asked for, the matrix is kept as long as steps with it gain what it predicts: a body that moves
+//! smoothly needs a new one only now and then.
+//!
 //! From a violent start, with many solutions at hand, it may settle in a worse one than sweeps would: sweep first.
 //!
 //! Source: truncated Newton after Nash 2000; aggregates after Vaněk, Mandel, Brezina 1996, without smoothing.
-//! Cost: filling and factoring is 20 to 30 sweeps, an iteration of conjugate gradients about two.
+//! Cost: filling is 3 sweeps, factoring 2 to 5, an iteration of conjugate gradients half of one.
 
 use super::aggregates::aggregates;
 use super::coarse::Coarse;
@@ -55,6 +58,26 @@ pub struct CoarseCorrectionReport {
     pub error: f64,
 }
 
+/// How a search along a direction ended.
+struct Search {
+    /// The part of the direction that was taken, or 0.
+    taken: f64,
+    /// The energy of the tets in the end.
+    elastic: f64,
+    /// The decrease of the potential.
+    gain: f64,
+}
+
+impl Search {
+    fn failed(elastic: f64) -> Self {
+        Self {
+            taken: 0.0,
+            elastic,
+            gain: 0.0,
+        }
+    }
+}
+
 /// The weight of the energy of the motion in the measure of an error: what is lost of a motion in one step adds up in the
 /// steps to come.
 const MOTION: f64 = 1e-4;
@@ -71,10 +94,18 @@ pub struct CoarseCorrection<R: Real> {
     held: Vec<bool>,
     force: Vec<R::Vector>,
     base: Vec<R::Vector>,
+    /// The substep time and held rows that the matrix was filled for, while it may be kept.
+    filled: Option<(R, Vec<bool>)>,
 }
 
 /// The part of the accuracy wanted that conjugate gradients may use up.
-const CG_ERROR_SHARE: f64 = 0.25;
+const CG_ERROR_SHARE: f64 = 0.5;
+
+/// A matrix is filled again once its steps gain a part more or less than it predicts.
+const KEPT_MISMATCH: f64 = 0.1;
+
+/// A matrix is filled again after a step that gains more than this part of the energy.
+const CALM: f64 = 0.01;
 
 /// Halvings of a direction that does not lower the potential.
 const HALVINGS: usize = 8;
@@ -131,6 +162,7 @@ impl<R: Real> CoarseCorrection<R> {
             held: Vec::new(),
             force: Vec::new(),
             base: Vec::new(),
+            filled: None,
         })
     }
 
@@ -140,6 +172,7 @@ impl<R: Real> CoarseCorrection<R> {
         let old = std::mem::replace(&mut self.order, stars.order.clone());
         self.matrix = Blocks::new(stars);
         self.coarse.follow(&old, &self.order, &self.matrix);
+        self.filled = None;
     }
 
     /// Number of aggregates.
@@ -202,6 +235,9 @@ impl<R: Real> Solver<R> {
         let _span = tracing::debug_span!("xpbd::step_vbd_two_level").entered();
         let (mut idle, accuracy) = (0, settings.accuracy);
         self.frame_of_vbd(stars, settings, CORRECTION_PENALTY, |step| {
+            if step.error.is_none() && accuracy.is_some() && correction.filled.is_none() {
+                step.choose_start(&mut correction.base);
+            }
             step.sweep();
             let report = step.correct(correction);
             idle = if report.taken > 0.0 { 0 } else { idle + 1 };
@@ -212,6 +248,24 @@ impl<R: Real> Solver<R> {
 }
 
 impl<R: Real> ImplicitStep<'_, R> {
+    /// Starts the substep where the last one ended if the potential is lower there than at the prediction, which is a bad
+    /// start for stiff bodies that vibrate.
+    fn choose_start(&self, predicted: &mut Vec<R::Vector>) {
+        predicted.clear();
+        predicted.extend(self.solver.particles.iter().map(load::<R>));
+        let potential = self.potential();
+        let free = |p: usize| weight::<R>(&self.solver.particles[p]) > R::ZERO;
+        let place = |positions: &[R::Vector]| {
+            for (p, &x) in positions.iter().enumerate().filter(|&(p, _)| free(p)) {
+                store::<R>(&self.solver.particles[p], x);
+            }
+        };
+        place(&self.solver.previous);
+        if self.potential() >= potential {
+            place(predicted);
+        }
+    }
+
     /// Moves the whole body along a Newton direction, as far as the potential falls.
     ///
     /// Particles that touch a collider are held meanwhile; sweeps lift them off.
@@ -227,6 +281,7 @@ impl<R: Real> ImplicitStep<'_, R> {
             held,
             force,
             base,
+            filled,
             ..
         } = correction;
         let rows = self.stars.order.len();
@@ -245,7 +300,14 @@ impl<R: Real> ImplicitStep<'_, R> {
         }
         force.clear();
         force.resize(rows, R::Vector::default());
-        matrix.fill(self.solver, self.stars, self.time, held, force);
+        let is_kept = self.accuracy.is_some()
+            && matches!(&*filled, Some((time, rows)) if *time == self.time && rows == held);
+        if is_kept {
+            matrix.forces(self.solver, self.stars, self.time, held, force);
+        } else {
+            matrix.fill(self.solver, self.stars, self.time, held, force);
+            *filled = Some((self.time, held.clone()));
+        }
         if coarse.is_stale() {
             if coarse.is_worn() {
                 let size = settings.aggregate;
@@ -265,19 +327,32 @@ impl<R: Real> ImplicitStep<'_, R> {
                 .map_or(0.0, |wanted| (CG_ERROR_SHARE * wanted).powi(2) * scale),
         };
         let solved = conjugate.solve(matrix, coarse, &self.stars.colors, force, held, limits);
-        coarse.note(solved.iterations, settings.iterations);
+        coarse.note(solved.iterations, solved.left);
         let direction = conjugate.solution();
         let slope: f64 = force
             .iter()
             .zip(direction)
             .map(|(f, d)| R::to_dvec3(*f).dot(R::to_dvec3(*d)))
             .sum();
-        let (taken, elastic) = self.search((potential, elastic), base, direction, slope);
+        let Search {
+            taken,
+            elastic,
+            gain,
+        } = self.search((potential, elastic), base, direction, slope);
         self.solver.project_to_colliders(&self.obstacles);
-        // Newton's method gains half of the slope, all of it in a full step, and leaves what the iteration left.
-        let part = if taken == 1.0 { solved.left } else { 1.0 };
-        let left = 0.5 * slope.max(0.0) * part;
+        // Newton's method gains half of the slope in a full step, and leaves what the iteration left. A matrix of an earlier
+        // state gains another part, and leaves at most the difference.
+        let expected = 0.5 * slope.max(0.0);
+        let mismatch = match (taken == 1.0, is_kept) {
+            (true, true) => (1.0 - gain / expected).abs(),
+            (true, false) => 0.0,
+            (false, _) => 1.0,
+        };
+        let left = expected * (solved.left + mismatch).min(1.0);
         let energy = elastic + MOTION * self.kinetic();
+        if mismatch > KEPT_MISMATCH || expected > CALM * energy {
+            *filled = None;
+        }
         let error = if left > 0.0 {
             (left / energy).sqrt()
         } else {
@@ -291,14 +366,14 @@ impl<R: Real> ImplicitStep<'_, R> {
     }
 
     /// Goes from `base`, where potential and energy of the tets are `start`, along a direction on which the potential falls by
-    /// `slope` at first; returns how far, and the energy of the tets there.
+    /// `slope` at first.
     fn search(
         &self,
         (start, elastic_at_start): (f64, f64),
         base: &[R::Vector],
         direction: &[R::Vector],
         slope: f64,
-    ) -> (f64, f64) {
+    ) -> Search {
         let place = |part: f64| {
             let part = R::from_f64(part);
             let mut sound = true;
@@ -313,7 +388,7 @@ impl<R: Real> ImplicitStep<'_, R> {
             sound
         };
         if !(slope.is_finite() && slope > 0.0) {
-            return (0.0, elastic_at_start);
+            return Search::failed(elastic_at_start);
         }
         let mut part = 1.0;
         for _ in 0..HALVINGS {
@@ -323,7 +398,11 @@ impl<R: Real> ImplicitStep<'_, R> {
             // Below its own rounding the potential says nothing, and so close to the solution Newton is right.
             let drowned = part == 1.0 && 0.5 * slope < ROUNDING * start.abs();
             if sound && (rise < 0.0 || drowned) {
-                return (part, elastic);
+                return Search {
+                    taken: part,
+                    elastic,
+                    gain: -rise,
+                };
             }
             // The minimum of the parabola through what is known, within reason.
             let parabola = slope * part * part / (2.0 * (rise + slope * part));
@@ -334,6 +413,6 @@ impl<R: Real> ImplicitStep<'_, R> {
             };
         }
         place(0.0);
-        (0.0, elastic_at_start)
+        Search::failed(elastic_at_start)
     }
 }

@@ -208,6 +208,46 @@ impl<R: Real> Blocks<R> {
         self.mirror(held);
     }
 
+    /// The forces that [`Blocks::fill`] says are left over, without the matrix.
+    pub(super) fn forces(
+        &self,
+        solver: &Solver<R>,
+        stars: &VertexStars<R>,
+        time: R,
+        held: &[bool],
+        force: &mut [R::Vector],
+    ) {
+        let per_time_squared = R::ONE / (time * time);
+        self.each_row(force, |row| {
+            if held[row] {
+                return R::Vector::default();
+            }
+            let p = stars.order[row] as usize;
+            let particle = &solver.particles[p];
+            let x = load::<R>(particle);
+            let free = solver.previous[p] + solver.velocities[p] * time;
+            let mut force = (free - x) * (per_time_squared / weight::<R>(particle));
+            for term in stars.of(row) {
+                let [a, b, c] = term
+                    .others
+                    .map(|p| load::<R>(&solver.particles[p as usize]) - x);
+                let [wa, wb, wc] = term.pulls;
+                let slope = R::cross(b - a, c - a) * term.slope;
+                let lack = R::dot(slope, a) - term.target;
+                force += slope * lack - (a * wa + b * wb + c * wc);
+            }
+            if let Some(viscosity) = &stars.viscosity {
+                force += viscosity.force(row, &stars.order, |p| {
+                    load::<R>(&solver.particles[p]) - solver.previous[p]
+                });
+            }
+            if !stars.constraints.is_empty() {
+                force += stars.constraints.force(solver, &stars.order, row);
+            }
+            force
+        });
+    }
+
     /// Copies what is left of the diagonal to its right, but in rows of particles that are held.
     fn mirror(&mut self, held: &[bool]) {
         let mut mirrors = self.mirrors.iter();

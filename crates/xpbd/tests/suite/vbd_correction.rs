@@ -69,6 +69,51 @@ fn corrections_lead_where_sweeps_lead() {
     within("distance", largest_distance(&sweeps, &both), 1e-8);
 }
 
+/// A beam that sinks, vibrates and comes to rest, with matrices that are kept from one substep to the next: in every frame
+/// its positions differ from those of converged steps by at most the accuracy asked for, as a part of the motion.
+#[test]
+fn an_accuracy_bounds_the_error() {
+    for (young_modulus, poisson_ratio) in [(1e5, 0.3), (1e7, 0.49), (1e9, 0.4999)] {
+        let material = Material {
+            young_modulus,
+            poisson_ratio,
+            damping: 0.01,
+            ..RUBBER
+        };
+        let run = |accuracy: Option<f64>| {
+            let mut solver = held_beam::<f64>(material);
+            let start = positions(&solver);
+            let mut stars = stars(&solver);
+            let mut correction = correction(&stars);
+            let mut settings = falling(50);
+            settings.accuracy = accuracy;
+            settings.tolerance = accuracy.is_none().then_some(1e-9);
+            let mut states = Vec::new();
+            let mut rounds = 0;
+            for _ in 0..40 {
+                let report = solver.step_vbd_two_level(&mut stars, &mut correction, &settings);
+                rounds += report.unwrap().iterations;
+                states.push(positions(&solver));
+            }
+            (start, states, rounds)
+        };
+        let (start, exact, most) = run(None);
+        let moved = |state: &Vec<DVec3>| largest_distance(&start, state);
+        let motion = exact.iter().map(moved).fold(0.0, f64::max);
+        for accuracy in [0.1, 0.05, 0.01] {
+            let (_, states, rounds) = run(Some(accuracy));
+            let apart = states.iter().zip(&exact);
+            let worst = apart
+                .map(|(a, b)| largest_distance(a, b))
+                .fold(0.0, f64::max);
+            let error = worst / motion;
+            let what = format!("E = {young_modulus:e}, nu = {poisson_ratio}, {accuracy}");
+            assert!(error <= accuracy, "{what}: {error}");
+            assert!(rounds < most, "{what}: {rounds} of {most} rounds");
+        }
+    }
+}
+
 /// From insane states, stiff and soft. Rounding may raise the potential: by 1e-10 of its start.
 #[test]
 fn corrections_never_raise_the_potential() {
