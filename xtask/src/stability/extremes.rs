@@ -38,6 +38,8 @@ pub(crate) struct Extreme {
     gravity: f64,
     /// Simulated, in s.
     pub(crate) time: f64,
+    /// Substeps of a frame, for the columns that have more than one.
+    pub(crate) substeps: Option<u32>,
     place: Place,
 }
 
@@ -59,6 +61,7 @@ pub(crate) fn extremes(quick: bool) -> anyhow::Result<Vec<Extreme>> {
         time_step: FRAME,
         gravity: GRAVITY,
         time: 1.0,
+        substeps: None,
         place: |_, x| x,
     };
     let mut extremes = vec![plain.clone()];
@@ -97,6 +100,27 @@ pub(crate) fn extremes(quick: bool) -> anyhow::Result<Vec<Extreme>> {
     ] {
         add(id.to_owned(), name.to_owned(), &|e| e.time_step = time_step);
     }
+    for damping in [0.01, 0.05] {
+        let name = format!("damping time of {damping} s");
+        add(format!("damping-{damping}"), name, &|e| {
+            e.material.damping = damping;
+        });
+    }
+    add(
+        "damping-rest".to_owned(),
+        "at rest, free, damping time of 0.05 s".to_owned(),
+        &|e| {
+            (e.held, e.gravity, e.material.damping) = (false, 0.0, 0.05);
+        },
+    );
+    let substeps = if quick { 100 } else { 1000 };
+    add(
+        "many-substeps".to_owned(),
+        format!("{substeps} substeps a frame (split and softened), 100 frames"),
+        &|e| {
+            (e.substeps, e.time) = (Some(substeps), 100.0 * FRAME);
+        },
+    );
     for ratio in [1e-6, 1e-3, 1e3, 1e6] {
         let name = format!("far half of {ratio:e} times the mass");
         add(format!("mass-{ratio:e}"), name, &|e| {

@@ -79,6 +79,11 @@ impl Method {
         }
     }
 
+    /// Whether a frame may have more than one substep.
+    pub(crate) fn has_substeps(self) -> bool {
+        matches!(self, Split | Softened)
+    }
+
     /// Substeps of a frame for a body with that kappa at the frame's time.
     #[expect(
         clippy::cast_possible_truncation,
@@ -86,9 +91,10 @@ impl Method {
         reason = "there are from 1 to 200 substeps"
     )]
     pub(crate) fn substeps(self, kappa: f64) -> u32 {
-        match self {
-            Split | Softened => (kappa / KAPPA).sqrt().ceil().clamp(1.0, MOST_SUBSTEPS) as u32,
-            _ => 1,
+        if self.has_substeps() {
+            (kappa / KAPPA).sqrt().ceil().clamp(1.0, MOST_SUBSTEPS) as u32
+        } else {
+            1
         }
     }
 

@@ -68,7 +68,8 @@ fn start<R: Real>(
     column: Column,
 ) -> anyhow::Result<(Solver<R>, Recipe, Watch<'_>)> {
     let kappa = extreme.solver::<f64>(None)?.kappa(extreme.time_step);
-    let substeps = column.method.substeps(kappa);
+    let own = extreme.substeps.filter(|_| column.method.has_substeps());
+    let substeps = own.unwrap_or_else(|| column.method.substeps(kappa));
     let time = extreme.time_step / f64::from(substeps);
     let solver = extreme.solver::<R>(column.method.limit(time))?;
     let recipe = column

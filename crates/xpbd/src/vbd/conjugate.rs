@@ -39,7 +39,7 @@ pub(super) struct CgReport {
 }
 
 /// Gains that say what was left before them: so many iterations late is the estimate.
-const DELAY: usize = 2;
+const DELAY: usize = 4;
 
 /// The vectors of the iteration.
 #[derive(Clone, Debug, Default)]

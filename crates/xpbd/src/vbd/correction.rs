@@ -19,6 +19,7 @@ use super::coarse::Coarse;
 use super::conjugate::{Conjugate, Limits};
 use super::constraints::CORRECTION_PENALTY;
 use super::matrix::Blocks;
+use super::state::Potential;
 use super::{ImplicitStep, VbdReport, VbdSettings, VertexStars};
 use crate::real::{finite, load, store, weight};
 use crate::{Real, Solver, XpbdError};
@@ -99,7 +100,7 @@ pub struct CoarseCorrection<R: Real> {
 }
 
 /// The part of the accuracy wanted that conjugate gradients may use up.
-const CG_ERROR_SHARE: f64 = 0.5;
+const CG_ERROR_SHARE: f64 = 0.25;
 
 /// A matrix is filled again once its steps gain a part more or less than it predicts.
 const KEPT_MISMATCH: f64 = 0.1;
@@ -112,9 +113,6 @@ const HALVINGS: usize = 8;
 
 /// Rounds in a row without a correction after which a substep ends: what is left is rounding.
 const IDLE_ROUNDS: u32 = 2;
-
-/// A gain below this part of the potential is lost in its rounding.
-const ROUNDING: f64 = 1e-11;
 
 impl<R: Real> CoarseCorrection<R> {
     /// Bytes of all arrays. O(1).
@@ -235,9 +233,6 @@ impl<R: Real> Solver<R> {
         let _span = tracing::debug_span!("xpbd::step_vbd_two_level").entered();
         let (mut idle, accuracy) = (0, settings.accuracy);
         self.frame_of_vbd(stars, settings, CORRECTION_PENALTY, |step| {
-            if step.error.is_none() && accuracy.is_some() && correction.filled.is_none() {
-                step.choose_start(&mut correction.base);
-            }
             step.sweep();
             let report = step.correct(correction);
             idle = if report.taken > 0.0 { 0 } else { idle + 1 };
@@ -248,24 +243,6 @@ impl<R: Real> Solver<R> {
 }
 
 impl<R: Real> ImplicitStep<'_, R> {
-    /// Starts the substep where the last one ended if the potential is lower there than at the prediction, which is a bad
-    /// start for stiff bodies that vibrate.
-    fn choose_start(&self, predicted: &mut Vec<R::Vector>) {
-        predicted.clear();
-        predicted.extend(self.solver.particles.iter().map(load::<R>));
-        let potential = self.potential();
-        let free = |p: usize| weight::<R>(&self.solver.particles[p]) > R::ZERO;
-        let place = |positions: &[R::Vector]| {
-            for (p, &x) in positions.iter().enumerate().filter(|&(p, _)| free(p)) {
-                store::<R>(&self.solver.particles[p], x);
-            }
-        };
-        place(&self.solver.previous);
-        if self.potential() >= potential {
-            place(predicted);
-        }
-    }
-
     /// Moves the whole body along a Newton direction, as far as the potential falls.
     ///
     /// Particles that touch a collider are held meanwhile; sweeps lift them off.
@@ -317,8 +294,8 @@ impl<R: Real> ImplicitStep<'_, R> {
             coarse.place(|row| R::to_dvec3(base[row]));
             coarse.assemble(matrix, held);
         }
-        let (potential, elastic) = self.potentials();
-        let scale = elastic + MOTION * self.kinetic();
+        let start = self.potentials();
+        let scale = start.elastic + MOTION * self.kinetic();
         let limits = Limits {
             iterations: settings.iterations,
             reduction: settings.reduction,
@@ -338,14 +315,19 @@ impl<R: Real> ImplicitStep<'_, R> {
             taken,
             elastic,
             gain,
-        } = self.search((potential, elastic), base, direction, slope);
+        } = self.search(start, base, direction, slope);
         self.solver.project_to_colliders(&self.obstacles);
-        // Newton's method gains half of the slope in a full step, and leaves what the iteration left. A matrix of an earlier
-        // state gains another part, and leaves at most the difference.
+        // A full step on a quadratic gains half of the slope, and leaves what the iteration left. Where a new matrix misses
+        // the gain by a part, the square of that part is left; where that of an earlier state does, at most the part.
         let expected = 0.5 * slope.max(0.0);
+        let mismatch = if expected > start.rounding {
+            (1.0 - gain / expected).abs()
+        } else {
+            0.0
+        };
         let mismatch = match (taken == 1.0, is_kept) {
-            (true, true) => (1.0 - gain / expected).abs(),
-            (true, false) => 0.0,
+            (true, true) => mismatch,
+            (true, false) => mismatch * mismatch,
             (false, _) => 1.0,
         };
         let left = expected * (solved.left + mismatch).min(1.0);
@@ -365,11 +347,10 @@ impl<R: Real> ImplicitStep<'_, R> {
         }
     }
 
-    /// Goes from `base`, where potential and energy of the tets are `start`, along a direction on which the potential falls by
-    /// `slope` at first.
+    /// Goes from `base`, where the potential is `start`, along a direction on which it falls by `slope` at first.
     fn search(
         &self,
-        (start, elastic_at_start): (f64, f64),
+        start: Potential,
         base: &[R::Vector],
         direction: &[R::Vector],
         slope: f64,
@@ -388,19 +369,19 @@ impl<R: Real> ImplicitStep<'_, R> {
             sound
         };
         if !(slope.is_finite() && slope > 0.0) {
-            return Search::failed(elastic_at_start);
+            return Search::failed(start.elastic);
         }
         let mut part = 1.0;
         for _ in 0..HALVINGS {
             let sound = place(part);
-            let (potential, elastic) = self.potentials();
-            let rise = potential - start;
+            let here = self.potentials();
+            let rise = here.total - start.total;
             // Below its own rounding the potential says nothing, and so close to the solution Newton is right.
-            let drowned = part == 1.0 && 0.5 * slope < ROUNDING * start.abs();
+            let drowned = part == 1.0 && 0.5 * slope < start.rounding;
             if sound && (rise < 0.0 || drowned) {
                 return Search {
                     taken: part,
-                    elastic,
+                    elastic: here.elastic,
                     gain: -rise,
                 };
             }
@@ -413,6 +394,6 @@ impl<R: Real> ImplicitStep<'_, R> {
             };
         }
         place(0.0);
-        Search::failed(elastic_at_start)
+        Search::failed(start.elastic)
     }
 }

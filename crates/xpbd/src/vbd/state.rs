@@ -19,19 +19,19 @@ impl<R: Real> ImplicitStep<'_, R> {
     /// constraints are in it with their present multipliers, see [`ImplicitStep::update_multipliers`].
     #[must_use]
     pub fn potential(&self) -> f64 {
-        self.potentials().0
+        self.potentials().total
     }
 
-    /// [`ImplicitStep::potential`], and the part of it in the tets.
-    pub(super) fn potentials(&self) -> (f64, f64) {
+    /// [`ImplicitStep::potential`] and what it consists of.
+    pub(super) fn potentials(&self) -> Potential {
         let solver = &*self.solver;
         let per_time_squared = self.time.to_f64().powi(-2);
-        let elastic = |tets: &[TetConstraint<R>]| -> f64 {
-            let each = tets.iter().map(|tet| {
+        let elastic = |tets: &[TetConstraint<R>]| {
+            tets.iter().fold([0.0; 2], |[energy, terms], tet| {
                 let tet = tet.to_f64();
-                energy(&tet, tet.particles.map(|p| solver.local(p as usize)))
-            });
-            each.sum()
+                let own = energy_and_terms(&tet, tet.particles.map(|p| solver.local(p as usize)));
+                [energy + own[0], terms + own[1]]
+            })
         };
         let inertia = |p: usize| {
             if weight::<R>(&solver.particles[p]) <= R::ZERO {
@@ -40,7 +40,8 @@ impl<R: Real> ImplicitStep<'_, R> {
             let lag = solver.local(p) - self.free_position(p);
             0.5 * per_time_squared * solver.mass(p) * lag.length_squared()
         };
-        let mut parts: Vec<f64> = solver.tets.par_chunks(PARALLEL_TETS).map(elastic).collect();
+        let tets: Vec<[f64; 2]> = solver.tets.par_chunks(PARALLEL_TETS).map(elastic).collect();
+        let mut parts: Vec<f64> = tets.iter().map(|part| part[0]).collect();
         let elastic = parts.iter().sum();
         parts.extend((0..solver.particle_count()).map(inertia));
         if let Some(viscosity) = &self.stars.viscosity {
@@ -57,7 +58,13 @@ impl<R: Real> ImplicitStep<'_, R> {
         if !constraints.is_empty() {
             parts.push(constraints.energy(solver, &|p| solver.local(p as usize)));
         }
-        (parts.into_iter().sum(), elastic)
+        let total: f64 = parts.into_iter().sum();
+        let terms = total.abs() + tets.iter().map(|part| part[1]).sum::<f64>();
+        Potential {
+            total,
+            elastic,
+            rounding: f64::EPSILON * terms,
+        }
     }
 
     /// The energy in J of the motion in the substep.
@@ -136,14 +143,27 @@ impl<R: Real> ImplicitStep<'_, R> {
     }
 }
 
-/// The energy of a tet with its corners at `x`; 0 at rest.
-fn energy(tet: &TetConstraint<f64>, x: [DVec3; 4]) -> f64 {
+/// The incremental potential in J.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Potential {
+    pub(super) total: f64,
+    /// The part of it in the tets.
+    pub(super) elastic: f64,
+    /// A bound of its rounding: the energy of a tet is the small difference of large terms.
+    pub(super) rounding: f64,
+}
+
+/// The energy of a tet with its corners at `x`, 0 at rest, and the sum of the terms that it is the difference of.
+fn energy_and_terms(tet: &TetConstraint<f64>, x: [DVec3; 4]) -> [f64; 2] {
     let q = DMat3::from_cols_array(&tet.inverse_rest).transpose();
     let f = DMat3::from_cols(x[1] - x[0], x[2] - x[0], x[3] - x[0]) * q;
     let squared = f.x_axis.length_squared() + f.y_axis.length_squared() + f.z_axis.length_squared();
     let (bulge, at_rest) = (f.determinant() - tet.gamma, 1.0 - tet.gamma);
-    let volume = tet.ratio * (bulge * bulge - at_rest * at_rest);
-    0.5 * tet.stiffness * (squared - 3.0 + volume)
+    let (now, before) = (bulge * bulge, at_rest * at_rest);
+    [
+        0.5 * tet.stiffness * (squared - 3.0 + tet.ratio * (now - before)),
+        0.5 * tet.stiffness * (squared + 3.0 + tet.ratio * (now + before)),
+    ]
 }
 
 fn norm(forces: &[DVec3]) -> f64 {
