@@ -168,7 +168,7 @@ fn scene(file: PathBuf, mesh: &TetMesh, young_modulus: f64, precision: Precision
     scene
 }
 
-fn ends(mesh: &TetMesh) -> (DVec3, DVec3) {
+pub(super) fn ends(mesh: &TetMesh) -> (DVec3, DVec3) {
     let positions = mesh.positions.iter();
     positions.fold((DVec3::MAX, DVec3::MIN), |(low, high), &x| {
         (low.min(x), high.max(x))

@@ -1,10 +1,11 @@
 //! `cargo xtask defaults`: what a scene with default settings gets, accuracy and stability, without tuning.
 //!
-//! Three parts: default scenes beside Newton's method, with the warnings they gave; bodies under load after cuts, from
-//! soft to rigid; bodies at rest after cuts. A result over its bar is counted at the top of the page.
+//! Four parts: default scenes beside Newton's method, with the warnings they gave; a stiff organ with stated accuracies;
+//! bodies under load after cuts, from soft to rigid; bodies at rest after cuts. A result over its bar is counted at the top of the page.
 
 mod cut;
 mod newton;
+mod organ;
 mod page;
 #[cfg(test)]
 mod tests;
@@ -24,6 +25,7 @@ use serde::{Deserialize, Serialize};
 use crate::experiment::{Cell, Experiment, ExperimentArguments};
 use cut::{CutBody, LoadRow, RestRow, Strokes};
 use newton::{Case, Load, NewtonRow};
+use organ::OrganRow;
 
 /// The codes of the warnings of a run.
 type Warned = BTreeSet<String>;
@@ -32,13 +34,14 @@ type Warned = BTreeSet<String>;
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) enum Row {
     Newton(Vec<NewtonRow>),
+    Organ(OrganRow),
     Load(Vec<LoadRow>),
     Rest(Vec<RestRow>),
     /// A body whose mesh is absent.
     Skipped(String),
 }
 
-/// The runs of a cell are measured in parallel, since nothing is timed.
+/// The runs of a cell are measured in parallel, since nothing is timed, but for the organ's.
 pub(crate) fn all(arguments: &ExperimentArguments) -> anyhow::Result<()> {
     experiment(arguments, None)?.run(arguments)
 }
@@ -57,6 +60,8 @@ pub(crate) struct DefaultsArguments {
 enum Only {
     /// Default scenes against Newton's method.
     Newton,
+    /// A stiff organ: time and error of an accuracy.
+    Organ,
     /// Bodies under load after cuts.
     Load,
     /// Bodies at rest after cuts.
@@ -78,6 +83,9 @@ fn experiment(
     let mut cells = Vec::new();
     if wanted(Only::Newton) {
         cells.extend(newton_cells(quick, &folder));
+    }
+    if wanted(Only::Organ) {
+        cells.extend(organ_cells(quick, &folder));
     }
     let file = arguments.models.as_ref();
     let file = file.map(|models| models.join("liver_11k.vtk"));
@@ -130,6 +138,24 @@ fn newton_cells(quick: bool, folder: &Path) -> Vec<Cell<Row>> {
         }
     }
     cells
+}
+
+fn organ_cells(quick: bool, folder: &Path) -> Vec<Cell<Row>> {
+    let (tets, accuracies): (usize, &[f64]) = if quick {
+        (600, &[0.05])
+    } else {
+        (11_000, &[0.1, 0.05, 0.02])
+    };
+    let cell = |(accuracy, strokes): (f64, usize)| {
+        let folder = folder.to_owned();
+        Cell::new(format!("organ-{accuracy}-{strokes}"), move || {
+            organ::measure(tets, strokes, accuracy, &folder).map(Row::Organ)
+        })
+    };
+    let runs = accuracies
+        .iter()
+        .flat_map(|&accuracy| [(accuracy, 0), (accuracy, organ::STROKES)]);
+    runs.map(cell).collect()
 }
 
 /// The mesh of a body as a file for scenes.

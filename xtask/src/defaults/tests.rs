@@ -33,6 +33,11 @@ fn the_quick_form_holds_its_bars() {
                     assert!(error <= 0.1 || !row.warned.is_empty(), "{row:?}");
                 }
             }
+            Row::Organ(row) => {
+                if let Some([error, reference]) = row.error {
+                    assert!(error < row.accuracy + reference, "{row:?}");
+                }
+            }
             Row::Load(rows) => {
                 for row in rows {
                     assert!(row.is_bounded && row.softened == 0, "{row:?}");
@@ -50,7 +55,7 @@ fn the_quick_form_holds_its_bars() {
     let page = page::page(&rows).unwrap();
     let tables = page.parts.iter();
     let tables = tables.filter(|part| matches!(part, Part::Table(_)));
-    assert_eq!(tables.count(), 1 + 3 + 2);
+    assert_eq!(tables.count(), 1 + 3 + 1 + 2);
     fs::remove_dir_all(out).unwrap();
 }
 

@@ -21,13 +21,12 @@ use crate::Real;
 use crate::real::finite;
 
 /// When to stop.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Limits {
+pub(super) struct Limits<E> {
     pub(super) iterations: u32,
     /// The part of the first error, in the norm of the energy.
     pub(super) reduction: f64,
-    /// What may be left of `x·Ax/2 - b·x` in any case.
-    pub(super) energy: f64,
+    /// What may be left of `x·Ax/2 - b·x` in any case, for what was gained so far.
+    pub(super) energy: E,
 }
 
 /// How a solution ended.
@@ -36,6 +35,8 @@ pub(super) struct CgReport {
     pub(super) iterations: u32,
     /// The estimated energy between where it is and the solution, as a part of what was gained.
     pub(super) left: f64,
+    /// Twice the energy that was gained, which is the product of right side and solution.
+    pub(super) slope: f64,
 }
 
 /// Gains that say what was left before them: so many iterations late is the estimate.
@@ -78,7 +79,7 @@ impl<R: Real> Conjugate<R> {
         colors: &[usize],
         b: &[R::Vector],
         held: &[bool],
-        limits: Limits,
+        limits: &Limits<impl Fn(f64) -> f64>,
     ) -> CgReport {
         let rows = b.len();
         for v in [
@@ -98,11 +99,11 @@ impl<R: Real> Conjugate<R> {
             .map(|row| inverse::<R>(&matrix.blocks[matrix.offsets[row]], held[row]))
             .collect_into_vec(&mut self.inverses);
         let mut last = 0.0;
-        let mut gained = 0.0;
         let mut gains = [f64::INFINITY; DELAY];
         let mut solved = CgReport {
             iterations: 0,
             left: 1.0,
+            slope: 0.0,
         };
         while solved.iterations < limits.iterations {
             self.precondition(matrix, coarse, colors, held);
@@ -135,11 +136,12 @@ impl<R: Real> Conjugate<R> {
                 *r += *q * -step;
             }
             let gain = length * now;
-            gained += gain;
+            solved.slope += gain;
             gains[solved.iterations as usize % DELAY] = gain;
             solved.iterations += 1;
-            solved.left = (gains.iter().sum::<f64>() / gained).min(1.0);
-            let enough = (limits.reduction * limits.reduction).max(2.0 * limits.energy / gained);
+            solved.left = (gains.iter().sum::<f64>() / solved.slope).min(1.0);
+            let enough = (limits.reduction * limits.reduction)
+                .max(2.0 * (limits.energy)(0.5 * solved.slope) / solved.slope);
             if solved.iterations as usize >= DELAY && solved.left <= enough {
                 return solved;
             }

@@ -277,7 +277,7 @@ impl<R: Real> ImplicitStep<'_, R> {
         }
         force.clear();
         force.resize(rows, R::Vector::default());
-        let is_kept = self.accuracy.is_some()
+        let mut is_kept = self.accuracy.is_some()
             && matches!(&*filled, Some((time, rows)) if *time == self.time && rows == held);
         if is_kept {
             matrix.forces(self.solver, self.stars, self.time, held, force);
@@ -295,22 +295,25 @@ impl<R: Real> ImplicitStep<'_, R> {
             coarse.assemble(matrix, held);
         }
         let start = self.potentials();
-        let scale = start.elastic + MOTION * self.kinetic();
+        let motion = MOTION * self.kinetic();
+        // The elastic energy of a prediction may be far above that of the solution, which is below the potential.
+        let energy = |gain: f64| start.elastic.min(start.total - gain).max(0.0) + motion;
+        let accuracy = CG_ERROR_SHARE * self.accuracy.unwrap_or(0.0);
         let limits = Limits {
             iterations: settings.iterations,
             reduction: settings.reduction,
-            energy: self
-                .accuracy
-                .map_or(0.0, |wanted| (CG_ERROR_SHARE * wanted).powi(2) * scale),
+            energy: |gain: f64| accuracy * accuracy * energy(gain),
         };
-        let solved = conjugate.solve(matrix, coarse, &self.stars.colors, force, held, limits);
+        let colors = &self.stars.colors;
+        let mut solved = conjugate.solve(matrix, coarse, colors, force, held, &limits);
+        let is_violent = |slope: f64| 0.5 * slope > CALM * energy(0.5 * slope);
+        if is_kept && is_violent(solved.slope) {
+            is_kept = false;
+            matrix.fill(self.solver, self.stars, self.time, held, force);
+            solved = conjugate.solve(matrix, coarse, colors, force, held, &limits);
+        }
         coarse.note(solved.iterations, solved.left);
-        let direction = conjugate.solution();
-        let slope: f64 = force
-            .iter()
-            .zip(direction)
-            .map(|(f, d)| R::to_dvec3(*f).dot(R::to_dvec3(*d)))
-            .sum();
+        let (direction, slope) = (conjugate.solution(), solved.slope);
         let Search {
             taken,
             elastic,
@@ -332,7 +335,7 @@ impl<R: Real> ImplicitStep<'_, R> {
         };
         let left = expected * (solved.left + mismatch).min(1.0);
         let energy = elastic + MOTION * self.kinetic();
-        if mismatch > KEPT_MISMATCH || expected > CALM * energy {
+        if mismatch > KEPT_MISMATCH || is_violent(slope) {
             *filled = None;
         }
         let error = if left > 0.0 {

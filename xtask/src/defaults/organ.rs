@@ -1,0 +1,158 @@
+//! A stiff organ whose end is pulled, uncut and while a blade is swept through it: time and error of the accuracy asked for.
+
+use std::path::Path;
+
+use incise::advise::Motion;
+use incise::mesh::generate::{Shape, generate};
+use incise::mesh::io;
+use incise::scene::{Method, Precision, SolverSpec, Substeps};
+use incise::{Scene, Simulation};
+use serde::{Deserialize, Serialize};
+
+use super::{Warned, warnings};
+
+/// Longest side in m.
+const SIZE: f64 = 0.2;
+/// Frames of the pull.
+const PULL: usize = 30;
+/// Frames in all.
+const FRAMES: u32 = 60;
+/// Strokes of the form that is cut, four frames each.
+pub(super) const STROKES: usize = 6;
+/// Substeps of the reference; half as many tell its own error.
+const REFERENCE_SUBSTEPS: u32 = 8;
+
+/// An organ with an accuracy.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct OrganRow {
+    pub(super) accuracy: f64,
+    pub(super) strokes: usize,
+    /// At the start and at the end.
+    pub(super) tets: [usize; 2],
+    /// As reports name it.
+    pub(super) method: String,
+    pub(super) substeps: u32,
+    pub(super) precision: String,
+    /// Median of the frames of the pull but the first two, the slowest frame that cuts, and the median of the last 20, in ms.
+    pub(super) pulled_ms: f64,
+    pub(super) slowest_cut_ms: Option<f64>,
+    pub(super) last_ms: f64,
+    /// Of the motion of all frames, uncut only: its error, and that of the reference.
+    pub(super) error: Option<[f64; 2]>,
+    pub(super) warned: Warned,
+}
+
+/// The organ with the strokes of the form that is cut, or without.
+fn scene(tets: usize, strokes: usize, accuracy: f64, folder: &Path) -> anyhow::Result<Scene> {
+    let mesh = generate(Shape::Liver, tets)?;
+    let (low, high) = super::cut::ends(&mesh);
+    let scale = SIZE / (high - low).max_element();
+    let file = folder.join(format!("organ-{tets}.vtk"));
+    io::write(&file, &mesh)?;
+    let at = |part: f64| scale * (low.x + part * (high.x - low.x));
+    let (held, pulled) = (at(0.1), at(0.9));
+    let mut text = format!(
+        "[world]
+gravity = [0.0, 0.0, -9.81]
+[solver]
+time_step = 0.01
+accuracy = {accuracy}
+[[body]]
+mesh = {file:?}
+scale = {scale}
+young_modulus = 1e7
+poisson_ratio = 0.49
+fixed = [{{ half_space = {{ point = [{held}, 0.0, 0.0], normal = [-1.0, 0.0, 0.0] }} }}]
+[[handle]]
+holds = [{{ half_space = {{ point = [{pulled}, 0.0, 0.0], normal = [1.0, 0.0, 0.0] }} }}]
+frames = [0, {PULL}]
+path = [[0.0, 0.0, 0.0], [0.03, 0.0, 0.0]]
+"
+    );
+    let (middle, top) = (0.5 * scale * (low + high), scale * high.z);
+    for stroke in 0..strokes {
+        let x = at(0.25 + 0.5 * stroke as f64 / (STROKES - 1) as f64);
+        let first = PULL + 1 + 4 * stroke;
+        text += &format!(
+            "[[stroke]]
+kind = \"sweep\"
+frames = [{first}, {}]
+blade = [[{x}, {}, {}], [{x}, {}, {}]]
+path = [[0.0, 0.0, 0.0], [0.0, 0.0, {}]]
+",
+            first + 4,
+            scale * low.y - 0.1,
+            top + 0.01,
+            middle.y,
+            top + 0.01,
+            -0.75 * (top - scale * low.z),
+        );
+    }
+    Ok(Scene::from_toml(&text)?)
+}
+
+/// Runs the organ with an accuracy, and, uncut, its reference.
+pub(super) fn measure(
+    tets: usize,
+    strokes: usize,
+    accuracy: f64,
+    folder: &Path,
+) -> anyhow::Result<OrganRow> {
+    let scene = scene(tets, strokes, accuracy, folder)?;
+    let mut simulation = Simulation::new(&scene)?;
+    let (mut ms, mut cut_ms, mut warned) = (Vec::new(), None, Warned::new());
+    let at_start = simulation.mesh().tets.len();
+    for _ in 0..FRAMES {
+        let report = simulation.step()?;
+        let total = report.ms.total;
+        ms.push(total);
+        if report.cut.is_some() {
+            cut_ms = Some(total.max(cut_ms.unwrap_or(0.0)));
+        }
+        warnings(report, &mut warned);
+    }
+    let report = simulation.report();
+    let body = report.bodies.first();
+    let error = if strokes == 0 {
+        let reference = |substeps| {
+            let mut scene = scene.clone();
+            scene.solver = SolverSpec {
+                time_step: scene.solver.time_step,
+                substeps: Substeps::Fixed(substeps),
+                iterations: 100,
+                two_level: true,
+                precision: Precision::F64,
+                ..SolverSpec::of(Method::Vbd)
+            };
+            Motion::of(&scene, FRAMES, None)
+        };
+        let best = reference(REFERENCE_SUBSTEPS)?;
+        let own = reference(REFERENCE_SUBSTEPS / 2)?.deviation(&best);
+        let motion = Motion::of(&scene, FRAMES, None)?;
+        Some([motion.deviation(&best).motion, own.motion].map(|percent| percent / 100.0))
+    } else {
+        None
+    };
+    Ok(OrganRow {
+        accuracy,
+        strokes,
+        tets: [at_start, report.tets],
+        method: serde_json::to_value(body.and_then(|body| body.method))?
+            .as_str()
+            .unwrap_or("-")
+            .to_owned(),
+        substeps: body.map_or(0, |body| body.substeps),
+        precision: report.precision.to_owned(),
+        pulled_ms: median(&ms[2..PULL]),
+        slowest_cut_ms: cut_ms,
+        last_ms: median(&ms[ms.len() - 20..]),
+        error,
+        warned,
+    })
+}
+
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}
