@@ -92,12 +92,12 @@ pub(crate) fn of_substeps(
         return None;
     }
     let percent = match 100.0 * choice.expected_error {
-        percent if percent >= 100.0 => "100 or more".to_owned(),
-        percent => format!("{percent:.0}"),
+        percent if percent >= 100.0 => "100% or more".to_owned(),
+        percent => format!("{percent:.0}%"),
     };
     let needed = choice.substeps_needed;
     let error = format!(
-        "the expected error is {percent}% of the motion with {} substeps; {needed} are needed for {:.0}%",
+        "the expected error is {percent} of the motion with {} substeps; {needed} are needed for {:.0}%",
         choice.substeps,
         100.0 * accuracy
     );

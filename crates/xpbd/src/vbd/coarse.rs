@@ -144,7 +144,7 @@ impl Coarse {
     pub(super) fn note(&mut self, iterations: u32, left: f64) {
         self.age.solutions += 1;
         self.age.usable = self.age.solutions < OLDEST;
-        if iterations >= TELLING {
+        if iterations >= TELLING && left > 0.0 {
             let rate = -left.ln() / f64::from(iterations);
             self.age.usable &= rate >= AGED * *self.age.first.get_or_insert(rate);
         }

@@ -54,7 +54,7 @@ pub struct CoarseCorrectionReport {
     /// The part of the direction that was taken; 0 if no part of it lowers the potential.
     pub taken: f64,
     /// The distance to the solution after the correction, as a part of the state's own energy: the root of the energy that
-    /// is estimated to be left to gain over that of the tets and a ten-thousandth of that of the motion. Infinite for a
+    /// is estimated to be left to gain over that of the tets and 3e-5 of that of the motion. Infinite for a
     /// state without energy that is no solution.
     pub error: f64,
 }
@@ -81,7 +81,7 @@ impl Search {
 
 /// The weight of the energy of the motion in the measure of an error: what is lost of a motion in one step adds up in the
 /// steps to come.
-const MOTION: f64 = 1e-4;
+const MOTION: f64 = 3e-5;
 
 /// Matrix, aggregates and vectors of a correction. It belongs to the stars it was made of.
 #[derive(Clone, Debug)]
@@ -125,6 +125,7 @@ impl<R: Real> CoarseCorrection<R> {
             + size_of_val(&*self.held)
             + size_of_val(&*self.force)
             + size_of_val(&*self.base)
+            + self.filled.as_ref().map_or(0, |(_, rows)| rows.len())
     }
 
     /// Prepares corrections for some stars. O(pairs).
