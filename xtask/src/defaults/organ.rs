@@ -21,6 +21,8 @@ const FRAMES: u32 = 60;
 pub(super) const STROKES: usize = 6;
 /// Substeps of the reference; half as many tell its own error.
 const REFERENCE_SUBSTEPS: u32 = 8;
+/// Rounds of a substep of the reference, from the third on each squares the error.
+const REFERENCE_ROUNDS: u32 = 6;
 
 /// An organ with an accuracy.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -119,7 +121,7 @@ pub(super) fn measure(
             scene.solver = SolverSpec {
                 time_step: scene.solver.time_step,
                 substeps: Substeps::Fixed(substeps),
-                iterations: 100,
+                iterations: REFERENCE_ROUNDS,
                 two_level: true,
                 precision: Precision::F64,
                 ..SolverSpec::of(Method::Vbd)

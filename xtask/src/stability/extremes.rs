@@ -106,13 +106,6 @@ pub(crate) fn extremes(quick: bool) -> anyhow::Result<Vec<Extreme>> {
             e.material.damping = damping;
         });
     }
-    add(
-        "damping-rest".to_owned(),
-        "at rest, free, damping time of 0.05 s".to_owned(),
-        &|e| {
-            (e.held, e.gravity, e.material.damping) = (false, 0.0, 0.05);
-        },
-    );
     let substeps = if quick { 100 } else { 1000 };
     add(
         "many-substeps".to_owned(),

@@ -27,7 +27,7 @@ fn the_quick_matrix_is_finite_explained_and_shown() {
             assert_eq!(outcome.not_finite, None, "{}: {outcome:?}", row.id);
             if outcome.verdict(row.is_state) != Verdict::Fine {
                 let explained = explain::explain(row, outcome).is_some();
-                assert!(explained, "nobody knows why: {}: {outcome:?}", row.id);
+                assert!(explained, "no explanation: {}: {outcome:?}", row.id);
             }
             // Constraints keep momentum but for rounding, measured: 1e-5. VBD keeps it as far as it converges.
             let drift = outcome.momentum_drift.unwrap_or(0.0);
