@@ -23,6 +23,7 @@ use incise::mesh::glam::DVec3;
 use incise::scene::StrokeSpec;
 use incise::{Scene, Simulation};
 
+use crate::experiment::median;
 use crate::models::{Model, models};
 use crate::table;
 
@@ -149,8 +150,8 @@ impl Cost {
             cut_tets,
             cutting_frames: solves.len(),
             stages: sums.map(|sum| 1e3 * sum / cut_tets as f64),
-            solve: median(&mut solves),
-            follow: median(&mut follows),
+            solve: median(solves),
+            follow: median(follows),
             largest,
         })
     }
@@ -405,9 +406,4 @@ fn mean_edge(mesh: &TetMesh) -> f64 {
         }
     }
     sum / (6 * mesh.tets.len()).max(1) as f64
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }

@@ -6,7 +6,6 @@
 //! compared (`Simulation::check`), positions must be finite and what the deltas say must be what the mesh is. Cutting
 //! only ever adds tets, so a body that has grown threefold is replaced by a fresh one. All is determined by the seed.
 
-use crate::random::Random;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -19,6 +18,7 @@ use incise::scene::{BodySpec, Precision, Region, StrokeSpec};
 use incise::{Scene, Simulation};
 
 use crate::models::{Model, models};
+use crate::random::Random;
 use crate::table;
 
 #[derive(Debug, Args)]

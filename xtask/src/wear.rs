@@ -19,6 +19,7 @@ use incise::mesh::glam::DVec3;
 use incise::scene::{ReclusterSpec, StrokeSpec};
 use incise::{FrameReport, Scene, Simulation};
 
+use crate::experiment::median;
 use crate::models::{Model, models};
 use crate::table;
 
@@ -282,11 +283,4 @@ fn costs(runs: &[Run]) -> Table {
 
 fn count(numbers: impl Iterator<Item = usize>) -> String {
     numbers.sum::<usize>().to_string()
-}
-
-/// The middle one, or 0 of none.
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }

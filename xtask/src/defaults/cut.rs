@@ -1,6 +1,5 @@
 //! Bodies after random strokes: falling on a ground, and free at rest.
 
-use crate::random::Random;
 use std::path::PathBuf;
 
 use anyhow::Context;
@@ -12,6 +11,7 @@ use incise::{Scene, Simulation};
 use serde::{Deserialize, Serialize};
 
 use super::{Warned, warnings};
+use crate::random::Random;
 
 /// Longest side of a body in m.
 const SIZE: f64 = 0.25;

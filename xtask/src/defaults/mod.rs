@@ -1,7 +1,8 @@
 //! `cargo xtask defaults`: what a scene with default settings gets, accuracy and stability, without tuning.
 //!
 //! Four parts: default scenes beside Newton's method, with the warnings they gave; a stiff organ with stated accuracies;
-//! bodies under load after cuts, from soft to rigid; bodies at rest after cuts. A result over its bar is counted at the top of the page.
+//! bodies under load after cuts, from soft to rigid; bodies at rest after cuts. A result over its bar is counted at the top
+//! of the page.
 
 mod cut;
 mod newton;
@@ -41,7 +42,7 @@ pub(crate) enum Row {
     Skipped(String),
 }
 
-/// The runs of a cell are measured in parallel, since nothing is timed, but for the organ's.
+/// The runs of a cell are measured in parallel; only the organ is timed, and a cell of it has one run.
 pub(crate) fn all(arguments: &ExperimentArguments) -> anyhow::Result<()> {
     experiment(arguments, None)?.run(arguments)
 }

@@ -10,6 +10,7 @@ use incise::{Scene, Simulation};
 use serde::{Deserialize, Serialize};
 
 use super::{Warned, warnings};
+use crate::experiment::median;
 
 /// Longest side in m.
 const SIZE: f64 = 0.2;
@@ -31,7 +32,7 @@ pub(crate) struct OrganRow {
     pub(super) strokes: usize,
     /// At the start and at the end.
     pub(super) tets: [usize; 2],
-    /// As reports name it.
+    /// By its name in reports.
     pub(super) method: String,
     pub(super) substeps: u32,
     pub(super) precision: String,
@@ -145,16 +146,10 @@ pub(super) fn measure(
             .to_owned(),
         substeps: body.map_or(0, |body| body.substeps),
         precision: report.precision.to_owned(),
-        pulled_ms: median(&ms[2..PULL]),
+        pulled_ms: median(ms[2..PULL].iter().copied()),
         slowest_cut_ms: cut_ms,
-        last_ms: median(&ms[ms.len() - 20..]),
+        last_ms: median(ms[ms.len() - 20..].iter().copied()),
         error,
         warned,
     })
-}
-
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
 }

@@ -135,16 +135,16 @@ fn standing(error: f64, warned: &Warned) -> Standing {
 }
 
 /// The warnings of a row that explain an error of its motion.
-fn explains_motion(row: &NewtonRow) -> Warned {
+fn reasons_for_motion(row: &NewtonRow) -> Warned {
     match row.load {
         Load::Hanging | Load::Pressed if row.motion <= ALL_OF_IT => row.warned.clone(),
         // A turn is no vibration, and one that is damped away is off by itself.
-        _ => explains_state(row),
+        _ => reasons_for_state(row),
     }
 }
 
 /// The warnings of a row that explain an error of a settled state: vibrations that are damped settle where others do.
-fn explains_state(row: &NewtonRow) -> Warned {
+fn reasons_for_state(row: &NewtonRow) -> Warned {
     let mut warned = row.warned.clone();
     warned.remove(DAMPED);
     warned
@@ -183,12 +183,12 @@ fn summary(newton: &[&NewtonRow], load: &[&LoadRow], rest: &[&RestRow]) -> Table
     };
     for load in Load::ALL {
         let of = || newton.iter().filter(|row| row.load == load);
-        let settled = of().filter_map(|row| Some(standing(row.settled?, &explains_state(row))));
+        let settled = of().filter_map(|row| Some(standing(row.settled?, &reasons_for_state(row))));
         let settled: Vec<Standing> = settled.collect();
         if !settled.is_empty() {
             add(&format!("{}, settled", load.name()), settled);
         }
-        let motion = of().map(|row| standing(row.motion, &explains_motion(row)));
+        let motion = of().map(|row| standing(row.motion, &reasons_for_motion(row)));
         add(&format!("{}, motion", load.name()), motion.collect());
     }
     let passed = |passes: bool| {
@@ -225,9 +225,9 @@ fn misses(newton: &[&NewtonRow], load: &[&LoadRow], rest: &[&RestRow]) -> String
             }
         };
         if let Some(error) = row.settled {
-            add("settled state off by", error, &explains_state(row));
+            add("settled state off by", error, &reasons_for_state(row));
         }
-        add("motion off by", row.motion, &explains_motion(row));
+        add("motion off by", row.motion, &reasons_for_motion(row));
     }
     for row in load.iter().filter(|row| !load_passes(row)) {
         lines.push(format!(
@@ -315,11 +315,11 @@ fn newton_tables(rows: &[&NewtonRow]) -> Vec<Part> {
             if load != Load::Spinning {
                 add("settled state", &|row| {
                     row.settled
-                        .map_or(String::new(), |error| cell(error, &explains_state(row)))
+                        .map_or(String::new(), |error| cell(error, &reasons_for_state(row)))
                 });
             }
             add("motion", &|row| {
-                let mut text = cell(row.motion, &explains_motion(row));
+                let mut text = cell(row.motion, &reasons_for_motion(row));
                 if row.reference > 0.02 {
                     text += &format!(", ref ±{}", percent(row.reference));
                 }

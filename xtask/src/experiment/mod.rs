@@ -131,5 +131,12 @@ fn progress(name: &'static str, cells: usize) -> ProgressBar {
     bar
 }
 
+/// The middle of some values; 0 of none.
+pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.into_iter().collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
 #[cfg(test)]
 mod tests;

@@ -14,9 +14,10 @@ use incise::report::FrameReport;
 use incise::scene::StrokeSpec;
 use incise::{Error, Scene, Simulation};
 
-use super::measure::{batch, median, ms_since};
+use super::measure::{batch, ms_since};
 use super::report::{CuttingFrames, FrameRow, Times};
 use crate::cutting::stroke;
+use crate::experiment::median;
 use crate::models::Model;
 
 /// Where a scene is computed, and with which clusters.

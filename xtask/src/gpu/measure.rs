@@ -1,12 +1,13 @@
 //! Timing: medians and the fastest of many runs, the first left out, since it compiles kernels.
 //!
-//! A wait for a device costs more than a small frame, so what is short is repeated before somebody waits.
+//! A wait for a device costs more than a small frame, so what is short is repeated before a wait.
 
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use incise::gpu::{GpuContext, GpuError};
 
 use super::report::Times;
+use crate::experiment::median;
 
 /// Time to fill before a wait, in ms, and most runs in it.
 const BATCH_MS: f64 = 50.0;
@@ -14,18 +15,12 @@ const MOST: u32 = 20;
 
 impl Times {
     /// Of several runs; 0 of none.
-    pub(crate) fn of(mut ms: Vec<f64>) -> Self {
-        ms.sort_by(f64::total_cmp);
+    pub(crate) fn of(ms: Vec<f64>) -> Self {
         Self {
-            median: ms.get(ms.len() / 2).copied().unwrap_or(0.0),
-            fastest: ms.first().copied().unwrap_or(0.0),
+            median: median(ms.iter().copied()),
+            fastest: ms.into_iter().reduce(f64::min).unwrap_or(0.0),
         }
     }
-}
-
-/// The middle of some values; 0 of none.
-pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> f64 {
-    Times::of(values.into_iter().collect()).median
 }
 
 /// Milliseconds since.

@@ -12,8 +12,9 @@ use incise::graph::{ConstraintGraph, Incidence};
 
 use super::coloring::{compared, from_graph, from_incidence};
 use super::frame::Cut;
-use super::measure::{median, ms_since, timed};
+use super::measure::{ms_since, timed};
 use super::report::RecoloringRow;
+use crate::experiment::median;
 
 pub(crate) fn recoloring(
     gpu: &GpuContext,

@@ -109,7 +109,7 @@ pub struct Advice {
 }
 
 /// Settings with the accuracy that they have by default, for comparison with those that name it.
-fn stated(spec: &SolverSpec) -> SolverSpec {
+fn with_default_accuracy(spec: &SolverSpec) -> SolverSpec {
     let is_default = spec.method == Method::Auto && spec.budget_ms.is_none();
     SolverSpec {
         accuracy: spec
@@ -182,7 +182,7 @@ pub fn advise(scene: &Scene, question: &Question) -> Result<Advice, Error> {
     specs.extend(
         candidates(scene, substeps)
             .into_iter()
-            .filter(|spec| *spec != stated(&scene.solver)),
+            .filter(|spec| *spec != with_default_accuracy(&scene.solver)),
     );
     let (mut kept, mut left_out) = (Vec::new(), Vec::new());
     for (i, spec) in specs.iter().enumerate() {

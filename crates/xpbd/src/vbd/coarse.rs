@@ -18,8 +18,8 @@ use crate::Real;
 /// A factor is stale when conjugate gradients converge at less than this part of the rate that they had when it was new.
 const AGED: f64 = 0.75;
 
-/// Iterations from which the rate of a solution says something about the factor.
-const TELLING: u32 = 8;
+/// Iterations from which the rate of convergence of a solution is judged: fewer say nothing about the factor.
+const RATED_ITERATIONS: u32 = 8;
 
 /// Solutions after which a factor is stale in any case: it may be that of a state that was worse to begin with.
 const OLDEST: u32 = 128;
@@ -144,7 +144,7 @@ impl Coarse {
     pub(super) fn note(&mut self, iterations: u32, left: f64) {
         self.age.solutions += 1;
         self.age.usable = self.age.solutions < OLDEST;
-        if iterations >= TELLING && left > 0.0 {
+        if iterations >= RATED_ITERATIONS && left > 0.0 {
             let rate = -left.ln() / f64::from(iterations);
             self.age.usable &= rate >= AGED * *self.age.first.get_or_insert(rate);
         }

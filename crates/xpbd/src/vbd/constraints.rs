@@ -103,7 +103,7 @@ struct Anchor<R: Real> {
 /// A distance seen from one of its particles.
 #[derive(Clone, Copy, Debug)]
 struct Stretch<R: Real> {
-    /// As [`Spring::excess`].
+    /// The value that [`Spring::excess`] returns.
     excess: R,
     /// The gradient of the length.
     along: R::Vector,

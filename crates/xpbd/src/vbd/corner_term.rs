@@ -4,8 +4,9 @@
 //! is `n · a / 6V`, and the pull of `|F|²` is a weighted sum of a, b and c. So a particle needs eight numbers of a tet,
 //! not the nine of its rest matrix, and the deformation gradient is never formed. Cost: about 60 operations.
 
-use crate::Real;
 use crate::neo_hookean::TetConstraint;
+use crate::real::load;
+use crate::{Real, Solver};
 
 /// The other corners of each corner, such that corner and others are an even permutation.
 pub(super) const OTHERS: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [3, 0, 1], [2, 1, 0]];
@@ -23,7 +24,33 @@ pub(super) struct CornerTerm<R> {
     pub(super) target: R,
 }
 
+/// A term at the present positions.
+pub(super) struct Corner<R: Real> {
+    /// The other particles relative to the own one.
+    pub(super) others: [R::Vector; 3],
+    /// Minus the gradient of `√(lV) det F`.
+    pub(super) slope: R::Vector,
+    /// The elastic force on the particle in N.
+    pub(super) force: R::Vector,
+}
+
 impl<R: Real> CornerTerm<R> {
+    /// The term with its own particle at `x`.
+    #[inline]
+    pub(super) fn at(&self, solver: &Solver<R>, x: R::Vector) -> Corner<R> {
+        let others = self
+            .others
+            .map(|p| load::<R>(&solver.particles[p as usize]) - x);
+        let ([a, b, c], [wa, wb, wc]) = (others, self.pulls);
+        let slope = R::cross(b - a, c - a) * self.slope;
+        let excess = R::dot(slope, a) - self.target;
+        Corner {
+            others,
+            slope,
+            force: slope * excess - (a * wa + b * wb + c * wc),
+        }
+    }
+
     /// What a corner sees of a tet, computed in double precision and rounded once; `None` if the tet takes no part.
     pub(super) fn new(tet: &TetConstraint<f64>, corner: usize) -> Option<Self> {
         if tet.stiffness <= 0.0 {

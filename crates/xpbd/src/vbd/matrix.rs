@@ -167,13 +167,10 @@ impl<R: Real> Blocks<R> {
                 let pairs = stars.offsets[row]..stars.offsets[row + 1];
                 for pair in pairs {
                     let term = &stars.terms[pair];
-                    let [a, b, c] = term
-                        .others
-                        .map(|p| load::<R>(&solver.particles[p as usize]) - x);
+                    let corner = term.at(solver, x);
+                    let ([a, b, c], slope) = (corner.others, corner.slope);
+                    *force += corner.force;
                     let [wa, wb, wc] = term.pulls;
-                    let slope = R::cross(b - a, c - a) * term.slope;
-                    let lack = R::dot(slope, a) - term.target;
-                    *force += slope * lack - (a * wa + b * wb + c * wc);
                     isotropic -= wa + wb + wc;
                     // Gradients of √(lV) det F at this particle (minus slope) and at the others.
                     let held = term.slope * excess[stars.tets[pair] as usize];
@@ -228,13 +225,7 @@ impl<R: Real> Blocks<R> {
             let free = solver.previous[p] + solver.velocities[p] * time;
             let mut force = (free - x) * (per_time_squared / weight::<R>(particle));
             for term in stars.of(row) {
-                let [a, b, c] = term
-                    .others
-                    .map(|p| load::<R>(&solver.particles[p as usize]) - x);
-                let [wa, wb, wc] = term.pulls;
-                let slope = R::cross(b - a, c - a) * term.slope;
-                let lack = R::dot(slope, a) - term.target;
-                force += slope * lack - (a * wa + b * wb + c * wc);
+                force += term.at(solver, x).force;
             }
             if let Some(viscosity) = &stars.viscosity {
                 force += viscosity.force(row, &stars.order, |p| {

@@ -79,15 +79,11 @@ impl<R: Real> Sweep<R> {
         let mut isotropic = inertia;
         let mut h = [R::ZERO; 6];
         for term in stars.of(place) {
-            let [a, b, c] = term
-                .others
-                .map(|p| load::<R>(&solver.particles[p as usize]) - x);
+            let corner = term.at(solver, x);
+            force += corner.force;
             let [wa, wb, wc] = term.pulls;
-            let slope = R::cross(b - a, c - a) * term.slope;
-            let excess = R::dot(slope, a) - term.target;
-            force += slope * excess - (a * wa + b * wb + c * wc);
             isotropic -= wa + wb + wc;
-            let [u, v, w] = R::components(slope);
+            let [u, v, w] = R::components(corner.slope);
             h[0] += u * u;
             h[1] += u * v;
             h[2] += u * w;
