@@ -28,10 +28,14 @@ pub(crate) enum Cut {
     FastBody,
     /// So many random strokes into a free body at rest without gravity, one a frame; then it is left alone.
     AtRest(u64),
+    /// So many random strokes into a body that hangs from one end, one a frame; then it is left alone.
+    UnderLoad(u64),
+    /// Pairs of planes 1/50 edge apart through a body that hangs from one end.
+    Slivers,
 }
 
 impl Cut {
-    pub(crate) const ALL: [Self; 7] = [
+    pub(crate) const ALL: [Self; 9] = [
         Self::Strokes,
         Self::FastBlade,
         Self::SlowBlade,
@@ -39,6 +43,8 @@ impl Cut {
         Self::AtRest(1),
         Self::AtRest(10),
         Self::AtRest(30),
+        Self::UnderLoad(30),
+        Self::Slivers,
     ];
 
     pub(crate) fn id(self) -> String {
@@ -48,6 +54,8 @@ impl Cut {
             Self::SlowBlade => "cut-slow-blade".to_owned(),
             Self::FastBody => "cut-fast-body".to_owned(),
             Self::AtRest(strokes) => format!("cut-at-rest-{strokes}"),
+            Self::UnderLoad(strokes) => format!("cut-under-load-{strokes}"),
+            Self::Slivers => "cut-slivers".to_owned(),
         }
     }
 
@@ -59,6 +67,8 @@ impl Cut {
             Self::FastBody => "a body that falls past a blade".to_owned(),
             Self::AtRest(1) => "a free body at rest after 1 cut".to_owned(),
             Self::AtRest(strokes) => format!("a free body at rest after {strokes} cuts"),
+            Self::UnderLoad(strokes) => format!("a hanging body after {strokes} cuts"),
+            Self::Slivers => "slices of 1/50 edge in a hanging body".to_owned(),
         }
     }
 
@@ -68,8 +78,9 @@ impl Cut {
             (Self::Strokes, true) => 25,
             (Self::SlowBlade, false) => 500,
             (Self::FastBlade | Self::FastBody, false) => 120,
-            (Self::AtRest(strokes), false) => strokes + 300,
-            (Self::AtRest(strokes), true) => strokes + 20,
+            (Self::AtRest(strokes) | Self::UnderLoad(strokes), false) => strokes + 300,
+            (Self::AtRest(strokes) | Self::UnderLoad(strokes), true) => strokes + 20,
+            (Self::Slivers, false) => 300,
             (_, true) => 30,
         }
     }
@@ -120,8 +131,20 @@ impl Cut {
             path: vec![[0.0; 3], [0.0, 0.0, way]],
             snap: 0.0,
         };
+        let edge = if quick { 0.1 } else { 0.06 };
+        let plane = |frame, x: f64| StrokeSpec::Plane {
+            frame,
+            point: [x, 0.0, 0.0],
+            normal: [1.0, 0.0, 0.3],
+            snap: 0.0,
+        };
         scene.stroke = match self {
-            Self::Strokes | Self::AtRest(_) => Vec::new(),
+            Self::Strokes | Self::AtRest(_) | Self::UnderLoad(_) => Vec::new(),
+            Self::Slivers => [-0.2, 0.05, 0.3]
+                .iter()
+                .zip([2, 4, 6])
+                .flat_map(|(&x, frame)| [plane(frame, x), plane(frame + 1, x + 0.02 * edge)])
+                .collect(),
             Self::FastBlade => vec![sweep([2, 3], blade(1.0), -3.0)],
             // From inside, since it would be long in coming.
             Self::SlowBlade => vec![sweep([2, last], blade(-0.1), -6e-4 * last as f64)],
@@ -155,7 +178,7 @@ pub(crate) fn run(
             let stroke = random_stroke(&simulation, &mut noise);
             simulation.cut(stroke)?;
         }
-        if matches!(cut, Cut::AtRest(strokes) if frame < strokes) {
+        if matches!(cut, Cut::AtRest(strokes) | Cut::UnderLoad(strokes) if frame < strokes) {
             let stroke = random_stroke(&simulation, &mut noise);
             simulation.cut(stroke)?;
         }

@@ -1,7 +1,7 @@
 //! The settings that are measured for every scene, and the pairs of them that differ in one knob.
 //!
-//! Around the default with `n` substeps, the number that brings kappa to 0.5: each knob alone, and substeps with each
-//! method.
+//! Stated accuracies; and around the split form with `n` substeps, the number that brings kappa to 0.5, each setting
+//! alone, and substeps with each method and form.
 
 use incise::scene::{Backend, Integrator, Method, Precision, SolverSpec, Substeps, TetSolve};
 
@@ -44,6 +44,15 @@ pub(super) fn settings(substeps: u32, gpu: bool) -> Settings {
         tet_solve: TetSolve::Sequential,
         ..xpbd(eighths, 1)
     };
+    let block = |eighths| SolverSpec {
+        tet_solve: TetSolve::Block,
+        ..xpbd(eighths, 1)
+    };
+    let accurate = |accuracy| SolverSpec {
+        accuracy: Some(accuracy),
+        time_step: 1.0 / 60.0,
+        ..SolverSpec::default()
+    };
     let jacobi = |eighths, iterations, relaxation| SolverSpec {
         relaxation,
         ..of(Method::Jacobi, eighths, iterations)
@@ -61,8 +70,8 @@ pub(super) fn settings(substeps: u32, gpu: bool) -> Settings {
         two_level: true,
         ..double(vbd(substeps, 4, 1.0))
     };
-    let unsoftened = |spec: SolverSpec| SolverSpec {
-        kappa_limit: f64::INFINITY,
+    let softened = |spec: SolverSpec| SolverSpec {
+        kappa_limit: 1.0,
         ..spec
     };
     let on_gpu = |eighths| SolverSpec {
@@ -78,6 +87,10 @@ pub(super) fn settings(substeps: u32, gpu: bool) -> Settings {
             }
         }
     };
+    add(
+        "accuracy",
+        [0.5, 0.2, 0.1, 0.05, 0.02, 0.01].map(accurate).into(),
+    );
     let counts = [1, 2, 4, 8, 16, 32, 64];
     add(
         "substeps, f32",
@@ -88,6 +101,8 @@ pub(super) fn settings(substeps: u32, gpu: bool) -> Settings {
         "substeps, f64",
         counts.iter().map(|&e| double(xpbd(e, 1))).collect(),
     );
+    let counts = [1, 2, 4, 8, 16, 32, 64];
+    add("substeps, block form", counts.map(block).into());
     let counts = [(8, 2), (8, 4), (8, 16), (16, 2), (16, 4), (32, 4)];
     add(
         "iterations",
@@ -132,8 +147,8 @@ pub(super) fn settings(substeps: u32, gpu: bool) -> Settings {
         [1, 2, 4, 8].map(coarse).into(),
     );
     add(
-        "not softened",
-        [2, 4, 8].map(|e| unsoftened(xpbd(e, 1))).into(),
+        "softened, block form",
+        [1, 2, 4].map(|e| softened(block(e))).into(),
     );
     if gpu {
         add("gpu", [4, 8, 16, 32].map(on_gpu).into());
@@ -146,6 +161,18 @@ pub(super) fn settings(substeps: u32, gpu: bool) -> Settings {
         to: to.clone(),
     };
     let mut exchanges = vec![
+        exchange(
+            "accuracy",
+            "Asking for an accuracy of 0.05 in place of 0.1",
+            &accurate(0.1),
+            &accurate(0.05),
+        ),
+        exchange(
+            "accuracy",
+            "Asking for an accuracy of 0.02 in place of 0.05",
+            &accurate(0.05),
+            &accurate(0.02),
+        ),
         exchange(
             "substeps",
             "Doubling the substeps from n/2 to n",
@@ -220,9 +247,27 @@ pub(super) fn settings(substeps: u32, gpu: bool) -> Settings {
         ),
         exchange(
             "form",
-            "The paper's form in place of the block form",
+            "The split form in place of the block form at n/4 substeps",
+            &block(2),
+            &xpbd(2, 1),
+        ),
+        exchange(
+            "form",
+            "The split form in place of the block form at n substeps",
+            &block(8),
             &xpbd(8, 1),
+        ),
+        exchange(
+            "form",
+            "The split form in place of the block form at 4 n substeps",
+            &block(32),
+            &xpbd(32, 1),
+        ),
+        exchange(
+            "form",
+            "The split form in place of the paper's at n substeps",
             &sequential(8),
+            &xpbd(8, 1),
         ),
         exchange(
             "precision",
@@ -238,9 +283,9 @@ pub(super) fn settings(substeps: u32, gpu: bool) -> Settings {
         ),
         exchange(
             "softening",
-            "Not softening above kappa 1 at n/2 substeps",
-            &xpbd(4, 1),
-            &unsoftened(xpbd(4, 1)),
+            "Softening the block form to kappa 1 at n/4 substeps",
+            &block(2),
+            &softened(block(2)),
         ),
         exchange(
             "method",
@@ -284,14 +329,13 @@ pub(super) fn settings(substeps: u32, gpu: bool) -> Settings {
     Settings { all, exchanges }
 }
 
-/// One substep of as many iterations, neither softened nor in single precision: nothing but the iteration is tested.
+/// One substep of as many iterations in double precision: nothing but the iteration is tested.
 pub(super) fn large_step(iterations: u32) -> SolverSpec {
     SolverSpec {
         time_step: 1.0 / 60.0,
         substeps: Substeps::Fixed(1),
         iterations,
         precision: Precision::F64,
-        kappa_limit: f64::INFINITY,
         ..SolverSpec::of(Method::GaussSeidel)
     }
 }

@@ -144,8 +144,10 @@ pub fn name(spec: &SolverSpec) -> String {
     if spec.method == Method::Chebyshev && spec.spectral_radius != defaults.spectral_radius {
         name += &format!(", spectral radius {}", spec.spectral_radius);
     }
-    if spec.tet_solve == TetSolve::Sequential {
-        name += ", sequential";
+    match spec.tet_solve {
+        TetSolve::Split => {}
+        TetSolve::Block => name += ", block",
+        TetSolve::Sequential => name += ", sequential",
     }
     if spec.clustering != defaults.clustering {
         name += &format!(", {}", spec.clustering);
