@@ -24,6 +24,8 @@ struct Change {
 
 // The trace of E beyond which the energy of shear is computed from it.
 const LARGE_STRAIN: f32 = 2.0;
+// How often a step that raises the energy of its tet is shortened.
+const SHORTENINGS: u32 = 3u;
 
 // The parts of the energy of the split form.
 struct Energies {
@@ -35,6 +37,8 @@ struct Energies {
     cofactor: Columns,
     // det F - 1.
     bulge: f32,
+    // Whether a step may raise the energy.
+    far: bool,
 }
 
 fn energies_of(f: Columns) -> Energies {
@@ -58,7 +62,8 @@ fn energies_of(f: Columns) -> Energies {
         cofactor = scaled(cofactor, scale);
         bulge *= scale;
     }
-    if steep || trace > LARGE_STRAIN {
+    let large = steep || trace > LARGE_STRAIN;
+    if large {
         shear = trace * settings.half - bulge + bulge * bulge * settings.half;
     }
     let pressure = bulge - settings.one;
@@ -67,7 +72,40 @@ fn energies_of(f: Columns) -> Energies {
         f.b + pressure * cofactor.b,
         f.c + pressure * cofactor.c,
     );
-    return Energies(shear, derivative, cofactor, bulge);
+    let far = large || (square < settings.one && square > 0.0);
+    return Energies(shear, derivative, cofactor, bulge, far);
+}
+
+// The energy of a tet over mu V.
+fn energy_of(tet: Tet, energies: Energies) -> f32 {
+    let lame = tet.ratio - settings.one;
+    return energies.shear + lame * settings.half * energies.bulge * energies.bulge;
+}
+
+// The part of a step that is taken where all of it would raise the energy of a tet that is far from rest; else 1.
+fn descent(tet: Tet, x: Corners, f: Columns, energies: Energies, change: Columns) -> f32 {
+    let push = (tet.ratio - settings.one) * energies.bulge;
+    let moved = deformation(tet, move_corners(tet, x, change));
+    let stress = Columns(
+        energies.derivative.a + push * energies.cofactor.a,
+        energies.derivative.b + push * energies.cofactor.b,
+        energies.derivative.c + push * energies.cofactor.c,
+    );
+    let way = Columns(moved.a - f.a, moved.b - f.b, moved.c - f.c);
+    let before = energy_of(tet, energies);
+    let slope = product(stress, way);
+    var fraction = settings.one;
+    for (var i = 0u; i < SHORTENINGS; i++) {
+        let after = Columns(f.a + way.a * fraction, f.b + way.b * fraction, f.c + way.c * fraction);
+        let rise = energy_of(tet, energies_of(after)) - before;
+        if rise <= 0.0 {
+            break;
+        }
+        let along = slope * fraction;
+        let shorter = -(along * settings.half) / (rise - along) * fraction;
+        fraction = select(0.0, shorter, shorter > 0.0);
+    }
+    return fraction;
 }
 
 // Moves the corners by a shear step of `shear_step` and by the volume constraint that sees this step. `factored` is A L for
@@ -75,6 +113,7 @@ fn energies_of(f: Columns) -> Energies {
 fn move_split(
     tet: Tet,
     x: Corners,
+    f: Columns,
     energies: Energies,
     factored: Columns,
     shear_step: f32,
@@ -95,11 +134,16 @@ fn move_split(
         return x;
     }
     (*multipliers).y += d;
-    let moved = Columns(
+    var moved = Columns(
         energies.derivative.a * along + energies.cofactor.a * d,
         energies.derivative.b * along + energies.cofactor.b * d,
         energies.derivative.c * along + energies.cofactor.c * d,
     );
+    if !ITERATED && energies.far {
+        let fraction = descent(tet, x, f, energies, moved);
+        moved = scaled(moved, fraction);
+        *multipliers *= fraction;
+    }
     return move_corners(tet, x, moved);
 }
 
@@ -125,7 +169,7 @@ fn solve_split(tet: Tet, x: Corners, f: Columns, multipliers: ptr<function, vec2
             (*multipliers).x += change;
         }
     }
-    return move_split(tet, x, energies, factored, shear_step, multipliers);
+    return move_split(tet, x, f, energies, factored, shear_step, multipliers);
 }
 
 // The split form with accumulating multipliers, for several iterations.
@@ -141,7 +185,7 @@ fn solve_split_iterated(tet: Tet, x: Corners, f: Columns, multipliers: ptr<funct
         d = 0.0;
     }
     (*multipliers).x += d * settings.relaxation;
-    return move_split(tet, x, energies, factored, d / constraint, multipliers);
+    return move_split(tet, x, f, energies, factored, d / constraint, multipliers);
 }
 
 // Prevents compilers from reordering the factors of a product. At rest the determinant of the block form is a difference

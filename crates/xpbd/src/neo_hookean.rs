@@ -7,6 +7,8 @@
 
 use glam::{DMat3, DVec3};
 
+#[cfg(test)]
+use crate::simd_kernel::SHORTENINGS;
 use crate::simd_kernel::{LARGE_STRAIN, MAX_COFACTOR_NORM};
 use crate::{Material, Real};
 
@@ -40,6 +42,9 @@ struct SplitEnergy<R: Real> {
     derivative: [R::Vector; 3],
     cofactor: [R::Vector; 3],
     bulge: R,
+    /// Whether a step may raise the energy.
+    #[cfg(test)]
+    far: bool,
 }
 
 impl<R: Real> TetConstraint<R> {
@@ -178,7 +183,8 @@ impl<R: Real> TetConstraint<R> {
             cofactor = cofactor.map(|column| column * scale);
             bulge *= scale;
         }
-        if is_steep || trace > R::from_f64(LARGE_STRAIN) {
+        let is_large = is_steep || trace > R::from_f64(LARGE_STRAIN);
+        if is_large {
             shear = trace * R::HALF - bulge + bulge * bulge * R::HALF;
         }
         let pressure = bulge - R::ONE;
@@ -191,6 +197,8 @@ impl<R: Real> TetConstraint<R> {
             ],
             cofactor,
             bulge,
+            #[cfg(test)]
+            far: is_large || (square < R::ONE && square > R::ZERO),
         }
     }
 
@@ -286,6 +294,37 @@ impl<R: Real> TetConstraint<R> {
         let lame = stiffness * (self.ratio - R::ONE);
         let m = weighted(&e.hydrostatic_gradients, &e.hydrostatic_gradients);
         [d1, -(lame * seen) * decay(lame * m)]
+    }
+
+    /// The energy of the split form over `μV`, and whether a step may raise it.
+    pub(crate) fn split_energy_and_far(&self, x: [R::Vector; 4]) -> (R, bool) {
+        let split = self.split_energy(x);
+        let volume = (self.ratio - R::ONE) * R::HALF * split.bulge * split.bulge;
+        (split.shear + volume, split.far)
+    }
+
+    /// The part of a step from `x` that the split form takes.
+    pub(crate) fn descent(&self, x: [R::Vector; 4], step: [R::Vector; 4]) -> R {
+        let (before, far) = self.split_energy_and_far(x);
+        let e = self.evaluate_split(x);
+        let gradients = (0..4).map(|k| {
+            let stress = e.deviatoric_gradients[k] * e.deviatoric
+                + e.hydrostatic_gradients[k] * (e.hydrostatic * (self.ratio - R::ONE));
+            R::dot(stress, step[k])
+        });
+        let slope = gradients.fold(R::ZERO, |sum, product| sum + product);
+        let mut part = R::ONE;
+        for _ in 0..SHORTENINGS {
+            let moved = [0, 1, 2, 3].map(|k| x[k] + step[k] * part);
+            let rise = self.split_energy_and_far(moved).0 - before;
+            if !far || rise <= R::ZERO {
+                break;
+            }
+            let along = slope * part;
+            let shorter = -(along * R::HALF) / (rise - along) * part;
+            part = if shorter > R::ZERO { shorter } else { R::ZERO };
+        }
+        part
     }
 }
 

@@ -11,7 +11,10 @@
 //! `1 / (1 + r)` is replaced by `f(r)`. Here `f(r) = (1 - e⁻ʳ) / r`, the exact decay over the substep: the implicit
 //! factor makes each tet too soft and the explicit one too stiff, by the same amount to first order, and a colored pass
 //! adds these errors up. With f their first order cancels, so sag at rest is off by kappa squared in place of kappa. As f
-//! is at most 1 and about `1 / ρ` beyond, a step never goes far beyond the linearized zero of `√U`. In a substep of
+//! is at most 1 and about `1 / ρ` beyond, a step never goes far beyond the linearized zero of `√U`. Far from rest that
+//! zero may be far away: `Ψ_D` has a saddle at F = 0.54, where its slope is 0 and its value is not, and the slope of the
+//! volume vanishes where a tet collapses to a line. There, and where a tet is strained by more than 0.8, a step that
+//! would raise the energy of its tet is shortened ([`Tets::descent`]). In a substep of
 //! several iterations both parts are XPBD constraints with multipliers (shear is `√(2 Ψ_D)`), since such steps must not
 //! be repeated. E, not F, enters `Ψ_D`: in single precision `|F|² - 3` loses all digits at a strain of 1e-4.
 //!
@@ -114,7 +117,7 @@ struct Volume<V> {
 }
 
 /// The parts of the energy of the split form, divided by μ where they are energies.
-struct Energies<V> {
+struct Energies<V, M> {
     /// `Ψ_D`.
     shear: V,
     /// Its derivative.
@@ -123,7 +126,14 @@ struct Energies<V> {
     cofactor: Matrix<V>,
     /// `det F - 1`.
     bulge: V,
+    /// Whether a step may raise the energy: strained beyond [`LARGE_STRAIN`] or flattened so far that the derivative of
+    /// det F is shorter than 1. Where that is 0, shear alone moves the corners, and not too far.
+    far: M,
 }
+
+/// [`Energies`] in lanes.
+type EnergiesOf<R, S> =
+    Energies<<R as Real>::Lanes<S>, <<R as Real>::Lanes<S> as SimdBase<S>>::Mask>;
 
 /// The norm of the derivative of det F, √3 at rest, up to which tets follow their material exactly: that of a tet
 /// stretched two and a half times along each axis, or fifty times along one at constant volume. Beyond it derivative and
@@ -133,6 +143,16 @@ pub(crate) const MAX_COFACTOR_NORM: f64 = 10.0;
 /// The trace of E beyond which `Ψ_D` is computed as `tr E / 2 - (J - 1) + (J - 1)² / 2`. Near rest that loses all digits, and
 /// far from it the form without `tr E` does, in which terms of sixth degree cancel.
 pub(crate) const LARGE_STRAIN: f64 = 2.0;
+
+/// The corners of tets with their inverse masses, and a change of them per weight.
+struct Step<R: Real, S: Simd> {
+    x: [[R::Lanes<S>; 4]; 4],
+    change: Matrix<R::Lanes<S>>,
+}
+
+/// How often a step that raises the energy of its tet is shortened. Of two million random tets three left one whose
+/// energy rose, by a part of 3e-5.
+pub(crate) const SHORTENINGS: u32 = 3;
 
 /// The tets of one block.
 struct Tets<'a, R: Real, S: Simd> {
@@ -172,7 +192,7 @@ fn solve_block<R: Real, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize, form
             let change = if pass.iterated {
                 tets.split_iterated(&f, &mut multipliers)
             } else {
-                tets.split(&f, keeps, &mut multipliers)
+                tets.split(&x, &q, keeps, &mut multipliers)
             };
             move_corners::<R, S>(&mut x, &change, &q);
         }
@@ -359,7 +379,7 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
     /// Beyond [`MAX_COFACTOR_NORM`] the volume terms of *both* parts are scaled down. Scaled in one of them alone the two
     /// no longer cancel, and torn slivers throw their corners.
     #[inline(always)]
-    fn energies(&self, f: &Matrix<R::Lanes<S>>) -> Energies<R::Lanes<S>> {
+    fn energies(&self, f: &Matrix<R::Lanes<S>>) -> EnergiesOf<R, S> {
         let (one, half) = (self.splat(R::ONE), self.splat(R::HALF));
         let [a, b, c] = f;
         let mut cofactor = cofactor::<R, S>(f);
@@ -387,6 +407,9 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
             let direct = trace * half - bulge + bulge * bulge * half;
             shear = large.select(direct, shear);
         }
+        // Lanes without a tet have F = 0.
+        let zero = self.splat(R::ZERO);
+        let far = large | (square.simd_lt(one) & square.simd_gt(zero));
         let pressure = bulge - one;
         let mut derivative = *f;
         for j in 0..3 {
@@ -399,7 +422,67 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
             derivative,
             cofactor,
             bulge,
+            far,
         }
+    }
+
+    /// The part of a step that is taken where all of it would raise the energy of a tet that is far from rest, else 1: that
+    /// of the minimum of the parabola through the energy and its slope before the step and the energy after it, and so on
+    /// up to [`SHORTENINGS`] times while the energy still rises.
+    ///
+    /// Compiled once and called with copies, so that the loop over tets near rest keeps its registers.
+    #[cold]
+    #[inline(never)]
+    fn descent(&self, step: &Step<R, S>) -> R::Lanes<S> {
+        self.simd.vectorize(
+            #[inline(always)]
+            || self.descent_in_lanes(step),
+        )
+    }
+
+    #[inline(always)]
+    fn descent_in_lanes(&self, step: &Step<R, S>) -> R::Lanes<S> {
+        let Step { x, change } = step;
+        let (one, zero) = (self.splat(R::ONE), self.splat(R::ZERO));
+        let half = self.splat(R::HALF);
+        let lame = self.ratio - one;
+        let q = &self.gradients();
+        let f = deformation::<R, S>(x, q);
+        let energies = self.energies(&f);
+        let energy = |e: &EnergiesOf<R, S>| e.shear + lame * half * e.bulge * e.bulge;
+        let push = lame * energies.bulge;
+        let mut moved = *x;
+        move_corners::<R, S>(&mut moved, change, q);
+        let moved = deformation::<R, S>(&moved, q);
+        let (mut stress, mut way) = (f, f);
+        for j in 0..3 {
+            for axis in 0..3 {
+                stress[j][axis] = energies.derivative[j][axis] + push * energies.cofactor[j][axis];
+                way[j][axis] = moved[j][axis] - f[j][axis];
+            }
+        }
+        let before = energy(&energies);
+        let slope = product::<R, S>(&stress, &way);
+        let mut part = one;
+        for _ in 0..SHORTENINGS {
+            let mut after = f;
+            for j in 0..3 {
+                for axis in 0..3 {
+                    after[j][axis] = f[j][axis] + way[j][axis] * part;
+                }
+            }
+            let rise = energy(&self.energies(&after)) - before;
+            // A rise that is no number counts as one, and leaves no part.
+            let rises = energies.far & !rise.simd_le(zero);
+            if !rises.any_true() {
+                break;
+            }
+            let along = slope * part;
+            let shorter = -(along * half) / (rise - along) * part;
+            let shorter = shorter.simd_gt(zero).select(shorter, zero);
+            part = rises.select(shorter, part);
+        }
+        part
     }
 
     /// The change of the corners per weight by a shear step of `along` and the volume constraint that sees it, and that
@@ -407,7 +490,7 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
     #[inline(always)]
     fn split_change(
         &self,
-        energies: &Energies<R::Lanes<S>>,
+        energies: &EnergiesOf<R, S>,
         factored: &Matrix<R::Lanes<S>>,
         along: R::Lanes<S>,
         iterated: bool,
@@ -450,15 +533,18 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
         (six + r) / (six + r * (four + r))
     }
 
-    /// The change of the corners per weight by the split form in a single iteration. `keeps` asks for multipliers.
+    /// The change of the corners per weight by the split form in a single iteration. `keeps` asks for multipliers, which
+    /// are those of this iteration.
     #[inline(always)]
     fn split(
         &self,
-        f: &Matrix<R::Lanes<S>>,
+        x: &[[R::Lanes<S>; 4]; 4],
+        q: &Matrix<R::Lanes<S>>,
         keeps: bool,
         multipliers: &mut [R::Lanes<S>; 2],
     ) -> Matrix<R::Lanes<S>> {
         let zero = self.splat(R::ZERO);
+        let f = &deformation::<R, S>(x, q);
         let energies = self.energies(f);
         let twice = energies.shear + energies.shear;
         let factored = self.times_factor(&energies.derivative);
@@ -471,7 +557,17 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
             let multiplier = along * root * self.relaxation;
             multipliers[0] += multiplier.is_finite().select(multiplier, zero);
         }
-        self.split_change(&energies, &factored, along, false, &mut multipliers[1])
+        let mut change = self.split_change(&energies, &factored, along, false, &mut multipliers[1]);
+        if energies.far.any_true() {
+            let part = self.descent(&Step { x: *x, change });
+            for entry in change.as_flattened_mut() {
+                *entry *= part;
+            }
+            for multiplier in multipliers {
+                *multiplier *= part;
+            }
+        }
+        change
     }
 
     /// The change of the corners per weight by an iteration of the split form with accumulating multipliers.

@@ -83,10 +83,24 @@ pub(crate) struct LoadRow {
     pub(super) most_inverted: usize,
     pub(super) inverted: usize,
     pub(super) softened: usize,
+    /// The largest kinetic energy of the last 50 frames as a fraction of what gravity has released.
+    pub(super) kinetic_at_end: f64,
     /// The speed in m/s of a fall from the top of the body to the ground.
     pub(super) fall: f64,
-    pub(super) is_bounded: bool,
+    pub(super) is_failure: bool,
     pub(super) warned: Warned,
+}
+
+impl LoadRow {
+    /// Whether the body has less energy of motion than its fall gave it.
+    pub(super) fn is_bounded(&self) -> bool {
+        !self.is_failure && self.kinetic_at_end < 1.0
+    }
+
+    /// Whether also its fastest particle is slower than ten falls, and at the end than three.
+    pub(super) fn is_slow(&self) -> bool {
+        self.fastest < 10.0 * self.fall && self.fastest_at_end < 3.0 * self.fall
+    }
 }
 
 /// A free body at rest after 30 strokes.
@@ -196,6 +210,7 @@ pub(super) fn load(
         height: low.z * scene.body[0].scale - strokes.drop(),
         friction: 0.5,
     });
+    scene.report.quantities.push(Quantity::Energy);
     scene.solver.time_step = 0.01;
     scene.solver.substeps = substeps.into();
     let mut simulation = Simulation::with_threads(&scene, 1)?;
@@ -213,11 +228,12 @@ pub(super) fn load(
         most_inverted: 0,
         inverted: 0,
         softened: 0,
+        kinetic_at_end: 0.0,
         fall: (2.0 * 9.81 * height).sqrt(),
-        is_bounded: false,
+        is_failure: false,
         warned: Warned::new(),
     };
-    let mut is_failure = false;
+    let (mut highest, mut released) = (None, 0.0);
     for frame in 0..frames {
         if frame < count {
             let stroke = random_stroke(&simulation, &mut random, snap);
@@ -225,7 +241,7 @@ pub(super) fn load(
         }
         let report = simulation.step()?;
         warnings(report, &mut row.warned);
-        is_failure |= report.warnings().iter().any(incise::Warning::is_failure);
+        row.is_failure |= report.warnings().iter().any(incise::Warning::is_failure);
         let speed = report.max_speed.context("no speed was reported")?;
         let speed = if speed.is_finite() { speed } else { f64::MAX };
         row.fastest = row.fastest.max(speed);
@@ -238,9 +254,14 @@ pub(super) fn load(
         let softened = report.softened.map_or(0, |softened| softened.tets);
         row.softened = row.softened.max(softened);
         row.tets = report.tets;
+        let energy = report.energy.context("no energy was reported")?;
+        let highest = *highest.get_or_insert(energy.gravity);
+        released = f64::max(released, highest - energy.gravity);
+        if frame + 50 >= frames {
+            let kinetic = (energy.kinetic / released).min(f64::MAX);
+            row.kinetic_at_end = row.kinetic_at_end.max(kinetic);
+        }
     }
-    row.is_bounded =
-        !is_failure && row.fastest < 10.0 * row.fall && row.fastest_at_end < 3.0 * row.fall;
     Ok(row)
 }
 

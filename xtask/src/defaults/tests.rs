@@ -40,7 +40,7 @@ fn the_quick_form_holds_its_bars() {
             }
             Row::Load(rows) => {
                 for row in rows {
-                    assert!(row.is_bounded && row.softened == 0, "{row:?}");
+                    assert!(row.is_bounded() && row.softened == 0, "{row:?}");
                 }
             }
             Row::Rest(rows) => {

@@ -25,6 +25,7 @@ pub(super) fn settings(substeps: u32, gpu: bool) -> Settings {
         time_step: 1.0 / 60.0,
         substeps: Substeps::Fixed((substeps * eighths).div_ceil(8)),
         iterations,
+        precision: Precision::F32,
         ..SolverSpec::of(method)
     };
     let xpbd = |eighths, iterations| of(Method::GaussSeidel, eighths, iterations);

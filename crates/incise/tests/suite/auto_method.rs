@@ -157,6 +157,21 @@ fn bodies_have_their_own_methods() {
     assert_eq!(methods(&simulation), both);
 }
 
+/// A body that moves over many frames stays with substeps where those nearly reach the accuracy: a step of VBD a frame
+/// would be less accurate.
+#[test]
+fn bodies_that_move_slowly_keep_their_substeps() {
+    let mut simulation = simulation(&beam("1e4", "accuracy = 0.01\nmax_substeps = 40"));
+    let report = simulation.step().unwrap();
+    let body = &report.bodies[0];
+    let choice = body.choice.unwrap();
+    assert_eq!(choice.missed, Some(Missed::Cap));
+    assert!(choice.expected_error > 0.01 && choice.expected_error < 0.1);
+    assert_eq!(body.method.unwrap(), ChosenMethod::GaussSeidel);
+    let codes: Vec<_> = report.warnings().iter().map(|w| w.code).collect();
+    assert!(codes.contains(&WarningCode::SubstepsCapped), "{codes:?}");
+}
+
 /// A generous budget buys what more accuracy takes, a stated accuracy takes no more than it needs, and a budget for less
 /// than one substep leaves one and says so. Times differ from machine to machine, so nothing else is asserted of them.
 #[test]
