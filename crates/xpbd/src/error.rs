@@ -26,16 +26,6 @@ pub enum XpbdError {
         /// The range it must lie in.
         range: &'static str,
     },
-    /// A direct solve left double precision.
-    #[cfg(feature = "direct")]
-    #[error("the constraints are too stiff for a direct solve: use a smaller substep")]
-    Factorization,
-    /// Constraints of a kind that the method does not know.
-    #[error("this method knows no {kind}: use XPBD")]
-    Unknown {
-        /// The kind.
-        kind: &'static str,
-    },
     /// A value of a distance or volume constraint outside its range.
     #[error("{what} of constraint {index} is {value}: it must be {range}")]
     Constraint {

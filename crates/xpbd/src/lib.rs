@@ -45,8 +45,6 @@ mod copy;
 mod crew;
 mod damping;
 mod device;
-#[cfg(feature = "direct")]
-mod direct;
 mod direction;
 mod distance;
 mod error;

@@ -32,7 +32,7 @@ pub(crate) struct Evaluation<R: Real> {
     pub(crate) deviatoric_gradients: [R::Vector; 4],
     pub(crate) hydrostatic_gradients: [R::Vector; 4],
     /// The square of the norm of the derivative of det F; what only measures has no use for it.
-    #[cfg(any(test, feature = "direct"))]
+    #[cfg(test)]
     slope_squared: R,
 }
 
@@ -133,7 +133,7 @@ impl<R: Real> TetConstraint<R> {
             hydrostatic: R::dot(f1, cofactor[0]) - self.gamma,
             deviatoric_gradients: self.gradients([f1 * scale, f2 * scale, f3 * scale]),
             hydrostatic_gradients: self.gradients(cofactor),
-            #[cfg(any(test, feature = "direct"))]
+            #[cfg(test)]
             slope_squared: cofactor.iter().fold(R::ZERO, |sum, &c| sum + R::dot(c, c)),
         }
     }
@@ -158,7 +158,7 @@ impl<R: Real> TetConstraint<R> {
             hydrostatic: split.bulge,
             deviatoric_gradients: self.gradients(split.derivative.map(|column| column * scale)),
             hydrostatic_gradients: self.gradients(split.cofactor),
-            #[cfg(any(test, feature = "direct"))]
+            #[cfg(test)]
             slope_squared: R::ZERO,
         }
     }
@@ -214,7 +214,7 @@ impl<R: Real> TetConstraint<R> {
     }
 }
 
-#[cfg(any(test, feature = "direct"))]
+#[cfg(test)]
 impl<R: Real> Evaluation<R> {
     /// What solvers scale the hydrostatic constraint by: 1, or less where det F has a slope beyond [`MAX_COFACTOR_NORM`].
     pub(crate) fn hydrostatic_scale(&self) -> R {

@@ -12,9 +12,14 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use fearless_simd::{Level, Simd, SimdFloat, SimdFloatElement};
 use glam::{DVec3, Vec3};
 
-use crate::TetSolve;
+use incise_graph::Schedule;
+
 use crate::gauss_seidel;
 use crate::simd_kernel::Pass;
+use crate::{
+    CoarseCorrection, Solver, StepReport, StepSettings, TetSolve, VbdReport, VbdSettings,
+    VertexStars, XpbdError,
+};
 
 /// A scalar that the solver can compute with: `f32` or `f64`.
 pub trait Real:
@@ -89,8 +94,32 @@ pub trait Real:
     /// Puts values into a particle's cell.
     fn write(particle: &Self::Particle, values: [Self; 4]);
 
-    /// Makes a pass over tets. Here and not where it is called, so that it is compiled once for each precision, not
-    /// in every crate that steps a solver.
+    // What follows are the large algorithms of a solver. Called through this trait they are compiled once for each
+    // precision, with this crate; called directly they would be compiled again in every crate that steps a solver.
+
+    /// Advances a solver by one frame of XPBD.
+    #[doc(hidden)]
+    fn step(
+        solver: &mut Solver<Self>,
+        schedule: &Schedule,
+        settings: &StepSettings,
+        keep_residuals: bool,
+    ) -> Result<StepReport, XpbdError>;
+
+    /// Advances a solver by one frame of vertex block descent.
+    #[doc(hidden)]
+    fn step_vbd(
+        solver: &mut Solver<Self>,
+        stars: &mut VertexStars<Self>,
+        correction: Option<&mut CoarseCorrection<Self>>,
+        settings: &VbdSettings,
+    ) -> Result<VbdReport, XpbdError>;
+
+    /// Updates the layout of a solver.
+    #[doc(hidden)]
+    fn lay_out(solver: &mut Solver<Self>, schedule: &Schedule);
+
+    /// Makes a pass over tets.
     #[doc(hidden)]
     fn solve_tets(level: Level, form: TetSolve, pass: &Pass<'_, Self>);
 
@@ -171,6 +200,31 @@ macro_rules! real {
             #[inline]
             fn store(self, cell: &$atomic) {
                 cell.store(self.to_bits(), Ordering::Relaxed);
+            }
+            #[inline(never)]
+            fn step(
+                solver: &mut Solver<Self>,
+                schedule: &Schedule,
+                settings: &StepSettings,
+                keep_residuals: bool,
+            ) -> Result<StepReport, XpbdError> {
+                solver.frame(schedule, settings, keep_residuals)
+            }
+            #[inline(never)]
+            fn step_vbd(
+                solver: &mut Solver<Self>,
+                stars: &mut VertexStars<Self>,
+                correction: Option<&mut CoarseCorrection<Self>>,
+                settings: &VbdSettings,
+            ) -> Result<VbdReport, XpbdError> {
+                match correction {
+                    None => solver.frame_of_sweeps(stars, settings),
+                    Some(correction) => solver.frame_of_corrections(stars, correction, settings),
+                }
+            }
+            #[inline(never)]
+            fn lay_out(solver: &mut Solver<Self>, schedule: &Schedule) {
+                solver.bring_up_layout(schedule);
             }
             #[inline(never)]
             fn solve_tets(level: Level, form: TetSolve, pass: &Pass<'_, Self>) {

@@ -415,22 +415,6 @@ impl<R: Real> Solver<R> {
         weight != before
     }
 
-    /// For methods that solve nothing but tets and what is held rigidly.
-    #[cfg(feature = "direct")]
-    pub(crate) fn refuse_soft_constraints(&self) -> Result<(), XpbdError> {
-        let unknown = |kind| Err(XpbdError::Unknown { kind });
-        if self.distances.is_some() {
-            return unknown("distance constraints");
-        }
-        if self.volume_constraints.is_some() {
-            return unknown("volume constraints");
-        }
-        if self.attachments.is_soft() {
-            return unknown("attachments with compliance");
-        }
-        Ok(())
-    }
-
     /// Whether a particle is fixed.
     ///
     /// # Panics

@@ -72,7 +72,7 @@ impl<R: Real> Solver<R> {
         schedule: &Schedule,
         settings: &StepSettings,
     ) -> Result<StepReport, XpbdError> {
-        self.frame(schedule, settings, false)
+        R::step(self, schedule, settings, false)
     }
 
     /// The same, keeping what [`Solver::residuals`] needs from the last substep.
@@ -87,10 +87,10 @@ impl<R: Real> Solver<R> {
         schedule: &Schedule,
         settings: &StepSettings,
     ) -> Result<StepReport, XpbdError> {
-        self.frame(schedule, settings, true)
+        R::step(self, schedule, settings, true)
     }
 
-    fn frame(
+    pub(crate) fn frame(
         &mut self,
         schedule: &Schedule,
         settings: &StepSettings,
@@ -216,9 +216,12 @@ impl<R: Real> Solver<R> {
     /// # Panics
     /// If the schedule names a tet that does not exist.
     pub fn lay_out(&mut self, schedule: &Schedule) {
-        if self.layout.fits(schedule) {
-            return;
+        if !self.layout.fits(schedule) {
+            R::lay_out(self, schedule);
         }
+    }
+
+    pub(crate) fn bring_up_layout(&mut self, schedule: &Schedule) {
         let mut layout = std::mem::take(&mut self.layout);
         self.bring_up(&mut layout, schedule);
         self.layout = layout;

@@ -52,6 +52,15 @@ struct Done<R> {
 impl<R: Serialize + DeserializeOwned> Experiment<R> {
     /// Measures the cells that are not there yet, and writes the page unless this is one shard of several.
     pub(crate) fn run(self, arguments: &ExperimentArguments) -> anyhow::Result<()> {
+        self.run_and_check(arguments, |_| Ok(()))
+    }
+
+    /// Measures like [`Experiment::run`]; the quick form then fails where `check` finds rows that must not occur.
+    pub(crate) fn run_and_check(
+        self,
+        arguments: &ExperimentArguments,
+        check: impl Fn(&[R]) -> anyhow::Result<()>,
+    ) -> anyhow::Result<()> {
         let folder = arguments.out.join("cells").join(self.name);
         fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
         arguments.agree_with(&folder.join("setup.json"))?;
@@ -78,7 +87,11 @@ impl<R: Serialize + DeserializeOwned> Experiment<R> {
         machines.dedup();
         let rows: Vec<R> = done.into_iter().map(|d| d.row).collect();
         let page = (self.page)(&rows)?;
-        write::write(&arguments.out, self.name, &page, &machines, &rows)
+        write::write(&arguments.out, self.name, &page, &machines, &rows)?;
+        if arguments.quick {
+            check(&rows)?;
+        }
+        Ok(())
     }
 }
 

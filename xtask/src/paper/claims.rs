@@ -3,7 +3,7 @@
 //! Cells of the tables that are there are taken, missing ones measured. The rules are about the paper's methods as they are
 //! here, on a processor.
 
-mod rules;
+pub(super) mod rules;
 
 use std::fs;
 
@@ -53,7 +53,7 @@ impl Verdict {
 
 /// A claim with what was found.
 pub(super) struct Claim {
-    claim: &'static str,
+    pub(super) claim: &'static str,
     rule: &'static str,
     pub(super) verdict: Verdict,
     measured: String,

@@ -7,6 +7,7 @@ use incise::graph::Clustering;
 use serde::de::DeserializeOwned;
 
 use super::body::{Body, incidence};
+use super::claims::{Evidence, Verdict};
 use super::colorings::{ALGORITHMS, Problem, occupied};
 use super::convergence::{PaperMethod, Setup, TIME_STEP, Trial, norm};
 use super::{What, printed, run};
@@ -95,8 +96,9 @@ fn table_1_has_the_papers_rows() {
     }
 }
 
+/// Table 2 and figure 4, and the claims that are decided from them.
 #[test]
-fn table_2_has_the_papers_rows_in_all_readings() {
+fn table_2_and_figure_4_have_the_papers_rows() {
     let folder = Folder::new("table2");
     run(What::Table2, &folder.0).unwrap();
     let page = folder.page("paper-table2");
@@ -140,36 +142,34 @@ fn table_2_has_the_papers_rows_in_all_readings() {
         assert!(of_body[2].tets > of_body[1].tets);
         assert!(of_body[2].clusters > of_body[1].clusters);
     }
+    run(What::Fig4, &folder.0).unwrap();
+    let fig4 = folder.page("paper-fig4");
+    for (name, tets) in printed::FIGURE_4 {
+        assert_eq!(cells(&fig4, &[name, &tets.to_string()]).len(), 2);
+    }
+    let mut evidence: Vec<Evidence> = rows.into_iter().map(Evidence::Table2).collect();
+    evidence.extend(folder.rows("paper-fig4").into_iter().map(Evidence::Fig4));
+    let claims = super::claims::rules::claims(&evidence);
+    let verdict = |wanted: &str| {
+        let found = claims.iter().find(|claim| claim.claim == wanted);
+        found.unwrap_or_else(|| panic!("{wanted}")).verdict
+    };
+    for claim in [
+        "SCGC has the fewest colors (5.1)",
+        "SCGC and ECL-GC find the same colors and distribution (Table 2)",
+        "clustering lowers the number of colors (5.1)",
+    ] {
+        verdict(claim);
+    }
+    // The same colors are a theorem, on whatever mesh.
+    let same = "SCGC and ECL-GC find the same colors and distribution (Table 2)";
+    assert_eq!(verdict(same), Verdict::Confirmed);
 }
 
 #[test]
-fn figure_9_is_pictured() {
-    let folder = Folder::new("fig9");
-    run(What::Fig9, &folder.0).unwrap();
-    let page = folder.page("paper-fig9");
-    for paper in &printed::FIGURE_9 {
-        for (algorithm, colors) in printed::FIGURE_9_ALGORITHMS.iter().zip(paper.colors) {
-            let rows = cells(&page, &[paper.body, "serial:10", algorithm]);
-            let [row] = &rows[..] else { panic!("{rows:?}") };
-            assert_eq!(row[10], colors.to_string());
-            assert!(
-                [5, 8, 12].iter().all(|&place| is_ratio(row, place)),
-                "{row:?}"
-            );
-        }
-    }
-    let drawings = printed::FIGURE_9.len() * printed::FIGURE_9_ALGORITHMS.len();
-    for i in 1..=drawings {
-        let svg = std::fs::read_to_string(folder.0.out.join(format!("paper-fig9-{i}.svg")));
-        assert!(svg.unwrap().matches("<path").count() > 100);
-    }
-}
-
-/// All in one, and again without measuring anything.
-#[test]
-fn everything_is_made_and_claims_take_what_is_there() {
-    let folder = Folder::new("all");
-    run(What::All, &folder.0).unwrap();
+fn table_3_has_the_papers_rows() {
+    let folder = Folder::new("table3");
+    run(What::Table3, &folder.0).unwrap();
     let table3 = folder.page("paper-table3");
     for paper in &printed::TABLE_3 {
         let rows = cells(&table3, &[]);
@@ -180,31 +180,6 @@ fn everything_is_made_and_claims_take_what_is_there() {
             Setup::ALL.len()
         );
     }
-    let fig4 = folder.page("paper-fig4");
-    for (name, tets) in printed::FIGURE_4 {
-        assert_eq!(cells(&fig4, &[name, &tets.to_string()]).len(), 2);
-    }
-    let claims = folder.page("paper-claims");
-    for claim in [
-        "SCGC has the fewest colors (5.1)",
-        "SCGC and ECL-GC find the same colors and distribution (Table 2)",
-        "clustering lowers the number of colors (5.1)",
-    ] {
-        let rows = cells(&claims, &[claim]);
-        assert_eq!(rows.len(), 1, "{claim}");
-    }
-    // The same colors are a theorem, on whatever mesh.
-    let same = "SCGC and ECL-GC find the same colors and distribution (Table 2)";
-    assert_eq!(cells(&claims, &[same])[0][1], "confirmed");
-    for name in ["fig6", "fig7", "fig8", "fig10", "fig11"] {
-        let page = folder.page(&format!("paper-{name}"));
-        assert!(!page.contains("NaN"), "{page}");
-    }
-    // From the cells alone, the page is the same.
-    std::fs::remove_dir_all(folder.0.out.join("meshes")).unwrap();
-    crate::named("paper-claims").unwrap()(&folder.0).unwrap();
-    assert_eq!(folder.page("paper-claims"), claims);
-    assert!(!folder.0.out.join("meshes").exists());
 }
 
 /// The force whose spectrum is drawn is the one whose norm the solver reports.

@@ -18,17 +18,38 @@ use std::cell::OnceCell;
 use std::rc::Rc;
 use std::sync::Arc;
 
+use anyhow::ensure;
 use incise::gpu::{GpuContext, GpuOptions};
 use rayon::prelude::*;
 
 use crate::experiment::{Backend, Cell, Experiment, ExperimentArguments};
 use cuts::Cut;
 use methods::Column;
-use outcome::Row;
+use outcome::{Row, Verdict};
 
 /// The columns of a row are measured side by side, since nothing is timed.
 pub(crate) fn stability(arguments: &ExperimentArguments) -> anyhow::Result<()> {
-    experiment(arguments.quick, arguments.backend)?.run(arguments)
+    experiment(arguments.quick, arguments.backend)?.run_and_check(arguments, check)
+}
+
+/// What holds of every cell whatever its verdict: finite, explained where it is not green, momentum kept by constraints.
+///
+/// # Errors
+/// On the first outcome of which it does not hold.
+fn check(rows: &[Row]) -> anyhow::Result<()> {
+    for row in rows {
+        for outcome in &row.outcomes {
+            ensure!(outcome.not_finite.is_none(), "{}: {outcome:?}", row.id);
+            let is_fine = outcome.verdict(row.is_state) == Verdict::Fine;
+            let is_explained = is_fine || explain::explain(row, outcome).is_some();
+            ensure!(is_explained, "no explanation: {}: {outcome:?}", row.id);
+            // Constraints keep momentum but for rounding, measured: 1e-5. VBD keeps it as far as it converges.
+            let drift = outcome.momentum_drift.unwrap_or(0.0);
+            let is_kept = !outcome.column.method.is_xpbd() || drift < 1e-3;
+            ensure!(is_kept, "momentum: {}: {outcome:?}", row.id);
+        }
+    }
+    Ok(())
 }
 
 /// A device that is opened by the first cell that needs it.

@@ -1,4 +1,4 @@
-//! The quick matrix, all of it: what must hold of every cell, whatever the numbers.
+//! Some rows of the quick matrix: what must hold of every cell, whatever the numbers.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -7,34 +7,32 @@ use incise::gpu::{GpuContext, GpuOptions};
 
 use super::methods::{Column, Method, Precision};
 use super::outcome::{Outcome, Row, Verdict};
-use super::{experiment, explain, extremes, page, picture, run};
+use super::{experiment, extremes, page, picture, run};
 use crate::experiment::{Backend, Part};
 
-fn quick() -> Vec<Row> {
+/// Rows of each kind; `.ci/run` measures all rows of the quick form and checks them.
+fn some_rows() -> Vec<Row> {
     let experiment = experiment(true, Backend::Cpu).unwrap();
     let ids: BTreeSet<&str> = experiment.cells.iter().map(|c| c.id.as_str()).collect();
     assert_eq!(ids.len(), experiment.cells.len());
+    let wanted = ["plane-free", "young-1e12", "mass-1e3", "cut-at-rest-1"];
     let cells = experiment.cells.iter();
-    cells.map(|cell| (cell.measure)().unwrap()).collect()
+    let cells = cells.filter(|cell| wanted.contains(&cell.id.as_str()));
+    let rows: Vec<Row> = cells.map(|cell| (cell.measure)().unwrap()).collect();
+    assert_eq!(rows.len(), wanted.len());
+    rows
 }
 
 #[test]
-fn the_quick_matrix_is_finite_explained_and_shown() {
-    let rows = quick();
+fn rows_are_finite_explained_and_shown() {
+    let rows = some_rows();
+    super::check(&rows).unwrap();
     for row in &rows {
         assert_eq!(row.outcomes.len(), 2 * Method::ALL.len(), "{}", row.id);
-        for outcome in &row.outcomes {
-            assert_eq!(outcome.not_finite, None, "{}: {outcome:?}", row.id);
-            if outcome.verdict(row.is_state) != Verdict::Fine {
-                let explained = explain::explain(row, outcome).is_some();
-                assert!(explained, "no explanation: {}: {outcome:?}", row.id);
-            }
-            // Constraints keep momentum but for rounding, measured: 1e-5. VBD keeps it as far as it converges.
-            let drift = outcome.momentum_drift.unwrap_or(0.0);
-            let xpbd = outcome.column.method.is_xpbd();
-            assert!(!xpbd || drift < 1e-3, "{}: {outcome:?}", row.id);
-        }
     }
+    let mut infinite = rows[0].clone();
+    infinite.outcomes[3].not_finite = Some(2);
+    super::check(&[infinite]).unwrap_err();
     // Numbers come back to the last digit but one; what is said of them is the same.
     let written = serde_json::to_string(&rows).unwrap();
     let again: Vec<Row> = serde_json::from_str(&written).unwrap();

@@ -232,6 +232,16 @@ impl<R: Real> Solver<R> {
         settings: &VbdSettings,
     ) -> Result<VbdReport, XpbdError> {
         let _span = tracing::debug_span!("xpbd::step_vbd_two_level").entered();
+        R::step_vbd(self, stars, Some(correction), settings)
+    }
+
+    /// A frame of sweeps, each with a correction.
+    pub(crate) fn frame_of_corrections(
+        &mut self,
+        stars: &mut VertexStars<R>,
+        correction: &mut CoarseCorrection<R>,
+        settings: &VbdSettings,
+    ) -> Result<VbdReport, XpbdError> {
         let (mut idle, accuracy) = (0, settings.accuracy);
         self.frame_of_vbd(stars, settings, CORRECTION_PENALTY, |step| {
             step.sweep();

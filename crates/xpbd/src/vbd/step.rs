@@ -75,6 +75,15 @@ impl<R: Real> Solver<R> {
         settings: &VbdSettings,
     ) -> Result<VbdReport, XpbdError> {
         let _span = tracing::debug_span!("xpbd::step_vbd").entered();
+        R::step_vbd(self, stars, None, settings)
+    }
+
+    /// A frame of sweeps alone.
+    pub(crate) fn frame_of_sweeps(
+        &mut self,
+        stars: &mut VertexStars<R>,
+        settings: &VbdSettings,
+    ) -> Result<VbdReport, XpbdError> {
         self.frame_of_vbd(stars, settings, SWEEP_PENALTY, |step| {
             step.sweep();
             true

@@ -92,8 +92,7 @@ fn an_affine_stretch_leaves_no_force_inside() {
 }
 
 /// Measured in edges of the cube: 5.8e-3 kappa, in both precisions. So 1e-4 is met at kappa 0.01; no substep a test can
-/// afford meets 1e-8 (that of the direct solve, which has no order, does), but the
-/// straight line through two comes within 1e-7.
+/// afford meets 1e-8, but the straight line through two comes within 1e-7.
 #[test]
 fn a_patch_comes_to_rest_where_it_should() {
     let [coarse, fine] = [0.02, 0.01].map(deviations::<f64>);

@@ -16,8 +16,6 @@ mod convergence;
 mod copies;
 mod damping;
 mod determinism;
-#[cfg(feature = "direct")]
-mod direct;
 mod distances;
 mod edits;
 mod energy;

@@ -7,7 +7,7 @@ use super::super::{fig4, fig8, table1, table2};
 use super::{Claim, Evidence, Verdict};
 
 /// All claims, in the order of the paper.
-pub(super) fn claims(rows: &[Evidence]) -> Vec<Claim> {
+pub(in crate::paper) fn claims(rows: &[Evidence]) -> Vec<Claim> {
     let mut all = colorings(rows);
     all.extend(clusterings(rows));
     all.extend(convergence(rows));
