@@ -22,19 +22,26 @@ pub(crate) struct Body {
 }
 
 impl Body {
-    /// The bodies of a scene.
-    pub(crate) fn all(scene: &Scene) -> Result<Vec<Self>, Error> {
+    /// The bodies of a scene, whose meshes are in memory or named by the scene.
+    pub(crate) fn all(scene: &Scene, meshes: &[Option<TetMesh>]) -> Result<Vec<Self>, Error> {
         if scene.body.is_empty() {
             return Err(value("body", "missing", "at least one [[body]]"));
         }
-        let bodies = scene.body.iter().enumerate();
+        let bodies = scene.body.iter().zip(meshes).enumerate();
         bodies
-            .map(|(i, spec)| Self::new(&format!("body[{i}]"), spec, scene.solver.substeps))
+            .map(|(i, (spec, mesh))| {
+                Self::new(&format!("body[{i}]"), spec, mesh, scene.solver.substeps)
+            })
             .collect()
     }
 
     /// The body of a spec; `substeps` are those of a body that does not name its own.
-    fn new(field: &str, spec: &BodySpec, substeps: Substeps) -> Result<Self, Error> {
+    fn new(
+        field: &str,
+        spec: &BodySpec,
+        mesh: &Option<TetMesh>,
+        substeps: Substeps,
+    ) -> Result<Self, Error> {
         let material = Material {
             young_modulus: spec.young_modulus,
             poisson_ratio: spec.poisson_ratio,
@@ -62,7 +69,7 @@ impl Body {
             .map(|c| within(&format!("{field}.volume_compliance"), c, 0.0, 1e9))
             .transpose()?;
         let position = coordinates(&format!("{field}.position"), spec.position)?;
-        let mut mesh = load(field, spec)?;
+        let mut mesh = load(field, spec, mesh.as_ref())?;
         for x in &mut mesh.positions {
             *x = *x * spec.scale + position;
             if x.abs().max_element() > LARGEST_COORDINATE {
@@ -90,16 +97,19 @@ impl Body {
     }
 }
 
-/// The body's mesh, sound.
-fn load(field: &str, spec: &BodySpec) -> Result<TetMesh, Error> {
-    let (key, mesh) = match (&spec.mesh, &spec.shape) {
-        (Some(path), None) => ("mesh", io::read(path)),
-        (None, Some(shape)) => {
+/// The body's mesh, checked.
+fn load(field: &str, spec: &BodySpec, in_memory: Option<&TetMesh>) -> Result<TetMesh, Error> {
+    let (key, mesh) = match (in_memory, &spec.mesh, &spec.shape) {
+        (Some(mesh), None, None) => ("mesh", Ok(mesh.clone())),
+        (None, Some(path), None) => ("mesh", io::read(path)),
+        (None, None, Some(shape)) => {
             let kind = Shape::from_name(&shape.kind);
             ("shape", kind.and_then(|kind| generate(kind, shape.tets)))
         }
-        (Some(_), Some(_)) => return Err(value(field, "given mesh and shape", "given only one")),
-        (None, None) => {
+        (_, Some(_), _) | (_, _, Some(_)) => {
+            return Err(value(field, "given mesh and shape", "given only one"));
+        }
+        (None, None, None) => {
             let range = "given either mesh or shape";
             return Err(value(field, "without a mesh", range));
         }

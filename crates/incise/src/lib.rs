@@ -1,6 +1,7 @@
 //! Cuts soft bodies in real time.
 //!
-//! This is the facade: a [`Scene`] says what is simulated, a [`Simulation`] moves it frame by frame, cuts included.
+//! This is the facade: a [`Scene`] or a [`SimulationBuilder`] says what is simulated, a [`Simulation`] moves it frame by
+//! frame, cuts included.
 //! The crates behind it are useful alone and re-exported here: [`mesh`], [`graph`], [`coloring`], [`clustering`],
 //! [`cutting`], [`xpbd`].
 //!
@@ -26,6 +27,7 @@ pub mod advise;
 mod backend;
 mod body;
 mod budget;
+mod builder;
 mod collider;
 #[cfg(feature = "gpu")]
 mod device;
@@ -60,6 +62,7 @@ mod volume;
 mod warning;
 mod whole;
 
+pub use builder::{Body, BodyHandle, SimulationBuilder};
 pub use error::Error;
 pub use grab::Grab;
 pub use incise_clustering as clustering;

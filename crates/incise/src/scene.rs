@@ -296,6 +296,25 @@ pub struct BodySpec {
     pub fixed: Vec<Region>,
 }
 
+impl Default for BodySpec {
+    /// A body without geometry.
+    fn default() -> Self {
+        Self {
+            mesh: None,
+            shape: None,
+            scale: unit(),
+            position: [0.0; 3],
+            young_modulus: soft(),
+            poisson_ratio: nearly_incompressible(),
+            density: water(),
+            damping: 0.0,
+            volume_compliance: None,
+            substeps: None,
+            fixed: Vec::new(),
+        }
+    }
+}
+
 /// A generated shape.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -22,6 +22,7 @@ use rayon::prelude::*;
 
 use crate::body::Body;
 use crate::budget;
+use crate::builder::SimulationBuilder;
 use crate::group::Group;
 use crate::islands::islands;
 use crate::joined::Joined;
@@ -108,7 +109,13 @@ impl Simulation {
     /// # Errors
     /// If a value of the scene lies outside its range or a mesh cannot be read or is broken.
     pub fn new(scene: &Scene) -> Result<Self, Error> {
-        Self::build(scene, Place::choose(scene, &AtHand::default())?, None)
+        SimulationBuilder::from_scene(scene.clone()).build()
+    }
+
+    /// Starts a simulation without a scene file: bodies are meshes in memory.
+    #[must_use]
+    pub fn builder() -> SimulationBuilder {
+        SimulationBuilder::default()
     }
 
     /// The same on a number of threads of its own. The result is the same to the bit for any number.
@@ -116,15 +123,9 @@ impl Simulation {
     /// # Errors
     /// As [`Simulation::new`], and if the threads cannot be started.
     pub fn with_threads(scene: &Scene, threads: usize) -> Result<Self, Error> {
-        if threads == 0 {
-            return Err(value("threads", threads, "at least 1"));
-        }
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        let pool = pool.map_err(|error| Error::Threads {
-            threads,
-            message: error.to_string(),
-        })?;
-        Self::build(scene, Place::choose(scene, &AtHand::default())?, Some(pool))
+        let mut builder = SimulationBuilder::from_scene(scene.clone());
+        builder.threads(threads);
+        builder.build()
     }
 
     /// Sets a scene up on a device that is open, whatever its `solver.backend` says: a renderer's, that of another
@@ -134,19 +135,25 @@ impl Simulation {
     /// As [`Simulation::new`], and if the device cannot do what the scene asks for.
     #[cfg(feature = "gpu")]
     pub fn on_device(scene: &Scene, gpu: Arc<crate::gpu::GpuContext>) -> Result<Self, Error> {
-        crate::place::check(scene)?;
-        let mut simulation = Self::build(scene, Place::on(gpu), None)?;
-        simulation.solver.backend = crate::scene::Backend::Gpu;
-        Ok(simulation)
+        let mut builder = SimulationBuilder::from_scene(scene.clone());
+        builder.device(gpu);
+        builder.build()
     }
 
-    fn build(scene: &Scene, place: Place, pool: Option<ThreadPool>) -> Result<Self, Error> {
+    /// Sets up a scene; `meshes` has for each body its mesh, unless the scene names a file or a shape.
+    pub(crate) fn build(
+        scene: Scene,
+        meshes: &[Option<TetMesh>],
+        place: Place,
+        pool: Option<ThreadPool>,
+    ) -> Result<Self, Error> {
+        let scene = &scene;
         let settings = settings(scene)?;
         if scene.report.every == 0 {
             return Err(value("report.every", 0, "at least 1"));
         }
         limits::check(scene)?;
-        let bodies = Body::all(scene)?;
+        let bodies = Body::all(scene, meshes)?;
         let islands = islands(bodies.len(), &link::pairs(scene, bodies.len())?);
         let several = islands.iter().any(|&island| island > 0);
         let whole = several.then(|| Whole::new(&bodies, &islands));
@@ -174,7 +181,8 @@ impl Simulation {
         };
         if scene.solver.precision == Precision::Auto && !place.is_device() && short() {
             precision = Precision::F64;
-            groups = make_groups(precision, Joined::all(scene, Body::all(scene)?, &islands)?)?;
+            let bodies = Body::all(scene, meshes)?;
+            groups = make_groups(precision, Joined::all(scene, bodies, &islands)?)?;
         }
         if let Some(budget) = scene.solver.budget_ms {
             let mut fit = || budget::fit(&mut groups, &scene.solver, budget);

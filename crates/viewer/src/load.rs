@@ -12,8 +12,8 @@ use anyhow::{Context, anyhow};
 use incise::gpu::GpuContext;
 use incise::mesh::glam::DVec3;
 use incise::mesh::{Solid, generate, io};
-use incise::scene::{Backend, BodySpec, GroundSpec, Region};
-use incise::{Scene, Simulation};
+use incise::scene::{Backend, GroundSpec};
+use incise::{Body, Scene, Simulation, SimulationBuilder};
 
 /// Tets to fill a surface with if nobody says.
 pub(crate) const TETS: u32 = 11_000;
@@ -63,9 +63,15 @@ impl Source {
         }
     }
 
-    fn scene(&self) -> anyhow::Result<(Scene, Option<tempfile::TempPath>)> {
+    /// The scene, and a builder of its simulation on the processor.
+    fn open(&self) -> anyhow::Result<(Scene, SimulationBuilder)> {
         match self {
-            Self::Scene(scene, _) => Ok(((**scene).clone(), None)),
+            Self::Scene(scene, _) => {
+                let mut scene = (**scene).clone();
+                // The window's device or none: one of its own could not be drawn from.
+                scene.solver.backend = Backend::Cpu;
+                Ok((scene.clone(), SimulationBuilder::from_scene(scene)))
+            }
             Self::Mesh(path, tets) => around(path, *tets),
         }
     }
@@ -76,21 +82,13 @@ fn name_of(path: &Path) -> String {
     name.to_string_lossy().into_owned()
 }
 
-/// A scene around a mesh, and the file of its tets if it was a surface.
-fn around(path: &Path, tets: u32) -> anyhow::Result<(Scene, Option<tempfile::TempPath>)> {
-    let mut filled = None;
-    let mut file = path.to_owned();
+/// A scene around a mesh, which fills the surface if the file has one.
+fn around(path: &Path, tets: u32) -> anyhow::Result<(Scene, SimulationBuilder)> {
     let mesh = if io::is_surface(path) {
         let surface = io::read_surface(path)?;
         let solid = Solid::new(&surface).with_context(|| path.display().to_string())?;
-        let mesh = generate::tetrahedralize(&solid, tets as usize, 0)
-            .with_context(|| path.display().to_string())?;
-        let temporary = tempfile::Builder::new().suffix(".vtk").tempfile()?;
-        let temporary = temporary.into_temp_path();
-        io::write(&temporary, &mesh)?;
-        file = temporary.to_path_buf();
-        filled = Some(temporary);
-        mesh
+        generate::tetrahedralize(&solid, tets as usize, 0)
+            .with_context(|| path.display().to_string())?
     } else {
         io::read(path)?
     };
@@ -103,29 +101,24 @@ fn around(path: &Path, tets: u32) -> anyhow::Result<(Scene, Option<tempfile::Tem
     if !scale.is_finite() {
         return Err(anyhow!("{}: the mesh has no extent", path.display()));
     }
-    let (low, high) = (low * scale, high * scale);
     let mut scene = Scene::built_in();
     scene.stroke.clear();
+    scene.body.clear();
     let table = GroundSpec {
         height: 0.0,
         friction: 0.5,
     };
     scene.world.ground = Some(table);
-    let model: &BodySpec = &scene.body[0];
-    let glued = Region::HalfSpace {
-        point: [0.0, 0.0, 0.1 * (high.z - low.z)],
-        normal: [0.0, 0.0, -1.0],
-    };
-    scene.body = vec![BodySpec {
-        mesh: Some(file),
-        shape: None,
-        scale,
-        position: [-(low.x + high.x) / 2.0, -(low.y + high.y) / 2.0, -low.z],
-        fixed: vec![glued],
-        young_modulus: STIFFNESS,
-        ..model.clone()
-    }];
-    Ok((scene, filled))
+    let glued = low.z + 0.1 * (high.z - low.z);
+    let middle = (low + high) / 2.0;
+    let body = Body::new(mesh)
+        .scale(scale)
+        .position(DVec3::new(-middle.x, -middle.y, -low.z) * scale)
+        .young_modulus(STIFFNESS)
+        .pinned(|x| x.z <= glued);
+    let mut builder = SimulationBuilder::from_scene(scene.clone());
+    builder.add_body(body);
+    Ok((scene, builder))
 }
 
 /// What was loaded.
@@ -177,10 +170,8 @@ impl Loading {
 }
 
 fn load(source: &Source, backend: Backend, gpu: Option<Arc<GpuContext>>) -> anyhow::Result<Loaded> {
-    let (mut scene, _file) = source.scene()?;
-    // The window's device or none: one of its own could not be drawn from.
-    scene.solver.backend = Backend::Cpu;
-    let mut simulation = Simulation::new(&scene)?;
+    let (mut scene, builder) = source.open()?;
+    let mut simulation = builder.build()?;
     if let Some(gpu) = gpu {
         simulation.offer_device(gpu);
         if backend != Backend::Cpu {

@@ -6,6 +6,7 @@
 mod advise;
 mod auto_method;
 mod bodies;
+mod builder;
 mod conservation;
 mod constraints;
 mod cutting;

@@ -1,0 +1,261 @@
+//! [`SimulationBuilder`]: a simulation from meshes in memory.
+//!
+//! A program that has its own meshes needs no scene file: it adds bodies, obstacles, attachments and strokes, and builds.
+//! A builder is a [`Scene`] and the meshes that the scene does not name, so both ways lead to the same simulation, bit
+//! for bit. Cost: that of the simulation.
+
+#[cfg(feature = "gpu")]
+use std::sync::Arc;
+
+use glam::DVec3;
+use incise_mesh::TetMesh;
+
+use crate::limits::value;
+use crate::place::{AtHand, Place};
+use crate::scene::{
+    BodySpec, ColliderSpec, GroundSpec, HandleSpec, LinkSpec, Region, ReportSpec, SolverSpec,
+    StrokeSpec,
+};
+use crate::{Error, Scene, Simulation};
+
+/// A body that is added to a [`SimulationBuilder`]: a mesh in memory, its material and its pinned particles.
+///
+/// Young's modulus is 1e5 Pa, Poisson's ratio 0.45, density 1000 kg/m³ and damping 0 unless they are set.
+#[derive(Clone, Debug)]
+pub struct Body {
+    mesh: TetMesh,
+    spec: BodySpec,
+}
+
+impl Body {
+    /// A body whose shape at rest is a mesh in m. The mesh is checked when the simulation is built.
+    #[must_use]
+    pub fn new(mesh: TetMesh) -> Self {
+        Self {
+            mesh,
+            spec: BodySpec::default(),
+        }
+    }
+
+    /// Sets Young's modulus in Pa.
+    #[must_use]
+    pub fn young_modulus(mut self, young_modulus: f64) -> Self {
+        self.spec.young_modulus = young_modulus;
+        self
+    }
+
+    /// Sets Poisson's ratio, at least 0 and below 0.5.
+    #[must_use]
+    pub fn poisson_ratio(mut self, poisson_ratio: f64) -> Self {
+        self.spec.poisson_ratio = poisson_ratio;
+        self
+    }
+
+    /// Sets the mass density in kg/m³.
+    #[must_use]
+    pub fn density(mut self, density: f64) -> Self {
+        self.spec.density = density;
+        self
+    }
+
+    /// Sets the damping time in s: see [`Material::damping`](crate::xpbd::Material::damping).
+    #[must_use]
+    pub fn damping(mut self, damping: f64) -> Self {
+        self.spec.damping = damping;
+        self
+    }
+
+    /// Sets where the origin of the mesh goes, in m.
+    #[must_use]
+    pub fn position(mut self, position: DVec3) -> Self {
+        self.spec.position = position.to_array();
+        self
+    }
+
+    /// Sets a factor on the coordinates of the mesh.
+    #[must_use]
+    pub fn scale(mut self, scale: f64) -> Self {
+        self.spec.scale = scale;
+        self
+    }
+
+    /// Pins the particles at whose position, in the coordinates of the mesh, the predicate holds: they do not move.
+    #[must_use]
+    pub fn pinned(self, is_pinned: impl Fn(DVec3) -> bool) -> Self {
+        let positions = (0..).zip(&self.mesh.positions);
+        let particles: Vec<u32> = positions
+            .filter(|(_, x)| is_pinned(**x))
+            .map(|(p, _)| p)
+            .collect();
+        self.pinned_particles(particles)
+    }
+
+    /// Pins particles by their indices in the mesh: they do not move.
+    #[must_use]
+    pub fn pinned_particles(mut self, particles: impl IntoIterator<Item = u32>) -> Self {
+        let particles = Region::Particles(particles.into_iter().collect());
+        self.spec.fixed.push(particles);
+        self
+    }
+}
+
+/// The index of a body of a simulation, in the order in which bodies were added.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct BodyHandle(usize);
+
+impl BodyHandle {
+    /// The index: that of `body` in reports, attachments and distances.
+    #[must_use]
+    pub fn index(self) -> usize {
+        self.0
+    }
+}
+
+/// Sets a simulation up from meshes in memory: [`Simulation::builder`].
+///
+/// # Example
+/// A bar of jelly that is held at one end and cut through.
+/// ```
+/// use incise::mesh::generate::{Shape, generate};
+/// use incise::mesh::glam::DVec3;
+/// use incise::scene::StrokeSpec;
+/// use incise::{Body, Simulation};
+///
+/// let bar = generate(Shape::Beam, 400)?; // or a `TetMesh` of your own
+/// let mut builder = Simulation::builder();
+/// builder.gravity(DVec3::new(0.0, 0.0, -9.81));
+/// builder.add_body(Body::new(bar).young_modulus(2e5).pinned(|x| x.x < -0.4));
+/// builder.add_stroke(StrokeSpec::Plane {
+///     frame: 2,
+///     point: [0.1, 0.0, 0.0],
+///     normal: [1.0, 0.0, 0.0],
+///     snap: 0.1,
+/// });
+/// let mut simulation = builder.build()?;
+/// for _ in 0..4 {
+///     simulation.step()?;
+/// }
+/// assert_eq!(simulation.report().pieces, 2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct SimulationBuilder {
+    scene: Scene,
+    /// For each body of the scene its mesh, unless the scene names a file or a shape.
+    meshes: Vec<Option<TetMesh>>,
+    threads: Option<usize>,
+    device: AtHand,
+}
+
+impl SimulationBuilder {
+    /// Starts from a scene: its bodies, if it has any, come before those that are added.
+    #[must_use]
+    pub fn from_scene(scene: Scene) -> Self {
+        Self {
+            meshes: vec![None; scene.body.len()],
+            scene,
+            ..Self::default()
+        }
+    }
+
+    /// Sets the acceleration of gravity in m/s²; without it there is none.
+    pub fn gravity(&mut self, gravity: DVec3) -> &mut Self {
+        self.scene.world.gravity = Some(gravity.to_array());
+        self
+    }
+
+    /// Adds a horizontal floor at a height in m, with a coefficient of friction.
+    pub fn ground(&mut self, height: f64, friction: f64) -> &mut Self {
+        self.scene.world.ground = Some(GroundSpec { height, friction });
+        self
+    }
+
+    /// Sets how bodies are solved. The defaults choose method, substeps and precision for an error of 10% of the motion.
+    pub fn solver(&mut self, solver: SolverSpec) -> &mut Self {
+        self.scene.solver = solver;
+        self
+    }
+
+    /// Sets what frames report beside times and counts.
+    pub fn report(&mut self, report: ReportSpec) -> &mut Self {
+        self.scene.report = report;
+        self
+    }
+
+    /// Computes on a number of threads of its own instead of rayon's global pool. The result is bit-identical for any
+    /// number.
+    pub fn threads(&mut self, threads: usize) -> &mut Self {
+        self.threads = Some(threads);
+        self
+    }
+
+    /// Computes on an open GPU device, for example that of a renderer.
+    #[cfg(feature = "gpu")]
+    pub fn device(&mut self, gpu: Arc<crate::gpu::GpuContext>) -> &mut Self {
+        self.device.gpu = Some(gpu);
+        self
+    }
+
+    /// Adds a body. Its values are checked by [`SimulationBuilder::build`].
+    pub fn add_body(&mut self, body: Body) -> BodyHandle {
+        let handle = BodyHandle(self.scene.body.len());
+        self.scene.body.push(body.spec);
+        self.meshes.push(Some(body.mesh));
+        handle
+    }
+
+    /// Adds an obstacle.
+    pub fn add_collider(&mut self, collider: ColliderSpec) -> &mut Self {
+        self.scene.collider.push(collider);
+        self
+    }
+
+    /// Adds an attachment: a part of a body that is held or moved.
+    pub fn add_attachment(&mut self, attachment: HandleSpec) -> &mut Self {
+        self.scene.handle.push(attachment);
+        self
+    }
+
+    /// Adds distance constraints between two bodies or parts of one.
+    pub fn add_distance(&mut self, distance: LinkSpec) -> &mut Self {
+        self.scene.link.push(distance);
+        self
+    }
+
+    /// Adds a stroke: a cut that is known beforehand. [`Simulation::cut`] adds strokes while the simulation runs.
+    pub fn add_stroke(&mut self, stroke: StrokeSpec) -> &mut Self {
+        self.scene.stroke.push(stroke);
+        self
+    }
+
+    /// Builds the simulation.
+    ///
+    /// # Errors
+    /// If there is no body, a value lies outside its range, a mesh is broken or cannot be read, a pinned particle does not
+    /// exist, the threads cannot be started, or the device cannot do what is asked for.
+    pub fn build(self) -> Result<Simulation, Error> {
+        #[cfg_attr(
+            not(feature = "gpu"),
+            expect(unused_mut, reason = "a device sets the backend")
+        )]
+        let mut scene = self.scene;
+        let pool = self.threads.map(thread_pool).transpose()?;
+        #[cfg(feature = "gpu")]
+        if self.device.gpu.is_some() {
+            scene.solver.backend = crate::scene::Backend::Gpu;
+        }
+        let place = Place::choose(&scene, &self.device)?;
+        Simulation::build(scene, &self.meshes, place, pool)
+    }
+}
+
+fn thread_pool(threads: usize) -> Result<rayon::ThreadPool, Error> {
+    if threads == 0 {
+        return Err(value("threads", threads, "at least 1"));
+    }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.map_err(|error| Error::Threads {
+        threads,
+        message: error.to_string(),
+    })
+}
