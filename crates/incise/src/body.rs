@@ -30,7 +30,12 @@ impl Body {
         let bodies = scene.body.iter().zip(meshes).enumerate();
         bodies
             .map(|(i, (spec, mesh))| {
-                Self::new(&format!("body[{i}]"), spec, mesh, scene.solver.substeps)
+                Self::new(
+                    &format!("body[{i}]"),
+                    spec,
+                    mesh.as_ref(),
+                    scene.solver.substeps,
+                )
             })
             .collect()
     }
@@ -39,7 +44,7 @@ impl Body {
     fn new(
         field: &str,
         spec: &BodySpec,
-        mesh: &Option<TetMesh>,
+        mesh: Option<&TetMesh>,
         substeps: Substeps,
     ) -> Result<Self, Error> {
         let material = Material {
@@ -69,7 +74,7 @@ impl Body {
             .map(|c| within(&format!("{field}.volume_compliance"), c, 0.0, 1e9))
             .transpose()?;
         let position = coordinates(&format!("{field}.position"), spec.position)?;
-        let mut mesh = load(field, spec, mesh.as_ref())?;
+        let mut mesh = load(field, spec, mesh)?;
         for x in &mut mesh.positions {
             *x = *x * spec.scale + position;
             if x.abs().max_element() > LARGEST_COORDINATE {

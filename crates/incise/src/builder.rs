@@ -234,19 +234,23 @@ impl SimulationBuilder {
     /// If there is no body, a value lies outside its range, a mesh is broken or cannot be read, a pinned particle does not
     /// exist, the threads cannot be started, or the device cannot do what is asked for.
     pub fn build(self) -> Result<Simulation, Error> {
-        #[cfg_attr(
-            not(feature = "gpu"),
-            expect(unused_mut, reason = "a device sets the backend")
-        )]
-        let mut scene = self.scene;
-        let pool = self.threads.map(thread_pool).transpose()?;
+        let scene = self.scene;
         #[cfg(feature = "gpu")]
-        if self.device.gpu.is_some() {
-            scene.solver.backend = crate::scene::Backend::Gpu;
-        }
+        let scene = match self.device.gpu {
+            Some(_) => computed_on_gpu(scene),
+            None => scene,
+        };
+        let pool = self.threads.map(thread_pool).transpose()?;
         let place = Place::choose(&scene, &self.device)?;
         Simulation::build(scene, &self.meshes, place, pool)
     }
+}
+
+/// The scene with the GPU as its backend, whatever backend it names.
+#[cfg(feature = "gpu")]
+fn computed_on_gpu(mut scene: Scene) -> Scene {
+    scene.solver.backend = crate::scene::Backend::Gpu;
+    scene
 }
 
 fn thread_pool(threads: usize) -> Result<rayon::ThreadPool, Error> {

@@ -40,27 +40,54 @@ fn text(rows: &[Row]) -> String {
     format!("{:?}", page::page(rows).unwrap().parts)
 }
 
+/// A spinning body with an error of its motion.
+fn newton_row(motion: f64, warned: &[&str]) -> NewtonRow {
+    NewtonRow {
+        shape: "beam".to_owned(),
+        load: Load::Spinning,
+        young_modulus: 1e5,
+        poisson_ratio: 0.3,
+        tets: 1,
+        method: "gauss-seidel".to_owned(),
+        substeps: 7,
+        precision: "f32".to_owned(),
+        frames: 4,
+        period: 1.0,
+        settled: None,
+        motion,
+        reference: 0.0,
+        warned: warned.iter().map(|&code| code.to_owned()).collect(),
+    }
+}
+
+/// The quick form refuses an error above 10% without a warning, and with one where no warning is expected.
+#[test]
+fn the_quick_form_refuses_errors_without_a_reason() {
+    let case = |young_modulus, settled, warned: &[&str]| NewtonRow {
+        young_modulus,
+        settled: Some(settled),
+        ..newton_row(0.0, warned)
+    };
+    for (row, is_refused) in [
+        (case(1e5, 0.09, &[]), false),
+        (case(1e5, 0.11, &[]), true),
+        (case(1e5, 0.11, &["inaccurate"]), true),
+        (case(1e9, 0.11, &["inaccurate"]), false),
+        (case(1e9, 0.11, &[]), true),
+    ] {
+        let text = format!("{row:?}");
+        assert_eq!(
+            check(&[Row::Newton(vec![row])]).is_err(),
+            is_refused,
+            "{text}"
+        );
+    }
+}
+
 /// Each kind of miss is counted, listed and marked.
 #[test]
 fn the_page_shows_what_misses_its_bar() {
-    let newton = |motion, warned: &[&str]| {
-        Row::Newton(vec![NewtonRow {
-            shape: "beam".to_owned(),
-            load: Load::Spinning,
-            young_modulus: 1e5,
-            poisson_ratio: 0.3,
-            tets: 1,
-            method: "gauss-seidel".to_owned(),
-            substeps: 7,
-            precision: "f32".to_owned(),
-            frames: 4,
-            period: 1.0,
-            settled: None,
-            motion,
-            reference: 0.0,
-            warned: warned.iter().map(|&code| code.to_owned()).collect(),
-        }])
-    };
+    let newton = |motion, warned: &[&str]| Row::Newton(vec![newton_row(motion, warned)]);
     let rest = |last, inverted| {
         Row::Rest(vec![RestRow {
             body: "a body".to_owned(),

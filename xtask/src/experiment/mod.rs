@@ -55,7 +55,8 @@ impl<R: Serialize + DeserializeOwned> Experiment<R> {
         self.run_and_check(arguments, |_| Ok(()))
     }
 
-    /// Measures like [`Experiment::run`]; the quick form then fails where `check` finds rows that must not occur.
+    /// Measures like [`Experiment::run`]; the quick form then fails where a table has NaN or `check` finds a
+    /// row that must not occur.
     pub(crate) fn run_and_check(
         self,
         arguments: &ExperimentArguments,
@@ -89,6 +90,7 @@ impl<R: Serialize + DeserializeOwned> Experiment<R> {
         let page = (self.page)(&rows)?;
         write::write(&arguments.out, self.name, &page, &machines, &rows)?;
         if arguments.quick {
+            ensure!(!page.has_nan(), "{}: a table has NaN", self.name);
             check(&rows)?;
         }
         Ok(())

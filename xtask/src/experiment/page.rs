@@ -9,6 +9,16 @@ pub(crate) struct Page {
     pub(crate) parts: Vec<Part>,
 }
 
+impl Page {
+    /// Whether a cell of one of the tables shows a number that is none.
+    pub(super) fn has_nan(&self) -> bool {
+        self.parts.iter().any(|part| match part {
+            Part::Table(table) => table.rows.iter().flatten().any(|cell| cell.contains("NaN")),
+            Part::Text(_) | Part::Plot(_) | Part::Picture { .. } => false,
+        })
+    }
+}
+
 /// A piece of a page.
 #[derive(Debug)]
 pub(crate) enum Part {

@@ -137,3 +137,16 @@ fn shares_are_read_and_refused() {
         assert!(wrong.parse::<Shard>().is_err(), "{wrong}");
     }
 }
+
+#[test]
+fn a_number_that_is_none_fails_the_quick_form() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = squares(&Rc::default());
+    experiment
+        .cells
+        .push(Cell::new("square-nan", || Ok((7.0, f64::NAN))));
+    let error = experiment
+        .run(&arguments(folder.path().to_owned(), None))
+        .unwrap_err();
+    assert!(error.to_string().contains("NaN"), "{error}");
+}

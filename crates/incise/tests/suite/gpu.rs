@@ -290,7 +290,7 @@ fn every_shipped_scene_moves_as_on_the_processor() {
             .iter()
             .map(|x| x.length())
             .fold(0.0, f64::max);
-        for frame in 0..15 {
+        for frame in 0..30 {
             let one = here.step().unwrap().clone();
             let other = there.step().unwrap();
             assert_eq!(

@@ -26,7 +26,7 @@ impl Random {
 fn scene(shape: &str, strokes: usize, snap: f64, precision: Precision, seed: u64) -> Scene {
     let text = format!(
         "[report]\nquantities = [\"speed\", \"volume\"]\n[solver]\ntime_step = 0.01\nprecision = \"{}\"\n\
-         [[body]]\nshape = {{ kind = \"{shape}\", tets = 800 }}\nscale = 0.25\nyoung_modulus = 1e5\n{}",
+         [[body]]\nshape = {{ kind = \"{shape}\", tets = 1500 }}\nscale = 0.25\nyoung_modulus = 1e5\n{}",
         precision.name(),
         random_sweeps(strokes, snap, seed)
     );
@@ -51,14 +51,11 @@ fn random_strokes_leave_a_body_at_rest_alone() {
                 assert!(!report.warnings().iter().any(|w| w.is_failure()));
             }
             let what = format!("{shape}, snap {snap}, {}: {speeds:?}", precision.name());
-            assert!(simulation.mesh().tets.len() > 1200, "{what}");
+            assert!(simulation.mesh().tets.len() > 2000, "{what}");
             assert_eq!(inverted, 0, "{what}");
             assert!(speeds[0] < bound && speeds[1] < bound, "{what}");
-            // It does not grow, rounding aside: an instability passes 1% of the bound within a few frames.
-            assert!(
-                speeds[1] <= 2.0 * speeds[0] || speeds[1] < 0.01 * bound,
-                "{what}"
-            );
+            // It does not grow: what is left is rounding.
+            assert!(speeds[1] <= 2.0 * speeds[0], "{what}");
         }
     }
 }
@@ -84,8 +81,8 @@ fn random_sweeps(count: usize, snap: f64, seed: u64) -> String {
 fn an_irregular_body_stays_at_rest_at_every_snap_distance() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("irregular.vtk");
-    io::write(&file, &irregular(Shape::Torus, 400, 5).unwrap()).unwrap();
-    let (strokes, frames) = (12, 40);
+    io::write(&file, &irregular(Shape::Torus, 600, 5).unwrap()).unwrap();
+    let (strokes, frames) = (12, 60);
     for snap in [0.0, 0.1, 0.2] {
         for (precision, bound) in [(Precision::F64, 1e-9), (Precision::F32, 1e-2)] {
             let text = format!(
@@ -110,10 +107,7 @@ fn an_irregular_body_stays_at_rest_at_every_snap_distance() {
             assert!(simulation.mesh().tets.len() > 3 * tets / 2, "{what}");
             assert_eq!(inverted, 0, "{what}");
             assert!(speeds[0] < bound && speeds[1] < bound, "{what}");
-            assert!(
-                speeds[1] <= 2.0 * speeds[0] || speeds[1] < 0.01 * bound,
-                "{what}"
-            );
+            assert!(speeds[1] <= 2.0 * speeds[0], "{what}");
         }
     }
 }

@@ -8,7 +8,7 @@ use crate::body::{GRAVITY, body, plain, within};
 
 /// The mean kinetic and elastic energy of a held beam over the second half of a number of substeps.
 fn energy<R: Real>(size: f64, substep: f64, substeps: u32) -> f64 {
-    let mesh = kuhn_box([8, 2, 2], dvec3(1.0, 0.25, 0.25) * size);
+    let mesh = kuhn_box([10, 3, 3], dvec3(1.0, 0.3, 0.3) * size);
     let stuff = Material {
         young_modulus: 1e6,
         poisson_ratio: 0.45,
