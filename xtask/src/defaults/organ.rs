@@ -22,6 +22,10 @@ const FRAMES: u32 = 60;
 pub(super) const STROKES: usize = 6;
 /// Substeps of the reference; half as many tell its own error.
 const REFERENCE_SUBSTEPS: u32 = 8;
+/// The accuracy whose times have a bar.
+const TIMED_ACCURACY: f64 = 0.05;
+/// The bars in ms of a frame of the pull without strokes, and of the slowest frame that cuts.
+const BARS_MS: [f64; 2] = [8.0, 16.0];
 /// Rounds of a substep of the reference, from the third on each squares the error.
 const REFERENCE_ROUNDS: u32 = 6;
 
@@ -43,6 +47,28 @@ pub(crate) struct OrganRow {
     /// Of the motion of all frames, uncut only: its error, and that of the reference.
     pub(super) error: Option<[f64; 2]>,
     pub(super) warned: Warned,
+}
+
+impl OrganRow {
+    /// What misses its bar, in words; `None` for a row that has no bar.
+    pub(super) fn misses(&self) -> Option<Vec<String>> {
+        let [uncut, cut] = BARS_MS;
+        let is_timed = self.accuracy == TIMED_ACCURACY;
+        let time = match self.slowest_cut_ms {
+            Some(ms) => Some(("slowest frame that cuts", ms, cut)),
+            None if self.strokes == 0 => Some(("frame of the pull", self.pulled_ms, uncut)),
+            None => None,
+        };
+        let time = time.filter(|_| is_timed);
+        if time.is_none() && self.error.is_none() {
+            return None;
+        }
+        let slow = time.filter(|(_, ms, bar)| ms > bar);
+        let slow = slow.map(|(what, ms, bar)| format!("{what} {ms:.1} ms, bar {bar} ms"));
+        let wrong = self.error.filter(|[error, _]| *error > self.accuracy);
+        let wrong = wrong.map(|[error, _]| format!("error {:.1}%", 100.0 * error));
+        Some(slow.into_iter().chain(wrong).collect())
+    }
 }
 
 /// The organ with the strokes of the form that is cut, or without.

@@ -101,7 +101,29 @@ fn the_page_shows_what_misses_its_bar() {
             warned: Warned::new(),
         }])
     };
+    let organ = |accuracy, pulled_ms, slowest_cut_ms: Option<f64>, error: Option<f64>| {
+        Row::Organ(OrganRow {
+            accuracy,
+            strokes: if slowest_cut_ms.is_some() { 6 } else { 0 },
+            tets: [1, 1],
+            method: String::new(),
+            substeps: 1,
+            precision: String::new(),
+            pulled_ms,
+            slowest_cut_ms,
+            last_ms: 1.0,
+            error: error.map(|error| [error, 0.0]),
+            warned: Warned::new(),
+        })
+    };
     for (row, is_missed) in [
+        (organ(0.05, 7.9, None, Some(0.049)), false),
+        (organ(0.05, 8.1, None, Some(0.049)), true),
+        (organ(0.05, 7.9, None, Some(0.051)), true),
+        (organ(0.05, 9.0, Some(15.9), None), false),
+        (organ(0.05, 7.9, Some(16.1), None), true),
+        (organ(0.02, 9.0, Some(17.0), None), false),
+        (organ(0.02, 9.0, None, Some(0.021)), true),
         (newton(0.099, &[]), false),
         (newton(0.5, &["diverged"]), false),
         (newton(0.101, &[]), true),
@@ -109,8 +131,11 @@ fn the_page_shows_what_misses_its_bar() {
         (rest(2.1e-12, 0), true),
         (rest(1e-12, 1), true),
     ] {
-        // The quick form has bars for what settles, and for rest.
-        let is_refused = is_missed && matches!(row, Row::Rest(_));
+        // The quick form has bars for what settles, for rest and for the error of the organ, none for times.
+        let is_refused = match &row {
+            Row::Organ(row) => row.error.is_some_and(|[error, _]| error > row.accuracy),
+            row => is_missed && matches!(row, Row::Rest(_)),
+        };
         assert_eq!(
             check(std::slice::from_ref(&row)).is_err(),
             is_refused,

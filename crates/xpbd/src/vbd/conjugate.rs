@@ -39,8 +39,11 @@ pub(super) struct CgReport {
     pub(super) slope: f64,
 }
 
-/// Gains that say what was left before them: so many iterations late is the estimate.
-const DELAY: usize = 4;
+/// Gains that say what was left before them: so many iterations late is the estimate, and so many are made at least.
+pub(super) const FEWEST_ITERATIONS: u32 = 4;
+
+/// Rows of a color that a thread relaxes at a time: a color has some hundred.
+const PARALLEL_RELAXED: usize = 128;
 
 /// The vectors of the iteration.
 #[derive(Clone, Debug, Default)]
@@ -99,7 +102,7 @@ impl<R: Real> Conjugate<R> {
             .map(|row| inverse::<R>(&matrix.blocks[matrix.offsets[row]], held[row]))
             .collect_into_vec(&mut self.inverses);
         let mut last = 0.0;
-        let mut gains = [f64::INFINITY; DELAY];
+        let mut gains = [f64::INFINITY; FEWEST_ITERATIONS as usize];
         let mut solved = CgReport {
             iterations: 0,
             left: 1.0,
@@ -137,12 +140,12 @@ impl<R: Real> Conjugate<R> {
             }
             let gain = length * now;
             solved.slope += gain;
-            gains[solved.iterations as usize % DELAY] = gain;
+            gains[(solved.iterations % FEWEST_ITERATIONS) as usize] = gain;
             solved.iterations += 1;
             solved.left = (gains.iter().sum::<f64>() / solved.slope).min(1.0);
             let enough = (limits.reduction * limits.reduction)
                 .max(2.0 * (limits.energy)(0.5 * solved.slope) / solved.slope);
-            if solved.iterations as usize >= DELAY && solved.left <= enough {
+            if solved.iterations >= FEWEST_ITERATIONS && solved.left <= enough {
                 return solved;
             }
         }
@@ -194,7 +197,7 @@ fn relax<R: Real>(
     let (own, after) = rest.split_at_mut(rows.len());
     let (before, after) = (&*before, &*after);
     own.par_iter_mut()
-        .with_min_len(PARALLEL_ROWS)
+        .with_min_len(PARALLEL_RELAXED)
         .enumerate()
         .for_each(|(k, z)| {
             let row = start + k;

@@ -16,7 +16,7 @@
 
 use super::aggregates::aggregates;
 use super::coarse::Coarse;
-use super::conjugate::{Conjugate, Limits};
+use super::conjugate::{Conjugate, FEWEST_ITERATIONS, Limits};
 use super::constraints::CORRECTION_PENALTY;
 use super::matrix::Blocks;
 use super::state::Potential;
@@ -100,7 +100,7 @@ pub struct CoarseCorrection<R: Real> {
 }
 
 /// The part of the accuracy wanted that conjugate gradients may use up.
-const CG_ERROR_SHARE: f64 = 0.25;
+const CG_ERROR_SHARE: f64 = 1.0 / 3.0;
 
 /// A matrix is filled again once its steps gain a part more or less than it predicts.
 const KEPT_MISMATCH: f64 = 0.1;
@@ -169,7 +169,7 @@ impl<R: Real> CoarseCorrection<R> {
     /// around them, and the factor stays in use. Aggregates are grown again when it has aged. O(pairs).
     pub fn follow(&mut self, stars: &VertexStars<R>) {
         let old = std::mem::replace(&mut self.order, stars.order.clone());
-        self.matrix = Blocks::new(stars);
+        self.matrix.follow(stars);
         self.coarse.follow(&old, &self.order, &self.matrix);
         self.filled = None;
     }
@@ -324,6 +324,7 @@ impl<R: Real> ImplicitStep<'_, R> {
             solved = conjugate.solve(matrix, coarse, colors, force, held, &limits);
         }
         coarse.note(solved.iterations, solved.left);
+        self.stars.try_start |= solved.iterations > FEWEST_ITERATIONS;
         let (direction, slope) = (conjugate.solution(), solved.slope);
         let Search {
             taken,

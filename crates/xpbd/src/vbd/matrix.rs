@@ -51,16 +51,40 @@ impl<R: Real> Blocks<R> {
 
     /// The pattern of some stars; no values yet. O(pairs + blocks log valence).
     pub(super) fn new(stars: &VertexStars<R>) -> Self {
+        let mut blocks = Self {
+            offsets: Vec::new(),
+            upper: Vec::new(),
+            mirrors: Vec::new(),
+            columns: Vec::new(),
+            blocks: Vec::new(),
+            places: Vec::new(),
+            excess: Vec::new(),
+        };
+        blocks.follow(stars);
+        blocks
+    }
+
+    /// Takes the pattern of other stars; memory is used again. O(pairs + blocks log valence).
+    pub(super) fn follow(&mut self, stars: &VertexStars<R>) {
+        let Self {
+            offsets,
+            upper,
+            mirrors,
+            columns,
+            blocks,
+            places,
+            ..
+        } = self;
         let rows = stars.order.len();
         let mut row_of = vec![0u32; rows];
         for (row, &p) in (0u32..).zip(&stars.order) {
             row_of[p as usize] = row;
         }
-        let mut offsets = Vec::with_capacity(rows + 1);
+        offsets.clear();
         offsets.push(0);
-        let mut upper = Vec::with_capacity(rows);
-        let mut columns: Vec<u32> = Vec::with_capacity(stars.terms.len());
-        let mut places = Vec::with_capacity(stars.terms.len());
+        upper.clear();
+        columns.clear();
+        places.clear();
         // Which row has seen a column last, and where the column's block is in that row.
         let mut seen = vec![(u32::MAX, 0u32); rows];
         for (row, diagonal) in (0..rows).zip(0u32..) {
@@ -87,25 +111,17 @@ impl<R: Real> Blocks<R> {
                 .extend(terms.map(|term| term.others.map(|p| seen[row_of[p as usize] as usize].1)));
             offsets.push(columns.len());
         }
-        let blocks = vec![[R::Vector::default(); 3]; columns.len()];
+        blocks.clear();
+        blocks.resize(columns.len(), [R::Vector::default(); 3]);
         // Rows come in ascending order, so the transposes in a row are met from its first block on.
         let mut next: Vec<usize> = offsets[..rows].iter().map(|first| first + 1).collect();
-        let mut mirrors = Vec::with_capacity(columns.len() / 2);
+        mirrors.clear();
         for (row, &from) in upper.iter().enumerate() {
             for &column in &columns[from..offsets[row + 1]] {
                 let place = &mut next[column as usize];
                 mirrors.push(u32::try_from(*place).expect("blocks are numbered in 32 bits"));
                 *place += 1;
             }
-        }
-        Self {
-            offsets,
-            upper,
-            mirrors,
-            columns,
-            blocks,
-            places,
-            excess: Vec::new(),
         }
     }
 

@@ -11,7 +11,11 @@ pub enum Guess {
     /// As if gravity were what it seemed to be in the last substep, between none of it and all: a body that lies or
     /// hangs starts where it is. Keeps the velocities of a substep.
     ///
-    /// Source: Chen et al. 2024, section 3.7.
+    /// With an accuracy, parts of a body that something holds also start nearer to where they were, as far as that lowers
+    /// the potential, if the energy of their motion is below the error allowed: what a substep leaves over
+    /// would otherwise come back twice as large in the next one.
+    ///
+    /// Source: Chen et al. 2024, section 3.7, for gravity.
     Adaptive,
 }
 

@@ -6,7 +6,7 @@
 //! fifth of what the tets themselves need. Cost: 32 bytes a tet and corner in single precision, 56 in double, read once
 //! a sweep from front to back.
 
-use incise_graph::{GraphError, Incidence, Schedule};
+use incise_graph::{DisjointSets, GraphError, Incidence, Schedule};
 
 use super::constraints::ConstraintTerms;
 use super::corner_term::CornerTerm;
@@ -36,6 +36,10 @@ pub struct VertexStars<R: Real> {
     pub(super) size: f64,
     /// Velocities a substep ago, kept only for [`super::Guess::Adaptive`].
     pub(super) earlier: Vec<R::Vector>,
+    /// Whether a start nearer to the last positions may save work: since a step was not calm, until such a start does not help.
+    pub(super) try_start: bool,
+    /// The smallest particle of each particle's connected part of the body, if known.
+    pub(super) parts: Vec<u32>,
     /// Kept only for [`super::Integrator::Bdf2`].
     pub(super) history: History<R>,
     /// Distances, volumes and attachments.
@@ -60,6 +64,8 @@ impl<R: Real> VertexStars<R> {
             tet_count: 0,
             size: 0.0,
             earlier: Vec::new(),
+            try_start: true,
+            parts: Vec::new(),
             history: History::default(),
             constraints: ConstraintTerms::default(),
             viscosity: None,
@@ -112,7 +118,8 @@ impl<R: Real> VertexStars<R> {
         self.size = (6.0 * volume / self.tet_count.max(1) as f64)
             .max(0.0)
             .cbrt();
-        self.earlier.clear();
+        self.parts.clear();
+        self.try_start = true;
         self.constraints.rebuild(solver, &self.order, incidence);
         self.viscosity = None;
         Ok(())
@@ -127,6 +134,7 @@ impl<R: Real> VertexStars<R> {
             + size_of_val(&*self.terms)
             + size_of_val(&*self.tets)
             + size_of_val(&*self.earlier)
+            + size_of_val(&*self.parts)
             + self.history.bytes()
             + self.constraints.bytes()
             + self.viscosity.as_ref().map_or(0, |v| v.bytes())
@@ -148,6 +156,26 @@ impl<R: Real> VertexStars<R> {
     #[inline]
     pub(super) fn of(&self, place: usize) -> &[CornerTerm<R>] {
         &self.terms[self.offsets[place]..self.offsets[place + 1]]
+    }
+
+    /// The smallest particle of each particle's connected part of the body. O(tets), but nothing while the stars stay the same.
+    pub(super) fn parts(&mut self, solver: &Solver<R>) -> &[u32] {
+        if self.parts.len() != self.order.len() {
+            let mut sets = DisjointSets::new(self.order.len());
+            for tet in &solver.tets {
+                let [a, others @ ..] = tet.particles;
+                for b in others {
+                    sets.unite(a, b);
+                }
+            }
+            for (row, &p) in self.order.iter().enumerate() {
+                for q in self.constraints.neighbors(row) {
+                    sets.unite(p, q);
+                }
+            }
+            self.parts = sets.roots();
+        }
+        &self.parts
     }
 
     /// Whether these are the stars of as many particles, tets and constraints.

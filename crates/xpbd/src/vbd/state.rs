@@ -154,6 +154,7 @@ pub(super) struct Potential {
 }
 
 /// The energy of a tet with its corners at `x`, 0 at rest, and the sum of the terms that it is the difference of.
+#[inline]
 fn energy_and_terms(tet: &TetConstraint<f64>, x: [DVec3; 4]) -> [f64; 2] {
     let q = DMat3::from_cols_array(&tet.inverse_rest).transpose();
     let f = DMat3::from_cols(x[1] - x[0], x[2] - x[0], x[3] - x[0]) * q;
