@@ -16,6 +16,8 @@ mod soak;
 mod solver;
 mod stability;
 mod sweep;
+#[cfg(test)]
+mod tidy;
 mod trade;
 mod viewer;
 mod wear;

@@ -3,17 +3,16 @@
 use std::time::Instant;
 
 use glam::DVec3;
-use incise_cutting::CuttableMesh;
+use incise_cutting::{CutDelta, CuttableMesh};
 use incise_graph::Schedule;
 use incise_mesh::{ParticleId, TetId, TetMesh};
-use incise_xpbd::{KappaLimit, Pose, Real, Residuals, Solver, StepReport, StepSettings, XpbdError};
+use incise_xpbd::{
+    Energy, KappaLimit, Pose, Real, Residuals, Solver, StepReport, StepSettings, Volume, XpbdError,
+};
 
 use crate::Error;
 #[cfg(feature = "gpu")]
 use crate::device::Device;
-use crate::follow::mass;
-use crate::joined::Joined;
-use crate::measure::State;
 use crate::place::Place;
 use crate::report::{Milliseconds, milliseconds};
 use crate::scene::{Method, Precision, Quantity, SolverSpec};
@@ -56,6 +55,14 @@ impl Clone for AnySolver {
 pub(crate) enum LastSubstep {
     Constraints(Residuals),
     Vbd { force: f64, potential: f64 },
+}
+
+/// What the state of a group is worth, as far as somebody asked.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct State {
+    pub(crate) energy: Option<Energy>,
+    pub(crate) volume: Option<Volume>,
+    pub(crate) max_speed: Option<f64>,
 }
 
 /// Does the same with whichever solver it is. On a device: with the host's, whose state is that of the last time it was
@@ -104,34 +111,69 @@ macro_rules! each_mut {
 pub(crate) use each_mut;
 
 impl AnySolver {
-    pub(crate) fn new(
-        precision: Precision,
-        joined: &Joined,
-        cuttable: &CuttableMesh,
-    ) -> Result<Self, Error> {
-        let positions = &cuttable.mesh().positions;
-        let mut any = match precision {
+    /// A solver with particles, and nothing else yet.
+    pub(crate) fn of_particles(precision: Precision, positions: &[DVec3]) -> Self {
+        match precision {
             Precision::F32 | Precision::Auto => Self::Single(Backend::new(positions)),
             Precision::F64 => Self::Double(Backend::new(positions)),
-        };
+        }
+    }
+
+    /// Applies a cut to particles, tets and masses. Costs what the cut touched.
+    pub(crate) fn follow(
+        &mut self,
+        delta: &CutDelta,
+        cuttable: &CuttableMesh,
+    ) -> Result<(), Error> {
         let mesh = cuttable.mesh();
-        each_mut!(&mut any, solver => {
-            for material in &joined.materials {
-                let field = "body".to_owned();
-                solver.add_material(*material).map_err(|source| Error::Xpbd { field, source })?;
+        each_mut!(self, solver => {
+            for point in &delta.points {
+                let [a, b] = point.ends.map(ParticleId::index);
+                solver.push_particle_between(a, b, point.parameter);
             }
-            for (t, tet) in mesh.tets.iter().enumerate() {
-                solver.push_tet(tet.map(|p| p.0), mesh.corners(TetId::new(t)), joined.material_of[t]);
+            for source in &delta.copies {
+                solver.push_copy(source.index());
             }
+            let mut added: Vec<_> = delta.added.iter().collect();
+            added.sort_unstable_by_key(|tet| tet.tet);
+            for tet in added {
+                let (corners, rest) = (tet.corners.map(|p| p.0), mesh.corners(tet.tet));
+                if tet.tet.index() < solver.tet_count() {
+                    solver.replace_tet(tet.tet.index(), corners, rest);
+                } else {
+                    solver.push_tet(corners, rest, solver.material_of(tet.parent.index()));
+                }
+            }
+            for tet in &delta.relinked {
+                solver.relink_tet(tet.tet.index(), tet.after.map(|p| p.0));
+            }
+            for tet in &delta.moved {
+                solver.move_tet(tet.from.index(), tet.to.index());
+            }
+            solver.truncate_tets(delta.tets_after());
             let mut star = Vec::new();
-            for (p, &fixed) in joined.fixed.iter().enumerate() {
-                solver.set_mass(p, mass(solver, cuttable, ParticleId::new(p), &mut star));
-                if fixed {
-                    solver.set_fixed(p, true);
+            for p in touched(delta) {
+                let mass = mass(solver, cuttable, p, &mut star);
+                solver.set_mass_in_star(p.index(), mass, star.iter().map(|tet| tet.index()));
+            }
+            // Particles that lost all their tets stay where they are.
+            for p in delta.deleted.iter().flat_map(|tet| tet.corners) {
+                if cuttable.around(p).next().is_none() {
+                    solver.set_velocity(p.index(), DVec3::ZERO);
                 }
             }
         });
-        Ok(any)
+        Ok(())
+    }
+
+    /// Updates what VBD keeps after a cut, once tets and volume constraints have been.
+    pub(crate) fn update_vbd(&mut self, ms: &mut Milliseconds) -> Result<(), Error> {
+        match self {
+            Self::Single(backend) => backend.follow(ms),
+            Self::Double(backend) => backend.follow(ms),
+            #[cfg(feature = "gpu")]
+            Self::Device(_) => Ok(()),
+        }
     }
 
     /// Prepares for the method and the place of the scene, once the tets are what they are.
@@ -474,4 +516,34 @@ impl<R: Real> Backend<R> {
 /// Whether a tet is too stiff for a limit.
 fn exceeds<R: Real>(solver: &Solver<R>, tet: usize, limit: Option<KappaLimit>) -> bool {
     limit.is_some_and(|limit| solver.kappa_of(tet, limit.substep_time) > limit.kappa)
+}
+
+/// A quarter of the mass of each tet around a particle, summed in the order of the tets, which `star` has afterwards.
+pub(crate) fn mass<R: Real>(
+    solver: &Solver<R>,
+    cuttable: &CuttableMesh,
+    particle: ParticleId,
+    star: &mut Vec<TetId>,
+) -> f64 {
+    star.clear();
+    star.extend(cuttable.around(particle));
+    star.sort_unstable();
+    let quarter = |t: &TetId| 0.25 * solver.density_of(t.index()) * cuttable.mesh().volume(*t);
+    // Rounding can make the volume of a sliver negative.
+    star.iter().map(quarter).sum::<f64>().max(0.0)
+}
+
+/// The particles whose tets changed, ascending.
+fn touched(delta: &CutDelta) -> Vec<ParticleId> {
+    let added = delta.added.iter().flat_map(|tet| tet.corners);
+    let relinked = delta
+        .relinked
+        .iter()
+        .flat_map(|tet| tet.before.into_iter().chain(tet.after));
+    let removed = delta.removed.iter().chain(&delta.deleted);
+    let removed = removed.flat_map(|tet| tet.corners);
+    let mut touched: Vec<ParticleId> = added.chain(relinked).chain(removed).collect();
+    touched.sort_unstable();
+    touched.dedup();
+    touched
 }

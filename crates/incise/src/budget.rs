@@ -11,13 +11,13 @@ use std::time::Instant;
 use incise_xpbd::StepSettings;
 
 use crate::Error;
-use crate::group::{Group, adopt};
+use crate::group::{Budget, Group, adopt};
 use crate::joined::demands;
 use crate::method::{tet_solve, with_vbd};
 use crate::place::Place;
 use crate::report::{Milliseconds, milliseconds};
-use crate::scene::{Method, SolverSpec};
-use crate::substeps::{Missed, choose, evaluate};
+use crate::scene::SolverSpec;
+use crate::substeps::{Missed, choose};
 
 /// The part of the budget that solving may take; the rest is for cuts, positions and reports.
 const SHARE: f64 = 0.75;
@@ -27,33 +27,6 @@ const FINEST: f64 = 0.01;
 
 /// Frames that are measured after a first one, of which the fastest counts.
 const FRAMES: u32 = 3;
-
-/// What a group costs and may cost.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Budget {
-    /// Milliseconds of a substep for each tet.
-    per_tet: f64,
-    /// Milliseconds of a frame.
-    share: f64,
-}
-
-impl Budget {
-    /// The most substeps that fit with a number of tets, at least 1.
-    fn most(self, tets: usize) -> u32 {
-        whole(self.share / (self.per_tet * tets.max(1) as f64))
-    }
-}
-
-/// The number rounded down to a positive integer.
-fn whole(number: f64) -> u32 {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "the cast saturates, and 0 becomes 1"
-    )]
-    let whole = number as u32;
-    whole.max(1)
-}
 
 /// Milliseconds of a frame of a copy of a group's solver with some settings.
 fn measure(group: &Group, spec: &SolverSpec, settings: &StepSettings) -> Result<f64, Error> {
@@ -111,7 +84,7 @@ pub(crate) fn fit(groups: &mut [Group], spec: &SolverSpec, budget: f64) -> Resul
             Some(_) => needed.min(most),
             None => most.min(finest.max(needed)),
         };
-        take(group, substeps);
+        group.take_substeps(substeps);
         let missed = group
             .choice
             .is_some_and(|choice| choice.missed == Some(Missed::Budget));
@@ -131,18 +104,6 @@ fn finest_substeps(group: &Group, spec: &SolverSpec) -> u32 {
     };
     let tets = demands(&finest, &group.solver, group.cuttable.mesh(), |_| true);
     choose(tets, spec.max_substeps, tet_solve(spec.tet_solve)).substeps
-}
-
-/// Gives a group a number of substeps, with the error to expect of it.
-fn take(group: &mut Group, substeps: u32) {
-    let form = tet_solve(group.spec.tet_solve);
-    let tets = demands(&group.spec, &group.solver, group.cuttable.mesh(), |_| true);
-    let mut choice = evaluate(tets, |_| substeps, form);
-    if choice.missed == Some(Missed::Cap) {
-        choice.missed = Some(Missed::Budget);
-    }
-    group.choice = Some(choice);
-    group.set_substeps(substeps);
 }
 
 /// Two-level VBD in place of too few substeps, if a frame of it fits and promises a smaller error.
@@ -166,18 +127,4 @@ fn try_vbd(group: &mut Group, spec: &SolverSpec, share: f64) -> Result<(), Error
     group.spec = own;
     group.budget = None;
     Ok(())
-}
-
-/// After cuts: fewer substeps where they no longer fit. Tells whether that is so.
-pub(crate) fn keep(group: &mut Group) -> bool {
-    let Some(budget) = group.budget.filter(|_| group.spec.method != Method::Vbd) else {
-        return false;
-    };
-    let most = budget.most(group.cuttable.mesh().tets.len());
-    if group.settings.substeps <= most {
-        return false;
-    }
-    take(group, most);
-    group.judge_settings();
-    true
 }

@@ -1,82 +1,11 @@
-//! [`ColliderSpec`]: the obstacles of a scene.
+//! The obstacles of a scene while it runs, and [`ColliderHandle`], their names.
 
 use glam::{DQuat, DVec3};
 use incise_xpbd::{Collider, ColliderShape, StepSettings};
-use serde::{Deserialize, Serialize};
 
 use crate::limits::{LARGEST_COORDINATE, coordinates, direction, within};
-use crate::scene::GroundSpec;
+use crate::scene::{ColliderSpec, GroundSpec};
 use crate::{Error, Scene};
-
-/// A solid obstacle that particles do not enter.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
-pub enum ColliderSpec {
-    /// A half space, free on the side that the normal points to.
-    Plane {
-        /// A point on its surface in m.
-        point: [f64; 3],
-        /// Its normal.
-        normal: [f64; 3],
-        /// Coefficient of friction.
-        #[serde(default)]
-        friction: f64,
-        /// Velocity in m/s, from the first frame on.
-        #[serde(default)]
-        velocity: [f64; 3],
-    },
-    /// A ball.
-    Sphere {
-        /// Its center in m.
-        center: [f64; 3],
-        /// Its radius in m.
-        radius: f64,
-        /// Coefficient of friction.
-        #[serde(default)]
-        friction: f64,
-        /// Velocity in m/s, from the first frame on.
-        #[serde(default)]
-        velocity: [f64; 3],
-    },
-    /// All points within the radius of a segment.
-    Capsule {
-        /// The ends of the segment in m.
-        ends: [[f64; 3]; 2],
-        /// Its radius in m.
-        radius: f64,
-        /// Coefficient of friction.
-        #[serde(default)]
-        friction: f64,
-        /// Velocity in m/s, from the first frame on.
-        #[serde(default)]
-        velocity: [f64; 3],
-    },
-    /// A box.
-    Box {
-        /// Its center in m.
-        center: [f64; 3],
-        /// Half its edges in m.
-        half_extents: [f64; 3],
-        /// How it is turned; absent: its edges are along the axes.
-        rotation: Option<RotationSpec>,
-        /// Coefficient of friction.
-        #[serde(default)]
-        friction: f64,
-        /// Velocity in m/s, from the first frame on.
-        #[serde(default)]
-        velocity: [f64; 3],
-    },
-}
-
-/// A rotation.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RotationSpec {
-    /// The axis.
-    pub axis: [f64; 3],
-    /// The angle in degrees, against the clock as seen against the axis.
-    pub angle_degrees: f64,
-}
 
 /// The rotation about an axis by an angle.
 pub(crate) fn rotation(field: &str, axis: [f64; 3], degrees: f64) -> Result<DQuat, Error> {
@@ -91,6 +20,106 @@ pub(crate) fn colliders(scene: &Scene) -> Result<Vec<Collider>, Error> {
     let others = scene.collider.iter().enumerate();
     let others = others.map(|(i, spec)| collider(&format!("collider[{i}]"), spec));
     ground.into_iter().map(Ok).chain(others).collect()
+}
+
+/// Names a collider of a simulation from when it is added until it is removed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ColliderHandle(u32);
+
+impl ColliderHandle {
+    /// The handle of the collider of a scene with this place in its list.
+    pub(crate) fn of_scene(place: usize) -> Self {
+        Self(u32::try_from(place).expect("colliders are numbered in 32 bits"))
+    }
+}
+
+/// Which collider of the settings of all groups each handle names.
+#[derive(Clone, Debug)]
+pub(crate) struct Colliders {
+    /// In the order of the settings; the ground has none.
+    handles: Vec<Option<ColliderHandle>>,
+    /// The handle of the next collider: none is given twice.
+    next: u32,
+    /// Where some go in the frame to come.
+    moves: Vec<(ColliderHandle, DVec3)>,
+}
+
+impl Colliders {
+    /// Those of a scene.
+    pub(crate) fn new(scene: &Scene) -> Self {
+        let ground = scene.world.ground.map(|_| None);
+        let others = (0..scene.collider.len()).map(|i| Some(ColliderHandle::of_scene(i)));
+        Self {
+            handles: ground.into_iter().chain(others).collect(),
+            next: ColliderHandle::of_scene(scene.collider.len()).0,
+            moves: Vec::new(),
+        }
+    }
+
+    /// The place of a collider in the settings, unless it was removed.
+    pub(crate) fn place(&self, handle: ColliderHandle) -> Option<usize> {
+        self.handles.iter().position(|h| *h == Some(handle))
+    }
+
+    /// Names a collider that goes to the end of the settings.
+    pub(crate) fn add(&mut self) -> ColliderHandle {
+        let handle = ColliderHandle(self.next);
+        self.next += 1;
+        self.handles.push(Some(handle));
+        handle
+    }
+
+    /// Follows the removal of a collider from the settings.
+    pub(crate) fn remove(&mut self, place: usize) {
+        self.handles.remove(place);
+    }
+
+    /// Notes where a collider goes in the next frame.
+    pub(crate) fn go_to(&mut self, handle: ColliderHandle, to: DVec3) {
+        self.stay(handle);
+        self.moves.push((handle, to));
+    }
+
+    /// Forgets where a collider was to go.
+    pub(crate) fn stay(&mut self, handle: ColliderHandle) {
+        self.moves.retain(|(h, _)| *h != handle);
+    }
+
+    /// Which colliders of the settings go where in this frame.
+    pub(crate) fn take_moves(&mut self) -> Vec<(usize, DVec3)> {
+        let moves = std::mem::take(&mut self.moves).into_iter();
+        moves
+            .filter_map(|(h, to)| Some((self.place(h)?, to)))
+            .collect()
+    }
+
+    /// Comes back to those of an earlier moment; handles given since stay void.
+    pub(crate) fn restore(&mut self, earlier: &Self) {
+        let next = self.next.max(earlier.next);
+        self.clone_from(earlier);
+        self.next = next;
+    }
+}
+
+/// Where a collider is: the point of a plane, the center of a sphere or a box, the middle of a capsule.
+pub(crate) fn position(shape: &ColliderShape) -> DVec3 {
+    match *shape {
+        ColliderShape::Plane { point, .. } => point,
+        ColliderShape::Sphere { center, .. } | ColliderShape::Box { center, .. } => center,
+        ColliderShape::Capsule { ends: [a, b], .. } => 0.5 * (a + b),
+    }
+}
+
+/// Has a collider go to a place within `time` s.
+pub(crate) fn send(collider: &mut Collider, to: DVec3, time: f64) {
+    collider.velocity = (to - position(&collider.shape)) / time;
+}
+
+/// Puts a collider at rest where it was sent: not next to it by the rounding of its way.
+pub(crate) fn arrive(collider: &mut Collider, to: DVec3) {
+    send(collider, to, 1.0);
+    *collider = collider.moved(1.0);
+    collider.velocity = DVec3::ZERO;
 }
 
 /// Takes the colliders to where they are after a frame.
@@ -109,7 +138,8 @@ fn ground(ground: GroundSpec) -> Result<Collider, Error> {
     ))
 }
 
-fn collider(field: &str, spec: &ColliderSpec) -> Result<Collider, Error> {
+/// The collider of a spec, if all its values are in their ranges.
+pub(crate) fn collider(field: &str, spec: &ColliderSpec) -> Result<Collider, Error> {
     let at = |key: &str, v| coordinates(&format!("{field}.{key}"), v);
     let size = |key: &str, v| within(&format!("{field}.{key}"), v, 1e-9, LARGEST_COORDINATE);
     let (shape, friction, velocity) = match *spec {

@@ -11,8 +11,6 @@ use incise_graph::Schedule;
 use incise_xpbd::{Solver, StepReport, StepSettings};
 
 use crate::Error;
-use crate::backend::AnySolver;
-use crate::group::Group;
 use crate::scene::SolverSpec;
 
 /// A solver on a GPU.
@@ -74,40 +72,4 @@ impl Device {
 fn form(spec: &SolverSpec) -> Result<ClusterMapping, Error> {
     let method: Method = spec.clustering.parse()?;
     Ok(ClusterMapping::for_clusters_of(method.max_size().get()))
-}
-
-/// Takes the solvers of `new` groups, which are on the processor, to a device; where `old` ones are there already, they
-/// lend their kernels and memory.
-///
-/// # Errors
-/// If the device is lost or out of memory; the old groups are as they were.
-pub(crate) fn take_over(
-    old: &mut [Group],
-    mut new: Vec<Group>,
-    gpu: &Arc<GpuContext>,
-    spec: &SolverSpec,
-) -> Result<Vec<Group>, Error> {
-    let mut lent = Vec::with_capacity(new.len());
-    for (old, new) in old.iter().zip(&mut new) {
-        let lends = match &old.solver {
-            AnySolver::Device(device) => device.serves(gpu, spec)?,
-            _ => false,
-        };
-        if !lends {
-            new.solver.take_to(gpu, spec)?;
-        }
-        lent.push(lends);
-    }
-    for ((old, new), lent) in old.iter_mut().zip(&mut new).zip(lent) {
-        if lent {
-            std::mem::swap(&mut old.solver, &mut new.solver);
-            if let (AnySolver::Device(device), AnySolver::Single(backend)) =
-                (&mut new.solver, &mut old.solver)
-            {
-                let host = std::mem::replace(&mut backend.solver, Solver::new(&[]));
-                device.solver.replace(host);
-            }
-        }
-    }
-    Ok(new)
 }

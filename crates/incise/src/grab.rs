@@ -8,12 +8,10 @@
 //! anew, O(tets); with a compliance it does not. A frame costs what its handles cost.
 
 use glam::DVec3;
-use incise_mesh::ParticleId;
 use incise_xpbd::Pose;
 
 use crate::Error;
 use crate::backend::{AnySolver, each, each_mut};
-use crate::group::Group;
 
 /// Something that is held, in the simulation that gave it: see [`Simulation::grab`](crate::Simulation::grab).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,19 +58,44 @@ impl Hand {
         }
     }
 
+    /// Says where the point of a grab is to be at the end of the next frame; tells whether there is such a grab.
+    pub(crate) fn move_to(&mut self, solver: &mut AnySolver, grab: Grab, to: DVec3) -> bool {
+        let Some(grip) = self.find(grab) else {
+            return false;
+        };
+        // What is held stays awake only while it really moves.
+        grip.moved |= grip.to != to;
+        grip.to = to;
+        let pose = Pose::at(grip.start + (to - grip.point));
+        solver.move_handle(grip.handle, pose);
+        true
+    }
+
+    /// Lets go of all that hangs on a grab's handle; tells whether there is such a grab.
+    pub(crate) fn release(&mut self, solver: &mut AnySolver, grab: Grab) -> Result<bool, Error> {
+        let Some(grip) = self.find(grab) else {
+            return Ok(false);
+        };
+        let_go(solver, grip.handle)?;
+        grip.held = false;
+        grip.user += 1;
+        Ok(true)
+    }
+
     fn find(&mut self, grab: Grab) -> Option<&mut Grip> {
         let grip = self.grips.get_mut(grab.slot)?;
         (grip.held && grip.user == grab.user).then_some(grip)
     }
 
-    /// Hangs particles on a handle that is free; returns the slot and the user.
-    fn take(
+    /// Hangs particles on a handle that is free. `group` is the number of the group.
+    pub(crate) fn take(
         &mut self,
+        group: usize,
         solver: &mut AnySolver,
         particles: &[usize],
         point: DVec3,
         compliance: f64,
-    ) -> Result<(usize, u64), Error> {
+    ) -> Result<Grab, Error> {
         let vacant = self.grips.iter().position(|grip| !grip.held);
         let slot = vacant.unwrap_or(self.grips.len());
         each_mut!(solver, solver => {
@@ -100,7 +123,7 @@ impl Hand {
                 Some(old) => *old = grip,
                 None => self.grips.push(grip),
             }
-            Ok((slot, user))
+            Ok(Grab { group, slot, user })
         })
     }
 
@@ -118,88 +141,6 @@ impl Hand {
             let what = format!("particle {p} hangs on a handle that was let go");
             Err(Error::Inconsistent(what))
         })
-    }
-}
-
-impl Group {
-    /// The nearest particle to a point within a radius that can be held, and its squared distance.
-    pub(crate) fn nearest(&self, point: DVec3, radius: f64) -> Option<(f64, usize)> {
-        let near = self.holdable(point, radius);
-        // The first of those at the same distance.
-        near.min_by(|(a, _), (b, _)| a.total_cmp(b))
-    }
-
-    /// The particles within a radius around a point that can be held, with their squared distances: neither fixed nor on
-    /// a handle, and corner of a tet.
-    fn holdable(&self, point: DVec3, radius: f64) -> impl Iterator<Item = (f64, usize)> + '_ {
-        let distances = self
-            .positions
-            .iter()
-            .map(move |x| x.distance_squared(point));
-        let near = distances
-            .zip(0..)
-            .filter(move |(d, _)| *d <= radius * radius);
-        near.filter(|&(_, p)| {
-            let free = each!(&self.solver, solver => {
-                !solver.is_fixed(p) && solver.handle_of(p).is_none()
-            });
-            free && self.piece_of(p).is_some()
-        })
-    }
-
-    /// The piece of a particle, unless it has lost all its tets.
-    fn piece_of(&self, particle: usize) -> Option<u32> {
-        let mut around = self.cuttable.around(ParticleId::new(particle));
-        around.next().map(|tet| self.pieces.piece_of(tet))
-    }
-
-    /// Takes hold of what can be held within a radius around a point, of the piece of the particle `nearest`. `number` is
-    /// that of the group. Wakes it.
-    pub(crate) fn grab(
-        &mut self,
-        number: usize,
-        nearest: usize,
-        point: DVec3,
-        radius: f64,
-        compliance: f64,
-    ) -> Result<Grab, Error> {
-        let piece = self.piece_of(nearest);
-        let near = self.holdable(point, radius).map(|(_, p)| p);
-        let particles: Vec<usize> = near.filter(|&p| self.piece_of(p) == piece).collect();
-        let (slot, user) = self
-            .hand
-            .take(&mut self.solver, &particles, point, compliance)?;
-        self.wake();
-        Ok(Grab {
-            group: number,
-            slot,
-            user,
-        })
-    }
-
-    /// Says where the point of a grab is to be at the end of the next frame; tells whether there is such a grab.
-    pub(crate) fn move_grab(&mut self, grab: Grab, to: DVec3) -> bool {
-        let Some(grip) = self.hand.find(grab) else {
-            return false;
-        };
-        // What is held stays awake only while it really moves.
-        grip.moved |= grip.to != to;
-        grip.to = to;
-        let pose = Pose::at(grip.start + (to - grip.point));
-        self.solver.move_handle(grip.handle, pose);
-        true
-    }
-
-    /// Lets go of all that hangs on a grab's handle, and wakes the group; tells whether there is such a grab.
-    pub(crate) fn release(&mut self, grab: Grab) -> Result<bool, Error> {
-        let Some(grip) = self.hand.find(grab) else {
-            return Ok(false);
-        };
-        let_go(&mut self.solver, grip.handle)?;
-        grip.held = false;
-        grip.user += 1;
-        self.wake();
-        Ok(true)
     }
 }
 

@@ -8,13 +8,12 @@ use std::time::Instant;
 
 use glam::DVec3;
 use incise_cutting::{CutDelta, CuttableMesh, PieceEvent, PieceTracker};
-use incise_mesh::signed_volume;
+use incise_mesh::{ParticleId, signed_volume};
 use incise_xpbd::{KappaLimit, Real, Solver, StepReport, StepSettings, shortest_substep_of_f32};
 
 use crate::accuracy::{DEFAULT_ACCURACY, OutsideVolume, largest_kappas};
 use crate::backend::{AnySolver, each, each_mut};
-use crate::budget::{self, Budget};
-use crate::grab::Hand;
+use crate::grab::{Grab, Hand};
 use crate::handle::Handle;
 use crate::joined::{Joined, demands, substeps};
 use crate::method::{leaves_open, resolve, tet_solve};
@@ -78,6 +77,33 @@ pub(crate) struct Group {
     pub(crate) rest: Option<Rest>,
     /// What renews the plan, in a scene where plans are renewed.
     pub(crate) recluster: Option<Recluster>,
+}
+
+/// What a group costs and may cost.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Budget {
+    /// Milliseconds of a substep for each tet.
+    pub(crate) per_tet: f64,
+    /// Milliseconds of a frame.
+    pub(crate) share: f64,
+}
+
+impl Budget {
+    /// The most substeps that fit with a number of tets, at least 1.
+    pub(crate) fn most(self, tets: usize) -> u32 {
+        whole(self.share / (self.per_tet * tets.max(1) as f64))
+    }
+}
+
+/// The number rounded down to a positive integer.
+fn whole(number: f64) -> u32 {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "the cast saturates, and 0 becomes 1"
+    )]
+    let whole = number as u32;
+    whole.max(1)
 }
 
 /// What cuts did to kappa.
@@ -152,7 +178,7 @@ impl Group {
             field: "body".into(),
             source,
         })?;
-        let mut solver = AnySolver::new(precision, &joined, &cuttable)?;
+        let mut solver = joined.solver(precision, &cuttable)?;
         let (substeps, choice) = joined.substeps(scene, &solver, &cuttable);
         settings.substeps = substeps;
         let is_open = leaves_open(
@@ -303,6 +329,32 @@ impl Group {
         self.first_substeps = substeps;
     }
 
+    /// Takes a number of substeps, with the error to expect of it.
+    pub(crate) fn take_substeps(&mut self, substeps: u32) {
+        let form = tet_solve(self.spec.tet_solve);
+        let tets = demands(&self.spec, &self.solver, self.cuttable.mesh(), |_| true);
+        let mut choice = evaluate(tets, |_| substeps, form);
+        if choice.missed == Some(Missed::Cap) {
+            choice.missed = Some(Missed::Budget);
+        }
+        self.choice = Some(choice);
+        self.set_substeps(substeps);
+    }
+
+    /// After cuts: takes fewer substeps where they no longer fit the budget. Tells whether that is so.
+    fn keep_budget(&mut self) -> bool {
+        let Some(budget) = self.budget.filter(|_| self.spec.method != Method::Vbd) else {
+            return false;
+        };
+        let most = budget.most(self.cuttable.mesh().tets.len());
+        if self.settings.substeps <= most {
+            return false;
+        }
+        self.take_substeps(most);
+        self.judge_settings();
+        true
+    }
+
     /// Takes over substeps that settings have changed: cuts raise them from there.
     pub(crate) fn set_first_substeps(&mut self, substeps: u32) {
         if substeps != self.settings.substeps {
@@ -312,7 +364,7 @@ impl Group {
 
     /// After cuts: chooses substeps again where too much of the body is outside the accuracy, or warns.
     pub(crate) fn judge_cut(&mut self, asked: &[Substeps]) {
-        if budget::keep(self) {
+        if self.keep_budget() {
             return;
         }
         let fraction = self.outside.outside / self.cuttable.mesh().total_volume();
@@ -433,6 +485,70 @@ impl Group {
         colliders.any(|collider| collider.velocity != DVec3::ZERO)
             || self.handles.iter().any(|handle| handle.moves(frame))
             || self.hand.moves()
+    }
+
+    /// The nearest particle to a point within a radius that can be held, and its squared distance.
+    pub(crate) fn nearest(&self, point: DVec3, radius: f64) -> Option<(f64, usize)> {
+        let near = self.holdable(point, radius);
+        // The first of those at the same distance.
+        near.min_by(|(a, _), (b, _)| a.total_cmp(b))
+    }
+
+    /// The particles within a radius around a point that can be held, with their squared distances: neither fixed nor on
+    /// a handle, and corner of a tet.
+    fn holdable(&self, point: DVec3, radius: f64) -> impl Iterator<Item = (f64, usize)> + '_ {
+        let distances = self
+            .positions
+            .iter()
+            .map(move |x| x.distance_squared(point));
+        let near = distances
+            .zip(0..)
+            .filter(move |(d, _)| *d <= radius * radius);
+        near.filter(|&(_, p)| {
+            let free = each!(&self.solver, solver => {
+                !solver.is_fixed(p) && solver.handle_of(p).is_none()
+            });
+            free && self.piece_of(p).is_some()
+        })
+    }
+
+    /// The piece of a particle, unless it has lost all its tets.
+    fn piece_of(&self, particle: usize) -> Option<u32> {
+        let mut around = self.cuttable.around(ParticleId::new(particle));
+        around.next().map(|tet| self.pieces.piece_of(tet))
+    }
+
+    /// Takes hold of what can be held within a radius around a point, of the piece of the particle `nearest`. `number` is
+    /// that of the group. Wakes it.
+    pub(crate) fn grab(
+        &mut self,
+        number: usize,
+        nearest: usize,
+        point: DVec3,
+        radius: f64,
+        compliance: f64,
+    ) -> Result<Grab, Error> {
+        let piece = self.piece_of(nearest);
+        let near = self.holdable(point, radius).map(|(_, p)| p);
+        let particles: Vec<usize> = near.filter(|&p| self.piece_of(p) == piece).collect();
+        let Self { hand, solver, .. } = self;
+        let grab = hand.take(number, solver, &particles, point, compliance)?;
+        self.wake();
+        Ok(grab)
+    }
+
+    /// Says where the point of a grab is to be at the end of the next frame; tells whether there is such a grab.
+    pub(crate) fn move_grab(&mut self, grab: Grab, to: DVec3) -> bool {
+        self.hand.move_to(&mut self.solver, grab, to)
+    }
+
+    /// Lets go of all that hangs on a grab's handle, and wakes the group; tells whether there is such a grab.
+    pub(crate) fn release(&mut self, grab: Grab) -> Result<bool, Error> {
+        let is_held = self.hand.release(&mut self.solver, grab)?;
+        if is_held {
+            self.wake();
+        }
+        Ok(is_held)
     }
 
     /// Lets solver, pieces, clusters, colors, schedule and volume constraints follow a cut of the mesh, and wakes it.

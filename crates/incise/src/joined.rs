@@ -10,12 +10,12 @@ use incise_mesh::{ParticleId, TetId, TetMesh};
 use incise_xpbd::{DistanceConstraint, Material};
 
 use crate::accuracy::{DEFAULT_ACCURACY, largest_kappas};
-use crate::backend::{AnySolver, each};
+use crate::backend::{AnySolver, each, each_mut, mass};
 use crate::body::Body;
 use crate::handle::Handle;
 use crate::limits::{existing, value};
 use crate::method::tet_solve;
-use crate::scene::{SolverSpec, Substeps};
+use crate::scene::{Precision, SolverSpec, Substeps};
 use crate::substeps::{Choice, TetDemand, choose};
 use crate::volume::Volumes;
 use crate::{Error, Scene, link};
@@ -100,6 +100,33 @@ impl Joined {
     /// The volume constraints of the group, if a body asks for them.
     pub(crate) fn volumes(&self) -> Option<Volumes> {
         Volumes::new(self.volume_compliances.clone())
+    }
+
+    /// The solver of a group whose mesh is `cuttable`, without what hangs on its particles.
+    pub(crate) fn solver(
+        &self,
+        precision: Precision,
+        cuttable: &CuttableMesh,
+    ) -> Result<AnySolver, Error> {
+        let mesh = cuttable.mesh();
+        let mut any = AnySolver::of_particles(precision, &mesh.positions);
+        each_mut!(&mut any, solver => {
+            for material in &self.materials {
+                let field = "body".to_owned();
+                solver.add_material(*material).map_err(|source| Error::Xpbd { field, source })?;
+            }
+            for (t, tet) in mesh.tets.iter().enumerate() {
+                solver.push_tet(tet.map(|p| p.0), mesh.corners(TetId::new(t)), self.material_of[t]);
+            }
+            let mut star = Vec::new();
+            for (p, &fixed) in self.fixed.iter().enumerate() {
+                solver.set_mass(p, mass(solver, cuttable, ParticleId::new(p), &mut star));
+                if fixed {
+                    solver.set_fixed(p, true);
+                }
+            }
+        });
+        Ok(any)
     }
 
     /// The substeps of the group: the most that a body asks for. Where it is left open, also how they were chosen.

@@ -2,7 +2,7 @@
 
 use incise_mesh::glam::DVec3;
 
-use crate::{Error, Scene};
+use crate::Error;
 
 /// Coordinates beyond this many meters are taken for a mistake; squares and cubes stay finite in single precision.
 pub(crate) const LARGEST_COORDINATE: f64 = 1e9;
@@ -59,40 +59,4 @@ pub(crate) fn within(field: &str, number: f64, low: f64, high: f64) -> Result<f6
         "finite".to_owned()
     };
     Err(value(field, number, range))
-}
-
-/// Refuses limits that are none.
-pub(crate) fn check(scene: &Scene) -> Result<(), Error> {
-    if let Some(accuracy) = scene.solver.accuracy
-        && !(accuracy > 0.0 && accuracy <= 1.0)
-    {
-        return Err(value("solver.accuracy", accuracy, "above 0 and at most 1"));
-    }
-    if let Some(budget) = scene.solver.budget_ms
-        && !(budget.is_finite() && budget > 0.0)
-    {
-        return Err(value("solver.budget_ms", budget, "positive and finite"));
-    }
-    let kappa = scene.solver.kappa_limit;
-    if kappa.is_nan() || kappa <= 0.0 {
-        return Err(value("solver.kappa_limit", kappa, "positive"));
-    }
-    if scene.solver.max_substeps == 0 {
-        return Err(value("solver.max_substeps", 0, "at least 1"));
-    }
-    if let Some(recluster) = scene.solver.recluster {
-        recluster.check()?;
-    }
-    if let Some(sleep) = scene.solver.sleep {
-        for (key, number) in [("speed", sleep.speed), ("time", sleep.time)] {
-            if !(number.is_finite() && number > 0.0) {
-                return Err(value(
-                    format!("solver.sleep.{key}"),
-                    number,
-                    "positive and finite",
-                ));
-            }
-        }
-    }
-    Ok(())
 }

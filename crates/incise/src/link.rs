@@ -1,42 +1,14 @@
-//! [`LinkSpec`]: sutures and springs between two points of bodies.
+//! Sutures and springs between two points of bodies, checked and handed to a solver.
 
 use glam::DVec3;
 use incise_coloring::{Order, greedy};
 use incise_graph::{Clustering, Incidence, Schedule};
 use incise_xpbd::DistanceConstraint;
-use serde::{Deserialize, Serialize};
 
 use crate::backend::{AnySolver, each_mut};
 use crate::limits::{LARGEST_COORDINATE, coordinates, existing, value, within};
+use crate::scene::{EndSpec, LinkSpec};
 use crate::{Error, Scene};
-
-/// Keeps two particles at a distance. A cut leaves it on its particles.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct LinkSpec {
-    /// One end.
-    pub from: EndSpec,
-    /// The other end.
-    pub to: EndSpec,
-    /// The length at rest in m; absent: the distance of both particles at rest.
-    pub length: Option<f64>,
-    /// One over the stiffness in m/N; 0 is a rod, or a thread that does not stretch.
-    #[serde(default)]
-    pub compliance: f64,
-    /// Whether it acts only while it is longer than at rest, as a thread does.
-    #[serde(default)]
-    pub only_when_longer: bool,
-}
-
-/// The particle of a body that is nearest to a point at rest.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct EndSpec {
-    /// The number of the body.
-    pub body: usize,
-    /// The point in m in the world.
-    pub point: [f64; 3],
-}
 
 /// The bodies that links join, if they all exist.
 pub(crate) fn pairs(scene: &Scene, bodies: usize) -> Result<Vec<[usize; 2]>, Error> {

@@ -8,7 +8,6 @@ use incise_cutting::CutError;
 
 use crate::Error;
 use crate::limits::coordinates;
-use crate::tool::long_enough;
 
 /// How far a blade is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,4 +83,17 @@ fn check(field: &str, pose: &[DVec3]) -> Result<(), Error> {
     let field = format!("{field}.blade");
     pose.iter()
         .try_for_each(|x| coordinates(&field, x.to_array()).map(drop))
+}
+
+/// Refuses a blade that is a point.
+pub(crate) fn long_enough(field: &str, blade: &[DVec3]) -> Result<(), Error> {
+    let length: f64 = blade.windows(2).map(|ends| ends[0].distance(ends[1])).sum();
+    if blade.len() < 2 || length == 0.0 {
+        let points = blade.len();
+        return Err(Error::Cut {
+            field: format!("{field}.blade"),
+            source: CutError::ShortBlade { points, length },
+        });
+    }
+    Ok(())
 }

@@ -4,21 +4,13 @@
 //! the bit. Cost: a pass over the particles or tets each.
 
 use glam::DVec3;
-use incise_xpbd::{Energy, Volume};
+use incise_xpbd::Volume;
 
 use crate::Error;
-use crate::backend::{LastSubstep, each};
+use crate::backend::{LastSubstep, State, each};
 use crate::group::Group;
 use crate::report::{BodyReport, ChosenMethod, EnergyReport, ResidualReport, SoftenedReport};
 use crate::scene::{Method, Quantity};
-
-/// What the state of a group is worth, as far as somebody asked.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct State {
-    pub(crate) energy: Option<Energy>,
-    pub(crate) volume: Option<Volume>,
-    pub(crate) max_speed: Option<f64>,
-}
 
 /// Whether a quantity is one of those.
 pub(crate) fn is_of_state(quantity: &Quantity) -> bool {

@@ -1,4 +1,4 @@
-//! [`Method`]: how a substep is solved, and which keys of a scene go with it.
+//! How the settings of a scene become those of a solver, and what `method = "auto"` takes.
 //!
 //! Gauss-Seidel, Jacobi and Chebyshev are ways through the same constraints of XPBD. VBD lowers the potential of the
 //! implicit step, in which damping, links, soft handles and volume constraints are terms, so it takes every scene.
@@ -7,101 +7,12 @@
 //! a frame for bodies that are too stiff for that.
 
 use incise_xpbd::{StepSettings, VbdSettings};
-use serde::{Deserialize, Serialize};
 
 use crate::accuracy::DEFAULT_ACCURACY;
 use crate::limits::{coordinates, value, within};
-use crate::scene::{SolverSpec, Substeps};
+use crate::scene::{Integrator, Method, SolverSpec, Substeps, TetSolve};
 use crate::substeps::{Choice, Missed};
 use crate::{Error, Scene, collider};
-
-/// How a substep is solved.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
-pub enum Method {
-    /// Gauss-Seidel, and two-level VBD for each body of which the accuracy needs more than `max_substeps`. VBD is taken
-    /// only where `substeps`, `iterations`, `relaxation`, `tet_solve` and `kappa_limit` have their defaults, not on a GPU, and
-    /// not in scenes with colliders: an impact of a stiff body does not converge in a frame.
-    #[default]
-    Auto,
-    /// Color after color, each constraint seeing the corrections before it.
-    GaussSeidel,
-    /// All constraints at once, corrections added up: see `incise_xpbd::Method::Jacobi`.
-    Jacobi,
-    /// Jacobi, extrapolated: see `incise_xpbd::Method::Chebyshev`.
-    Chebyshev,
-    /// No XPBD: particle by particle into the minimum of the implicit step's potential, see
-    /// `incise_xpbd::Solver::step_vbd`. Stable at any stiffness.
-    Vbd,
-}
-
-/// The rule by which VBD advances in time: see `incise_xpbd::Integrator`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
-pub enum Integrator {
-    /// The backward differentiation formula of two steps, second order.
-    #[default]
-    Bdf2,
-    /// Implicit Euler, first order: it damps vibrations much more.
-    ImplicitEuler,
-}
-
-impl Integrator {
-    pub(crate) fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
-
-    /// The solver's name of it.
-    pub(crate) fn of_solver(self) -> incise_xpbd::Integrator {
-        match self {
-            Self::Bdf2 => incise_xpbd::Integrator::Bdf2,
-            Self::ImplicitEuler => incise_xpbd::Integrator::ImplicitEuler,
-        }
-    }
-}
-
-/// How the elastic energy of a tet is solved.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
-pub enum TetSolve {
-    /// A shear part and a volume part that vanish at rest: bounded at any stiffness.
-    #[default]
-    Split,
-    /// `|F|` and `det F` as one system of two unknowns: unstable from a kappa of about 2 on unless `kappa_limit` softens.
-    Block,
-    /// One after the other, as in the paper.
-    Sequential,
-}
-
-impl SolverSpec {
-    /// The defaults that go with a method: those of [`SolverSpec::default`], but
-    ///
-    /// * Jacobi, Chebyshev and VBD take 20 `iterations`, as one of theirs does little;
-    /// * Jacobi and Chebyshev have a `relaxation` of 0.1: with 1 they overshoot where more than two tets meet;
-    /// * VBD takes one substep, as it is stable at any stiffness.
-    ///
-    /// ```
-    /// let scene = incise::Scene::from_toml("[solver]\nmethod = \"jacobi\"\niterations = 7")?;
-    /// assert_eq!((scene.solver.iterations, scene.solver.relaxation), (7, 0.1));
-    /// # Ok::<(), incise::Error>(())
-    /// ```
-    #[must_use]
-    pub fn of(method: Method) -> Self {
-        let mut spec = Self {
-            method,
-            ..Self::default()
-        };
-        match method {
-            Method::Auto | Method::GaussSeidel => {}
-            Method::Jacobi | Method::Chebyshev => (spec.iterations, spec.relaxation) = (20, 0.1),
-            Method::Vbd => (spec.substeps, spec.iterations) = (1.into(), 20),
-        }
-        spec
-    }
-}
 
 /// Rounds of two-level VBD in a frame, at most: what has not converged then is reported.
 const MOST_ROUNDS: u32 = 20;
@@ -112,6 +23,14 @@ pub(crate) fn tet_solve(form: TetSolve) -> incise_xpbd::TetSolve {
         TetSolve::Split => incise_xpbd::TetSolve::Split,
         TetSolve::Block => incise_xpbd::TetSolve::Block,
         TetSolve::Sequential => incise_xpbd::TetSolve::Sequential,
+    }
+}
+
+/// The solver's name of an integrator.
+pub(crate) fn integrator(integrator: Integrator) -> incise_xpbd::Integrator {
+    match integrator {
+        Integrator::Bdf2 => incise_xpbd::Integrator::Bdf2,
+        Integrator::ImplicitEuler => incise_xpbd::Integrator::ImplicitEuler,
     }
 }
 

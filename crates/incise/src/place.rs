@@ -9,30 +9,10 @@ use std::sync::Arc;
 
 #[cfg(feature = "gpu")]
 use incise_gpu::{GpuContext, GpuOptions};
-use serde::{Deserialize, Serialize};
 
 use crate::limits::value;
-use crate::scene::{Method, Precision};
+use crate::scene::{Backend, Method, Precision};
 use crate::{Error, Scene};
-
-/// Where a scene is to be computed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Backend {
-    /// On the processor.
-    #[default]
-    Cpu,
-    /// On a GPU; an error if there is none or it cannot do what the scene asks for. Needs the feature `gpu`.
-    Gpu,
-    /// On a GPU if there is a real one that can, else on the processor.
-    Auto,
-}
-
-impl Backend {
-    pub(crate) fn is_cpu(&self) -> bool {
-        *self == Self::Cpu
-    }
-}
 
 /// A device that is open, if one is.
 #[derive(Clone, Debug, Default)]

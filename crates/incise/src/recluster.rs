@@ -14,48 +14,13 @@
 //!
 //! The paper leaves this open. Cost: clustering and coloring in the background; beside it two divisions a frame.
 
-use std::num::NonZeroU32;
 use std::thread::JoinHandle;
 
 use incise_cutting::{CutDelta, CuttableMesh};
-use serde::{Deserialize, Serialize};
 
+use crate::Error;
 use crate::plan::{Plan, Recipe};
-use crate::{Error, limits};
-
-/// When clusters and colors are made anew in the background, and how long that may take.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ReclusterSpec {
-    /// How far they may wear first, above 1: the number of colors over that of the last whole plan, or the mean cluster
-    /// size of that over the present one, whichever is larger.
-    #[serde(default = "five_quarters")]
-    pub wear: f64,
-    /// After how many frames the new ones are taken, at least 1. A frame that comes too early waits for them.
-    #[serde(default = "ten")]
-    pub frames: NonZeroU32,
-}
-
-fn five_quarters() -> f64 {
-    1.25
-}
-fn ten() -> NonZeroU32 {
-    NonZeroU32::MIN.saturating_add(9)
-}
-
-impl ReclusterSpec {
-    /// Refuses a limit that the first cut would exceed, or none.
-    pub(crate) fn check(&self) -> Result<(), Error> {
-        if self.wear.is_finite() && self.wear > 1.0 {
-            return Ok(());
-        }
-        Err(limits::value(
-            "solver.recluster.wear",
-            self.wear,
-            "above 1 and finite",
-        ))
-    }
-}
+use crate::scene::ReclusterSpec;
 
 /// What watches over the wear of a plan.
 #[derive(Debug)]

@@ -1,39 +1,10 @@
-//! [`Region`] of a scene file; [`Solid`]: one in space, and which particles of a body lie in it.
+//! [`Solid`]: a region of a scene in space, and which particles of a body lie in it.
 
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::limits::{coordinates, direction, value};
-
-/// Some of a body's particles.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Region {
-    /// Those on the side of a plane that its normal points to.
-    HalfSpace {
-        /// A point on the plane.
-        point: [f64; 3],
-        /// Its normal.
-        normal: [f64; 3],
-    },
-    /// Those in an axis-aligned box.
-    Box {
-        /// The corner with the smallest coordinates.
-        low: [f64; 3],
-        /// The corner with the largest coordinates.
-        high: [f64; 3],
-    },
-    /// Those in a sphere.
-    Sphere {
-        /// Its center.
-        center: [f64; 3],
-        /// Its radius.
-        radius: f64,
-    },
-    /// Those with these numbers in the body's mesh.
-    Particles(Vec<u32>),
-}
+use crate::scene::Region;
 
 /// A part of space.
 #[derive(Clone, Copy, Debug)]

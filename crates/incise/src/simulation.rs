@@ -4,6 +4,8 @@
 //! advance, those of different groups of bodies in parallel; the report is made. A frame without a cut touches only the
 //! solvers.
 
+mod builder;
+mod edit;
 mod live;
 mod retune;
 mod snapshot;
@@ -20,13 +22,13 @@ use incise_mesh::{Surface, TetMesh};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use crate::body::Body;
+use crate::body;
 use crate::budget;
-use crate::builder::SimulationBuilder;
+use crate::collider::Colliders;
 use crate::group::Group;
 use crate::islands::islands;
 use crate::joined::Joined;
-use crate::limits::{self, value};
+use crate::limits::value;
 use crate::measure::{kappa, softened};
 use crate::method::settings;
 use crate::pieces::PieceNumbers;
@@ -38,8 +40,9 @@ use crate::scene::{Precision, Quantity, SolverSpec, StrokeSpec};
 use crate::strokes::Timeline;
 use crate::warning::{Warning, WarningCode};
 use crate::whole::Whole;
-use crate::{Error, Scene, link};
+use crate::{Error, Event, Scene, collider, link};
 
+pub use builder::{Body, BodyHandle, SimulationBuilder};
 pub use snapshot::Snapshot;
 
 /// A scene in motion.
@@ -80,6 +83,8 @@ pub struct Simulation {
     /// The frame since which time steps have been as long, and the simulated time in s at its start.
     epoch: (u64, f64),
     gravity: Option<DVec3>,
+    /// The names of the colliders in the settings of all groups.
+    colliders: Colliders,
     quantities: Vec<Quantity>,
     every: u64,
     precision: Precision,
@@ -96,6 +101,8 @@ pub struct Simulation {
     on_cut: Vec<bool>,
     /// What the strokes of the last frame changed.
     deltas: Vec<CutDelta>,
+    /// What happened in the last frame.
+    events: Vec<Event>,
     next_frame: u64,
     report: FrameReport,
     /// Whether the solvers have the residuals of the last frame.
@@ -152,8 +159,8 @@ impl Simulation {
         if scene.report.every == 0 {
             return Err(value("report.every", 0, "at least 1"));
         }
-        limits::check(scene)?;
-        let bodies = Body::all(scene, meshes)?;
+        crate::scene::check(scene)?;
+        let bodies = body::Body::all(scene, meshes)?;
         let islands = islands(bodies.len(), &link::pairs(scene, bodies.len())?);
         let several = islands.iter().any(|&island| island > 0);
         let whole = several.then(|| Whole::new(&bodies, &islands));
@@ -181,7 +188,7 @@ impl Simulation {
         };
         if scene.solver.precision == Precision::Auto && !place.is_device() && short() {
             precision = Precision::F64;
-            let bodies = Body::all(scene, meshes)?;
+            let bodies = body::Body::all(scene, meshes)?;
             groups = make_groups(precision, Joined::all(scene, bodies, &islands)?)?;
         }
         if let Some(budget) = scene.solver.budget_ms {
@@ -204,6 +211,7 @@ impl Simulation {
             time_step: settings.time_step,
             epoch: (0, 0.0),
             gravity: settings.gravity,
+            colliders: Colliders::new(scene),
             quantities: scene.report.quantities.clone(),
             every: scene.report.every,
             precision,
@@ -211,6 +219,7 @@ impl Simulation {
             at_hand: AtHand::default(),
             on_cut: Vec::new(),
             deltas: Vec::new(),
+            events: Vec::new(),
             pieces: PieceNumbers::new(&groups),
             groups,
             whole,
@@ -281,6 +290,15 @@ impl Simulation {
             repaired += self.fetch(&mut ms)?;
         }
         let cut = self.carry_out_strokes(&mut detached, &mut ms)?;
+        self.events = self.timeline.take_events();
+        let ended = |event: &Event| matches!(event, Event::CutEnded { .. });
+        let first_end = self
+            .events
+            .iter()
+            .position(ended)
+            .unwrap_or(self.events.len());
+        let detached_now = detached.iter().copied().map(Event::PieceDetached);
+        self.events.splice(first_end..first_end, detached_now);
         if cut.is_some() {
             self.judge_cuts();
         }
@@ -291,10 +309,22 @@ impl Simulation {
 
         let before_solve = Instant::now();
         let (frame, residual) = (self.next_frame, self.wants(Quantity::Residual));
+        let moves = self.colliders.take_moves();
+        for group in &mut self.groups {
+            for &(place, to) in &moves {
+                collider::send(&mut group.settings.colliders[place], to, self.time_step);
+            }
+        }
         let groups = self.groups.par_iter_mut();
-        repaired += groups
+        let solved = groups
             .map(|group| group.step(frame, residual).map(|step| step.repaired))
-            .try_reduce(|| 0, |a, b| Ok(a + b))?;
+            .try_reduce(|| 0, |a, b| Ok(a + b));
+        for group in &mut self.groups {
+            for &(place, to) in &moves {
+                collider::arrive(&mut group.settings.colliders[place], to);
+            }
+        }
+        repaired += solved?;
         ms.solve = milliseconds(before_solve.elapsed());
         self.residuals_kept = residual;
 
@@ -456,6 +486,12 @@ impl Simulation {
     #[must_use]
     pub fn surface(&self) -> Surface {
         self.mesh().surface()
+    }
+
+    /// What happened in the last frame: cuts that began, pieces that came off, cuts that ended.
+    #[must_use]
+    pub fn events(&self) -> &[Event] {
+        &self.events
     }
 
     /// What the strokes of the last frame changed, in the order in which they did, in the numbers of

@@ -10,27 +10,7 @@
 //!
 //! Source: sleeping islands as in rigid body engines. Cost: a pass over the particles a frame while awake, none asleep.
 
-use serde::{Deserialize, Serialize};
-
-/// When a body falls asleep.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SleepSpec {
-    /// The largest speed in m/s of a particle that still counts as rest, positive. Choose it below the speed after one
-    /// frame of free fall (0.16 m/s at 0.016 s), or a body falls asleep before it falls.
-    #[serde(default = "millimeter_per_second")]
-    pub speed: f64,
-    /// For how long in s a body must rest before it sleeps, positive.
-    #[serde(default = "half_a_second")]
-    pub time: f64,
-}
-
-fn millimeter_per_second() -> f64 {
-    1e-3
-}
-fn half_a_second() -> f64 {
-    0.5
-}
+use crate::scene::SleepSpec;
 
 /// The rest of a group.
 #[derive(Clone, Copy, Debug)]

@@ -5,13 +5,12 @@ use incise_cutting::{
     CutDelta, CutMemory, CutOptions, Sweep, carve, cut_level_set, cut_plane, cut_surface_joining,
 };
 
-use crate::Error;
 use crate::group::Group;
 use crate::limits::value;
 use crate::live_blade::LiveBlade;
-use crate::scene::StrokeSpec;
-use crate::stroke_spec::pose;
+use crate::scene::{StrokeSpec, pose};
 use crate::tool::{Tool, tool};
+use crate::{Error, Event};
 
 /// A stroke and how far it is.
 #[derive(Clone, Debug)]
@@ -23,6 +22,8 @@ struct Stroke {
     frames: [u64; 2],
     /// One for each group of bodies once a blade has its first pose.
     sweeps: Vec<Sweep>,
+    /// Whether it has changed a mesh.
+    has_cut: bool,
 }
 
 /// The strokes that are not finished.
@@ -34,6 +35,8 @@ pub(crate) struct Timeline {
     tolerance: f64,
     /// For each group what its strokes leave for later ones to join; empty before the first stroke.
     memories: Vec<CutMemory>,
+    /// Strokes that began or ended to cut since the events were taken.
+    events: Vec<Event>,
 }
 
 impl Timeline {
@@ -79,6 +82,7 @@ impl Timeline {
             options,
             frames,
             sweeps: Vec::new(),
+            has_cut: false,
         });
         self.added += 1;
         Ok(())
@@ -103,7 +107,8 @@ impl Timeline {
     pub(crate) fn end(&mut self, stroke: u32) -> Result<(), Error> {
         let (place, _, blade) = self.live(stroke)?;
         if !blade.end() {
-            self.strokes.remove(place);
+            let stroke = self.strokes.remove(place);
+            self.events.extend(stroke.end());
         }
         Ok(())
     }
@@ -135,6 +140,11 @@ impl Timeline {
         UNDER_WAY * particles * under_way.count() + REMEMBERED * remembered
     }
 
+    /// The strokes that began or ended to cut since the last call.
+    pub(crate) fn take_events(&mut self) -> Vec<Event> {
+        std::mem::take(&mut self.events)
+    }
+
     /// Whether a stroke begins or goes on in a frame.
     pub(crate) fn is_due(&self, frame: u64) -> bool {
         self.strokes.iter().any(|stroke| stroke.frames[0] <= frame)
@@ -161,6 +171,10 @@ impl Timeline {
                 if delta.is_empty() {
                     continue;
                 }
+                if !std::mem::replace(&mut stroke.has_cut, true) {
+                    let stroke = stroke.options.tag;
+                    self.events.push(Event::CutBegan { stroke });
+                }
                 delta.extend_particles(&mut group.positions);
                 for other in self.strokes.iter_mut().enumerate().filter(|(j, _)| *j != i) {
                     if let Some(sweep) = other.1.sweeps.get_mut(g) {
@@ -170,15 +184,28 @@ impl Timeline {
                 follow(g, group, &delta)?;
             }
         }
-        self.strokes.retain_mut(|stroke| match &mut stroke.tool {
-            Tool::Live(blade) => blade.arrive(),
-            _ => frame < stroke.frames[1],
+        let events = &mut self.events;
+        self.strokes.retain_mut(|stroke| {
+            let goes_on = match &mut stroke.tool {
+                Tool::Live(blade) => blade.arrive(),
+                _ => frame < stroke.frames[1],
+            };
+            if !goes_on {
+                events.extend(stroke.end());
+            }
+            goes_on
         });
         Ok(())
     }
 }
 
 impl Stroke {
+    /// What its end is to the world.
+    fn end(&self) -> Option<Event> {
+        let stroke = self.options.tag;
+        self.has_cut.then_some(Event::CutEnded { stroke })
+    }
+
     /// Cuts, or moves, in the group of the given number.
     fn advance(
         &mut self,
@@ -224,37 +251,5 @@ impl Stroke {
             memory.follow(&group.cuttable, &delta, &self.options);
         }
         Ok(Some(delta))
-    }
-}
-
-/// The point at a fraction of a path whose points are passed at equal times.
-pub(crate) fn along(path: &[[f64; 3]], fraction: f64) -> DVec3 {
-    let (mut from, mut to, mut rest) = (path[0], path[0], fraction * (path.len() - 1) as f64);
-    for &next in &path[1..] {
-        (from, to) = (to, next);
-        if rest <= 1.0 {
-            break;
-        }
-        rest -= 1.0;
-    }
-    DVec3::from_array(from).lerp(DVec3::from_array(to), rest.min(1.0))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_path_passes_through_its_points() {
-        let path = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 4.0, 0.0]];
-        for (fraction, expected) in [
-            (0.0, [0.0, 0.0, 0.0]),
-            (0.25, [0.5, 0.0, 0.0]),
-            (0.5, [1.0, 0.0, 0.0]),
-            (0.75, [1.0, 2.0, 0.0]),
-            (1.0, [1.0, 4.0, 0.0]),
-        ] {
-            assert_eq!(along(&path, fraction).to_array(), expected);
-        }
     }
 }

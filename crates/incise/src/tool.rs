@@ -5,7 +5,7 @@ use incise_cutting::{CutError, Plane, TriangleSurface};
 
 use crate::Error;
 use crate::limits::{coordinates, direction, value};
-use crate::live_blade::LiveBlade;
+use crate::live_blade::{LiveBlade, long_enough};
 use crate::region::Solid;
 use crate::scene::{Region, StrokeSpec};
 
@@ -97,19 +97,6 @@ pub(crate) fn tool(field: &str, spec: &StrokeSpec) -> Result<(Tool, f64), Error>
             (Tool::Sweep { blade, path }, *snap)
         }
     })
-}
-
-/// Refuses a blade that is a point.
-pub(crate) fn long_enough(field: &str, blade: &[DVec3]) -> Result<(), Error> {
-    let length: f64 = blade.windows(2).map(|ends| ends[0].distance(ends[1])).sum();
-    if blade.len() < 2 || length == 0.0 {
-        let points = blade.len();
-        return Err(Error::Cut {
-            field: format!("{field}.blade"),
-            source: CutError::ShortBlade { points, length },
-        });
-    }
-    Ok(())
 }
 
 fn solid(field: &str, region: &Region) -> Result<Solid, Error> {

@@ -63,7 +63,7 @@ impl<R: Real> Vbd<R> {
             color_count: coloring.color_count(),
             correction,
             accuracy: spec.accuracy,
-            integrator: spec.integrator.of_solver(),
+            integrator: method::integrator(spec.integrator),
             last: VbdReport::default(),
         })
     }

@@ -13,7 +13,6 @@ use incise::scene::{ColliderSpec, GroundSpec};
 use incise::{Scene, Simulation};
 
 use crate::palette::{self, Legend, decades, legend_from};
-use crate::pick::{self, Hit};
 use crate::piece_colors::PieceNumbers;
 use crate::{ColorBy, RenderError, stretch};
 
@@ -286,15 +285,6 @@ impl Painting {
         let word = self.colors.get(triangle).copied().unwrap_or(NONE);
         let [r, g, b, alpha] = word.to_le_bytes();
         (alpha > 0).then_some([r, g, b])
-    }
-
-    /// The first triangle that a ray meets, for particles at `positions`. O(triangles).
-    ///
-    /// # Panics
-    /// If a particle has no position.
-    #[must_use]
-    pub fn pick(&self, positions: &[DVec3], origin: DVec3, direction: DVec3) -> Option<Hit> {
-        pick::pick(&self.skin, positions, origin, direction)
     }
 
     /// The colors that a style shows: one for each triangle, or none at all.

@@ -14,7 +14,7 @@ use crate::jacobi::Jacobi;
 use crate::layout::Layout;
 use crate::neo_hookean::TetConstraint;
 use crate::origin::frame_of;
-use crate::real::{finite, load, store};
+use crate::real::{finite, load, store, weight};
 use crate::scalar::Constraints;
 use crate::volume::TetVolume;
 use crate::{Changes, KappaLimit, Material, Real, TetSolve, XpbdError};
@@ -422,6 +422,15 @@ impl<R: Real> Solver<R> {
     #[must_use]
     pub fn is_fixed(&self, particle: usize) -> bool {
         self.fixed[particle]
+    }
+
+    /// Whether forces move a particle: it is neither fixed nor rigidly attached, and has a mass.
+    ///
+    /// # Panics
+    /// If the particle does not exist.
+    #[must_use]
+    pub fn is_free(&self, particle: usize) -> bool {
+        weight::<R>(&self.particles[particle]) > R::ZERO
     }
 
     /// The mass of a particle in kg.

@@ -17,7 +17,7 @@ use crate::backend::AnySolver;
 use crate::budget;
 use crate::group::{Group, adopt, kappa_limit};
 use crate::joined::substeps;
-use crate::limits::{self, value};
+use crate::limits::value;
 use crate::method::{leaves_open, resolve, settings};
 use crate::place::Place;
 use crate::plan::{Plan, Recipe};
@@ -123,7 +123,7 @@ impl Simulation {
             ..Scene::default()
         };
         let settings = settings(&scene)?;
-        limits::check(&scene)?;
+        crate::scene::check(&scene)?;
         let place = self.place_for(&scene)?;
         if !is_light(&self.solver, solver) {
             self.read_back()?;
@@ -250,6 +250,7 @@ impl Retuned {
         let mesh = group.cuttable.mesh();
         let mut settings = StepSettings {
             substeps: group.settings.substeps,
+            gravity: group.settings.gravity,
             colliders: group.settings.colliders.clone(),
             ..settings.clone()
         };

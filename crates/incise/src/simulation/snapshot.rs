@@ -10,7 +10,10 @@
 
 use std::sync::Arc;
 
+use glam::DVec3;
+
 use super::Simulation;
+use crate::collider::Colliders;
 use crate::group::Group;
 use crate::limits::value;
 use crate::pieces::PieceNumbers;
@@ -29,6 +32,8 @@ pub struct Snapshot {
     solver: SolverSpec,
     time_step: f64,
     epoch: (u64, f64),
+    gravity: Option<DVec3>,
+    colliders: Colliders,
     quantities: Vec<Quantity>,
     every: u64,
     place: Place,
@@ -126,8 +131,9 @@ impl Simulation {
             solver,
             time_step,
             epoch,
+            gravity,
+            colliders,
             // Of the scene, which does not change.
-            gravity: _,
             precision: _,
             quantities,
             every,
@@ -141,6 +147,7 @@ impl Simulation {
             on_cut,
             // Of the last frame only.
             deltas: _,
+            events: _,
             next_frame,
             report,
             residuals_kept,
@@ -151,6 +158,8 @@ impl Simulation {
             solver: solver.clone(),
             time_step: *time_step,
             epoch: *epoch,
+            gravity: *gravity,
+            colliders: colliders.clone(),
             quantities: quantities.clone(),
             every: *every,
             place: place.clone(),
@@ -187,7 +196,7 @@ impl Simulation {
         let groups = snapshot.groups.clone();
         #[cfg(feature = "gpu")]
         let groups = match &snapshot.place.gpu {
-            Some(gpu) => crate::device::take_over(&mut self.groups, groups, gpu, &snapshot.solver)?,
+            Some(gpu) => take_over(&mut self.groups, groups, gpu, &snapshot.solver)?,
             None => groups,
         };
         let Snapshot {
@@ -195,6 +204,8 @@ impl Simulation {
             solver,
             time_step,
             epoch,
+            gravity,
+            colliders,
             quantities,
             every,
             place,
@@ -211,6 +222,8 @@ impl Simulation {
         self.solver = solver.clone();
         self.time_step = *time_step;
         self.epoch = *epoch;
+        self.gravity = *gravity;
+        self.colliders.restore(colliders);
         self.quantities.clone_from(quantities);
         self.every = *every;
         self.leave_device();
@@ -221,6 +234,7 @@ impl Simulation {
         self.timeline = timeline.clone();
         self.on_cut.clone_from(on_cut);
         self.deltas.clear();
+        self.events.clear();
         self.next_frame = *next_frame;
         self.report = report.clone();
         self.residuals_kept = *residuals_kept;
@@ -261,4 +275,42 @@ fn is_same(a: &Arc<Scene>, b: &Arc<Scene>) -> bool {
             &b.link,
             &b.stroke,
         ) && a.solver.precision == b.solver.precision
+}
+
+/// Takes the solvers of `new` groups, which are on the processor, to a device; where `old` ones are there already, they
+/// lend their kernels and memory.
+///
+/// # Errors
+/// If the device is lost or out of memory; the old groups are as they were.
+#[cfg(feature = "gpu")]
+fn take_over(
+    old: &mut [Group],
+    mut new: Vec<Group>,
+    gpu: &Arc<crate::gpu::GpuContext>,
+    spec: &SolverSpec,
+) -> Result<Vec<Group>, Error> {
+    use crate::backend::AnySolver;
+    let mut lent = Vec::with_capacity(new.len());
+    for (old, new) in old.iter().zip(&mut new) {
+        let lends = match &old.solver {
+            AnySolver::Device(device) => device.serves(gpu, spec)?,
+            _ => false,
+        };
+        if !lends {
+            new.solver.take_to(gpu, spec)?;
+        }
+        lent.push(lends);
+    }
+    for ((old, new), lent) in old.iter_mut().zip(&mut new).zip(lent) {
+        if lent {
+            std::mem::swap(&mut old.solver, &mut new.solver);
+            if let (AnySolver::Device(device), AnySolver::Single(backend)) =
+                (&mut new.solver, &mut old.solver)
+            {
+                let host = std::mem::replace(&mut backend.solver, incise_xpbd::Solver::new(&[]));
+                device.solver.replace(host);
+            }
+        }
+    }
+    Ok(new)
 }

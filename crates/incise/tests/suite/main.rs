@@ -11,6 +11,7 @@ mod conservation;
 mod constraints;
 mod cutting;
 mod determinism;
+mod edits;
 #[cfg(feature = "gpu")]
 mod gpu;
 #[cfg(feature = "gpu")]

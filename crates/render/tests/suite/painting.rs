@@ -224,56 +224,6 @@ fn residuals_are_one_a_tet() {
     assert_eq!(legend.color(7.0), legend.color(1.0));
 }
 
-/// The six volumes that a line has with the edges of a triangle tell whether it goes through: no division, no plane.
-fn goes_through(corners: [DVec3; 3], origin: DVec3, direction: DVec3) -> Option<f64> {
-    let to = corners.map(|x| x - origin);
-    let sides = [0, 1, 2].map(|i| direction.dot(to[i].cross(to[(i + 1) % 3])));
-    let inside = sides.iter().all(|&side| side >= 0.0) || sides.iter().all(|&side| side <= 0.0);
-    let total: f64 = sides.iter().sum();
-    if !inside || total == 0.0 {
-        return None;
-    }
-    let point = (to[2] * sides[0] + to[0] * sides[1] + to[1] * sides[2]) / total;
-    let distance = point.dot(direction) / direction.length_squared();
-    (distance > 0.0).then_some(distance)
-}
-
-#[test]
-fn rays_hit_the_first_triangle() {
-    let shown = Shown::new(STROKES, 9);
-    let (painting, positions) = (&shown.painting, shown.simulation.positions());
-    let mut camera = shown.camera();
-    // Where a part was taken away.
-    (camera.azimuth, camera.elevation) = (-2.4, -0.4);
-    let skin = painting.skin();
-    let (mut hits, mut cut) = (0, 0);
-    for (x, y) in (0..24).flat_map(|x| (0..18).map(move |y| (x, y))) {
-        let pixel = [f64::from(x) + 0.3, f64::from(y) + 0.4];
-        let (origin, direction) = camera.ray(pixel, [24.0, 18.0]);
-        let corners = skin.triangles().iter();
-        let corners =
-            corners.map(|t| t.map(|v| positions[skin.vertices()[v as usize].particle.index()]));
-        let distances = corners.filter_map(|corners| goes_through(corners, origin, direction));
-        let nearest = distances.min_by(f64::total_cmp);
-        let hit = painting.pick(positions, origin, direction);
-        assert_eq!(hit.is_some(), nearest.is_some(), "{pixel:?}");
-        let (Some(hit), Some(nearest)) = (hit, nearest) else {
-            continue;
-        };
-        // Two ways to compute one number of size 1.
-        assert!((hit.distance - nearest).abs() < 1e-9);
-        assert!((hit.point - (origin + direction * nearest)).length() < 1e-9);
-        let of_tet = shown.simulation.mesh().tets[hit.tet.index()];
-        assert!(hit.particles.iter().all(|p| of_tet.contains(p)));
-        assert_eq!(hit.tag, skin.tag(hit.triangle));
-        hits += 1;
-        cut += usize::from(hit.tag != FaceTag::Outer);
-    }
-    assert!(hits > 60 && cut > 0, "{hits} hits, {cut} on cut faces");
-    let away = painting.pick(positions, camera.eye(), -camera.forward());
-    assert_eq!(away, None);
-}
-
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 

@@ -191,9 +191,7 @@ impl Stage {
     fn surface_at(&mut self, pixel: [f64; 2], size: [f64; 2]) -> anyhow::Result<Option<f64>> {
         self.simulation.read_back()?;
         let (origin, direction) = self.camera.ray(pixel, size);
-        let hit = self
-            .painting
-            .pick(self.simulation.positions(), origin, direction);
+        let hit = self.simulation.ray_cast(origin, direction);
         Ok(hit.map(|hit| hit.distance))
     }
 
@@ -203,7 +201,7 @@ impl Stage {
         self.simulation.read_back()?;
         let (origin, direction) = self.camera.ray(pixel, size);
         let positions = self.simulation.positions();
-        let Some(hit) = self.painting.pick(positions, origin, direction) else {
+        let Some(hit) = self.simulation.ray_cast(origin, direction) else {
             return Ok(false);
         };
         // A hand that is smaller than a triangle takes its nearest corner.

@@ -327,8 +327,8 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
                 }
                 let (mut sum, mut neighbors) = (R::ZERO, R::ZERO);
                 for q in around {
-                    sum = sum + taken_back[q as usize];
-                    neighbors = neighbors + R::ONE;
+                    sum += taken_back[q as usize];
+                    neighbors += R::ONE;
                 }
                 if neighbors > R::ZERO {
                     taken_back[p as usize] = sum / neighbors;
@@ -380,13 +380,14 @@ impl<'a, R: Real> ImplicitStep<'a, R> {
         let whole = self.potentials().total;
         at(0.5);
         let half = self.potentials().total;
-        if !(half < whole) {
+        if half >= whole || !half.is_finite() {
             at(1.0);
             return false;
         }
         at(0.0);
         let none = self.potentials();
-        if !(kinetic <= accuracy * accuracy * none.elastic) {
+        let allowed = accuracy * accuracy * none.elastic;
+        if kinetic > allowed || !allowed.is_finite() {
             at(1.0);
             return false;
         }

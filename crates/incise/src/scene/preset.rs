@@ -5,8 +5,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::{Method, SolverSpec, Substeps, TetSolve};
 use crate::Error;
-use crate::scene::{Method, SolverSpec, Substeps, TetSolve};
 
 /// Other defaults for the keys of `[solver]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

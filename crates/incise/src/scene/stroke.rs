@@ -6,8 +6,7 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use crate::scene::Region;
-use crate::strokes::along;
+use super::Region;
 
 /// A cut.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -147,6 +146,19 @@ pub(crate) fn pose(
     blade.map(|x| x + offset).collect()
 }
 
+/// The point at a fraction of a path whose points are passed at equal times.
+pub(crate) fn along(path: &[[f64; 3]], fraction: f64) -> DVec3 {
+    let (mut from, mut to, mut rest) = (path[0], path[0], fraction * (path.len() - 1) as f64);
+    for &next in &path[1..] {
+        (from, to) = (to, next);
+        if rest <= 1.0 {
+            break;
+        }
+        rest -= 1.0;
+    }
+    DVec3::from_array(from).lerp(DVec3::from_array(to), rest.min(1.0))
+}
+
 fn tenth() -> f64 {
     0.1
 }
@@ -174,5 +186,19 @@ mod tests {
         assert_eq!(sweep([3, 3], &path).blade_at(3), None);
         assert_eq!(sweep([7, 3], &path).blade_at(5), None);
         assert_eq!(sweep([3, 7], &[]).blade_at(5), None);
+    }
+
+    #[test]
+    fn a_path_passes_through_its_points() {
+        let path = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 4.0, 0.0]];
+        for (fraction, expected) in [
+            (0.0, [0.0, 0.0, 0.0]),
+            (0.25, [0.5, 0.0, 0.0]),
+            (0.5, [1.0, 0.0, 0.0]),
+            (0.75, [1.0, 2.0, 0.0]),
+            (1.0, [1.0, 4.0, 0.0]),
+        ] {
+            assert_eq!(along(&path, fraction).to_array(), expected);
+        }
     }
 }

@@ -10,6 +10,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use incise_mesh::TetMesh;
 
+use crate::collider::ColliderHandle;
 use crate::limits::value;
 use crate::place::{AtHand, Place};
 use crate::scene::{
@@ -204,10 +205,11 @@ impl SimulationBuilder {
         handle
     }
 
-    /// Adds an obstacle.
-    pub fn add_collider(&mut self, collider: ColliderSpec) -> &mut Self {
+    /// Adds an obstacle, which [`Simulation::move_collider`] moves.
+    pub fn add_collider(&mut self, collider: ColliderSpec) -> ColliderHandle {
+        let handle = ColliderHandle::of_scene(self.scene.collider.len());
         self.scene.collider.push(collider);
-        self
+        handle
     }
 
     /// Adds an attachment: a part of a body that is held or moved.

@@ -1,0 +1,198 @@
+//! [`SolverSpec`]: how a scene is computed.
+
+use std::num::NonZeroU32;
+
+use serde::{Deserialize, Serialize};
+
+use super::{Integrator, Method, Preset, Substeps, TetSolve};
+
+/// How it is computed.
+///
+/// Some defaults depend on the method: see [`SolverSpec::of`]. Those and a preset's are applied when a scene is read.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SolverSpec {
+    /// Other defaults for the keys below: `paper`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub preset: Option<Preset>,
+    /// Time of a frame in s.
+    pub time_step: f64,
+    /// The largest error wanted, as a fraction of the motion, above 0 and at most 1; absent: 0.1. Decides what
+    /// `substeps = "auto"` and `method = "auto"` take, and, if given, ends the rounds of two-level VBD.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accuracy: Option<f64>,
+    /// The time in ms that a frame may take on this machine, positive; absent: no limit. Substeps that are chosen, and the
+    /// method, are fitted to it: with `accuracy` no more than that needs, without it as many as fit. Runs then differ from
+    /// each other. Not on a GPU.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub budget_ms: Option<f64>,
+    /// Equal parts of a frame: a number, or `auto`, which chooses for each body by the accuracy.
+    pub substeps: Substeps,
+    /// The most substeps that `auto` takes.
+    pub max_substeps: u32,
+    /// Passes over the constraints in a substep, or sweeps of VBD. With Gauss-Seidel 1 is what converges.
+    pub iterations: u32,
+    /// How a substep is solved: `auto`, `gauss-seidel`, `jacobi`, `chebyshev` or `vbd`.
+    pub method: Method,
+    /// How the elastic energy of a tet is solved. VBD has no constraints.
+    pub tet_solve: TetSolve,
+    /// Factor on each correction.
+    pub relaxation: f64,
+    /// For Chebyshev: the spectral radius of the Jacobi iteration, from 0 to below 1: the larger, the bolder. At 0.99
+    /// the weights tend to 1.75, which they reach in some ten iterations; more pays only with hundreds of them.
+    pub spectral_radius: f64,
+    /// For Chebyshev: plain iterations before the first extrapolation, at least 1. They damp what extrapolation would
+    /// blow up.
+    pub delay: u32,
+    /// For VBD: whether each sweep is followed by a correction of the whole body, which costs some 100 sweeps.
+    #[serde(skip_serializing_if = "is_false")]
+    pub two_level: bool,
+    /// For VBD: how a substep advances in time, `bdf2` or `implicit-euler`.
+    #[serde(skip_serializing_if = "Integrator::is_default")]
+    pub integrator: Integrator,
+    /// How constraints are put together: `none` or `serial:K`.
+    pub clustering: String,
+    /// Whether clusters that a cut leaves small are merged with neighbors. It makes a cut a little dearer, and all frames
+    /// after many cuts cheaper; without it clusters shrink and colors grow with every cut, as in the paper.
+    #[serde(skip_serializing_if = "is_true")]
+    pub merge_clusters: bool,
+    /// When clusters and colors that many cuts have worn are made anew, in the background; absent: never.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recluster: Option<ReclusterSpec>,
+    /// How clusters are colored, by the name of an [`Algorithm`](incise_coloring::Algorithm). Clusters that cuts make are
+    /// colored one by one, until they need more colors than they should; then all are colored anew, with `auto`.
+    pub coloring: String,
+    /// Width of the numbers.
+    pub precision: Precision,
+    /// Where it is computed: `cpu`, `gpu` or `auto`. On a GPU clusters of up to 32 tets are a thread's work each, larger
+    /// ones, up to 256, that of a workgroup.
+    #[serde(skip_serializing_if = "Backend::is_cpu")]
+    pub backend: Backend,
+    /// Largest kappa of a tet, positive: stiffer ones, as cuts leave them, are softened to it. `inf`, the default,
+    /// softens none.
+    pub kappa_limit: f64,
+    /// Bodies at rest are not solved until they are cut or something moves them; absent: all are always solved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sleep: Option<SleepSpec>,
+}
+
+impl Default for SolverSpec {
+    fn default() -> Self {
+        Self {
+            preset: None,
+            time_step: 0.016,
+            accuracy: None,
+            budget_ms: None,
+            substeps: Substeps::Auto,
+            max_substeps: 200,
+            iterations: 1,
+            method: Method::Auto,
+            tet_solve: TetSolve::Split,
+            relaxation: 1.0,
+            spectral_radius: 0.99,
+            delay: 10,
+            two_level: false,
+            integrator: Integrator::Bdf2,
+            clustering: "serial:10".to_owned(),
+            merge_clusters: true,
+            recluster: None,
+            coloring: "auto".to_owned(),
+            precision: Precision::Auto,
+            backend: Backend::Cpu,
+            kappa_limit: f64::INFINITY,
+            sleep: None,
+        }
+    }
+}
+
+/// Width of the numbers the solver computes with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Precision {
+    /// Single on a GPU and wherever the substep is long enough for it, else double; double also where `method = "auto"`
+    /// takes VBD.
+    #[default]
+    Auto,
+    /// Single: 32 bits.
+    F32,
+    /// Double: 64 bits.
+    F64,
+}
+
+impl Precision {
+    /// The name as written in a scene.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::F32 => "f32",
+            Self::F64 => "f64",
+        }
+    }
+}
+
+/// Where a scene is to be computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Backend {
+    /// On the processor.
+    #[default]
+    Cpu,
+    /// On a GPU; an error if there is none or it cannot do what the scene asks for. Needs the feature `gpu`.
+    Gpu,
+    /// On a GPU if there is a real one that can, else on the processor.
+    Auto,
+}
+
+impl Backend {
+    pub(crate) fn is_cpu(&self) -> bool {
+        *self == Self::Cpu
+    }
+}
+
+/// When clusters and colors are made anew in the background, and how long that may take.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReclusterSpec {
+    /// How far they may wear first, above 1: the number of colors over that of the last whole plan, or the mean cluster
+    /// size of that over the present one, whichever is larger.
+    #[serde(default = "five_quarters")]
+    pub wear: f64,
+    /// After how many frames the new ones are taken, at least 1. A frame that comes too early waits for them.
+    #[serde(default = "ten")]
+    pub frames: NonZeroU32,
+}
+
+fn five_quarters() -> f64 {
+    1.25
+}
+fn ten() -> NonZeroU32 {
+    NonZeroU32::MIN.saturating_add(9)
+}
+
+/// When a body falls asleep.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SleepSpec {
+    /// The largest speed in m/s of a particle that still counts as rest, positive. Choose it below the speed after one
+    /// frame of free fall (0.16 m/s at 0.016 s), or a body falls asleep before it falls.
+    #[serde(default = "millimeter_per_second")]
+    pub speed: f64,
+    /// For how long in s a body must rest before it sleeps, positive.
+    #[serde(default = "half_a_second")]
+    pub time: f64,
+}
+
+fn millimeter_per_second() -> f64 {
+    1e-3
+}
+fn half_a_second() -> f64 {
+    0.5
+}
+
+fn is_false(flag: &bool) -> bool {
+    !flag
+}
+fn is_true(flag: &bool) -> bool {
+    *flag
+}
