@@ -129,16 +129,6 @@ pub enum CutError {
         /// Tets the stroke knows.
         tets: usize,
     },
-    /// The two polylines of a strip do not belong together.
-    #[error(
-        "a strip between polylines of {first} and {second} points: it needs as many on both, two at least"
-    )]
-    StripPoints {
-        /// Points of the first polyline.
-        first: usize,
-        /// Points of the second.
-        second: usize,
-    },
     /// The pieces that are tracked are not those of the mesh, which would be a defect of this crate.
     #[error("the pieces are not current: {0}")]
     Pieces(String),

@@ -106,34 +106,6 @@ impl TriangleSurface {
         Self::new(&points, &[[0, 1, 2], [0, 2, 3]])
     }
 
-    /// The strip between two polylines of equally many points in m. Where they touch, it ends in a point.
-    ///
-    /// # Errors
-    /// If the polylines have less than two points or not equally many, if a number is not finite, or if a triangle has
-    /// three different points on one line.
-    pub fn strip(first: &[DVec3], second: &[DVec3]) -> Result<Self, CutError> {
-        if first.len() != second.len() || first.len() < 2 {
-            return Err(CutError::StripPoints {
-                first: first.len(),
-                second: second.len(),
-            });
-        }
-        let points: Vec<DVec3> = first
-            .iter()
-            .zip(second)
-            .flat_map(|(a, b)| [*a, *b])
-            .collect();
-        let numbers = 0..u32::try_from(2 * (first.len() - 1)).unwrap_or(u32::MAX);
-        let in_pairs = numbers.step_by(2);
-        let both = in_pairs.flat_map(|i| [[i, i + 2, i + 3], [i, i + 3, i + 1]]);
-        let point = |p: u32| points[p as usize];
-        let distinct = |t: &[u32; 3]| {
-            let [a, b, c] = t.map(point);
-            a != b && b != c && c != a
-        };
-        Self::new(&points, &both.filter(distinct).collect::<Vec<_>>())
-    }
-
     fn corners(&self, triangle: usize) -> [DVec3; 3] {
         self.triangles[triangle].map(|p| self.points[p as usize])
     }

@@ -210,16 +210,6 @@ impl<T: NoUninit + AnyBitPattern> Staging<T> {
         self.values(gpu, mapped.map_err(|error| lost(&error))?)
     }
 
-    /// The values if they have arrived; afterwards they are gone from here.
-    pub(crate) fn try_collect(&self, gpu: &GpuContext) -> Result<Option<Vec<T>>, GpuError> {
-        gpu.look()?;
-        match self.receiver.try_recv() {
-            Ok(mapped) => self.values(gpu, mapped).map(Some),
-            Err(mpsc::TryRecvError::Empty) => Ok(None),
-            Err(error) => Err(lost(&error)),
-        }
-    }
-
     fn values(&self, gpu: &GpuContext, mapped: Result<(), String>) -> Result<Vec<T>, GpuError> {
         mapped.map_err(|message| GpuError::Lost { message })?;
         let view = self

@@ -264,11 +264,6 @@ impl GpuContext {
         })
     }
 
-    /// Tells who waits for something that it is done, without waiting.
-    pub(crate) fn look(&self) -> Result<(), GpuError> {
-        self.poll(PollType::Poll)
-    }
-
     fn poll(&self, how: PollType) -> Result<(), GpuError> {
         let polled = self.device.poll(how);
         self.check()?;

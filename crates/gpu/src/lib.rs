@@ -12,7 +12,7 @@ mod traffic;
 pub use context::{AdapterDescription, GpuContext, GpuOptions};
 pub use error::GpuError;
 pub use shaders::{Shader, SharedStruct, shaders, shared_structs};
-pub use solver::{ClusterMapping, GpuSolver, Measures, Readback, StageTimes};
+pub use solver::{ClusterMapping, GpuSolver, Measures, StageTimes};
 pub use traffic::Traffic;
 pub use wgpu;
 

@@ -4,8 +4,7 @@
 //! particle must not move it at the same time. Constraints that share no particle may run together.
 //! This crate holds the values that say which: who touches what ([`Incidence`]), who is in whose
 //! way ([`ConstraintGraph`]), who is solved as one block ([`Clustering`]), who runs when
-//! ([`Coloring`]), and the flat order a solver walks ([`Schedule`], or [`BlockSchedule`] with two
-//! levels). It holds no algorithm that
+//! ([`Coloring`]), and the flat order a solver walks ([`Schedule`]). It holds no algorithm that
 //! chooses among them; those are in `incise-coloring` and `incise-clustering`.
 //!
 //! Constraints, particles and graph vertices are plain `u32` numbers from 0, so any constraint of
@@ -39,7 +38,6 @@
 //! # Ok::<(), incise_graph::GraphError>(())
 //! ```
 
-mod block_schedule;
 mod classes;
 mod clustering;
 mod coloring;
@@ -49,13 +47,13 @@ mod disjoint_sets;
 mod error;
 mod id;
 mod incidence;
+#[cfg(feature = "petgraph")]
 mod interop;
 mod metrics;
 mod read;
 mod rows;
 mod schedule;
 
-pub use block_schedule::BlockSchedule;
 pub use classes::Classes;
 pub use clustering::Clustering;
 pub use coloring::Coloring;

@@ -14,7 +14,6 @@ mod journal;
 
 use crate::csr::offset;
 use crate::{ClusterId, Clustering, ColorId, Coloring, Rows};
-pub(crate) use check::each_once;
 use journal::Journal;
 
 /// The color of a cluster that is in none.

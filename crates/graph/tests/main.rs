@@ -2,7 +2,6 @@
 
 #![expect(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
-mod block_schedule;
 mod disjoint_sets;
 mod graph;
 mod read;

@@ -6,11 +6,9 @@
 //! them. Cost: a pass over the triangles, most of which are smaller than a texel, and 13 operations a texel twice.
 
 use glam::Vec3;
-use retrofire_core::geom::vertex;
-use retrofire_core::math::pt3;
-use retrofire_core::render::raster::{ScreenPt, tri_fill};
 
 use crate::props::Plane;
+use crate::raster::fill;
 
 /// Texels on a side.
 pub(crate) const SIDE: usize = 128;
@@ -54,15 +52,11 @@ impl Impression {
             if !corners.into_iter().all(inside) {
                 continue;
             }
-            let corner = |x: Vec3| vertex::<ScreenPt, ()>(pt3(x.x, x.y, x.z), ());
-            tri_fill(corners.map(corner), |row| {
-                if row.y >= SIDE || row.xs.start >= row.xs.end.min(SIDE) {
-                    return;
-                }
-                let (start, end) = (row.xs.start, row.xs.end.min(SIDE));
-                let texels = &mut texels[row.y * SIDE + start..row.y * SIDE + end];
-                for (texel, (at, ())) in texels.iter_mut().zip(row.vs) {
-                    let dark = (-at.z().max(0.0) / (FALLOFF * plane.radius)).exp();
+            fill(corners, SIDE, 0..SIDE, |row| {
+                let first = row.y * SIDE;
+                let texels = &mut texels[first + row.start..first + row.end];
+                for (texel, height) in texels.iter_mut().zip(row.depths()) {
+                    let dark = (-height.max(0.0) / (FALLOFF * plane.radius)).exp();
                     *texel = rounded(dark).max(*texel);
                 }
             });

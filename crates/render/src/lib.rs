@@ -17,6 +17,7 @@ mod palette;
 mod picture;
 mod piece_colors;
 mod props;
+mod raster;
 mod renderer;
 mod shading;
 mod sheet;

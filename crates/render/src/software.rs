@@ -1,9 +1,6 @@
 //! [`software_picture`]: the same pictures without a device.
 //!
-//! Triangles are clipped and cut into rows of pixels by `retrofire-core`: of the rasterizers in Rust it is the one that clips
-//! against all planes of the view (without it a camera inside a scene draws nonsense), fills exactly the pixels whose middle
-//! a triangle covers, interpolates one over depth, has no dependencies and no unsafe code in the way. `euc` 0.5 does not
-//! clip, so that triangles behind the eye come out mirrored.
+//! Triangles are clipped and cut into rows of pixels (`raster.rs`).
 //!
 //! What the rasterizer is asked for is only which triangle is in front at each of four samples of a pixel, placed as devices
 //! place them. A pixel is then shaded once for each triangle that it shows, at the middle of the samples that show it: what
@@ -11,18 +8,15 @@
 //! so a picture is the same for any number of threads. Cost: each band looks at each triangle, O(bands x triangles); four
 //! passes over the rows of those in it, and a shading or two a pixel.
 
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec4};
 use incise::Simulation;
 use incise::cutting::FaceTag;
 use rayon::prelude::*;
-use retrofire_core::geom::{Tri, Vertex, vertex};
-use retrofire_core::math::{ProjVec3, pt3};
-use retrofire_core::render::clip::{ClipVert, Status, view_frustum};
-use retrofire_core::render::raster::{ScreenPt, tri_fill};
 
 use crate::impression::Impression;
 use crate::normals::normal_sums;
 use crate::props::{Plane, PropCorner, Props};
+use crate::raster::{clip, fill};
 use crate::shading::{self, Surface, direction};
 use crate::srgb::{decode, encode};
 use crate::view::{LARGEST_SIDE, View};
@@ -181,32 +175,20 @@ impl<'a> Frame<'a> {
     }
 
     fn place_one(&self, triangle: u32, placed: &mut Vec<Placed>) {
-        let corner = |place: Vec3| {
-            let clip = self.view.clip * place.extend(1.0);
-            // Depth from -w to w is what the clipper expects.
-            let clip = ProjVec3::new([clip.x, clip.y, 2.0 * clip.z - clip.w, clip.w]);
-            ClipVert::new(vertex(clip, ()))
-        };
-        let clipped = Tri(self.corners(triangle as usize).places.map(corner));
-        let mut add = |Tri(corners): Tri<ClipVert<()>>| {
-            placed.push(Placed {
-                corners: corners.map(|corner| self.screen(corner.pos)),
-                triangle,
-            });
-        };
-        match view_frustum::status(&clipped.0) {
-            Status::Hidden => {}
-            Status::Visible => add(clipped),
-            Status::Clipped => {
-                let mut parts = Vec::new();
-                view_frustum::clip(&[clipped][..], &mut parts);
-                parts.into_iter().for_each(&mut add);
-            }
-        }
+        let places = self.corners(triangle as usize).places;
+        clip(
+            places.map(|place| self.view.clip * place.extend(1.0)),
+            |part| {
+                placed.push(Placed {
+                    corners: part.map(|corner| self.screen(corner)),
+                    triangle,
+                });
+            },
+        );
     }
 
-    fn screen(&self, clip: ProjVec3) -> Vec3 {
-        let [x, y, _, w] = clip.0;
+    fn screen(&self, clip: Vec4) -> Vec3 {
+        let [x, y, _, w] = clip.to_array();
         let [width, height] = self.view.size.map(|side| side as f32);
         Vec3::new(
             (x / w * 0.5 + 0.5) * width,
@@ -403,20 +385,11 @@ impl Band {
         for (sample, place) in SAMPLES.iter().enumerate() {
             // The rasterizer asks for the middle of a pixel.
             let shift = 0.5 - *place;
-            let corner = |corner: Vec3| -> Vertex<ScreenPt, ()> {
-                vertex(pt3(corner.x + shift.x, corner.y + shift.y, corner.z), ())
-            };
-            tri_fill(placed.corners.map(corner), |row| {
-                let Some(y) = row.y.checked_sub(top).filter(|&y| y < height) else {
-                    return;
-                };
-                let (start, end) = (row.xs.start, row.xs.end.min(width));
-                if start >= end {
-                    return;
-                }
-                let pixels = &mut self.samples[y * width + start..y * width + end];
-                for (pixel, (at, ())) in pixels.iter_mut().zip(row.vs) {
-                    let nearness = at.z();
+            let corners = placed.corners.map(|corner| corner + shift.extend(0.0));
+            fill(corners, width, top..top + height, |row| {
+                let first = (row.y - top) * width;
+                let pixels = &mut self.samples[first + row.start..first + row.end];
+                for (pixel, nearness) in pixels.iter_mut().zip(row.depths()) {
                     if nearness > pixel[sample].1 {
                         pixel[sample] = (placed.triangle, nearness);
                     }

@@ -3,7 +3,9 @@
 use std::collections::BTreeSet;
 
 use glam::DVec3;
-use incise_cutting::{BoundaryTriangle, CutDelta, CutOptions, CuttableMesh, FaceTag};
+use incise_cutting::{
+    BoundaryTriangle, CutDelta, CutError, CutOptions, CuttableMesh, FaceTag, TriangleSurface,
+};
 use incise_mesh::generate::{Shape, generate, kuhn_box};
 use incise_mesh::{ParticleId, TetId, TetMesh};
 
@@ -328,4 +330,17 @@ pub(crate) fn cuboid(low: DVec3, high: DVec3) -> (Vec<DVec3>, Vec<[u32; 3]>) {
         .into_iter()
         .flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
     ((0..8).map(corner).collect(), triangles.collect())
+}
+
+/// The strip between two polylines of equally many points. Where they touch, it ends in a point.
+pub(crate) fn strip(first: &[DVec3], second: &[DVec3]) -> Result<TriangleSurface, CutError> {
+    let pairs = first.iter().zip(second);
+    let points: Vec<DVec3> = pairs.flat_map(|(a, b)| [*a, *b]).collect();
+    let numbers = (0..u32::try_from(points.len() - 2).unwrap()).step_by(2);
+    let both = numbers.flat_map(|i| [[i, i + 2, i + 3], [i, i + 3, i + 1]]);
+    let distinct = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|p| points[p as usize]);
+        a != b && b != c && c != a
+    };
+    TriangleSurface::new(&points, &both.filter(distinct).collect::<Vec<_>>())
 }

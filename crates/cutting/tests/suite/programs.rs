@@ -305,7 +305,7 @@ fn surface(bytes: &mut Bytes<'_>) -> Result<TriangleSurface, CutError> {
                 .chain((1..count).map(|_| bytes.vector()))
                 .collect();
             let second: Vec<DVec3> = first.iter().map(|x| *x + b).collect();
-            TriangleSurface::strip(&first, &second)
+            crate::bodies::strip(&first, &second)
         }
         _ => {
             let mut points = vec![a, b];

@@ -225,7 +225,7 @@ fn a_curved_strip() {
         };
         (0..=20).map(at).collect::<Vec<_>>()
     };
-    let strip = TriangleSurface::strip(&line(-0.5), &line(1.5)).unwrap();
+    let strip = crate::bodies::strip(&line(-0.5), &line(1.5)).unwrap();
     for snap in [0.0, 0.1] {
         let body = cut_mesh(&jittered_box(6, 0.1, 6), &strip, snap);
         let volumes = volumes(&body);
@@ -251,7 +251,7 @@ fn a_spiral() {
         };
         (0..=120).map(at).collect::<Vec<_>>()
     };
-    let strip = TriangleSurface::strip(&line(-0.5), &line(1.5)).unwrap();
+    let strip = crate::bodies::strip(&line(-0.5), &line(1.5)).unwrap();
     let mesh = kuhn_box([16, 2, 16], DVec3::ONE);
     let triangles = mesh.surface().triangles.len();
     let body = cut_mesh(&mesh, &strip, 0.1);
@@ -313,17 +313,6 @@ fn bad_surfaces_are_refused() {
     assert!(matches!(
         TriangleSurface::new(&nan, &[[0, 1, 2]]),
         Err(CutError::NonFinite { .. })
-    ));
-    assert!(matches!(
-        TriangleSurface::strip(&points, &points[1..]),
-        Err(CutError::StripPoints {
-            first: 4,
-            second: 3
-        })
-    ));
-    assert!(matches!(
-        TriangleSurface::strip(&[DVec3::ZERO], &[DVec3::X]),
-        Err(CutError::StripPoints { .. })
     ));
     // Huge ones are as good as any.
     let huge = TriangleSurface::rectangle(DVec3::splat(0.4), DVec3::X * 1e200, DVec3::Y * 1e-200);

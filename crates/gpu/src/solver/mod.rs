@@ -22,7 +22,6 @@ mod kernels;
 mod layout;
 mod measure;
 mod obstacles;
-mod readback;
 mod scalars;
 mod seats;
 #[cfg(test)]
@@ -41,7 +40,6 @@ use wgpu::SubmissionIndex;
 pub(crate) use kernels::SOURCES;
 pub use layout::ClusterMapping;
 pub use measure::Measures;
-pub use readback::Readback;
 pub use stages::StageTimes;
 
 pub(crate) use gpu_types::{

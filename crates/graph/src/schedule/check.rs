@@ -85,7 +85,7 @@ impl Schedule {
 }
 
 /// An error unless `order` lists every constraint once; those without particles may be missing.
-pub(crate) fn each_once(
+fn each_once(
     what: &'static str,
     order: impl Iterator<Item = u32>,
     incidence: &Incidence,
