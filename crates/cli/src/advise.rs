@@ -7,7 +7,7 @@ use incise::advise::{Advice, Against, Measured, Question, ReferenceKind, default
 use crate::args::AdviseArguments;
 use crate::failure::Failure;
 use crate::print::print;
-use crate::run::load;
+use crate::run::{load, located};
 
 pub(crate) fn advise(arguments: &AdviseArguments) -> Result<(), Failure> {
     let scene = load(arguments.scene.as_deref())?;
@@ -16,7 +16,8 @@ pub(crate) fn advise(arguments: &AdviseArguments) -> Result<(), Failure> {
         frames: arguments.frames.unwrap_or_else(|| default_frames(&scene)),
         threads: arguments.threads.map(usize::from),
     };
-    let advice = incise::advise::advise(&scene, &question)?;
+    let advice = incise::advise::advise(&scene, &question);
+    let advice = advice.map_err(|error| located(error, arguments.scene.as_deref()))?;
     if arguments.json {
         let json = serde_json::to_string(&advice).map_err(|error| Failure::Run(error.into()))?;
         return print(json);

@@ -1,10 +1,11 @@
 //! `incise run`: simulates a scene.
 
 use std::collections::HashSet;
+use std::fs;
 use std::path::Path;
 
 use anyhow::anyhow;
-use incise::scene::{Backend, Method, Precision, Quantity};
+use incise::scene::{Backend, Method, Precision, Quantity, line_of};
 use incise::{Error, Scene, Simulation, Warning};
 use incise_render::{ColorBy, Film};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -45,7 +46,8 @@ fn simulate(arguments: &RunArguments) -> Result<(), Failure> {
     let frames = arguments
         .frames
         .unwrap_or_else(|| scene.frames_needed().max(FRAMES));
-    let mut simulation = Simulation::new(&scene)?;
+    let simulation = Simulation::new(&scene);
+    let mut simulation = simulation.map_err(|error| located(error, arguments.scene.as_deref()))?;
     let pictures = Pictures::of(arguments, &scene, &simulation, frames)?;
     let folder = arguments.out.as_deref().unwrap_or(Path::new("out"));
     let jsonl = arguments.jsonl.as_deref();
@@ -135,6 +137,19 @@ pub(crate) fn load(path: Option<&Path>) -> Result<Scene, Failure> {
         }
         _ => error.into(),
     })
+}
+
+/// An error about a scene, with the file and the line of the key that it is about.
+pub(crate) fn located(error: Error, path: Option<&Path>) -> Failure {
+    let line = || {
+        let text = fs::read_to_string(path?).ok()?;
+        line_of(&text, &error.key()?)
+    };
+    let (Some(path), Some(line)) = (path, line()) else {
+        return error.into();
+    };
+    let place = format!("{}: line {line}", path.display());
+    Failure::Input(anyhow::Error::from(error).context(place))
 }
 
 /// The scene as asked for, with what the command line changes.

@@ -93,6 +93,28 @@ pub enum Error {
     },
 }
 
+impl Error {
+    /// The key of a scene that it is about, as in `body[0].scale`, if it is about one.
+    #[must_use]
+    pub fn key(&self) -> Option<String> {
+        match self {
+            Self::Value { field, .. } | Self::Mesh { field, .. } | Self::Cut { field, .. } => {
+                Some(field.clone())
+            }
+            Self::Xpbd { field, source } => Some(match source {
+                XpbdError::Material { what, .. } | XpbdError::Setting { what, .. } => {
+                    format!("{field}.{what}")
+                }
+                _ => field.clone(),
+            }),
+            Self::Coloring(_) => Some("solver.coloring".to_owned()),
+            Self::Clustering(_) => Some("solver.clustering".to_owned()),
+            Self::NoGpuPath => Some("solver.backend".to_owned()),
+            _ => None,
+        }
+    }
+}
+
 impl From<GraphError> for Error {
     fn from(error: GraphError) -> Self {
         Self::Inconsistent(error.to_string())

@@ -57,7 +57,7 @@ fn scenes_with_a_mistake() {
         (
             "young_modulus = 1e4",
             "young_modulus = -1e4",
-            &["body[0].young_modulus is -10000"][..],
+            &["scene.toml: line 6: body[0].young_modulus is -10000"][..],
         ),
         (
             "young_modulus = 1e4",
@@ -67,7 +67,10 @@ fn scenes_with_a_mistake() {
         (
             "young_modulus = 1e4",
             "poisson_ratio = 0.5",
-            &["body[0].poisson_ratio is 0.5", "below 0.5"],
+            &[
+                "scene.toml: line 6: body[0].poisson_ratio is 0.5",
+                "below 0.5",
+            ],
         ),
         (
             "young_modulus = 1e4",
@@ -113,7 +116,7 @@ fn scenes_with_a_mistake() {
         (
             "normal = [1.0, 0.1, 0.0]",
             "normal = [0, 0, 0]",
-            &["stroke[0].normal is zero"],
+            &["scene.toml: line 11: stroke[0].normal is zero"],
         ),
         (
             "normal = [1.0, 0.1, 0.0]",
@@ -132,7 +135,7 @@ fn scenes_with_a_mistake() {
         (
             "shape = { kind = \"box\", tets = 300 }",
             "",
-            &["body[0] is without a mesh"],
+            &["scene.toml: line 4: body[0] is without a mesh"],
         ),
         (
             "shape = {",
