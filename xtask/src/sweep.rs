@@ -194,8 +194,8 @@ mod tests {
             ("beam", 3, 1),
             ("colliders", 60, 1),
             ("crossing", 62, 4),
-            ("handles", 82, 2),
-            ("links", 20, 2),
+            ("attachments", 82, 2),
+            ("distances", 20, 2),
             ("two_bodies", 5, 4),
         ] {
             let path =

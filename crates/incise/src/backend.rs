@@ -59,7 +59,7 @@ pub(crate) enum LastSubstep {
 
 /// What the state of a group is worth, as far as somebody asked.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct State {
+pub(crate) struct Measures {
     pub(crate) energy: Option<Energy>,
     pub(crate) volume: Option<Volume>,
     pub(crate) max_speed: Option<f64>,
@@ -248,14 +248,14 @@ impl AnySolver {
         &mut self,
         gravity: Option<DVec3>,
         quantities: &[Quantity],
-    ) -> Result<State, Error> {
+    ) -> Result<Measures, Error> {
         match self {
             Self::Single(backend) => Ok(backend.state(gravity, quantities)),
             Self::Double(backend) => Ok(backend.state(gravity, quantities)),
             #[cfg(feature = "gpu")]
             Self::Device(device) => {
                 let measures = device.solver.measure(gravity)?;
-                Ok(State {
+                Ok(Measures {
                     energy: Some(measures.energy),
                     volume: Some(measures.volume),
                     max_speed: Some(measures.max_speed),
@@ -469,9 +469,9 @@ impl<R: Real> Backend<R> {
         }
     }
 
-    fn state(&self, gravity: Option<DVec3>, quantities: &[Quantity]) -> State {
+    fn state(&self, gravity: Option<DVec3>, quantities: &[Quantity]) -> Measures {
         let (solver, asks) = (&self.solver, |quantity| quantities.contains(&quantity));
-        State {
+        Measures {
             energy: asks(Quantity::Energy).then(|| solver.energy(gravity)),
             volume: asks(Quantity::Volume).then(|| solver.volume()),
             max_speed: asks(Quantity::Speed).then(|| solver.max_speed()),

@@ -93,11 +93,9 @@ impl Colliders {
             .collect()
     }
 
-    /// Comes back to those of an earlier moment; handles given since stay void.
-    pub(crate) fn restore(&mut self, earlier: &Self) {
-        let next = self.next.max(earlier.next);
-        self.clone_from(earlier);
-        self.next = next;
+    /// Gives no handle that others have given: handles of colliders that are gone stay void.
+    pub(crate) fn keep_numbers_of(&mut self, others: &Self) {
+        self.next = self.next.max(others.next);
     }
 }
 

@@ -11,6 +11,7 @@ use glam::DVec3;
 use incise_xpbd::Pose;
 
 use crate::Error;
+use crate::attachment::detach_all;
 use crate::backend::{AnySolver, each, each_mut};
 
 /// Something that is held, in the simulation that gave it: see [`Simulation::grab`](crate::Simulation::grab).
@@ -144,17 +145,10 @@ impl Hand {
     }
 }
 
-/// Lets all go that hangs on a handle, copies that cuts made too, and sends the handle back to where it began, so that
-/// its way does not add up from grab to grab.
+/// Detaches all particles from a handle and sends it back to where it began, so that its way does not add up from grab
+/// to grab.
 fn let_go(solver: &mut AnySolver, handle: u32) -> Result<(), Error> {
-    each_mut!(solver, solver => {
-        let all = solver.attachments();
-        let held: Vec<u32> = all.filter(|a| a.handle == handle).map(|a| a.particle).collect();
-        // The list of what hangs closes up behind each of them.
-        for p in held.into_iter().rev() {
-            solver.detach(p as usize);
-        }
-        solver.move_handle(handle, Pose::at(DVec3::ZERO));
-    });
+    detach_all(solver, handle)?;
+    solver.move_handle(handle, Pose::at(DVec3::ZERO));
     Ok(())
 }

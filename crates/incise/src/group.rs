@@ -9,24 +9,29 @@ use std::time::Instant;
 use glam::DVec3;
 use incise_cutting::{CutDelta, CuttableMesh, PieceEvent, PieceTracker};
 use incise_mesh::{ParticleId, signed_volume};
-use incise_xpbd::{KappaLimit, Real, Solver, StepReport, StepSettings, shortest_substep_of_f32};
+use incise_xpbd::{
+    DistanceConstraint, KappaLimit, Real, Solver, StepReport, StepSettings, shortest_substep_of_f32,
+};
 
 use crate::accuracy::{DEFAULT_ACCURACY, OutsideVolume, largest_kappas};
+use crate::attachment::{Attachment, AttachmentHandle};
 use crate::backend::{AnySolver, each, each_mut};
+use crate::distance::Distances;
 use crate::grab::{Grab, Hand};
-use crate::handle::Handle;
 use crate::joined::{Joined, demands, substeps};
 use crate::method::{leaves_open, resolve, tet_solve};
 use crate::place::Place;
 use crate::plan::Plan;
 use crate::recluster::Recluster;
 use crate::report::{Milliseconds, milliseconds};
-use crate::scene::{Method, Precision, Quantity, SolverSpec, Substeps};
+use crate::scene::{
+    AttachmentSpec, DistanceSpec, Method, Precision, Quantity, SolverSpec, Substeps,
+};
 use crate::sleep::Rest;
 use crate::substeps::{Choice, Missed, evaluate};
 use crate::volume::Volumes;
 use crate::warning::{self, Warning, WarningCode};
-use crate::{Error, Scene, collider, link};
+use crate::{Error, Scene, collider, distance};
 
 /// Bodies that are solved together. A copy has the state as it is known here, and its solver on the processor.
 #[derive(Clone, Debug)]
@@ -45,7 +50,10 @@ pub(crate) struct Group {
     pub(crate) leaves_substeps_open: bool,
     /// Whether VBD may be chosen for it.
     pub(crate) leaves_method_open: bool,
-    pub(crate) handles: Vec<Handle>,
+    pub(crate) attachments: Vec<Attachment>,
+    /// Frames of removed attachments in the solver, for new ones.
+    spare_frames: Vec<u32>,
+    pub(crate) distances: Distances,
     /// What somebody holds.
     pub(crate) hand: Hand,
     volumes: Option<Volumes>,
@@ -193,10 +201,12 @@ impl Group {
         }
         let limit = kappa_limit(&scene.solver, &settings);
         solver.limit_kappa(None, limit, cuttable.mesh())?;
-        for handle in &mut joined.handles {
-            handle.attach(&mut solver)?;
+        for attachment in &mut joined.attachments {
+            attachment.attach(0, &mut solver, None)?;
         }
-        link::connect(&mut solver, &joined.links)?;
+        if !joined.distances.is_empty() {
+            joined.distances.hand_to(&mut solver)?;
+        }
         let plan = Plan::new(scene, cuttable.mesh())?;
         let volumes = joined.volumes();
         if let Some(volumes) = &volumes {
@@ -210,7 +220,9 @@ impl Group {
             solver,
             plan,
             settings: settings.clone(),
-            handles: joined.handles,
+            attachments: joined.attachments,
+            spare_frames: Vec::new(),
+            distances: joined.distances,
             hand: Hand::default(),
             volumes,
             positions: Vec::new(),
@@ -436,14 +448,17 @@ impl Group {
         if self.asleep() {
             return Ok(StepReport::default());
         }
-        for handle in &self.handles {
-            handle.advance(frame, &mut self.solver);
+        for attachment in &self.attachments {
+            attachment.advance(frame, &mut self.solver);
         }
         let (schedule, settings) = (&self.plan.schedule, &self.settings);
         let step = self.solver.step(schedule, settings, keeping_residuals)?;
         self.judge_step();
         collider::advance(&mut self.settings);
         self.hand.arrive();
+        for attachment in &mut self.attachments {
+            attachment.arrive();
+        }
         let time = self.settings.time_step;
         if let Some(rest) = self.rest.as_mut().filter(|_| !moved) {
             let state = self.solver.state(None, &[Quantity::Speed])?;
@@ -479,11 +494,81 @@ impl Group {
         self.misses_accuracy = misses;
     }
 
+    /// The particles of a body of the group with their positions at rest: those whose tets have its material.
+    pub(crate) fn particles_of(&self, body: usize) -> (Vec<usize>, Vec<DVec3>) {
+        let mesh = self.cuttable.mesh();
+        let all = 0..mesh.positions.len();
+        let numbers: Vec<usize> = if self.bodies.len() == 1 {
+            all.collect()
+        } else {
+            let is_of = |p: &usize| {
+                let tet = self.cuttable.around(ParticleId::new(*p)).next();
+                tet.is_some_and(|tet| {
+                    let material = each!(&self.solver, solver => solver.material_of(tet.index()));
+                    self.bodies[usize::from(material)] == body
+                })
+            };
+            all.filter(is_of).collect()
+        };
+        let positions = numbers.iter().map(|&p| mesh.positions[p]).collect();
+        (numbers, positions)
+    }
+
+    /// Attaches part of a body of the group at the start of a frame, and wakes it.
+    pub(crate) fn add_attachment(
+        &mut self,
+        name: AttachmentHandle,
+        spec: &AttachmentSpec,
+        frame: u64,
+    ) -> Result<(), Error> {
+        let (numbers, positions) = self.particles_of(spec.body);
+        let field = "attachment".to_owned();
+        let mut attachment = Attachment::new(name, field, spec, &positions, |p| numbers[p])?;
+        let spare = self.spare_frames.last().copied();
+        attachment.attach(frame, &mut self.solver, spare)?;
+        self.spare_frames.pop();
+        self.attachments.push(attachment);
+        self.wake();
+        Ok(())
+    }
+
+    /// Detaches what an attachment holds, and wakes it; tells whether there is such an attachment.
+    pub(crate) fn remove_attachment(&mut self, name: AttachmentHandle) -> Result<bool, Error> {
+        let Some(index) = self.attachments.iter().position(|a| a.name == name) else {
+            return Ok(false);
+        };
+        self.attachments[index].detach(&mut self.solver)?;
+        self.spare_frames.push(self.attachments[index].number);
+        self.attachments.remove(index);
+        self.wake();
+        Ok(true)
+    }
+
+    /// Hands changed distance constraints to the solver, and wakes it.
+    pub(crate) fn update_distances(&mut self) -> Result<(), Error> {
+        self.distances.hand_to(&mut self.solver)?;
+        self.solver.update_vbd(&mut Milliseconds::default())?;
+        self.wake();
+        Ok(())
+    }
+
+    /// The constraint of a spec whose bodies are both in the group.
+    pub(crate) fn distance(&self, spec: &DistanceSpec) -> Result<DistanceConstraint, Error> {
+        distance::constraint("distance", spec, |end| {
+            let (numbers, positions) = self.particles_of(end.body);
+            let (x, p) = distance::nearest(end.point, &positions)?;
+            Some((x, numbers[p]))
+        })
+    }
+
     /// Whether a handle, a hand or a collider moves in a frame.
     fn is_moved(&self, frame: u64) -> bool {
         let mut colliders = self.settings.colliders.iter();
         colliders.any(|collider| collider.velocity != DVec3::ZERO)
-            || self.handles.iter().any(|handle| handle.moves(frame))
+            || self
+                .attachments
+                .iter()
+                .any(|attachment| attachment.moves(frame))
             || self.hand.moves()
     }
 

@@ -7,18 +7,19 @@ use std::ops::Range;
 
 use incise_cutting::CuttableMesh;
 use incise_mesh::{ParticleId, TetId, TetMesh};
-use incise_xpbd::{DistanceConstraint, Material};
+use incise_xpbd::Material;
 
 use crate::accuracy::{DEFAULT_ACCURACY, largest_kappas};
+use crate::attachment::{Attachment, AttachmentHandle};
 use crate::backend::{AnySolver, each, each_mut, mass};
 use crate::body::Body;
-use crate::handle::Handle;
+use crate::distance::{DistanceHandle, Distances};
 use crate::limits::{existing, value};
 use crate::method::tet_solve;
 use crate::scene::{Precision, SolverSpec, Substeps};
 use crate::substeps::{Choice, TetDemand, choose};
 use crate::volume::Volumes;
-use crate::{Error, Scene, link};
+use crate::{Error, Scene, distance};
 
 /// The bodies of a group before it is set up.
 #[derive(Debug, Default)]
@@ -30,8 +31,8 @@ pub(crate) struct Joined {
     /// For each tet the number of its material, which is that of its body within the group.
     pub(crate) material_of: Vec<u16>,
     pub(crate) fixed: Vec<bool>,
-    pub(crate) handles: Vec<Handle>,
-    pub(crate) links: Vec<DistanceConstraint>,
+    pub(crate) attachments: Vec<Attachment>,
+    pub(crate) distances: Distances,
     /// What each body asks for.
     volume_compliances: Vec<Option<f64>>,
     pub(crate) substeps: Vec<Substeps>,
@@ -54,27 +55,33 @@ impl Joined {
             all[island].add(number, body)?;
             ranges.push(first..all[island].mesh.positions.len());
         }
+        let (mut attachments, mut distances) = (Vec::new(), Vec::new());
         let particles = |body: usize| {
             let range: Range<usize> = ranges[body].clone();
             let first = range.start;
             (&all[islands[body]].mesh.positions[range], first)
         };
-        let handles = scene.handle.iter().enumerate().map(|(i, spec)| {
-            let field = format!("handle[{i}]");
+        for (i, spec) in scene.attachment.iter().enumerate() {
+            let (name, field) = (AttachmentHandle::of_scene(i), format!("attachment[{i}]"));
             existing(&format!("{field}.body"), spec.body, islands.len())?;
             let (positions, first) = particles(spec.body);
-            Handle::new(field, spec, positions, first)
-        });
-        let handles = handles.collect::<Result<Vec<_>, Error>>()?;
-        let links = scene.link.iter().enumerate();
-        let links = links
-            .map(|(i, spec)| link::link(&format!("link[{i}]"), spec, particles))
-            .collect::<Result<Vec<_>, _>>()?;
-        for (handle, spec) in handles.into_iter().zip(&scene.handle) {
-            all[islands[spec.body]].handles.push(handle);
+            let attachment = Attachment::new(name, field, spec, positions, |p| first + p)?;
+            attachments.push((islands[spec.body], attachment));
         }
-        for (link, spec) in links.into_iter().zip(&scene.link) {
-            all[islands[spec.from.body]].links.push(link);
+        for (i, spec) in scene.distance.iter().enumerate() {
+            let field = format!("distance[{i}]");
+            let constraint = distance::constraint(&field, spec, |end| {
+                let (positions, first) = particles(end.body);
+                distance::nearest(end.point, positions).map(|(x, p)| (x, first + p))
+            })?;
+            let name = DistanceHandle::of_scene(i);
+            distances.push((islands[spec.from.body], name, constraint));
+        }
+        for (island, attachment) in attachments {
+            all[island].attachments.push(attachment);
+        }
+        for (island, name, constraint) in distances {
+            all[island].distances.add(name, constraint);
         }
         Ok(all)
     }

@@ -24,21 +24,21 @@
 mod accuracy;
 #[cfg(feature = "advise")]
 pub mod advise;
+mod attachment;
 mod backend;
 mod body;
 mod budget;
 mod collider;
 #[cfg(feature = "gpu")]
 mod device;
+mod distance;
 mod error;
 mod event;
 mod grab;
 mod group;
-mod handle;
 mod islands;
 mod joined;
 mod limits;
-mod link;
 mod live_blade;
 mod measure;
 mod method;
@@ -60,7 +60,9 @@ mod volume;
 mod warning;
 mod whole;
 
+pub use attachment::AttachmentHandle;
 pub use collider::ColliderHandle;
+pub use distance::DistanceHandle;
 pub use error::Error;
 pub use event::Event;
 pub use grab::Grab;

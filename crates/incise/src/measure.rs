@@ -7,7 +7,7 @@ use glam::DVec3;
 use incise_xpbd::Volume;
 
 use crate::Error;
-use crate::backend::{LastSubstep, State, each};
+use crate::backend::{LastSubstep, Measures, each};
 use crate::group::Group;
 use crate::report::{BodyReport, ChosenMethod, EnergyReport, ResidualReport, SoftenedReport};
 use crate::scene::{Method, Quantity};
@@ -25,7 +25,7 @@ pub(crate) fn states(
     groups: &mut [Group],
     gravity: Option<DVec3>,
     quantities: &[Quantity],
-) -> Result<Vec<State>, Error> {
+) -> Result<Vec<Measures>, Error> {
     if !quantities.iter().any(is_of_state) {
         return Ok(Vec::new());
     }
@@ -92,7 +92,7 @@ pub(crate) fn residuals_of_tets(group: &Group) -> Option<Vec<f64>> {
     group.solver.residuals_of_tets(time)
 }
 
-pub(crate) fn energy(states: &[State]) -> EnergyReport {
+pub(crate) fn energy(states: &[Measures]) -> EnergyReport {
     let mut sum = EnergyReport {
         kinetic: 0.0,
         elastic: 0.0,
@@ -106,7 +106,7 @@ pub(crate) fn energy(states: &[State]) -> EnergyReport {
     sum
 }
 
-pub(crate) fn volume(states: &[State]) -> Volume {
+pub(crate) fn volume(states: &[Measures]) -> Volume {
     let mut sum = Volume {
         total: 0.0,
         rest: 0.0,
@@ -123,7 +123,7 @@ pub(crate) fn volume(states: &[State]) -> Volume {
 }
 
 /// The largest speed of a particle in m/s.
-pub(crate) fn max_speed(states: &[State]) -> f64 {
+pub(crate) fn max_speed(states: &[Measures]) -> f64 {
     let speeds = states.iter().filter_map(|state| state.max_speed);
     speeds.fold(0.0, f64::max)
 }

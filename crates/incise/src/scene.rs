@@ -9,11 +9,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 
+mod attachment;
 mod check;
 mod collider;
-mod handle;
+mod distance;
 mod lines;
-mod link;
 mod method;
 mod preset;
 mod region;
@@ -21,11 +21,11 @@ mod solver;
 mod stroke;
 mod substeps;
 
+pub use attachment::{AttachmentSpec, PathRotationSpec};
 pub(crate) use check::check;
 pub use collider::{ColliderSpec, RotationSpec};
-pub use handle::{HandleSpec, TurnSpec};
+pub use distance::{DistanceSpec, EndSpec};
 pub use lines::line_of;
-pub use link::{EndSpec, LinkSpec};
 pub use method::{Integrator, Method, TetSolve};
 pub use preset::Preset;
 pub use region::Region;
@@ -71,10 +71,10 @@ pub struct Scene {
     pub collider: Vec<ColliderSpec>,
     /// What holds parts of bodies and moves them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub handle: Vec<HandleSpec>,
+    pub attachment: Vec<AttachmentSpec>,
     /// Sutures and springs.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub link: Vec<LinkSpec>,
+    pub distance: Vec<DistanceSpec>,
     /// The cuts.
     #[serde(default)]
     pub stroke: Vec<StrokeSpec>,
@@ -275,9 +275,12 @@ impl Scene {
     #[must_use]
     pub fn frames_needed(&self) -> u64 {
         let strokes = self.stroke.iter().map(StrokeSpec::last_frame);
-        let handles = self.handle.iter().map(|handle| handle.frames[1]);
+        let attachments = self
+            .attachment
+            .iter()
+            .map(|attachment| attachment.frames[1]);
         strokes
-            .chain(handles)
+            .chain(attachments)
             .map(|last| last.saturating_add(1))
             .max()
             .unwrap_or(0)

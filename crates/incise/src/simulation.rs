@@ -6,7 +6,8 @@
 
 mod builder;
 mod edit;
-mod live;
+mod interaction;
+mod readback;
 mod retune;
 mod snapshot;
 mod state;
@@ -36,14 +37,16 @@ use crate::place::{AtHand, Place};
 use crate::report::{
     CutReport, DetachedReport, FrameReport, Milliseconds, PieceReport, SoftenedReport, milliseconds,
 };
-use crate::scene::{Precision, Quantity, SolverSpec, StrokeSpec};
+use crate::scene::{Precision, Quantity, StrokeSpec};
 use crate::strokes::Timeline;
 use crate::warning::{Warning, WarningCode};
 use crate::whole::Whole;
-use crate::{Error, Event, Scene, collider, link};
+use crate::{Error, Event, Scene, collider, distance};
 
 pub use builder::{Body, BodyHandle, SimulationBuilder};
 pub use snapshot::Snapshot;
+
+use state::{Clock, NextNumbers, State};
 
 /// A scene in motion.
 ///
@@ -74,39 +77,14 @@ pub use snapshot::Snapshot;
 /// ```
 #[derive(Debug)]
 pub struct Simulation {
-    /// As it was set up.
-    scene: Arc<Scene>,
-    /// How it is computed now.
-    solver: SolverSpec,
-    /// In s.
-    time_step: f64,
-    /// The frame since which time steps have been as long, and the simulated time in s at its start.
-    epoch: (u64, f64),
-    gravity: Option<DVec3>,
-    /// The names of the colliders in the settings of all groups.
-    colliders: Colliders,
-    quantities: Vec<Quantity>,
-    every: u64,
-    precision: Precision,
-    place: Place,
-    /// To go to when one is asked for.
+    /// All that changes with time.
+    state: State,
+    /// The devices that are open, for settings that ask for one.
     at_hand: AtHand,
-    /// In the order of their first bodies.
-    groups: Vec<Group>,
-    /// All groups together, if there are several.
-    whole: Option<Whole>,
-    pieces: PieceNumbers,
-    timeline: Timeline,
-    /// Whether a particle lies on a cut; empty before the first.
-    on_cut: Vec<bool>,
     /// What the strokes of the last frame changed.
     deltas: Vec<CutDelta>,
     /// What happened in the last frame.
     events: Vec<Event>,
-    next_frame: u64,
-    report: FrameReport,
-    /// Whether the solvers have the residuals of the last frame.
-    residuals_kept: bool,
     pool: Option<ThreadPool>,
 }
 
@@ -161,7 +139,7 @@ impl Simulation {
         }
         crate::scene::check(scene)?;
         let bodies = body::Body::all(scene, meshes)?;
-        let islands = islands(bodies.len(), &link::pairs(scene, bodies.len())?);
+        let islands = islands(bodies.len(), &distance::pairs(scene, bodies.len())?);
         let several = islands.iter().any(|&island| island > 0);
         let whole = several.then(|| Whole::new(&bodies, &islands));
         let joined = Joined::all(scene, bodies, &islands)?;
@@ -206,27 +184,27 @@ impl Simulation {
             timeline.add(stroke)?;
         }
         let mut simulation = Self {
-            scene: Arc::new(scene.clone()),
-            solver: scene.solver.clone(),
-            time_step: settings.time_step,
-            epoch: (0, 0.0),
-            gravity: settings.gravity,
-            colliders: Colliders::new(scene),
-            quantities: scene.report.quantities.clone(),
-            every: scene.report.every,
-            precision,
-            place,
+            state: State {
+                scene: Arc::new(scene.clone()),
+                solver: scene.solver.clone(),
+                precision,
+                place,
+                clock: Clock::new(settings.time_step),
+                gravity: settings.gravity,
+                colliders: Colliders::new(scene),
+                next: NextNumbers::new(scene),
+                reporting: scene.report.clone(),
+                pieces: PieceNumbers::new(&groups),
+                groups,
+                whole,
+                on_cut: Vec::new(),
+                timeline,
+                report: FrameReport::default(),
+                residuals_kept: false,
+            },
             at_hand: AtHand::default(),
-            on_cut: Vec::new(),
             deltas: Vec::new(),
             events: Vec::new(),
-            pieces: PieceNumbers::new(&groups),
-            groups,
-            whole,
-            timeline,
-            next_frame: 0,
-            report: FrameReport::default(),
-            residuals_kept: false,
             pool,
         };
         simulation.collect_positions();
@@ -243,13 +221,13 @@ impl Simulation {
 
     #[cfg(feature = "advise")]
     pub(crate) fn groups(&self) -> &[Group] {
-        &self.groups
+        &self.state.groups
     }
 
     /// The number in the whole of a particle of a group.
     #[cfg(feature = "advise")]
     pub(crate) fn particle(&self, group: usize, particle: usize) -> usize {
-        match &self.whole {
+        match &self.state.whole {
             Some(whole) => whole.particle(group, particle),
             None => particle,
         }
@@ -260,7 +238,7 @@ impl Simulation {
     /// # Errors
     /// If a value of the stroke lies outside its range.
     pub fn cut(&mut self, stroke: StrokeSpec) -> Result<(), Error> {
-        self.timeline.add(&stroke)
+        self.state.timeline.add(&stroke)
     }
 
     /// Advances by one frame and reports on it.
@@ -277,20 +255,21 @@ impl Simulation {
             }
             None => self.frame()?,
         }
-        Ok(&self.report)
+        Ok(&self.state.report)
     }
 
     fn frame(&mut self) -> Result<(), Error> {
-        let _span = tracing::debug_span!("incise::frame", frame = self.next_frame).entered();
+        let _span =
+            tracing::debug_span!("incise::frame", frame = self.state.clock.next_frame).entered();
         let start = Instant::now();
         let mut ms = Milliseconds::default();
         let mut detached = Vec::new();
         let mut repaired = 0;
-        if self.place.is_device() && self.timeline.is_due(self.next_frame) {
+        if self.state.place.is_device() && self.state.timeline.is_due(self.state.clock.next_frame) {
             repaired += self.fetch(&mut ms)?;
         }
         let cut = self.carry_out_strokes(&mut detached, &mut ms)?;
-        self.events = self.timeline.take_events();
+        self.events = self.state.timeline.take_events();
         let ended = |event: &Event| matches!(event, Event::CutEnded { .. });
         let first_end = self
             .events
@@ -303,38 +282,42 @@ impl Simulation {
             self.judge_cuts();
         }
         let mut reclustered = 0;
-        for group in &mut self.groups {
-            reclustered += usize::from(group.renew_plan(self.next_frame, &mut ms)?);
+        for group in &mut self.state.groups {
+            reclustered += usize::from(group.renew_plan(self.state.clock.next_frame, &mut ms)?);
         }
 
         let before_solve = Instant::now();
-        let (frame, residual) = (self.next_frame, self.wants(Quantity::Residual));
-        let moves = self.colliders.take_moves();
-        for group in &mut self.groups {
+        let (frame, residual) = (self.state.clock.next_frame, self.wants(Quantity::Residual));
+        let moves = self.state.colliders.take_moves();
+        for group in &mut self.state.groups {
             for &(place, to) in &moves {
-                collider::send(&mut group.settings.colliders[place], to, self.time_step);
+                collider::send(
+                    &mut group.settings.colliders[place],
+                    to,
+                    self.state.clock.time_step,
+                );
             }
         }
-        let groups = self.groups.par_iter_mut();
+        let groups = self.state.groups.par_iter_mut();
         let solved = groups
             .map(|group| group.step(frame, residual).map(|step| step.repaired))
             .try_reduce(|| 0, |a, b| Ok(a + b));
-        for group in &mut self.groups {
+        for group in &mut self.state.groups {
             for &(place, to) in &moves {
                 collider::arrive(&mut group.settings.colliders[place], to);
             }
         }
         repaired += solved?;
         ms.solve = milliseconds(before_solve.elapsed());
-        self.residuals_kept = residual;
+        self.state.residuals_kept = residual;
 
         // A device measures what it has; residuals need positions and multipliers of all.
-        if !self.place.is_device() || residual {
+        if !self.state.place.is_device() || residual {
             repaired += self.fetch(&mut ms)?;
         }
-        self.report = FrameReport {
-            frame: self.next_frame,
-            time_s: self.time_at(self.next_frame + 1),
+        self.state.report = FrameReport {
+            frame: self.state.clock.next_frame,
+            time_s: self.state.clock.time_at(self.state.clock.next_frame + 1),
             cut,
             detached,
             repaired,
@@ -347,17 +330,20 @@ impl Simulation {
         ms.total = milliseconds(start.elapsed());
         ms.other = ms.total
             - (ms.cut + ms.cluster + ms.color + ms.schedule + ms.upload + ms.solve + ms.readback);
-        self.report.ms = ms;
-        self.next_frame += 1;
+        self.state.report.ms = ms;
+        self.state.clock.next_frame += 1;
         Ok(())
     }
 
     /// Lets groups that were cut choose substeps again where that is due.
     fn judge_cuts(&mut self) {
-        for group in &mut self.groups {
-            let bodies = group.bodies.iter().map(|&body| &self.scene.body[body]);
+        for group in &mut self.state.groups {
+            let bodies = group
+                .bodies
+                .iter()
+                .map(|&body| &self.state.scene.body[body]);
             let asked: Vec<_> = bodies
-                .map(|body| body.substeps.unwrap_or(self.solver.substeps))
+                .map(|body| body.substeps.unwrap_or(self.state.solver.substeps))
                 .collect();
             group.judge_cut(&asked);
         }
@@ -365,45 +351,54 @@ impl Simulation {
 
     /// Puts the warnings of all groups into the report, and looks for divergence.
     fn collect_warnings(&mut self) {
-        let elapsed = self.report.time_s;
-        for group in &mut self.groups {
-            self.report.warnings.append(&mut group.warnings);
+        let elapsed = self.state.report.time_s;
+        for group in &mut self.state.groups {
+            self.state.report.warnings.append(&mut group.warnings);
             let speed = match group.solver.host_max_speed() {
                 Some(speed) => speed,
-                None => self.report.max_speed.unwrap_or(0.0),
+                None => self.state.report.max_speed.unwrap_or(0.0),
             };
             if group.is_absurd(speed, elapsed) {
                 let message = format!(
                     "the solution has diverged: a particle moves at {speed:.1e} m/s; check method, relaxation and substeps"
                 );
                 let warning = Warning::new(WarningCode::Diverged, &group.bodies, message);
-                self.report.warnings.push(warning);
+                self.state.report.warnings.push(warning);
             }
         }
-        if self.report.repaired > 0 {
-            let bodies: Vec<usize> = self.groups.iter().flat_map(|g| g.bodies.clone()).collect();
+        if self.state.report.repaired > 0 {
+            let bodies: Vec<usize> = self
+                .state
+                .groups
+                .iter()
+                .flat_map(|g| g.bodies.clone())
+                .collect();
             let message = format!(
                 "{} particle(s) would have become infinite and were put back: use more substeps",
-                self.report.repaired
+                self.state.report.repaired
             );
             let warning = Warning::new(WarningCode::Repaired, &bodies, message);
-            self.report.warnings.push(warning);
+            self.state.report.warnings.push(warning);
         }
     }
 
     /// Whether the frame to come is to report a quantity.
     fn wants(&self, quantity: Quantity) -> bool {
-        self.next_frame.is_multiple_of(self.every) && self.quantities.contains(&quantity)
+        self.state
+            .clock
+            .next_frame
+            .is_multiple_of(self.state.reporting.every)
+            && self.state.reporting.quantities.contains(&quantity)
     }
 
     /// Whether substeps are chosen for a body.
     fn chooses(&self) -> bool {
-        self.groups.iter().any(|group| group.choice.is_some())
+        self.state.groups.iter().any(|group| group.choice.is_some())
     }
 
     /// Whether bodies may sleep.
     fn sleeps(&self) -> bool {
-        self.groups.iter().any(|group| group.rest.is_some())
+        self.state.groups.iter().any(|group| group.rest.is_some())
     }
 
     /// Cuts what is due and lets everybody follow; adds what comes off to `detached`.
@@ -415,19 +410,20 @@ impl Simulation {
         let start = Instant::now();
         let wants_kappa = self.wants(Quantity::Kappa);
         let notes_kappa = wants_kappa || self.chooses();
-        let Self {
+        let Self { state, deltas, .. } = self;
+        let State {
             timeline,
             groups,
             whole,
             pieces,
             on_cut,
-            deltas,
+            clock,
             ..
-        } = self;
+        } = state;
         deltas.clear();
         let mut report: Option<CutReport> = None;
         let mut measuring = 0.0;
-        timeline.advance(self.next_frame, groups, |number, group, delta| {
+        timeline.advance(clock.next_frame, groups, |number, group, delta| {
             if notes_kappa {
                 let start = Instant::now();
                 group.note_kappa(wants_kappa);
@@ -456,16 +452,16 @@ impl Simulation {
     /// The report on the last frame; before the first, only its counts and the chosen substeps mean something.
     #[must_use]
     pub fn report(&self) -> &FrameReport {
-        &self.report
+        &self.state.report
     }
 
     /// The positions of all particles in m: the present ones, or, if the state is on a device, those when it was last
     /// fetched: see [`Simulation::read_back`].
     #[must_use]
     pub fn positions(&self) -> &[DVec3] {
-        match &self.whole {
+        match &self.state.whole {
             Some(whole) => &whole.positions,
-            None => &self.groups[0].positions,
+            None => &self.state.groups[0].positions,
         }
     }
 
@@ -476,9 +472,9 @@ impl Simulation {
     /// stroke and within a stroke body by body.
     #[must_use]
     pub fn mesh(&self) -> &TetMesh {
-        match &self.whole {
+        match &self.state.whole {
             Some(whole) => &whole.mesh,
-            None => self.groups[0].cuttable.mesh(),
+            None => self.state.groups[0].cuttable.mesh(),
         }
     }
 
@@ -504,10 +500,10 @@ impl Simulation {
     /// The boundary triangles with what each of them is: outer surface or laid bare by the stroke of a number, counted
     /// from 0 in the order of the scene, of [`Simulation::cut`] and of [`Simulation::begin_stroke`]. No pass over the mesh.
     pub fn boundary(&self) -> impl Iterator<Item = BoundaryTriangle> + '_ {
-        let groups = self.groups.iter().enumerate();
+        let groups = self.state.groups.iter().enumerate();
         groups.flat_map(move |(g, group)| {
             let triangles = group.cuttable.boundary();
-            triangles.map(move |triangle| match &self.whole {
+            triangles.map(move |triangle| match &self.state.whole {
                 Some(whole) => whole.triangle(g, &triangle),
                 None => triangle,
             })
@@ -518,7 +514,7 @@ impl Simulation {
     /// have three such particles, too: [`Simulation::boundary`] tells them apart.
     #[must_use]
     pub fn on_cut(&self) -> &[bool] {
-        &self.on_cut
+        &self.state.on_cut
     }
 
     /// The pieces of all bodies with their numbers, ascending: what a cut took off whom, and how much each weighs.
@@ -530,25 +526,25 @@ impl Simulation {
     /// were).
     #[must_use]
     pub fn pieces(&self) -> Vec<PieceReport> {
-        self.pieces.report(&self.groups)
+        self.state.pieces.report(&self.state.groups)
     }
 
     /// The clusters of tets. With several bodies they are put together: O(tets), and the clusters of a body are
     /// numbered after those of the bodies before it, so that a cut can change their numbers.
     #[must_use]
     pub fn clustering(&self) -> Cow<'_, Clustering> {
-        match &self.whole {
-            Some(whole) => Cow::Owned(whole.plan(&self.groups).0),
-            None => Cow::Borrowed(&self.groups[0].plan.clustering),
+        match &self.state.whole {
+            Some(whole) => Cow::Owned(whole.plan(&self.state.groups).0),
+            None => Cow::Borrowed(&self.state.groups[0].plan.clustering),
         }
     }
 
     /// The colors of the clusters. With several bodies they are put together: O(tets).
     #[must_use]
     pub fn coloring(&self) -> Cow<'_, Coloring> {
-        match &self.whole {
-            Some(whole) => Cow::Owned(whole.plan(&self.groups).1),
-            None => Cow::Borrowed(self.groups[0].plan.coloring()),
+        match &self.state.whole {
+            Some(whole) => Cow::Owned(whole.plan(&self.state.groups).1),
+            None => Cow::Borrowed(self.state.groups[0].plan.coloring()),
         }
     }
 
@@ -556,12 +552,12 @@ impl Simulation {
     /// none waits for another.
     #[must_use]
     pub fn schedule(&self) -> Cow<'_, Schedule> {
-        match &self.whole {
+        match &self.state.whole {
             Some(whole) => {
-                let (clustering, coloring) = whole.plan(&self.groups);
+                let (clustering, coloring) = whole.plan(&self.state.groups);
                 Cow::Owned(Schedule::new(&clustering, &coloring))
             }
-            None => Cow::Borrowed(&self.groups[0].plan.schedule),
+            None => Cow::Borrowed(&self.state.groups[0].plan.schedule),
         }
     }
 
@@ -569,13 +565,13 @@ impl Simulation {
     /// substep of the tet's body.
     #[must_use]
     pub fn kappa(&self) -> f64 {
-        kappa(&self.groups)
+        kappa(&self.state.groups)
     }
 
     /// The tets that are softer than their material to keep the scene's limit of kappa.
     #[must_use]
     pub fn softened(&self) -> SoftenedReport {
-        softened(&self.groups)
+        softened(&self.state.groups)
     }
 
     /// Recomputes everything derived and compares: the mesh, the lists around its particles, volume, masses, clusters,
@@ -585,10 +581,11 @@ impl Simulation {
     /// # Errors
     /// [`Error::Inconsistent`] or [`Error::Cut`] name the first difference.
     pub fn check(&self) -> Result<(), Error> {
-        self.groups.iter().try_for_each(Group::check)?;
-        self.pieces.check(&self.groups)?;
-        self.whole
+        self.state.groups.iter().try_for_each(Group::check)?;
+        self.state.pieces.check(&self.state.groups)?;
+        self.state
+            .whole
             .as_ref()
-            .map_or(Ok(()), |whole| whole.check(&self.groups))
+            .map_or(Ok(()), |whole| whole.check(&self.state.groups))
     }
 }

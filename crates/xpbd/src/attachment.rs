@@ -202,6 +202,17 @@ fn number(particle: usize) -> u32 {
     u32::try_from(particle).expect("particles are numbered by 32 bits")
 }
 
+fn check(what: &'static str, value: f64) -> Result<(), XpbdError> {
+    if value.is_finite() && value >= 0.0 {
+        return Ok(());
+    }
+    Err(XpbdError::Setting {
+        what,
+        value,
+        range: "at least 0 and finite",
+    })
+}
+
 impl<R: Real> Solver<R> {
     /// Adds a handle and returns its number.
     ///
@@ -216,6 +227,19 @@ impl<R: Real> Solver<R> {
             now: pose,
         });
         number(handles.len() - 1)
+    }
+
+    /// Puts a handle at a pose at once. Particles attached to it go there in the next substep.
+    ///
+    /// # Panics
+    /// If the handle does not exist, the pose is not finite or its rotation not of length 1.
+    pub fn set_handle(&mut self, handle: u32, pose: Pose) {
+        pose.check();
+        self.attachments.handles[handle as usize] = Handle {
+            from: pose,
+            to: pose,
+            now: pose,
+        };
     }
 
     /// Says where a handle is at the end of the next frame; until told again, it stays there.
@@ -275,18 +299,8 @@ impl<R: Real> Solver<R> {
         compliance: f64,
         damping: f64,
     ) -> Result<(), XpbdError> {
-        for (what, value) in [
-            ("attachment compliance", compliance),
-            ("attachment damping", damping),
-        ] {
-            if !(value.is_finite() && value >= 0.0) {
-                return Err(XpbdError::Setting {
-                    what,
-                    value,
-                    range: "at least 0 and finite",
-                });
-            }
-        }
+        check("attachment compliance", compliance)?;
+        check("attachment damping", damping)?;
         let pose = self.attachments.handles[handle as usize].from;
         let (x, world) = (self.vector(particle), self.position(particle));
         let attachment = Attachment {
@@ -306,6 +320,25 @@ impl<R: Real> Solver<R> {
         }
         self.note(|changes| changes.attachments = true);
         self.set_weight(particle);
+        Ok(())
+    }
+
+    /// Sets the compliance of all particles on a handle in m/N, wherever they are now; 0 is rigid. O(attachments).
+    ///
+    /// # Errors
+    /// A negative or infinite compliance.
+    pub fn set_compliance(&mut self, handle: u32, compliance: f64) -> Result<(), XpbdError> {
+        check("attachment compliance", compliance)?;
+        let list = self.attachments.list.iter_mut();
+        let mut changed = Vec::new();
+        for attachment in list.filter(|attachment| attachment.handle == handle) {
+            attachment.compliance = compliance;
+            changed.push(attachment.particle as usize);
+        }
+        for particle in changed {
+            self.set_weight(particle);
+        }
+        self.note(|changes| changes.attachments = true);
         Ok(())
     }
 

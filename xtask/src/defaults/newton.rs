@@ -13,7 +13,7 @@ use incise::mesh::generate::{Shape, generate};
 use incise::mesh::glam::DVec3;
 use incise::mesh::{ParticleId, TetMesh};
 use incise::report::ChosenMethod;
-use incise::scene::{BodySpec, HandleSpec, Region, ShapeSpec};
+use incise::scene::{AttachmentSpec, BodySpec, Region, ShapeSpec};
 use incise::{Scene, Simulation};
 use incise_reference::Body;
 use serde::{Deserialize, Serialize};
@@ -232,12 +232,12 @@ impl Setup {
             _ => DVec3::ZERO,
         };
         if is_held {
-            scene.handle.push(HandleSpec {
+            scene.attachment.push(AttachmentSpec {
                 body: 0,
-                holds: vec![half_space(held_side, axis)],
+                regions: vec![half_space(held_side, axis)],
                 frames: [0, 1],
                 path: vec![[0.0; 3], [0.0; 3]],
-                turn: None,
+                rotation: None,
                 compliance: 0.0,
             });
         }
@@ -309,7 +309,7 @@ impl Setup {
     /// Gives the handle its path, a smooth ramp with a point after each stride.
     fn add_press(&mut self, span: &Span) {
         let press = self.press;
-        for handle in &mut self.scene.handle {
+        for handle in &mut self.scene.attachment {
             handle.frames = [0, span.ramp * span.stride];
             let offsets = (0..=span.ramp).map(|i| (press * span.part(i)).to_array());
             handle.path = offsets.collect();

@@ -94,8 +94,8 @@ scale = {scale}
 young_modulus = 1e7
 poisson_ratio = 0.49
 fixed = [{{ half_space = {{ point = [{held}, 0.0, 0.0], normal = [-1.0, 0.0, 0.0] }} }}]
-[[handle]]
-holds = [{{ half_space = {{ point = [{pulled}, 0.0, 0.0], normal = [1.0, 0.0, 0.0] }} }}]
+[[attachment]]
+regions = [{{ half_space = {{ point = [{pulled}, 0.0, 0.0], normal = [1.0, 0.0, 0.0] }} }}]
 frames = [0, {PULL}]
 path = [[0.0, 0.0, 0.0], [0.03, 0.0, 0.0]]
 "

@@ -6,8 +6,9 @@
 
 use incise::Scene;
 use incise::scene::{
-    BodySpec, ColliderSpec, EndSpec, GroundSpec, HandleSpec, LinkSpec, Method, Precision, Quantity,
-    ReclusterSpec, Region, ReportSpec, ShapeSpec, SleepSpec, StrokeSpec, Substeps, TetSolve,
+    AttachmentSpec, BodySpec, ColliderSpec, DistanceSpec, EndSpec, GroundSpec, Method, Precision,
+    Quantity, ReclusterSpec, Region, ReportSpec, ShapeSpec, SleepSpec, StrokeSpec, Substeps,
+    TetSolve,
 };
 
 /// What of a feature a scene has.
@@ -97,13 +98,13 @@ const END: Region = Region::HalfSpace {
     normal: [-1.0, 0.0, 0.0],
 };
 
-fn handle(frames: [u64; 2], way: f64, compliance: f64) -> HandleSpec {
-    HandleSpec {
+fn handle(frames: [u64; 2], way: f64, compliance: f64) -> AttachmentSpec {
+    AttachmentSpec {
         body: 0,
-        holds: vec![END],
+        regions: vec![END],
         frames,
         path: vec![[0.0; 3], [way, 0.0, 0.0]],
-        turn: None,
+        rotation: None,
         compliance,
     }
 }
@@ -117,17 +118,17 @@ fn ball(at: f64, velocity: f64) -> ColliderSpec {
     }
 }
 
-fn link(only_when_longer: bool, length: Option<f64>) -> LinkSpec {
+fn link(tension_only: bool, length: Option<f64>) -> DistanceSpec {
     let end = |x| EndSpec {
         body: 0,
         point: [x, 0.125, 0.125],
     };
-    LinkSpec {
+    DistanceSpec {
         from: end(-0.5),
         to: end(0.5),
         length,
         compliance: 0.0,
-        only_when_longer,
+        tension_only,
     }
 }
 
@@ -136,7 +137,7 @@ fn two_linked(scene: &mut Scene) {
     let mut second = scene.body[0].clone();
     second.position = [0.0, 0.0, 0.5];
     scene.body.push(second);
-    scene.link.push(LinkSpec {
+    scene.distance.push(DistanceSpec {
         from: EndSpec {
             body: 0,
             point: [0.0, 0.0, 0.125],
@@ -147,7 +148,7 @@ fn two_linked(scene: &mut Scene) {
         },
         length: None,
         compliance: 0.0,
-        only_when_longer: false,
+        tension_only: false,
     });
 }
 
@@ -224,19 +225,21 @@ pub(crate) fn cases() -> Vec<Case> {
         case("fixed particles", Used, "one end", |s| {
             s.body[0].fixed.push(END);
         }),
-        case("handle", Idle, "one end, not yet moving", |s| {
-            s.handle.push(handle([LATE, LATE + 1], 0.1, 0.0));
+        case("attachment", Idle, "one end, not yet moving", |s| {
+            s.attachment.push(handle([LATE, LATE + 1], 0.1, 0.0));
         }),
-        case("handle", Used, "one end, moving", |s| {
-            s.handle.push(handle([0, 1000], 0.01, 0.0));
+        case("attachment", Used, "one end, moving", |s| {
+            s.attachment.push(handle([0, 1000], 0.01, 0.0));
         }),
         case("soft handle", Used, "one end, moving", |s| {
-            s.handle.push(handle([0, 1000], 0.01, 1e-4));
+            s.attachment.push(handle([0, 1000], 0.01, 1e-4));
         }),
-        case("link", Idle, "a slack thread", |s| {
-            s.link.push(link(true, Some(2.0)));
+        case("distance", Idle, "a slack thread", |s| {
+            s.distance.push(link(true, Some(2.0)));
         }),
-        case("link", Used, "a rod", |s| s.link.push(link(false, None))),
+        case("distance", Used, "a rod", |s| {
+            s.distance.push(link(false, None))
+        }),
         case("volume constraints", Used, "one a tet", |s| {
             s.body[0].volume_compliance = Some(1e-7);
         }),

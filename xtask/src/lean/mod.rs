@@ -121,7 +121,7 @@ fn experiment(quick: bool, valgrind: &Option<String>) -> Experiment<Row> {
 
 /// Whether a quick run counts the instructions of this one, and asks a device; bytes are counted of all.
 fn of_a_quick_run(case: &Case) -> bool {
-    case.state == State::Base || ["gravity", "handle"].contains(&case.feature)
+    case.state == State::Base || ["gravity", "attachment"].contains(&case.feature)
 }
 
 #[cfg(test)]

@@ -10,8 +10,8 @@ use crate::experiment::{Page, Part, Table};
 
 /// Features and the modules that are theirs alone: what of a bare frame is in those is paid by who declared nothing.
 const MODULES: [(&str, &[&str]); 12] = [
-    ("handles", &["xpbd::attachment", "incise::handle"]),
-    ("links", &["xpbd::distance", "incise::link"]),
+    ("attachments", &["xpbd::attachment", "incise::attachment"]),
+    ("distances", &["xpbd::distance", "incise::distance"]),
     ("volume constraints", &["xpbd::volume", "incise::volume"]),
     ("colliders, ground", &["xpbd::collider", "incise::collider"]),
     ("Jacobi, Chebyshev", &["xpbd::jacobi"]),

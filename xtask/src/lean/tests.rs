@@ -60,7 +60,7 @@ fn what_is_idle_takes_a_constant() {
         assert_eq!(here.allocations, bare.allocations, "{}", case.id());
         here.bytes - bare.bytes
     };
-    for feature in ["ground", "collider", "link", "plane stroke", "blade"] {
+    for feature in ["ground", "collider", "distance", "plane stroke", "blade"] {
         let case = case(feature, State::Idle);
         let constant = more(case, 300);
         // Measured: 200 to 1344 bytes.

@@ -173,7 +173,7 @@ fn large(scene: &Scene, frames: u32, quick: bool) -> anyhow::Result<Vec<LargeRow
         let motion = |spec| Motion::of(&with(scene, &spec), frames, Some(1));
         let xpbd = motion(large_step(iterations))?;
         // Rounds of VBD are dear, and few are enough. Scenes with links cannot be run with it.
-        let vbd = if iterations <= 16 && scene.link.is_empty() {
+        let vbd = if iterations <= 16 && scene.distance.is_empty() {
             Some(motion(large_vbd(iterations))?.deviation(&newton))
         } else {
             None

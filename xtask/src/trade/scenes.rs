@@ -90,9 +90,9 @@ impl Kind {
                 write!(
                     text,
                     "poisson_ratio = 0.3\n{held}\
-                     [[handle]]\nholds = [{{ half_space = {{ point = [1, 0, 0], normal = [1, 0, 0] }} }}]\n\
+                     [[attachment]]\nregions = [{{ half_space = {{ point = [1, 0, 0], normal = [1, 0, 0] }} }}]\n\
                      frames = [0, {frames}]\npath = [[0, 0, 0], [0, 0, 0]]\n\
-                     turn = {{ axis = [1, 0, 0], angle_degrees = 90, center = [1, 0.125, 0.125] }}\n"
+                     rotation = {{ axis = [1, 0, 0], angle_degrees = 90, center = [1, 0.125, 0.125] }}\n"
                 )?;
             }
             Self::PressedLiver => {
@@ -101,7 +101,7 @@ impl Kind {
                 write!(
                     text,
                     "fixed = [{{ half_space = {{ point = [0, 0, -0.03], normal = [0, 0, -1] }} }}]\n\
-                     [[handle]]\nholds = [{{ half_space = {{ point = [0, 0, 0.05], normal = [0, 0, 1] }} }}]\n\
+                     [[attachment]]\nregions = [{{ half_space = {{ point = [0, 0, 0.05], normal = [0, 0, 1] }} }}]\n\
                      frames = [0, {frames}]\npath = [[0, 0, 0], [0, 0, -0.02]]\n"
                 )?;
             }
@@ -167,7 +167,7 @@ fn bilayer(folder: &Path, quick: bool) -> anyhow::Result<String> {
         let point = format!("[{:?}, {:?}, {:?}]", x.x, x.y, x.z);
         write!(
             text,
-            "[[link]]\nfrom = {{ body = 0, point = {point} }}\nto = {{ body = 1, point = {point} }}\n"
+            "[[distance]]\nfrom = {{ body = 0, point = {point} }}\nto = {{ body = 1, point = {point} }}\n"
         )?;
         stitches += 1;
     }

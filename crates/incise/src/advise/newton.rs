@@ -42,7 +42,7 @@ struct Part {
 
 /// What keeps a scene from the reference, in words that complete "the scene has".
 pub(super) fn obstacle(scene: &Scene) -> Option<&'static str> {
-    let links = |f: fn(&crate::scene::LinkSpec) -> bool| scene.link.iter().any(f);
+    let links = |f: fn(&crate::scene::DistanceSpec) -> bool| scene.distance.iter().any(f);
     let later = |stroke: &crate::scene::StrokeSpec| stroke.last_frame() > 0;
     [
         (scene.world.ground.is_some(), "a ground"),
@@ -54,7 +54,7 @@ pub(super) fn obstacle(scene: &Scene) -> Option<&'static str> {
             "volume constraints",
         ),
         (
-            scene.handle.iter().any(|h| h.compliance > 0.0),
+            scene.attachment.iter().any(|h| h.compliance > 0.0),
             "soft handles",
         ),
         (
@@ -109,9 +109,9 @@ impl Newton {
                 .zip(&mut bodies);
             for (g, ((part, group), body)) in all.enumerate() {
                 let poses: Vec<[Pose; 2]> = group
-                    .handles
+                    .attachments
                     .iter()
-                    .map(|handle| [frame, frame + 1].map(|f| handle.pose(f)))
+                    .map(|attachment| [frame, frame + 1].map(|f| attachment.pose(f)))
                     .collect();
                 for step in 1..=steps {
                     let fraction = f64::from(step) / f64::from(steps);
@@ -161,9 +161,9 @@ impl Part {
                 let seat = seat[p] as usize;
                 fixed[seat] |= solver.is_fixed(p);
                 if let Some(number) = solver.handle_of(p).filter(|_| !solver.is_fixed(p)) {
-                    let handle = group.handles.iter().position(|h| h.number == number);
-                    let handle = handle.expect("handles of a group hold its particles");
-                    let pose = group.handles[handle].pose(0);
+                    let handle = group.attachments.iter().position(|a| a.number == number);
+                    let handle = handle.expect("attachments of a group hold its particles");
+                    let pose = group.attachments[handle].pose(0);
                     let place = pose.rotation.inverse() * (mesh.positions[p] - pose.position);
                     fixed[seat] = true;
                     held.push((handle, p, place));

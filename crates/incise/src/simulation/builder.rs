@@ -10,12 +10,14 @@ use std::sync::Arc;
 use glam::DVec3;
 use incise_mesh::TetMesh;
 
+use crate::attachment::AttachmentHandle;
 use crate::collider::ColliderHandle;
+use crate::distance::DistanceHandle;
 use crate::limits::value;
 use crate::place::{AtHand, Place};
 use crate::scene::{
-    BodySpec, ColliderSpec, GroundSpec, HandleSpec, LinkSpec, Region, ReportSpec, SolverSpec,
-    StrokeSpec,
+    AttachmentSpec, BodySpec, ColliderSpec, DistanceSpec, GroundSpec, Region, ReportSpec,
+    SolverSpec, StrokeSpec,
 };
 use crate::{Error, Scene, Simulation};
 
@@ -212,16 +214,18 @@ impl SimulationBuilder {
         handle
     }
 
-    /// Adds an attachment: a part of a body that is held or moved.
-    pub fn add_attachment(&mut self, attachment: HandleSpec) -> &mut Self {
-        self.scene.handle.push(attachment);
-        self
+    /// Adds an attachment: part of a body that is held and moved, by its path or by [`Simulation::move_attachment`].
+    pub fn add_attachment(&mut self, attachment: AttachmentSpec) -> AttachmentHandle {
+        let handle = AttachmentHandle::of_scene(self.scene.attachment.len());
+        self.scene.attachment.push(attachment);
+        handle
     }
 
-    /// Adds distance constraints between two bodies or parts of one.
-    pub fn add_distance(&mut self, distance: LinkSpec) -> &mut Self {
-        self.scene.link.push(distance);
-        self
+    /// Adds a distance constraint between two bodies or parts of one, which [`Simulation::set_distance`] changes.
+    pub fn add_distance(&mut self, distance: DistanceSpec) -> DistanceHandle {
+        let handle = DistanceHandle::of_scene(self.scene.distance.len());
+        self.scene.distance.push(distance);
+        handle
     }
 
     /// Adds a stroke: a cut that is known beforehand. [`Simulation::cut`] adds strokes while the simulation runs.

@@ -1,17 +1,19 @@
-//! What a program changes between frames: gravity, colliders, impulses; and what it asks, by rays.
+//! What a program changes between frames: gravity, colliders, attachments, distances, impulses; and what it asks, by rays.
 //!
 //! Every group of bodies has the colliders of the world among its settings, so a change goes to all of them. Cost: that of
 //! the change; an impulse wakes what sleeps and, on a device, fetches the positions.
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
 use super::Simulation;
 use crate::Error;
-use crate::backend::{each, each_mut};
+use crate::attachment::{Attachment, AttachmentHandle};
+use crate::backend::{AnySolver, each, each_mut};
 use crate::collider::{self, ColliderHandle};
-use crate::limits::{coordinates, value, within};
+use crate::distance::DistanceHandle;
+use crate::limits::{LARGEST_COORDINATE, coordinates, value, within};
 use crate::ray::{RayHit, first_hit};
-use crate::scene::ColliderSpec;
+use crate::scene::{AttachmentSpec, ColliderSpec, DistanceSpec};
 
 impl Simulation {
     /// Sets the acceleration of gravity in m/s² from the next frame on; `None` is weightlessness. Wakes what sleeps.
@@ -22,8 +24,8 @@ impl Simulation {
         if let Some(gravity) = gravity {
             coordinates("gravity", gravity.to_array())?;
         }
-        self.gravity = gravity;
-        for group in &mut self.groups {
+        self.state.gravity = gravity;
+        for group in &mut self.state.groups {
             group.settings.gravity = gravity;
             group.wake();
         }
@@ -64,8 +66,8 @@ impl Simulation {
     /// ```
     pub fn add_collider(&mut self, collider: &ColliderSpec) -> Result<ColliderHandle, Error> {
         let added = collider::collider("collider", collider)?;
-        let handle = self.colliders.add();
-        for group in &mut self.groups {
+        let handle = self.state.colliders.add();
+        for group in &mut self.state.groups {
             group.settings.colliders.push(added);
             group.wake();
         }
@@ -81,7 +83,7 @@ impl Simulation {
     pub fn move_collider(&mut self, handle: ColliderHandle, to: DVec3) -> Result<(), Error> {
         coordinates("collider.to", to.to_array())?;
         self.collider_place(handle)?;
-        self.colliders.go_to(handle, to);
+        self.state.colliders.go_to(handle, to);
         Ok(())
     }
 
@@ -96,8 +98,8 @@ impl Simulation {
     ) -> Result<(), Error> {
         let place = self.collider_place(handle)?;
         let new = collider::collider("collider", collider)?;
-        self.colliders.stay(handle);
-        for group in &mut self.groups {
+        self.state.colliders.stay(handle);
+        for group in &mut self.state.groups {
             group.settings.colliders[place] = new;
             group.wake();
         }
@@ -111,7 +113,7 @@ impl Simulation {
     pub fn collider_position(&self, handle: ColliderHandle) -> Result<DVec3, Error> {
         let place = self.collider_place(handle)?;
         Ok(collider::position(
-            &self.groups[0].settings.colliders[place].shape,
+            &self.state.groups[0].settings.colliders[place].shape,
         ))
     }
 
@@ -121,8 +123,8 @@ impl Simulation {
     /// If it was removed before.
     pub fn remove_collider(&mut self, handle: ColliderHandle) -> Result<(), Error> {
         let place = self.collider_place(handle)?;
-        self.colliders.remove(place);
-        for group in &mut self.groups {
+        self.state.colliders.remove(place);
+        for group in &mut self.state.groups {
             group.settings.colliders.remove(place);
             group.wake();
         }
@@ -130,14 +132,193 @@ impl Simulation {
     }
 
     fn collider_place(&self, handle: ColliderHandle) -> Result<usize, Error> {
-        let unknown = || {
-            value(
-                "collider",
-                format!("{handle:?}"),
-                "one that was not removed",
-            )
-        };
-        self.colliders.place(handle).ok_or_else(unknown)
+        let place = self.state.colliders.place(handle);
+        place.ok_or_else(|| removed("collider", handle))
+    }
+
+    /// Holds part of a body from the next frame on: its particles that lie at rest in the regions of the attachment. They
+    /// stay where they are until the attachment moves, by its path from the frames that it names, or by
+    /// [`Simulation::move_attachment`]. O(particles of the body); with a compliance of 0 the next step lays out all tets
+    /// again. On a device the positions are fetched.
+    ///
+    /// # Errors
+    /// If the body does not exist, a value lies outside its range, another attachment or a grab holds one of the particles,
+    /// or the device is lost; nothing has changed then.
+    ///
+    /// # Example
+    /// ```
+    /// use incise::mesh::glam::{DQuat, DVec3};
+    /// use incise::scene::{AttachmentSpec, Region};
+    /// use incise::{Scene, Simulation};
+    ///
+    /// let scene = Scene::from_toml("[[body]]\nshape = { kind = \"beam\", tets = 300 }")?;
+    /// let mut simulation = Simulation::new(&scene)?;
+    /// let end = Region::HalfSpace { point: [0.45, 0.0, 0.0], normal: [1.0, 0.0, 0.0] };
+    /// let grip = simulation.add_attachment(&AttachmentSpec::new(0, vec![end]))?;
+    /// for frame in 1..=10 {
+    ///     let offset = DVec3::Z * 0.01 * f64::from(frame);
+    ///     simulation.move_attachment(grip, offset, DQuat::IDENTITY)?;
+    ///     simulation.step()?;
+    /// }
+    /// let mesh = simulation.mesh().positions.iter();
+    /// let lifted = mesh.zip(simulation.positions()).filter(|(rest, _)| rest.x >= 0.45);
+    /// assert!(lifted.clone().count() > 3);
+    /// assert!(lifted.clone().all(|(rest, x)| (x.z - rest.z - 0.1).abs() < 1e-6));
+    /// simulation.remove_attachment(grip)?;
+    /// # Ok::<(), incise::Error>(())
+    /// ```
+    pub fn add_attachment(&mut self, spec: &AttachmentSpec) -> Result<AttachmentHandle, Error> {
+        let group = self.group_of("attachment.body", spec.body)?;
+        self.read_back()?;
+        let name = AttachmentHandle(self.state.next.attachment);
+        let frame = self.state.clock.next_frame;
+        self.state.groups[group].add_attachment(name, spec, frame)?;
+        self.state.next.attachment += 1;
+        Ok(name)
+    }
+
+    /// Has an attachment go within the next frame to where its particles, as they were when they were attached, are
+    /// turned by `rotation` about their center and then displaced by `offset` in m. From then on the program moves it, not
+    /// its path; until told again, it stays there. Moves of more than a tet or half a turn in a frame may turn tets
+    /// inside out for a while.
+    ///
+    /// # Errors
+    /// If the attachment was removed, the offset is not finite or beyond 1e9 m, or the rotation is not of length 1; nothing
+    /// has changed then.
+    pub fn move_attachment(
+        &mut self,
+        handle: AttachmentHandle,
+        offset: DVec3,
+        rotation: DQuat,
+    ) -> Result<(), Error> {
+        coordinates("attachment.offset", offset.to_array())?;
+        if !(rotation.is_finite() && (rotation.length() - 1.0).abs() < 1e-6) {
+            return Err(value("attachment.rotation", rotation, "of length 1"));
+        }
+        self.attachment(handle)?.1.move_to(offset, rotation);
+        Ok(())
+    }
+
+    /// Sets the compliance by which an attachment holds each of its particles, in m/N; 0 is rigid. What is held stays
+    /// where it is at that moment. O(attached particles).
+    ///
+    /// # Errors
+    /// If the attachment was removed, the compliance is not between 0 and 1e9, or the device is lost; nothing has changed
+    /// then.
+    pub fn set_attachment_compliance(
+        &mut self,
+        handle: AttachmentHandle,
+        compliance: f64,
+    ) -> Result<(), Error> {
+        self.read_back()?;
+        let (solver, attachment) = self.attachment(handle)?;
+        attachment.set_compliance(solver, compliance)
+    }
+
+    /// Lets go of what an attachment holds, what cuts made of it too. Its handle is void from then on.
+    ///
+    /// # Errors
+    /// If it was removed before, or the device is lost; nothing has changed then.
+    pub fn remove_attachment(&mut self, handle: AttachmentHandle) -> Result<(), Error> {
+        self.read_back()?;
+        for group in &mut self.state.groups {
+            if group.remove_attachment(handle)? {
+                return Ok(());
+            }
+        }
+        Err(removed("attachment", handle))
+    }
+
+    fn attachment(
+        &mut self,
+        handle: AttachmentHandle,
+    ) -> Result<(&mut AnySolver, &mut Attachment), Error> {
+        for group in &mut self.state.groups {
+            let mut all = group.attachments.iter_mut();
+            if let Some(attachment) = all.find(|attachment| attachment.name == handle) {
+                return Ok((&mut group.solver, attachment));
+            }
+        }
+        Err(removed("attachment", handle))
+    }
+
+    /// Ties two particles of a body together, or of bodies that are tied together already: a suture, a rod or a spring
+    /// from the next frame on. O(particles of the bodies + distances). On a device the positions are fetched.
+    ///
+    /// Bodies that nothing ties together have solvers of their own. To tie them while the simulation runs, declare a
+    /// distance between them before it starts, such as one that acts only under tension and is longer than the scene.
+    ///
+    /// # Errors
+    /// If a body does not exist, the bodies have solvers of their own, a value lies outside its range, both ends are on one
+    /// particle, or the device is lost; nothing has changed then.
+    pub fn add_distance(&mut self, spec: &DistanceSpec) -> Result<DistanceHandle, Error> {
+        let group = self.group_of_both(spec)?;
+        self.read_back()?;
+        let name = DistanceHandle(self.state.next.distance);
+        let group = &mut self.state.groups[group];
+        let constraint = group.distance(spec)?;
+        group.distances.add(name, constraint);
+        group.update_distances()?;
+        self.state.next.distance += 1;
+        Ok(name)
+    }
+
+    /// Sets rest length in m and compliance in m/N of a distance constraint, such as of a suture that is pulled tight.
+    /// O(distances of its bodies).
+    ///
+    /// # Errors
+    /// If it was removed, a value lies outside its range, or the device is lost; nothing has changed then.
+    pub fn set_distance(
+        &mut self,
+        handle: DistanceHandle,
+        length: f64,
+        compliance: f64,
+    ) -> Result<(), Error> {
+        let length = within("distance.length", length, 0.0, 2.0 * LARGEST_COORDINATE)?;
+        let compliance = within("distance.compliance", compliance, 0.0, 1e9)?;
+        self.read_back()?;
+        for group in &mut self.state.groups {
+            if let Some(constraint) = group.distances.get_mut(handle) {
+                (constraint.length, constraint.compliance) = (length, compliance);
+                return group.update_distances();
+            }
+        }
+        Err(removed("distance", handle))
+    }
+
+    /// Removes a distance constraint: the suture is cut. Its handle is void from then on. O(distances of its bodies).
+    ///
+    /// # Errors
+    /// If it was removed before, or the device is lost; nothing has changed then.
+    pub fn remove_distance(&mut self, handle: DistanceHandle) -> Result<(), Error> {
+        self.read_back()?;
+        for group in &mut self.state.groups {
+            if group.distances.remove(handle) {
+                return group.update_distances();
+            }
+        }
+        Err(removed("distance", handle))
+    }
+
+    /// The number of the group of a body.
+    fn group_of(&self, field: &str, body: usize) -> Result<usize, Error> {
+        let mut groups = self.state.groups.iter();
+        let group = groups.position(|group| group.bodies.contains(&body));
+        group.ok_or_else(|| value(field, body, "the number of a body, counted from 0"))
+    }
+
+    /// The number of the group of both bodies of a distance constraint.
+    fn group_of_both(&self, spec: &DistanceSpec) -> Result<usize, Error> {
+        let from = self.group_of("distance.from.body", spec.from.body)?;
+        let to = self.group_of("distance.to.body", spec.to.body)?;
+        if from != to {
+            let range = format!(
+                "a body that a distance has tied to body {} since the simulation started",
+                spec.from.body
+            );
+            return Err(value("distance.to.body", spec.to.body, range));
+        }
+        Ok(from)
     }
 
     /// Gives what lies within a radius in m of a point an impulse in N·s, and wakes what sleeps: all particles there change
@@ -158,7 +339,7 @@ impl Simulation {
         self.read_back()?;
         let mut hit = Vec::new();
         let mut mass = 0.0;
-        for (g, group) in self.groups.iter().enumerate() {
+        for (g, group) in self.state.groups.iter().enumerate() {
             each!(&group.solver, solver => {
                 for p in 0..solver.particle_count() {
                     let is_near = solver.position(p).distance(point) <= radius;
@@ -175,7 +356,7 @@ impl Simulation {
         let change = impulse / mass;
         coordinates("impulse over the mass it meets", change.to_array())?;
         for (g, p) in hit {
-            let group = &mut self.groups[g];
+            let group = &mut self.state.groups[g];
             group.wake();
             each_mut!(&mut group.solver, solver => {
                 solver.set_velocity(p, solver.velocity(p) + change);
@@ -204,4 +385,9 @@ impl Simulation {
     pub fn ray_cast(&self, origin: DVec3, direction: DVec3) -> Option<RayHit> {
         first_hit(self.boundary(), self.positions(), origin, direction)
     }
+}
+
+/// The error about a handle of something that is gone.
+fn removed(field: &str, handle: impl std::fmt::Debug) -> Error {
+    value(field, format!("{handle:?}"), "one that was not removed")
 }

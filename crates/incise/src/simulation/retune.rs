@@ -22,7 +22,7 @@ use crate::method::{leaves_open, resolve, settings};
 use crate::place::Place;
 use crate::plan::{Plan, Recipe};
 use crate::recluster::Recluster;
-use crate::scene::{Method, Precision, SolverSpec, Substeps};
+use crate::scene::{Method, Precision, ReportSpec, SolverSpec, Substeps};
 use crate::sleep::Rest;
 use crate::substeps::Choice;
 use crate::{Error, Scene};
@@ -49,7 +49,7 @@ impl Simulation {
     /// The settings of the solver as they are now: those of the scene, or of the last [`Simulation::retune`].
     #[must_use]
     pub fn solver_spec(&self) -> &SolverSpec {
-        &self.solver
+        &self.state.solver
     }
 
     /// Has the simulation go on with other settings of the solver from the next frame on. Whatever is cut, moves and
@@ -94,44 +94,33 @@ impl Simulation {
     /// # Ok::<(), incise::Error>(())
     /// ```
     pub fn retune(&mut self, solver: &SolverSpec) -> Result<(), Error> {
-        if *solver == self.solver {
+        if *solver == self.state.solver {
             return Ok(());
         }
-        if solver.precision != Precision::Auto && solver.precision != self.precision {
+        if solver.precision != Precision::Auto && solver.precision != self.state.precision {
             let range = format!(
                 "{}, as when the simulation was set up",
-                self.precision.name()
+                self.state.precision.name()
             );
             return Err(value("solver.precision", solver.precision.name(), range));
         }
-        let Scene {
-            world,
-            body,
-            collider,
-            handle,
-            link,
-            ..
-        } = &*self.scene;
+        // Strokes are under way, and reports are not the solver's business.
         let scene = Scene {
             solver: solver.clone(),
-            world: *world,
-            body: body.clone(),
-            collider: collider.clone(),
-            handle: handle.clone(),
-            link: link.clone(),
-            // Strokes are under way, and reports are not the solver's business.
-            ..Scene::default()
+            stroke: Vec::new(),
+            report: ReportSpec::default(),
+            ..(*self.state.scene).clone()
         };
         let settings = settings(&scene)?;
         crate::scene::check(&scene)?;
         let place = self.place_for(&scene)?;
-        if !is_light(&self.solver, solver) {
+        if !is_light(&self.state.solver, solver) {
             self.read_back()?;
         }
         let retuned = || {
-            let groups = self.groups.par_iter();
+            let groups = self.state.groups.par_iter();
             groups
-                .map(|group| Retuned::of(group, &self.solver, &scene, &settings, &place))
+                .map(|group| Retuned::of(group, &self.state.solver, &scene, &settings, &place))
                 .collect::<Result<Vec<_>, Error>>()
         };
         let retuned = match &self.pool {
@@ -140,26 +129,23 @@ impl Simulation {
         }?;
 
         // Nothing fails from here on: what is on a device has been fetched.
-        for (group, retuned) in self.groups.iter_mut().zip(retuned) {
+        for (group, retuned) in self.state.groups.iter_mut().zip(retuned) {
             retuned.take_effect(group)?;
             group.judge_settings();
         }
         if let Some(budget) = solver.budget_ms {
-            let mut fit = || budget::fit(&mut self.groups, solver, budget);
+            let mut fit = || budget::fit(&mut self.state.groups, solver, budget);
             match &self.pool {
                 Some(pool) => pool.install(fit),
                 None => fit(),
             }?;
         }
-        if settings.time_step.to_bits() != self.time_step.to_bits() {
-            self.epoch = (self.next_frame, self.time_at(self.next_frame));
-            self.time_step = settings.time_step;
-        }
+        self.state.clock.set_time_step(settings.time_step);
         self.leave_device();
-        self.place = place;
-        self.solver = solver.clone();
-        self.residuals_kept = false;
-        if self.next_frame == 0 {
+        self.state.place = place;
+        self.state.solver = solver.clone();
+        self.state.residuals_kept = false;
+        if self.state.clock.next_frame == 0 {
             self.report_before_the_first();
         }
         Ok(())
@@ -197,20 +183,20 @@ impl Simulation {
 
     /// Where the scene with other settings is computed.
     fn place_for(&self, scene: &Scene) -> Result<Place, Error> {
-        let (before, after) = (&self.solver, &scene.solver);
+        let (before, after) = (&self.state.solver, &scene.solver);
         if (before.backend, before.method, &before.clustering)
             == (after.backend, after.method, &after.clustering)
         {
-            return Ok(self.place.clone());
+            return Ok(self.state.place.clone());
         }
-        Place::choose(scene, &self.place.or(&self.at_hand))
+        Place::choose(scene, &self.state.place.or(&self.at_hand))
     }
 
     /// Keeps the present device at hand, unless another one is.
     pub(super) fn leave_device(&mut self) {
         #[cfg(feature = "gpu")]
         if self.at_hand.gpu.is_none() {
-            self.at_hand.gpu.clone_from(&self.place.gpu);
+            self.at_hand.gpu.clone_from(&self.state.place.gpu);
         }
     }
 }

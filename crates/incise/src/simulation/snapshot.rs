@@ -8,45 +8,21 @@
 //! Cost: a copy of all arrays, 0.25 to 0.4 kB a tet, with VBD up to 0.6; the first step after coming back lays out
 //! all tets, and sends a device everything.
 
+#[cfg(feature = "gpu")]
 use std::sync::Arc;
 
-use glam::DVec3;
-
 use super::Simulation;
-use crate::collider::Colliders;
+use super::state::State;
+use crate::Error;
 use crate::group::Group;
 use crate::limits::value;
-use crate::pieces::PieceNumbers;
-use crate::place::Place;
 use crate::recluster::Recluster;
-use crate::report::FrameReport;
-use crate::scene::{Quantity, ReportSpec, SolverSpec};
-use crate::strokes::Timeline;
+use crate::scene::ReportSpec;
 use crate::whole::Whole;
-use crate::{Error, Scene};
 
 /// A simulation at one moment: see [`Simulation::snapshot`].
 #[derive(Clone, Debug)]
-pub struct Snapshot {
-    scene: Arc<Scene>,
-    solver: SolverSpec,
-    time_step: f64,
-    epoch: (u64, f64),
-    gravity: Option<DVec3>,
-    colliders: Colliders,
-    quantities: Vec<Quantity>,
-    every: u64,
-    place: Place,
-    /// With their solvers on the processor.
-    groups: Vec<Group>,
-    whole: Option<Whole>,
-    pieces: PieceNumbers,
-    timeline: Timeline,
-    on_cut: Vec<bool>,
-    next_frame: u64,
-    report: FrameReport,
-    residuals_kept: bool,
-}
+pub struct Snapshot(State);
 
 /// Bytes of a tet in what a cut needs: corners, the lists of the stars around its corners, the links of its faces.
 const CUTTING: usize = 16 + 32 + 16;
@@ -65,14 +41,19 @@ impl Snapshot {
     /// cuts is the least certain. O(bodies + particles).
     #[must_use]
     pub fn bytes(&self) -> usize {
-        let groups = self.groups.iter().map(Group::bytes);
-        let particles = |group: &Group| group.positions.len();
-        let particles = self.groups.iter().map(particles).sum();
-        let on_cut = self.on_cut.iter().filter(|on_cut| **on_cut).count();
-        groups.sum::<usize>()
-            + self.whole.as_ref().map_or(0, Whole::bytes)
-            + self.timeline.bytes(particles, on_cut)
-            + self.on_cut.len()
+        let State {
+            groups,
+            whole,
+            on_cut,
+            timeline,
+            ..
+        } = &self.0;
+        let particles = groups.iter().map(|group| group.positions.len()).sum();
+        let cut = on_cut.iter().filter(|on_cut| **on_cut).count();
+        groups.iter().map(Group::bytes).sum::<usize>()
+            + whole.as_ref().map_or(0, Whole::bytes)
+            + timeline.bytes(particles, cut)
+            + on_cut.len()
     }
 }
 
@@ -120,124 +101,41 @@ impl Simulation {
     /// ```
     pub fn snapshot(&mut self) -> Result<Snapshot, Error> {
         self.read_back()?;
-        for group in &mut self.groups {
+        for group in &mut self.state.groups {
             if let Some(recluster) = &mut group.recluster {
                 recluster.settle()?;
             }
         }
-        // Whoever adds a field says here whether it belongs to a moment.
-        let Self {
-            scene,
-            solver,
-            time_step,
-            epoch,
-            gravity,
-            colliders,
-            // Of the scene, which does not change.
-            precision: _,
-            quantities,
-            every,
-            place,
-            // Of the simulation, whatever the moment.
-            at_hand: _,
-            groups,
-            whole,
-            pieces,
-            timeline,
-            on_cut,
-            // Of the last frame only.
-            deltas: _,
-            events: _,
-            next_frame,
-            report,
-            residuals_kept,
-            pool: _,
-        } = self;
-        Ok(Snapshot {
-            scene: Arc::clone(scene),
-            solver: solver.clone(),
-            time_step: *time_step,
-            epoch: *epoch,
-            gravity: *gravity,
-            colliders: colliders.clone(),
-            quantities: quantities.clone(),
-            every: *every,
-            place: place.clone(),
-            groups: groups.clone(),
-            whole: whole.clone(),
-            pieces: pieces.clone(),
-            timeline: timeline.clone(),
-            on_cut: on_cut.clone(),
-            next_frame: *next_frame,
-            report: report.clone(),
-            residuals_kept: *residuals_kept,
-        })
+        Ok(Snapshot(self.state.clone()))
     }
 
-    /// Comes back to a moment: what follows is to the bit what would have followed then, on a device on the same device
+    /// Goes to the moment of a snapshot: what follows is to the bit what followed then, on a device on the same device
     /// and driver. The snapshot can be used again.
     ///
-    /// Everything goes back: also what [`Simulation::retune`] and [`Simulation::set_report`] have set and the number of the
-    /// next frame. Strokes added since are gone, and who computes is who computed then. Grabs and strokes begun since are
-    /// void: their numbers may come to name later ones. Whoever wants to keep the present settings of the solver hands a
-    /// copy of [`Simulation::solver_spec`] to `retune` afterwards. [`Simulation::deltas`] is empty: renderers and recorders
-    /// begin anew from [`Simulation::boundary`], and find other buffers in the solvers of a device. O(particles + tets).
+    /// Everything goes back: bodies, colliders, the settings of [`Simulation::retune`] and [`Simulation::set_report`], and
+    /// the number of the next frame. Strokes added since are gone. Grabs and strokes begun since are void: their numbers
+    /// may come to name later ones. To keep the present settings of the solver, hand a copy of
+    /// [`Simulation::solver_spec`] to `retune` afterwards. [`Simulation::deltas`] is empty: renderers and recorders start
+    /// again from [`Simulation::boundary`], and find other buffers in the solvers of a device. A snapshot of another
+    /// simulation makes this one continue that one. O(particles + tets).
     ///
     /// # Errors
-    /// If the snapshot is of a simulation of another scene, or the device is lost or out of memory; nothing has changed
-    /// then.
+    /// If the device is lost or out of memory; nothing has changed then.
     pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), Error> {
-        if !is_same(&self.scene, &snapshot.scene) {
-            let range = "of a simulation of the same scene";
-            return Err(value("the snapshot", "of another scene", range));
-        }
         // What is under way on a device ends here, with its count of repairs.
         self.read_back()?;
-        let groups = snapshot.groups.clone();
+        let mut state = snapshot.0.clone();
         #[cfg(feature = "gpu")]
-        let groups = match &snapshot.place.gpu {
-            Some(gpu) => take_over(&mut self.groups, groups, gpu, &snapshot.solver)?,
-            None => groups,
-        };
-        let Snapshot {
-            scene,
-            solver,
-            time_step,
-            epoch,
-            gravity,
-            colliders,
-            quantities,
-            every,
-            place,
-            groups: _,
-            whole,
-            pieces,
-            timeline,
-            on_cut,
-            next_frame,
-            report,
-            residuals_kept,
-        } = snapshot;
-        self.scene = Arc::clone(scene);
-        self.solver = solver.clone();
-        self.time_step = *time_step;
-        self.epoch = *epoch;
-        self.gravity = *gravity;
-        self.colliders.restore(colliders);
-        self.quantities.clone_from(quantities);
-        self.every = *every;
+        if let Some(gpu) = state.place.gpu.clone() {
+            let groups = std::mem::take(&mut state.groups);
+            state.groups = take_over(&mut self.state.groups, groups, &gpu, &state.solver)?;
+        }
+        state.colliders.keep_numbers_of(&self.state.colliders);
+        state.next.keep_numbers_of(self.state.next);
         self.leave_device();
-        self.place = place.clone();
-        self.groups = groups;
-        self.whole.clone_from(whole);
-        self.pieces = pieces.clone();
-        self.timeline = timeline.clone();
-        self.on_cut.clone_from(on_cut);
+        self.state = state;
         self.deltas.clear();
         self.events.clear();
-        self.next_frame = *next_frame;
-        self.report = report.clone();
-        self.residuals_kept = *residuals_kept;
         Ok(())
     }
 
@@ -249,32 +147,9 @@ impl Simulation {
         if report.every == 0 {
             return Err(value("report.every", 0, "at least 1"));
         }
-        self.every = report.every;
-        self.quantities = report.quantities;
+        self.state.reporting = report;
         Ok(())
     }
-}
-
-/// Whether two simulations were set up with the same bodies and all around them; how they are computed and what they
-/// report may differ.
-fn is_same(a: &Arc<Scene>, b: &Arc<Scene>) -> bool {
-    let of_one = Arc::ptr_eq(a, b);
-    of_one
-        || (
-            &a.world,
-            &a.body,
-            &a.collider,
-            &a.handle,
-            &a.link,
-            &a.stroke,
-        ) == (
-            &b.world,
-            &b.body,
-            &b.collider,
-            &b.handle,
-            &b.link,
-            &b.stroke,
-        ) && a.solver.precision == b.solver.precision
 }
 
 /// Takes the solvers of `new` groups, which are on the processor, to a device; where `old` ones are there already, they
@@ -287,13 +162,13 @@ fn take_over(
     old: &mut [Group],
     mut new: Vec<Group>,
     gpu: &Arc<crate::gpu::GpuContext>,
-    spec: &SolverSpec,
+    spec: &crate::scene::SolverSpec,
 ) -> Result<Vec<Group>, Error> {
     use crate::backend::AnySolver;
     let mut lent = Vec::with_capacity(new.len());
-    for (old, new) in old.iter().zip(&mut new) {
-        let lends = match &old.solver {
-            AnySolver::Device(device) => device.serves(gpu, spec)?,
+    for (i, new) in new.iter_mut().enumerate() {
+        let lends = match old.get(i).map(|old| &old.solver) {
+            Some(AnySolver::Device(device)) => device.serves(gpu, spec)?,
             _ => false,
         };
         if !lends {

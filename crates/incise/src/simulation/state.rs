@@ -1,229 +1,107 @@
-//! The state of a [`Simulation`]: where it is, what it is worth, and how it gets to whoever asks.
+//! [`State`]: all of a simulation that changes with time.
 //!
-//! On the processor it is here after each frame. On a device it stays there: reported sums are taken there, and only what
-//! needs every particle fetches it. Cost: a pass over what is reported; a wait for the device where it is asked.
+//! A snapshot is a copy of it, and a simulation that takes a state over continues as the one it came from, to the bit.
+//! What follows from the rest is left out and built again: the layout of the solvers, and what a device has. Cost of a
+//! copy: O(particles + tets).
 
-use std::time::Instant;
+use std::sync::Arc;
 
-use incise_mesh::ParticleId;
+use glam::DVec3;
 
-use super::Simulation;
-use crate::Error;
-use crate::measure::{
-    by_body, energy, kappa, max_speed, residual, residuals_of_tets, softened, states, volume,
-};
-use crate::report::{FrameReport, Milliseconds, milliseconds};
-use crate::scene::Quantity;
+use crate::Scene;
+use crate::attachment::AttachmentHandle;
+use crate::collider::Colliders;
+use crate::distance::DistanceHandle;
+use crate::group::Group;
+use crate::pieces::PieceNumbers;
+use crate::place::Place;
+use crate::report::FrameReport;
+use crate::scene::{Precision, ReportSpec, SolverSpec};
+use crate::strokes::Timeline;
+use crate::whole::Whole;
 
-impl Simulation {
-    /// Computes the quantities that this frame reports.
-    pub(super) fn measure(&mut self, ms: &mut Milliseconds) -> Result<(), Error> {
-        let kappa_too = self.wants(Quantity::Kappa);
-        if kappa_too || self.chooses() || self.sleeps() {
-            self.report.bodies = by_body(&mut self.groups, kappa_too);
+/// All of a simulation that changes with time. A copy has its solvers on the processor.
+#[derive(Clone, Debug)]
+pub(super) struct State {
+    /// The scene with all bodies, as each was added.
+    pub(super) scene: Arc<Scene>,
+    /// The settings of the solver as they are now.
+    pub(super) solver: SolverSpec,
+    pub(super) precision: Precision,
+    pub(super) place: Place,
+    pub(super) clock: Clock,
+    pub(super) gravity: Option<DVec3>,
+    /// The names of the colliders in the settings of all groups.
+    pub(super) colliders: Colliders,
+    pub(super) next: NextNumbers,
+    pub(super) reporting: ReportSpec,
+    /// In the order of their first bodies.
+    pub(super) groups: Vec<Group>,
+    /// All groups together, if there are several.
+    pub(super) whole: Option<Whole>,
+    pub(super) pieces: PieceNumbers,
+    /// Whether a particle lies on a cut; empty before the first.
+    pub(super) on_cut: Vec<bool>,
+    pub(super) timeline: Timeline,
+    pub(super) report: FrameReport,
+    /// Whether the solvers have the residuals of the last frame.
+    pub(super) residuals_kept: bool,
+}
+
+/// The numbers of the next handles; none is given twice.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct NextNumbers {
+    pub(super) attachment: u32,
+    pub(super) distance: u32,
+}
+
+impl NextNumbers {
+    /// Those after all handles of a scene.
+    pub(super) fn new(scene: &Scene) -> Self {
+        Self {
+            attachment: AttachmentHandle::of_scene(scene.attachment.len()).0,
+            distance: DistanceHandle::of_scene(scene.distance.len()).0,
         }
-        if !self.report.frame.is_multiple_of(self.every) {
-            return Ok(());
-        }
-        let start = Instant::now();
-        let states = states(&mut self.groups, self.gravity, &self.quantities)?;
-        if self.place.is_device() {
-            let groups = self.groups.iter_mut();
-            self.report.repaired += groups.map(|group| group.solver.news()).sum::<usize>();
-            ms.readback += milliseconds(start.elapsed());
-        }
-        for quantity in &self.quantities {
-            let report = &mut self.report;
-            match quantity {
-                Quantity::Residual => report.residual = residual(&self.groups, self.gravity),
-                Quantity::Energy => report.energy = Some(energy(&states)),
-                Quantity::Volume => {
-                    let volume = volume(&states);
-                    report.volume = Some(volume.total);
-                    // Nothing may be left.
-                    let error = volume.total / volume.rest - 1.0;
-                    report.volume_error = Some(if volume.rest > 0.0 { error } else { 0.0 });
-                    report.min_volume_ratio = Some(volume.min_ratio);
-                    report.inverted_tets = Some(volume.inverted);
-                }
-                Quantity::Speed => report.max_speed = Some(max_speed(&states)),
-                Quantity::Kappa => {
-                    report.kappa = Some(kappa(&self.groups));
-                    report.softened = Some(softened(&self.groups));
-                }
-            }
-        }
-        Ok(())
     }
 
-    /// Makes the report what it is before the first frame.
-    pub(super) fn report_before_the_first(&mut self) {
-        self.report = FrameReport::default();
-        self.count();
-        if self.chooses() {
-            self.report.bodies = by_body(&mut self.groups, false);
+    /// Gives no number that another simulation has given.
+    pub(super) fn keep_numbers_of(&mut self, other: Self) {
+        self.attachment = self.attachment.max(other.attachment);
+        self.distance = self.distance.max(other.distance);
+    }
+}
+
+/// The number of the next frame, and the simulated time of every frame.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Clock {
+    /// Length of a frame in s.
+    pub(super) time_step: f64,
+    /// The frame since which frames have this length, and the simulated time in s at its start.
+    epoch: (u64, f64),
+    pub(super) next_frame: u64,
+}
+
+impl Clock {
+    /// A clock before the first frame.
+    pub(super) fn new(time_step: f64) -> Self {
+        Self {
+            time_step,
+            epoch: (0, 0.0),
+            next_frame: 0,
         }
     }
 
-    /// Fills in the counts.
-    pub(super) fn count(&mut self) {
-        let mesh = self.mesh();
-        let (particles, tets) = (mesh.positions.len(), mesh.tets.len());
-        let plans = || self.groups.iter().map(|group| &group.plan);
-        let clusters = plans().map(|plan| plan.clustering.occupied()).sum();
-        let colors = plans().map(|plan| plan.schedule.color_count());
-        let colors = colors.max().unwrap_or(0);
-        let report = &mut self.report;
-        report.particles = particles;
-        report.tets = tets;
-        report.clusters = clusters;
-        report.colors = colors;
-        report.pieces = self.groups.iter().map(|group| group.pieces.count()).sum();
-        report.backend = self.place.name();
-        report.precision = self.precision.name();
-    }
-
-    /// The simulated time in s at the start of a frame.
+    /// The simulated time in s at the start of a frame that is not before the last change of the time step.
     pub(super) fn time_at(&self, frame: u64) -> f64 {
         let (first, start) = self.epoch;
         start + (frame - first) as f64 * self.time_step
     }
 
-    /// Takes over state and positions; returns how many particles a device had to put back since the last time.
-    pub(super) fn fetch(&mut self, ms: &mut Milliseconds) -> Result<usize, Error> {
-        let start = Instant::now();
-        let mut repaired = 0;
-        for group in &mut self.groups {
-            repaired += group.solver.read_back()?;
-        }
-        if self.place.is_device() {
-            ms.readback += milliseconds(start.elapsed());
-        }
-        self.collect_positions();
-        Ok(repaired)
-    }
-
-    /// Makes [`Simulation::positions`] those of now, if the state is on a device: waits for it and fetches them.
-    /// Otherwise they are, and nothing happens.
-    ///
-    /// A frame does this by itself only if a stroke is due, since a blade has to know where the body is, or if it reports
-    /// residuals. Energies, volume and speed are summed up on the device.
-    ///
-    /// # Errors
-    /// If the device is lost.
-    pub fn read_back(&mut self) -> Result<(), Error> {
-        if self.place.is_device() {
-            self.report.repaired += self.fetch(&mut Milliseconds::default())?;
-        }
-        Ok(())
-    }
-
-    /// What is to be said about where it is computed: the device, or why there is none; `None` if the scene asked for
-    /// the processor.
-    #[must_use]
-    pub fn backend_note(&self) -> Option<&str> {
-        self.place.note.as_deref()
-    }
-
-    /// The duration of a frame in s.
-    #[must_use]
-    pub fn time_step(&self) -> f64 {
-        self.time_step
-    }
-
-    /// The number of the frame to come, counted from 0: that of the frames that were made.
-    #[must_use]
-    pub fn next_frame(&self) -> u64 {
-        self.next_frame
-    }
-
-    /// In which group of bodies a particle of [`Simulation::mesh`] is solved, and its number there. O(1).
-    ///
-    /// Bodies that links join are a group, every other one is a group of its own; groups are numbered in the order of
-    /// their first bodies. On a device the group is the number of its solver in `Simulation::device_solvers`: a renderer
-    /// that draws the whole mesh from the buffers of the solvers looks its particles up here, once at the start and then
-    /// those that [`Simulation::deltas`] append. A particle keeps its place for good.
-    ///
-    /// # Panics
-    /// If the particle does not exist.
-    ///
-    /// # Example
-    /// ```
-    /// use incise::mesh::ParticleId;
-    /// use incise::{Scene, Simulation};
-    ///
-    /// let scene = Scene::from_toml(
-    ///     r#"
-    ///     [[body]]
-    ///     shape = { kind = "box", tets = 200 }
-    ///     [[body]]
-    ///     shape = { kind = "sphere", tets = 200 }
-    ///     position = [3.0, 0.0, 0.0]
-    ///     "#,
-    /// )?;
-    /// let simulation = Simulation::new(&scene)?;
-    /// let last = ParticleId::new(simulation.mesh().positions.len() - 1);
-    /// assert_eq!(simulation.place_of(ParticleId(0)), (0, 0));
-    /// assert_eq!(simulation.place_of(last).0, 1);
-    /// # Ok::<(), incise::Error>(())
-    /// ```
-    #[must_use]
-    pub fn place_of(&self, particle: ParticleId) -> (usize, usize) {
-        let count = self.mesh().positions.len();
-        assert!(particle.index() < count, "the mesh has {count} particles");
-        match &self.whole {
-            Some(whole) => whole.place(particle),
-            None => (0, particle.index()),
-        }
-    }
-
-    /// The device solvers of the scene's groups of bodies, for renderers; none on the processor. Which of them has a
-    /// particle: [`Simulation::place_of`].
-    #[cfg(feature = "gpu")]
-    pub fn device_solvers(&self) -> impl Iterator<Item = &crate::gpu::GpuSolver> + '_ {
-        self.groups.iter().filter_map(|group| group.solver.device())
-    }
-
-    /// For each tet of [`Simulation::mesh`] how far its constraints are from solved in the last substep: the norm of
-    /// `C + α̃ λ` over its two, without unit. The root of the sum of squares is the `dual` of the residuals that the frame
-    /// reports. 0 for tets that take no part and for bodies asleep.
-    ///
-    /// `None` unless the last frame has reported [`Quantity::Residual`], and after [`Simulation::retune`] until the next
-    /// one does. VBD knows no multipliers and its force is a matter of particles: `None`, too. O(tets).
-    ///
-    /// ```
-    /// use incise::{Scene, Simulation};
-    ///
-    /// let scene = Scene::from_toml(
-    ///     "[report]\nquantities = [\"residual\"]\n[[body]]\nshape = { kind = \"sphere\", tets = 300 }",
-    /// )?;
-    /// let mut simulation = Simulation::new(&scene)?;
-    /// assert!(simulation.residuals_of_tets().is_none());
-    /// simulation.step()?;
-    /// let residuals = simulation.residuals_of_tets().expect("they are reported");
-    /// assert_eq!(residuals.len(), simulation.mesh().tets.len());
-    /// # Ok::<(), incise::Error>(())
-    /// ```
-    #[must_use]
-    pub fn residuals_of_tets(&self) -> Option<Vec<f64>> {
-        if !self.residuals_kept {
-            return None;
-        }
-        let groups = self.groups.iter().map(residuals_of_tets);
-        let mut groups = groups.collect::<Option<Vec<_>>>()?;
-        match &self.whole {
-            Some(whole) => Some(whole.of_tets(&groups)),
-            None => groups.pop(),
-        }
-    }
-
-    /// Takes over the positions of the solvers.
-    pub(super) fn collect_positions(&mut self) {
-        for group in &mut self.groups {
-            group.solver.positions(&mut group.positions);
-        }
-        if let Some(whole) = &mut self.whole {
-            whole.collect_positions(&self.groups);
+    /// Sets the length of the frames to come in s.
+    pub(super) fn set_time_step(&mut self, time_step: f64) {
+        if time_step.to_bits() != self.time_step.to_bits() {
+            self.epoch = (self.next_frame, self.time_at(self.next_frame));
+            self.time_step = time_step;
         }
     }
 }

@@ -121,8 +121,8 @@ fn advice_looks_far_enough() {
 fn handles_move_the_reference_as_they_say() {
     let mut text = BEAM.to_owned();
     text.truncate(text.find("fixed").unwrap());
-    text += "[[handle]]\nholds = [{ half_space = { point = [0, 0, 9], normal = [0, 0, -1] } }]\nframes = [0, 4]\n\
-             path = [[0, 0, 0], [0.4, 0, 0]]\nturn = { axis = [1, 0, 0], angle_degrees = 80, center = [0, 0.1, 0] }\n";
+    text += "[[attachment]]\nregions = [{ half_space = { point = [0, 0, 9], normal = [0, 0, -1] } }]\nframes = [0, 4]\n\
+             path = [[0, 0, 0], [0.4, 0, 0]]\nrotation = { axis = [1, 0, 0], angle_degrees = 80, center = [0, 0.1, 0] }\n";
     let scene = scene(&text);
     let rest = incise::Simulation::with_threads(&scene, 1)
         .unwrap()
@@ -167,7 +167,7 @@ fn stitched_layers_move_as_one_body() {
         let point = x.to_array();
         writeln!(
             text,
-            "[[link]]\nfrom = {{ body = 0, point = {point:?} }}\nto = {{ body = 1, point = {point:?} }}"
+            "[[distance]]\nfrom = {{ body = 0, point = {point:?} }}\nto = {{ body = 1, point = {point:?} }}"
         )
         .unwrap();
     }

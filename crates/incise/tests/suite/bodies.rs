@@ -249,7 +249,7 @@ fn the_fixture_of_two_bodies_is_cut_in_one_stroke() {
 #[test]
 fn linked_bodies_share_a_group_and_others_do_not() {
     let bodies = three();
-    let link = "[[link]]\nfrom = { body = 2, point = [0, 0.8, 0] }\nto = { body = 0, point = [0, -0.8, 0] }\ncompliance = 1e-5\n";
+    let link = "[[distance]]\nfrom = { body = 2, point = [0, 0.8, 0] }\nto = { body = 0, point = [0, -0.8, 0] }\ncompliance = 1e-5\n";
     let report = "[report]\nquantities = [\"kappa\"]\n[solver]\nsubsteps = 2\n";
     let second = bodies[1].clone() + "substeps = 7\n";
     let with = |bodies: &str| simulation(&scene(&format!("{report}{WORLD}{bodies}{}", strokes())));
@@ -289,7 +289,7 @@ fn a_handle_on_one_of_two_bodies_moves_that_one() {
         body("box", 200, [0.0; 3]),
         body("box", 200, [2.0, 0.0, 0.0]),
     ];
-    let handle = "[[handle]]\nbody = 1\nholds = [{ half_space = { point = [2, 0, 0.3], normal = [0, 0, 1] } }]\n\
+    let handle = "[[attachment]]\nbody = 1\nregions = [{ half_space = { point = [2, 0, 0.3], normal = [0, 0, 1] } }]\n\
         frames = [1, 5]\npath = [[0, 0, 0], [0, 0, 0.1]]\n";
     let with = |text: &str| {
         let mut scene = scene(&format!("{WORLD}{text}"));

@@ -33,18 +33,18 @@ fn everything() -> Scene {
         center = [2, 0, -1]
         half_extents = [0.5, 0.5, 0.1]
         rotation = {{ axis = [0, 1, 0], angle_degrees = 20 }}
-        [[handle]]
+        [[attachment]]
         body = 1
-        holds = [{{ half_space = {{ point = [2, 0, 0.3], normal = [0, 0, 1] }} }}]
+        regions = [{{ half_space = {{ point = [2, 0, 0.3], normal = [0, 0, 1] }} }}]
         frames = [1, 4]
         path = [[0, 0, 0], [0, 0.1, 0], [0, 0.1, 0.1]]
-        turn = {{ axis = [0, 0, 1], angle_degrees = 30, center = [2, 0, 0] }}
-        [[link]]
+        rotation = {{ axis = [0, 0, 1], angle_degrees = 30, center = [2, 0, 0] }}
+        [[distance]]
         from = {{ body = 0, point = [0.5, 0, 0] }}
         to = {{ body = 1, point = [1.5, 0, 0] }}
         compliance = 1e-4
-        only_when_longer = true
-        [[link]]
+        tension_only = true
+        [[distance]]
         from = {{ body = 0, point = [0, 0.5, 0.5] }}
         to = {{ body = 0, point = [0, 0.5, -0.5] }}
         length = 0.9
@@ -134,41 +134,59 @@ const MISTAKES: [Mistake; 35] = [
             rotation.as_mut().unwrap().angle_degrees = f64::NAN;
         }
     }),
-    ("handle[0].body", |s| s.handle[0].body = 2),
-    ("handle[0].holds[0].half_space.normal", |s| {
-        if let Region::HalfSpace { normal, .. } = &mut s.handle[0].holds[0] {
+    ("attachment[0].body", |s| s.attachment[0].body = 2),
+    ("attachment[0].regions[0].half_space.normal", |s| {
+        if let Region::HalfSpace { normal, .. } = &mut s.attachment[0].regions[0] {
             *normal = [0.0; 3];
         }
     }),
-    ("handle[0].holds[1].particles", |s| {
-        s.handle[0].holds.push(Region::Particles(vec![1_000_000]));
+    ("attachment[0].regions[1].particles", |s| {
+        s.attachment[0]
+            .regions
+            .push(Region::Particles(vec![1_000_000]));
     }),
-    ("handle[0].frames", |s| s.handle[0].frames = [3, 3]),
-    ("handle[0].path", |s| s.handle[0].path.truncate(1)),
-    ("handle[0].path", |s| s.handle[0].path[1][2] = f64::NAN),
-    ("handle[0].turn.axis", |s| {
-        s.handle[0].turn.as_mut().unwrap().axis = [0.0; 3];
+    ("attachment[0].frames", |s| s.attachment[0].frames = [3, 3]),
+    ("attachment[0].path", |s| s.attachment[0].path.truncate(1)),
+    ("attachment[0].path", |s| {
+        s.attachment[0].path[1][2] = f64::NAN
     }),
-    ("handle[0].turn.angle_degrees", |s| {
-        s.handle[0].turn.as_mut().unwrap().angle_degrees = 540.0;
+    ("attachment[0].rotation.axis", |s| {
+        s.attachment[0].rotation.as_mut().unwrap().axis = [0.0; 3];
     }),
-    ("handle[0].turn.angle_degrees", |s| {
-        s.handle[0].turn.as_mut().unwrap().angle_degrees = f64::INFINITY;
+    ("attachment[0].rotation.angle_degrees", |s| {
+        s.attachment[0].rotation.as_mut().unwrap().angle_degrees = 540.0;
     }),
-    ("handle[0].turn.center", |s| {
-        s.handle[0].turn.as_mut().unwrap().center[0] = f64::NAN;
+    ("attachment[0].rotation.angle_degrees", |s| {
+        s.attachment[0].rotation.as_mut().unwrap().angle_degrees = f64::INFINITY;
     }),
-    ("handle[0].compliance", |s| s.handle[0].compliance = -1.0),
-    ("handle[1].holds", |s| s.handle.push(s.handle[0].clone())),
-    ("link[0].from.body", |s| s.link[0].from.body = 2),
-    ("link[0].to.body", |s| s.link[0].to.body = usize::MAX),
-    ("link[0].from.point", |s| s.link[0].from.point[0] = f64::NAN),
-    ("link[0].to.point", |s| s.link[0].to = s.link[0].from),
-    ("link[1].length", |s| s.link[1].length = Some(-1.0)),
-    ("link[1].length", |s| s.link[1].length = Some(f64::NAN)),
-    ("link[0].compliance", |s| s.link[0].compliance = -1e-9),
-    ("link[0].compliance", |s| {
-        s.link[0].compliance = f64::INFINITY;
+    ("attachment[0].rotation.center", |s| {
+        s.attachment[0].rotation.as_mut().unwrap().center[0] = f64::NAN;
+    }),
+    ("attachment[0].compliance", |s| {
+        s.attachment[0].compliance = -1.0
+    }),
+    ("attachment[1].regions", |s| {
+        s.attachment.push(s.attachment[0].clone())
+    }),
+    ("distance[0].from.body", |s| s.distance[0].from.body = 2),
+    ("distance[0].to.body", |s| {
+        s.distance[0].to.body = usize::MAX
+    }),
+    ("distance[0].from.point", |s| {
+        s.distance[0].from.point[0] = f64::NAN
+    }),
+    ("distance[0].to.point", |s| {
+        s.distance[0].to = s.distance[0].from
+    }),
+    ("distance[1].length", |s| s.distance[1].length = Some(-1.0)),
+    ("distance[1].length", |s| {
+        s.distance[1].length = Some(f64::NAN)
+    }),
+    ("distance[0].compliance", |s| {
+        s.distance[0].compliance = -1e-9
+    }),
+    ("distance[0].compliance", |s| {
+        s.distance[0].compliance = f64::INFINITY;
     }),
     ("body[0].volume_compliance", |s| {
         s.body[0].volume_compliance = Some(-1.0);
@@ -195,8 +213,8 @@ fn unknown_keys_name_the_nearest() {
             "[[collider]]\nkind = \"box\"\ncenter = [0, 0, 0]\nhalf_extnts = [1, 1, 1]",
             "half_extents",
         ),
-        ("[[handle]]\nhold = []", "holds"),
-        ("[[link]]\nform = 1", "from"),
+        ("[[attachment]]\nregion = []", "regions"),
+        ("[[distance]]\nform = 1", "from"),
         ("[[body]]\nvolume_complience = 1", "volume_compliance"),
         ("[[colider]]", "collider"),
     ] {
@@ -254,9 +272,9 @@ fn a_moving_ball_pushes_a_body_away() {
 fn a_handle_takes_what_it_holds_along() {
     let text = format!(
         "{GRAVITY}[solver]\nprecision = \"f64\"\n{}fixed = [{{ half_space = {{ point = [-0.4, 0, 0], normal = [-1, 0, 0] }} }}]\n\
-         [[handle]]\nholds = [{{ half_space = {{ point = [0.4, 0, 0], normal = [1, 0, 0] }} }}]\n\
+         [[attachment]]\nregions = [{{ half_space = {{ point = [0.4, 0, 0], normal = [1, 0, 0] }} }}]\n\
          frames = [2, 12]\npath = [[0, 0, 1], [0.1, 0, 1], [0.1, 0.1, 1]]\n\
-         turn = {{ axis = [2, 0, 0], angle_degrees = 45, center = [0.4, 0.1, 0] }}\n{}",
+         rotation = {{ axis = [2, 0, 0], angle_degrees = 45, center = [0.4, 0.1, 0] }}\n{}",
         body("beam", 600, [0.0, 0.0, 0.0]),
         plane(5, [0.45, 0.013, 0.0], [0.0, 1.0, 0.0]),
     );
@@ -296,7 +314,7 @@ fn a_handle_takes_what_it_holds_along() {
 fn links_carry_a_body() {
     let text = format!(
         "{GRAVITY}[solver]\nprecision = \"f64\"\nsubsteps = 20\n{}fixed = [{{ half_space = {{ point = [0, 0, -9], normal = [0, 0, 1] }} }}]\n{}\
-         [[link]]\nfrom = {{ body = 0, point = [0, 0, -0.5] }}\nto = {{ body = 1, point = [0, 0, -1.5] }}\nonly_when_longer = true\n",
+         [[distance]]\nfrom = {{ body = 0, point = [0, 0, -0.5] }}\nto = {{ body = 1, point = [0, 0, -1.5] }}\ntension_only = true\n",
         body("box", 300, [0.0, 0.0, 0.0]),
         body("box", 300, [0.0, 0.0, -2.0]),
     );
@@ -324,7 +342,7 @@ fn links_carry_a_body() {
     }
     assert!(lowest(&tied) > -3.6, "{}", lowest(&tied));
     // Without the link it falls by 2 m.
-    scene.link.clear();
+    scene.distance.clear();
     let mut loose = simulation(&scene);
     for _ in 0..40 {
         loose.step().unwrap();
@@ -335,9 +353,9 @@ fn links_carry_a_body() {
 #[test]
 fn an_end_of_a_link_is_the_nearest_particle_of_its_body() {
     let mut scene = everything();
-    scene.link[0].to = EndSpec {
+    scene.distance[0].to = EndSpec {
         body: 1,
-        point: scene.link[0].from.point,
+        point: scene.distance[0].from.point,
     };
     // The other body's nearest particle is another one.
     simulation(&scene).step().unwrap();

@@ -275,7 +275,7 @@ fn a_cut_through_what_is_held_leaves_both_sides_held_and_both_are_let_go() {
 fn what_is_fixed_or_held_cannot_be_grabbed() {
     let text = body("box", 300, [0.0; 3])
         + "fixed = [{ half_space = { point = [0, 0, 0.1], normal = [0, 0, 1] } }]\n"
-        + "[[handle]]\nholds = [{ half_space = { point = [0, 0, -0.4], normal = [0, 0, -1] } }]\n\
+        + "[[attachment]]\nregions = [{ half_space = { point = [0, 0, -0.4], normal = [0, 0, -1] } }]\n\
            frames = [1, 2]\npath = [[0, 0, 0], [0, 0, 0]]\n";
     let mut simulation = simulation(&scene(&text));
     let [top, bottom] = [0.5, -0.5].map(|z| dvec3(0.0, 0.0, z));

@@ -20,7 +20,7 @@ pub(crate) fn two_bodies() -> Scene {
          {beam}fixed = [{{ half_space = {{ point = [-0.45, 0.0, 0.0], normal = [-1.0, 0.0, 0.0] }} }}]\n\
          {cube}{sweep}{plane}\n\
          [[collider]]\nkind = \"sphere\"\ncenter = [0.2, 0.0, 0.5]\nradius = 0.1\nvelocity = [0.0, 0.0, -1.0]\n\
-         [[handle]]\nbody = 0\nholds = [{{ half_space = {{ point = [0.45, 0.0, 0.0], normal = [1.0, 0.0, 0.0] }} }}]\n\
+         [[attachment]]\nbody = 0\nregions = [{{ half_space = {{ point = [0.45, 0.0, 0.0], normal = [1.0, 0.0, 0.0] }} }}]\n\
          frames = [0, 6]\npath = [[0.0, 0.0, 0.0], [0.05, 0.0, 0.0]]"
     ))
 }

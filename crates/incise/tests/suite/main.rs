@@ -42,4 +42,5 @@ mod snapshot;
 mod strokes;
 mod substeps;
 mod support;
+mod ties;
 mod values;

@@ -209,7 +209,7 @@ fn vbd_is_stable_at_any_stiffness() {
 fn a_rigid_handle_goes_with_vbd() {
     let text = format!(
         "[solver]\nmethod = \"vbd\"\nprecision = \"f64\"\n{}\
-         [[handle]]\nholds = [{{ half_space = {{ point = [0, 0, 0.3], normal = [0, 0, 1] }} }}]\n\
+         [[attachment]]\nregions = [{{ half_space = {{ point = [0, 0, 0.3], normal = [0, 0, 1] }} }}]\n\
          frames = [0, 4]\npath = [[0, 0, 0], [0, 0, 0.2]]\n{}",
         body("box", 300, [0.0; 3]),
         plane(2, [0.03, 0.0, 0.0], [1.0, 0.1, 0.0])
@@ -240,9 +240,9 @@ fn vbd_takes_damping_links_soft_handles_and_volumes() {
         let text = format!(
             "[world]\ngravity = [0.0, 0.0, -9.81]\n[solver]\nprecision = \"f64\"\nkappa_limit = inf\n{keys}\n\
              {}{body_keys}{}{body_keys}\
-             [[handle]]\nholds = [{{ half_space = {{ point = [0, 0, 0.3], normal = [0, 0, 1] }} }}]\n\
+             [[attachment]]\nregions = [{{ half_space = {{ point = [0, 0, 0.3], normal = [0, 0, 1] }} }}]\n\
              frames = [0, 4]\npath = [[0, 0, 0], [0, 0, 0.02]]\ncompliance = 1e-4\n\
-             [[link]]\nfrom = {{ body = 0, point = [0.5, 0, 0] }}\nto = {{ body = 1, point = [1.0, 0, 0] }}\n\
+             [[distance]]\nfrom = {{ body = 0, point = [0.5, 0, 0] }}\nto = {{ body = 1, point = [1.0, 0, 0] }}\n\
              compliance = 1e-4\n{}",
             body("box", 200, [0.0; 3]),
             body("box", 200, [1.5, 0.0, 0.0]),

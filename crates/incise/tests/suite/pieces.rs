@@ -84,7 +84,7 @@ fn numbers_are_unique_over_all_bodies_and_stay() {
         plane(5, [0.0, 0.0, 0.1], [0.0, 0.1, 1.0]),
     ]
     .concat();
-    let link = "[[link]]\nfrom = { body = 2, point = [0, 0.8, 0] }\nto = { body = 0, point = [0, -0.8, 0] }\ncompliance = 1e-5\n";
+    let link = "[[distance]]\nfrom = { body = 2, point = [0, 0.8, 0] }\nto = { body = 0, point = [0, -0.8, 0] }\ncompliance = 1e-5\n";
     for (joined, first) in [("", [0, 1, 2]), (link, [0, 2, 1])] {
         for precision in [Precision::F32, Precision::F64] {
             let mut scene = scene(&format!("{bodies}{strokes}{joined}"));

@@ -68,7 +68,7 @@ fn other_constraints_follow_from_the_start() {
     let base = scene(&format!(
         "[world]\ngravity = [0.0, 0.0, -9.81]\n\
          {beam}damping = 0.01\nvolume_compliance = 1e-6\nsubsteps = \"auto\"\n{cube}\n\
-         [[link]]\nfrom = {{ body = 0, point = [0.0, 0.0, 0.0] }}\nto = {{ body = 1, point = [0.0, 1.2, 0.0] }}\n\
+         [[distance]]\nfrom = {{ body = 0, point = [0.0, 0.0, 0.0] }}\nto = {{ body = 1, point = [0.0, 1.2, 0.0] }}\n\
          compliance = 1e-4"
     ));
     for (name, solver) in settings() {
@@ -161,7 +161,7 @@ fn softened_tets_of_a_cut_body_are_restored() {
     let mut base = two_bodies();
     base.world = incise::scene::WorldSpec::default();
     base.collider.clear();
-    base.handle.clear();
+    base.attachment.clear();
     let limits = |kappa_limit, substeps: u32| SolverSpec {
         kappa_limit,
         substeps: substeps.into(),

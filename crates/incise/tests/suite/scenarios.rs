@@ -112,7 +112,7 @@ fn a_flap_hangs_on_its_hinge() {
 fn cut_while_stretched() {
     let text = format!(
         "{}damping = 0.002\nfixed = [{{ half_space = {{ point = [-0.45, 0.0, 0.0], normal = [-1.0, 0.0, 0.0] }} }}]\n\
-         [[handle]]\nholds = [{{ half_space = {{ point = [0.45, 0.0, 0.0], normal = [1.0, 0.0, 0.0] }} }}]\n\
+         [[attachment]]\nregions = [{{ half_space = {{ point = [0.45, 0.0, 0.0], normal = [1.0, 0.0, 0.0] }} }}]\n\
          frames = [0, 60]\npath = [[0.0, 0.0, 0.0], [0.9, 0.0, 0.0]]\n\
          [report]\nquantities = [\"energy\", \"volume\", \"speed\"]\n{}",
         body("beam", 600, [0.0; 3]).replace("1e4", "1e5"),

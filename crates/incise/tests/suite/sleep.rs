@@ -68,7 +68,7 @@ fn a_stroke_wakes_what_it_cuts_and_nothing_else() {
 fn a_handle_wakes_what_it_holds_while_it_moves() {
     let solver = "[solver]\nsleep = { speed = 0.05, time = 0.05 }\n";
     let bodies = body("box", 200, [0.0; 3]) + &body("box", 200, [3.0, 0.0, 0.0]);
-    let all = "[[handle]]\nbody = 1\nholds = [{ half_space = { point = [0, 0, -9], normal = [0, 0, 1] } }]\n\
+    let all = "[[attachment]]\nbody = 1\nregions = [{ half_space = { point = [0, 0, -9], normal = [0, 0, 1] } }]\n\
         frames = [10, 20]\npath = [[0, 0, 0], [0, 0, 1]]\n";
     let mut simulation = simulation(&scene(&format!("{solver}{bodies}{all}")));
     for frame in 0..30_u32 {

@@ -3,7 +3,7 @@
 //! An aggregate has twelve motions: `δx = u₀ + (r₁ u₁ + r₂ u₂ + r₃ u₃)` with r the place of the particle relative to the
 //! aggregate's center over its radius. They contain its turns, stretches and shears, of which bending and bulging of
 //! the body are made. A block of A between two particles contributes itself times the products of their r: no more
-//! than 16 scaled copies. The matrix is dense, because aggregates are few.
+//! than 16 scaled copies. The matrix of a connected piece is dense, because its aggregates are few.
 //!
 //! The factor is kept from one correction to the next until conjugate gradients converge at less than [`AGED`] of the rate
 //! that they had when it was new: a preconditioner need not be that of the present matrix, only symmetric and positive.
@@ -174,7 +174,20 @@ impl Coarse {
     /// Assembles and factors the matrix; held rows take no part.
     pub(super) fn assemble<R: Real>(&mut self, matrix: &Blocks<R>, held: &[bool]) {
         const WIDTH: usize = 3 * VECTORS;
-        self.cholesky.reset(WIDTH * self.count);
+        // Aggregates of different pieces are not coupled, and those of a piece have consecutive numbers.
+        let mut firsts: Vec<u32> = (0..).take(self.count).collect();
+        for (row, &a) in self.of.iter().enumerate() {
+            for (column, _) in matrix.row(row) {
+                let first = &mut firsts[a as usize];
+                *first = self.of[column].min(*first);
+            }
+        }
+        let of_aggregate = |(a, first)| {
+            let columns = WIDTH * first as usize..WIDTH * (a + 1);
+            std::iter::repeat_n(columns, WIDTH)
+        };
+        self.cholesky
+            .reset(firsts.into_iter().enumerate().flat_map(of_aggregate));
         // The blocks of a row, times the motions of their columns, by aggregate: three rows of twelve numbers each.
         let mut sums: Vec<(u32, [[f64; WIDTH]; 3])> = Vec::new();
         for (row, &a) in self.of.iter().enumerate() {

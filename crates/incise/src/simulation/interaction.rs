@@ -48,7 +48,7 @@ impl Simulation {
     /// # Ok::<(), incise::Error>(())
     /// ```
     pub fn begin_stroke(&mut self, blade: &[DVec3], snap: f64) -> Result<u32, Error> {
-        self.timeline.begin(blade, snap)
+        self.state.timeline.begin(blade, snap)
     }
 
     /// Says where the blade of a stroke is at the start of the next frame; of several calls before a frame the last one
@@ -58,7 +58,7 @@ impl Simulation {
     /// If the stroke was not begun by [`Simulation::begin_stroke`] or has ended, if the blade has another number of
     /// points than before, or if a coordinate is not finite or beyond 1e9 m. The blade stays where it was then.
     pub fn move_blade(&mut self, stroke: u32, blade: &[DVec3]) -> Result<(), Error> {
-        self.timeline.move_blade(stroke, blade)
+        self.state.timeline.move_blade(stroke, blade)
     }
 
     /// Ends a stroke: after the next frame if its blade was moved since the last one, so that no pose is lost, or else at
@@ -67,7 +67,7 @@ impl Simulation {
     /// # Errors
     /// If the stroke was not begun by [`Simulation::begin_stroke`] or has ended.
     pub fn end_stroke(&mut self, stroke: u32) -> Result<(), Error> {
-        self.timeline.end(stroke)
+        self.state.timeline.end(stroke)
     }
 
     /// Takes hold of the body at a point, to move it by hand; `None` if there is nothing to hold.
@@ -77,7 +77,7 @@ impl Simulation {
     /// stay with these; the nearest one is the nearest of the others.
     ///
     /// `compliance` is one over the stiffness by which each particle is held, in m/N, as in
-    /// [`HandleSpec`](crate::scene::HandleSpec): 0 holds rigidly, whatever the body does, and a large one lets the
+    /// [`AttachmentSpec`](crate::scene::AttachmentSpec): 0 holds rigidly, whatever the body does, and a large one lets the
     /// body pull away from the hand. VBD knows 0 only.
     ///
     /// A body that sleeps wakes. Cuts through what is held leave both sides held.
@@ -116,7 +116,7 @@ impl Simulation {
         within("grab.radius", radius, 0.0, 1e9)?;
         within("grab.compliance", compliance, 0.0, 1e9)?;
         self.read_back()?;
-        let groups = self.groups.iter().enumerate();
+        let groups = self.state.groups.iter().enumerate();
         let nearest = groups.filter_map(|(g, group)| {
             let (distance, particle) = group.nearest(point, radius)?;
             Some((distance, g, particle))
@@ -125,7 +125,7 @@ impl Simulation {
         let Some((_, g, particle)) = nearest else {
             return Ok(None);
         };
-        let grab = self.groups[g].grab(g, particle, point, radius, compliance)?;
+        let grab = self.state.groups[g].grab(g, particle, point, radius, compliance)?;
         Ok(Some(grab))
     }
 
@@ -139,7 +139,7 @@ impl Simulation {
     /// If the grab was released, or if a coordinate is not finite or beyond 1e9 m. The hand stays where it was then.
     pub fn move_grab(&mut self, grab: Grab, to: DVec3) -> Result<(), Error> {
         coordinates("grab.to", to.to_array())?;
-        let group = self.groups.get_mut(grab.group);
+        let group = self.state.groups.get_mut(grab.group);
         match group.is_some_and(|group| group.move_grab(grab, to)) {
             true => Ok(()),
             false => Err(unknown(grab)),
@@ -154,7 +154,7 @@ impl Simulation {
     /// # Errors
     /// If the grab was released before, or the device is lost.
     pub fn release(&mut self, grab: Grab) -> Result<(), Error> {
-        let group = self.groups.get_mut(grab.group);
+        let group = self.state.groups.get_mut(grab.group);
         match group.map_or(Ok(false), |group| group.release(grab))? {
             true => Ok(()),
             false => Err(unknown(grab)),
@@ -191,14 +191,14 @@ impl Simulation {
     /// ```
     pub fn set_velocities(&mut self, velocity: impl Fn(DVec3) -> DVec3) -> Result<(), Error> {
         self.read_back()?;
-        for group in &self.groups {
+        for group in &self.state.groups {
             each!(&group.solver, solver => {
                 for p in 0..solver.particle_count() {
                     coordinates("velocity", velocity(solver.position(p)).to_array())?;
                 }
             });
         }
-        for group in &mut self.groups {
+        for group in &mut self.state.groups {
             group.wake();
             each_mut!(&mut group.solver, solver => {
                 for p in 0..solver.particle_count() {
@@ -249,7 +249,7 @@ mod tests {
                 simulation.release(other).unwrap();
                 step_at(&mut simulation, 9);
             }
-            let solver = &simulation.groups[0].solver;
+            let solver = &simulation.state.groups[0].solver;
             let (handles, hanging) = each!(solver, solver => {
                 let ways = solver.handle_poses(1.0).map(|pose| pose.position);
                 (ways.collect::<Vec<_>>(), solver.attachments().len())

@@ -1,11 +1,11 @@
-//! [`LinkSpec`]: a suture or a spring between two points of bodies.
+//! [`DistanceSpec`]: a suture or a spring between two points of bodies.
 
 use serde::{Deserialize, Serialize};
 
 /// Keeps two particles at a distance. A cut leaves it on its particles.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct LinkSpec {
+pub struct DistanceSpec {
     /// One end.
     pub from: EndSpec,
     /// The other end.
@@ -17,7 +17,7 @@ pub struct LinkSpec {
     pub compliance: f64,
     /// Whether it acts only while it is longer than at rest, as a thread does.
     #[serde(default)]
-    pub only_when_longer: bool,
+    pub tension_only: bool,
 }
 
 /// The particle of a body that is nearest to a point at rest.

@@ -1,0 +1,237 @@
+//! [`Attachment`]: part of a body that is held and moved, such as by an instrument or a bone.
+//!
+//! The particles of an attachment keep their places in a moving frame. A path that is known beforehand gives the frame's
+//! pose at the start of every frame of the simulation; once a program moves the attachment, the program does. The frame's
+//! origin lies in the center of the path's rotation, so that particles go around it on circles between two frames as
+//! well. Cost: a pass over the body's particles to attach, and one over all attached particles to detach.
+
+use glam::{DQuat, DVec3};
+use incise_xpbd::Pose;
+
+use crate::Error;
+use crate::backend::{AnySolver, each_mut};
+use crate::collider::rotation;
+use crate::limits::{coordinates, value, within};
+use crate::region::particles;
+use crate::scene::{AttachmentSpec, along};
+
+/// Names an attachment of a simulation from when it is added until it is removed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct AttachmentHandle(pub(crate) u32);
+
+impl AttachmentHandle {
+    /// The handle of the attachment of a scene with this index.
+    pub(crate) fn of_scene(index: usize) -> Self {
+        Self(u32::try_from(index).expect("attachments are numbered in 32 bits"))
+    }
+}
+
+/// What moves an attachment.
+#[derive(Clone, Copy, Debug)]
+enum Motion {
+    /// Its path.
+    Path,
+    /// A program. `moved` is whether it moves in the next frame.
+    Program { to: Pose, moved: bool },
+}
+
+/// An attachment, checked.
+#[derive(Clone, Debug)]
+pub(crate) struct Attachment {
+    pub(crate) name: AttachmentHandle,
+    /// Its key in the scene.
+    field: String,
+    spec: AttachmentSpec,
+    /// The origin of its frame before the first move, in m.
+    origin: DVec3,
+    motion: Motion,
+    /// The particles that are attached at first, as numbered in their group of bodies.
+    particles: Vec<usize>,
+    /// Center of these particles when they were attached, in m.
+    middle: DVec3,
+    /// The number of its frame in the solver.
+    pub(crate) number: u32,
+}
+
+impl Attachment {
+    /// Checks an attachment. `positions` are those of its body's particles at rest, and `number_of` gives the number of
+    /// each in its group.
+    pub(crate) fn new(
+        name: AttachmentHandle,
+        field: String,
+        spec: &AttachmentSpec,
+        positions: &[DVec3],
+        number_of: impl Fn(usize) -> usize,
+    ) -> Result<Self, Error> {
+        let [first, last] = spec.frames;
+        if first >= last {
+            let range = "two frames, the second after the first";
+            let frames = format!("{:?}", spec.frames);
+            return Err(value(format!("{field}.frames"), frames, range));
+        }
+        if spec.path.len() < 2 {
+            let count = format!("{} point(s)", spec.path.len());
+            return Err(value(format!("{field}.path"), count, "at least two"));
+        }
+        for &offset in &spec.path {
+            coordinates(&format!("{field}.path"), offset)?;
+        }
+        let mut origin = DVec3::ZERO;
+        if let Some(turn) = spec.rotation {
+            let field = format!("{field}.rotation");
+            rotation(&field, turn.axis, turn.angle_degrees)?;
+            origin = coordinates(&format!("{field}.center"), turn.center)?;
+            if turn.angle_degrees.abs() / (last - first) as f64 >= 180.0 {
+                let range = "below 180 a frame";
+                let field = format!("{field}.angle_degrees");
+                return Err(value(field, turn.angle_degrees, range));
+            }
+        }
+        check_compliance(&field, spec.compliance)?;
+        let mut held = Vec::new();
+        for (i, region) in spec.regions.iter().enumerate() {
+            let inside = particles(&format!("{field}.regions[{i}]"), region, positions)?;
+            held.extend(inside.into_iter().map(&number_of));
+        }
+        held.sort_unstable();
+        held.dedup();
+        Ok(Self {
+            name,
+            field,
+            spec: spec.clone(),
+            origin,
+            motion: Motion::Path,
+            particles: held,
+            middle: DVec3::ZERO,
+            number: 0,
+        })
+    }
+
+    /// Attaches the particles at the start of a frame, to a frame of the solver that is `spare` or a new one; on an error
+    /// none of them.
+    pub(crate) fn attach(
+        &mut self,
+        frame: u64,
+        solver: &mut AnySolver,
+        spare: Option<u32>,
+    ) -> Result<(), Error> {
+        let field = &self.field;
+        let (pose, compliance) = (self.pose(frame), self.spec.compliance);
+        each_mut!(solver, solver => {
+            if self.particles.iter().any(|&p| solver.handle_of(p).is_some()) {
+                let what = "a region with a particle of another attachment";
+                let range = "particles that nothing else holds";
+                return Err(value(format!("{field}.regions"), what, range));
+            }
+            self.number = match spare {
+                Some(number) => {
+                    solver.set_handle(number, pose);
+                    number
+                }
+                None => solver.add_handle(pose),
+            };
+            for &p in &self.particles {
+                self.middle += solver.position(p) / self.particles.len() as f64;
+                solver
+                    .attach(p, self.number, compliance, 0.0)
+                    .map_err(|source| Error::Xpbd { field: field.clone(), source })?;
+            }
+        });
+        Ok(())
+    }
+
+    /// Detaches all its particles, those that cuts made too.
+    pub(crate) fn detach(&self, solver: &mut AnySolver) -> Result<(), Error> {
+        detach_all(solver, self.number)
+    }
+
+    /// Sets the compliance of all its particles in m/N, those that cuts made too; they stay where they are.
+    pub(crate) fn set_compliance(
+        &mut self,
+        solver: &mut AnySolver,
+        compliance: f64,
+    ) -> Result<(), Error> {
+        check_compliance(&self.field, compliance)?;
+        self.spec.compliance = compliance;
+        each_mut!(solver, solver => {
+            solver
+                .set_compliance(self.number, compliance)
+                .map_err(|source| Error::Xpbd { field: self.field.clone(), source })?;
+        });
+        Ok(())
+    }
+
+    /// Goes within the next frame to where its particles, had they stayed as they were when they were attached, are turned
+    /// by `rotation` about their center and then displaced by `offset`.
+    pub(crate) fn move_to(&mut self, offset: DVec3, rotation: DQuat) {
+        let arm = self.origin - self.middle;
+        let to = Pose {
+            position: self.middle + offset + rotation * arm,
+            rotation,
+        };
+        let moved = match self.motion {
+            Motion::Path => true,
+            // What is held stays awake only while it really moves.
+            Motion::Program { to: before, moved } => moved || before != to,
+        };
+        self.motion = Motion::Program { to, moved };
+    }
+
+    /// Notes that a frame has been made.
+    pub(crate) fn arrive(&mut self) {
+        if let Motion::Program { moved, .. } = &mut self.motion {
+            *moved = false;
+        }
+    }
+
+    /// Whether it moves in a frame.
+    pub(crate) fn moves(&self, frame: u64) -> bool {
+        match self.motion {
+            Motion::Path => self.pose(frame) != self.pose(frame.saturating_add(1)),
+            Motion::Program { moved, .. } => moved,
+        }
+    }
+
+    /// Tells the solver where the frame is at the end of a frame of the simulation.
+    pub(crate) fn advance(&self, frame: u64, solver: &mut AnySolver) {
+        let pose = self.pose(frame.saturating_add(1));
+        solver.move_handle(self.number, pose);
+    }
+
+    /// Where its frame is at the start of a frame of the simulation.
+    pub(crate) fn pose(&self, frame: u64) -> Pose {
+        if let Motion::Program { to, .. } = self.motion {
+            return to;
+        }
+        let [first, last] = self.spec.frames;
+        let elapsed = (frame.clamp(first, last) - first) as f64 / (last - first) as f64;
+        let rotation = self.spec.rotation.map_or(DQuat::IDENTITY, |turn| {
+            let axis = DVec3::from_array(turn.axis);
+            let axis = (axis / axis.abs().max_element()).normalize();
+            DQuat::from_axis_angle(axis, (elapsed * turn.angle_degrees).to_radians())
+        });
+        let way = along(&self.spec.path, elapsed) - DVec3::from_array(self.spec.path[0]);
+        Pose {
+            position: self.origin + way,
+            rotation,
+        }
+    }
+}
+
+fn check_compliance(field: &str, compliance: f64) -> Result<(), Error> {
+    within(&format!("{field}.compliance"), compliance, 0.0, 1e9)?;
+    Ok(())
+}
+
+/// Detaches all particles from a frame of the solver.
+pub(crate) fn detach_all(solver: &mut AnySolver, number: u32) -> Result<(), Error> {
+    each_mut!(solver, solver => {
+        let all = solver.attachments();
+        let held: Vec<u32> = all.filter(|a| a.handle == number).map(|a| a.particle).collect();
+        // The list of attachments closes up behind each of them.
+        for p in held.into_iter().rev() {
+            solver.detach(p as usize);
+        }
+    });
+    Ok(())
+}

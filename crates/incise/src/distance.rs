@@ -1,0 +1,138 @@
+//! Sutures and springs between two points of bodies, checked and handed to a solver.
+//!
+//! A change of one of them hands all of a group to the solver again: O(distances of the group).
+
+use glam::DVec3;
+use incise_coloring::{Order, greedy};
+use incise_graph::{Clustering, Incidence, Schedule};
+use incise_xpbd::DistanceConstraint;
+
+use crate::backend::{AnySolver, each_mut};
+use crate::limits::{LARGEST_COORDINATE, coordinates, existing, value, within};
+use crate::scene::{DistanceSpec, EndSpec};
+use crate::{Error, Scene};
+
+/// Names a distance constraint of a simulation from when it is added until it is removed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct DistanceHandle(pub(crate) u32);
+
+impl DistanceHandle {
+    /// The handle of the distance constraint of a scene with this index.
+    pub(crate) fn of_scene(index: usize) -> Self {
+        Self(u32::try_from(index).expect("distances are numbered in 32 bits"))
+    }
+}
+
+/// The bodies that distance constraints join, if they all exist.
+pub(crate) fn pairs(scene: &Scene, bodies: usize) -> Result<Vec<[usize; 2]>, Error> {
+    let specs = scene.distance.iter().enumerate();
+    specs
+        .map(|(i, spec)| ends_exist(&format!("distance[{i}]"), spec, bodies))
+        .collect()
+}
+
+/// The bodies of both ends, if there are so many bodies.
+pub(crate) fn ends_exist(
+    field: &str,
+    spec: &DistanceSpec,
+    bodies: usize,
+) -> Result<[usize; 2], Error> {
+    existing(&format!("{field}.from.body"), spec.from.body, bodies)?;
+    existing(&format!("{field}.to.body"), spec.to.body, bodies)?;
+    Ok([spec.from.body, spec.to.body])
+}
+
+/// The position nearest to a point, and its index; the first of several.
+pub(crate) fn nearest(point: [f64; 3], positions: &[DVec3]) -> Option<(DVec3, usize)> {
+    let point = DVec3::from_array(point);
+    let near = positions.iter().enumerate().min_by(|a, b| {
+        let [a, b] = [a, b].map(|(_, x)| x.distance_squared(point));
+        a.total_cmp(&b)
+    });
+    near.map(|(p, &x)| (x, p))
+}
+
+/// Checks a distance constraint. `particle` gives the position at rest of the particle of an end, and its number in its
+/// group; nothing if its body has none.
+pub(crate) fn constraint(
+    field: &str,
+    spec: &DistanceSpec,
+    particle: impl Fn(&EndSpec) -> Option<(DVec3, usize)>,
+) -> Result<DistanceConstraint, Error> {
+    let end = |key: &str, end: &EndSpec| {
+        coordinates(&format!("{field}.{key}.point"), end.point)?;
+        particle(end).ok_or_else(|| value(field, "on a body without particles", "on a particle"))
+    };
+    let (a, from) = end("from", &spec.from)?;
+    let (b, to) = end("to", &spec.to)?;
+    if from == to {
+        let range = "such that another particle is nearest than from the other end";
+        return Err(value(
+            format!("{field}.to.point"),
+            format!("{:?}", spec.to.point),
+            range,
+        ));
+    }
+    let number =
+        |p: usize| u32::try_from(p).map_err(|_| Error::Inconsistent("too many particles".into()));
+    let length = spec.length.unwrap_or(a.distance(b));
+    Ok(DistanceConstraint {
+        particles: [number(from)?, number(to)?],
+        length: within(
+            &format!("{field}.length"),
+            length,
+            0.0,
+            2.0 * LARGEST_COORDINATE,
+        )?,
+        compliance: within(&format!("{field}.compliance"), spec.compliance, 0.0, 1e9)?,
+        damping: 0.0,
+        only_when_longer: spec.tension_only,
+    })
+}
+
+/// The distance constraints of a group.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Distances {
+    names: Vec<DistanceHandle>,
+    list: Vec<DistanceConstraint>,
+}
+
+impl Distances {
+    pub(crate) fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+
+    /// Appends a constraint.
+    pub(crate) fn add(&mut self, name: DistanceHandle, constraint: DistanceConstraint) {
+        self.names.push(name);
+        self.list.push(constraint);
+    }
+
+    /// The constraint of a name.
+    pub(crate) fn get_mut(&mut self, name: DistanceHandle) -> Option<&mut DistanceConstraint> {
+        let index = self.names.iter().position(|n| *n == name)?;
+        Some(&mut self.list[index])
+    }
+
+    /// Removes the constraint of a name; tells whether there was one.
+    pub(crate) fn remove(&mut self, name: DistanceHandle) -> bool {
+        let Some(index) = self.names.iter().position(|n| *n == name) else {
+            return false;
+        };
+        self.names.remove(index);
+        self.list.remove(index);
+        true
+    }
+
+    /// Hands all to the solver, in an order by colors.
+    pub(crate) fn hand_to(&self, solver: &mut AnySolver) -> Result<(), Error> {
+        each_mut!(solver, solver => {
+            let particles = self.list.iter().map(|constraint| constraint.particles);
+            let incidence = Incidence::from_constraints(solver.particle_count(), particles)?;
+            let coloring = greedy(&incidence, Order::LargestFirst);
+            let schedule = Schedule::new(&Clustering::none(self.list.len()), &coloring);
+            let set = solver.set_distances(&self.list, schedule);
+            set.map_err(|source| Error::Xpbd { field: "distance".into(), source })
+        })
+    }
+}

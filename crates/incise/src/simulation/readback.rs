@@ -1,0 +1,242 @@
+//! The state of a [`Simulation`]: where it is, what it is worth, and how it gets to whoever asks.
+//!
+//! On the processor it is here after each frame. On a device it stays there: reported sums are taken there, and only what
+//! needs every particle fetches it. Cost: a pass over what is reported; a wait for the device where it is asked.
+
+use std::time::Instant;
+
+use incise_mesh::ParticleId;
+
+use super::Simulation;
+use crate::Error;
+use crate::measure::{
+    by_body, energy, kappa, max_speed, residual, residuals_of_tets, softened, states, volume,
+};
+use crate::report::{FrameReport, Milliseconds, milliseconds};
+use crate::scene::Quantity;
+
+impl Simulation {
+    /// Computes the quantities that this frame reports.
+    pub(super) fn measure(&mut self, ms: &mut Milliseconds) -> Result<(), Error> {
+        let kappa_too = self.wants(Quantity::Kappa);
+        if kappa_too || self.chooses() || self.sleeps() {
+            self.state.report.bodies = by_body(&mut self.state.groups, kappa_too);
+        }
+        if !self
+            .state
+            .report
+            .frame
+            .is_multiple_of(self.state.reporting.every)
+        {
+            return Ok(());
+        }
+        let start = Instant::now();
+        let states = states(
+            &mut self.state.groups,
+            self.state.gravity,
+            &self.state.reporting.quantities,
+        )?;
+        if self.state.place.is_device() {
+            let groups = self.state.groups.iter_mut();
+            self.state.report.repaired += groups.map(|group| group.solver.news()).sum::<usize>();
+            ms.readback += milliseconds(start.elapsed());
+        }
+        for quantity in &self.state.reporting.quantities {
+            let report = &mut self.state.report;
+            match quantity {
+                Quantity::Residual => {
+                    report.residual = residual(&self.state.groups, self.state.gravity)
+                }
+                Quantity::Energy => report.energy = Some(energy(&states)),
+                Quantity::Volume => {
+                    let volume = volume(&states);
+                    report.volume = Some(volume.total);
+                    // Nothing may be left.
+                    let error = volume.total / volume.rest - 1.0;
+                    report.volume_error = Some(if volume.rest > 0.0 { error } else { 0.0 });
+                    report.min_volume_ratio = Some(volume.min_ratio);
+                    report.inverted_tets = Some(volume.inverted);
+                }
+                Quantity::Speed => report.max_speed = Some(max_speed(&states)),
+                Quantity::Kappa => {
+                    report.kappa = Some(kappa(&self.state.groups));
+                    report.softened = Some(softened(&self.state.groups));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes the report what it is before the first frame.
+    pub(super) fn report_before_the_first(&mut self) {
+        self.state.report = FrameReport::default();
+        self.count();
+        if self.chooses() {
+            self.state.report.bodies = by_body(&mut self.state.groups, false);
+        }
+    }
+
+    /// Fills in the counts.
+    pub(super) fn count(&mut self) {
+        let mesh = self.mesh();
+        let (particles, tets) = (mesh.positions.len(), mesh.tets.len());
+        let plans = || self.state.groups.iter().map(|group| &group.plan);
+        let clusters = plans().map(|plan| plan.clustering.occupied()).sum();
+        let colors = plans().map(|plan| plan.schedule.color_count());
+        let colors = colors.max().unwrap_or(0);
+        let report = &mut self.state.report;
+        report.particles = particles;
+        report.tets = tets;
+        report.clusters = clusters;
+        report.colors = colors;
+        report.pieces = self
+            .state
+            .groups
+            .iter()
+            .map(|group| group.pieces.count())
+            .sum();
+        report.backend = self.state.place.name();
+        report.precision = self.state.precision.name();
+    }
+
+    /// Takes over state and positions; returns how many particles a device had to put back since the last time.
+    pub(super) fn fetch(&mut self, ms: &mut Milliseconds) -> Result<usize, Error> {
+        let start = Instant::now();
+        let mut repaired = 0;
+        for group in &mut self.state.groups {
+            repaired += group.solver.read_back()?;
+        }
+        if self.state.place.is_device() {
+            ms.readback += milliseconds(start.elapsed());
+        }
+        self.collect_positions();
+        Ok(repaired)
+    }
+
+    /// Makes [`Simulation::positions`] those of now, if the state is on a device: waits for it and fetches them.
+    /// Otherwise they are, and nothing happens.
+    ///
+    /// A frame does this by itself only if a stroke is due, since a blade has to know where the body is, or if it reports
+    /// residuals. Energies, volume and speed are summed up on the device.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub fn read_back(&mut self) -> Result<(), Error> {
+        if self.state.place.is_device() {
+            self.state.report.repaired += self.fetch(&mut Milliseconds::default())?;
+        }
+        Ok(())
+    }
+
+    /// What is to be said about where it is computed: the device, or why there is none; `None` if the scene asked for
+    /// the processor.
+    #[must_use]
+    pub fn backend_note(&self) -> Option<&str> {
+        self.state.place.note.as_deref()
+    }
+
+    /// The duration of a frame in s.
+    #[must_use]
+    pub fn time_step(&self) -> f64 {
+        self.state.clock.time_step
+    }
+
+    /// The number of the frame to come, counted from 0: that of the frames that were made.
+    #[must_use]
+    pub fn next_frame(&self) -> u64 {
+        self.state.clock.next_frame
+    }
+
+    /// In which group of bodies a particle of [`Simulation::mesh`] is solved, and its number there. O(1).
+    ///
+    /// Bodies that links join are a group, every other one is a group of its own; groups are numbered in the order of
+    /// their first bodies. On a device the group is the number of its solver in `Simulation::device_solvers`: a renderer
+    /// that draws the whole mesh from the buffers of the solvers looks its particles up here, once at the start and then
+    /// those that [`Simulation::deltas`] append. A particle keeps its place for good.
+    ///
+    /// # Panics
+    /// If the particle does not exist.
+    ///
+    /// # Example
+    /// ```
+    /// use incise::mesh::ParticleId;
+    /// use incise::{Scene, Simulation};
+    ///
+    /// let scene = Scene::from_toml(
+    ///     r#"
+    ///     [[body]]
+    ///     shape = { kind = "box", tets = 200 }
+    ///     [[body]]
+    ///     shape = { kind = "sphere", tets = 200 }
+    ///     position = [3.0, 0.0, 0.0]
+    ///     "#,
+    /// )?;
+    /// let simulation = Simulation::new(&scene)?;
+    /// let last = ParticleId::new(simulation.mesh().positions.len() - 1);
+    /// assert_eq!(simulation.place_of(ParticleId(0)), (0, 0));
+    /// assert_eq!(simulation.place_of(last).0, 1);
+    /// # Ok::<(), incise::Error>(())
+    /// ```
+    #[must_use]
+    pub fn place_of(&self, particle: ParticleId) -> (usize, usize) {
+        let count = self.mesh().positions.len();
+        assert!(particle.index() < count, "the mesh has {count} particles");
+        match &self.state.whole {
+            Some(whole) => whole.place(particle),
+            None => (0, particle.index()),
+        }
+    }
+
+    /// The device solvers of the scene's groups of bodies, for renderers; none on the processor. Which of them has a
+    /// particle: [`Simulation::place_of`].
+    #[cfg(feature = "gpu")]
+    pub fn device_solvers(&self) -> impl Iterator<Item = &crate::gpu::GpuSolver> + '_ {
+        self.state
+            .groups
+            .iter()
+            .filter_map(|group| group.solver.device())
+    }
+
+    /// For each tet of [`Simulation::mesh`] how far its constraints are from solved in the last substep: the norm of
+    /// `C + α̃ λ` over its two, without unit. The root of the sum of squares is the `dual` of the residuals that the frame
+    /// reports. 0 for tets that take no part and for bodies asleep.
+    ///
+    /// `None` unless the last frame has reported [`Quantity::Residual`], and after [`Simulation::retune`] until the next
+    /// one does. VBD knows no multipliers and its force is a matter of particles: `None`, too. O(tets).
+    ///
+    /// ```
+    /// use incise::{Scene, Simulation};
+    ///
+    /// let scene = Scene::from_toml(
+    ///     "[report]\nquantities = [\"residual\"]\n[[body]]\nshape = { kind = \"sphere\", tets = 300 }",
+    /// )?;
+    /// let mut simulation = Simulation::new(&scene)?;
+    /// assert!(simulation.residuals_of_tets().is_none());
+    /// simulation.step()?;
+    /// let residuals = simulation.residuals_of_tets().expect("they are reported");
+    /// assert_eq!(residuals.len(), simulation.mesh().tets.len());
+    /// # Ok::<(), incise::Error>(())
+    /// ```
+    #[must_use]
+    pub fn residuals_of_tets(&self) -> Option<Vec<f64>> {
+        if !self.state.residuals_kept {
+            return None;
+        }
+        let groups = self.state.groups.iter().map(residuals_of_tets);
+        let mut groups = groups.collect::<Option<Vec<_>>>()?;
+        match &self.state.whole {
+            Some(whole) => Some(whole.of_tets(&groups)),
+            None => groups.pop(),
+        }
+    }
+
+    /// Takes over the positions of the solvers.
+    pub(super) fn collect_positions(&mut self) {
+        for group in &mut self.state.groups {
+            group.solver.positions(&mut group.positions);
+        }
+        if let Some(whole) = &mut self.state.whole {
+            whole.collect_positions(&self.state.groups);
+        }
+    }
+}
