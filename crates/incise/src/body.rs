@@ -5,15 +5,18 @@ use incise_mesh::{TetMesh, io};
 use incise_xpbd::Material;
 
 use crate::limits::{LARGEST_COORDINATE, coordinates, value, within};
-use crate::region::particles;
-use crate::scene::{BodySpec, Substeps};
+use crate::region::{particles, tets};
+use crate::scene::{BodySpec, MaterialSpec, Substeps};
 use crate::{Error, Scene};
 
 /// A body in the world.
 #[derive(Debug)]
 pub(crate) struct Body {
     pub(crate) mesh: TetMesh,
-    pub(crate) material: Material,
+    /// The first is that of all tets that no other one claims.
+    pub(crate) materials: Vec<Material>,
+    /// For each tet the index of its material.
+    pub(crate) material_of: Vec<u16>,
     /// For each particle whether it is fixed.
     pub(crate) fixed: Vec<bool>,
     /// Of the volume constraints that it asks for.
@@ -41,30 +44,14 @@ impl Body {
     }
 
     /// The body of a spec; `substeps` are those of a body that does not name its own.
-    fn new(
+    pub(crate) fn new(
         field: &str,
         spec: &BodySpec,
         mesh: Option<&TetMesh>,
         substeps: Substeps,
     ) -> Result<Self, Error> {
-        let material = Material {
-            young_modulus: spec.young_modulus,
-            poisson_ratio: spec.poisson_ratio,
-            density: spec.density,
-            damping: spec.damping,
-        };
-        material.check().map_err(|source| Error::Xpbd {
-            field: field.to_owned(),
-            source,
-        })?;
-        within(
-            &format!("{field}.young_modulus"),
-            spec.young_modulus,
-            1e-6,
-            1e15,
-        )?;
-        within(&format!("{field}.density"), spec.density, 1e-6, 1e9)?;
-        within(&format!("{field}.damping"), spec.damping, 0.0, 1e6)?;
+        let own = MaterialSpec::default();
+        let mut materials = vec![material(field, spec, &own)?];
         within(&format!("{field}.scale"), spec.scale, 1e-9, 1e9)?;
         if spec.substeps == Some(Substeps::Fixed(0)) {
             return Err(value(format!("{field}.substeps"), 0, "at least 1"));
@@ -92,14 +79,49 @@ impl Body {
                 fixed[p] = true;
             }
         }
+        let mut material_of = vec![0; mesh.tets.len()];
+        for (i, part) in spec.material.iter().enumerate() {
+            let field = format!("{field}.material[{i}]");
+            let index = u16::try_from(materials.len())
+                .map_err(|_| value(&field, "one too many", "at most 65,535 a body"))?;
+            materials.push(material(&field, spec, part)?);
+            for (j, region) in part.regions.iter().enumerate() {
+                for t in tets(&format!("{field}.regions[{j}]"), region, &mesh)? {
+                    material_of[t] = index;
+                }
+            }
+        }
         Ok(Self {
             mesh,
-            material,
+            materials,
+            material_of,
             fixed,
             volume_compliance,
             substeps: spec.substeps.unwrap_or(substeps),
         })
     }
+}
+
+/// The material of a part of a body, all values checked.
+fn material(field: &str, body: &BodySpec, part: &MaterialSpec) -> Result<Material, Error> {
+    let material = Material {
+        young_modulus: part.young_modulus.unwrap_or(body.young_modulus),
+        poisson_ratio: part.poisson_ratio.unwrap_or(body.poisson_ratio),
+        density: part.density.unwrap_or(body.density),
+        damping: part.damping.unwrap_or(body.damping),
+    };
+    material.check().map_err(|source| Error::Xpbd {
+        field: field.to_owned(),
+        source,
+    })?;
+    for (key, number, low, high) in [
+        ("young_modulus", material.young_modulus, 1e-6, 1e15),
+        ("density", material.density, 1e-6, 1e9),
+        ("damping", material.damping, 0.0, 1e6),
+    ] {
+        within(&format!("{field}.{key}"), number, low, high)?;
+    }
+    Ok(material)
 }
 
 /// The body's mesh, checked.

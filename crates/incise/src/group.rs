@@ -4,11 +4,12 @@
 //! each is precise around its own origin, and a body moves to the bit as it would alone in the scene. Cost: that of its
 //! parts.
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 use glam::DVec3;
-use incise_cutting::{CutDelta, CuttableMesh, PieceEvent, PieceTracker};
-use incise_mesh::{ParticleId, signed_volume};
+use incise_cutting::{CutDelta, CuttableMesh, PieceEvent, PieceTracker, remove_tets};
+use incise_mesh::{ParticleId, TetId, signed_volume};
 use incise_xpbd::{
     DistanceConstraint, KappaLimit, Real, Solver, StepReport, StepSettings, shortest_substep_of_f32,
 };
@@ -38,6 +39,8 @@ use crate::{Error, Scene, collider, distance};
 pub(crate) struct Group {
     /// The numbers of its bodies in the scene, ascending.
     pub(crate) bodies: Vec<usize>,
+    /// For each material of the solver the index of its body in `bodies`.
+    body_of: Vec<usize>,
     /// Mesh at rest; its particles and tets are numbered within the group.
     pub(crate) cuttable: CuttableMesh,
     pub(crate) solver: AnySolver,
@@ -231,6 +234,7 @@ impl Group {
             removed_volume: 0.0,
             cuttable,
             bodies: joined.bodies,
+            body_of: joined.body_of,
             choice,
             first_substeps: settings.substeps,
             budget: None,
@@ -445,7 +449,7 @@ impl Group {
         if moved {
             self.wake();
         }
-        if self.asleep() {
+        if self.asleep() || self.cuttable.mesh().tets.is_empty() {
             return Ok(StepReport::default());
         }
         for attachment in &self.attachments {
@@ -494,7 +498,53 @@ impl Group {
         self.misses_accuracy = misses;
     }
 
-    /// The particles of a body of the group with their positions at rest: those whose tets have its material.
+    /// The number of the body of a tet in the scene.
+    pub(crate) fn body_of_tet(&self, tet: TetId) -> usize {
+        let material = each!(&self.solver, solver => solver.material_of(tet.index()));
+        self.bodies[self.body_of[usize::from(material)]]
+    }
+
+    /// Removes all tets of a body from the mesh; what depends on the mesh takes the delta.
+    pub(crate) fn remove_tets_of(&mut self, body: usize) -> Result<CutDelta, Error> {
+        let all = (0..self.cuttable.mesh().tets.len()).map(TetId::new);
+        let tets: Vec<TetId> = all.filter(|&t| self.body_of_tet(t) == body).collect();
+        remove_tets(&mut self.cuttable, &tets, 0).map_err(|source| Error::Cut {
+            field: "body".into(),
+            source,
+        })
+    }
+
+    /// For each material what its body, given by its number in the scene, asks for.
+    pub(crate) fn asked<T>(&self, asks: impl Fn(usize) -> T) -> Vec<T> {
+        let bodies = self.body_of.iter().map(|&body| self.bodies[body]);
+        bodies.map(asks).collect()
+    }
+
+    /// Whether all tets have one density in kg/m³, and which.
+    pub(crate) fn density(&self) -> Option<f64> {
+        each!(&self.solver, solver => {
+            let first = solver.materials().first()?.density;
+            let same = solver.materials().iter().all(|m| m.density == first);
+            same.then_some(first)
+        })
+    }
+
+    /// The mass at rest in kg of each of its pieces that is wanted, by number. O(tets).
+    pub(crate) fn masses(&self, wanted: impl Fn(u32) -> bool) -> BTreeMap<u32, f64> {
+        let mesh = self.cuttable.mesh();
+        let mut masses = BTreeMap::new();
+        each!(&self.solver, solver => {
+            for t in (0..mesh.tets.len()).map(TetId::new) {
+                let piece = self.pieces.piece_of(t);
+                if wanted(piece) {
+                    *masses.entry(piece).or_insert(0.0) += solver.density_of(t.index()) * mesh.volume(t);
+                }
+            }
+        });
+        masses
+    }
+
+    /// The particles of a body of the group with their positions at rest.
     pub(crate) fn particles_of(&self, body: usize) -> (Vec<usize>, Vec<DVec3>) {
         let mesh = self.cuttable.mesh();
         let all = 0..mesh.positions.len();
@@ -503,10 +553,7 @@ impl Group {
         } else {
             let is_of = |p: &usize| {
                 let tet = self.cuttable.around(ParticleId::new(*p)).next();
-                tet.is_some_and(|tet| {
-                    let material = each!(&self.solver, solver => solver.material_of(tet.index()));
-                    self.bodies[usize::from(material)] == body
-                })
+                tet.is_some_and(|tet| self.body_of_tet(tet) == body)
             };
             all.filter(is_of).collect()
         };

@@ -21,6 +21,10 @@ use crate::substeps::{Choice, TetDemand, choose};
 use crate::volume::Volumes;
 use crate::{Error, Scene, distance};
 
+/// How many materials there may be.
+const TOO_MANY: &str =
+    "at most 65,536 bodies and parts of other materials that are solved together";
+
 /// The bodies of a group before it is set up.
 #[derive(Debug, Default)]
 pub(crate) struct Joined {
@@ -28,12 +32,14 @@ pub(crate) struct Joined {
     pub(crate) bodies: Vec<usize>,
     pub(crate) mesh: TetMesh,
     pub(crate) materials: Vec<Material>,
-    /// For each tet the number of its material, which is that of its body within the group.
+    /// For each material the index of its body in `bodies`.
+    pub(crate) body_of: Vec<usize>,
+    /// For each tet the number of its material.
     pub(crate) material_of: Vec<u16>,
     pub(crate) fixed: Vec<bool>,
     pub(crate) attachments: Vec<Attachment>,
     pub(crate) distances: Distances,
-    /// What each body asks for.
+    /// What the body of each material asks for.
     volume_compliances: Vec<Option<f64>>,
     pub(crate) substeps: Vec<Substeps>,
 }
@@ -86,21 +92,35 @@ impl Joined {
         Ok(all)
     }
 
+    /// A body alone.
+    pub(crate) fn of_one(number: usize, body: Body) -> Result<Self, Error> {
+        let mut joined = Self::default();
+        joined.add(number, body)?;
+        Ok(joined)
+    }
+
     /// Appends a body of the scene.
     fn add(&mut self, number: usize, body: Body) -> Result<(), Error> {
-        let material = u16::try_from(self.materials.len())
-            .map_err(|_| value("body", "too many", "at most 65,536"))?;
         let first = self.mesh.positions.len();
         let shifted = |p: ParticleId| ParticleId::new(first + p.index());
         self.mesh.positions.extend(body.mesh.positions);
         let tets = body.mesh.tets.iter().map(|tet| tet.map(shifted));
         self.mesh.tets.extend(tets);
+        let known = self.materials.len();
+        let of_group = |material: u16| u16::try_from(known + usize::from(material));
+        for &material in &body.material_of {
+            let material = of_group(material);
+            let material = material.map_err(|_| value("body", "too many", TOO_MANY))?;
+            self.material_of.push(material);
+        }
+        for material in body.materials {
+            self.materials.push(material);
+            self.body_of.push(self.bodies.len());
+            self.volume_compliances.push(body.volume_compliance);
+            self.substeps.push(body.substeps);
+        }
         self.bodies.push(number);
-        self.material_of.resize(self.mesh.tets.len(), material);
-        self.materials.push(body.material);
         self.fixed.extend(body.fixed);
-        self.volume_compliances.push(body.volume_compliance);
-        self.substeps.push(body.substeps);
         Ok(())
     }
 
@@ -147,7 +167,7 @@ impl Joined {
     }
 }
 
-/// The same for bodies that ask for these substeps. Each has the material of its number.
+/// The substeps of a group whose materials ask for these, and how they were chosen where that is left open.
 pub(crate) fn substeps(
     asked: &[Substeps],
     spec: &SolverSpec,

@@ -2,16 +2,17 @@
 //!
 //! Each group follows its own pieces ([`incise_cutting::PieceTracker`]) and numbers them from 0. Here each gets a number
 //! in the scene: at the start group by group, then as they come off, stroke by stroke and within a stroke group by
-//! group. Numbers stay and none is used twice. A piece belongs to one body, as bodies share no particles, so its mass is
-//! its volume times the body's density.
+//! group. Numbers stay and none is used twice. A piece belongs to one body, as bodies share no particles.
 //!
-//! Cost: a pass over the tets at the start, then a line for each piece that comes off.
+//! Cost: a pass over the tets at the start, then O(1) for each piece that comes off. Where a group has several densities,
+//! the masses of pieces are summed over its tets: O(tets) when some come off, and for a report.
+
+use std::collections::BTreeMap;
 
 use incise_cutting::PieceEvent;
 use incise_mesh::TetId;
 
 use crate::Error;
-use crate::backend::each;
 use crate::group::Group;
 use crate::report::{DetachedReport, PieceReport};
 
@@ -23,8 +24,6 @@ struct Number {
     piece: u32,
     /// The number of its body in the scene.
     body: usize,
-    /// In kg/m³.
-    density: f64,
 }
 
 /// The pieces of all groups.
@@ -44,28 +43,29 @@ impl PieceNumbers {
     /// The pieces before all cuts.
     pub(crate) fn new(groups: &[Group]) -> Self {
         let mut numbers = Self::default();
-        for (g, group) in groups.iter().enumerate() {
-            numbers.of_group.push(Numbers::default());
-            let mut known = 0;
-            for t in 0..group.cuttable.mesh().tets.len() {
-                let piece = group.pieces.piece_of(TetId::new(t));
-                // Pieces are numbered in the order of their first tets.
-                if piece == known {
-                    known += 1;
-                    let (material, density) = each!(&group.solver, solver => {
-                        (solver.material_of(t), solver.density_of(t))
-                    });
-                    numbers.add(Number {
-                        group: g,
-                        piece,
-                        // Each body has a material of its own.
-                        body: group.bodies[usize::from(material)],
-                        density,
-                    });
-                }
-            }
+        for group in groups {
+            numbers.add_group(group);
         }
         numbers
+    }
+
+    /// Numbers the pieces of a group that is added to those there are.
+    pub(crate) fn add_group(&mut self, group: &Group) {
+        let number = self.of_group.len();
+        self.of_group.push(Numbers::default());
+        let mut known = 0;
+        for t in (0..group.cuttable.mesh().tets.len()).map(TetId::new) {
+            let piece = group.pieces.piece_of(t);
+            // Pieces are numbered in the order of their first tets.
+            if piece == known {
+                known += 1;
+                self.add(Number {
+                    group: number,
+                    piece,
+                    body: group.body_of_tet(t),
+                });
+            }
+        }
     }
 
     fn add(&mut self, number: Number) -> u32 {
@@ -75,13 +75,25 @@ impl PieceNumbers {
         id
     }
 
-    /// Notes what came off in a group; adds it to `detached`.
+    /// Notes what came off in a group of a number; adds it to `detached`.
     pub(crate) fn follow(
         &mut self,
-        group: usize,
+        number: usize,
+        group: &Group,
         events: &[PieceEvent],
         detached: &mut Vec<DetachedReport>,
     ) {
+        let new = |event: &PieceEvent| match *event {
+            PieceEvent::Detached { piece, .. } => Some(piece),
+            _ => None,
+        };
+        let density = group.density();
+        let masses = match density {
+            None if events.iter().any(|event| new(event).is_some()) => {
+                group.masses(|piece| events.iter().any(|event| new(event) == Some(piece)))
+            }
+            _ => BTreeMap::new(),
+        };
         for event in events {
             // A piece that vanished keeps its number and is no longer listed.
             let PieceEvent::Detached {
@@ -93,20 +105,28 @@ impl PieceNumbers {
             else {
                 continue;
             };
-            let from = self.of_group[group].0[from as usize];
+            let from = self.of_group[number].0[from as usize];
             let parent = self.pieces[from as usize];
             detached.push(DetachedReport {
                 piece: self.add(Number { piece, ..parent }),
                 from,
                 tets,
                 volume,
-                mass: parent.density * volume,
+                mass: mass_of(density, &masses, piece, volume),
             });
         }
     }
 
     /// All pieces that exist, in the order of their numbers.
     pub(crate) fn report(&self, groups: &[Group]) -> Vec<PieceReport> {
+        let densities: Vec<_> = groups.iter().map(Group::density).collect();
+        let masses = groups.iter().zip(&densities);
+        let masses: Vec<_> = masses
+            .map(|(group, density)| match density {
+                Some(_) => BTreeMap::new(),
+                None => group.masses(|_| true),
+            })
+            .collect();
         let reports = self.pieces.iter().zip(0..).filter_map(|(number, id)| {
             let piece = groups[number.group].pieces.piece(number.piece)?;
             let of_group = &self.of_group[number.group].0;
@@ -116,7 +136,10 @@ impl PieceNumbers {
                 body: number.body,
                 tets: piece.tets,
                 volume: piece.volume,
-                mass: number.density * piece.volume,
+                mass: {
+                    let (density, masses) = (densities[number.group], &masses[number.group]);
+                    mass_of(density, masses, number.piece, piece.volume)
+                },
             })
         });
         reports.collect()
@@ -129,24 +152,23 @@ impl PieceNumbers {
             for t in 0..group.cuttable.mesh().tets.len() {
                 let piece = group.pieces.piece_of(TetId::new(t));
                 let number = self.of_group[g].0.get(piece as usize);
-                let Some(&Number {
-                    group: of,
-                    piece: own,
-                    body,
-                    density,
-                }) = number.map(|&id| &self.pieces[id as usize])
-                else {
+                let Some(number) = number.map(|&id| &self.pieces[id as usize]) else {
                     return differs(format!("piece {piece} of group {g} has no number"));
                 };
-                let (material, dense) = each!(&group.solver, solver => {
-                    (solver.material_of(t), solver.density_of(t))
-                });
-                let expected = (g, piece, group.bodies[usize::from(material)]);
-                if (of, own, body) != expected || density.to_bits() != dense.to_bits() {
+                let expected = (g, piece, group.body_of_tet(TetId::new(t)));
+                if (number.group, number.piece, number.body) != expected {
                     return differs(format!("piece {piece} of group {g} has another's number"));
                 }
             }
         }
         Ok(())
     }
+}
+
+/// The mass of a piece in kg: its volume times the density of its group, or the sum over its tets.
+fn mass_of(density: Option<f64>, masses: &BTreeMap<u32, f64>, piece: u32, volume: f64) -> f64 {
+    density.map_or_else(
+        || masses.get(&piece).copied().unwrap_or(0.0),
+        |density| density * volume,
+    )
 }

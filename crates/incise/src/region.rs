@@ -1,6 +1,7 @@
 //! [`Solid`]: a region of a scene in space, and which particles of a body lie in it.
 
 use glam::DVec3;
+use incise_mesh::{TetId, TetMesh};
 
 use crate::Error;
 use crate::limits::{coordinates, direction, value};
@@ -15,7 +16,7 @@ pub(crate) enum Solid {
 }
 
 impl Solid {
-    /// The region in space; `None` if it is a list of particles.
+    /// The region in space; `None` if it is a list.
     pub(crate) fn new(field: &str, region: &Region) -> Result<Option<Self>, Error> {
         Ok(Some(match region {
             Region::HalfSpace { point, normal } => Self::HalfSpace {
@@ -40,7 +41,7 @@ impl Solid {
                 let radius = *radius;
                 Self::Sphere { center, radius }
             }
-            Region::Particles(_) => return Ok(None),
+            Region::Particles(_) | Region::Tets(_) => return Ok(None),
         }))
     }
 
@@ -77,14 +78,43 @@ pub(crate) fn particles(
         return Ok(numbers.filter(|&p| solid.contains(positions[p])).collect());
     }
     let Region::Particles(particles) = region else {
-        return Ok(Vec::new());
+        let range = "half_space, box, sphere or particles";
+        return Err(value(format!("{field}.tets"), "a list of tets", range));
     };
-    let count = positions.len();
-    if let Some(p) = particles.iter().find(|p| **p as usize >= count) {
-        let range = format!("below {count}, the body's number of particles");
-        return Err(value(format!("{field}.particles"), p, range));
+    listed(
+        &format!("{field}.particles"),
+        particles,
+        positions.len(),
+        "particles",
+    )
+}
+
+/// The numbers of the tets of a mesh whose centers lie in a region, ascending.
+pub(crate) fn tets(field: &str, region: &Region, mesh: &TetMesh) -> Result<Vec<usize>, Error> {
+    if let Some(solid) = Solid::new(field, region)? {
+        let center = |t: usize| mesh.corners(TetId::new(t)).iter().sum::<DVec3>() / 4.0;
+        let numbers = 0..mesh.tets.len();
+        return Ok(numbers.filter(|&t| solid.contains(center(t))).collect());
     }
-    let mut numbers: Vec<usize> = particles.iter().map(|&p| p as usize).collect();
+    if let Region::Tets(tets) = region {
+        return listed(&format!("{field}.tets"), tets, mesh.tets.len(), "tets");
+    }
+    let mut inside = vec![false; mesh.positions.len()];
+    for p in particles(field, region, &mesh.positions)? {
+        inside[p] = true;
+    }
+    let all = mesh.tets.iter().enumerate();
+    let with_all = all.filter(|(_, tet)| tet.iter().all(|p| inside[p.index()]));
+    Ok(with_all.map(|(t, _)| t).collect())
+}
+
+/// A list of numbers below `count`, ascending and each once.
+fn listed(field: &str, list: &[u32], count: usize, what: &str) -> Result<Vec<usize>, Error> {
+    if let Some(number) = list.iter().find(|number| **number as usize >= count) {
+        let range = format!("below {count}, the body's number of {what}");
+        return Err(value(field, number, range));
+    }
+    let mut numbers: Vec<usize> = list.iter().map(|&number| number as usize).collect();
     numbers.sort_unstable();
     numbers.dedup();
     Ok(numbers)

@@ -183,6 +183,30 @@ pub struct BodySpec {
     /// Particles that do not move, in m in the world.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fixed: Vec<Region>,
+    /// Parts of another material.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub material: Vec<MaterialSpec>,
+}
+
+/// The material of a part of a body. What it does not name is that of the body.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MaterialSpec {
+    /// The part: the tets at rest whose centers lie in any of these regions, in m in the world. Where parts overlap, the
+    /// last one counts.
+    pub regions: Vec<Region>,
+    /// Young's modulus in Pa.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub young_modulus: Option<f64>,
+    /// Poisson's ratio, at least 0 and below 0.5.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub poisson_ratio: Option<f64>,
+    /// Mass density in kg/m³.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub density: Option<f64>,
+    /// Damping time in s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub damping: Option<f64>,
 }
 
 impl Default for BodySpec {
@@ -200,6 +224,7 @@ impl Default for BodySpec {
             volume_compliance: None,
             substeps: None,
             fixed: Vec::new(),
+            material: Vec::new(),
         }
     }
 }

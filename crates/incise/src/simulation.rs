@@ -17,7 +17,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use glam::DVec3;
-use incise_cutting::{BoundaryTriangle, CutDelta, FaceTag};
+use incise_cutting::{BoundaryTriangle, CutDelta};
 use incise_graph::{Clustering, Coloring, Schedule};
 use incise_mesh::{Surface, TetMesh};
 use rayon::ThreadPool;
@@ -46,7 +46,7 @@ use crate::{Error, Event, Scene, collider, distance};
 pub use builder::{Body, BodyHandle, SimulationBuilder};
 pub use snapshot::Snapshot;
 
-use state::{Clock, NextNumbers, State};
+use state::{Clock, Cut, NextNumbers, State};
 
 /// A scene in motion.
 ///
@@ -193,6 +193,7 @@ impl Simulation {
                 gravity: settings.gravity,
                 colliders: Colliders::new(scene),
                 next: NextNumbers::new(scene),
+                removed: Vec::new(),
                 reporting: scene.report.clone(),
                 pieces: PieceNumbers::new(&groups),
                 groups,
@@ -265,7 +266,7 @@ impl Simulation {
         let mut ms = Milliseconds::default();
         let mut detached = Vec::new();
         let mut repaired = 0;
-        if self.state.place.is_device() && self.state.timeline.is_due(self.state.clock.next_frame) {
+        if self.state.place.is_device() && self.state.changes_meshes() {
             repaired += self.fetch(&mut ms)?;
         }
         let cut = self.carry_out_strokes(&mut detached, &mut ms)?;
@@ -337,14 +338,14 @@ impl Simulation {
 
     /// Lets groups that were cut choose substeps again where that is due.
     fn judge_cuts(&mut self) {
-        for group in &mut self.state.groups {
-            let bodies = group
-                .bodies
-                .iter()
-                .map(|&body| &self.state.scene.body[body]);
-            let asked: Vec<_> = bodies
-                .map(|body| body.substeps.unwrap_or(self.state.solver.substeps))
-                .collect();
+        let State {
+            groups,
+            scene,
+            solver,
+            ..
+        } = &mut self.state;
+        for group in groups {
+            let asked = group.asked(|body| scene.body[body].substeps.unwrap_or(solver.substeps));
             group.judge_cut(&asked);
         }
     }
@@ -401,7 +402,7 @@ impl Simulation {
         self.state.groups.iter().any(|group| group.rest.is_some())
     }
 
-    /// Cuts what is due and lets everybody follow; adds what comes off to `detached`.
+    /// Removes bodies and cuts what is due, with all that depends on the meshes; adds what comes off to `detached`.
     fn carry_out_strokes(
         &mut self,
         detached: &mut Vec<DetachedReport>,
@@ -411,39 +412,20 @@ impl Simulation {
         let wants_kappa = self.wants(Quantity::Kappa);
         let notes_kappa = wants_kappa || self.chooses();
         let Self { state, deltas, .. } = self;
-        let State {
-            timeline,
-            groups,
-            whole,
-            pieces,
-            on_cut,
-            clock,
-            ..
-        } = state;
         deltas.clear();
-        let mut report: Option<CutReport> = None;
-        let mut measuring = 0.0;
-        timeline.advance(clock.next_frame, groups, |number, group, delta| {
-            if notes_kappa {
-                let start = Instant::now();
-                group.note_kappa(wants_kappa);
-                measuring += milliseconds(start.elapsed());
-            }
-            let events = group.follow(delta, ms)?;
-            pieces.follow(number, &events, detached);
-            report.get_or_insert_default().add(delta);
-            let of_whole = whole.as_mut().map(|whole| whole.follow(number, delta));
-            let delta = of_whole.as_ref().unwrap_or(delta);
-            on_cut.resize(delta.particles_after(), false);
-            let bare = |triangle: &&BoundaryTriangle| triangle.tag != FaceTag::Outer;
-            for triangle in delta.surface_added.iter().filter(bare) {
-                for p in triangle.particles {
-                    on_cut[p.index()] = true;
-                }
-            }
-            deltas.push(delta.clone());
-            Ok(())
-        })?;
+        let mut cut = Cut {
+            number: state.clock.next_frame,
+            notes_kappa: notes_kappa.then_some(wants_kappa),
+            deltas,
+            detached,
+            report: None,
+            measuring: 0.0,
+        };
+        state.remove_bodies(&mut cut, ms)?;
+        state.carry_out(&mut cut, ms)?;
+        let Cut {
+            report, measuring, ..
+        } = cut;
         let others = ms.cluster + ms.color + ms.schedule + ms.upload + measuring;
         ms.cut = milliseconds(start.elapsed()) - others;
         Ok(report)

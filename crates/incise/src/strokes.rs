@@ -150,6 +150,18 @@ impl Timeline {
         self.strokes.iter().any(|stroke| stroke.frames[0] <= frame)
     }
 
+    /// Applies a delta of a group that no stroke made to what strokes keep of its mesh.
+    pub(crate) fn apply_delta(&mut self, number: usize, group: &Group, delta: &CutDelta) {
+        for stroke in &mut self.strokes {
+            if let Some(sweep) = stroke.sweeps.get_mut(number) {
+                sweep.follow(&group.cuttable, delta);
+            }
+        }
+        if let Some(memory) = self.memories.get_mut(number) {
+            memory.follow(&group.cuttable, delta, &CutOptions::default());
+        }
+    }
+
     /// Carries out what is due in `frame` on every group; hands each delta to `follow` before the next stroke moves. The
     /// groups' positions are kept current.
     pub(crate) fn advance(

@@ -13,7 +13,7 @@ use incise_xpbd::{VolumeConstraint, XpbdError};
 use crate::Error;
 use crate::backend::{AnySolver, each_mut};
 
-/// What each body of a group asks for.
+/// What the body of each material of a group asks for.
 #[derive(Clone, Debug)]
 pub(crate) struct Volumes {
     compliances: Vec<Option<f64>>,
@@ -58,8 +58,8 @@ impl Volumes {
         added.sort_unstable_by_key(|tet| tet.tet);
         each_mut!(solver, solver => {
             for tet in added {
-                let body = solver.material_of(tet.tet.index());
-                let constraint = self.constraint(body, tet.corners, mesh.corners(tet.tet));
+                let material = solver.material_of(tet.tet.index());
+                let constraint = self.constraint(material, tet.corners, mesh.corners(tet.tet));
                 solver.put_volume(tet.tet.index(), constraint).map_err(refused)?;
             }
             for tet in &delta.relinked {
@@ -67,8 +67,8 @@ impl Volumes {
             }
             // Constraints past the last tet stay in the list, but no schedule names them any more.
             for tet in &delta.moved {
-                let body = solver.material_of(tet.to.index());
-                let constraint = self.constraint(body, tet.corners, mesh.corners(tet.to));
+                let material = solver.material_of(tet.to.index());
+                let constraint = self.constraint(material, tet.corners, mesh.corners(tet.to));
                 solver.put_volume(tet.to.index(), constraint).map_err(refused)?;
             }
             solver.reschedule_volumes(schedule);
@@ -78,11 +78,11 @@ impl Volumes {
 
     fn constraint(
         &self,
-        body: u16,
+        material: u16,
         corners: [ParticleId; 4],
         rest: [DVec3; 4],
     ) -> VolumeConstraint {
-        let compliance = self.compliances[usize::from(body)];
+        let compliance = self.compliances[usize::from(material)];
         let particles = corners.map(|p| p.0);
         let mut constraint = VolumeConstraint::of_tet(particles, rest, compliance.unwrap_or(0.0));
         if compliance.is_none() {

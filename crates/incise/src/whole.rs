@@ -79,6 +79,36 @@ impl Whole {
         }
     }
 
+    /// A group that is the only one, seen as one of several.
+    pub(crate) fn of_one(group: &Group) -> Self {
+        let mut whole = Self {
+            mesh: TetMesh::default(),
+            positions: Vec::new(),
+            numbers: Vec::new(),
+            places: Vec::new(),
+        };
+        whole.add_group(group);
+        whole
+    }
+
+    /// Appends a group: its particles and tets get the next numbers.
+    pub(crate) fn add_group(&mut self, group: &Group) {
+        let mesh = group.cuttable.mesh();
+        let (first, first_tet) = (self.mesh.positions.len(), self.mesh.tets.len());
+        let shifted = |p: ParticleId| ParticleId::new(first + p.index());
+        self.mesh.positions.extend(&mesh.positions);
+        self.positions.extend(&group.positions);
+        let tets = mesh.tets.iter().map(|tet| tet.map(shifted));
+        self.mesh.tets.extend(tets);
+        let mut numbers = Numbers::default();
+        let particles = (first..self.mesh.positions.len()).map(ParticleId::new);
+        numbers.add_particles(self.numbers.len(), particles, &mut self.places);
+        numbers
+            .tets
+            .extend((first_tet..self.mesh.tets.len()).map(TetId::new));
+        self.numbers.push(numbers);
+    }
+
     /// The group of a particle and its number there. O(1).
     pub(crate) fn place(&self, particle: ParticleId) -> (usize, usize) {
         let (group, number) = self.places[particle.index()];

@@ -138,11 +138,11 @@ impl Part {
         let count = mesh.positions.len();
         each!(&group.solver, solver => {
             let materials = (0..mesh.tets.len()).map(|t| {
-                let body = &scene.body[group.bodies[usize::from(solver.material_of(t))]];
+                let material = solver.material(solver.material_of(t));
                 Material {
-                    young_modulus: body.young_modulus,
-                    poisson_ratio: body.poisson_ratio,
-                    density: body.density,
+                    young_modulus: material.young_modulus,
+                    poisson_ratio: material.poisson_ratio,
+                    density: material.density,
                 }
             });
             let mut seat = seats(&group.solver, count);

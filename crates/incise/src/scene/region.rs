@@ -1,8 +1,8 @@
-//! [`Region`]: some of a body's particles, or a part of space.
+//! [`Region`]: some of a body's particles or tets, or a part of space.
 
 use serde::{Deserialize, Serialize};
 
-/// Some of a body's particles.
+/// Some of a body's particles, or of its tets by their centers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Region {
@@ -27,6 +27,8 @@ pub enum Region {
         /// Its radius.
         radius: f64,
     },
-    /// Those with these numbers in the body's mesh.
+    /// Those with these numbers in the body's mesh; tets if they have all four corners.
     Particles(Vec<u32>),
+    /// The tets with these numbers in the body's mesh, as part of another material only.
+    Tets(Vec<u32>),
 }

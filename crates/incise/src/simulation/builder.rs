@@ -16,8 +16,8 @@ use crate::distance::DistanceHandle;
 use crate::limits::value;
 use crate::place::{AtHand, Place};
 use crate::scene::{
-    AttachmentSpec, BodySpec, ColliderSpec, DistanceSpec, GroundSpec, Region, ReportSpec,
-    SolverSpec, StrokeSpec,
+    AttachmentSpec, BodySpec, ColliderSpec, DistanceSpec, GroundSpec, MaterialSpec, Region,
+    ReportSpec, SolverSpec, StrokeSpec,
 };
 use crate::{Error, Scene, Simulation};
 
@@ -26,8 +26,8 @@ use crate::{Error, Scene, Simulation};
 /// Young's modulus is 1e5 Pa, Poisson's ratio 0.45, density 1000 kg/m³ and damping 0 unless they are set.
 #[derive(Clone, Debug)]
 pub struct Body {
-    mesh: TetMesh,
-    spec: BodySpec,
+    pub(super) mesh: TetMesh,
+    pub(super) spec: BodySpec,
 }
 
 impl Body {
@@ -68,6 +68,14 @@ impl Body {
         self
     }
 
+    /// Gives parts of the body another material, such as a tumor: tets by their centers or by their numbers
+    /// ([`Region::Tets`]). Where parts overlap, the last one counts.
+    #[must_use]
+    pub fn material(mut self, part: MaterialSpec) -> Self {
+        self.spec.material.push(part);
+        self
+    }
+
     /// Sets where the origin of the mesh goes, in m.
     #[must_use]
     pub fn position(mut self, position: DVec3) -> Self {
@@ -104,7 +112,7 @@ impl Body {
 
 /// The index of a body of a simulation, in the order in which bodies were added.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct BodyHandle(usize);
+pub struct BodyHandle(pub(super) usize);
 
 impl BodyHandle {
     /// The index: that of `body` in reports, attachments and distances.

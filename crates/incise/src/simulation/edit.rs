@@ -1,19 +1,28 @@
-//! What a program changes between frames: gravity, colliders, attachments, distances, impulses; and what it asks, by rays.
+//! What a program changes between frames: bodies, gravity, colliders, attachments, distances, impulses; and what it asks, by rays.
 //!
 //! Every group of bodies has the colliders of the world among its settings, so a change goes to all of them. Cost: that of
 //! the change; an impulse wakes what sleeps and, on a device, fetches the positions.
 
+use std::sync::Arc;
+
 use glam::{DQuat, DVec3};
+use incise_xpbd::StepSettings;
 
 use super::Simulation;
-use crate::Error;
+use super::builder::{Body, BodyHandle};
+use super::state::{Removal, State};
 use crate::attachment::{Attachment, AttachmentHandle};
 use crate::backend::{AnySolver, each, each_mut};
 use crate::collider::{self, ColliderHandle};
 use crate::distance::DistanceHandle;
+use crate::group::Group;
+use crate::joined::Joined;
 use crate::limits::{LARGEST_COORDINATE, coordinates, value, within};
+use crate::method::settings;
 use crate::ray::{RayHit, first_hit};
 use crate::scene::{AttachmentSpec, ColliderSpec, DistanceSpec};
+use crate::whole::Whole;
+use crate::{Error, Scene, body, budget};
 
 impl Simulation {
     /// Sets the acceleration of gravity in m/s² from the next frame on; `None` is weightlessness. Wakes what sleeps.
@@ -300,8 +309,106 @@ impl Simulation {
         Err(removed("distance", handle))
     }
 
+    /// Adds a body, which takes part from the next frame on, at rest. It has a solver of its own, with the present
+    /// settings. Its particles and tets get the next numbers. O(tets) of the body; of all bodies where there was one.
+    ///
+    /// What draws the skin starts again from [`Simulation::boundary`]. On a device the positions are fetched.
+    ///
+    /// # Errors
+    /// If a value lies outside its range, the mesh is broken, or the device is lost; nothing has changed then.
+    ///
+    /// # Example
+    /// ```
+    /// use incise::mesh::generate::{Shape, generate};
+    /// use incise::mesh::glam::DVec3;
+    /// use incise::{Body, Simulation};
+    ///
+    /// let mut builder = Simulation::builder();
+    /// builder.gravity(DVec3::NEG_Z * 9.81).ground(0.0, 0.5);
+    /// builder.add_body(Body::new(generate(Shape::Box, 300)?).position(DVec3::Z));
+    /// let mut simulation = builder.build()?;
+    /// simulation.step()?;
+    /// let ball = Body::new(generate(Shape::Sphere, 300)?).position(DVec3::new(3.0, 0.0, 1.0));
+    /// let ball = simulation.add_body(ball)?;
+    /// assert_eq!(simulation.step()?.pieces, 2);
+    /// simulation.remove_body(ball)?;
+    /// assert_eq!(simulation.step()?.pieces, 1);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn add_body(&mut self, body: Body) -> Result<BodyHandle, Error> {
+        self.read_back()?;
+        let state = &self.state;
+        let number = state.scene.body.len();
+        let field = format!("body[{number}]");
+        let made = body::Body::new(&field, &body.spec, Some(&body.mesh), state.solver.substeps)?;
+        let joined = Joined::of_one(number, made)?;
+        let mut scene = (*state.scene).clone();
+        scene.body.push(body.spec);
+        let present = Scene {
+            solver: state.solver.clone(),
+            ..scene.clone()
+        };
+        let settings = StepSettings {
+            gravity: state.gravity,
+            colliders: state.groups[0].settings.colliders.clone(),
+            ..settings(&present)?
+        };
+        let make = || Group::new(&present, &state.place, state.precision, settings, joined);
+        let group = match &self.pool {
+            Some(pool) => pool.install(make),
+            None => make(),
+        }?;
+
+        let state = &mut self.state;
+        let groups = &mut state.groups;
+        let whole = &mut state.whole;
+        whole
+            .get_or_insert_with(|| Whole::of_one(&groups[0]))
+            .add_group(&group);
+        state.pieces.add_group(&group);
+        groups.push(group);
+        state.scene = Arc::new(scene);
+        state.residuals_kept = false;
+        if !state.on_cut.is_empty() {
+            let particles = self.mesh().positions.len();
+            self.state.on_cut.resize(particles, false);
+        }
+        if let Some(budget) = self.state.solver.budget_ms {
+            let State { groups, solver, .. } = &mut self.state;
+            let mut fit = || budget::fit(groups, solver, budget);
+            match &self.pool {
+                Some(pool) => pool.install(fit),
+                None => fit(),
+            }?;
+        }
+        Ok(BodyHandle(number))
+    }
+
+    /// Removes a body, whatever pieces it is in, at the start of the next frame: its tets, in one of the
+    /// [`Simulation::deltas`]. Its particles stay in [`Simulation::mesh`] without tets, and attachments and distances on
+    /// them hold nothing. The numbers of other bodies stay. O(tets) of the bodies that are solved with it.
+    ///
+    /// # Errors
+    /// If it was removed before.
+    pub fn remove_body(&mut self, body: BodyHandle) -> Result<(), Error> {
+        self.group_of("body", body.index())?;
+        self.state.removed.push(Removal {
+            body: body.index(),
+            is_done: false,
+        });
+        Ok(())
+    }
+
     /// The number of the group of a body.
     fn group_of(&self, field: &str, body: usize) -> Result<usize, Error> {
+        if self
+            .state
+            .removed
+            .iter()
+            .any(|removal| removal.body == body)
+        {
+            return Err(removed(field, body));
+        }
         let mut groups = self.state.groups.iter();
         let group = groups.position(|group| group.bodies.contains(&body));
         group.ok_or_else(|| value(field, body, "the number of a body, counted from 0"))

@@ -241,10 +241,7 @@ impl Retuned {
             ..settings.clone()
         };
         let mut choice = group.choice;
-        let bodies = group.bodies.iter().map(|&body| &scene.body[body]);
-        let asked: Vec<_> = bodies
-            .map(|body| body.substeps.unwrap_or(after.substeps))
-            .collect();
+        let asked = group.asked(|body| scene.body[body].substeps.unwrap_or(after.substeps));
         let chosen_anew = substeps_follow_from(before) != substeps_follow_from(after);
         if chosen_anew {
             (settings.substeps, choice) = substeps(&asked, after, &group.solver, mesh);

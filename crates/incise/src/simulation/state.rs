@@ -5,20 +5,22 @@
 //! copy: O(particles + tets).
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use glam::DVec3;
+use incise_cutting::{BoundaryTriangle, CutDelta, FaceTag};
 
-use crate::Scene;
 use crate::attachment::AttachmentHandle;
 use crate::collider::Colliders;
 use crate::distance::DistanceHandle;
 use crate::group::Group;
 use crate::pieces::PieceNumbers;
 use crate::place::Place;
-use crate::report::FrameReport;
+use crate::report::{CutReport, DetachedReport, FrameReport, Milliseconds, milliseconds};
 use crate::scene::{Precision, ReportSpec, SolverSpec};
 use crate::strokes::Timeline;
 use crate::whole::Whole;
+use crate::{Error, Scene};
 
 /// All of a simulation that changes with time. A copy has its solvers on the processor.
 #[derive(Clone, Debug)]
@@ -34,6 +36,8 @@ pub(super) struct State {
     /// The names of the colliders in the settings of all groups.
     pub(super) colliders: Colliders,
     pub(super) next: NextNumbers,
+    /// Bodies that were removed, or will be at the start of the next frame.
+    pub(super) removed: Vec<Removal>,
     pub(super) reporting: ReportSpec,
     /// In the order of their first bodies.
     pub(super) groups: Vec<Group>,
@@ -46,6 +50,134 @@ pub(super) struct State {
     pub(super) report: FrameReport,
     /// Whether the solvers have the residuals of the last frame.
     pub(super) residuals_kept: bool,
+}
+
+/// A body that a program removed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Removal {
+    /// Its number in the scene.
+    pub(super) body: usize,
+    /// Whether its tets are gone.
+    pub(super) is_done: bool,
+}
+
+/// What the strokes and removals of a frame do.
+pub(super) struct Cut<'a> {
+    /// The number of the frame.
+    pub(super) number: u64,
+    /// Whether kappa is noted, and if so, whether that before the cut too.
+    pub(super) notes_kappa: Option<bool>,
+    pub(super) deltas: &'a mut Vec<CutDelta>,
+    pub(super) detached: &'a mut Vec<DetachedReport>,
+    pub(super) report: Option<CutReport>,
+    /// Milliseconds that noting kappa took.
+    pub(super) measuring: f64,
+}
+
+/// All that depends on the mesh of a group, but the group itself.
+struct Dependents<'a> {
+    whole: &'a mut Option<Whole>,
+    pieces: &'a mut PieceNumbers,
+    on_cut: &'a mut Vec<bool>,
+}
+
+impl Dependents<'_> {
+    /// Applies the delta of the group of a number to all that depends on its mesh.
+    fn apply_delta(
+        &mut self,
+        number: usize,
+        group: &mut Group,
+        delta: &CutDelta,
+        cut: &mut Cut<'_>,
+        ms: &mut Milliseconds,
+    ) -> Result<(), Error> {
+        if let Some(before) = cut.notes_kappa {
+            let start = Instant::now();
+            group.note_kappa(before);
+            cut.measuring += milliseconds(start.elapsed());
+        }
+        let events = group.follow(delta, ms)?;
+        self.pieces.follow(number, group, &events, cut.detached);
+        cut.report.get_or_insert_default().add(delta);
+        let of_whole = self.whole.as_mut().map(|whole| whole.follow(number, delta));
+        let delta = of_whole.as_ref().unwrap_or(delta);
+        self.on_cut.resize(delta.particles_after(), false);
+        let bare = |triangle: &&BoundaryTriangle| triangle.tag != FaceTag::Outer;
+        for triangle in delta.surface_added.iter().filter(bare) {
+            for p in triangle.particles {
+                self.on_cut[p.index()] = true;
+            }
+        }
+        cut.deltas.push(delta.clone());
+        Ok(())
+    }
+}
+
+impl State {
+    /// Whether the next frame may change a mesh.
+    pub(super) fn changes_meshes(&self) -> bool {
+        self.timeline.is_due(self.clock.next_frame) || self.removed.iter().any(|r| !r.is_done)
+    }
+
+    /// Carries out the strokes that are due.
+    pub(super) fn carry_out(
+        &mut self,
+        cut: &mut Cut<'_>,
+        ms: &mut Milliseconds,
+    ) -> Result<(), Error> {
+        let Self {
+            timeline,
+            groups,
+            whole,
+            pieces,
+            on_cut,
+            ..
+        } = self;
+        let mut dependents = Dependents {
+            whole,
+            pieces,
+            on_cut,
+        };
+        timeline.advance(cut.number, groups, |number, group, delta| {
+            dependents.apply_delta(number, group, delta, cut, ms)
+        })
+    }
+
+    /// Removes the tets of bodies that are to be removed.
+    pub(super) fn remove_bodies(
+        &mut self,
+        cut: &mut Cut<'_>,
+        ms: &mut Milliseconds,
+    ) -> Result<(), Error> {
+        let Self {
+            removed,
+            timeline,
+            groups,
+            whole,
+            pieces,
+            on_cut,
+            ..
+        } = self;
+        let mut dependents = Dependents {
+            whole,
+            pieces,
+            on_cut,
+        };
+        for removal in removed.iter_mut().filter(|removal| !removal.is_done) {
+            let of_body = |group: &Group| group.bodies.contains(&removal.body);
+            let Some(number) = groups.iter().position(of_body) else {
+                continue;
+            };
+            let group = &mut groups[number];
+            let delta = group.remove_tets_of(removal.body)?;
+            removal.is_done = true;
+            if !delta.is_empty() {
+                timeline.apply_delta(number, group, &delta);
+                dependents.apply_delta(number, group, &delta, cut, ms)?;
+            }
+        }
+        Ok(())
+    }
 }
 
 /// The numbers of the next handles; none is given twice.

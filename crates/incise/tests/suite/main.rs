@@ -23,6 +23,7 @@ mod hands;
 mod kappa;
 mod knobs;
 mod live;
+mod live_bodies;
 mod locality;
 mod methods;
 mod mistakes;

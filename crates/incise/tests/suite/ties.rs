@@ -239,7 +239,10 @@ fn bad_ties_are_refused_and_nothing_changes() {
     let refusals = [
         (message(simulation.add_attachment(&whole)), "regions"),
         (message(simulation.add_attachment(&soft)), "compliance"),
-        (message(simulation.add_attachment(&nobody)), "attachment.body"),
+        (
+            message(simulation.add_attachment(&nobody)),
+            "attachment.body",
+        ),
     ];
     for (message, key) in refusals {
         assert!(message.contains(key), "{message}");
