@@ -178,6 +178,7 @@ fn scene(file: PathBuf, mesh: &TetMesh, young_modulus: f64, precision: Precision
         volume_compliance: None,
         substeps: None,
         fixed: Vec::new(),
+        ..BodySpec::default()
     });
     scene
 }

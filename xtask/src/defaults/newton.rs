@@ -225,6 +225,7 @@ impl Setup {
             } else {
                 Vec::new()
             },
+            ..BodySpec::default()
         });
         let press = match (case.load, case.shape) {
             (Load::Pressed, Shape::Beam) => DVec3::NEG_Z * PRESS * extent.x,

@@ -85,6 +85,7 @@ fn beam(tets: usize, height: f64) -> BodySpec {
         volume_compliance: None,
         substeps: None,
         fixed: Vec::new(),
+        ..BodySpec::default()
     }
 }
 

@@ -122,6 +122,7 @@ impl Cut {
             } else {
                 vec![held]
             },
+            ..BodySpec::default()
         });
         let last = self.frames(quick) - 1;
         let blade = |height: f64| vec![[0.02, -1.0, height], [0.03, 1.0, height]];

@@ -78,10 +78,7 @@ impl Newton {
         let mut simulation = Simulation::with_threads(&scene, 1)?;
         let particles = simulation.positions().len();
         simulation.cut_now()?;
-        let parts = simulation
-            .groups()
-            .iter()
-            .map(|group| Part::new(&scene, group));
+        let parts = simulation.groups().iter().map(Part::new);
         Ok(Self {
             parts: parts.collect::<Result<_, _>>()?,
             simulation,
@@ -133,7 +130,7 @@ impl Newton {
 }
 
 impl Part {
-    fn new(scene: &Scene, group: &Group) -> Result<Self, Error> {
+    fn new(group: &Group) -> Result<Self, Error> {
         let mesh = group.cuttable.mesh();
         let count = mesh.positions.len();
         each!(&group.solver, solver => {

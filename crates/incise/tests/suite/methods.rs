@@ -1,10 +1,10 @@
 //! The methods a scene may name: what they default to, that each runs, and what does not go with it.
 
 use incise::mesh::glam::DVec3;
-use incise::scene::{Method, Precision, SolverSpec, TetSolve};
+use incise::scene::{Method, Precision, SolverSpec, StrokeSpec, TetSolve};
 use incise::{Scene, Simulation};
 
-use crate::support::{body, plane, scene, simulation, state};
+use crate::support::{body, noise, plane, scene, simulation, state};
 use crate::values::refused;
 
 const NAMES: [(&str, Method); 4] = [
@@ -298,4 +298,46 @@ fn what_a_method_does_not_know_is_refused_by_name() {
         mistake(&mut scene);
         refused(&scene, field);
     }
+}
+
+/// Many cuts leave many pieces and ten times the tets: what two-level VBD keeps grows with the tets, not with the square of
+/// the pieces.
+#[test]
+fn memory_of_two_level_vbd_follows_the_tets_through_many_cuts() {
+    let mut scene = scene(&body("beam", 400, [0.0; 3]));
+    scene.solver.method = Method::Vbd;
+    scene.solver.two_level = true;
+    scene.solver.iterations = 2;
+    let mut simulation = simulation(&scene);
+    simulation.step().unwrap();
+    let bytes_per_tet = |simulation: &mut Simulation| {
+        let bytes = simulation.snapshot().unwrap().bytes();
+        bytes as f64 / simulation.mesh().tets.len() as f64
+    };
+    let before = bytes_per_tet(&mut simulation);
+    let first = simulation.mesh().tets.len();
+    for number in 0..20 {
+        let at = |k: usize, size: f64| size * noise(5, 9 * number + k);
+        simulation
+            .cut(StrokeSpec::Rectangle {
+                frame: 0,
+                center: [at(0, 0.5), at(1, 0.12), at(2, 0.12)],
+                half_u: [at(3, 0.2), at(4, 0.2), 0.2],
+                half_v: [at(6, 0.2), 0.2, at(8, 0.2)],
+                snap: 0.0,
+            })
+            .unwrap();
+        // The factor ages.
+        for _ in 0..4 {
+            simulation.step().unwrap();
+        }
+    }
+    let (pieces, tets) = (simulation.pieces().len(), simulation.mesh().tets.len());
+    assert!(
+        pieces > 20 && tets > 5 * first,
+        "{pieces} pieces, {tets} tets"
+    );
+    let after = bytes_per_tet(&mut simulation);
+    assert!(after < 1.5 * before, "{before} bytes a tet, then {after}");
+    simulation.check().unwrap();
 }

@@ -32,7 +32,7 @@ pub struct CoarseCorrectionSettings {
     /// Ends them once the distance to the solution of the linear system, in the norm of the energy, is estimated to have
     /// fallen to this part.
     pub reduction: f64,
-    /// Particles of an aggregate, about: see [`CoarseCorrection::new`].
+    /// Particles of an aggregate before all cuts, about: see [`CoarseCorrection::new`].
     pub aggregate: usize,
 }
 
@@ -87,6 +87,8 @@ const MOTION: f64 = 3e-5;
 #[derive(Clone, Debug)]
 pub struct CoarseCorrection<R: Real> {
     settings: CoarseCorrectionSettings,
+    /// Rows at first, when aggregates had the size of the settings.
+    first_rows: usize,
     /// The particle of each row.
     order: Vec<u32>,
     matrix: Blocks<R>,
@@ -154,6 +156,7 @@ impl<R: Real> CoarseCorrection<R> {
         let (of, count) = aggregates(&matrix.offsets, &matrix.columns, settings.aggregate);
         Ok(Self {
             settings,
+            first_rows: stars.order.len(),
             order: stars.order.clone(),
             matrix,
             coarse: Coarse::new(of, count),
@@ -166,7 +169,8 @@ impl<R: Real> CoarseCorrection<R> {
     }
 
     /// Follows stars that were rebuilt, after a cut for example. Particles keep their aggregates, new ones join those
-    /// around them, and the factor stays in use. Aggregates are grown again when it has aged. O(pairs).
+    /// around them, and the factor stays in use. When it has aged, aggregates are grown again, as many in all: larger ones where
+    /// cuts have made more particles. O(pairs).
     pub fn follow(&mut self, stars: &VertexStars<R>) {
         let old = std::mem::replace(&mut self.order, stars.order.clone());
         self.matrix.follow(stars);
@@ -263,6 +267,7 @@ impl<R: Real> ImplicitStep<'_, R> {
     pub fn correct(&mut self, correction: &mut CoarseCorrection<R>) -> CoarseCorrectionReport {
         let CoarseCorrection {
             settings,
+            first_rows,
             matrix,
             coarse,
             conjugate,
@@ -298,7 +303,9 @@ impl<R: Real> ImplicitStep<'_, R> {
         }
         if coarse.is_stale() {
             if coarse.is_worn() {
-                let size = settings.aggregate;
+                // The factor grows with the cube of their number, so aggregates grow with the body.
+                let size = settings.aggregate * rows / (*first_rows).max(1);
+                let size = size.max(settings.aggregate);
                 let (of, count) = aggregates(&matrix.offsets, &matrix.columns, size);
                 *coarse = Coarse::new(of, count);
             }
