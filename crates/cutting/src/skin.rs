@@ -1,12 +1,14 @@
 //! [`Skin`]: the boundary as a renderer wants it, following cuts.
 //!
-//! A dense list of triangles over render vertices. A render vertex is a particle on one kind of boundary: a particle on
+//! A dense list of triangles over render vertices, those of the outer surface first, so that outer and cut faces are two
+//! ranges of one index buffer, to be drawn with two materials. A render vertex is a particle on one kind of boundary: a particle on
 //! the rim of a cut has one for the outer surface and one for each cut surface, so that shading breaks there and is
-//! smooth elsewhere. Positions and attributes are those of the particle, which [`CutDelta::extend_with`] interpolates
-//! on cut edges. Following a delta costs what the boundary lost and gained; normals cost a pass over the triangles,
+//! smooth elsewhere. Positions and attributes, such as texture coordinates, are those of the particle, which
+//! [`CutDelta::extend_with`] interpolates on cut edges. Following a delta costs what the boundary lost and gained; normals cost a pass over the triangles,
 //! since they follow the motion.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
 use glam::DVec3;
 use incise_mesh::{ParticleId, TetId};
@@ -61,7 +63,10 @@ pub struct Skin {
     uses: Vec<u32>,
     /// Vertices without a triangle, to be used again.
     vacant: Vec<u32>,
+    /// Those of the outer surface first.
     triangles: Vec<[u32; 3]>,
+    /// How many triangles are of the outer surface.
+    outer: usize,
     /// For each triangle its face.
     faces: Vec<(TetId, u8)>,
     /// Never iterated: their order is that of a hash.
@@ -74,16 +79,30 @@ impl Skin {
     #[must_use]
     pub fn new(boundary: impl IntoIterator<Item = BoundaryTriangle>) -> Self {
         let mut skin = Self::default();
+        let mut change = SkinChange::default();
         for triangle in boundary {
-            skin.add(&triangle);
+            skin.add(&triangle, &mut change);
         }
         skin
     }
 
-    /// The corners of the triangles, counterclockwise seen from outside, as indices of vertices.
+    /// The corners of the triangles, counterclockwise seen from outside, as indices of vertices: those of the outer surface
+    /// first, then those of cuts.
     #[must_use]
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
+    }
+
+    /// The triangles of the outer surface: a range of [`Skin::triangles`].
+    #[must_use]
+    pub fn outer_triangles(&self) -> Range<usize> {
+        0..self.outer
+    }
+
+    /// The triangles of cuts: a range of [`Skin::triangles`].
+    #[must_use]
+    pub fn cut_triangles(&self) -> Range<usize> {
+        self.outer..self.triangles.len()
     }
 
     /// The tet behind a triangle.
@@ -128,10 +147,7 @@ impl Skin {
             }
         }
         for triangle in &delta.surface_added {
-            change.triangles.push(self.triangles.len());
-            change
-                .vertices
-                .extend(self.add(triangle).into_iter().flatten());
+            self.add(triangle, &mut change);
         }
         change
             .triangles
@@ -166,20 +182,39 @@ impl Skin {
         normals
     }
 
-    /// Returns for each corner its vertex if that is new.
-    fn add(&mut self, triangle: &BoundaryTriangle) -> [Option<usize>; 3] {
+    /// Adds a triangle at the end of its range.
+    fn add(&mut self, triangle: &BoundaryTriangle, change: &mut SkinChange) {
         let tag = triangle.tag;
-        let vertices = triangle
-            .particles
-            .map(|particle| self.vertex(SkinVertex { particle, tag }));
-        let place = index(self.triangles.len());
-        self.triangles.push(vertices.map(|(v, _)| v));
-        self.faces.push((triangle.tet, triangle.opposite));
-        let before = self
-            .place_of_face
-            .insert((triangle.tet, triangle.opposite), place);
+        let corners = triangle.particles.map(|particle| {
+            let (place, is_new) = self.vertex(SkinVertex { particle, tag });
+            change.vertices.extend(is_new.then_some(place as usize));
+            place
+        });
+        let face = (triangle.tet, triangle.opposite);
+        let end = self.triangles.len();
+        self.triangles.push(corners);
+        self.faces.push(face);
+        let before = self.place_of_face.insert(face, index(end));
         assert!(before.is_none(), "a face is on the boundary once");
-        vertices.map(|(v, new)| new.then_some(v as usize))
+        change.triangles.push(end);
+        if tag == FaceTag::Outer {
+            // The first triangle of the cuts makes room.
+            self.swap(self.outer, end, change);
+            self.outer += 1;
+        }
+    }
+
+    /// Swaps two triangles.
+    fn swap(&mut self, a: usize, b: usize, change: &mut SkinChange) {
+        if a == b {
+            return;
+        }
+        self.triangles.swap(a, b);
+        self.faces.swap(a, b);
+        for place in [a, b] {
+            self.place_of_face.insert(self.faces[place], index(place));
+            change.triangles.push(place);
+        }
     }
 
     /// The place of a vertex and whether it is new.
@@ -201,19 +236,23 @@ impl Skin {
 
     fn remove(&mut self, triangle: &BoundaryTriangle, change: &mut SkinChange) {
         let face = (triangle.tet, triangle.opposite);
-        let place = self.place_of_face.remove(&face);
-        let place = place.expect("the triangle was on the boundary") as usize;
-        for v in self.triangles.swap_remove(place) {
+        let place = self.place_of_face.get(&face).copied();
+        let mut place = place.expect("the triangle was on the boundary") as usize;
+        if place < self.outer {
+            self.outer -= 1;
+            self.swap(place, self.outer, change);
+            place = self.outer;
+        }
+        let last = self.triangles.len() - 1;
+        self.swap(place, last, change);
+        self.faces.pop();
+        self.place_of_face.remove(&face);
+        for v in self.triangles.pop().into_iter().flatten() {
             self.uses[v as usize] -= 1;
             if self.uses[v as usize] == 0 {
                 self.place_of_vertex.remove(&self.vertices[v as usize]);
                 self.vacant.push(v);
             }
-        }
-        self.faces.swap_remove(place);
-        if let Some(moved) = self.faces.get(place) {
-            self.place_of_face.insert(*moved, index(place));
-            change.triangles.push(place);
         }
     }
 }

@@ -4,8 +4,8 @@
 
 #![expect(clippy::print_stdout, reason = "prints what it did")]
 
-use incise::cutting::{FaceTag, Skin};
-use incise::mesh::glam::DVec3;
+use incise::cutting::Skin;
+use incise::mesh::glam::{DVec3, Vec2};
 use incise::mesh::{ParticleId, TetMesh};
 use incise::scene::ColliderSpec;
 use incise::{Body, Event, Simulation};
@@ -39,6 +39,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     // What a renderer keeps: an index buffer that follows cuts, and vertices that follow the particles.
     let mut skin = Skin::new(simulation.boundary());
+    // Texture coordinates of the particles; those that cuts make lie between others.
+    let rest = &simulation.mesh().positions;
+    let mut uv: Vec<Vec2> = rest.iter().map(|x| x.as_vec3().truncate()).collect();
     let blade = |y: f64| [DVec3::new(0.43, y, -1.0), DVec3::new(0.43, y, 1.0)];
     let stroke = simulation.begin_stroke(&blade(-0.1), 0.1)?;
     for frame in 1..=20 {
@@ -58,17 +61,27 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let changed = skin.follow(delta);
             triangles += changed.triangles.len(); // upload skin.triangles()[i] for each
             vertices += changed.vertices.len();
+            delta.extend_with(&mut uv, |a, b, t| a.lerp(*b, t as f32));
         }
         let positions = simulation.positions();
         let at = |p: ParticleId| positions[p.index()].as_vec3();
         let buffer: Vec<_> = skin.vertices().iter().map(|v| at(v.particle)).collect();
         let normals = skin.normals(positions);
-        let is_cut = |t: &usize| skin.tag(*t) != FaceTag::Outer;
-        let cut = (0..skin.triangles().len()).filter(is_cut).count();
+        let mapped: Vec<_> = skin
+            .vertices()
+            .iter()
+            .map(|v| uv[v.particle.index()])
+            .collect();
+        // Two draw calls: skin with its texture, and flesh.
+        let (outer, cut) = (skin.outer_triangles(), skin.cut_triangles());
         println!(
-            "frame {frame:2}: {ms:4.1} ms, {:3} vertices, {} normals, {cut:3} cut triangles, changed {triangles} and {vertices}",
+            "frame {frame:2}: {ms:4.1} ms, {:3} vertices, {} normals, {} texture coordinates, {:3} outer and {:3} cut triangles, \
+             changed {triangles} and {vertices}",
             buffer.len(),
             normals.len(),
+            mapped.len(),
+            outer.len(),
+            cut.len(),
         );
         for event in simulation.events() {
             match event {

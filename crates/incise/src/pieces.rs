@@ -145,6 +145,19 @@ impl PieceNumbers {
         reports.collect()
     }
 
+    /// The number of the piece of each tet of a group of a number, in the order of its tets. O(tets).
+    pub(crate) fn of_tets<'a>(
+        &'a self,
+        number: usize,
+        group: &'a Group,
+    ) -> impl ExactSizeIterator<Item = u32> + 'a {
+        let tets = 0..group.cuttable.mesh().tets.len();
+        tets.map(move |t| {
+            let piece = group.pieces.piece_of(TetId::new(t));
+            self.of_group[number].0[piece as usize]
+        })
+    }
+
     /// Compares with the groups: each of their pieces has one number, and it is on the body that its tets are of.
     pub(crate) fn check(&self, groups: &[Group]) -> Result<(), Error> {
         let differs = |what: String| Err(Error::Inconsistent(what));

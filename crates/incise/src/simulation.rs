@@ -511,6 +511,25 @@ impl Simulation {
         self.state.pieces.report(&self.state.groups)
     }
 
+    /// The number of the piece of each tet of [`Simulation::mesh`], as [`Simulation::pieces`] numbers them. O(tets).
+    #[must_use]
+    pub fn piece_numbers(&self) -> Vec<u32> {
+        let State {
+            groups,
+            whole,
+            pieces,
+            ..
+        } = &self.state;
+        let groups = groups.iter().enumerate();
+        let mut of_groups: Vec<Vec<u32>> = groups
+            .map(|(number, group)| pieces.of_tets(number, group).collect())
+            .collect();
+        match whole {
+            Some(whole) => whole.of_tets(&of_groups),
+            None => of_groups.swap_remove(0),
+        }
+    }
+
     /// The clusters of tets. With several bodies they are put together: O(tets), and the clusters of a body are
     /// numbered after those of the bodies before it, so that a cut can change their numbers.
     #[must_use]

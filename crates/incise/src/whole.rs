@@ -237,8 +237,8 @@ impl Whole {
     }
 
     /// Puts what each group says of its tets in the order of the whole.
-    pub(crate) fn of_tets(&self, of_groups: &[Vec<f64>]) -> Vec<f64> {
-        let mut of_tets = vec![0.0; self.mesh.tets.len()];
+    pub(crate) fn of_tets<T: Copy + Default>(&self, of_groups: &[Vec<T>]) -> Vec<T> {
+        let mut of_tets = vec![T::default(); self.mesh.tets.len()];
         for (numbers, of_group) in self.numbers.iter().zip(of_groups) {
             for (tet, value) in numbers.tets.iter().zip(of_group) {
                 of_tets[tet.index()] = *value;

@@ -15,7 +15,6 @@ mod normals;
 mod painting;
 mod palette;
 mod picture;
-mod piece_colors;
 mod props;
 mod raster;
 mod renderer;

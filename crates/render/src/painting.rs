@@ -13,7 +13,6 @@ use incise::scene::{ColliderSpec, GroundSpec};
 use incise::{Scene, Simulation};
 
 use crate::palette::{self, Legend, decades, legend_from};
-use crate::piece_colors::PieceNumbers;
 use crate::{ColorBy, RenderError, stretch};
 
 /// The color of a triangle without one: it is drawn as tissue.
@@ -58,7 +57,6 @@ pub struct Painting {
     shown: ColorBy,
     /// What colors that stay while nothing changes were made for.
     made_for: Option<(ColorBy, u64)>,
-    pieces: PieceNumbers,
     /// Of the skin.
     topology: u64,
     /// Of clusters and colors, which change with each cut and when they are made anew.
@@ -87,7 +85,6 @@ impl Painting {
             colors: Vec::new(),
             shown: ColorBy::Tissue,
             made_for: None,
-            pieces: PieceNumbers::default(),
             topology: 0,
             plan: 0,
             coloring: revision(),
@@ -125,7 +122,6 @@ impl Painting {
         let colored = !self.colors.is_empty();
         for delta in deltas {
             let change = self.skin.follow(delta);
-            self.pieces.follow_cut(delta);
             if colored {
                 self.colors.resize(self.skin.triangles().len(), NONE);
                 for triangle in change.triangles {
@@ -149,7 +145,6 @@ impl Painting {
         self.coloring = self.topology;
         self.colors.clear();
         self.made_for = None;
-        self.pieces.clear();
         self.followed = simulation.report().time_s;
         self.device_is_current = false;
     }
@@ -190,11 +185,8 @@ impl Painting {
                 None
             }
             ColorBy::Piece => {
-                let found = simulation.mesh().pieces();
-                let mut pieces = std::mem::take(&mut self.pieces);
-                let numbers = pieces.follow(&found.labels, found.count);
-                self.paint(|tet| palette::distinct(numbers[tet]));
-                self.pieces = pieces;
+                let pieces = simulation.piece_numbers();
+                self.paint(|tet| palette::distinct(pieces[tet]));
                 None
             }
             ColorBy::Stretch => {

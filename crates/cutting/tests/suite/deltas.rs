@@ -192,6 +192,9 @@ proptest! {
             let change = skin.follow(&delta);
             upload(&mut copy, &skin, &change);
             prop_assert_eq!(listed(&skin), listed(&Skin::new(cuttable.boundary())));
+            prop_assert!(skin.outer_triangles().all(|t| skin.tag(t) == FaceTag::Outer));
+            prop_assert!(skin.cut_triangles().all(|t| skin.tag(t) != FaceTag::Outer));
+            prop_assert_eq!(skin.cut_triangles().end, skin.triangles().len());
             let normals = skin.normals(&cuttable.mesh().positions);
             prop_assert!(normals.iter().all(|n| *n == DVec3::ZERO || (n.length() - 1.0).abs() < 1e-9));
         }

@@ -124,6 +124,12 @@ fn bodies_come_and_go_among_cuts() {
         told.sort_unstable();
         there.sort_unstable();
         assert!(told == there, "frame {frame}");
+        // Numbers of tets and pieces fit together.
+        let numbers = simulation.piece_numbers();
+        for piece in simulation.pieces() {
+            let tets = numbers.iter().filter(|&&number| number == piece.id).count();
+            assert_eq!(tets, piece.tets, "frame {frame}");
+        }
         let bits = |x: &[DVec3]| x.iter().map(|x| x.to_array()).collect::<Vec<_>>();
         let now = &simulation.positions()[..particles];
         assert!(bits(now) == bits(&alone[frame as usize]), "frame {frame}");
