@@ -11,7 +11,7 @@ use std::path::PathBuf;
 
 use criterion::BatchSize;
 use incise::scene::{Region, StrokeSpec};
-use incise::{Scene, Simulation, mesh};
+use incise::{Scene, Simulation, mesh_io};
 use incise_benches::Case;
 
 fn main() {
@@ -19,7 +19,7 @@ fn main() {
     incise_benches::run("incise", |bench| {
         let case = bench.case;
         let path = folder.path().join("case.vtk");
-        mesh::io::write(&path, &case.mesh).unwrap();
+        mesh_io::write(&path, &case.mesh).unwrap();
         let scene = scene(case, path);
 
         let mut simulation = Simulation::new(&scene).unwrap();

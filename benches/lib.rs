@@ -13,9 +13,10 @@ use std::time::Duration;
 use criterion::measurement::WallTime;
 use criterion::{Bencher, BenchmarkGroup, BenchmarkId, Criterion, Throughput};
 use incise::graph::{ConstraintGraph, Incidence};
-use incise::mesh::generate::{Shape, generate, kuhn_box};
 use incise::mesh::glam::DVec3;
-use incise::mesh::{TetId, TetMesh, io};
+use incise::mesh::{TetId, TetMesh, kuhn_box};
+use incise::mesh_io;
+use incise::meshing::{Shape, generate};
 
 /// The environment variable that names a folder of further meshes.
 pub const MODELS: &str = "INCISE_MODELS";
@@ -44,7 +45,7 @@ impl Source {
         match self {
             Self::Shape(shape, tets) => generate(*shape, *tets).unwrap(),
             Self::Grid(cells) => kuhn_box([*cells; 3], DVec3::ONE),
-            Self::File(path) => io::read(path).unwrap(),
+            Self::File(path) => mesh_io::read(path).unwrap(),
         }
     }
 }

@@ -5,8 +5,8 @@
 // The same reason as in the library.
 #![expect(clippy::unwrap_used, reason = "benches stop at the first surprise")]
 
-use incise::mesh::generate::Shape;
-use incise::mesh::io;
+use incise::mesh_io;
+use incise::meshing::Shape;
 use incise_benches::Source;
 
 /// All but the box, which the plate stands for: organic, thin-limbed, of genus 1, with a void, flat, convex, long, of two
@@ -48,10 +48,10 @@ fn main() {
 
         let path = folder.path().join("case.vtk");
         // Written once beforehand, for runs that leave the next bench out.
-        io::write(&path, &case.mesh).unwrap();
+        mesh_io::write(&path, &case.mesh).unwrap();
         bench.measure("write-vtk", |b| {
-            b.iter(|| io::write(&path, &case.mesh).unwrap());
+            b.iter(|| mesh_io::write(&path, &case.mesh).unwrap());
         });
-        bench.measure("read-vtk", |b| b.iter(|| io::read(&path).unwrap()));
+        bench.measure("read-vtk", |b| b.iter(|| mesh_io::read(&path).unwrap()));
     });
 }

@@ -6,10 +6,9 @@
 use std::fs;
 use std::path::Path;
 
-use incise_mesh::MeshError;
-use incise_mesh::generate::kuhn_box;
 use incise_mesh::glam::DVec3;
-use incise_mesh::io::{self, MeshFile, MshKind, NamedValues, OwnedValues, PlyEncoding};
+use incise_mesh::kuhn_box;
+use incise_mesh_io::{MeshFile, MeshIoError, MshKind, NamedValues, OwnedValues, PlyEncoding};
 
 const VTU: &str = r#"<?xml version="1.0"?><VTKFile type="UnstructuredGrid" byte_order="LittleEndian" header_type="UInt32">
 <UnstructuredGrid><Piece NumberOfPoints="4" NumberOfCells="1">
@@ -54,7 +53,7 @@ const PLY: &str = "ply\nformat ascii 1.0\ncomment c\nelement vertex 3\nproperty 
 const OFF: &str =
     "COFF 3 2 0\n0 0 0 1 1 1 1\n1 0 0 1 1 1 1 # c\n0 1 0 1 1 1 1\n2 0 1\n3 0 1 2 0.5 0.5\n";
 
-fn main() -> Result<(), MeshError> {
+fn main() -> Result<(), MeshIoError> {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus");
     let path = |target: &str, name: &str| {
         let folder = corpus.join(target);
@@ -67,12 +66,12 @@ fn main() -> Result<(), MeshError> {
     let file = sample();
     let plain = MeshFile::from(file.mesh.clone());
 
-    io::write_file(path("vtk", "plain.vtk"), &plain)?;
-    io::write_file(path("vtk", "fields.vtk"), &file)?;
-    io::write_vtk_binary(path("vtk", "binary.vtk"), &file)?;
+    incise_mesh_io::write_file(path("vtk", "plain.vtk"), &plain)?;
+    incise_mesh_io::write_file(path("vtk", "fields.vtk"), &file)?;
+    incise_mesh_io::write_vtk_binary(path("vtk", "binary.vtk"), &file)?;
     put("vtk", "data.vtk", VTK.as_bytes());
 
-    io::write_file(path("vtu", "fields.vtu"), &file)?;
+    incise_mesh_io::write_file(path("vtu", "fields.vtu"), &file)?;
     put("vtu", "appended.vtu", VTU.as_bytes());
     put("vtu", "zlib.vtu", VTU_ZLIB.as_bytes());
     let raw = VTU
@@ -86,17 +85,17 @@ fn main() -> Result<(), MeshError> {
         ("text22.msh", MshKind::Text22),
         ("binary22.msh", MshKind::Binary22),
     ] {
-        io::write_msh(path("msh", name), &file, kind)?;
+        incise_mesh_io::write_msh(path("msh", name), &file, kind)?;
     }
     put("msh", "version1.msh", MSH_1.as_bytes());
     put("msh", "entities.msh", MSH_41.as_bytes());
 
-    io::write_file(path("medit", "text.mesh"), &file)?;
-    io::write_file(path("medit", "binary.meshb"), &file)?;
+    incise_mesh_io::write_file(path("medit", "text.mesh"), &file)?;
+    incise_mesh_io::write_file(path("medit", "binary.meshb"), &file)?;
     put("medit", "sections.mesh", MEDIT.as_bytes());
 
     let pair = path("tetgen", "pair.node");
-    io::write_file(&pair, &file)?;
+    incise_mesh_io::write_file(&pair, &file)?;
     let [nodes, tets] = ["node", "ele"].map(|ending| {
         let half = pair.with_extension(ending);
         let bytes = fs::read(&half).expect("it was written");
@@ -108,13 +107,13 @@ fn main() -> Result<(), MeshError> {
         1 10 1\n1 1 2 3 4 1 1 1 1 1 1 -7\n";
     put("tetgen", "ten", ten.as_bytes());
 
-    let surface = io::TriangleSurface::boundary_of(&file.mesh);
+    let surface = incise_mesh::TriangleSurface::boundary_of(&file.mesh);
     for target in ["obj", "stl", "ply", "off"] {
-        io::write_surface(path(target, &format!("box.{target}")), &surface)?;
+        incise_mesh_io::write_surface(path(target, &format!("box.{target}")), &surface)?;
     }
-    io::write_stl_binary(path("stl", "binary.stl"), &surface)?;
-    io::write_ply(path("ply", "text.ply"), &surface, PlyEncoding::Ascii)?;
-    io::write_ply(path("ply", "big.ply"), &surface, PlyEncoding::BigEndian)?;
+    incise_mesh_io::write_stl_binary(path("stl", "binary.stl"), &surface)?;
+    incise_mesh_io::write_ply(path("ply", "text.ply"), &surface, PlyEncoding::Ascii)?;
+    incise_mesh_io::write_ply(path("ply", "big.ply"), &surface, PlyEncoding::BigEndian)?;
     put("obj", "faces.obj", OBJ.as_bytes());
     put("ply", "properties.ply", PLY.as_bytes());
     put("off", "colors.off", OFF.as_bytes());
@@ -127,10 +126,10 @@ fn main() -> Result<(), MeshError> {
         ("a.msh", MSH_41.as_bytes()),
         ("a.mesh", MEDIT.as_bytes()),
     ] {
-        io::parse_file(name, bytes)?;
+        incise_mesh_io::parse_file(name, bytes)?;
     }
     for (name, text) in [("a.obj", OBJ), ("a.ply", PLY), ("a.off", OFF)] {
-        io::parse_surface(name, text.as_bytes())?;
+        incise_mesh_io::parse_surface(name, text.as_bytes())?;
     }
     Ok(())
 }

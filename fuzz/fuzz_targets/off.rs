@@ -1,8 +1,7 @@
 //! Any bytes as OFF files: an error or a surface whose parts fit together.
 #![no_main]
 
-use incise_mesh::io;
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    incise_fuzz::check_surface(io::parse_surface("a.off", bytes));
+    incise_fuzz::check_surface(incise_mesh_io::parse_surface("a.off", bytes));
 });

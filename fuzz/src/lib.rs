@@ -1,13 +1,13 @@
 //! What the targets of the mesh files have in common: what must hold of whatever a reader accepts.
 
-use incise_mesh::io::{MeshFile, TriangleSurface};
-use incise_mesh::{MeshError, ParticleId};
+use incise_mesh::{ParticleId, TriangleSurface};
+use incise_mesh_io::{MeshFile, MeshIoError};
 
 /// A mesh must have tets with existing corners, finite coordinates and one value for each element.
 ///
 /// # Panics
 /// If it is not so.
-pub fn check_mesh(file: Result<MeshFile, MeshError>) {
+pub fn check_mesh(file: Result<MeshFile, MeshIoError>) {
     match file {
         Ok(file) => {
             let mesh = &file.mesh;
@@ -24,7 +24,7 @@ pub fn check_mesh(file: Result<MeshFile, MeshError>) {
 ///
 /// # Panics
 /// If it is not so.
-pub fn check_surface(surface: Result<TriangleSurface, MeshError>) {
+pub fn check_surface(surface: Result<TriangleSurface, MeshIoError>) {
     match surface {
         Ok(surface) => {
             assert!(!surface.triangles.is_empty());
@@ -40,10 +40,10 @@ fn check_corners(corners: &[ParticleId], particles: usize) {
 }
 
 /// What is wrong is said in a sentence or two, whatever the file has in it.
-fn check_error(error: &MeshError) {
+fn check_error(error: &MeshIoError) {
     let kinds = matches!(
         error,
-        MeshError::Empty | MeshError::Parse { .. } | MeshError::ParseBytes { .. }
+        MeshIoError::Empty | MeshIoError::Parse { .. } | MeshIoError::ParseBytes { .. }
     );
     assert!(kinds, "{error}");
 }

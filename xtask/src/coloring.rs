@@ -13,9 +13,8 @@ use comfy_table::Table;
 use incise::clustering::{Method, cluster};
 use incise::coloring::{Algorithm, Colored, Conflicts, Order, Shortcuts, balance, color, greedy};
 use incise::graph::{Coloring, ColoringMetrics, ConstraintGraph, Incidence};
-use incise::mesh::TetMesh;
-use incise::mesh::generate::kuhn_box;
 use incise::mesh::glam::DVec3;
+use incise::mesh::{TetMesh, kuhn_box};
 
 use crate::models::models;
 use crate::table;

@@ -18,8 +18,8 @@ use incise::cutting::{
     CutOptions, CuttableMesh, FaceTag, PieceTracker, Plane, Skin, Sweep, cut_plane,
 };
 use incise::mesh::TetMesh;
-use incise::mesh::generate::Shape;
 use incise::mesh::glam::DVec3;
+use incise::meshing::Shape;
 use incise::scene::StrokeSpec;
 use incise::{Scene, Simulation};
 

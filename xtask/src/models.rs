@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
-use incise::mesh::generate::{Shape, generate};
-use incise::mesh::{TetMesh, io};
+use incise::mesh::TetMesh;
+use incise::mesh_io;
+use incise::meshing::{Shape, generate};
 use incise::scene::{BodySpec, ShapeSpec};
 
 /// A mesh and where it comes from.
@@ -34,7 +35,7 @@ impl Model {
 
     /// The mesh of a file, checked.
     pub(crate) fn read(path: PathBuf) -> anyhow::Result<Self> {
-        let mesh = io::read(&path)?;
+        let mesh = mesh_io::read(&path)?;
         mesh.check().with_context(|| path.display().to_string())?;
         let name = path
             .file_stem()

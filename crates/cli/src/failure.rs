@@ -3,7 +3,8 @@
 use std::process::ExitCode;
 
 use incise::Error;
-use incise::mesh::MeshError;
+use incise::mesh_io::MeshIoError;
+use incise::meshing::MeshingError;
 
 /// Why a command ended early.
 #[derive(Debug)]
@@ -51,8 +52,14 @@ impl From<Error> for Failure {
     }
 }
 
-impl From<MeshError> for Failure {
-    fn from(error: MeshError) -> Self {
+impl From<MeshIoError> for Failure {
+    fn from(error: MeshIoError) -> Self {
+        Self::Input(error.into())
+    }
+}
+
+impl From<MeshingError> for Failure {
+    fn from(error: MeshingError) -> Self {
         Self::Input(error.into())
     }
 }

@@ -5,9 +5,9 @@ use std::path::Path;
 use anyhow::Context;
 use comfy_table::Table;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
-use incise::mesh::generate::{Shape, generate, tetrahedralize};
-use incise::mesh::io::{self, TriangleSurface};
-use incise::mesh::{RepairOptions, Solid, TetMesh, repair};
+use incise::mesh::{RepairOptions, TetMesh, TriangleSurface, repair};
+use incise::mesh_io;
+use incise::meshing::{Shape, Solid, generate, tetrahedralize};
 use serde::Serialize;
 
 use crate::args::MeshCommand;
@@ -91,17 +91,17 @@ pub(crate) fn mesh(command: &MeshCommand) -> Result<(), Failure> {
             output,
             repair: wanted,
         } => {
-            let mut file = io::read_file(input)?;
+            let mut file = mesh_io::read_file(input)?;
             let mut report = None;
             if *wanted {
                 let repaired = repair(&file.mesh, &RepairOptions::ALL);
                 report = Some(repaired.report);
                 file = file.repaired(repaired);
             }
-            if io::is_surface(output) {
-                io::write_surface(output, &TriangleSurface::boundary_of(&file.mesh))?;
+            if mesh_io::is_surface(output) {
+                mesh_io::write_surface(output, &TriangleSurface::boundary_of(&file.mesh))?;
             } else {
-                io::write_file(output, &file)?;
+                mesh_io::write_file(output, &file)?;
             }
             report.map_or(Ok(()), print)
         }
@@ -115,7 +115,7 @@ pub(crate) fn mesh(command: &MeshCommand) -> Result<(), Failure> {
             shape,
             tets,
             output,
-        } => Ok(io::write(
+        } => Ok(mesh_io::write(
             output,
             &generate(Shape::from_name(shape)?, *tets)?,
         )?),
@@ -124,14 +124,14 @@ pub(crate) fn mesh(command: &MeshCommand) -> Result<(), Failure> {
 
 /// Fills a surface, and says how well the body fits it.
 fn fill(file: &Path, output: &Path, tets: usize, levels: u32) -> Result<(), Failure> {
-    let surface = io::read_surface(file)?;
+    let surface = mesh_io::read_surface(file)?;
     let named = |error| {
         let error = anyhow::Error::new(error).context(file.display().to_string());
         Failure::Input(error)
     };
     let solid = Solid::new(&surface).map_err(named)?;
     let mesh = tetrahedralize(&solid, tets, levels).map_err(named)?;
-    io::write(output, &mesh)?;
+    mesh_io::write(output, &mesh)?;
     let boundary = TriangleSurface::boundary_of(&mesh);
     let back = Solid::new(&boundary).map_err(named)?;
     let prepared = solid.prepared();
@@ -176,7 +176,7 @@ fn fill(file: &Path, output: &Path, tets: usize, levels: u32) -> Result<(), Fail
 }
 
 fn info(file: &Path, json: bool, stiffness: &Stiffness) -> Result<(), Failure> {
-    let mesh = io::read(file)?;
+    let mesh = mesh_io::read(file)?;
     mesh.check()
         .with_context(|| file.display().to_string())
         .map_err(Failure::Input)?;

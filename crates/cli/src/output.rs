@@ -10,9 +10,10 @@ use std::path::{self, Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use anyhow::Context;
-use incise::mesh::MeshError;
 use incise::mesh::glam::DVec3;
-use incise::mesh::io::{Field, Fields, Values, write_atomically, write_pvd, write_vtp, write_vtu};
+use incise::mesh_io::{
+    Field, Fields, MeshIoError, Values, write_atomically, write_pvd, write_vtp, write_vtu,
+};
 use incise::{Scene, Simulation};
 
 use crate::failure::Failure;
@@ -265,7 +266,7 @@ pub(crate) fn require_mesh_file(path: &Path) -> Result<(), Failure> {
         .iter()
         .any(|known| ending.eq_ignore_ascii_case(known))
     {
-        return Err(MeshError::UnknownFormat {
+        return Err(MeshIoError::UnknownFormat {
             path: path.to_owned(),
             known: ".vtk, .vtu, .node, .ele",
         }
@@ -304,7 +305,7 @@ pub(crate) fn save_mesh(path: &Path, simulation: &Simulation) -> anyhow::Result<
         };
         write_vtu(path, &mesh.positions, &mesh.tets, fields)?;
     } else {
-        incise::mesh::io::write(path, mesh)?;
+        incise::mesh_io::write(path, mesh)?;
     }
     Ok(())
 }

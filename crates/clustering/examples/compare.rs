@@ -22,9 +22,9 @@ use std::time::{Duration, Instant};
 use incise_clustering::{Method, cluster, serial_neighbor};
 use incise_coloring::{Order, greedy};
 use incise_graph::{Clustering, ConstraintGraph, Incidence};
-use incise_mesh::generate::{Shape, generate, kuhn_box};
 use incise_mesh::glam::DVec3;
-use incise_mesh::io;
+use incise_mesh::kuhn_box;
+use incise_meshing::{Shape, generate};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mesh = match name.split_once(':') {
             Some(("kuhn", cells)) => kuhn_box([cells.parse()?; 3], DVec3::ONE),
             Some((shape, tets)) => generate(Shape::from_name(shape)?, tets.parse()?)?,
-            None => io::read(&name)?,
+            None => incise_mesh_io::read(&name)?,
         };
         let tets = mesh.tets.iter().copied();
         let incidence = Incidence::from_constraints(mesh.positions.len(), tets)?;

@@ -6,7 +6,7 @@
 
 use glam::DVec3;
 use incise_cutting::{CutOptions, CuttableMesh, PieceTracker, Sweep};
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::kuhn_box;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut body = CuttableMesh::new(kuhn_box([6, 6, 6], DVec3::ONE))?;

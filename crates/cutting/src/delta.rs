@@ -189,7 +189,7 @@ impl CutDelta {
     /// ```
     /// use glam::DVec3;
     /// use incise_cutting::{CutOptions, CuttableMesh, Plane, cut_plane};
-    /// use incise_mesh::generate::kuhn_box;
+    /// use incise_mesh::kuhn_box;
     ///
     /// let mut body = CuttableMesh::new(kuhn_box([2; 3], DVec3::ONE))?;
     /// let rest = body.mesh().positions.clone();

@@ -41,7 +41,7 @@ const RESOLUTION: f64 = 1e-15;
 /// ```
 /// use glam::DVec3;
 /// use incise_cutting::{CutOptions, CuttableMesh, cut_level_set};
-/// use incise_mesh::generate::kuhn_box;
+/// use incise_mesh::kuhn_box;
 ///
 /// // A ball is carved out of a box.
 /// let mut body = CuttableMesh::new(kuhn_box([6, 6, 6], DVec3::ONE))?;

@@ -13,7 +13,7 @@
 //! ```
 //! use glam::DVec3;
 //! use incise_cutting::{CutOptions, CuttableMesh, Plane, cut_plane};
-//! use incise_mesh::generate::kuhn_box;
+//! use incise_mesh::kuhn_box;
 //!
 //! let mut body = CuttableMesh::new(kuhn_box([4, 2, 2], DVec3::new(2.0, 1.0, 1.0)))?;
 //! let positions = body.mesh().positions.clone();
@@ -23,7 +23,6 @@
 //! assert_eq!(body.mesh().pieces().count, 2);
 //! # Ok::<(), incise_cutting::CutError>(())
 //! ```
-//!
 //! This crate knows nothing of constraints, solvers, colors or the GPU.
 
 mod bisect;

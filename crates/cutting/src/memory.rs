@@ -30,7 +30,7 @@ const ALIGNED: f64 = 0.9;
 /// ```
 /// use glam::DVec3;
 /// use incise_cutting::{CutMemory, CutOptions, CuttableMesh, TriangleSurface, cut_surface_joining};
-/// use incise_mesh::generate::kuhn_box;
+/// use incise_mesh::kuhn_box;
 ///
 /// let mut body = CuttableMesh::new(kuhn_box([4, 4, 4], DVec3::ONE))?;
 /// let mut memory = CutMemory::default();

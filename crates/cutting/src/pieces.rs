@@ -61,7 +61,7 @@ pub enum PieceEvent {
 /// ```
 /// use glam::DVec3;
 /// use incise_cutting::{CutOptions, CuttableMesh, PieceEvent, PieceTracker, Plane, cut_plane};
-/// use incise_mesh::generate::kuhn_box;
+/// use incise_mesh::kuhn_box;
 ///
 /// let mut body = CuttableMesh::new(kuhn_box([8, 2, 2], DVec3::new(4.0, 1.0, 1.0)))?;
 /// let mut pieces = PieceTracker::new(&body);

@@ -57,7 +57,7 @@ impl Plane {
 /// ```
 /// use glam::DVec3;
 /// use incise_cutting::{CutOptions, CuttableMesh, Plane, cut_plane};
-/// use incise_mesh::generate::kuhn_box;
+/// use incise_mesh::kuhn_box;
 ///
 /// let mut body = CuttableMesh::new(kuhn_box([2, 2, 2], DVec3::ONE))?;
 /// let positions = body.mesh().positions.clone();

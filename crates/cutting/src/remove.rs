@@ -29,8 +29,7 @@ use crate::{CutError, CutOptions, CuttableMesh};
 /// ```
 /// use glam::DVec3;
 /// use incise_cutting::{CuttableMesh, remove_tets};
-/// use incise_mesh::TetId;
-/// use incise_mesh::generate::kuhn_box;
+/// use incise_mesh::{TetId, kuhn_box};
 ///
 /// let mut body = CuttableMesh::new(kuhn_box([2, 1, 1], DVec3::ONE))?;
 /// let delta = remove_tets(&mut body, &[TetId(3)], 0)?;
@@ -99,7 +98,7 @@ pub fn remove_tets(
 /// ```
 /// use glam::DVec3;
 /// use incise_cutting::{CuttableMesh, carve};
-/// use incise_mesh::generate::kuhn_box;
+/// use incise_mesh::kuhn_box;
 ///
 /// let mesh = kuhn_box([8; 3], DVec3::ONE);
 /// let mut body = CuttableMesh::new(mesh.clone())?;

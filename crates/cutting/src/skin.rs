@@ -39,7 +39,7 @@ pub struct SkinChange {
 /// ```
 /// use glam::DVec3;
 /// use incise_cutting::{CutOptions, CuttableMesh, FaceTag, Plane, Skin, cut_plane};
-/// use incise_mesh::generate::kuhn_box;
+/// use incise_mesh::kuhn_box;
 ///
 /// let mut body = CuttableMesh::new(kuhn_box([3; 3], DVec3::ONE))?;
 /// let mut skin = Skin::new(body.boundary());

@@ -59,7 +59,7 @@ impl Blade for MovingBlade {
 /// ```
 /// use glam::DVec3;
 /// use incise_cutting::{CutOptions, CuttableMesh, Sweep};
-/// use incise_mesh::generate::kuhn_box;
+/// use incise_mesh::kuhn_box;
 ///
 /// let mut body = CuttableMesh::new(kuhn_box([3, 3, 3], DVec3::ONE))?;
 /// let blade = |z: f64| [DVec3::new(0.4, -1.0, z), DVec3::new(0.5, 2.0, z)];

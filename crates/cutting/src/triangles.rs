@@ -315,7 +315,7 @@ fn without_returns(meetings: &mut Vec<Meeting>, [a, b]: [DVec3; 2], tolerance: f
 /// ```
 /// use glam::DVec3;
 /// use incise_cutting::{CutOptions, CuttableMesh, TriangleSurface, cut_surface};
-/// use incise_mesh::generate::kuhn_box;
+/// use incise_mesh::kuhn_box;
 ///
 /// // A slit from above, half as deep as the box.
 /// let mut body = CuttableMesh::new(kuhn_box([4, 4, 4], DVec3::ONE))?;

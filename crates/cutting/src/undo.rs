@@ -24,7 +24,7 @@ impl CuttableMesh {
     /// ```
     /// use glam::DVec3;
     /// use incise_cutting::{CutOptions, CuttableMesh, Plane, cut_plane};
-    /// use incise_mesh::generate::kuhn_box;
+    /// use incise_mesh::kuhn_box;
     ///
     /// let mesh = kuhn_box([3; 3], DVec3::ONE);
     /// let mut body = CuttableMesh::new(mesh.clone())?;

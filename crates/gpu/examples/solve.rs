@@ -12,7 +12,7 @@ use incise_gpu::coloring::{ColoringKernels, DeviceIncidence, scgc_incidence};
 use incise_gpu::{ClusterMapping, GpuContext, GpuError, GpuOptions, GpuSolver};
 use incise_graph::{Incidence, Schedule};
 use incise_mesh::TetId;
-use incise_mesh::generate::{Shape, generate};
+use incise_meshing::{Shape, generate};
 use incise_xpbd::{Material, Solver, StepSettings};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

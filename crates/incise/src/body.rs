@@ -1,7 +1,7 @@
 //! [`Body`]: a body of a scene with its mesh, what it is made of and its fixed particles, all values checked.
 
-use incise_mesh::generate::{Shape, generate};
-use incise_mesh::{TetMesh, io};
+use incise_mesh::TetMesh;
+use incise_meshing::{Shape, generate};
 use incise_xpbd::Material;
 
 use crate::limits::{LARGEST_COORDINATE, coordinates, value, within};
@@ -126,12 +126,23 @@ fn material(field: &str, body: &BodySpec, part: &MaterialSpec) -> Result<Materia
 
 /// The body's mesh, checked.
 fn load(field: &str, spec: &BodySpec, in_memory: Option<&TetMesh>) -> Result<TetMesh, Error> {
-    let (key, mesh) = match (in_memory, &spec.mesh, &spec.shape) {
-        (Some(mesh), None, None) => ("mesh", Ok(mesh.clone())),
-        (None, Some(path), None) => ("mesh", io::read(path)),
+    let key = |key: &str| format!("{field}.{key}");
+    let (field, mesh) = match (in_memory, &spec.mesh, &spec.shape) {
+        (Some(mesh), None, None) => (key("mesh"), mesh.clone()),
+        (None, Some(path), None) => {
+            let field = key("mesh");
+            match incise_mesh_io::read(path) {
+                Ok(mesh) => (field, mesh),
+                Err(source) => return Err(Error::MeshFile { field, source }),
+            }
+        }
         (None, None, Some(shape)) => {
+            let field = key("shape");
             let kind = Shape::from_name(&shape.kind);
-            ("shape", kind.and_then(|kind| generate(kind, shape.tets)))
+            match kind.and_then(|kind| generate(kind, shape.tets)) {
+                Ok(mesh) => (field, mesh),
+                Err(source) => return Err(Error::Shape { field, source }),
+            }
         }
         (_, Some(_), _) | (_, _, Some(_)) => {
             return Err(value(field, "given mesh and shape", "given only one"));
@@ -141,9 +152,8 @@ fn load(field: &str, spec: &BodySpec, in_memory: Option<&TetMesh>) -> Result<Tet
             return Err(value(field, "without a mesh", range));
         }
     };
-    let checked = mesh.and_then(|mesh| mesh.check().map(|()| mesh));
-    checked.map_err(|source| Error::Mesh {
-        field: format!("{field}.{key}"),
-        source,
-    })
+    match mesh.check() {
+        Ok(()) => Ok(mesh),
+        Err(source) => Err(Error::Mesh { field, source }),
+    }
 }

@@ -7,6 +7,8 @@ use incise_coloring::ColoringError;
 use incise_cutting::CutError;
 use incise_graph::GraphError;
 use incise_mesh::MeshError;
+use incise_mesh_io::MeshIoError;
+use incise_meshing::MeshingError;
 use incise_xpbd::XpbdError;
 
 /// Why a scene could not be read or run.
@@ -46,6 +48,22 @@ pub enum Error {
         field: String,
         /// What is wrong with it.
         source: MeshError,
+    },
+    /// A body's mesh file.
+    #[error("{field}: {source}")]
+    MeshFile {
+        /// The body.
+        field: String,
+        /// Why it was not read.
+        source: MeshIoError,
+    },
+    /// A body's shape.
+    #[error("{field}: {source}")]
+    Shape {
+        /// The body.
+        field: String,
+        /// Why it was not generated.
+        source: MeshingError,
     },
     /// A body's material or a setting of the solver.
     #[error("{field}.{source}")]
@@ -98,9 +116,11 @@ impl Error {
     #[must_use]
     pub fn key(&self) -> Option<String> {
         match self {
-            Self::Value { field, .. } | Self::Mesh { field, .. } | Self::Cut { field, .. } => {
-                Some(field.clone())
-            }
+            Self::Value { field, .. }
+            | Self::Mesh { field, .. }
+            | Self::MeshFile { field, .. }
+            | Self::Shape { field, .. }
+            | Self::Cut { field, .. } => Some(field.clone()),
             Self::Xpbd { field, source } => Some(match source {
                 XpbdError::Material { what, .. } | XpbdError::Setting { what, .. } => {
                     format!("{field}.{what}")

@@ -2,8 +2,8 @@
 //!
 //! This is the facade: a [`Scene`] or a [`SimulationBuilder`] says what is simulated, a [`Simulation`] moves it frame by
 //! frame, cuts included.
-//! The crates behind it are useful alone and re-exported here: [`mesh`], [`graph`], [`coloring`], [`clustering`],
-//! [`cutting`], [`xpbd`].
+//! The crates behind it are useful alone and re-exported here: [`mesh`], [`mesh_io`], [`meshing`], [`graph`],
+//! [`coloring`], [`clustering`], [`cutting`], [`xpbd`].
 //!
 //! ```
 //! use incise::{Scene, Simulation};
@@ -73,6 +73,8 @@ pub use incise_cutting as cutting;
 pub use incise_gpu as gpu;
 pub use incise_graph as graph;
 pub use incise_mesh as mesh;
+pub use incise_mesh_io as mesh_io;
+pub use incise_meshing as meshing;
 pub use incise_xpbd as xpbd;
 pub use ray::RayHit;
 pub use report::FrameReport;

@@ -414,7 +414,7 @@ pub(crate) fn incidence(mesh: &TetMesh) -> Result<Incidence, Error> {
 mod tests {
     use glam::DVec3;
     use incise_cutting::{MovedTet, RemovedTet};
-    use incise_mesh::generate::kuhn_box;
+    use incise_mesh::kuhn_box;
 
     use super::*;
 

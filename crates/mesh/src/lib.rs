@@ -1,65 +1,68 @@
-//! Tetrahedral meshes: the value, checks, quality, boundary surface, file formats, generated shapes.
+//! Tetrahedral meshes: the value, checks, boundary surface, pieces, quality, repair.
 //!
 //! A [`TetMesh`] is a plain value: positions, and four corners per tet. Everything else is computed from it when asked
-//! for, and nothing here knows of materials, solvers or time.
+//! for, and nothing here knows of files, generators, materials, solvers or time. Files are read and written by
+//! `incise-mesh-io`, shapes and surfaces are filled with tets by `incise-meshing`.
 //!
 //! ```
-//! use incise_mesh::generate::{Shape, generate};
-//! use incise_mesh::{TetId, io};
+//! use incise_mesh::{RepairOptions, TetId, glam::DVec3, kuhn_box, repair};
 //!
-//! // A solid from a formula, with the number of tets you want (to within 2 %).
-//! let liver = generate(Shape::Liver, 2_000)?;
+//! // A box of 4 x 2 x 2 cells, six tets each. Any positions and corners of your own will do.
+//! let mut mesh = kuhn_box([4, 2, 2], DVec3::new(2.0, 1.0, 1.0));
 //!
 //! // Sound? Counts every fault and names the first; the sign of a volume is exact.
-//! liver.check()?;
+//! mesh.check()?;
 //!
 //! // What follows from it.
-//! let surface = liver.surface();
+//! let surface = mesh.surface();
 //! assert!(surface.is_manifold());
 //! assert_eq!(surface.euler_characteristic(), 2);
-//! assert_eq!(liver.pieces().count, 1);
-//! assert!(liver.quality().min_dihedral > 10.7);
-//! assert!(liver.volume(TetId(0)) > 0.0);
+//! assert_eq!(mesh.pieces().count, 1);
+//! assert!(mesh.quality().min_dihedral > 44.9);
+//! assert!(mesh.volume(TetId(0)) > 0.0);
 //!
-//! // Files, by ending; coordinates survive bit for bit.
-//! let path = std::env::temp_dir().join(format!("incise-mesh-doc-{}.vtk", std::process::id()));
-//! io::write(&path, &liver)?;
-//! assert_eq!(io::read(&path)?, liver);
-//! # std::fs::remove_file(path).ok();
+//! // An inverted tet is found, and turned on request.
+//! mesh.tets[7].swap(0, 1);
+//! assert!(mesh.check().unwrap_err().to_string().contains("first: tet 7 has the volume -"));
+//! let repaired = repair(&mesh, &RepairOptions::ALL);
+//! repaired.mesh.check()?;
 //! # Ok::<(), incise_mesh::MeshError>(())
 //! ```
-//!
 //! Conventions: meters; a tet `[a, b, c, d]` is positive when `(b - a) × (c - a) · (d - a) > 0`; orders are by index and
 //! never depend on hashing or threads, so that equal input gives equal output.
 
 mod check;
+mod disjoint_sets;
 mod error;
 mod faces;
-pub mod generate;
 mod histogram;
 mod ids;
-pub mod io;
+mod kuhn_box;
 mod orientation;
 mod pieces;
 mod pinches;
 mod quality;
 mod repair;
-mod solid;
+mod report;
 mod surface;
 mod tet_mesh;
+mod triangle_surface;
 
-pub use check::{CheckReport, Fault};
+pub use disjoint_sets::DisjointSets;
 pub use error::MeshError;
+pub use faces::{FaceSide, Faces};
 pub use glam;
 pub use histogram::QualityHistograms;
 pub use ids::{ParticleId, TetId};
+pub use kuhn_box::kuhn_box;
 pub use orientation::orientation;
 pub use pieces::Pieces;
-pub use quality::{QualitySummary, TetQuality, dihedral_angles, tet_quality};
+pub use quality::{QualitySummary, TetQuality, dihedral_angles, outward_normals, tet_quality};
 pub use repair::{RepairOptions, RepairReport, Repaired, repair};
-pub use solid::{Prepared, Solid};
+pub use report::{CheckReport, Fault};
 pub use surface::Surface;
 pub use tet_mesh::{TetMesh, signed_volume};
+pub use triangle_surface::TriangleSurface;
 
 /// Compiles the example of the README.
 #[cfg(doctest)]

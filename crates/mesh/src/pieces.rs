@@ -1,13 +1,10 @@
 //! The connected pieces of a mesh, as things that hang together by particles or by faces.
 //!
-//! Union-find with path halving, the lower index becoming the root, then one pass that numbers the pieces in the order
-//! of their first tet. Almost linear over particles ([`TetMesh::pieces`]); O(n log n) over faces
-//! ([`TetMesh::face_pieces`]), which must be matched first. The result does not depend on anything but the mesh.
-//!
-//! Source: R. E. Tarjan and J. van Leeuwen, "Worst-case Analysis of Set Union Algorithms", 1984.
+//! [`DisjointSets`], then one pass that numbers the pieces in the order of their first tet. Almost linear over
+//! particles ([`TetMesh::pieces`]); O(n log n) over faces ([`TetMesh::face_pieces`]), which must be matched first. The
+//! result does not depend on anything but the mesh.
 
-use crate::faces::{Side, by_face, sorted_sides};
-use crate::{TetId, TetMesh};
+use crate::{DisjointSets, Faces, TetId, TetMesh};
 
 /// The piece each tet belongs to.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -26,9 +23,9 @@ impl TetMesh {
     ///
     /// # Example
     /// ```
-    /// use incise_mesh::{generate, glam::DVec3};
+    /// use incise_mesh::{glam::DVec3, kuhn_box};
     ///
-    /// let mut mesh = generate::kuhn_box([3, 1, 1], DVec3::ONE);
+    /// let mut mesh = kuhn_box([3, 1, 1], DVec3::ONE);
     /// mesh.tets.drain(6..12); // the middle cell
     /// let pieces = mesh.pieces();
     /// assert_eq!(pieces.count, 2);
@@ -36,7 +33,7 @@ impl TetMesh {
     /// ```
     #[must_use]
     pub fn pieces(&self) -> Pieces {
-        let mut sets = Sets::new(self.positions.len());
+        let mut sets = DisjointSets::new(self.positions.len());
         for &[a, b, c, d] in &self.tets {
             for other in [b, c, d] {
                 sets.unite(a.0, other.0);
@@ -56,13 +53,17 @@ impl TetMesh {
     /// From 2³⁰ tets on.
     #[must_use]
     pub fn face_pieces(&self) -> Pieces {
-        self.face_pieces_of(&sorted_sides(&self.tets, |_| true))
+        self.face_pieces_from(&self.faces())
     }
 
-    /// The pieces connected by faces, from the sorted sides of all tets.
-    pub(crate) fn face_pieces_of(&self, sides: &[Side]) -> Pieces {
-        let mut sets = Sets::new(self.tets.len());
-        for face in by_face(sides) {
+    /// [`face_pieces`](Self::face_pieces) from faces that are sorted already.
+    ///
+    /// # Panics
+    /// If `faces` are those of a mesh with more tets.
+    #[must_use]
+    pub fn face_pieces_from(&self, faces: &Faces) -> Pieces {
+        let mut sets = DisjointSets::new(self.tets.len());
+        for face in faces.iter() {
             for pair in face.windows(2) {
                 sets.unite(pair[0].tet().0, pair[1].tet().0);
             }
@@ -115,34 +116,6 @@ impl Pieces {
             labels,
             count: count as usize,
         }
-    }
-}
-
-/// Disjoint sets of numbers.
-#[derive(Debug)]
-pub(crate) struct Sets {
-    parents: Vec<u32>,
-}
-
-impl Sets {
-    pub(crate) fn new(count: usize) -> Self {
-        Self {
-            parents: (0..count).map(|i| TetId::new(i).0).collect(),
-        }
-    }
-
-    pub(crate) fn root(&mut self, mut element: u32) -> u32 {
-        while self.parents[element as usize] != element {
-            let parent = self.parents[element as usize];
-            self.parents[element as usize] = self.parents[parent as usize];
-            element = parent;
-        }
-        element
-    }
-
-    pub(crate) fn unite(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.parents[a.max(b) as usize] = a.min(b);
     }
 }
 

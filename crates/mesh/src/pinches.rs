@@ -16,8 +16,7 @@ impl TetMesh {
     ///
     /// # Example
     /// ```
-    /// use incise_mesh::glam::DVec3;
-    /// use incise_mesh::{ParticleId, TetMesh};
+    /// use incise_mesh::{ParticleId, TetMesh, glam::DVec3};
     ///
     /// // Two tets on opposite sides of the origin.
     /// let mut positions = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];

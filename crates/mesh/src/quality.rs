@@ -94,7 +94,8 @@ pub fn dihedral_angles(corners: [DVec3; 4]) -> [f64; 6] {
 }
 
 /// The outward normals of the faces opposite each corner, as long as twice the area.
-pub(crate) fn outward_normals([a, b, c, d]: [DVec3; 4]) -> [DVec3; 4] {
+#[must_use]
+pub fn outward_normals([a, b, c, d]: [DVec3; 4]) -> [DVec3; 4] {
     [
         (c - b).cross(d - b),
         (d - a).cross(c - a),

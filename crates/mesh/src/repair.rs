@@ -10,8 +10,7 @@
 
 use std::fmt;
 
-use crate::pieces::Sets;
-use crate::{ParticleId, TetId, TetMesh, orientation};
+use crate::{DisjointSets, ParticleId, TetId, TetMesh, orientation};
 
 /// What to repair; nothing by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -106,7 +105,7 @@ pub struct Repaired {
 ///
 /// # Example
 /// ```
-/// use incise_mesh::{RepairOptions, generate::kuhn_box, glam::DVec3, repair};
+/// use incise_mesh::{RepairOptions, glam::DVec3, kuhn_box, repair};
 ///
 /// let mut mesh = kuhn_box([2, 1, 1], DVec3::ONE);
 /// mesh.tets[0].swap(0, 1); // inside out
@@ -234,7 +233,7 @@ fn stand_ins(mesh: &TetMesh, distance: f64) -> Vec<ParticleId> {
         .filter(|&p| positions[p].is_finite())
         .collect();
     order.sort_unstable_by(|&p, &q| positions[p].x.total_cmp(&positions[q].x).then(p.cmp(&q)));
-    let mut sets = Sets::new(positions.len());
+    let mut sets = DisjointSets::new(positions.len());
     for (i, &p) in order.iter().enumerate() {
         for &q in &order[i + 1..] {
             if positions[q].x - positions[p].x > distance {
@@ -299,7 +298,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::generate::kuhn_box;
+    use crate::kuhn_box;
 
     #[test]
     fn nothing_is_done_that_was_not_asked_for() {

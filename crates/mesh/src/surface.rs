@@ -4,9 +4,8 @@
 
 use glam::DVec3;
 
-use crate::faces::{Side, by_face, outward_face, sorted_sides};
-use crate::pieces::Sets;
-use crate::{ParticleId, TetId, TetMesh};
+use crate::faces::outward_face;
+use crate::{DisjointSets, Faces, ParticleId, TetId, TetMesh};
 
 /// Triangles, counterclockwise when seen from outside, and the tet behind each.
 ///
@@ -27,9 +26,9 @@ impl TetMesh {
     ///
     /// # Example
     /// ```
-    /// use incise_mesh::{generate, glam::DVec3};
+    /// use incise_mesh::{glam::DVec3, kuhn_box};
     ///
-    /// let mesh = generate::kuhn_box([3, 2, 1], DVec3::ONE);
+    /// let mesh = kuhn_box([3, 2, 1], DVec3::ONE);
     /// let surface = mesh.surface();
     /// assert_eq!(surface.triangles.len(), 2 * 2 * (3 * 2 + 2 * 1 + 1 * 3));
     /// assert_eq!(surface.euler_characteristic(), 2);
@@ -37,12 +36,17 @@ impl TetMesh {
     /// ```
     #[must_use]
     pub fn surface(&self) -> Surface {
-        self.surface_of(&sorted_sides(&self.tets, |_| true))
+        self.surface_from(&self.faces())
     }
 
-    /// The boundary, from the sorted sides of all tets.
-    pub(crate) fn surface_of(&self, sides: &[Side]) -> Surface {
-        let mut boundary: Vec<u32> = by_face(sides)
+    /// [`surface`](Self::surface) from faces that are sorted already.
+    ///
+    /// # Panics
+    /// If `faces` are those of a mesh with more tets.
+    #[must_use]
+    pub fn surface_from(&self, faces: &Faces) -> Surface {
+        let mut boundary: Vec<u32> = faces
+            .iter()
             .filter(|sides| sides.len() == 1)
             .map(|sides| sides[0].place())
             .collect();
@@ -128,7 +132,7 @@ impl Surface {
     ///
     /// # Example
     /// ```
-    /// use incise_mesh::{generate::kuhn_box, glam::DVec3};
+    /// use incise_mesh::{glam::DVec3, kuhn_box};
     ///
     /// let mut ring = kuhn_box([3, 3, 1], DVec3::ONE);
     /// ring.tets.drain(24..30); // the cell in the middle
@@ -140,7 +144,7 @@ impl Surface {
             return None;
         }
         let particles = self.triangles.iter().flatten().map(|p| p.index() + 1);
-        let mut sets = Sets::new(particles.max().unwrap_or(0));
+        let mut sets = DisjointSets::new(particles.max().unwrap_or(0));
         for [a, b, c] in &self.triangles {
             sets.unite(a.0, b.0);
             sets.unite(a.0, c.0);

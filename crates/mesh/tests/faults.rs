@@ -1,8 +1,7 @@
 //! Every fault a mesh can have is found, counted and named.
 
-use incise_mesh::generate::kuhn_box;
 use incise_mesh::glam::DVec3;
-use incise_mesh::{CheckReport, Fault, MeshError, ParticleId, TetId, TetMesh};
+use incise_mesh::{CheckReport, Fault, MeshError, ParticleId, TetId, TetMesh, kuhn_box};
 
 fn cube() -> TetMesh {
     kuhn_box([2, 2, 2], DVec3::ONE)

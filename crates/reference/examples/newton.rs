@@ -5,14 +5,13 @@
 //! cargo run --release -p incise-reference --example newton -- kuhn:4 kuhn:8 MESH.vtk ...
 //! ```
 //!
-//! `kuhn:N` is a beam of 4 N × N × N cubes, each of them six tets; anything else is a file that `incise-mesh` reads.
+//! `kuhn:N` is a beam of 4 N × N × N cubes, each of them six tets; anything else is a file that `incise-mesh-io` reads.
 
 use std::error::Error;
 use std::time::Instant;
 
 use glam::{DVec3, dvec3};
-use incise_mesh::generate::kuhn_box;
-use incise_mesh::{ParticleId, TetMesh, io};
+use incise_mesh::{ParticleId, TetMesh, kuhn_box};
 use incise_reference::{Body, Material};
 
 const FRAMES: usize = 8;
@@ -61,6 +60,6 @@ fn read(name: &str) -> Result<TetMesh, Box<dyn Error>> {
             let n: usize = count.parse()?;
             Ok(kuhn_box([4 * n, n, n], dvec3(4.0, 1.0, 1.0)))
         }
-        None => Ok(io::read(name)?),
+        None => Ok(incise_mesh_io::read(name)?),
     }
 }

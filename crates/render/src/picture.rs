@@ -4,8 +4,7 @@ use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Write};
 use std::path::Path;
 
-use incise::mesh::MeshError;
-use incise::mesh::io::write_atomically;
+use incise::mesh_io::{MeshIoError, write_atomically};
 
 use crate::RenderError;
 use crate::srgb::{decode, encode};
@@ -158,7 +157,7 @@ pub(crate) fn atomically(
     };
     write_atomically(path, content).map_err(|error| {
         let source = match error {
-            MeshError::Io { source, .. } => source,
+            MeshIoError::Io { source, .. } => source,
             other => io::Error::other(other.to_string()),
         };
         RenderError::Io {

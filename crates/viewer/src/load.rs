@@ -11,9 +11,10 @@ use std::time::Instant;
 use anyhow::{Context, anyhow};
 use incise::gpu::GpuContext;
 use incise::mesh::glam::DVec3;
-use incise::mesh::{Solid, generate, io};
+use incise::meshing::Solid;
 use incise::scene::{Backend, GroundSpec};
 use incise::{Body, Scene, Simulation, SimulationBuilder};
+use incise::{mesh_io, meshing};
 
 /// Tets to fill a surface with if nobody says.
 pub(crate) const TETS: u32 = 11_000;
@@ -84,13 +85,13 @@ fn name_of(path: &Path) -> String {
 
 /// A scene around a mesh, which fills the surface if the file has one.
 fn around(path: &Path, tets: u32) -> anyhow::Result<(Scene, SimulationBuilder)> {
-    let mesh = if io::is_surface(path) {
-        let surface = io::read_surface(path)?;
+    let mesh = if mesh_io::is_surface(path) {
+        let surface = mesh_io::read_surface(path)?;
         let solid = Solid::new(&surface).with_context(|| path.display().to_string())?;
-        generate::tetrahedralize(&solid, tets as usize, 0)
+        meshing::tetrahedralize(&solid, tets as usize, 0)
             .with_context(|| path.display().to_string())?
     } else {
-        io::read(path)?
+        mesh_io::read(path)?
     };
     let start = [DVec3::INFINITY, DVec3::NEG_INFINITY];
     let [low, high] = mesh
@@ -188,14 +189,16 @@ fn load(source: &Source, backend: Backend, gpu: Option<Arc<GpuContext>>) -> anyh
 
 #[cfg(test)]
 mod tests {
+    use incise::mesh::{TriangleSurface, kuhn_box};
+
     use super::*;
 
     #[test]
     fn a_mesh_alone_is_an_organ_on_a_table() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("body.vtk");
-        let mesh = generate::kuhn_box([4, 2, 6], DVec3::new(40.0, 20.0, 60.0));
-        io::write(&path, &mesh).unwrap();
+        let mesh = kuhn_box([4, 2, 6], DVec3::new(40.0, 20.0, 60.0));
+        mesh_io::write(&path, &mesh).unwrap();
         let loaded = load(&Source::new(Some(&path), TETS).unwrap(), Backend::Cpu, None).unwrap();
         let positions = loaded.simulation.positions();
         let high = positions.iter().fold(DVec3::NEG_INFINITY, |a, b| a.max(*b));
@@ -210,8 +213,8 @@ mod tests {
     fn a_surface_is_filled() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("body.stl");
-        let mesh = generate::kuhn_box([2; 3], DVec3::ONE);
-        io::write_surface(&path, &io::TriangleSurface::boundary_of(&mesh)).unwrap();
+        let mesh = kuhn_box([2; 3], DVec3::ONE);
+        mesh_io::write_surface(&path, &TriangleSurface::boundary_of(&mesh)).unwrap();
         let loaded = load(&Source::new(Some(&path), 2000).unwrap(), Backend::Cpu, None).unwrap();
         let tets = loaded.simulation.mesh().tets.len();
         assert!((1000..4000).contains(&tets), "{tets}");

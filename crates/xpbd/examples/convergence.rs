@@ -15,7 +15,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 use incise_graph::{Clustering, Schedule};
-use incise_mesh::{TetId, TetMesh, generate::kuhn_box, io};
+use incise_mesh::{TetId, TetMesh, kuhn_box};
 use incise_xpbd::{
     CoarseCorrection, CoarseCorrectionSettings, ImplicitStep, Material, Real, Solver, VbdSettings,
     VertexStars,
@@ -137,7 +137,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let argument = |k: usize, default: &'static str| arguments.get(k).map_or(default, |a| a);
     let mut mesh = match argument(0, "box") {
         "box" => kuhn_box([24, 10, 8], DVec3::new(24.0, 10.0, 8.0)),
-        path => io::read(path)?,
+        path => incise_mesh_io::read(path)?,
     };
     let ends = (DVec3::MAX, DVec3::MIN);
     let (low, high) = mesh

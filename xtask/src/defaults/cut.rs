@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use anyhow::Context;
-use incise::mesh::generate::{Shape, generate, irregular};
+use incise::mesh::TetMesh;
 use incise::mesh::glam::DVec3;
-use incise::mesh::{TetMesh, io};
+use incise::mesh_io;
+use incise::meshing::{Shape, generate, irregular};
 use incise::scene::{BodySpec, GroundSpec, Precision, Quantity, StrokeSpec};
 use incise::{Scene, Simulation};
 use serde::{Deserialize, Serialize};
@@ -39,7 +40,9 @@ impl CutBody {
     pub(super) fn mesh(&self) -> anyhow::Result<Option<TetMesh>> {
         Ok(Some(match self {
             Self::File(None) => return Ok(None),
-            Self::File(Some(path)) => io::read(path).with_context(|| path.display().to_string())?,
+            Self::File(Some(path)) => {
+                mesh_io::read(path).with_context(|| path.display().to_string())?
+            }
             Self::Liver(tets) => generate(Shape::Liver, *tets)?,
             Self::Irregular(tets) => irregular(Shape::Torus, *tets, 5)?,
         }))

@@ -18,8 +18,8 @@ use std::path::{Path, PathBuf};
 use anyhow::ensure;
 use clap::{Args, ValueEnum};
 use incise::FrameReport;
-use incise::mesh::generate::Shape;
-use incise::mesh::io;
+use incise::mesh_io;
+use incise::meshing::Shape;
 use incise::scene::Precision;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -206,7 +206,7 @@ fn file_of(body: &CutBody, folder: &Path) -> anyhow::Result<Option<PathBuf>> {
     let name: String = body.name().replace([' ', ','], "-");
     let path = folder.join(format!("{name}.vtk"));
     if let Some(mesh) = body.mesh()? {
-        io::write(&path, &mesh)?;
+        mesh_io::write(&path, &mesh)?;
     }
     Ok(Some(path))
 }

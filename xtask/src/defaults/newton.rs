@@ -9,9 +9,9 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, ensure};
-use incise::mesh::generate::{Shape, generate};
 use incise::mesh::glam::DVec3;
 use incise::mesh::{ParticleId, TetMesh};
+use incise::meshing::{Shape, generate};
 use incise::report::ChosenMethod;
 use incise::scene::{AttachmentSpec, BodySpec, Region, ShapeSpec};
 use incise::{Scene, Simulation};

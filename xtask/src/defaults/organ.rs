@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use incise::advise::Motion;
-use incise::mesh::generate::{Shape, generate};
-use incise::mesh::io;
+use incise::mesh_io;
+use incise::meshing::{Shape, generate};
 use incise::scene::{Method, Precision, SolverSpec, Substeps};
 use incise::{Scene, Simulation};
 use serde::{Deserialize, Serialize};
@@ -79,7 +79,7 @@ fn scene(tets: usize, strokes: usize, accuracy: f64, folder: &Path) -> anyhow::R
     let (low, high) = super::cut::ends(&mesh);
     let scale = SIZE / (high - low).max_element();
     let file = folder.join(format!("organ-{tets}.vtk"));
-    io::write(&file, &mesh)?;
+    mesh_io::write(&file, &mesh)?;
     let at = |part: f64| scale * (low.x + part * (high.x - low.x));
     let (held, pulled) = (at(0.1), at(0.9));
     let mut text = format!(

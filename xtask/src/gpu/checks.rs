@@ -13,9 +13,9 @@ use incise::coloring::{Order, color_within_clusters, greedy};
 use incise::gpu::coloring::ColoringKernels;
 use incise::gpu::{ClusterMapping, GpuContext, GpuSolver};
 use incise::graph::{Clustering, ColorId, Coloring, Incidence, Schedule};
-use incise::mesh::TetMesh;
-use incise::mesh::generate::{Shape, kuhn_box};
 use incise::mesh::glam::DVec3;
+use incise::mesh::{TetMesh, kuhn_box};
+use incise::meshing::Shape;
 use incise::xpbd::{Material, StepSettings};
 
 use super::coloring::colorings;

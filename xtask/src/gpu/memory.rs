@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use incise::gpu::{GpuContext, GpuSolver};
-use incise::mesh::generate::{Shape, generate};
+use incise::meshing::{Shape, generate};
 
 use super::iteration::{WAYS, Way, absent, hanging};
 use super::measure::{flush, ms_since};

@@ -23,7 +23,7 @@ use anyhow::Context;
 use clap::Args;
 use incise::gpu::coloring::ColoringKernels;
 use incise::gpu::{GpuContext, GpuError, GpuOptions};
-use incise::mesh::generate::Shape;
+use incise::meshing::Shape;
 
 use crate::models::{Model, models};
 use report::{Facts, Report};

@@ -7,8 +7,9 @@ use std::path::PathBuf;
 
 use anyhow::{Context, ensure};
 use incise::graph::Incidence;
-use incise::mesh::generate::{Shape, irregular};
-use incise::mesh::{TetMesh, io};
+use incise::mesh::TetMesh;
+use incise::mesh_io;
+use incise::meshing::{Shape, irregular};
 
 use crate::experiment::ExperimentArguments;
 
@@ -67,14 +68,14 @@ impl Body {
         std::fs::create_dir_all(&folder)?;
         let path = folder.join(format!("{}-of-{tets}.vtk", self.shape));
         if !path.exists() {
-            io::write(&path, &irregular(self.shape, tets, 1)?)?;
+            mesh_io::write(&path, &irregular(self.shape, tets, 1)?)?;
         }
         Ok(std::path::absolute(path)?)
     }
 
     pub(super) fn mesh(&self, arguments: &ExperimentArguments) -> anyhow::Result<TetMesh> {
         let path = self.file(arguments)?;
-        let mesh = io::read(&path).with_context(|| path.display().to_string())?;
+        let mesh = mesh_io::read(&path).with_context(|| path.display().to_string())?;
         ensure!(!mesh.tets.is_empty(), "{} has no tets", path.display());
         Ok(mesh)
     }

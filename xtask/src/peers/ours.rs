@@ -7,8 +7,8 @@
 use std::time::Instant;
 
 use incise::graph::Schedule;
-use incise::mesh::generate::kuhn_box;
 use incise::mesh::glam::DVec3;
+use incise::mesh::kuhn_box;
 use incise::scene::Precision;
 use incise::xpbd::{Material, Real, Solver, StepSettings};
 use rayon::ThreadPoolBuilder;

@@ -1,8 +1,7 @@
 //! A beam that is held at one end and hangs under gravity, for the solver and for the reference.
 
-use incise::mesh::generate::kuhn_box;
 use incise::mesh::glam::DVec3;
-use incise::mesh::{ParticleId, TetMesh};
+use incise::mesh::{ParticleId, TetMesh, kuhn_box};
 use incise::xpbd::{Material, Real, Solver};
 use incise_reference::Body;
 

@@ -6,9 +6,10 @@ use anyhow::Context;
 use incise::clustering::{Method as ClusteringMethod, cluster};
 use incise::coloring::{Algorithm, color};
 use incise::graph::{Clustering, Incidence, Schedule};
-use incise::mesh::generate::{Shape, generate};
 use incise::mesh::glam::DVec3;
-use incise::mesh::{TetId, TetMesh, io};
+use incise::mesh::{TetId, TetMesh};
+use incise::mesh_io;
+use incise::meshing::{Shape, generate};
 use incise::xpbd::{Material, Real, Solver, VertexStars};
 
 /// The liver of a folder of models, or a generated one of the same number of tets.
@@ -16,7 +17,7 @@ pub(crate) fn liver(models: Option<&Path>, quick: bool) -> anyhow::Result<TetMes
     match models {
         Some(folder) => {
             let path = folder.join("liver_11k.vtk");
-            io::read(&path).with_context(|| path.display().to_string())
+            mesh_io::read(&path).with_context(|| path.display().to_string())
         }
         None => Ok(generate(Shape::Liver, if quick { 1500 } else { 11_000 })?),
     }

@@ -7,9 +7,8 @@
 use std::time::Instant;
 
 use comfy_table::Table;
-use incise::mesh::TetMesh;
-use incise::mesh::generate::kuhn_box;
 use incise::mesh::glam::DVec3;
+use incise::mesh::{TetMesh, kuhn_box};
 use incise::xpbd::{Material, Real, StepSettings, TetSolve};
 use rayon::ThreadPoolBuilder;
 

@@ -4,9 +4,8 @@
 //! state are left alone, without gravity, one end held or none, so that the shape at rest is what they should come back
 //! to. All others are held at one end and fall from rest under gravity, which no method that loses its stiffness survives.
 
-use incise::mesh::generate::kuhn_box;
 use incise::mesh::glam::DVec3;
-use incise::mesh::{TetId, TetMesh};
+use incise::mesh::{TetId, TetMesh, kuhn_box};
 use incise::xpbd::{KappaLimit, Material, Real, Solver};
 
 use crate::random::Random;

@@ -10,9 +10,9 @@ use std::path::Path;
 
 use anyhow::{Context, ensure};
 use incise::Scene;
-use incise::mesh::generate::kuhn_box;
 use incise::mesh::glam::DVec3;
-use incise::mesh::io;
+use incise::mesh::kuhn_box;
+use incise::mesh_io;
 
 /// A scene to measure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -136,7 +136,7 @@ fn body(
     let mesh = kuhn_box(cells, DVec3::new(1.0, 0.25, thickness));
     let name = format!("{name}{}.vtk", if quick { "-quick" } else { "" });
     let path = folder.join(&name);
-    io::write(&path, &mesh).with_context(|| path.display().to_string())?;
+    mesh_io::write(&path, &mesh).with_context(|| path.display().to_string())?;
     Ok(format!(
         "[[body]]\nmesh = \"{name}\"\nyoung_modulus = {young_modulus:e}\n"
     ))

@@ -13,7 +13,8 @@ use incise::coloring::Conflicts;
 use incise::graph::{
     Clustering, Coloring, ConstraintGraph, GraphError, Incidence, read_dimacs, read_matrix_market,
 };
-use incise::mesh::{MeshError, TetMesh, io};
+use incise::mesh::TetMesh;
+use incise::mesh_io::{self, MeshIoError};
 
 use crate::failure::Failure;
 
@@ -87,8 +88,8 @@ impl Format {
 }
 
 fn read_mesh(path: &Path) -> Result<TetMesh, Failure> {
-    let mesh = io::read(path).map_err(|error| match error {
-        MeshError::UnknownFormat { .. } => {
+    let mesh = mesh_io::read(path).map_err(|error| match error {
+        MeshIoError::UnknownFormat { .. } => {
             Failure::Input(anyhow!("{error}; .mtx or .col for a graph"))
         }
         _ => error.into(),

@@ -6,7 +6,7 @@ use std::path::Path;
 use comfy_table::Table;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use incise::graph::{Clustering, Coloring, ColoringMetrics};
-use incise::mesh::io;
+use incise::mesh_io;
 use serde::Serialize;
 
 use crate::failure::Failure;
@@ -80,7 +80,7 @@ pub(crate) fn write_csv(
     clustering: &Clustering,
     coloring: &Coloring,
 ) -> Result<(), Failure> {
-    io::write_atomically(path, |file| {
+    mesh_io::write_atomically(path, |file| {
         let mut file = BufWriter::new(file);
         writeln!(file, "constraint,cluster,color")?;
         for (constraint, cluster) in clustering.labels().iter().enumerate() {

@@ -1,7 +1,8 @@
 //! The search against a look at all tets: the cuts of whole runs, bit for bit.
 
 use glam::DMat3;
-use incise_mesh::generate::{Shape, generate, kuhn_box};
+use incise_mesh::kuhn_box;
+use incise_meshing::{Shape, generate};
 use proptest::prelude::*;
 
 use super::*;

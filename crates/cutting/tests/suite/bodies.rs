@@ -6,8 +6,8 @@ use glam::DVec3;
 use incise_cutting::{
     BoundaryTriangle, CutDelta, CutError, CutOptions, CuttableMesh, FaceTag, TriangleSurface,
 };
-use incise_mesh::generate::{Shape, generate, kuhn_box};
-use incise_mesh::{ParticleId, TetId, TetMesh};
+use incise_mesh::{ParticleId, TetId, TetMesh, kuhn_box};
+use incise_meshing::{Shape, generate};
 
 /// A hash of a seed and a number, in -1..1.
 pub(crate) fn noise(seed: u64, number: usize) -> f64 {

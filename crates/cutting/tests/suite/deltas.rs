@@ -8,8 +8,7 @@ use incise_cutting::{
     CutError, CutOptions, CuttableMesh, FaceTag, Plane, Skin, SkinChange, SkinVertex, carve,
     cut_plane,
 };
-use incise_mesh::generate::kuhn_box;
-use incise_mesh::{ParticleId, TetId};
+use incise_mesh::{ParticleId, TetId, kuhn_box};
 use proptest::prelude::*;
 
 use crate::bodies::{body, check_cut, noise};

@@ -5,7 +5,7 @@ use incise_cutting::{
     CutDelta, CutMemory, CuttableMesh, Plane, Sweep, TriangleSurface, cut_plane,
     cut_surface_joining,
 };
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::kuhn_box;
 use proptest::prelude::*;
 
 use crate::bodies::{body, check_cut, jittered_box, noise, options, volumes};

@@ -5,8 +5,8 @@ use incise_cutting::{
     CutDelta, CutOptions, CuttableMesh, MovedTet, PieceEvent, PieceTracker, Plane, RemovedTet,
     Sweep, cut_plane,
 };
-use incise_mesh::generate::{Shape, generate, kuhn_box};
-use incise_mesh::{TetId, TetMesh};
+use incise_mesh::{TetId, TetMesh, kuhn_box};
+use incise_meshing::{Shape, generate};
 use proptest::prelude::*;
 
 use crate::bodies::{body, jittered_box, noise};

@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 use incise_cutting::{CutError, CutOptions, CuttableMesh, Plane, cut_plane};
-use incise_mesh::generate::{Shape, generate, kuhn_box};
+use incise_mesh::kuhn_box;
+use incise_meshing::{Shape, generate};
 use proptest::prelude::*;
 
 use crate::bodies::{bend, body, check_cut, noise, pieces_by_sign};

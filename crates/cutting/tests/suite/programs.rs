@@ -9,8 +9,7 @@ use incise_cutting::{
     CutDelta, CutError, CutMemory, CutOptions, CuttableMesh, Plane, Separation, Skin, Sweep,
     TriangleSurface, carve, cut_level_set, cut_plane, cut_surface, cut_surface_joining,
 };
-use incise_mesh::generate::kuhn_box;
-use incise_mesh::{ParticleId, TetMesh};
+use incise_mesh::{ParticleId, TetMesh, kuhn_box};
 
 /// Larger meshes would only make the search slow.
 const LARGEST: usize = 6_000;

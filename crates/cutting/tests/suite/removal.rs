@@ -4,8 +4,7 @@ use std::collections::BTreeSet;
 
 use glam::DVec3;
 use incise_cutting::{CutError, CutOptions, CuttableMesh, Plane, carve, cut_plane, remove_tets};
-use incise_mesh::TetId;
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::{TetId, kuhn_box};
 use proptest::prelude::*;
 
 use crate::bodies::{body, check_cut, noise};

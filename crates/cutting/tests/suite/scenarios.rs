@@ -7,8 +7,8 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DVec3, dvec3};
 use incise_cutting::{CutOptions, CuttableMesh, PieceTracker, Plane, Sweep, cut_plane};
-use incise_mesh::generate::{Shape, generate, kuhn_box};
-use incise_mesh::{ParticleId, TetId, TetMesh};
+use incise_mesh::{ParticleId, TetId, TetMesh, kuhn_box};
+use incise_meshing::{Shape, generate};
 
 use crate::bodies::check_cut;
 

@@ -2,8 +2,7 @@
 
 use glam::DVec3;
 use incise_cutting::{CutOptions, CuttableMesh, Plane, Separation, cut_plane};
-use incise_mesh::generate::kuhn_box;
-use incise_mesh::{ParticleId, TetMesh, signed_volume};
+use incise_mesh::{ParticleId, TetMesh, kuhn_box, signed_volume};
 use proptest::prelude::*;
 
 use crate::bodies::{body, jittered_box, noise};

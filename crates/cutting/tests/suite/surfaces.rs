@@ -7,8 +7,7 @@ use incise_cutting::{
     CutDelta, CutError, CutOptions, CuttableMesh, Plane, Sweep, TriangleSurface, cut_level_set,
     cut_plane, cut_surface,
 };
-use incise_mesh::TetMesh;
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::{TetMesh, kuhn_box};
 use proptest::prelude::*;
 
 use crate::bodies::{

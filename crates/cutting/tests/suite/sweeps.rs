@@ -5,8 +5,8 @@ use incise_cutting::{
     CutDelta, CutError, CutMemory, CutOptions, CuttableMesh, FaceTag, Plane, Sweep,
     TriangleSurface, carve, cut_level_set, cut_plane, cut_surface,
 };
-use incise_mesh::generate::{Shape, generate, kuhn_box};
-use incise_mesh::{TetId, TetMesh};
+use incise_mesh::{TetId, TetMesh, kuhn_box};
+use incise_meshing::{Shape, generate};
 use proptest::prelude::*;
 
 use crate::bodies::{body, check_cut, jittered_box, noise, pieces_by_sign};

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{DQuat, DVec3, dvec3};
 use incise_gpu::{ClusterMapping, GpuSolver};
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::kuhn_box;
 use incise_xpbd::{Collider, ColliderShape, Solver, StepSettings};
 
 use crate::solver::{SOFT, body, schedules, settings, share};

@@ -13,8 +13,8 @@ use incise_gpu::coloring::{
 };
 use incise_gpu::{GpuContext, GpuError};
 use incise_graph::{Coloring, ConstraintGraph, Incidence};
-use incise_mesh::generate::kuhn_box;
 use incise_mesh::glam::DVec3;
+use incise_mesh::kuhn_box;
 use proptest::collection::{btree_set, vec};
 use proptest::prelude::*;
 

@@ -3,8 +3,7 @@
 use glam::{DVec3, dvec3};
 use incise_gpu::{ClusterMapping, GpuContext, GpuError};
 use incise_graph::{Clustering, ColorId, Coloring, Incidence};
-use incise_mesh::TetId;
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::{TetId, kuhn_box};
 use incise_xpbd::{Collider, Pose, Solver, StepSettings};
 use proptest::prelude::*;
 use proptest::sample::Index;

@@ -2,8 +2,7 @@
 
 use glam::{DVec3, dvec3};
 use incise_gpu::{ClusterMapping, GpuSolver};
-use incise_mesh::TetMesh;
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::{TetMesh, kuhn_box};
 use incise_xpbd::{Collider, ColliderShape, Material, Method, Pose, Solver, StepSettings};
 
 use crate::scalars::{set_springs, set_volumes};

@@ -2,7 +2,7 @@
 
 use glam::dvec3;
 use incise_gpu::{ClusterMapping, GpuError, GpuSolver};
-use incise_mesh::generate::{Shape, generate};
+use incise_meshing::{Shape, generate};
 use incise_xpbd::{Collider, Material, Method, Pose, Solver, StepSettings, TetSolve};
 
 use crate::solver::{SOFT, body, schedules, settings, share};

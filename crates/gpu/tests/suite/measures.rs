@@ -5,7 +5,8 @@ use std::sync::Arc;
 use glam::{DVec3, dvec3};
 use incise_gpu::{ClusterMapping, GpuSolver, Measures};
 use incise_graph::{Clustering, ColorId, Coloring, Schedule};
-use incise_mesh::generate::{Shape, generate, kuhn_box};
+use incise_mesh::kuhn_box;
+use incise_meshing::{Shape, generate};
 use incise_xpbd::{Material, Pose, Solver};
 
 use crate::solver::{SOFT, body, schedules, settings, share};

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, dvec3};
 use incise_gpu::GpuSolver;
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::kuhn_box;
 use incise_xpbd::{Pose, Solver};
 
 use crate::solver::{SOFT, body, schedules, settings, share};

@@ -183,7 +183,7 @@ fn constraints_follow_edits_and_are_sent_once() {
         return;
     };
     let gpu_of_its_own = share(gpu);
-    let mesh = incise_mesh::generate::kuhn_box([12, 4, 4], dvec3(1.0, 0.5, 0.5));
+    let mesh = incise_mesh::kuhn_box([12, 4, 4], dvec3(1.0, 0.5, 0.5));
     let (schedule, _) = schedules(&mesh, "serial:10");
     let prepare = |solver: &mut Solver<f32>| set_springs(solver, &mesh, 0.0, false);
     let mut solver = body(&mesh, &[SOFT]);

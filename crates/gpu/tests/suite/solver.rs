@@ -7,8 +7,8 @@ use incise_clustering::{Method as Clustered, cluster};
 use incise_coloring::{Order, color_within_clusters, greedy};
 use incise_gpu::{ClusterMapping, GpuContext, GpuSolver};
 use incise_graph::{Clustering, ColorId, Coloring, Incidence, Schedule};
-use incise_mesh::generate::{Shape, generate, kuhn_box};
-use incise_mesh::{TetId, TetMesh};
+use incise_mesh::{TetId, TetMesh, kuhn_box};
+use incise_meshing::{Shape, generate};
 use incise_xpbd::{Material, Solver, StepSettings, TetSolve};
 
 use crate::support::{gpu, skip};

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use glam::{DVec3, dvec3};
 use incise_gpu::{GpuSolver, StageTimes};
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::kuhn_box;
 use incise_xpbd::{Collider, Material, Pose, Solver, StepSettings};
 
 use crate::solver::{SOFT, body, schedules, settings, share};

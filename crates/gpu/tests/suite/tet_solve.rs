@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use glam::{DVec3, dvec3};
 use incise_gpu::{ClusterMapping, GpuSolver};
 use incise_graph::Incidence;
-use incise_mesh::generate::{Shape, generate};
+use incise_meshing::{Shape, generate};
 use incise_xpbd::{Material, Method, Solver, StepSettings, TetSolve};
 
 use crate::solver::{SOFT, body, clusters, schedules, settings, share, tiled};

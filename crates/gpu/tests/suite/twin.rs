@@ -3,8 +3,7 @@
 use glam::DVec3;
 use incise_gpu::{ClusterMapping, GpuContext, GpuSolver};
 use incise_graph::Schedule;
-use incise_mesh::TetMesh;
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::{TetMesh, kuhn_box};
 use incise_xpbd::{Material, Solver, StepSettings};
 
 use crate::solver::{body, distance, schedules, share};

@@ -127,7 +127,7 @@ impl BodyHandle {
 /// # Example
 /// A bar of jelly that is held at one end and cut through.
 /// ```
-/// use incise::mesh::generate::{Shape, generate};
+/// use incise::meshing::{Shape, generate};
 /// use incise::mesh::glam::DVec3;
 /// use incise::scene::StrokeSpec;
 /// use incise::{Body, Simulation};

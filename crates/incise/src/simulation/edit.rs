@@ -49,7 +49,7 @@ impl Simulation {
     /// # Example
     /// A plate comes down on a ball of jelly and is taken away again.
     /// ```
-    /// use incise::mesh::generate::{Shape, generate};
+    /// use incise::meshing::{Shape, generate};
     /// use incise::mesh::glam::DVec3;
     /// use incise::scene::ColliderSpec;
     /// use incise::{Body, Simulation};
@@ -319,7 +319,7 @@ impl Simulation {
     ///
     /// # Example
     /// ```
-    /// use incise::mesh::generate::{Shape, generate};
+    /// use incise::meshing::{Shape, generate};
     /// use incise::mesh::glam::DVec3;
     /// use incise::{Body, Simulation};
     ///

@@ -7,9 +7,9 @@ use incise::advise::{
     Measured, Motion, Question, Reference, ReferenceKind, accurate_substeps, advise,
     default_frames, newton_motion, with,
 };
-use incise::mesh::generate::kuhn_box;
 use incise::mesh::glam::{DQuat, DVec3};
-use incise::mesh::io;
+use incise::mesh::kuhn_box;
+use incise::mesh_io;
 use incise::scene::{Precision, SolverSpec};
 
 use crate::support::{extent, scene};
@@ -147,7 +147,7 @@ fn stitched_layers_move_as_one_body() {
     let [whole, layer] = [([4, 2, 2], size), ([4, 2, 1], DVec3::new(1.0, 0.25, 0.125))]
         .map(|(cells, size)| kuhn_box(cells, size));
     for (name, mesh) in [("whole.vtk", &whole), ("layer.vtk", &layer)] {
-        io::write(folder.path().join(name), mesh).unwrap();
+        mesh_io::write(folder.path().join(name), mesh).unwrap();
     }
     let body = |name: &str, z: f64| {
         let path = folder.path().join(name);

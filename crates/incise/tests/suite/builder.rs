@@ -1,8 +1,8 @@
 //! Simulations from meshes in memory: the same as from a scene, and mistakes refused by name.
 
-use incise::mesh::generate::{Shape, generate};
 use incise::mesh::glam::DVec3;
 use incise::mesh::{ParticleId, TetMesh};
+use incise::meshing::{Shape, generate};
 use incise::scene::{ColliderSpec, Region, SolverSpec, StrokeSpec};
 use incise::{Body, Simulation, SimulationBuilder};
 

@@ -5,9 +5,9 @@
 //! [`Moment::compare`].
 
 use incise::cutting::{CutDelta, CutOptions, CuttableMesh, Plane, Sweep, cut_plane};
-use incise::mesh::generate::{Shape, generate, kuhn_box};
 use incise::mesh::glam::{DVec3, dvec3};
-use incise::mesh::{ParticleId, TetId, TetMesh};
+use incise::mesh::{ParticleId, TetId, TetMesh, kuhn_box};
+use incise::meshing::{Shape, generate};
 use incise::xpbd::{Material, Solver};
 
 use crate::support::noise;

@@ -1,8 +1,8 @@
 //! What a program changes between frames: colliders, gravity, impulses; rays and events.
 
 use incise::cutting::FaceTag;
-use incise::mesh::generate::{Shape, generate};
 use incise::mesh::glam::DVec3;
+use incise::meshing::{Shape, generate};
 use incise::scene::{ColliderSpec, Precision, SolverSpec, StrokeSpec};
 use incise::{Body, Event, Simulation, SimulationBuilder};
 

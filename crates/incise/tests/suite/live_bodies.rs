@@ -1,8 +1,8 @@
 //! Bodies that a program adds and removes while a simulation runs, and bodies of several materials.
 
 use incise::cutting::Skin;
-use incise::mesh::generate::{Shape, generate};
 use incise::mesh::glam::DVec3;
+use incise::meshing::{Shape, generate};
 use incise::scene::{
     AttachmentSpec, MaterialSpec, Precision, Region, SleepSpec, SolverSpec, StrokeSpec,
 };

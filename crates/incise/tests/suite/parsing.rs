@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use incise::mesh::generate::{Shape, generate};
-use incise::mesh::io;
+use incise::mesh_io;
+use incise::meshing::{Shape, generate};
 use incise::scene::{Method, Precision, StrokeSpec, TetSolve};
 use incise::{Error, Scene, Simulation};
 
@@ -224,7 +224,7 @@ fn mesh_files_are_relative_to_the_scene_file() {
     let below = folder.path().join("meshes");
     fs::create_dir(&below).unwrap();
     let mesh = generate(Shape::Box, 300).unwrap();
-    io::write(below.join("box.vtk"), &mesh).unwrap();
+    mesh_io::write(below.join("box.vtk"), &mesh).unwrap();
     let file = folder.path().join("scene.toml");
     fs::write(&file, "[[body]]\nmesh = \"meshes/box.vtk\"").unwrap();
     let scene = Scene::load(&file).unwrap();

@@ -1,8 +1,8 @@
 //! Bodies after random cuts, with the default settings: at rest they stay at rest, under load they stay bounded.
 
 use incise::Simulation;
-use incise::mesh::generate::{Shape, irregular};
-use incise::mesh::io;
+use incise::mesh_io;
+use incise::meshing::{Shape, irregular};
 use incise::scene::{Precision, Scene};
 
 /// Random numbers from 0 to below 1 (`SplitMix64`).
@@ -81,7 +81,7 @@ fn random_sweeps(count: usize, snap: f64, seed: u64) -> String {
 fn an_irregular_body_stays_at_rest_at_every_snap_distance() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("irregular.vtk");
-    io::write(&file, &irregular(Shape::Torus, 600, 5).unwrap()).unwrap();
+    mesh_io::write(&file, &irregular(Shape::Torus, 600, 5).unwrap()).unwrap();
     let (strokes, frames) = (12, 60);
     for snap in [0.0, 0.1, 0.2] {
         for (precision, bound) in [(Precision::F64, 1e-9), (Precision::F32, 1e-2)] {

@@ -120,7 +120,7 @@ fn the_cap_is_kept_and_reported_and_the_result_finite() {
 /// A box with one tet that was squeezed flat at the surface.
 fn with_sliver(folder: &std::path::Path) -> String {
     use incise::mesh::glam::DVec3;
-    let mut mesh = incise::mesh::generate::kuhn_box([6, 6, 6], DVec3::ONE);
+    let mut mesh = incise::mesh::kuhn_box([6, 6, 6], DVec3::ONE);
     // A flat tet on a face of the box: three of its corners and a point just outside.
     let surface = mesh.surface();
     let triangle = surface.triangles[0];
@@ -130,7 +130,7 @@ fn with_sliver(folder: &std::path::Path) -> String {
     let tip = incise::mesh::ParticleId::new(mesh.positions.len() - 1);
     mesh.tets.push([triangle[0], triangle[1], triangle[2], tip]);
     mesh.orient_positively();
-    incise::mesh::io::write(folder.join("sliver.vtk"), &mesh).unwrap();
+    incise::mesh_io::write(folder.join("sliver.vtk"), &mesh).unwrap();
     format!(
         "[[body]]\nmesh = {:?}\nyoung_modulus = 1e4\n",
         folder.join("sliver.vtk")

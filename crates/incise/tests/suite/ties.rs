@@ -1,7 +1,7 @@
 //! Attachments and distances that a program adds, moves, changes and removes while a simulation runs.
 
-use incise::mesh::generate::{Shape, generate};
 use incise::mesh::glam::{DQuat, DVec3};
+use incise::meshing::{Shape, generate};
 use incise::scene::{
     AttachmentSpec, DistanceSpec, EndSpec, Method, Precision, Region, SolverSpec, StrokeSpec,
 };

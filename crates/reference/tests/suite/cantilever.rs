@@ -3,8 +3,7 @@
 //! of the solver: with five to six tets for each particle there are more volumes to keep than particles to move.
 
 use glam::{DVec3, dvec3};
-use incise_mesh::TetMesh;
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::{TetMesh, kuhn_box};
 use incise_reference::Material;
 
 use crate::support::{body, within};

@@ -1,7 +1,7 @@
 //! States that no step of sane size leads to: flat, in a point, mirrored, scrambled, blown up.
 
 use glam::DVec3;
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::kuhn_box;
 use incise_reference::{Body, Material, ReferenceError};
 
 use crate::support::{Noise, RUBBER, body, largest_distance, within};

@@ -1,8 +1,7 @@
 //! Homogeneous deformations, which linear tets can represent exactly: patch test and uniaxial stretch.
 
 use glam::{DMat3, DVec3, dvec3};
-use incise_mesh::TetMesh;
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::{TetMesh, kuhn_box};
 use incise_reference::{Body, Material};
 
 use crate::support::{Noise, RUBBER, body, largest_distance, within};

@@ -1,7 +1,7 @@
 //! Rest, free fall, momentum, energy: what every step must keep.
 
 use glam::{DVec3, dvec3};
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::kuhn_box;
 use proptest::prelude::*;
 
 use crate::support::{Noise, RUBBER, body, largest_distance, vector, within};

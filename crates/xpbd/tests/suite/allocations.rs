@@ -1,7 +1,7 @@
 //! After the first frames a step asks for no memory.
 
 use glam::{DVec3, dvec3};
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::kuhn_box;
 use incise_xpbd::{Collider, Method, Pose, Real, StepSettings, TetSolve};
 
 use crate::body::{GRAVITY, RUBBER, body, plain};

@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec3, dvec3};
 use incise_graph::Schedule;
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::kuhn_box;
 use incise_xpbd::{Collider, Pose, Real, Solver, StepSettings, XpbdError};
 use proptest::prelude::*;
 

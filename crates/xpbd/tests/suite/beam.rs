@@ -7,7 +7,7 @@
 
 use glam::{DVec3, dvec3};
 use incise_graph::Schedule;
-use incise_mesh::{TetMesh, generate::kuhn_box};
+use incise_mesh::{TetMesh, kuhn_box};
 use incise_xpbd::{Material, Real, StepSettings};
 
 use crate::body::{KineticDamping, body, plain, schedule, substep, within};

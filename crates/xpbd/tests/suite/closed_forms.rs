@@ -6,7 +6,7 @@
 //! form.
 
 use glam::{DMat3, DVec3, dvec3};
-use incise_mesh::{TetMesh, generate::kuhn_box};
+use incise_mesh::{TetMesh, kuhn_box};
 use incise_xpbd::{Material, Real, Solver};
 
 use crate::body::{KineticDamping, Noise, RUBBER, body, frames, plain, substep, within};

@@ -1,7 +1,7 @@
 //! The order of convergence in the substep.
 
 use glam::{DVec3, dvec3};
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::kuhn_box;
 use incise_xpbd::StepSettings;
 
 use crate::body::{GRAVITY, RUBBER, body, plain, positions, substep};

@@ -2,8 +2,7 @@
 
 use glam::{DVec3, dvec3};
 use incise_graph::{Clustering, ColorId, Coloring, Schedule};
-use incise_mesh::TetId;
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::{TetId, kuhn_box};
 use incise_xpbd::{
     CoarseCorrection, CoarseCorrectionSettings, Collider, DistanceConstraint, Material, Method,
     Pose, Real, Solver, StepSettings, VbdSettings, VertexStars, VolumeConstraint,

@@ -1,7 +1,7 @@
 //! Vibrations: how fast they die with damping, and that nothing is gained without it.
 
 use glam::{DVec3, dvec3};
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::kuhn_box;
 use incise_xpbd::{Material, Real, Solver, StepSettings, TetSolve};
 
 use crate::body::{

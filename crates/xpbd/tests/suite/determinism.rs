@@ -1,7 +1,7 @@
 //! The same bits for any number of threads, and from one release to the next.
 
 use glam::{DVec3, dvec3};
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::kuhn_box;
 use incise_xpbd::{Collider, Material, Real, StepSettings};
 
 use crate::body::{GRAVITY, RUBBER, body, disturb, plain, schedule};

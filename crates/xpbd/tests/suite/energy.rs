@@ -1,7 +1,7 @@
 //! Energies and forces: rest, rotation, small strains, and that the solver's force is the slope of the energy.
 
 use glam::{DMat3, DQuat, DVec3, dvec3};
-use incise_mesh::{TetMesh, generate::kuhn_box};
+use incise_mesh::{TetMesh, kuhn_box};
 use incise_xpbd::{Material, Real, Solver};
 
 use crate::body::{Noise, RUBBER, body, disturb, plain, schedule, substep, within};

@@ -1,7 +1,7 @@
 //! Whatever comes in, as long as it is finite: no infinity and no NaN comes out.
 
 use glam::{DVec3, dvec3};
-use incise_mesh::{TetId, TetMesh, generate::kuhn_box};
+use incise_mesh::{TetId, TetMesh, kuhn_box};
 use incise_xpbd::{Collider, KappaLimit, Material, Real, Solver, StepSettings};
 use proptest::prelude::*;
 

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, dvec3};
 use incise_graph::{Clustering, Coloring, Schedule};
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::kuhn_box;
 use incise_xpbd::{Collider, Material, Real, Solver, StepSettings};
 
 use crate::body::{GRAVITY, Noise, RUBBER, body, disturb, plain, substep, within};

@@ -1,7 +1,7 @@
 //! Kappa, the number that decides whether a substep is accurate, and the units that decide nothing.
 
 use glam::{DVec3, dvec3};
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::kuhn_box;
 use incise_xpbd::{Material, Real, Solver, StepSettings};
 
 use crate::body::{RUBBER, advance, body, disturb, plain, positions, within};

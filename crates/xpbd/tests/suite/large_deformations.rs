@@ -1,7 +1,7 @@
 //! Volume at Poisson's ratios up to 0.499999, and a full twist.
 
 use glam::{DQuat, dvec3};
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::kuhn_box;
 use incise_xpbd::{Material, Real, StepSettings};
 
 use crate::body::{

@@ -2,8 +2,7 @@
 
 use glam::{DVec3, dvec3};
 use incise_graph::{ClusterId, Clustering, ColorId, Coloring, Schedule};
-use incise_mesh::TetMesh;
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::{TetMesh, kuhn_box};
 use incise_xpbd::{Material, Real, Solver, StepSettings, XpbdError};
 
 use crate::body::{GRAVITY, Noise, RUBBER};

@@ -2,8 +2,7 @@
 
 use glam::{DVec3, dvec3};
 use incise_graph::{Clustering, Coloring, Schedule};
-use incise_mesh::TetMesh;
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::{TetMesh, kuhn_box};
 use incise_xpbd::{Collider, Material, Real, Solver, StepSettings};
 
 use crate::body::{GRAVITY, RUBBER, advance, body, largest_distance, plain, positions, within};

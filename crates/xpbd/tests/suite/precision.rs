@@ -1,7 +1,7 @@
 //! Single against double precision over many substeps.
 
 use glam::{DVec3, dvec3};
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::kuhn_box;
 use incise_xpbd::{Material, Real, StepSettings};
 
 use crate::body::{GRAVITY, body, plain, within};

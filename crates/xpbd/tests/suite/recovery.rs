@@ -1,7 +1,7 @@
 //! A body crushed beyond recognition comes back to its shape: substeps of one iteration at kappa 0.35, one second.
 
 use glam::{DVec3, dvec3};
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::kuhn_box;
 use incise_xpbd::{Real, StepSettings};
 
 use crate::body::{GRAVITY, Method, Noise, RUBBER, advance, body, plain, within};

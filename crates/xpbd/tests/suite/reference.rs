@@ -7,8 +7,7 @@
 //! with `l/μ`, because kappa knows Young's modulus only: a beam's sag is off by 2 to 5 % of `kappa l/μ`.
 
 use glam::{DQuat, DVec3, dvec3};
-use incise_mesh::generate::kuhn_box;
-use incise_mesh::{ParticleId, TetMesh};
+use incise_mesh::{ParticleId, TetMesh, kuhn_box};
 use incise_reference::Body;
 use incise_xpbd::{
     CoarseCorrection, CoarseCorrectionSettings, Material, Solver, StepSettings, VbdSettings,

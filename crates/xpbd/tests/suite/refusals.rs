@@ -1,7 +1,7 @@
 //! Absurd settings and materials are refused by name, and nothing moves then.
 
 use glam::DVec3;
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::kuhn_box;
 use incise_xpbd::{Collider, Material, Solver, StepSettings, XpbdError};
 
 use crate::body::{RUBBER, body, plain, positions};

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, dvec3};
 use incise_graph::{Clustering, ColorId, Coloring, Schedule};
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::kuhn_box;
 use incise_xpbd::{Real, Residuals, Solver, StepSettings, TetSolve};
 
 use crate::body::{GRAVITY, RUBBER, body, disturb, plain, substep, within};

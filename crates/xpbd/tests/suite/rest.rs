@@ -2,8 +2,7 @@
 
 use glam::{DVec3, dvec3};
 use incise_graph::{Clustering, ColorId, Coloring, Schedule};
-use incise_mesh::TetId;
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::{TetId, kuhn_box};
 use incise_xpbd::{KappaLimit, Real, Solver, StepSettings, TetSolve};
 
 use crate::body::{RUBBER, body, largest_distance, plain, positions, substep, within};

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, dvec3};
 use incise_graph::{Clustering, ColorId, Coloring, GraphError, Schedule};
-use incise_mesh::{TetMesh, generate::kuhn_box};
+use incise_mesh::{TetMesh, kuhn_box};
 use incise_xpbd::{
     Collider, ColliderShape, Guess, ImplicitStep, Material, Real, Solver, VbdSettings, VertexStars,
     XpbdError,

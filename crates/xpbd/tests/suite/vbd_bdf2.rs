@@ -2,7 +2,7 @@
 
 use glam::{DVec3, dvec3};
 use incise_graph::{Clustering, ColorId, Coloring, Schedule};
-use incise_mesh::{TetMesh, generate::kuhn_box};
+use incise_mesh::{TetMesh, kuhn_box};
 use incise_xpbd::{
     Collider, DistanceConstraint, Integrator, Real, Solver, VbdSettings, VertexStars,
 };

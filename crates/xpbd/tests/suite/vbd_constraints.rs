@@ -3,7 +3,7 @@
 use glam::{DVec3, dvec3};
 use incise_coloring::color;
 use incise_graph::{Clustering, ConstraintGraph, Incidence, Schedule};
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::kuhn_box;
 use incise_xpbd::{
     CoarseCorrection, CoarseCorrectionSettings, DistanceConstraint, ImplicitStep, Material, Pose,
     Real, Solver, StepSettings, VbdSettings, VolumeConstraint,

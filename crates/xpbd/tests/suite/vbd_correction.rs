@@ -1,7 +1,7 @@
 //! Corrections: they lead to the same solution as sweeps, in far fewer rounds, and never uphill.
 
 use glam::{DVec3, dvec3};
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::kuhn_box;
 use incise_xpbd::{
     CoarseCorrection, CoarseCorrectionReport, CoarseCorrectionSettings, Collider, Guess,
     ImplicitStep, Integrator, Material, Real, Solver, VbdSettings, VertexStars, XpbdError,

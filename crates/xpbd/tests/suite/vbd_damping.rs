@@ -1,7 +1,7 @@
 //! Damping of materials in VBD: equilibria do not move, vibrations decay as the closed form says.
 
 use glam::{DVec3, dvec3};
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::kuhn_box;
 use incise_xpbd::{
     CoarseCorrection, CoarseCorrectionSettings, Material, Real, Solver, VbdSettings,
 };

@@ -1,7 +1,7 @@
 //! VBD from extreme states: always finite, and back to shape.
 
 use glam::{DVec3, dvec3};
-use incise_mesh::generate::kuhn_box;
+use incise_mesh::kuhn_box;
 use incise_xpbd::{Collider, Material, Real, VbdSettings};
 
 use crate::body::{GRAVITY, Noise, RUBBER, body, within};

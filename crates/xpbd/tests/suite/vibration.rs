@@ -1,7 +1,7 @@
 //! The first bending vibration of a beam: finite elements on the same mesh, and the formula.
 
 use glam::{DVec3, dvec3};
-use incise_mesh::{TetMesh, generate::kuhn_box};
+use incise_mesh::{TetMesh, kuhn_box};
 use incise_xpbd::Material;
 
 use crate::body::{RUBBER, body, plain, substep, within};

@@ -2,8 +2,7 @@
 
 use glam::{DVec3, dvec3};
 use incise_graph::{Clustering, ColorId, Coloring, Schedule};
-use incise_mesh::generate::kuhn_box;
-use incise_mesh::{TetId, TetMesh};
+use incise_mesh::{TetId, TetMesh, kuhn_box};
 use incise_xpbd::{
     Collider, ColliderShape, Material, Real, Solver, StepSettings, VolumeConstraint, XpbdError,
 };

@@ -1,0 +1,137 @@
+//! Closed or open surfaces of triangles: `.obj`, `.stl`, `.ply`, `.off`, and for viewers `.glb` and `.gltf`.
+//!
+//! Readers of our own, because what a tetrahedralization needs is the same in all four: coordinates as doubles, corners
+//! within bounds, the line or byte of what is wrong, and memory bounded by the size of the file. Of the crates for
+//! these formats, `stl_io` keeps coordinates as `f32`, ASCII ones too; `tobj` names no line, splits a file into models
+//! that number their points anew, and has doubles as a feature of the whole build only; `ply-rs-bw` makes as many
+//! elements as a header announces when they have no properties, so that a file of 100 bytes fills the memory.
+//!
+//! Polygons become fans of triangles around their first corner, right for convex ones. Linear.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use incise_mesh::TriangleSurface;
+
+use crate::endings::{ending, is_among, refused};
+#[cfg(feature = "gltf")]
+use crate::gltf;
+#[cfg(feature = "obj")]
+use crate::obj;
+#[cfg(feature = "off")]
+use crate::off;
+#[cfg(feature = "ply")]
+use crate::ply::{self, PlyEncoding};
+#[cfg(feature = "stl")]
+use crate::stl;
+use crate::text::load;
+use crate::{MeshIoError, write_atomically};
+
+const KNOWN: &str = ".obj, .stl, .ply, .off";
+const KNOWN_TO_WRITERS: &str = ".obj, .stl, .ply, .off, .glb, .gltf";
+
+/// Reads a surface, the format chosen by the ending of the file name. Every form of a format is understood.
+///
+/// Points that no triangle uses are kept. STL has no points: equal corners, to the bit, become one.
+///
+/// # Errors
+/// [`MeshIoError::UnknownFormat`] for another ending, [`MeshIoError::FormatLeftOut`] for a format that this build
+/// lacks, [`MeshIoError::Io`] if the file cannot be read, [`MeshIoError::Parse`] or [`MeshIoError::ParseBytes`] if its
+/// content is wrong or has no triangle.
+///
+/// # Example
+/// ```
+/// use incise_mesh::{glam::DVec3, kuhn_box};
+///
+/// let path = std::env::temp_dir().join(format!("incise-doc-{}.off", std::process::id()));
+/// let mesh = kuhn_box([1, 1, 1], DVec3::splat(0.1));
+/// let surface = incise_mesh::TriangleSurface::boundary_of(&mesh);
+/// incise_mesh_io::write_surface(&path, &surface)?;
+/// assert_eq!(incise_mesh_io::read_surface(&path)?, surface);
+/// # std::fs::remove_file(path).ok();
+/// # Ok::<(), incise_mesh_io::MeshIoError>(())
+/// ```
+pub fn read_surface(path: impl AsRef<Path>) -> Result<TriangleSurface, MeshIoError> {
+    let path = path.as_ref();
+    let parse = parser(path)?;
+    parse(&load(path)?, path)
+}
+
+/// Reads a surface that is in memory: the content of a file in an archive or from a network. The ending of `path` names
+/// the format, and errors name the path; it need not exist.
+///
+/// # Errors
+/// As [`read_surface`], but [`MeshIoError::Io`].
+///
+/// # Example
+/// ```
+/// let bytes = b"OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+/// assert_eq!(incise_mesh_io::parse_surface("a.off", bytes)?.triangles.len(), 1);
+/// # Ok::<(), incise_mesh_io::MeshIoError>(())
+/// ```
+pub fn parse_surface(path: impl AsRef<Path>, bytes: &[u8]) -> Result<TriangleSurface, MeshIoError> {
+    let path = path.as_ref();
+    parser(path)?(bytes, path)
+}
+
+type Writer = fn(&mut dyn Write, &TriangleSurface) -> io::Result<()>;
+type Parser = fn(&[u8], &Path) -> Result<TriangleSurface, MeshIoError>;
+
+fn parser(path: &Path) -> Result<Parser, MeshIoError> {
+    let parser: Option<Parser> = match ending(path).as_str() {
+        #[cfg(feature = "obj")]
+        "obj" => Some(obj::parse_obj),
+        #[cfg(feature = "stl")]
+        "stl" => Some(stl::parse_stl),
+        #[cfg(feature = "ply")]
+        "ply" => Some(ply::parse_ply),
+        #[cfg(feature = "off")]
+        "off" => Some(off::parse_off),
+        _ => None,
+    };
+    parser.ok_or_else(|| refused(path, KNOWN))
+}
+
+/// Whether the ending of a file name is that of a surface which [`write_surface`] writes.
+#[must_use]
+pub fn is_surface(path: &Path) -> bool {
+    is_among(path, KNOWN_TO_WRITERS)
+}
+
+/// Writes a surface, the format chosen by the ending of the file name: `.obj`, `.off` and `.stl` as text, `.ply` as
+/// little-endian binary. All keep every bit of the coordinates, and all but `.stl` points without triangles.
+///
+/// For viewers there are `.glb` (binary) and `.gltf` (the same as text), which have normals, too, but are not read:
+/// their coordinates are rounded to floats.
+///
+/// # Errors
+/// [`MeshIoError::UnknownFormat`] for another ending, [`MeshIoError::FormatLeftOut`] for a format that this build
+/// lacks, [`MeshIoError::Io`] if the file cannot be written, or, for `.glb` and `.gltf`, if there are no triangles, a
+/// coordinate is too large for a float, or the file would have 4 GiB.
+///
+/// # Panics
+/// For `.stl`, `.glb` and `.gltf`, if a corner has no position.
+pub fn write_surface(path: impl AsRef<Path>, surface: &TriangleSurface) -> Result<(), MeshIoError> {
+    let path = path.as_ref();
+    let write: Option<Writer> = match ending(path).as_str() {
+        #[cfg(feature = "obj")]
+        "obj" => Some(obj::write),
+        #[cfg(feature = "stl")]
+        "stl" => Some(stl::write),
+        #[cfg(feature = "ply")]
+        "ply" => Some(|out, surface| ply::write(out, surface, PlyEncoding::LittleEndian)),
+        #[cfg(feature = "off")]
+        "off" => Some(off::write),
+        #[cfg(feature = "gltf")]
+        "glb" => Some(gltf::write_glb),
+        #[cfg(feature = "gltf")]
+        "gltf" => Some(gltf::write_gltf),
+        _ => None,
+    };
+    let write = write.ok_or_else(|| refused(path, KNOWN_TO_WRITERS))?;
+    write_atomically(path, |out| write(out, surface))
+}
+
+#[cfg(test)]
+#[cfg(all(feature = "obj", feature = "stl", feature = "ply", feature = "off"))]
+mod tests;

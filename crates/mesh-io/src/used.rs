@@ -1,0 +1,22 @@
+//! The particles that triangles use, for files that leave out the others. O(n log n).
+
+use incise_mesh::ParticleId;
+
+/// The particles in ascending order, and the place of each among them (0 for those that are not).
+pub(super) struct Used {
+    pub(super) particles: Vec<usize>,
+    pub(super) places: Vec<u32>,
+}
+
+impl Used {
+    pub(super) fn new(triangles: &[[ParticleId; 3]], count: usize) -> Self {
+        let mut particles: Vec<usize> = triangles.iter().flatten().map(|p| p.index()).collect();
+        particles.sort_unstable();
+        particles.dedup();
+        let mut places = vec![0; count];
+        for (place, &particle) in (0..).zip(&particles) {
+            places[particle] = place;
+        }
+        Self { particles, places }
+    }
+}

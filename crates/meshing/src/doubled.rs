@@ -1,0 +1,300 @@
+//! [`Doubled`]: cells of a lattice joined to larger ones where nothing needs small ones, and the tets that fill them.
+//!
+//! Cubes of 2, 4, 8 .. cells a side become one cell each, so that cells form the leaves of octrees whose neighbors, also at
+//! edges and corners, differ by a factor of two at most. A face between cells of one size is filled as in the lattice: four
+//! tets around the line between the two centers, two each where an edge of the face is halved by a smaller cell. A face
+//! between a cell and four smaller ones is cut into eight triangles that meet in its middle; each is joined to the center
+//! on either side. Both sides of a face and all cells around an edge see the same triangles and halves, so faces match.
+//!
+//! Source: the graded interior of F. Labelle and J. R. Shewchuk, "Isosurface Stuffing", 2007, with tets of our own choice
+//! between sizes. Cost: linear in the number of cells, a byte each.
+
+/// Coordinates of a lattice vertex in half spacings.
+type At = [i32; 3];
+
+/// See the module.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Doubled {
+    cells: [usize; 3],
+    /// Per cell, how often the cell it is part of was doubled; empty if none was.
+    levels: Vec<u8>,
+}
+
+impl Doubled {
+    /// Doubles cells up to `most` times where the corner and center of all cells within one layer are inside.
+    pub(super) fn new(cells: [usize; 3], most: u32, inside: impl Fn(usize) -> bool) -> Self {
+        if most == 0 {
+            return Self::default();
+        }
+        let [nx, ny, nz] = cells;
+        let mut doubled = Self {
+            cells,
+            levels: vec![0; nx * ny * nz],
+        };
+        // Beyond the largest power of two that fits nothing can be doubled.
+        let fits = nx.min(ny).min(nz).max(1).ilog2();
+        let most = u8::try_from(most.min(fits)).unwrap_or(u8::MAX);
+        for level in 1..=most {
+            doubled.double(level, &inside);
+        }
+        while doubled.halve_beside_small() {}
+        doubled
+    }
+
+    /// Whether a cell is part of a larger one.
+    pub(super) fn is_doubled(&self, cell: usize) -> bool {
+        self.levels.get(cell).is_some_and(|&level| level > 0)
+    }
+
+    /// Joins eight cells of the level below wherever that can be.
+    fn double(&mut self, level: u8, inside: &impl Fn(usize) -> bool) {
+        let side = 1 << level;
+        for low in self.blocks(level) {
+            let ready = if level == 1 {
+                self.around(low, side, 1).all(inside)
+                    && (0..3).all(|a| low[a] > 0 && low[a] + side < self.cells[a])
+            } else {
+                self.around(low, side, 0)
+                    .all(|cell| self.levels[cell] == level - 1)
+            };
+            if ready {
+                self.set(low, side, level);
+            }
+        }
+    }
+
+    /// Takes back the last doubling of cells that touch one less than half as large. Whether there were any.
+    fn halve_beside_small(&mut self) -> bool {
+        let mut changed = false;
+        for level in 2..=self.levels.iter().copied().max().unwrap_or(0) {
+            let side = 1 << level;
+            for low in self.blocks(level) {
+                if self.levels[self.cell(low)] == level
+                    && self
+                        .around(low, side, 1)
+                        .any(|cell| self.levels[cell] + 1 < level)
+                {
+                    self.set(low, side, level - 1);
+                    changed = true;
+                }
+            }
+        }
+        changed
+    }
+
+    /// The low cells of all cubes of a level that lie in the lattice.
+    fn blocks(&self, level: u8) -> impl Iterator<Item = [usize; 3]> + use<> {
+        let side = 1 << level;
+        let [nx, ny, nz] = self.cells.map(|n| n / side);
+        (0..nx * ny * nz)
+            .map(move |block| [block % nx, block / nx % ny, block / nx / ny].map(|b| b * side))
+    }
+
+    /// The cells of a cube, with so many layers around it as far as there are.
+    fn around(
+        &self,
+        low: [usize; 3],
+        side: usize,
+        layers: usize,
+    ) -> impl Iterator<Item = usize> + use<> {
+        let [nx, ny, nz] = self.cells;
+        let range = move |axis: usize, count: usize| {
+            low[axis].saturating_sub(layers)..(low[axis] + side + layers).min(count)
+        };
+        range(2, nz).flat_map(move |z| {
+            range(1, ny).flat_map(move |y| range(0, nx).map(move |x| x + nx * (y + ny * z)))
+        })
+    }
+
+    fn set(&mut self, low: [usize; 3], side: usize, level: u8) {
+        for cell in self.around(low, side, 0) {
+            self.levels[cell] = level;
+        }
+    }
+
+    fn cell(&self, [x, y, z]: [usize; 3]) -> usize {
+        x + self.cells[0] * (y + self.cells[1] * z)
+    }
+
+    /// The level of the cell around a place that lies on no face between cells.
+    #[expect(clippy::cast_sign_loss, reason = "doubled cells are not at the rim")]
+    fn level_at(&self, at: At) -> u8 {
+        self.levels[self.cell(at.map(|c| (c >> 1) as usize))]
+    }
+
+    /// Makes all tets at doubled cells. Their corners come in no particular orientation.
+    pub(super) fn fill(&self, mut emit: impl FnMut([At; 4])) {
+        let most = self.levels.iter().copied().max().unwrap_or(0);
+        for level in 1..=most {
+            for low in self.blocks(level) {
+                if self.levels[self.cell(low)] == level {
+                    self.fill_cell(low, level, &mut emit);
+                }
+            }
+        }
+    }
+
+    /// Makes the tets at a doubled cell, up to those that belong to its neighbors.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_possible_wrap,
+        reason = "a lattice has at most 2^26 cells"
+    )]
+    fn fill_cell(&self, low: [usize; 3], level: u8, emit: &mut impl FnMut([At; 4])) {
+        // Half a side, in half spacings.
+        let half = 1 << level;
+        let center = low.map(|c| 2 * c as i32 + half);
+        for (axis, sign) in [(0, -1), (0, 1), (1, -1), (1, 1), (2, -1), (2, 1)] {
+            let face = step(center, axis, sign * half);
+            // Just across the face, off all edges of the lattice there.
+            let across = step(face.map(|c| c + 1), axis, if sign > 0 { 0 } else { -2 });
+            let beyond = self.level_at(across);
+            let others = [(axis + 1) % 3, (axis + 2) % 3];
+            if beyond == level {
+                if sign > 0 {
+                    self.fill_between(center, face, axis, level, emit);
+                }
+            } else if beyond < level {
+                // The eight triangles in the middle, and the centers beyond where those cells are smaller.
+                for (u, v) in [(-1, -1), (1, -1), (1, 1), (-1, 1)] {
+                    let corner = step(step(face, others[0], u * half), others[1], v * half);
+                    let quarter = step(
+                        step(step(face, others[0], u * half / 2), others[1], v * half / 2),
+                        axis,
+                        sign * half / 2,
+                    );
+                    for middle in [
+                        step(face, others[0], u * half),
+                        step(face, others[1], v * half),
+                    ] {
+                        emit([center, face, middle, corner]);
+                        emit([quarter, face, middle, corner]);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Fills around the line between the centers of two cells of one size.
+    fn fill_between(
+        &self,
+        center: At,
+        face: At,
+        axis: usize,
+        level: u8,
+        emit: &mut impl FnMut([At; 4]),
+    ) {
+        let half = 1 << level;
+        let beyond = step(face, axis, half);
+        let others = [(axis + 1) % 3, (axis + 2) % 3];
+        for (out, along) in [(others[0], others[1]), (others[1], others[0])] {
+            for sign in [-1, 1] {
+                let middle = step(face, out, sign * half);
+                let [from, to] = [step(middle, along, -half), step(middle, along, half)];
+                if self.is_halved(middle, level) {
+                    emit([center, beyond, from, middle]);
+                    emit([center, beyond, middle, to]);
+                } else {
+                    emit([center, beyond, from, to]);
+                }
+            }
+        }
+    }
+
+    /// Whether one of the cells around the middle of an edge of a cell is smaller than that.
+    fn is_halved(&self, middle: At, level: u8) -> bool {
+        (0..8).any(|octant| {
+            let near = [0, 1, 2].map(|a| middle[a] + if octant >> a & 1 == 1 { 1 } else { -1 });
+            self.level_at(near) < level
+        })
+    }
+}
+
+fn step(mut at: At, axis: usize, by: i32) -> At {
+    at[axis] += by;
+    at
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DVec3, dvec3};
+
+    use crate::{Lattice, stuff, stuff_graded};
+    use incise_mesh::{TetMesh, dihedral_angles};
+
+    fn mesh(levels: u32, cells: f64, region: impl Fn(DVec3) -> f64 + Sync) -> TetMesh {
+        let lattice = Lattice::covering(-DVec3::ONE, DVec3::ONE, 2.0 / cells, dvec3(0.3, 0.1, 0.7));
+        stuff_graded(&lattice.expect("is a box"), levels, region).expect("fits")
+    }
+
+    /// Regions of all kinds: matching faces, positive tets, the same surface and volume, and the bounds of the angles.
+    #[test]
+    fn graded_meshes_are_sound_and_have_the_same_surface() {
+        let ball = |p: DVec3| p.length() - 0.95;
+        let box_ = |p: DVec3| (p.abs() - dvec3(0.9, 0.7, 0.8)).max_element();
+        let ring = |p: DVec3| (p.truncate().length() - 0.6).hypot(p.z) - 0.3;
+        let two = |p: DVec3| {
+            let (a, b) = (p - dvec3(0.2, 0.1, 0.0), p + dvec3(0.3, 0.3, 0.2));
+            (a.length() - 0.7).min(b.length() - 0.5)
+        };
+        let regions: [&(dyn Fn(DVec3) -> f64 + Sync); 4] = [&ball, &box_, &ring, &two];
+        for region in regions {
+            for cells in [12.0, 25.0, 40.0] {
+                let uniform = mesh(0, cells, region);
+                for levels in [1, 2, 5] {
+                    let graded = mesh(levels, cells, region);
+                    graded.check().expect("faces match and tets are positive");
+                    // Up to the rounding of sums of some 10^5 terms.
+                    let more = graded.total_volume() / uniform.total_volume() - 1.0;
+                    assert!(more.abs() < 1e-11, "{more}");
+                    assert!(graded.tets.len() <= uniform.tets.len());
+                    // The same surface, though particles are numbered otherwise.
+                    let corners = |mesh: &TetMesh| {
+                        let mut all: Vec<_> = mesh
+                            .surface()
+                            .triangles
+                            .iter()
+                            .flatten()
+                            .map(|p| mesh.positions[p.index()].to_array().map(f64::to_bits))
+                            .collect();
+                        all.sort_unstable();
+                        all
+                    };
+                    assert_eq!(corners(&graded), corners(&uniform));
+                    assert!(graded.surface().is_manifold());
+                    let quality = graded.quality();
+                    assert!(quality.min_dihedral > 9.3 && quality.max_dihedral < 161.7);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_thick_body_has_far_fewer_tets() {
+        let ball = |p: DVec3| p.length() - 1.0;
+        let [uniform, once, often] = [0, 1, 9].map(|levels| mesh(levels, 60.0, ball).tets.len());
+        assert!(
+            2 * once < uniform && 5 * often < 2 * uniform,
+            "{uniform} {once} {often}"
+        );
+        let lattice = Lattice::covering(-DVec3::ONE, DVec3::ONE, 0.1, DVec3::ZERO).expect("a box");
+        let plain = stuff(&lattice, ball).expect("fits");
+        assert_eq!(stuff_graded(&lattice, 0, ball).expect("fits"), plain);
+    }
+
+    #[test]
+    fn tets_of_doubled_cells_have_angles_of_45_to_120_degrees() {
+        let graded = mesh(4, 40.0, |p| p.length() - 0.95);
+        // Those without a corner near the surface.
+        let deep = graded.tets.iter().filter(|tet| {
+            tet.iter()
+                .all(|p| graded.positions[p.index()].length() < 0.95 - 4.0 * 0.05)
+        });
+        for tet in deep {
+            let angles = dihedral_angles(tet.map(|p| graded.positions[p.index()]));
+            for angle in angles {
+                assert!((44.99..120.01).contains(&angle), "{angle}");
+            }
+        }
+    }
+}

@@ -1,0 +1,226 @@
+//! Points for an irregular mesh: evenly thinned ones on the surface of a solid, jittered lattice points inside.
+//!
+//! Surface points come from dense random candidates near the surface, moved onto it by Newton steps along the gradient,
+//! and taken in random order as long as they keep a distance from those taken (maximal Poisson disk sampling: no gap is
+//! larger than the distance). Candidates on edges and corners go first, so that these stay sharp. Inside, the vertices of
+//! a body-centered cubic lattice are moved at random.
+//!
+//! Source: Delaunay meshing of jittered lattices is folklore; for the surface M. S. Ebeida and others, "Efficient maximal
+//! Poisson-disk sampling", 2011. Cost: linear in the volume over the spacing cubed, some thirty distances per point.
+
+use glam::DVec3;
+
+use crate::random::{hash, in_cube};
+use crate::{Lattice, MeshingError, Shape};
+
+/// No entry in a list.
+const NONE: u32 = u32::MAX;
+/// Largest move of a lattice point along each axis, in spacings.
+const JITTER: f64 = 0.33;
+/// Smallest distance between surface points, in spacings.
+const APART: f64 = 0.65;
+/// Smallest distance of inner points from the surface, and from its points, in spacings.
+const DEPTH: f64 = 0.4;
+const FROM_SURFACE_POINTS: f64 = 0.6;
+/// Candidates for surface points along a spacing.
+const CANDIDATES: f64 = 3.0;
+
+/// Points of `shape` for a body-centered cubic lattice with the given side of its cells.
+pub(super) fn sample(shape: Shape, spacing: f64, seed: u64) -> Result<Vec<DVec3>, MeshingError> {
+    let half = shape.half_extent();
+    let low = -half - 2.0 * spacing;
+    let mut near = Grid::new(low, -low, spacing);
+    for p in candidates(shape, spacing, seed)? {
+        if !near.has_within(p, APART * spacing) {
+            near.push(p);
+        }
+    }
+    let lattice = Lattice::covering(-half, half, spacing, in_cube(seed, 0))?;
+    let mut points = Vec::new();
+    let [nx, ny, nz] = lattice.cells;
+    for vertex in 0..2 * nx * ny * nz {
+        let cell = vertex / 2;
+        let at = [cell % nx, cell / nx % ny, cell / nx / ny].map(|c| c as f64);
+        let center = 0.5 * (vertex % 2) as f64;
+        let jitter = JITTER * in_cube(seed.wrapping_add(1), vertex as u64);
+        let p = lattice.origin + spacing * (DVec3::from_array(at) + center + jitter);
+        if is_deep(shape, p, DEPTH * spacing) && !near.has_within(p, FROM_SURFACE_POINTS * spacing)
+        {
+            points.push(p);
+        }
+    }
+    near.points.append(&mut points);
+    Ok(near.points)
+}
+
+/// Random points on the surface, many to a spacing: corners first, then edges, then the rest, each in random order.
+fn candidates(shape: Shape, spacing: f64, seed: u64) -> Result<Vec<DVec3>, MeshingError> {
+    let half = shape.half_extent();
+    let fine = spacing / CANDIDATES;
+    let lattice = Lattice::covering(-half, half, fine, DVec3::ZERO)?;
+    let [nx, ny, nz] = lattice.cells;
+    let mut found = Vec::new();
+    for cell in 0..nx * ny * nz {
+        let at = DVec3::from_array([cell % nx, cell / nx % ny, cell / nx / ny].map(|c| c as f64));
+        let p = lattice.origin + fine * (at + 0.5 * in_cube(seed.wrapping_add(2), cell as u64));
+        if shape.signed_distance(p).abs() < 2.5 * fine
+            && let Some(p) = project(shape, p, spacing)
+        {
+            let random = hash(seed.wrapping_add(3), cell as u64);
+            found.push((smoothness(shape, p), random, p));
+        }
+    }
+    found.sort_unstable_by_key(|&(smooth, random, _)| (smooth, random));
+    Ok(found.into_iter().map(|(_, _, p)| p).collect())
+}
+
+/// The point moved onto the surface, unless that is farther than `reach` or does not succeed.
+pub(super) fn project(shape: Shape, from: DVec3, reach: f64) -> Option<DVec3> {
+    let mut p = from;
+    for _ in 0..12 {
+        let distance = shape.signed_distance(p);
+        if distance.abs() < 1e-9 {
+            return (p.distance(from) <= reach).then_some(p);
+        }
+        let slope = gradient(shape, p);
+        p -= distance * slope / slope.length_squared().max(1e-2);
+    }
+    None
+}
+
+/// Whether a point lies inside by more than `depth`, to first order.
+fn is_deep(shape: Shape, p: DVec3, depth: f64) -> bool {
+    let distance = shape.signed_distance(p);
+    // No distance function of a shape is steeper than the true distance.
+    distance <= -depth || distance < 0.0 && distance < -depth * gradient(shape, p).length()
+}
+
+fn gradient(shape: Shape, p: DVec3) -> DVec3 {
+    const STEP: f64 = 1e-6;
+    let along = |axis: DVec3| {
+        let step = STEP * axis;
+        (shape.signed_distance(p + step) - shape.signed_distance(p - step)) / (2.0 * STEP)
+    };
+    DVec3::new(along(DVec3::X), along(DVec3::Y), along(DVec3::Z))
+}
+
+/// 0 at a corner, 1 at an edge, 2 elsewhere: outside a sharp edge the distance grows faster than it falls inside.
+fn smoothness(shape: Shape, p: DVec3) -> u8 {
+    let step = 1e-5 * gradient(shape, p).normalize_or_zero();
+    let [outside, inside] = [p + step, p - step].map(|p| shape.signed_distance(p).abs());
+    // One, the square root of a half, and of a third in the corner of a box.
+    match inside / outside.max(1e-9) {
+        ratio if ratio < 0.64 => 0,
+        ratio if ratio < 0.9 => 1,
+        _ => 2,
+    }
+}
+
+/// Points sorted into cubic cells, to find near ones.
+struct Grid {
+    low: DVec3,
+    side: f64,
+    cells: [usize; 3],
+    /// Per cell its last point, per point the one before in its cell.
+    last: Vec<u32>,
+    before: Vec<u32>,
+    points: Vec<DVec3>,
+}
+
+impl Grid {
+    fn new(low: DVec3, high: DVec3, side: f64) -> Self {
+        let mut grid = Self {
+            low,
+            side,
+            cells: [usize::MAX; 3],
+            last: Vec::new(),
+            before: Vec::new(),
+            points: Vec::new(),
+        };
+        grid.cells = grid.cell(high).map(|cell| cell + 1);
+        grid.last = vec![NONE; grid.cells.iter().product()];
+        grid
+    }
+
+    fn cell(&self, p: DVec3) -> [usize; 3] {
+        let at = ((p - self.low) / self.side).to_array();
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "kept within the grid"
+        )]
+        std::array::from_fn(|axis| (at[axis].max(0.0) as usize).min(self.cells[axis] - 1))
+    }
+
+    fn push(&mut self, p: DVec3) {
+        let [i, j, k] = self.cell(p);
+        let cell = i + self.cells[0] * (j + self.cells[1] * k);
+        self.before.push(self.last[cell]);
+        self.last[cell] = u32::try_from(self.points.len()).expect("fewer than 2^32 points");
+        self.points.push(p);
+    }
+
+    /// Whether there is a point nearer than `distance`.
+    fn has_within(&self, p: DVec3, distance: f64) -> bool {
+        let [low, high] = [p - distance, p + distance].map(|p| self.cell(p));
+        for k in low[2]..=high[2] {
+            for j in low[1]..=high[1] {
+                for i in low[0]..=high[0] {
+                    let mut point = self.last[i + self.cells[0] * (j + self.cells[1] * k)];
+                    while point != NONE {
+                        if self.points[point as usize].distance(p) < distance {
+                            return true;
+                        }
+                        point = self.before[point as usize];
+                    }
+                }
+            }
+        }
+        false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn surface_points_are_on_the_surface_and_apart_without_gaps() {
+        for shape in Shape::ALL {
+            let spacing = 0.1;
+            let points = sample(shape, spacing, 5).expect("a lattice");
+            let on = |p: DVec3| shape.signed_distance(p).abs() < 1e-8;
+            let surface: Vec<DVec3> = points.iter().copied().filter(|&p| on(p)).collect();
+            for (n, p) in surface.iter().enumerate() {
+                assert!(
+                    surface[..n]
+                        .iter()
+                        .all(|q| q.distance(*p) >= APART * spacing)
+                );
+            }
+            for p in &points[surface.len()..] {
+                assert!(shape.signed_distance(*p) < 0.0);
+                let near = FROM_SURFACE_POINTS * spacing;
+                assert!(surface.iter().all(|q| q.distance(*p) >= near));
+            }
+            // Other places on the surface have a point near; the candidates are a third of a spacing apart.
+            for n in 0..500 {
+                let from = in_cube(9, n) * shape.half_extent();
+                if let Some(p) = project(shape, from, 1.0) {
+                    let nearest = surface.iter().map(|q| q.distance(p)).fold(1.0, f64::min);
+                    assert!(nearest < (APART + 0.5) * spacing, "{shape}: {nearest}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn corners_are_kept() {
+        let points = sample(Shape::Box, 0.2, 1).expect("a lattice");
+        for corner in 0..8 {
+            let side = |axis: u32| f64::from(corner >> axis & 1) - 0.5;
+            let corner = DVec3::new(side(0), side(1), side(2));
+            assert!(points.iter().any(|p| p.distance(corner) < 1e-6), "{corner}");
+        }
+    }
+}
