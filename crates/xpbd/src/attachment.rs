@@ -10,10 +10,10 @@
 use glam::{DQuat, DVec3};
 use rayon::prelude::*;
 
-use crate::real::{finite, load, store, weight};
+use crate::float::{finite, load, store, weight};
 use crate::step::Factors;
 use crate::step::PARALLEL_PARTICLES;
-use crate::{AttachmentData, Real, Solver, XpbdError};
+use crate::{AttachmentData, Float, Solver, XpbdError};
 
 /// Where a handle is and how it is turned.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,7 +72,7 @@ struct Handle {
 
 /// A particle's place on a handle.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Attachment<R: Real> {
+pub(crate) struct Attachment<R: Float> {
     pub(crate) particle: u32,
     handle: u32,
     /// The place in the handle's frame.
@@ -89,13 +89,13 @@ pub(crate) struct Attachment<R: Real> {
 
 /// All handles and what hangs on them.
 #[derive(Clone, Debug)]
-pub(crate) struct Attachments<R: Real> {
+pub(crate) struct Attachments<R: Float> {
     handles: Vec<Handle>,
     /// Ascending by particle, at most one each.
     list: Vec<Attachment<R>>,
 }
 
-impl<R: Real> Default for Attachments<R> {
+impl<R: Float> Default for Attachments<R> {
     fn default() -> Self {
         Self {
             handles: Vec::new(),
@@ -104,7 +104,7 @@ impl<R: Real> Default for Attachments<R> {
     }
 }
 
-impl<R: Real> Attachments<R> {
+impl<R: Float> Attachments<R> {
     /// Bytes of both lists.
     pub(crate) fn bytes(&self) -> usize {
         size_of_val(&*self.handles) + size_of_val(&*self.list)
@@ -213,7 +213,7 @@ fn check(what: &'static str, value: f64) -> Result<(), XpbdError> {
     })
 }
 
-impl<R: Real> Solver<R> {
+impl<R: Float> Solver<R> {
     /// Adds a handle and returns its number.
     ///
     /// # Panics

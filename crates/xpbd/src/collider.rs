@@ -17,9 +17,9 @@ mod solid;
 use glam::{DQuat, DVec3};
 use rayon::prelude::*;
 
-use crate::real::{finite, load, store, weight};
+use crate::float::{finite, load, store, weight};
 use crate::step::PARALLEL_PARTICLES;
-use crate::{Real, Solver, StepSettings, XpbdError};
+use crate::{Float, Solver, StepSettings, XpbdError};
 use solid::{Nearest, Solid};
 
 /// How far a particle may be pushed, in depths.
@@ -218,14 +218,14 @@ impl Collider {
 
 /// A collider at the end of a substep.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Obstacle<R: Real> {
+pub(crate) struct Obstacle<R: Float> {
     solid: Solid<R>,
     friction: R,
     /// What it moved in the substep.
     motion: R::Vector,
 }
 
-impl<R: Real> Obstacle<R> {
+impl<R: Float> Obstacle<R> {
     /// The colliders `elapsed` s after the start of the frame, at the end of a substep, relative to an origin.
     pub(crate) fn place(
         settings: &StepSettings,
@@ -329,7 +329,7 @@ impl Obstacle<f32> {
     }
 }
 
-impl<R: Real> Solver<R> {
+impl<R: Float> Solver<R> {
     /// Puts the particles inside of colliders on their surface.
     pub(crate) fn project_to_colliders(&self, obstacles: &[Obstacle<R>]) {
         let particles = self.particles.par_iter().with_min_len(PARALLEL_PARTICLES);
@@ -349,7 +349,7 @@ impl<R: Real> Solver<R> {
 /// Where a particle inside of a collider is put; `None` outside of all. Where colliders overlap, one may push a particle
 /// into another; then they take turns, which ends at a point outside of all if there is one nearby.
 #[inline]
-pub(crate) fn outside<R: Real>(
+pub(crate) fn outside<R: Float>(
     obstacles: &[Obstacle<R>],
     mut x: R::Vector,
     previous: R::Vector,

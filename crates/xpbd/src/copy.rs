@@ -6,7 +6,7 @@
 //! first step of a copy lays the tets out, O(tets).
 
 use crate::layout::Layout;
-use crate::{Real, Solver};
+use crate::{Float, Solver};
 
 /// A copy that goes on as the original would, to the bit. Nobody follows its changes yet: see
 /// [`Solver::track_changes`].
@@ -24,7 +24,7 @@ use crate::{Real, Solver};
 /// assert!(solver.position(0).z < 0.0 && before.position(0).z == 0.0);
 /// # Ok::<(), incise_xpbd::XpbdError>(())
 /// ```
-impl<R: Real> Clone for Solver<R> {
+impl<R: Float> Clone for Solver<R> {
     fn clone(&self) -> Self {
         Self {
             origin: self.origin,
@@ -60,7 +60,7 @@ impl<R: Real> Clone for Solver<R> {
     }
 }
 
-impl<R: Real> Solver<R> {
+impl<R: Float> Solver<R> {
     /// Bytes of the arrays that a copy has: those of particles, tets, attachments and other constraints, without their
     /// schedules. O(1).
     #[must_use]

@@ -12,11 +12,12 @@
 //! Source: Kelvin-Voigt model; implicit steps derived in [`crate::simd_kernel`]. Cost: about a pass over the tets a
 //! substep, and a copy of the velocities; nothing without a damped material.
 
+use crate::gauss_seidel;
 use crate::simd_kernel::Pass;
 use crate::step::Factors;
-use crate::{Real, Solver};
+use crate::{Float, Solver};
 
-impl<R: Real> Solver<R> {
+impl<R: Float> Solver<R> {
     /// Damps the velocities of a substep.
     pub(crate) fn damp(&mut self, factors: &Factors<R>) {
         let mut shared = std::mem::take(&mut self.shared_velocities);
@@ -36,7 +37,7 @@ impl<R: Real> Solver<R> {
             iterated: false,
             factors: *factors,
         };
-        R::damp_tets(self.level, &pass);
+        gauss_seidel::damp(self.level, &pass);
         for (velocity, cell) in self.velocities.iter_mut().zip(&shared) {
             let [x, y, z, _] = R::read(cell);
             *velocity = R::vector(x, y, z);

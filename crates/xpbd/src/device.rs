@@ -9,8 +9,8 @@ use incise_graph::Schedule;
 
 use crate::collider::Obstacle;
 use crate::layout::{CONSTANTS, REST};
-use crate::simd_kernel::MAX_COFACTOR_NORM;
-use crate::{Pose, Real, Solver, StepSettings, TetSolve};
+use crate::neo_hookean::MAX_COFACTOR_NORM;
+use crate::{Float, Pose, Solver, StepSettings, TetSolve};
 
 /// A tet as a kernel wants it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -103,7 +103,7 @@ impl Changes {
     }
 }
 
-impl<R: Real> Solver<R> {
+impl<R: Float> Solver<R> {
     /// From now on keeps track of changes; [`Solver::take_changes`] begins with everything.
     pub fn track_changes(&mut self) {
         self.changes = Some(Changes::everything());

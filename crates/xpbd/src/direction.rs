@@ -3,11 +3,11 @@
 //! Squares of lengths leave the range of single precision beyond 1e19 m and below 1e-19 m. Divided by its largest
 //! component first, a vector keeps its direction however long or short it is. Cost: three divisions more.
 
-use crate::Real;
+use crate::Float;
 
 /// The length of a vector and the vector of length 1 along it; `None` for zero and for what is no number.
 #[inline]
-pub(crate) fn direction<R: Real>(v: R::Vector) -> Option<(R, R::Vector)> {
+pub(crate) fn direction<R: Float>(v: R::Vector) -> Option<(R, R::Vector)> {
     let [x, y, z] = R::components(v);
     let [a, b, c] = [x, y, z].map(absolute);
     let largest = if a > b { a } else { b };
@@ -19,7 +19,7 @@ pub(crate) fn direction<R: Real>(v: R::Vector) -> Option<(R, R::Vector)> {
 
 /// The absolute value.
 #[inline]
-pub(crate) fn absolute<R: Real>(value: R) -> R {
+pub(crate) fn absolute<R: Float>(value: R) -> R {
     if value < R::ZERO { -value } else { value }
 }
 

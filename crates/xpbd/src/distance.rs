@@ -8,7 +8,7 @@ use incise_graph::Schedule;
 
 use crate::direction::direction;
 use crate::scalar::{Constraints, Scalar};
-use crate::{DistanceData, Real, Solver, XpbdError};
+use crate::{DistanceData, Float, Solver, XpbdError};
 
 /// Keeps two particles at a distance. See [`Solver::set_distances`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,7 +56,7 @@ pub(crate) struct Distance<R> {
     only_when_longer: bool,
 }
 
-impl<R: Real> Distance<R> {
+impl<R: Float> Distance<R> {
     /// All there is to know.
     pub(crate) fn data(&self) -> DistanceData<R> {
         DistanceData {
@@ -69,7 +69,7 @@ impl<R: Real> Distance<R> {
     }
 }
 
-impl<R: Real> Distance<R> {
+impl<R: Float> Distance<R> {
     /// The distance at rest.
     #[inline]
     pub(crate) fn length(&self) -> R {
@@ -88,7 +88,7 @@ impl<R: Real> Distance<R> {
     }
 }
 
-impl<R: Real> Scalar<R, 2> for Distance<R> {
+impl<R: Float> Scalar<R, 2> for Distance<R> {
     #[inline]
     fn particles(&self) -> [u32; 2] {
         self.particles
@@ -117,7 +117,7 @@ impl<R: Real> Scalar<R, 2> for Distance<R> {
     }
 }
 
-impl<R: Real> Solver<R> {
+impl<R: Float> Solver<R> {
     /// Replaces all distance constraints; none at all takes neither memory nor time. They are solved after the tets of
     /// each iteration, in the order of their own `schedule`, which a coloring of any kind may have made. O(constraints).
     ///

@@ -11,13 +11,14 @@ use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
 use crate::crew::in_rounds;
 use crate::simd_kernel::{Block, BlockKernel, Damping, Pass, Sequential, Split};
-use crate::{Real, TetSolve};
+use crate::{Float, TetSolve};
 
 /// Fewest blocks that a thread is given of a color: about a microsecond of work.
 const BLOCKS_A_THREAD: usize = 4;
 
 /// Solves all tets once.
-pub(crate) fn solve<R: Real>(level: Level, form: TetSolve, pass: &Pass<'_, R>) {
+#[inline(never)]
+pub(crate) fn solve<R: Float>(level: Level, form: TetSolve, pass: &Pass<'_, R>) {
     match form {
         TetSolve::Split => with::<R, Split>(level, pass),
         TetSolve::Block => with::<R, Block>(level, pass),
@@ -26,13 +27,14 @@ pub(crate) fn solve<R: Real>(level: Level, form: TetSolve, pass: &Pass<'_, R>) {
 }
 
 /// Damps the velocities at the corners of all tets once.
-pub(crate) fn damp<R: Real>(level: Level, pass: &Pass<'_, R>) {
+#[inline(never)]
+pub(crate) fn damp<R: Float>(level: Level, pass: &Pass<'_, R>) {
     with::<R, Damping>(level, pass);
 }
 
 /// Of the instruction sets of x86-64, SSE 4.2 has nothing over SSE 2 that the kernel needs.
 #[cfg(target_arch = "x86_64")]
-fn with<R: Real, K: BlockKernel>(level: Level, pass: &Pass<'_, R>) {
+fn with<R: Float, K: BlockKernel>(level: Level, pass: &Pass<'_, R>) {
     if let Some(simd) = level.as_avx512() {
         colors::<R, _, K>(simd, pass);
     } else if let Some(simd) = level.as_avx2() {
@@ -44,21 +46,21 @@ fn with<R: Real, K: BlockKernel>(level: Level, pass: &Pass<'_, R>) {
 }
 
 #[cfg(not(target_arch = "x86_64"))]
-fn with<R: Real, K: BlockKernel>(level: Level, pass: &Pass<'_, R>) {
+fn with<R: Float, K: BlockKernel>(level: Level, pass: &Pass<'_, R>) {
     dispatch!(level, simd => colors::<R, _, K>(simd, pass));
 }
 
 /// The tets in a block.
-pub(crate) fn lanes<R: Real>(level: Level) -> usize {
+pub(crate) fn lanes<R: Float>(level: Level) -> usize {
     #[inline(always)]
-    fn length<R: Real, S: Simd>(_: S) -> usize {
+    fn length<R: Float, S: Simd>(_: S) -> usize {
         R::Lanes::<S>::LEN
     }
     dispatch!(level, simd => length::<R, _>(simd))
 }
 
 #[inline(always)]
-fn colors<R: Real, S: Simd, K: BlockKernel>(simd: S, pass: &Pass<'_, R>) {
+fn colors<R: Float, S: Simd, K: BlockKernel>(simd: S, pass: &Pass<'_, R>) {
     let layout = pass.layout;
     let threads = rayon::current_num_threads();
     let chunks = |color: usize| match layout.blocks_of(color) {

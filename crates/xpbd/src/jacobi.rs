@@ -8,12 +8,12 @@
 //! Source: Wang 2015, algorithm 1, for the extrapolation; paper section 5.3 for the comparison.
 //! Cost: that of a Gauss-Seidel pass, a pass over the particles, and with Chebyshev two more copies of the state.
 
-use crate::Real;
-use crate::real::{load, store};
+use crate::Float;
+use crate::float::{load, store};
 
 /// The state of Jacobi iterations within a substep.
 #[derive(Debug)]
-pub(crate) struct Jacobi<R: Real> {
+pub(crate) struct Jacobi<R: Float> {
     /// What the constraints want to move each particle by.
     pub(crate) corrections: Vec<R::Particle>,
     /// The last two iterates; empty without extrapolation.
@@ -26,12 +26,12 @@ pub(crate) struct Jacobi<R: Real> {
 }
 
 #[derive(Debug, Default)]
-struct Iterate<R: Real> {
+struct Iterate<R: Float> {
     positions: Vec<R::Vector>,
     multipliers: Vec<R>,
 }
 
-impl<R: Real> Default for Jacobi<R> {
+impl<R: Float> Default for Jacobi<R> {
     fn default() -> Self {
         Self {
             corrections: Vec::new(),
@@ -43,7 +43,7 @@ impl<R: Real> Default for Jacobi<R> {
     }
 }
 
-impl<R: Real> Jacobi<R> {
+impl<R: Float> Jacobi<R> {
     /// Begins a substep.
     pub(crate) fn restart(&mut self) {
         self.made = 0;

@@ -2,7 +2,7 @@
 //!
 //! Nothing is softened in a solver without a limit. Cost: a comparison for each tet that comes.
 
-use crate::{Real, Solver};
+use crate::{Float, Solver};
 
 /// See [`Solver::limit_kappa`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,7 +13,7 @@ pub struct KappaLimit {
     pub substep_time: f64,
 }
 
-impl<R: Real> Solver<R> {
+impl<R: Float> Solver<R> {
     /// From now on, softens every new tet whose [`Solver::kappa`] at `substep_time` would exceed `kappa`, so that it
     /// just meets it; `None` ends this.
     ///

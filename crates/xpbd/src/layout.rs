@@ -19,7 +19,7 @@ use std::ops::Range;
 use glam::DVec4;
 use incise_graph::{ClusterId, Rows, Schedule};
 
-use crate::Real;
+use crate::Float;
 use crate::neo_hookean::TetConstraint;
 
 /// Numbers a lane has in [`Layout::rest`]: the inverse rest matrix, the Cholesky factor of the weighted metric, the stiffness.
@@ -118,7 +118,7 @@ pub(crate) struct Ingredients<R> {
     pub(crate) constants: [R; CONSTANTS],
 }
 
-impl<R: Real> Ingredients<R> {
+impl<R: Float> Ingredients<R> {
     /// What is stored for the tet.
     pub(crate) fn rest(&self) -> [R; REST] {
         let mut rest = [self.tet.stiffness; REST];
@@ -128,7 +128,7 @@ impl<R: Real> Ingredients<R> {
     }
 }
 
-impl<R: Real> Default for Layout<R> {
+impl<R: Float> Default for Layout<R> {
     fn default() -> Self {
         Self {
             revision: None,
@@ -154,7 +154,7 @@ impl<R: Real> Default for Layout<R> {
     }
 }
 
-impl<R: Real> Layout<R> {
+impl<R: Float> Layout<R> {
     /// Whether this is the layout of the schedule, and no tet has changed since.
     pub(crate) fn fits(&self, schedule: &Schedule) -> bool {
         self.revision == Some(schedule.revision()) && self.dirty.is_empty()
@@ -231,7 +231,7 @@ impl<R: Real> Layout<R> {
 /// With it `Σ w |∇C|²` needs no gradients at the corners: it is `|A L|²` for `A = dC/dF`. A sum of squares loses nothing to
 /// rounding; `G : AᵀA`, which is the same, loses all of a sliver whose steep direction A hardly sees. L comes from an
 /// orthogonalization of the weighted gradients in double precision, since G itself would lose as much.
-fn metric_factor<R: Real>(tet: &TetConstraint<R>, weights: [R; 4]) -> [R; 6] {
+fn metric_factor<R: Float>(tet: &TetConstraint<R>, weights: [R; 4]) -> [R; 6] {
     let q = tet.inverse_rest.map(R::to_f64);
     let stiffness = tet.stiffness.to_f64();
     let roots = weights.map(|w| (w.to_f64() * stiffness).sqrt());

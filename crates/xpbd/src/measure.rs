@@ -5,7 +5,7 @@
 
 use glam::{DMat3, DVec3};
 
-use crate::{Real, Solver};
+use crate::{Float, Solver};
 
 /// Energies in J.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -42,7 +42,7 @@ pub struct Softened {
     pub strongest: f64,
 }
 
-impl<R: Real> Solver<R> {
+impl<R: Float> Solver<R> {
     /// The energies of the present state.
     #[must_use]
     pub fn energy(&self, gravity: Option<DVec3>) -> Energy {

@@ -15,9 +15,9 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::real::{load, store};
+use crate::float::{load, store};
 use crate::step::PARALLEL_PARTICLES;
-use crate::{Real, Solver};
+use crate::{Float, Solver};
 
 /// An axis-aligned box.
 #[derive(Clone, Copy, Debug)]
@@ -79,7 +79,7 @@ pub(crate) fn frame_of(positions: &[DVec3]) -> (DVec3, f64) {
     }
 }
 
-impl<R: Real> Solver<R> {
+impl<R: Float> Solver<R> {
     /// The point in m that the solver keeps positions relative to, in its own precision. [`Solver::step`] moves it
     /// when the body has moved on by more than twice its size.
     #[must_use]

@@ -1,102 +1,17 @@
-//! [`Real`]: the scalar of a solver, `f32` or `f64`, with its vector and its shared cell.
+//! [`Real`]: the precisions that a solver steps in, and the functions that advance it.
 //!
-//! One source serves both precisions. Particles live in atomic cells: within a color every particle belongs to at most
-//! one cluster, so threads never meet, but the language cannot know that. Relaxed atomic loads and stores are plain
-//! moves on every processor of interest; they make the sharing safe at no cost. A single-precision particle takes two
-//! cells of 64 bits, not four of 32: half the moves.
-
-use std::fmt::Debug;
-use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
-use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
-
-use fearless_simd::{Level, Simd, SimdFloat, SimdFloatElement};
-use glam::{DVec3, Vec3};
+//! The large algorithms are called through this trait, so they are compiled once for each precision, with this crate;
+//! called directly they would be compiled again in every crate that steps a solver.
 
 use incise_graph::Schedule;
 
-use crate::gauss_seidel;
-use crate::simd_kernel::Pass;
 use crate::{
-    CoarseCorrection, Solver, StepReport, StepSettings, TetSolve, VbdReport, VbdSettings,
-    VertexStars, XpbdError,
+    CoarseCorrection, Float, Solver, StepReport, StepSettings, VbdReport, VbdSettings, VertexStars,
+    XpbdError,
 };
 
-/// A scalar that the solver can compute with: `f32` or `f64`.
-pub trait Real:
-    Copy
-    + Debug
-    + Default
-    + PartialOrd
-    + Send
-    + Sync
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Div<Output = Self>
-    + Neg<Output = Self>
-    + SimdFloatElement
-    + 'static
-{
-    /// The vector of three such scalars.
-    type Vector: Copy
-        + Debug
-        + Default
-        + Send
-        + Sync
-        + Add<Output = Self::Vector>
-        + AddAssign
-        + Sub<Output = Self::Vector>
-        + Neg<Output = Self::Vector>
-        + Mul<Self, Output = Self::Vector>;
-    /// A cell that threads may share.
-    type Atomic: Debug + Send + Sync;
-    /// Four scalars that threads may share: the position of a particle and its inverse mass.
-    type Particle: Debug + Send + Sync;
-    /// As many scalars as an instruction of a processor takes.
-    #[doc(hidden)]
-    type Lanes<S: Simd>: SimdFloat<S, Element = Self>;
-
-    /// Zero.
-    const ZERO: Self;
-    /// One.
-    const ONE: Self;
-    /// One half.
-    const HALF: Self;
-    /// The distance from one to the next larger number.
-    const EPSILON: Self;
-
-    /// Rounds a double to this precision.
-    fn from_f64(value: f64) -> Self;
-    /// The value in double precision.
-    fn to_f64(self) -> f64;
-    /// The square root.
-    fn sqrt(self) -> Self;
-    /// Whether the value is neither infinite nor NaN.
-    fn is_finite(self) -> bool;
-    /// A vector from its components.
-    fn vector(x: Self, y: Self, z: Self) -> Self::Vector;
-    /// The components of a vector.
-    fn components(v: Self::Vector) -> [Self; 3];
-    /// The dot product.
-    fn dot(a: Self::Vector, b: Self::Vector) -> Self;
-    /// The cross product.
-    fn cross(a: Self::Vector, b: Self::Vector) -> Self::Vector;
-    /// A cell that holds `self`.
-    fn cell(self) -> Self::Atomic;
-    /// The value in a cell.
-    fn load(cell: &Self::Atomic) -> Self;
-    /// Puts `self` into a cell.
-    fn store(self, cell: &Self::Atomic);
-    /// A particle's cell that holds `values`.
-    fn particle(values: [Self; 4]) -> Self::Particle;
-    /// The values in a particle's cell.
-    fn read(particle: &Self::Particle) -> [Self; 4];
-    /// Puts values into a particle's cell.
-    fn write(particle: &Self::Particle, values: [Self; 4]);
-
-    // What follows are the large algorithms of a solver. Called through this trait they are compiled once for each
-    // precision, with this crate; called directly they would be compiled again in every crate that steps a solver.
-
+/// A precision that solvers step in: `f32` or `f64`.
+pub trait Real: Float {
     /// Advances a solver by one frame of XPBD.
     #[doc(hidden)]
     fn step(
@@ -118,89 +33,11 @@ pub trait Real:
     /// Updates the layout of a solver.
     #[doc(hidden)]
     fn lay_out(solver: &mut Solver<Self>, schedule: &Schedule);
-
-    /// Makes a pass over tets.
-    #[doc(hidden)]
-    fn solve_tets(level: Level, form: TetSolve, pass: &Pass<'_, Self>);
-
-    /// Makes a damping pass over tets.
-    #[doc(hidden)]
-    fn damp_tets(level: Level, pass: &Pass<'_, Self>);
-
-    /// Rounds a vector of doubles to this precision.
-    #[inline]
-    fn from_dvec3(v: DVec3) -> Self::Vector {
-        Self::vector(
-            Self::from_f64(v.x),
-            Self::from_f64(v.y),
-            Self::from_f64(v.z),
-        )
-    }
-
-    /// The vector in double precision.
-    #[inline]
-    fn to_dvec3(v: Self::Vector) -> DVec3 {
-        DVec3::from_array(Self::components(v).map(Self::to_f64))
-    }
 }
 
 macro_rules! real {
-    ($scalar:ty, $vector:ty, $atomic:ty, $lanes:ident, $from_f64:expr, $cells:literal, $pack:expr, $unpack:expr) => {
+    ($($scalar:ty),*) => {$(
         impl Real for $scalar {
-            type Vector = $vector;
-            type Atomic = $atomic;
-            type Particle = [AtomicU64; $cells];
-            type Lanes<S: Simd> = S::$lanes;
-
-            const ZERO: Self = 0.0;
-            const ONE: Self = 1.0;
-            const HALF: Self = 0.5;
-            const EPSILON: Self = <$scalar>::EPSILON;
-
-            #[inline]
-            fn from_f64(value: f64) -> Self {
-                $from_f64(value)
-            }
-            #[inline]
-            fn to_f64(self) -> f64 {
-                f64::from(self)
-            }
-            #[inline]
-            fn sqrt(self) -> Self {
-                self.sqrt()
-            }
-            #[inline]
-            fn is_finite(self) -> bool {
-                self.is_finite()
-            }
-            #[inline]
-            fn vector(x: Self, y: Self, z: Self) -> $vector {
-                <$vector>::new(x, y, z)
-            }
-            #[inline]
-            fn components(v: $vector) -> [Self; 3] {
-                v.to_array()
-            }
-            #[inline]
-            fn dot(a: $vector, b: $vector) -> Self {
-                a.dot(b)
-            }
-            #[inline]
-            fn cross(a: $vector, b: $vector) -> $vector {
-                a.cross(b)
-            }
-            #[inline]
-            fn cell(self) -> $atomic {
-                <$atomic>::new(self.to_bits())
-            }
-            #[inline]
-            fn load(cell: &$atomic) -> Self {
-                Self::from_bits(cell.load(Ordering::Relaxed))
-            }
-            #[inline]
-            fn store(self, cell: &$atomic) {
-                cell.store(self.to_bits(), Ordering::Relaxed);
-            }
             #[inline(never)]
             fn step(
                 solver: &mut Solver<Self>,
@@ -224,114 +61,163 @@ macro_rules! real {
             }
             #[inline(never)]
             fn lay_out(solver: &mut Solver<Self>, schedule: &Schedule) {
-                solver.bring_up_layout(schedule);
-            }
-            #[inline(never)]
-            fn solve_tets(level: Level, form: TetSolve, pass: &Pass<'_, Self>) {
-                gauss_seidel::solve(level, form, pass);
-            }
-            #[inline(never)]
-            fn damp_tets(level: Level, pass: &Pass<'_, Self>) {
-                gauss_seidel::damp(level, pass);
-            }
-            #[inline(always)]
-            fn particle(values: [Self; 4]) -> Self::Particle {
-                $pack(values).map(AtomicU64::new)
-            }
-            #[inline(always)]
-            fn read(particle: &Self::Particle) -> [Self; 4] {
-                $unpack(std::array::from_fn(|i| particle[i].load(Ordering::Relaxed)))
-            }
-            #[inline(always)]
-            fn write(particle: &Self::Particle, values: [Self; 4]) {
-                let packed: [u64; $cells] = $pack(values);
-                for (cell, bits) in particle.iter().zip(packed) {
-                    cell.store(bits, Ordering::Relaxed);
-                }
+                solver.update_layout(schedule);
             }
         }
-    };
+    )*};
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "rounding to single precision is the purpose"
-)]
-#[inline]
-fn round_to_f32(value: f64) -> f32 {
-    value as f32
-}
+real!(f32, f64);
 
-/// Two single-precision numbers in one cell, the first in the lower half.
-#[inline(always)]
-fn pack_f32(v: [f32; 4]) -> [u64; 2] {
-    let pair = |a: f32, b: f32| u64::from(a.to_bits()) | (u64::from(b.to_bits()) << 32);
-    [pair(v[0], v[1]), pair(v[2], v[3])]
-}
+impl<R: Real> Solver<R> {
+    /// Advances by one frame of `settings.time_step`.
+    ///
+    /// # Errors
+    /// If the settings do not pass [`StepSettings::check`]; nothing has moved then.
+    ///
+    /// # Panics
+    /// If the schedule names a tet that does not exist.
+    ///
+    /// # Determinism
+    /// Bit-identical for any number of threads.
+    pub fn step(
+        &mut self,
+        schedule: &Schedule,
+        settings: &StepSettings,
+    ) -> Result<StepReport, XpbdError> {
+        R::step(self, schedule, settings, false)
+    }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "the lower half is what is wanted"
-)]
-#[inline(always)]
-fn unpack_f32(cells: [u64; 2]) -> [f32; 4] {
-    let [low, high] = cells.map(|c| [f32::from_bits(c as u32), f32::from_bits((c >> 32) as u32)]);
-    [low[0], low[1], high[0], high[1]]
-}
+    /// Advances by one frame and keeps what [`Solver::residuals`] needs from the last substep.
+    ///
+    /// # Errors
+    /// If the settings do not pass [`StepSettings::check`]; nothing has moved then.
+    ///
+    /// # Panics
+    /// If the schedule names a tet that does not exist.
+    pub fn step_keeping_residuals(
+        &mut self,
+        schedule: &Schedule,
+        settings: &StepSettings,
+    ) -> Result<StepReport, XpbdError> {
+        R::step(self, schedule, settings, true)
+    }
 
-#[inline(always)]
-fn pack_f64(v: [f64; 4]) -> [u64; 4] {
-    v.map(f64::to_bits)
-}
+    /// Puts the tets into the order of a schedule, unless they are, as a step does first. Whoever wants to know what a
+    /// cut costs calls this before the step.
+    ///
+    /// A schedule that has been [updated](Schedule::update) since the last call is followed at the cost of what has
+    /// changed of it and of the tets, amortized; another one, even an equal one, and new materials cost O(tets).
+    ///
+    /// # Panics
+    /// If the schedule names a tet that does not exist.
+    pub fn lay_out(&mut self, schedule: &Schedule) {
+        R::lay_out(self, schedule);
+    }
 
-#[inline(always)]
-fn unpack_f64(cells: [u64; 4]) -> [f64; 4] {
-    cells.map(f64::from_bits)
-}
+    /// Advances by one frame of `settings.step.time_step` by sweeps of vertex block descent. May take turns with
+    /// [`Solver::step`].
+    ///
+    /// Damping, distances, volume constraints and attachments mean what they mean to [`Solver::step`]: both go to the same
+    /// motion with smaller substeps. Hard constraints (compliance 0) are met by multipliers that each iteration
+    /// improves; with few iterations a part of their violation is left.
+    ///
+    /// # Errors
+    /// If the settings do not pass [`VbdSettings::check`]; nothing has moved then.
+    ///
+    /// # Panics
+    /// If the stars are those of another number of particles, tets or constraints.
+    ///
+    /// # Determinism
+    /// Bit-identical for any number of threads.
+    ///
+    /// # Example
+    /// A tet of steel hangs from a corner; kappa is 1e4, far beyond what XPBD can do in one substep.
+    /// ```
+    /// use glam::DVec3;
+    /// use incise_graph::{Clustering, ColorId, Coloring, Schedule};
+    /// use incise_xpbd::{VbdSettings, Material, Solver, VertexStars};
+    ///
+    /// let rest = [DVec3::ZERO, DVec3::Y, DVec3::X, DVec3::NEG_Z];
+    /// let steel = Material { young_modulus: 2e11, poisson_ratio: 0.3, density: 7800.0, damping: 0.0 };
+    /// let mut solver = Solver::<f64>::new(&rest);
+    /// solver.add_material(steel)?;
+    /// solver.push_tet([0, 1, 2, 3], rest, 0);
+    /// for p in 0..4 {
+    ///     solver.set_mass(p, 7800.0 / 24.0);
+    /// }
+    /// solver.set_fixed(0, true);
+    ///
+    /// // Four particles of one tet need four colors.
+    /// let colors = Coloring::new([0, 1, 2, 3].map(ColorId).to_vec());
+    /// let mut stars = VertexStars::new(&solver, &Schedule::new(&Clustering::none(4), &colors))?;
+    /// let mut settings = VbdSettings::new(1.0 / 60.0, 20);
+    /// settings.step.gravity = Some(DVec3::new(0.0, 0.0, -9.81));
+    /// for _ in 0..60 {
+    ///     assert_eq!(solver.step_vbd(&mut stars, &settings)?.repaired, 0);
+    /// }
+    /// assert!((solver.volume().min_ratio - 1.0).abs() < 1e-3);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn step_vbd(
+        &mut self,
+        stars: &mut VertexStars<R>,
+        settings: &VbdSettings,
+    ) -> Result<VbdReport, XpbdError> {
+        let _span = tracing::debug_span!("xpbd::step_vbd").entered();
+        R::step_vbd(self, stars, None, settings)
+    }
 
-real!(
-    f32,
-    Vec3,
-    AtomicU32,
-    f32s,
-    round_to_f32,
-    2,
-    pack_f32,
-    unpack_f32
-);
-real!(
-    f64,
-    DVec3,
-    AtomicU64,
-    f64s,
-    std::convert::identity,
-    4,
-    pack_f64,
-    unpack_f64
-);
-
-/// Whether all components are finite.
-#[inline]
-pub(crate) fn finite<R: Real>(v: R::Vector) -> bool {
-    R::components(v).into_iter().all(R::is_finite)
-}
-
-/// The position of a particle.
-#[inline]
-pub(crate) fn load<R: Real>(particle: &R::Particle) -> R::Vector {
-    let [x, y, z, _] = R::read(particle);
-    R::vector(x, y, z)
-}
-
-/// The inverse mass of a particle in 1/kg; 0 if it does not move.
-#[inline]
-pub(crate) fn weight<R: Real>(particle: &R::Particle) -> R {
-    R::read(particle)[3]
-}
-
-/// Moves a particle.
-#[inline]
-pub(crate) fn store<R: Real>(particle: &R::Particle, x: R::Vector) {
-    let [a, b, c] = R::components(x);
-    R::write(particle, [a, b, c, weight::<R>(particle)]);
+    /// Advances by one frame of VBD with a coarse correction after each sweep. A substep also ends when the accuracy of the
+    /// settings is reached, or when two corrections in a row find nothing to gain: in single precision that is soon so in a
+    /// stiff body.
+    ///
+    /// # Errors
+    /// Those of [`Solver::step_vbd`].
+    ///
+    /// # Panics
+    /// If stars or correction are those of another number of particles or tets.
+    ///
+    /// # Determinism
+    /// Bit-identical for any number of threads.
+    ///
+    /// # Example
+    /// A wedge of steel hangs from a corner and reaches 1e-9 of its first residual in a few rounds.
+    /// ```
+    /// use glam::DVec3;
+    /// use incise_graph::{Clustering, ColorId, Coloring, Schedule};
+    /// use incise_xpbd::{CoarseCorrection, CoarseCorrectionSettings, VbdSettings, Material, Solver, VertexStars};
+    ///
+    /// let rest = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE];
+    /// let steel = Material { young_modulus: 2e11, poisson_ratio: 0.3, density: 7800.0, damping: 0.0 };
+    /// let mut solver = Solver::<f64>::new(&rest);
+    /// solver.add_material(steel)?;
+    /// for tet in [[0u32, 1, 2, 3], [1, 4, 2, 3]] {
+    ///     solver.push_tet(tet, tet.map(|p| rest[p as usize]), 0);
+    /// }
+    /// for p in 0..5 {
+    ///     solver.set_mass(p, 1000.0);
+    /// }
+    /// solver.set_fixed(0, true);
+    ///
+    /// // Particles 0 and 4 share no tet, so they share a color.
+    /// let colors = Coloring::new([0, 1, 2, 3, 0].map(ColorId).to_vec());
+    /// let mut stars = VertexStars::new(&solver, &Schedule::new(&Clustering::none(5), &colors))?;
+    /// let mut correction = CoarseCorrection::new(&stars, CoarseCorrectionSettings::default())?;
+    /// let mut settings = VbdSettings::new(1.0 / 60.0, 20);
+    /// settings.step.gravity = Some(DVec3::new(0.0, 0.0, -9.81));
+    /// settings.tolerance = Some(1e-9);
+    /// let report = solver.step_vbd_two_level(&mut stars, &mut correction, &settings)?;
+    /// assert!(report.iterations < 10);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn step_vbd_two_level(
+        &mut self,
+        stars: &mut VertexStars<R>,
+        correction: &mut CoarseCorrection<R>,
+        settings: &VbdSettings,
+    ) -> Result<VbdReport, XpbdError> {
+        let _span = tracing::debug_span!("xpbd::step_vbd_two_level").entered();
+        R::step_vbd(self, stars, Some(correction), settings)
+    }
 }

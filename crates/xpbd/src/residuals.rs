@@ -10,9 +10,9 @@
 
 use glam::DVec3;
 
+use crate::float::weight;
 use crate::neo_hookean::{Evaluation, TetConstraint};
-use crate::real::weight;
-use crate::{Real, Solver, TetSolve};
+use crate::{Float, Solver, TetSolve};
 
 /// How far the last substep is from a solution of its equations.
 ///
@@ -38,7 +38,7 @@ pub struct Residuals {
     pub potential: f64,
 }
 
-impl<R: Real> Solver<R> {
+impl<R: Float> Solver<R> {
     /// The residuals of the last substep; `None` unless it was made by [`Solver::step_keeping_residuals`] with
     /// `substep_time` and no particle or tet has come since. They are those of the positions as they are now.
     ///
@@ -200,16 +200,6 @@ impl<R: Real> Solver<R> {
     /// Whether a particle is neither held nor without mass.
     pub(crate) fn moves(&self, particle: usize) -> bool {
         weight::<R>(&self.particles[particle]) > R::ZERO
-    }
-}
-
-impl TetConstraint<f64> {
-    /// The elastic energy in J of the tet as the solver has it, softened or left out; 0 at rest.
-    pub(crate) fn energy(&self, e: &Evaluation<f64>) -> f64 {
-        let at_rest = 1.0 - self.gamma;
-        let shape = e.deviatoric * e.deviatoric - 3.0;
-        let bulge = e.hydrostatic * e.hydrostatic - at_rest * at_rest;
-        0.5 * self.stiffness * (shape + self.ratio * bulge)
     }
 }
 

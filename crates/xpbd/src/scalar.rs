@@ -10,15 +10,15 @@
 use incise_graph::{ClusterId, Incidence, Schedule};
 use rayon::prelude::*;
 
-use crate::real::{load, store, weight};
+use crate::float::{load, store, weight};
 use crate::step::Factors;
-use crate::{Real, Solver, XpbdError};
+use crate::{Float, Solver, XpbdError};
 
 /// Constraints in a color from which a second thread pays for its wake-up.
 const PARALLEL_CONSTRAINTS: usize = 256;
 
 /// One constraint on `K` particles.
-pub(crate) trait Scalar<R: Real, const K: usize>: Sync {
+pub(crate) trait Scalar<R: Float, const K: usize>: Sync {
     fn particles(&self) -> [u32; K];
     /// Value and gradients; `None` where there is no gradient.
     fn evaluate(&self, x: [R::Vector; K]) -> Option<(R, [R::Vector; K])>;
@@ -31,7 +31,7 @@ pub(crate) trait Scalar<R: Real, const K: usize>: Sync {
 
 /// All constraints of a kind with their order.
 #[derive(Debug)]
-pub(crate) struct Constraints<R: Real, C> {
+pub(crate) struct Constraints<R: Float, C> {
     pub(crate) list: Vec<C>,
     pub(crate) schedule: Schedule,
     damped: bool,
@@ -39,7 +39,7 @@ pub(crate) struct Constraints<R: Real, C> {
     multipliers: Vec<R::Atomic>,
 }
 
-impl<R: Real, C: Clone> Clone for Constraints<R, C> {
+impl<R: Float, C: Clone> Clone for Constraints<R, C> {
     fn clone(&self) -> Self {
         Self {
             list: self.list.clone(),
@@ -51,7 +51,7 @@ impl<R: Real, C: Clone> Clone for Constraints<R, C> {
     }
 }
 
-impl<R: Real, C> Constraints<R, C> {
+impl<R: Float, C> Constraints<R, C> {
     /// Puts constraints and a schedule together that fit. `what` names the kind.
     pub(crate) fn new<const K: usize>(
         what: &'static str,

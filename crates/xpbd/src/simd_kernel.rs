@@ -40,14 +40,14 @@ mod memory;
 use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask};
 
 use crate::layout::{CONSTANTS, Layout, REST};
+use crate::neo_hookean::{LARGE_STRAIN, MAX_COFACTOR_NORM, SHORTENINGS};
 use crate::step::Factors;
-use crate::{Real, TetSolve};
+use crate::{Float, TetSolve};
 use memory::{gather, load_multipliers, scatter, splat, store_multipliers};
 
-/// The input of a pass over the tets. Public only because [`Real`] names it.
-#[expect(unnameable_types, reason = "passes are made by this crate alone")]
+/// The input of a pass over the tets.
 #[derive(Debug)]
-pub struct Pass<'a, R: Real> {
+pub(crate) struct Pass<'a, R: Float> {
     pub(crate) layout: &'a Layout<R>,
     pub(crate) particles: &'a [R::Particle],
     /// Velocities and inverse masses of the particles; used by [`Damping`] only, else empty.
@@ -65,7 +65,7 @@ pub struct Pass<'a, R: Real> {
 /// corrections go is decided once a block at run time, which costs nothing measurable.
 pub(crate) trait BlockKernel {
     /// Processes the tets of a block, which share no particle.
-    fn run<R: Real, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize);
+    fn run<R: Float, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize);
 }
 
 /// [`TetSolve::Split`].
@@ -79,28 +79,28 @@ pub(crate) struct Damping;
 
 impl BlockKernel for Split {
     #[inline(always)]
-    fn run<R: Real, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize) {
+    fn run<R: Float, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize) {
         solve_block::<R, S>(simd, pass, block, TetSolve::Split);
     }
 }
 
 impl BlockKernel for Block {
     #[inline(always)]
-    fn run<R: Real, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize) {
+    fn run<R: Float, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize) {
         solve_block::<R, S>(simd, pass, block, TetSolve::Block);
     }
 }
 
 impl BlockKernel for Sequential {
     #[inline(always)]
-    fn run<R: Real, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize) {
+    fn run<R: Float, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize) {
         solve_block::<R, S>(simd, pass, block, TetSolve::Sequential);
     }
 }
 
 impl BlockKernel for Damping {
     #[inline(always)]
-    fn run<R: Real, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize) {
+    fn run<R: Float, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize) {
         damp_block::<R, S>(simd, pass, block);
     }
 }
@@ -133,29 +133,16 @@ struct Energies<V, M> {
 
 /// [`Energies`] in lanes.
 type EnergiesOf<R, S> =
-    Energies<<R as Real>::Lanes<S>, <<R as Real>::Lanes<S> as SimdBase<S>>::Mask>;
-
-/// The norm of the derivative of det F, √3 at rest, up to which tets follow their material exactly: that of a tet
-/// stretched two and a half times along each axis, or fifty times along one at constant volume. Beyond it derivative and
-/// value of the volume term are scaled down.
-pub(crate) const MAX_COFACTOR_NORM: f64 = 10.0;
-
-/// The trace of E beyond which `Ψ_D` is computed as `tr E / 2 - (J - 1) + (J - 1)² / 2`. Near rest that loses all digits, and
-/// far from it the form without `tr E` does, in which terms of sixth degree cancel.
-pub(crate) const LARGE_STRAIN: f64 = 2.0;
+    Energies<<R as Float>::Lanes<S>, <<R as Float>::Lanes<S> as SimdBase<S>>::Mask>;
 
 /// The corners of tets with their inverse masses, and a change of them per weight.
-struct Step<R: Real, S: Simd> {
+struct Step<R: Float, S: Simd> {
     x: [[R::Lanes<S>; 4]; 4],
     change: Matrix<R::Lanes<S>>,
 }
 
-/// How often a step that raises the energy of its tet is shortened. Of two million random tets three left one whose
-/// energy rose, by a part of 3e-5.
-pub(crate) const SHORTENINGS: u32 = 3;
-
 /// The tets of one block.
-struct Tets<'a, R: Real, S: Simd> {
+struct Tets<'a, R: Float, S: Simd> {
     simd: S,
     rest: &'a [R],
     /// `l/μ`.
@@ -169,7 +156,7 @@ struct Tets<'a, R: Real, S: Simd> {
 
 /// Solves the constraints of the tets of a block.
 #[inline(always)]
-fn solve_block<R: Real, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize, form: TetSolve) {
+fn solve_block<R: Float, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize, form: TetSolve) {
     let lanes = R::Lanes::<S>::LEN;
     let layout = pass.layout;
     let active = layout.active[block];
@@ -235,7 +222,7 @@ fn solve_block<R: Real, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize, form
 
 /// Damps the velocities of the corners of the tets of a block.
 #[inline(always)]
-fn damp_block<R: Real, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize) {
+fn damp_block<R: Float, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize) {
     let lanes = R::Lanes::<S>::LEN;
     let layout = pass.layout;
     let active = layout.active[block];
@@ -253,7 +240,7 @@ fn damp_block<R: Real, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize) {
     scatter::<R, S>(&v, corners, active, write);
 }
 
-impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
+impl<'a, R: Float, S: Simd> Tets<'a, R, S> {
     #[inline(always)]
     fn new(simd: S, pass: &Pass<'a, R>, block: usize) -> Self {
         let lanes = R::Lanes::<S>::LEN;
@@ -754,7 +741,7 @@ impl<'a, R: Real, S: Simd> Tets<'a, R, S> {
 
 /// The columns of F.
 #[inline(always)]
-fn deformation<R: Real, S: Simd>(
+fn deformation<R: Float, S: Simd>(
     x: &[[R::Lanes<S>; 4]; 4],
     q: &Matrix<R::Lanes<S>>,
 ) -> Matrix<R::Lanes<S>> {
@@ -774,7 +761,7 @@ fn deformation<R: Real, S: Simd>(
 
 /// Moves the corners by the weight of each times a matrix times the gradient of its barycentric coordinate.
 #[inline(always)]
-fn move_corners<R: Real, S: Simd>(
+fn move_corners<R: Float, S: Simd>(
     x: &mut [[R::Lanes<S>; 4]; 4],
     change: &Matrix<R::Lanes<S>>,
     q: &Matrix<R::Lanes<S>>,
@@ -792,12 +779,12 @@ fn move_corners<R: Real, S: Simd>(
 }
 
 #[inline(always)]
-fn dot<R: Real, S: Simd>(a: &[R::Lanes<S>; 3], b: &[R::Lanes<S>; 3]) -> R::Lanes<S> {
+fn dot<R: Float, S: Simd>(a: &[R::Lanes<S>; 3], b: &[R::Lanes<S>; 3]) -> R::Lanes<S> {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[inline(always)]
-fn cross<R: Real, S: Simd>(a: &[R::Lanes<S>; 3], b: &[R::Lanes<S>; 3]) -> [R::Lanes<S>; 3] {
+fn cross<R: Float, S: Simd>(a: &[R::Lanes<S>; 3], b: &[R::Lanes<S>; 3]) -> [R::Lanes<S>; 3] {
     [
         a[1] * b[2] - b[1] * a[2],
         a[2] * b[0] - b[2] * a[0],
@@ -807,7 +794,7 @@ fn cross<R: Real, S: Simd>(a: &[R::Lanes<S>; 3], b: &[R::Lanes<S>; 3]) -> [R::La
 
 /// The derivative of the determinant.
 #[inline(always)]
-fn cofactor<R: Real, S: Simd>([a, b, c]: &Matrix<R::Lanes<S>>) -> Matrix<R::Lanes<S>> {
+fn cofactor<R: Float, S: Simd>([a, b, c]: &Matrix<R::Lanes<S>>) -> Matrix<R::Lanes<S>> {
     [
         cross::<R, S>(b, c),
         cross::<R, S>(c, a),
@@ -817,7 +804,7 @@ fn cofactor<R: Real, S: Simd>([a, b, c]: &Matrix<R::Lanes<S>>) -> Matrix<R::Lane
 
 /// The symmetric part of `AᵀB`: xx, yy, zz, xy, xz, yz.
 #[inline(always)]
-fn symmetric<R: Real, S: Simd>(
+fn symmetric<R: Float, S: Simd>(
     a: &Matrix<R::Lanes<S>>,
     b: &Matrix<R::Lanes<S>>,
 ) -> [R::Lanes<S>; 6] {
@@ -835,7 +822,7 @@ fn symmetric<R: Real, S: Simd>(
 
 /// A matrix times a symmetric one.
 #[inline(always)]
-fn times_symmetric<R: Real, S: Simd>(
+fn times_symmetric<R: Float, S: Simd>(
     a: &Matrix<R::Lanes<S>>,
     [xx, yy, zz, xy, xz, yz]: &[R::Lanes<S>; 6],
 ) -> Matrix<R::Lanes<S>> {
@@ -851,7 +838,7 @@ fn times_symmetric<R: Real, S: Simd>(
 
 /// The sum of the products of all entries.
 #[inline(always)]
-fn product<R: Real, S: Simd>(a: &Matrix<R::Lanes<S>>, b: &Matrix<R::Lanes<S>>) -> R::Lanes<S> {
+fn product<R: Float, S: Simd>(a: &Matrix<R::Lanes<S>>, b: &Matrix<R::Lanes<S>>) -> R::Lanes<S> {
     dot::<R, S>(&a[0], &b[0]) + dot::<R, S>(&a[1], &b[1]) + dot::<R, S>(&a[2], &b[2])
 }
 

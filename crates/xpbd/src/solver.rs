@@ -10,14 +10,14 @@ use glam::DVec3;
 use crate::attachment::Attachments;
 use crate::collider::Obstacle;
 use crate::distance::Distance;
+use crate::float::{finite, load, store, weight};
 use crate::jacobi::Jacobi;
 use crate::layout::Layout;
 use crate::neo_hookean::TetConstraint;
 use crate::origin::frame_of;
-use crate::real::{finite, load, store, weight};
 use crate::scalar::Constraints;
 use crate::volume::TetVolume;
-use crate::{Changes, KappaLimit, Material, Real, TetSolve, XpbdError};
+use crate::{Changes, Float, KappaLimit, Material, TetSolve, XpbdError};
 
 /// The state of a simulation in one precision.
 ///
@@ -43,7 +43,7 @@ use crate::{Changes, KappaLimit, Material, Real, TetSolve, XpbdError};
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]
-pub struct Solver<R: Real> {
+pub struct Solver<R: Float> {
     /// What positions are relative to.
     pub(crate) origin: DVec3,
     /// The longest side of the bounding box at the start in m.
@@ -83,7 +83,7 @@ pub struct Solver<R: Real> {
     pub(crate) volume_constraints: Option<Constraints<R, TetVolume<R>>>,
 }
 
-impl<R: Real> Solver<R> {
+impl<R: Float> Solver<R> {
     /// Particles at rest at `positions`, without mass and without constraints.
     ///
     /// Positions are kept relative to [`Solver::origin`], which is chosen from them: the precision is that of a body at

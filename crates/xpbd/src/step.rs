@@ -12,13 +12,13 @@ use incise_graph::Schedule;
 use rayon::prelude::*;
 
 use crate::collider::Obstacle;
+use crate::float::{finite, load, store, weight};
 use crate::gauss_seidel;
 use crate::jacobi::Jacobi;
 use crate::layout::{Ingredients, Layout};
 use crate::neo_hookean::TetConstraint;
-use crate::real::{finite, load, store, weight};
 use crate::simd_kernel::Pass;
-use crate::{Material, Method, Real, Solver, StepSettings, XpbdError};
+use crate::{Float, Material, Method, Solver, StepSettings, XpbdError};
 
 /// Particles a thread takes at a time.
 pub(crate) const PARALLEL_PARTICLES: usize = 4096;
@@ -45,7 +45,7 @@ pub(crate) struct Factors<R> {
     pub(crate) relaxation: R,
 }
 
-impl<R: Real> Factors<R> {
+impl<R: Float> Factors<R> {
     pub(crate) fn new(settings: &StepSettings) -> Self {
         let time = settings.substep_time();
         Self {
@@ -56,40 +56,7 @@ impl<R: Real> Factors<R> {
     }
 }
 
-impl<R: Real> Solver<R> {
-    /// Advances by one frame of `settings.time_step`.
-    ///
-    /// # Errors
-    /// If the settings do not pass [`StepSettings::check`]; nothing has moved then.
-    ///
-    /// # Panics
-    /// If the schedule names a tet that does not exist.
-    ///
-    /// # Determinism
-    /// Bit-identical for any number of threads.
-    pub fn step(
-        &mut self,
-        schedule: &Schedule,
-        settings: &StepSettings,
-    ) -> Result<StepReport, XpbdError> {
-        R::step(self, schedule, settings, false)
-    }
-
-    /// The same, keeping what [`Solver::residuals`] needs from the last substep.
-    ///
-    /// # Errors
-    /// If the settings do not pass [`StepSettings::check`]; nothing has moved then.
-    ///
-    /// # Panics
-    /// If the schedule names a tet that does not exist.
-    pub fn step_keeping_residuals(
-        &mut self,
-        schedule: &Schedule,
-        settings: &StepSettings,
-    ) -> Result<StepReport, XpbdError> {
-        R::step(self, schedule, settings, true)
-    }
-
+impl<R: Float> Solver<R> {
     pub(crate) fn frame(
         &mut self,
         schedule: &Schedule,
@@ -98,7 +65,7 @@ impl<R: Real> Solver<R> {
     ) -> Result<StepReport, XpbdError> {
         let _span = tracing::debug_span!("xpbd::step").entered();
         settings.check()?;
-        self.lay_out(schedule);
+        self.update_layout(schedule);
         self.follow_body();
         let mut report = StepReport {
             repaired: 0,
@@ -195,7 +162,7 @@ impl<R: Real> Solver<R> {
             iterated: settings.iterations > 1,
             factors: *factors,
         };
-        R::solve_tets(self.level, settings.tet_solve, &pass);
+        gauss_seidel::solve(self.level, settings.tet_solve, &pass);
         let Some(jacobi) = jacobi else { return };
         jacobi.apply(&self.particles);
         if let Method::Chebyshev {
@@ -207,21 +174,11 @@ impl<R: Real> Solver<R> {
         }
     }
 
-    /// Puts the tets into the order of a schedule, unless they are, as a step does first. Whoever wants to know what a
-    /// cut costs calls this before the step.
-    ///
-    /// A schedule that has been [updated](Schedule::update) since the last call is followed at the cost of what has
-    /// changed of it and of the tets, amortized; another one, even an equal one, and new materials cost O(tets).
-    ///
-    /// # Panics
-    /// If the schedule names a tet that does not exist.
-    pub fn lay_out(&mut self, schedule: &Schedule) {
-        if !self.layout.fits(schedule) {
-            R::lay_out(self, schedule);
+    /// Puts the tets into the order of a schedule, unless they are.
+    pub(crate) fn update_layout(&mut self, schedule: &Schedule) {
+        if self.layout.fits(schedule) {
+            return;
         }
-    }
-
-    pub(crate) fn bring_up_layout(&mut self, schedule: &Schedule) {
         let mut layout = std::mem::take(&mut self.layout);
         self.bring_up(&mut layout, schedule);
         self.layout = layout;

@@ -9,13 +9,13 @@
 
 use glam::DVec3;
 
-use crate::real::{finite, store};
-use crate::{Real, Solver};
+use crate::float::{finite, store};
+use crate::{Float, Solver};
 
 /// How far particles are moved, as a part of the size of a tet.
 const TOUCH: f64 = 1e-6;
 
-impl<R: Real> Solver<R> {
+impl<R: Float> Solver<R> {
     /// Moves each particle by about [`TOUCH`] of a tet's size if all tets lie on one line; returns how many it moved.
     ///
     /// Deterministic: the direction is a hash of the particle's number.

@@ -12,7 +12,7 @@ use glam::DVec3;
 use incise_graph::Schedule;
 
 use crate::scalar::{Constraints, Scalar};
-use crate::{Real, Solver, VolumeData, XpbdError};
+use crate::{Float, Solver, VolumeData, XpbdError};
 
 /// Keeps the volume that four particles span. See [`Solver::set_volumes`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,7 +73,7 @@ pub(crate) struct TetVolume<R> {
     damping: R,
 }
 
-impl<R: Real> TetVolume<R> {
+impl<R: Float> TetVolume<R> {
     fn new(constraint: &VolumeConstraint) -> Self {
         let per_six = 1.0 / (6.0 * constraint.rest_volume);
         let compliance = constraint.compliance / constraint.rest_volume;
@@ -99,7 +99,7 @@ impl<R: Real> TetVolume<R> {
     }
 }
 
-impl<R: Real> TetVolume<R> {
+impl<R: Float> TetVolume<R> {
     /// The constraint in double precision.
     pub(crate) fn to_f64(self) -> TetVolume<f64> {
         TetVolume {
@@ -119,7 +119,7 @@ impl TetVolume<f64> {
     }
 }
 
-impl<R: Real> Scalar<R, 4> for TetVolume<R> {
+impl<R: Float> Scalar<R, 4> for TetVolume<R> {
     #[inline]
     fn particles(&self) -> [u32; 4] {
         self.particles
@@ -153,7 +153,7 @@ impl<R: Real> Scalar<R, 4> for TetVolume<R> {
     }
 }
 
-impl<R: Real> Solver<R> {
+impl<R: Float> Solver<R> {
     /// Replaces all volume constraints; none at all takes neither memory nor time. They are solved after the tets of
     /// each iteration, in the order of their own `schedule`; where constraint `i` is that of tet `i`, the schedule of
     /// the tets fits. O(constraints).

@@ -6,12 +6,12 @@
 use glam::{DMat3, DVec3};
 
 use super::ColliderShape;
-use crate::Real;
+use crate::Float;
 use crate::direction::{absolute, direction};
 
 /// A shape in the solver's precision, prepared for many questions.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Solid<R: Real> {
+pub(super) enum Solid<R: Float> {
     Plane {
         normal: R::Vector,
         /// Of the surface from the origin, along the normal.
@@ -35,13 +35,13 @@ pub(super) enum Solid<R: Real> {
 }
 
 /// What is nearest to a point on a surface.
-pub(super) struct Nearest<R: Real> {
+pub(super) struct Nearest<R: Float> {
     pub(super) distance: R,
     pub(super) normal: R::Vector,
     pub(super) point: R::Vector,
 }
 
-impl<R: Real> Solid<R> {
+impl<R: Float> Solid<R> {
     pub(super) fn new(shape: &ColliderShape) -> Self {
         match *shape {
             ColliderShape::Plane { point, normal } => {
@@ -131,7 +131,7 @@ impl<R: Real> Solid<R> {
 
 /// Signed distance, normal and nearest point of an axis-aligned box around the origin.
 #[inline]
-fn nearest_on_box<R: Real>(x: [R; 3], half: [R; 3]) -> (R, [R; 3], [R; 3]) {
+fn nearest_on_box<R: Float>(x: [R; 3], half: [R; 3]) -> (R, [R; 3], [R; 3]) {
     let beyond: [R; 3] = std::array::from_fn(|i| absolute(x[i]) - half[i]);
     let clamped: [R; 3] = std::array::from_fn(|i| clamp(x[i], -half[i], half[i]));
     let outside = R::vector(x[0] - clamped[0], x[1] - clamped[1], x[2] - clamped[2]);
@@ -152,7 +152,7 @@ fn nearest_on_box<R: Real>(x: [R; 3], half: [R; 3]) -> (R, [R; 3], [R; 3]) {
 }
 
 #[inline]
-fn clamp<R: Real>(value: R, low: R, high: R) -> R {
+fn clamp<R: Float>(value: R, low: R, high: R) -> R {
     if value < low {
         low
     } else if value > high {

@@ -3,9 +3,9 @@
 use incise_graph::{ClusterId, Schedule};
 
 use super::{CONSTANTS, Ingredients, Layout, REST, Usage};
-use crate::{Real, XpbdError};
+use crate::{Float, XpbdError};
 
-impl<R: Real> Layout<R> {
+impl<R: Float> Layout<R> {
     /// Compares with the schedule that was followed and with the tets as they are. O(tets).
     pub(crate) fn check(
         &self,

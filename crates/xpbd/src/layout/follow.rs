@@ -13,9 +13,9 @@ use std::cmp::Reverse;
 use incise_graph::{ClusterId, Schedule};
 
 use super::{CONSTANTS, Group, Ingredients, Layout, NONE, REST, Usage, index};
-use crate::Real;
+use crate::Float;
 
-impl<R: Real> Layout<R> {
+impl<R: Float> Layout<R> {
     /// Makes this the layout of a schedule; returns how many tets were filled in. `uniform` says that all tets have the
     /// same constants.
     pub(crate) fn follow(

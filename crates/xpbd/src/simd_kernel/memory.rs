@@ -6,19 +6,19 @@
 use fearless_simd::{Simd, SimdBase, SimdFrom};
 
 use super::Pass;
-use crate::Real;
+use crate::Float;
 
 /// Most lanes of any instruction set.
 const MOST_LANES: usize = 16;
 
 #[inline(always)]
-pub(super) fn splat<R: Real, S: Simd>(simd: S, value: R) -> R::Lanes<S> {
+pub(super) fn splat<R: Float, S: Simd>(simd: S, value: R) -> R::Lanes<S> {
     R::Lanes::<S>::simd_from(simd, value)
 }
 
 /// The corners of the tets in all lanes: x, y, z and the inverse mass of each.
 #[inline(always)]
-pub(super) fn gather<R: Real, S: Simd>(
+pub(super) fn gather<R: Float, S: Simd>(
     simd: S,
     corners: &[[u32; 4]],
     read: impl Fn(u32) -> [R; 4],
@@ -53,7 +53,7 @@ pub(super) fn gather<R: Real, S: Simd>(
 
 /// Hands each corner of each tet in an active lane to `write`.
 #[inline(always)]
-pub(super) fn scatter<R: Real, S: Simd>(
+pub(super) fn scatter<R: Float, S: Simd>(
     x: &[[R::Lanes<S>; 4]; 4],
     corners: &[[u32; 4]],
     active: u16,
@@ -86,7 +86,7 @@ pub(super) fn scatter<R: Real, S: Simd>(
 }
 
 #[inline(always)]
-pub(super) fn load_multipliers<R: Real, S: Simd>(
+pub(super) fn load_multipliers<R: Float, S: Simd>(
     simd: S,
     pass: &Pass<'_, R>,
     block: usize,
@@ -105,7 +105,7 @@ pub(super) fn load_multipliers<R: Real, S: Simd>(
 }
 
 #[inline(always)]
-pub(super) fn store_multipliers<R: Real, S: Simd>(
+pub(super) fn store_multipliers<R: Float, S: Simd>(
     pass: &Pass<'_, R>,
     block: usize,
     multipliers: [R::Lanes<S>; 2],

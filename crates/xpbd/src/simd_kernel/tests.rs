@@ -5,10 +5,10 @@ use glam::DVec3;
 use proptest::prelude::*;
 
 use super::*;
+use crate::float::load;
 use crate::layout::Ingredients;
 use crate::neo_hookean::TetConstraint;
 use crate::neo_hookean::tests::{point, rest};
-use crate::real::load;
 use crate::{Material, TetSolve, gauss_seidel};
 use incise_graph::{Clustering, ColorId, Coloring, Schedule};
 
@@ -20,14 +20,14 @@ const RUBBER: Material = Material {
 };
 
 /// Tets that share no particle, in one color, so that one pass is one solve of each.
-struct Case<R: Real> {
+struct Case<R: Float> {
     tets: Vec<TetConstraint<R>>,
     particles: Vec<[R; 4]>,
     velocities: Vec<R::Vector>,
     factors: Factors<R>,
 }
 
-impl<R: Real> Case<R> {
+impl<R: Float> Case<R> {
     fn new(rest: &[[DVec3; 4]], moved: &[[DVec3; 4]], time: f64) -> Self {
         let mut tets = Vec::new();
         let mut particles = Vec::new();
@@ -100,7 +100,7 @@ impl<R: Real> Case<R> {
             iterated,
             factors: self.factors,
         };
-        R::solve_tets(level, form, &pass);
+        gauss_seidel::solve(level, form, &pass);
         particles.iter().map(load::<R>).collect()
     }
 
@@ -126,7 +126,7 @@ impl<R: Real> Case<R> {
             iterated: false,
             factors: self.factors,
         };
-        R::damp_tets(level, &pass);
+        gauss_seidel::damp(level, &pass);
         velocities.iter().map(load::<R>).collect()
     }
 
@@ -197,7 +197,7 @@ fn tets() -> impl Strategy<Value = Vec<([DVec3; 4], [DVec3; 4])>> {
     prop::collection::vec((rest(), moved), 0..40)
 }
 
-fn case<R: Real>(tets: &[([DVec3; 4], [DVec3; 4])], time: f64) -> Case<R> {
+fn case<R: Float>(tets: &[([DVec3; 4], [DVec3; 4])], time: f64) -> Case<R> {
     let (rest, moved): (Vec<_>, Vec<_>) = tets.iter().copied().unzip();
     Case::new(&rest, &moved, time)
 }

@@ -13,7 +13,7 @@
 
 use super::cholesky::Cholesky;
 use super::matrix::Blocks;
-use crate::Real;
+use crate::Float;
 
 /// A factor is stale when conjugate gradients converge at less than this part of the rate that they had when it was new.
 const AGED: f64 = 0.75;
@@ -85,7 +85,7 @@ impl Coarse {
 
     /// Follows another order of the particles, of which some are new: these join aggregates of their neighbors, with the
     /// mean of their motions. O(blocks).
-    pub(super) fn follow<R: Real>(&mut self, old: &[u32], new: &[u32], matrix: &Blocks<R>) {
+    pub(super) fn follow<R: Float>(&mut self, old: &[u32], new: &[u32], matrix: &Blocks<R>) {
         self.worn = true;
         let mut before = vec![(NONE, [0.0; VECTORS]); new.len()];
         for ((&p, &a), &weight) in old.iter().zip(&self.of).zip(&self.weights) {
@@ -172,7 +172,7 @@ impl Coarse {
     }
 
     /// Assembles and factors the matrix; held rows take no part.
-    pub(super) fn assemble<R: Real>(&mut self, matrix: &Blocks<R>, held: &[bool]) {
+    pub(super) fn assemble<R: Float>(&mut self, matrix: &Blocks<R>, held: &[bool]) {
         const WIDTH: usize = 3 * VECTORS;
         // Aggregates of different pieces are not coupled, and those of a piece have consecutive numbers.
         let mut firsts: Vec<u32> = (0..).take(self.count).collect();
@@ -240,7 +240,12 @@ impl Coarse {
     /// Adds the coarse correction for the forces `r` to `z`, but in held rows.
     ///
     /// With the rows left out on both sides this is symmetric and semidefinite whatever matrix the factor is of.
-    pub(super) fn correct<R: Real>(&mut self, r: &[R::Vector], z: &mut [R::Vector], held: &[bool]) {
+    pub(super) fn correct<R: Float>(
+        &mut self,
+        r: &[R::Vector],
+        z: &mut [R::Vector],
+        held: &[bool],
+    ) {
         self.values.clear();
         self.values.resize(3 * VECTORS * self.count, 0.0);
         for (row, &a) in self.of.iter().enumerate() {

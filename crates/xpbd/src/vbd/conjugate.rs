@@ -17,8 +17,8 @@ use rayon::prelude::*;
 use super::coarse::Coarse;
 use super::matrix::{Block, Blocks, PARALLEL_ROWS, apply};
 use super::sweep::solve;
-use crate::Real;
-use crate::real::finite;
+use crate::Float;
+use crate::float::finite;
 
 /// When to stop.
 pub(super) struct Limits<E> {
@@ -47,7 +47,7 @@ const PARALLEL_RELAXED: usize = 128;
 
 /// The vectors of the iteration.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Conjugate<R: Real> {
+pub(super) struct Conjugate<R: Float> {
     inverses: Vec<Block<R>>,
     solution: Vec<R::Vector>,
     residual: Vec<R::Vector>,
@@ -56,7 +56,7 @@ pub(super) struct Conjugate<R: Real> {
     preconditioned: Vec<R::Vector>,
 }
 
-impl<R: Real> Conjugate<R> {
+impl<R: Float> Conjugate<R> {
     /// Bytes of all vectors.
     pub(super) fn bytes(&self) -> usize {
         let vectors = [
@@ -184,7 +184,7 @@ impl<R: Real> Conjugate<R> {
 }
 
 /// Solves each row of a color for its own unknown, seeing some of its blocks; no two rows of a color are coupled.
-fn relax<R: Real>(
+fn relax<R: Float>(
     matrix: &Blocks<R>,
     inverses: &[Block<R>],
     b: &[R::Vector],
@@ -220,7 +220,7 @@ fn relax<R: Real>(
 }
 
 /// The inverse of a symmetric block; zero if it has none or the row is held.
-fn inverse<R: Real>(block: &Block<R>, held: bool) -> Block<R> {
+fn inverse<R: Float>(block: &Block<R>, held: bool) -> Block<R> {
     let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = block.map(R::components);
     let axes = [
         (R::ONE, R::ZERO, R::ZERO),
@@ -235,6 +235,6 @@ fn inverse<R: Real>(block: &Block<R>, held: bool) -> Block<R> {
     columns
 }
 
-fn dot<R: Real>(a: &[R::Vector], b: &[R::Vector]) -> f64 {
+fn dot<R: Float>(a: &[R::Vector], b: &[R::Vector]) -> f64 {
     a.iter().zip(b).map(|(a, b)| R::dot(*a, *b).to_f64()).sum()
 }

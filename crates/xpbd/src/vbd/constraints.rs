@@ -29,10 +29,10 @@ use super::matrix::{Block, add_isotropic, add_outer};
 use super::sweep::solve;
 use crate::direction::direction;
 use crate::distance::Distance;
-use crate::real::{load, weight};
+use crate::float::{load, weight};
 use crate::scalar::Scalar;
 use crate::volume::TetVolume;
-use crate::{Real, Solver};
+use crate::{Float, Solver};
 
 /// Newton steps of a particle with a distance.
 const NEWTON_STEPS: usize = 3;
@@ -48,7 +48,7 @@ const NONE: u32 = u32::MAX;
 
 /// All constraints but the tets, by the particles of the stars. Lists are empty where nothing is declared.
 #[derive(Clone, Debug)]
-pub(super) struct ConstraintTerms<R: Real> {
+pub(super) struct ConstraintTerms<R: Float> {
     /// Where the terms of each particle of the order end, a 0 before the first.
     offsets: Vec<usize>,
     terms: Vec<Term>,
@@ -93,7 +93,7 @@ struct Spring<R> {
 
 /// `K/2 |x - y|²`.
 #[derive(Clone, Copy, Debug)]
-struct Anchor<R: Real> {
+struct Anchor<R: Float> {
     particle: u32,
     stiffness: R,
     /// y.
@@ -102,7 +102,7 @@ struct Anchor<R: Real> {
 
 /// A distance seen from one of its particles.
 #[derive(Clone, Copy, Debug)]
-struct Stretch<R: Real> {
+struct Stretch<R: Float> {
     /// The value that [`Spring::excess`] returns.
     excess: R,
     /// The gradient of the length.
@@ -113,7 +113,7 @@ struct Stretch<R: Real> {
 
 /// Force and matrix of one particle: `isotropic I + h` with h as xx, xy, xz, yy, yz, zz.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Local<R: Real> {
+pub(super) struct Local<R: Float> {
     pub(super) isotropic: R,
     pub(super) h: [R; 6],
     pub(super) force: R::Vector,
@@ -128,7 +128,7 @@ enum Curvature {
     Bound,
 }
 
-impl<R: Real> Default for ConstraintTerms<R> {
+impl<R: Float> Default for ConstraintTerms<R> {
     fn default() -> Self {
         Self {
             offsets: Vec::new(),
@@ -145,7 +145,7 @@ impl<R: Real> Default for ConstraintTerms<R> {
     }
 }
 
-impl<R: Real> Spring<R> {
+impl<R: Float> Spring<R> {
     /// `C - s + λ/k`, at least 0 if one-sided.
     #[inline]
     fn excess(&self, value: R) -> R {
@@ -168,7 +168,7 @@ impl<R: Real> Spring<R> {
     }
 }
 
-impl<R: Real> Local<R> {
+impl<R: Float> Local<R> {
     #[inline]
     fn solve(&self) -> R::Vector {
         solve(self.isotropic, self.h, self.force)
@@ -209,7 +209,7 @@ impl<R: Real> Local<R> {
     }
 }
 
-impl<R: Real> ConstraintTerms<R> {
+impl<R: Float> ConstraintTerms<R> {
     /// Bytes of all lists.
     pub(super) fn bytes(&self) -> usize {
         size_of_val(&*self.offsets)
@@ -758,7 +758,7 @@ impl Spring<f64> {
 
 /// The positions of a constraint's particles, one of them at `x`.
 #[inline]
-fn corners<R: Real, const K: usize>(
+fn corners<R: Float, const K: usize>(
     solver: &Solver<R>,
     constraint: &impl Scalar<R, K>,
     own: usize,
@@ -772,13 +772,13 @@ fn corners<R: Real, const K: usize>(
 }
 
 #[inline]
-fn distance<R: Real>(solver: &Solver<R>, index: usize) -> &Distance<R> {
+fn distance<R: Float>(solver: &Solver<R>, index: usize) -> &Distance<R> {
     let distances = solver.distances.as_ref();
     &distances.expect("a term belongs to a distance").list[index]
 }
 
 #[inline]
-fn volume_of<R: Real>(solver: &Solver<R>, index: usize) -> &TetVolume<R> {
+fn volume_of<R: Float>(solver: &Solver<R>, index: usize) -> &TetVolume<R> {
     let volumes = solver.volume_constraints.as_ref();
     &volumes.expect("a term belongs to a volume").list[index]
 }

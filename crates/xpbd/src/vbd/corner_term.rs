@@ -4,9 +4,9 @@
 //! is `n · a / 6V`, and the pull of `|F|²` is a weighted sum of a, b and c. So a particle needs eight numbers of a tet,
 //! not the nine of its rest matrix, and the deformation gradient is never formed. Cost: about 60 operations.
 
+use crate::float::load;
 use crate::neo_hookean::TetConstraint;
-use crate::real::load;
-use crate::{Real, Solver};
+use crate::{Float, Solver};
 
 /// The other corners of each corner, such that corner and others are an even permutation.
 pub(super) const OTHERS: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [3, 0, 1], [2, 1, 0]];
@@ -25,7 +25,7 @@ pub(super) struct CornerTerm<R> {
 }
 
 /// A term at the present positions.
-pub(super) struct Corner<R: Real> {
+pub(super) struct Corner<R: Float> {
     /// The other particles relative to the own one.
     pub(super) others: [R::Vector; 3],
     /// Minus the gradient of `√(lV) det F`.
@@ -34,7 +34,7 @@ pub(super) struct Corner<R: Real> {
     pub(super) force: R::Vector,
 }
 
-impl<R: Real> CornerTerm<R> {
+impl<R: Float> CornerTerm<R> {
     /// The term with its own particle at `x`.
     #[inline]
     pub(super) fn at(&self, solver: &Solver<R>, x: R::Vector) -> Corner<R> {

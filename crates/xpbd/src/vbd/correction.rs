@@ -21,8 +21,8 @@ use super::constraints::CORRECTION_PENALTY;
 use super::matrix::Blocks;
 use super::state::Potential;
 use super::{ImplicitStep, VbdReport, VbdSettings, VertexStars};
-use crate::real::{finite, load, store, weight};
-use crate::{Real, Solver, XpbdError};
+use crate::float::{finite, load, store, weight};
+use crate::{Float, Solver, XpbdError};
 
 /// How thorough a correction is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,7 +85,7 @@ const MOTION: f64 = 3e-5;
 
 /// Matrix, aggregates and vectors of a correction. It belongs to the stars it was made of.
 #[derive(Clone, Debug)]
-pub struct CoarseCorrection<R: Real> {
+pub struct CoarseCorrection<R: Float> {
     settings: CoarseCorrectionSettings,
     /// Rows at first, when aggregates had the size of the settings.
     first_rows: usize,
@@ -116,7 +116,7 @@ const HALVINGS: usize = 8;
 /// Rounds in a row without a correction after which a substep ends: what is left is rounding.
 const IDLE_ROUNDS: u32 = 2;
 
-impl<R: Real> CoarseCorrection<R> {
+impl<R: Float> CoarseCorrection<R> {
     /// Bytes of all arrays. O(1).
     #[must_use]
     pub fn bytes(&self) -> usize {
@@ -185,60 +185,7 @@ impl<R: Real> CoarseCorrection<R> {
     }
 }
 
-impl<R: Real> Solver<R> {
-    /// Advances by one frame of VBD with a coarse correction after each sweep. A substep also ends when the accuracy of the
-    /// settings is reached, or when two corrections in a row find nothing to gain: in single precision that is soon so in a
-    /// stiff body.
-    ///
-    /// # Errors
-    /// Those of [`Solver::step_vbd`].
-    ///
-    /// # Panics
-    /// If stars or correction are those of another number of particles or tets.
-    ///
-    /// # Determinism
-    /// Bit-identical for any number of threads.
-    ///
-    /// # Example
-    /// A wedge of steel hangs from a corner and reaches 1e-9 of its first residual in a few rounds.
-    /// ```
-    /// use glam::DVec3;
-    /// use incise_graph::{Clustering, ColorId, Coloring, Schedule};
-    /// use incise_xpbd::{CoarseCorrection, CoarseCorrectionSettings, VbdSettings, Material, Solver, VertexStars};
-    ///
-    /// let rest = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE];
-    /// let steel = Material { young_modulus: 2e11, poisson_ratio: 0.3, density: 7800.0, damping: 0.0 };
-    /// let mut solver = Solver::<f64>::new(&rest);
-    /// solver.add_material(steel)?;
-    /// for tet in [[0u32, 1, 2, 3], [1, 4, 2, 3]] {
-    ///     solver.push_tet(tet, tet.map(|p| rest[p as usize]), 0);
-    /// }
-    /// for p in 0..5 {
-    ///     solver.set_mass(p, 1000.0);
-    /// }
-    /// solver.set_fixed(0, true);
-    ///
-    /// // Particles 0 and 4 share no tet, so they share a color.
-    /// let colors = Coloring::new([0, 1, 2, 3, 0].map(ColorId).to_vec());
-    /// let mut stars = VertexStars::new(&solver, &Schedule::new(&Clustering::none(5), &colors))?;
-    /// let mut correction = CoarseCorrection::new(&stars, CoarseCorrectionSettings::default())?;
-    /// let mut settings = VbdSettings::new(1.0 / 60.0, 20);
-    /// settings.step.gravity = Some(DVec3::new(0.0, 0.0, -9.81));
-    /// settings.tolerance = Some(1e-9);
-    /// let report = solver.step_vbd_two_level(&mut stars, &mut correction, &settings)?;
-    /// assert!(report.iterations < 10);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn step_vbd_two_level(
-        &mut self,
-        stars: &mut VertexStars<R>,
-        correction: &mut CoarseCorrection<R>,
-        settings: &VbdSettings,
-    ) -> Result<VbdReport, XpbdError> {
-        let _span = tracing::debug_span!("xpbd::step_vbd_two_level").entered();
-        R::step_vbd(self, stars, Some(correction), settings)
-    }
-
+impl<R: Float> Solver<R> {
     /// A frame of sweeps, each with a correction.
     pub(crate) fn frame_of_corrections(
         &mut self,
@@ -257,7 +204,7 @@ impl<R: Real> Solver<R> {
     }
 }
 
-impl<R: Real> ImplicitStep<'_, R> {
+impl<R: Float> ImplicitStep<'_, R> {
     /// Moves the whole body along a Newton direction, as far as the potential falls.
     ///
     /// Particles that touch a collider are held meanwhile; sweeps lift them off.

@@ -14,7 +14,7 @@
 //! Source: eigenvalues from Smith, de Goes, Kim 2018, section 4; the bounds are derived here.
 //! Cost: about 150 operations and four square roots a tet.
 
-use crate::Real;
+use crate::Float;
 use crate::neo_hookean::TetConstraint;
 
 /// Newton steps for a root; from above, each at least halves what is too much: at a double root 2 % of it remain.
@@ -22,7 +22,7 @@ const ROOT_STEPS: usize = 6;
 
 /// `√(lV) (det F - γ)` of a tet with its corners at `x`, held within the bounds; 0 for what is not finite.
 #[inline]
-pub(super) fn held_excess<R: Real>(tet: &TetConstraint<R>, x: [R::Vector; 4]) -> R {
+pub(super) fn held_excess<R: Float>(tet: &TetConstraint<R>, x: [R::Vector; 4]) -> R {
     let q = &tet.inverse_rest;
     let (e1, e2, e3) = (x[1] - x[0], x[2] - x[0], x[3] - x[0]);
     let f1 = e1 * q[0] + e2 * q[3] + e3 * q[6];
@@ -36,7 +36,7 @@ pub(super) fn held_excess<R: Real>(tet: &TetConstraint<R>, x: [R::Vector; 4]) ->
 
 /// The pressure p held within its bounds; p and l in units of μ.
 #[inline]
-fn held<R: Real>(pressure: R, f: [R::Vector; 3], l: R) -> R {
+fn held<R: Float>(pressure: R, f: [R::Vector; 3], l: R) -> R {
     let [f1, f2, f3] = f;
     let [half, two, three] = [0.5, 2.0, 3.0].map(R::from_f64);
     let cofactor = [R::cross(f2, f3), R::cross(f3, f1), R::cross(f1, f2)];
@@ -75,7 +75,7 @@ fn held<R: Real>(pressure: R, f: [R::Vector; 3], l: R) -> R {
 
 /// The largest root of `t³ - 3t = 2ρ`, from 1 to 2, or up to 2.1 % more; ρ lies between -1 and 1.
 #[inline]
-fn largest_root<R: Real>(rho: R) -> R {
+fn largest_root<R: Float>(rho: R) -> R {
     let [two, three] = [2.0, 3.0].map(R::from_f64);
     let mut t = two;
     for _ in 0..ROOT_STEPS {

@@ -11,12 +11,12 @@
 
 use glam::DVec3;
 
-use crate::real::{load, store, weight};
-use crate::{Real, Solver};
+use crate::float::{load, store, weight};
+use crate::{Float, Solver};
 
 /// The velocities that BDF2 needs of earlier substeps, by particle.
 #[derive(Clone, Debug)]
-pub(super) struct History<R: Real> {
+pub(super) struct History<R: Float> {
     particles: Vec<Past<R>>,
     /// The length of the last substep in s.
     time: f64,
@@ -36,7 +36,7 @@ struct Startup {
 
 /// What is known of a particle at the end of a substep, in m/s.
 #[derive(Clone, Copy, Debug)]
-struct Past<R: Real> {
+struct Past<R: Float> {
     /// The mean velocity during the substep.
     mean: R::Vector,
     /// The velocity before it.
@@ -45,7 +45,7 @@ struct Past<R: Real> {
     after: R::Vector,
 }
 
-impl<R: Real> Past<R> {
+impl<R: Float> Past<R> {
     /// That of a particle that moves steadily.
     fn steady(velocity: R::Vector) -> Self {
         Self {
@@ -56,7 +56,7 @@ impl<R: Real> Past<R> {
     }
 }
 
-impl<R: Real> Default for History<R> {
+impl<R: Float> Default for History<R> {
     fn default() -> Self {
         Self {
             particles: Vec::new(),
@@ -66,7 +66,7 @@ impl<R: Real> Default for History<R> {
     }
 }
 
-impl<R: Real> History<R> {
+impl<R: Float> History<R> {
     /// Bytes of the list.
     pub(super) fn bytes(&self) -> usize {
         size_of_val(&*self.particles)

@@ -10,18 +10,18 @@ use rayon::prelude::*;
 
 use super::VertexStars;
 use super::hessian::held_excess;
-use crate::real::{load, weight};
-use crate::{Real, Solver};
+use crate::float::{load, weight};
+use crate::{Float, Solver};
 
 /// Rows a thread takes at a time.
 pub(super) const PARALLEL_ROWS: usize = 512;
 
 /// A 3×3 matrix by columns.
-pub(super) type Block<R> = [<R as Real>::Vector; 3];
+pub(super) type Block<R> = [<R as Float>::Vector; 3];
 
 /// A symmetric matrix of blocks with the pattern of a mesh.
 #[derive(Clone, Debug)]
-pub(super) struct Blocks<R: Real> {
+pub(super) struct Blocks<R: Float> {
     /// Where the blocks of each row end, a 0 before the first.
     pub(super) offsets: Vec<usize>,
     /// Where the blocks right of the diagonal begin in each row.
@@ -37,7 +37,7 @@ pub(super) struct Blocks<R: Real> {
     excess: Vec<R>,
 }
 
-impl<R: Real> Blocks<R> {
+impl<R: Float> Blocks<R> {
     /// Bytes of all lists.
     pub(super) fn bytes(&self) -> usize {
         size_of_val(&*self.offsets)
@@ -347,14 +347,14 @@ pub(super) fn row_slices<'a, B>(
 }
 
 #[inline]
-pub(super) fn apply<R: Real>(block: &Block<R>, x: R::Vector) -> R::Vector {
+pub(super) fn apply<R: Float>(block: &Block<R>, x: R::Vector) -> R::Vector {
     let [a, b, c] = R::components(x);
     block[0] * a + block[1] * b + block[2] * c
 }
 
 /// Adds `u vᵀ`.
 #[inline]
-pub(super) fn add_outer<R: Real>(block: &mut Block<R>, u: R::Vector, v: R::Vector) {
+pub(super) fn add_outer<R: Float>(block: &mut Block<R>, u: R::Vector, v: R::Vector) {
     let v = R::components(v);
     for k in 0..3 {
         block[k] += u * v[k];
@@ -362,7 +362,7 @@ pub(super) fn add_outer<R: Real>(block: &mut Block<R>, u: R::Vector, v: R::Vecto
 }
 
 #[inline]
-pub(super) fn add_isotropic<R: Real>(block: &mut Block<R>, value: R) {
+pub(super) fn add_isotropic<R: Float>(block: &mut Block<R>, value: R) {
     block[0] += R::vector(value, R::ZERO, R::ZERO);
     block[1] += R::vector(R::ZERO, value, R::ZERO);
     block[2] += R::vector(R::ZERO, R::ZERO, value);
@@ -370,7 +370,7 @@ pub(super) fn add_isotropic<R: Real>(block: &mut Block<R>, value: R) {
 
 /// Adds the matrix of `w ×`.
 #[inline]
-fn add_cross<R: Real>(block: &mut Block<R>, w: R::Vector) {
+fn add_cross<R: Float>(block: &mut Block<R>, w: R::Vector) {
     let [x, y, z] = R::components(w);
     block[0] += R::vector(R::ZERO, z, -y);
     block[1] += R::vector(-z, R::ZERO, x);

@@ -13,7 +13,7 @@ use super::corner_term::CornerTerm;
 use super::history::History;
 use super::viscosity::Viscosity;
 use crate::scalar::Scalar;
-use crate::{Real, Solver};
+use crate::{Float, Solver};
 
 /// What VBD needs of the tets, sorted by the particles of a schedule.
 ///
@@ -21,7 +21,7 @@ use crate::{Real, Solver};
 /// other change of these, update it with [`VertexStars::rebuild`]. Positions, velocities, masses, attachments and what
 /// is fixed may change at any time.
 #[derive(Clone, Debug)]
-pub struct VertexStars<R: Real> {
+pub struct VertexStars<R: Float> {
     /// Particles in solving order.
     pub(super) order: Vec<u32>,
     /// Where each color ends in `order`, a 0 before the first.
@@ -48,7 +48,7 @@ pub struct VertexStars<R: Real> {
     pub(super) viscosity: Option<Box<Viscosity<R>>>,
 }
 
-impl<R: Real> VertexStars<R> {
+impl<R: Float> VertexStars<R> {
     /// Sorts the tets of a solver by the particles of a schedule. O(tets).
     ///
     /// # Errors
@@ -199,7 +199,7 @@ impl<R: Real> VertexStars<R> {
     }
 }
 
-impl<R: Real> Solver<R> {
+impl<R: Float> Solver<R> {
     /// The tets, distances and volume constraints that each particle belongs to. Particle p is constraint p of the result;
     /// its particles are the tets, then the distances, then the volume constraints. Color and schedule this for
     /// [`VertexStars`]: particles of one color share none of them. O(tets + constraints).

@@ -7,14 +7,14 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::ImplicitStep;
-use crate::Real;
+use crate::Float;
+use crate::float::weight;
 use crate::neo_hookean::TetConstraint;
-use crate::real::weight;
 
 /// Tets summed as one part: the same parts for any number of threads.
 const PARALLEL_TETS: usize = 2048;
 
-impl<R: Real> ImplicitStep<'_, R> {
+impl<R: Float> ImplicitStep<'_, R> {
     /// The incremental potential in J: inertia, tets, damping and constraints. Its elastic part is 0 at rest. Hard
     /// constraints are in it with their present multipliers, see [`ImplicitStep::update_multipliers`].
     #[must_use]

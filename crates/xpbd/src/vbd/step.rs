@@ -3,8 +3,8 @@
 use super::constraints::SWEEP_PENALTY;
 use super::{Guess, Integrator, VbdSettings, VertexStars};
 use crate::collider::Obstacle;
-use crate::real::{finite, load, store, weight};
-use crate::{Real, Solver, StepReport, StepSettings, XpbdError};
+use crate::float::{finite, load, store, weight};
+use crate::{Float, Solver, StepReport, StepSettings, XpbdError};
 
 /// What a frame of VBD has to say about itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -24,60 +24,7 @@ pub struct VbdReport {
     pub potential: Option<f64>,
 }
 
-impl<R: Real> Solver<R> {
-    /// Advances by one frame of `settings.step.time_step` by sweeps of vertex block descent. May take turns with
-    /// [`Solver::step`].
-    ///
-    /// Damping, distances, volume constraints and attachments mean what they mean to [`Solver::step`]: both go to the same
-    /// motion with smaller substeps. Hard constraints (compliance 0) are met by multipliers that each iteration
-    /// improves; with few iterations a part of their violation is left.
-    ///
-    /// # Errors
-    /// If the settings do not pass [`VbdSettings::check`]; nothing has moved then.
-    ///
-    /// # Panics
-    /// If the stars are those of another number of particles, tets or constraints.
-    ///
-    /// # Determinism
-    /// Bit-identical for any number of threads.
-    ///
-    /// # Example
-    /// A tet of steel hangs from a corner; kappa is 1e4, far beyond what XPBD can do in one substep.
-    /// ```
-    /// use glam::DVec3;
-    /// use incise_graph::{Clustering, ColorId, Coloring, Schedule};
-    /// use incise_xpbd::{VbdSettings, Material, Solver, VertexStars};
-    ///
-    /// let rest = [DVec3::ZERO, DVec3::Y, DVec3::X, DVec3::NEG_Z];
-    /// let steel = Material { young_modulus: 2e11, poisson_ratio: 0.3, density: 7800.0, damping: 0.0 };
-    /// let mut solver = Solver::<f64>::new(&rest);
-    /// solver.add_material(steel)?;
-    /// solver.push_tet([0, 1, 2, 3], rest, 0);
-    /// for p in 0..4 {
-    ///     solver.set_mass(p, 7800.0 / 24.0);
-    /// }
-    /// solver.set_fixed(0, true);
-    ///
-    /// // Four particles of one tet need four colors.
-    /// let colors = Coloring::new([0, 1, 2, 3].map(ColorId).to_vec());
-    /// let mut stars = VertexStars::new(&solver, &Schedule::new(&Clustering::none(4), &colors))?;
-    /// let mut settings = VbdSettings::new(1.0 / 60.0, 20);
-    /// settings.step.gravity = Some(DVec3::new(0.0, 0.0, -9.81));
-    /// for _ in 0..60 {
-    ///     assert_eq!(solver.step_vbd(&mut stars, &settings)?.repaired, 0);
-    /// }
-    /// assert!((solver.volume().min_ratio - 1.0).abs() < 1e-3);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn step_vbd(
-        &mut self,
-        stars: &mut VertexStars<R>,
-        settings: &VbdSettings,
-    ) -> Result<VbdReport, XpbdError> {
-        let _span = tracing::debug_span!("xpbd::step_vbd").entered();
-        R::step_vbd(self, stars, None, settings)
-    }
-
+impl<R: Float> Solver<R> {
     /// A frame of sweeps alone.
     pub(crate) fn frame_of_sweeps(
         &mut self,
@@ -145,7 +92,7 @@ pub(super) struct Substep {
 /// before that leaves the solver with velocities that do not belong to its positions.
 #[derive(Debug)]
 #[must_use = "velocities follow in `finish`"]
-pub struct ImplicitStep<'a, R: Real> {
+pub struct ImplicitStep<'a, R: Float> {
     pub(super) solver: &'a mut Solver<R>,
     pub(super) stars: &'a mut VertexStars<R>,
     pub(super) settings: StepSettings,
@@ -163,7 +110,7 @@ pub struct ImplicitStep<'a, R: Real> {
     lost: usize,
 }
 
-impl<'a, R: Real> ImplicitStep<'a, R> {
+impl<'a, R: Float> ImplicitStep<'a, R> {
     /// Begins the last substep of a frame: moves the particles to the initial guess, and handles to where they go.
     ///
     /// # Errors

@@ -6,8 +6,8 @@ use super::constraints::Local;
 use super::matrix::Block;
 use super::{ImplicitStep, VertexStars};
 use crate::collider::{Obstacle, outside};
-use crate::real::{finite, load, store, weight};
-use crate::{Real, Solver};
+use crate::float::{finite, load, store, weight};
+use crate::{Float, Solver};
 
 /// Pairs of particle and tet in a color from which a second thread pays for its wake-up.
 const PARALLEL_PAIRS: usize = 1024;
@@ -24,7 +24,7 @@ struct Sweep<R> {
     nudge: R,
 }
 
-impl<R: Real> ImplicitStep<'_, R> {
+impl<R: Float> ImplicitStep<'_, R> {
     /// Moves every free particle once, color after color, and out of colliders.
     ///
     /// Without colliders the potential does not rise, up to rounding. Cost: about 60 operations a pair of particle and
@@ -55,7 +55,7 @@ impl<R: Real> ImplicitStep<'_, R> {
     }
 }
 
-impl<R: Real> Sweep<R> {
+impl<R: Float> Sweep<R> {
     /// Moves one particle into its minimum.
     #[inline]
     fn step_vbd(
@@ -137,7 +137,7 @@ impl<R: Real> Sweep<R> {
 /// Gaussian elimination without square roots. No pivot of such a matrix is smaller than its isotropic part; where
 /// rounding says otherwise, it is noise.
 #[inline]
-pub(super) fn solve<R: Real>(isotropic: R, h: [R; 6], force: R::Vector) -> R::Vector {
+pub(super) fn solve<R: Float>(isotropic: R, h: [R; 6], force: R::Vector) -> R::Vector {
     let [f0, f1, f2] = R::components(force);
     let at_least = |pivot: R| if pivot > isotropic { pivot } else { isotropic };
     let d0 = R::ONE / (h[0] + isotropic);
@@ -156,7 +156,7 @@ pub(super) fn solve<R: Real>(isotropic: R, h: [R; 6], force: R::Vector) -> R::Ve
 
 /// Adds a symmetric block to a matrix that is given as xx, xy, xz, yy, yz, zz.
 #[inline]
-pub(super) fn add_symmetric<R: Real>(h: &mut [R; 6], block: &Block<R>) {
+pub(super) fn add_symmetric<R: Float>(h: &mut [R; 6], block: &Block<R>) {
     let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = block.map(R::components);
     for (entry, value) in h.iter_mut().zip([xx, xy, xz, yy, yz, zz]) {
         *entry += value;
@@ -165,7 +165,7 @@ pub(super) fn add_symmetric<R: Real>(h: &mut [R; 6], block: &Block<R>) {
 
 /// A direction that differs from particle to particle: each coordinate in -1 .. 1, by the mixing step of `SplitMix64`.
 #[cold]
-fn push_of<R: Real>(particle: usize) -> R::Vector {
+fn push_of<R: Float>(particle: usize) -> R::Vector {
     let coordinate = |k: u64| {
         let mut z = (particle as u64 * 3 + k + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

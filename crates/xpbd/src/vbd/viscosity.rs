@@ -21,20 +21,20 @@ use super::VertexStars;
 use super::corner_term::{OTHERS, rows};
 use super::matrix::{Blocks, PARALLEL_ROWS, add_outer, apply, row_slices};
 use super::sweep::add_symmetric;
+use crate::float::finite;
 use crate::neo_hookean::TetConstraint;
-use crate::real::finite;
-use crate::{Real, Solver};
+use crate::{Float, Solver};
 
 /// The matrix of the dissipation in a substep.
 #[derive(Clone, Debug)]
-pub(super) struct Viscosity<R: Real> {
+pub(super) struct Viscosity<R: Float> {
     matrix: Blocks<R>,
     tets: Vec<ViscousTet<R>>,
 }
 
 /// What a block is made of, scaled so that a block is `pull · metric + images imagesᵀ + areas areasᵀ`.
 #[derive(Clone, Copy, Debug)]
-struct ViscousTet<R: Real> {
+struct ViscousTet<R: Float> {
     /// `√(τ μ V / Δt) Bₖ`.
     images: [R::Vector; 4],
     /// `√(τ λ V / Δt) cₖ`.
@@ -43,7 +43,7 @@ struct ViscousTet<R: Real> {
     metric: [R::Vector; 3],
 }
 
-impl<R: Real> ViscousTet<R> {
+impl<R: Float> ViscousTet<R> {
     /// A tet without damping, or out of the range of numbers.
     fn none() -> Self {
         Self {
@@ -77,7 +77,7 @@ impl<R: Real> ViscousTet<R> {
     }
 }
 
-impl<R: Real> Viscosity<R> {
+impl<R: Float> Viscosity<R> {
     /// The pattern of some stars; no values yet.
     pub(super) fn new(stars: &VertexStars<R>) -> Self {
         Self {
