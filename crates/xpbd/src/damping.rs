@@ -1,4 +1,4 @@
-//! Damping of strain rates, on velocities, after the constraints of a substep are solved.
+//! [`Damping`] of strain rates, on velocities, after the constraints of a substep are solved.
 //!
 //! The dissipation of a tet is `τ V (μ |D|² + λ/2 tr²)` with `D = sym(Fᵀ Ḟ)` and `tr = cof F : Ḟ`: a Kelvin-Voigt
 //! viscosity of τ times the stiffness, in Rayleigh's terms the part `β = τ` proportional to stiffness. It is 0 where
@@ -12,36 +12,57 @@
 //! Source: Kelvin-Voigt model; implicit steps derived in [`crate::simd_kernel`]. Cost: about a pass over the tets a
 //! substep, and a copy of the velocities; nothing without a damped material.
 
-use crate::gauss_seidel;
-use crate::simd_kernel::Pass;
-use crate::step::Factors;
-use crate::{Float, Solver};
+use fearless_simd::Level;
 
-impl<R: Float> Solver<R> {
+use crate::Float;
+use crate::gauss_seidel;
+use crate::layout::Layout;
+use crate::particles::Particles;
+use crate::simd_kernel::Pass;
+use crate::substep::Factors;
+
+/// The memory of the damping pass.
+#[derive(Debug)]
+pub(crate) struct Damping<R: Float> {
+    /// Copies of velocities and inverse masses that threads may share, while some material is damped.
+    cells: Vec<R::Particle>,
+}
+
+impl<R: Float> Default for Damping<R> {
+    fn default() -> Self {
+        Self { cells: Vec::new() }
+    }
+}
+
+impl<R: Float> Damping<R> {
     /// Damps the velocities of a substep.
-    pub(crate) fn damp(&mut self, factors: &Factors<R>) {
-        let mut shared = std::mem::take(&mut self.shared_velocities);
-        shared.clear();
-        let cells = self.velocities.iter().zip(&self.particles);
-        shared.extend(cells.map(|(&velocity, particle)| {
+    pub(crate) fn damp(
+        &mut self,
+        particles: &mut Particles<R>,
+        layout: &Layout<R>,
+        factors: Factors<R>,
+        level: Level,
+    ) {
+        self.cells.clear();
+        let cells = particles.velocities.iter().zip(&particles.cells);
+        self.cells.extend(cells.map(|(&velocity, particle)| {
             let [x, y, z] = R::components(velocity);
             let [.., weight] = R::read(particle);
             R::particle([x, y, z, weight])
         }));
         let pass = Pass {
-            layout: &self.layout,
-            particles: &self.particles,
-            velocities: &shared,
+            layout,
+            particles: &particles.cells,
+            velocities: &self.cells,
             multipliers: &[],
             corrections: &[],
             iterated: false,
-            factors: *factors,
+            factors,
         };
-        gauss_seidel::damp(self.level, &pass);
-        for (velocity, cell) in self.velocities.iter_mut().zip(&shared) {
+        gauss_seidel::damp(level, &pass);
+        for (velocity, cell) in particles.velocities.iter_mut().zip(&self.cells) {
             let [x, y, z, _] = R::read(cell);
             *velocity = R::vector(x, y, z);
         }
-        self.shared_velocities = shared;
     }
 }

@@ -4,13 +4,11 @@
 //! The solver here stays the place where tets, masses and materials are edited; a GPU follows it as the layout of this
 //! crate does. Nothing of this costs a solver anything that nobody asked to keep track. Cost: a number an edit.
 
-use glam::DVec3;
-use incise_graph::Schedule;
-
-use crate::collider::Obstacle;
+use crate::constraints::Obstacle;
 use crate::layout::{CONSTANTS, REST};
 use crate::neo_hookean::MAX_COFACTOR_NORM;
-use crate::{Float, Pose, Solver, StepSettings, TetSolve};
+use crate::particles::Particles;
+use crate::{Changes, Float, Solver, StepSettings, TetSolve};
 
 /// A tet as a kernel wants it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,106 +23,10 @@ pub struct TetData<R> {
     pub constants: [R; CONSTANTS],
 }
 
-/// What hangs a particle on a handle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AttachmentData {
-    /// The particle.
-    pub particle: u32,
-    /// The number of the handle.
-    pub handle: u32,
-    /// The place in the handle's frame in m.
-    pub place: DVec3,
-    /// In m/N; 0 is rigid.
-    pub compliance: f64,
-    /// Damping time in s.
-    pub damping: f64,
-}
-
-/// A distance constraint as a kernel wants it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DistanceData<R> {
-    /// Its particles.
-    pub particles: [u32; 2],
-    /// Their distance at rest in m.
-    pub length: R,
-    /// In m/N.
-    pub compliance: R,
-    /// Damping time in s.
-    pub damping: R,
-    /// Whether it acts only while the particles are farther apart.
-    pub only_when_longer: bool,
-}
-
-/// A volume constraint as a kernel wants it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct VolumeData<R> {
-    /// Its particles.
-    pub particles: [u32; 4],
-    /// One over six times the volume at rest in 1/m³; 0 takes no part.
-    pub per_six_volumes: R,
-    /// Compliance over the volume at rest in 1/J.
-    pub compliance: R,
-    /// Damping time in s.
-    pub damping: R,
-}
-
-/// What edits have changed.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct Changes {
-    /// Masses or materials have changed in a way of which nobody said what tets it touches: all are to be taken anew.
-    pub all_tets: bool,
-    /// Tets with other corners, another rest shape or corners of another mass, with repetitions; some may be gone since.
-    pub tets: Vec<u32>,
-    /// The origin has moved: all particles are to be taken anew.
-    pub all_particles: bool,
-    /// Particles that are new or have another position, velocity or mass, with repetitions; some may be gone since.
-    pub particles: Vec<u32>,
-    /// Whether particles were attached, let go or appended with an attachment.
-    pub attachments: bool,
-    /// Whether the distance constraints were replaced.
-    pub distances: bool,
-    /// Whether the volume constraints were replaced.
-    pub volumes: bool,
-}
-
-impl Changes {
-    /// Everything, for who begins.
-    #[must_use]
-    pub fn everything() -> Self {
-        Self {
-            all_tets: true,
-            all_particles: true,
-            attachments: true,
-            distances: true,
-            volumes: true,
-            ..Self::default()
-        }
-    }
-}
-
 impl<R: Float> Solver<R> {
     /// From now on keeps track of changes; [`Solver::take_changes`] begins with everything.
     pub fn track_changes(&mut self) {
         self.changes = Some(Changes::everything());
-    }
-
-    /// Notes a change for who follows.
-    pub(crate) fn note(&mut self, change: impl FnOnce(&mut Changes)) {
-        if let Some(changes) = &mut self.changes {
-            change(changes);
-        }
-    }
-
-    /// Notes that the corners, the rest shape or the masses of a tet have changed.
-    pub(crate) fn note_tet(&mut self, tet: usize) {
-        self.layout.touch(tet);
-        self.note(|changes| changes.tets.push(number(tet)));
-    }
-
-    /// Notes that a particle is new or has another state or mass.
-    pub(crate) fn note_particle(&mut self, particle: usize) {
-        self.note(|changes| changes.particles.push(number(particle)));
     }
 
     /// What has changed since the last call; nothing unless [`Solver::track_changes`] was called.
@@ -159,7 +61,7 @@ impl<R: Float> Solver<R> {
     /// If the tet does not exist.
     #[must_use]
     pub fn tet_data(&self, tet: u32) -> TetData<R> {
-        let ingredients = self.ingredients(tet);
+        let ingredients = self.tets.ingredients(&self.particles, tet);
         TetData {
             corners: ingredients.tet.particles,
             rest: ingredients.rest(),
@@ -173,7 +75,7 @@ impl<R: Float> Solver<R> {
     /// If the tet does not exist.
     #[must_use]
     pub fn rest_volume(&self, tet: usize) -> f64 {
-        self.volumes[tet]
+        self.tets.rest_volumes[tet]
     }
 
     /// Whether a tet takes part: one too flat to be represented does not.
@@ -182,19 +84,19 @@ impl<R: Float> Solver<R> {
     /// If the tet does not exist.
     #[must_use]
     pub fn takes_part(&self, tet: usize) -> bool {
-        self.tets[tet].inverse_rest != [R::ZERO; 9]
+        self.tets.list[tet].inverse_rest != [R::ZERO; 9]
     }
 
     /// Whether there is but one material, so that the constants of all tets are the same.
     #[must_use]
     pub fn is_uniform(&self) -> bool {
-        self.materials.len() < 2
+        self.tets.materials.len() < 2
     }
 
     /// Whether a material is damped.
     #[must_use]
     pub fn is_damped(&self) -> bool {
-        self.materials.iter().any(|m| m.damping > 0.0)
+        self.tets.is_damped()
     }
 
     /// Position relative to [`Solver::origin`] in m and inverse mass in 1/kg, which is 0 for what is held; velocity in m/s.
@@ -203,18 +105,17 @@ impl<R: Float> Solver<R> {
     /// If the particle does not exist.
     #[must_use]
     pub fn particle_data(&self, particle: usize) -> ([R; 4], [R; 3]) {
-        let data = R::read(&self.particles[particle]);
-        (data, R::components(self.velocities[particle]))
+        let data = R::read(&self.particles.cells[particle]);
+        (data, R::components(self.particles.velocities[particle]))
     }
 
     /// What a step of this solver does with its state before it begins: gives a body that has moved on a new origin, and
     /// one on an exact line a little width; returns how many particles that moved.
     pub fn prepare_state(&mut self) -> usize {
-        let origin = self.origin;
-        self.follow_body();
-        let unfolded = self.unfold();
+        let origin = self.particles.origin;
+        let unfolded = self.prepare();
         if let Some(changes) = &mut self.changes {
-            changes.all_particles |= origin != self.origin || unfolded > 0;
+            changes.all_particles |= origin != self.particles.origin || unfolded > 0;
         }
         unfolded
     }
@@ -227,18 +128,21 @@ impl<R: Float> Solver<R> {
     pub fn load_state(&mut self, positions: &[[R; 4]], velocities: &[[R; 4]]) {
         let count = self.particle_count();
         assert_eq!((positions.len(), velocities.len()), (count, count));
-        for ((particle, x), (velocity, v)) in self
-            .particles
+        let Particles {
+            cells,
+            velocities: own,
+            ..
+        } = &mut self.particles;
+        for ((cell, x), (velocity, v)) in cells
             .iter()
             .zip(positions)
-            .zip(self.velocities.iter_mut().zip(velocities))
+            .zip(own.iter_mut().zip(velocities))
         {
-            let [.., weight] = R::read(particle);
-            R::write(particle, [x[0], x[1], x[2], weight]);
+            let [.., weight] = R::read(cell);
+            R::write(cell, [x[0], x[1], x[2], weight]);
             *velocity = R::vector(v[0], v[1], v[2]);
         }
-        self.predicted.clear();
-        self.kept.clear();
+        self.stepper.last.clear();
     }
 
     /// Takes over what [`Solver::residuals`] needs of a last substep that was made elsewhere: the positions before the
@@ -255,60 +159,17 @@ impl<R: Float> Solver<R> {
     ) {
         assert_eq!(predicted.len(), self.particle_count());
         assert_eq!(multipliers.len(), self.tet_count());
-        self.predicted.clear();
+        let last = &mut self.stepper.last;
+        last.clear();
         let vectors = predicted.iter().map(|x| R::vector(x[0], x[1], x[2]));
-        self.predicted.extend(vectors);
-        self.kept.clear();
-        self.kept.extend_from_slice(multipliers);
-        self.kept_form = tet_solve;
-    }
-
-    /// What hangs on handles, ascending by particle.
-    pub fn attachments(&self) -> impl ExactSizeIterator<Item = AttachmentData> + '_ {
-        self.attachments.list()
-    }
-
-    /// The poses of all handles at a fraction of the frame.
-    pub fn handle_poses(&self, fraction: f64) -> impl ExactSizeIterator<Item = Pose> + '_ {
-        self.attachments.poses(fraction)
-    }
-
-    /// A distance constraint as a kernel wants it.
-    ///
-    /// # Panics
-    /// If the constraint does not exist.
-    #[must_use]
-    pub fn distance_data(&self, constraint: u32) -> DistanceData<R> {
-        let distances = self.distances.as_ref();
-        distances.expect("there are distance constraints").list[constraint as usize].data()
-    }
-
-    /// The order in which distance constraints are solved, if there are any.
-    #[must_use]
-    pub fn distance_schedule(&self) -> Option<&Schedule> {
-        self.distances.as_ref().map(|distances| &distances.schedule)
-    }
-
-    /// A volume constraint as a kernel wants it.
-    ///
-    /// # Panics
-    /// If the constraint does not exist.
-    #[must_use]
-    pub fn volume_data(&self, constraint: u32) -> VolumeData<R> {
-        let volumes = self.volume_constraints.as_ref();
-        volumes.expect("there are volume constraints").list[constraint as usize].data()
-    }
-
-    /// The order in which volume constraints are solved, if there are any.
-    #[must_use]
-    pub fn volume_schedule(&self) -> Option<&Schedule> {
-        let volumes = self.volume_constraints.as_ref();
-        volumes.map(|volumes| &volumes.schedule)
+        last.predicted.extend(vectors);
+        last.multipliers.extend_from_slice(multipliers);
+        last.tet_solve = tet_solve;
     }
 
     /// Ends a frame that was computed elsewhere: the handles have arrived.
     pub fn end_frame(&mut self) {
-        self.arrive();
+        self.constraints.end_frame();
     }
 }
 
@@ -330,10 +191,7 @@ impl Solver<f32> {
         settings: &'a StepSettings,
         elapsed: f64,
     ) -> impl Iterator<Item = [f32; 20]> + use<'a> {
-        Obstacle::<f32>::place(settings, elapsed, self.origin).map(|obstacle| obstacle.numbers())
+        Obstacle::<f32>::place(settings, elapsed, self.particles.origin)
+            .map(|obstacle| obstacle.numbers())
     }
-}
-
-fn number(index: usize) -> u32 {
-    u32::try_from(index).expect("particles and tets are numbered by 32 bits")
 }

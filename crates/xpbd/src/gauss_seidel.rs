@@ -9,8 +9,8 @@
 
 use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
-use crate::crew::in_rounds;
 use crate::simd_kernel::{Block, BlockKernel, Damping, Pass, Sequential, Split};
+use crate::team::parallel_rounds;
 use crate::{Float, TetSolve};
 
 /// Fewest blocks that a thread is given of a color: about a microsecond of work.
@@ -93,6 +93,6 @@ fn colors<R: Float, S: Simd, K: BlockKernel>(simd: S, pass: &Pass<'_, R>) {
             }
         }
     } else {
-        in_rounds(colors, chunks, solve);
+        parallel_rounds(colors, chunks, solve);
     }
 }

@@ -39,54 +39,56 @@
 //! What it cannot do: iterating a large step does not converge to the implicit solution of that step, because XPBD
 //! leaves out the primal residual; use substeps, and watch [`Solver::kappa`].
 
-mod attachment;
+mod changes;
 mod collider;
-mod copy;
-mod crew;
+mod constraints;
 mod damping;
+mod degeneracy_jitter;
 mod device;
 mod direction;
-mod distance;
 mod error;
 mod float;
+mod floating_origin;
 mod gauss_seidel;
 mod jacobi;
-mod kappa_limit;
 mod layout;
 mod material;
 mod measure;
 mod neo_hookean;
-mod origin;
+mod particles;
+mod pose;
 mod real;
 mod residuals;
-mod scalar;
 mod settings;
 mod simd_kernel;
 mod solver;
-mod step;
-mod unfold;
+mod stepper;
+mod substep;
+mod team;
+mod tets;
 mod vbd;
-mod volume;
 
-pub use attachment::Pose;
+pub use changes::Changes;
 pub use collider::{Collider, ColliderShape};
-pub use device::{AttachmentData, Changes, DistanceData, TetData, VolumeData};
-pub use distance::DistanceConstraint;
+pub use constraints::{
+    AttachmentData, DistanceConstraint, DistanceData, VolumeConstraint, VolumeData,
+};
+pub use device::TetData;
 pub use error::XpbdError;
 pub use float::Float;
-pub use kappa_limit::KappaLimit;
 pub use material::Material;
 pub use measure::{Energy, Softened, Volume};
+pub use pose::Pose;
 pub use real::Real;
 pub use residuals::Residuals;
 pub use settings::{Method, StepSettings, TetSolve, shortest_substep_of_f32};
 pub use solver::Solver;
-pub use step::StepReport;
+pub use stepper::StepReport;
+pub use tets::KappaLimit;
 pub use vbd::{
     CoarseCorrection, CoarseCorrectionReport, CoarseCorrectionSettings, Guess, ImplicitStep,
     Integrator, VbdReport, VbdSettings, VertexStars,
 };
-pub use volume::VolumeConstraint;
 
 /// The example of the README, run as a test.
 #[cfg(doctest)]

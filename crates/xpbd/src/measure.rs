@@ -48,12 +48,13 @@ impl<R: Float> Solver<R> {
     pub fn energy(&self, gravity: Option<DVec3>) -> Energy {
         let mut energy = Energy::default();
         for p in 0..self.particle_count() {
-            energy.kinetic += 0.5 * self.masses[p] * self.velocity(p).length_squared();
-            energy.gravity -= gravity.map_or(0.0, |g| self.masses[p] * g.dot(self.position(p)));
+            energy.kinetic += 0.5 * self.particles.masses[p] * self.velocity(p).length_squared();
+            energy.gravity -=
+                gravity.map_or(0.0, |g| self.particles.masses[p] * g.dot(self.position(p)));
         }
-        for tet in &self.tets {
+        for tet in &self.tets.list {
             let tet = tet.to_f64();
-            energy.elastic += tet.energy(&self.evaluate(&tet));
+            energy.elastic += tet.energy(&tet.evaluate(self.particles.corners(tet.particles)));
         }
         energy
     }
@@ -68,7 +69,7 @@ impl<R: Float> Solver<R> {
             inverted: 0,
         };
         for t in 0..self.tet_count() {
-            let (rest, ratio) = (self.volumes[t], self.gradient(t).determinant());
+            let (rest, ratio) = (self.tets.rest_volumes[t], self.gradient(t).determinant());
             volume.rest += rest;
             volume.total += rest * ratio;
             volume.min_ratio = volume.min_ratio.min(ratio);
@@ -96,14 +97,14 @@ impl<R: Float> Solver<R> {
             .fold(0.0, f64::max)
     }
 
-    /// The same for one tet.
+    /// [`Solver::kappa`] of one tet.
     ///
     /// # Panics
     /// If the tet does not exist.
     #[must_use]
     pub fn kappa_of(&self, tet: usize, substep_time: f64) -> f64 {
-        let material = &self.materials[usize::from(self.material_of[tet])];
-        self.tets[tet].kappa(material, substep_time)
+        let material = self.tets.material(tet);
+        self.tets.list[tet].kappa(material, substep_time)
     }
 
     /// The tets softened by [`Solver::limit_kappa`]. O(tets).
@@ -119,30 +120,31 @@ impl<R: Float> Solver<R> {
             // Single precision keeps seven digits of it.
             if factor > 1.0 + 1e-5 {
                 softened.tets += 1;
-                softened.volume_fraction += self.volumes[t];
+                softened.volume_fraction += self.tets.rest_volumes[t];
                 softened.strongest = softened.strongest.max(factor);
             }
         }
-        softened.volume_fraction /= self.volumes.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        let volume = self.tets.rest_volumes.iter().sum::<f64>();
+        softened.volume_fraction /= volume.max(f64::MIN_POSITIVE);
         softened
     }
 
     fn inverse_rest(&self, tet: usize) -> DMat3 {
-        let q = self.tets[tet].inverse_rest.map(R::to_f64);
+        let q = self.tets.list[tet].inverse_rest.map(R::to_f64);
         DMat3::from_cols_array(&q).transpose()
     }
 
     fn gradient(&self, tet: usize) -> DMat3 {
-        let [a, b, c, d] = self.tets[tet].particles.map(|p| self.local(p as usize));
+        let [a, b, c, d] = self.particles.corners(self.tets.list[tet].particles);
         DMat3::from_cols(b - a, c - a, d - a) * self.inverse_rest(tet)
     }
 
     /// By how much a tet was softened: 1 if not at all, also if it is too flat to take part.
     fn softening(&self, tet: usize) -> f64 {
-        let material = &self.materials[usize::from(self.material_of[tet])];
-        match self.tets[tet].stiffness.to_f64() {
+        let material = self.tets.material(tet);
+        match self.tets.list[tet].stiffness.to_f64() {
             0.0 => 1.0,
-            stiffness => material.mu() * self.volumes[tet] / stiffness,
+            stiffness => material.mu() * self.tets.rest_volumes[tet] / stiffness,
         }
     }
 }

@@ -10,7 +10,6 @@
 
 use glam::DVec3;
 
-use crate::float::weight;
 use crate::neo_hookean::{Evaluation, TetConstraint};
 use crate::{Float, Solver, TetSolve};
 
@@ -66,24 +65,28 @@ impl<R: Float> Solver<R> {
         if !self.has_kept() {
             return None;
         }
+        let last = &self.stepper.last;
         let time_squared = substep_time * substep_time;
         let inertia: Vec<DVec3> = (0..self.particle_count())
-            .map(|p| (self.local(p) - R::to_dvec3(self.predicted[p])) * self.masses[p])
+            .map(|p| {
+                (self.particles.local(p) - R::to_dvec3(last.predicted[p]))
+                    * self.particles.masses[p]
+            })
             .collect();
         let mut potential: f64 = (0..self.particle_count())
-            .filter(|&p| self.moves(p))
-            .map(|p| inertia[p].length_squared() / (2.0 * self.masses[p] * time_squared))
+            .filter(|&p| self.is_free(p))
+            .map(|p| inertia[p].length_squared() / (2.0 * self.particles.masses[p] * time_squared))
             .sum();
         let mut force: Vec<DVec3> = inertia.iter().map(|&i| i / time_squared).collect();
         let mut primal = inertia;
         let mut dual = Vec::new();
-        for (t, tet) in self.tets.iter().enumerate() {
+        for (t, tet) in self.tets.list.iter().enumerate() {
             let tet = tet.to_f64();
             let stiffness = self.kept_stiffness(&tet);
             let evaluation = self.evaluate_kept(&tet);
             let values = [evaluation.deviatoric, evaluation.hydrostatic];
-            potential += tet.energy(&self.evaluate(&tet));
-            let multipliers = self.kept[t].map(R::to_f64);
+            potential += tet.energy(&tet.evaluate(self.particles.corners(tet.particles)));
+            let multipliers = last.multipliers[t].map(R::to_f64);
             for (k, &p) in tet.particles.iter().enumerate() {
                 let gradients = [
                     evaluation.deviatoric_gradients[k],
@@ -104,7 +107,7 @@ impl<R: Float> Solver<R> {
             let entries = vectors.into_iter().enumerate();
             norm(
                 entries
-                    .filter(|&(p, _)| self.moves(p))
+                    .filter(|&(p, _)| self.is_free(p))
                     .flat_map(|(_, v)| v.to_array()),
             )
         };
@@ -157,12 +160,20 @@ impl<R: Float> Solver<R> {
             let left = unsatisfied(stiffness, values, kept.map(R::to_f64), time_squared);
             left.map_or(0.0, |left| norm(left.into_iter()))
         };
-        Some(self.tets.iter().zip(&self.kept).map(of_tet).collect())
+        Some(
+            self.tets
+                .list
+                .iter()
+                .zip(&self.stepper.last.multipliers)
+                .map(of_tet)
+                .collect(),
+        )
     }
 
-    /// Whether the last substep was kept, and nobody has come since.
+    /// Whether the last substep was kept, and no particle or tet was added since.
     fn has_kept(&self) -> bool {
-        self.predicted.len() == self.particle_count() && self.kept.len() == self.tet_count()
+        let last = &self.stepper.last;
+        last.predicted.len() == self.particle_count() && last.multipliers.len() == self.tet_count()
     }
 
     /// `‖M g‖` over the particles that move, in N: the size of the forces in play, by which residuals are judged.
@@ -170,13 +181,13 @@ impl<R: Float> Solver<R> {
     /// The sum of squares shrinks with the size of the particles as that of [`Residuals::force`] does.
     #[must_use]
     pub fn load(&self, gravity: DVec3) -> f64 {
-        let particles = (0..self.particle_count()).filter(|&p| self.moves(p));
-        norm(particles.flat_map(|p| (gravity * self.masses[p]).to_array()))
+        let particles = (0..self.particle_count()).filter(|&p| self.is_free(p));
+        norm(particles.flat_map(|p| (gravity * self.particles.masses[p]).to_array()))
     }
 
     /// One over the compliances of both constraints, as the last substep solved them.
     fn kept_stiffness(&self, tet: &TetConstraint<f64>) -> [f64; 2] {
-        let volume = match self.kept_form {
+        let volume = match self.stepper.last.tet_solve {
             TetSolve::Split => tet.ratio - 1.0,
             TetSolve::Block | TetSolve::Sequential => tet.ratio,
         };
@@ -185,21 +196,11 @@ impl<R: Float> Solver<R> {
 
     /// Both constraints of a tet at the present positions, as the last substep solved them.
     fn evaluate_kept(&self, tet: &TetConstraint<f64>) -> Evaluation<f64> {
-        let x = tet.particles.map(|p| self.local(p as usize));
-        match self.kept_form {
+        let x = self.particles.corners(tet.particles);
+        match self.stepper.last.tet_solve {
             TetSolve::Split => tet.evaluate_split(x),
             TetSolve::Block | TetSolve::Sequential => tet.evaluate(x),
         }
-    }
-
-    /// Both constraints of a tet, in the block form, at the present positions.
-    pub(crate) fn evaluate(&self, tet: &TetConstraint<f64>) -> Evaluation<f64> {
-        tet.evaluate(tet.particles.map(|p| self.local(p as usize)))
-    }
-
-    /// Whether a particle is neither held nor without mass.
-    pub(crate) fn moves(&self, particle: usize) -> bool {
-        weight::<R>(&self.particles[particle]) > R::ZERO
     }
 }
 

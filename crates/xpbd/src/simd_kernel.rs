@@ -41,7 +41,7 @@ use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask};
 
 use crate::layout::{CONSTANTS, Layout, REST};
 use crate::neo_hookean::{LARGE_STRAIN, MAX_COFACTOR_NORM, SHORTENINGS};
-use crate::step::Factors;
+use crate::substep::Factors;
 use crate::{Float, TetSolve};
 use memory::{gather, load_multipliers, scatter, splat, store_multipliers};
 

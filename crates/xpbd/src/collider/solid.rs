@@ -11,7 +11,7 @@ use crate::direction::{absolute, direction};
 
 /// A shape in the solver's precision, prepared for many questions.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Solid<R: Float> {
+pub(crate) enum Solid<R: Float> {
     Plane {
         normal: R::Vector,
         /// Of the surface from the origin, along the normal.
@@ -35,14 +35,14 @@ pub(super) enum Solid<R: Float> {
 }
 
 /// What is nearest to a point on a surface.
-pub(super) struct Nearest<R: Float> {
-    pub(super) distance: R,
-    pub(super) normal: R::Vector,
-    pub(super) point: R::Vector,
+pub(crate) struct Nearest<R: Float> {
+    pub(crate) distance: R,
+    pub(crate) normal: R::Vector,
+    pub(crate) point: R::Vector,
 }
 
 impl<R: Float> Solid<R> {
-    pub(super) fn new(shape: &ColliderShape) -> Self {
+    pub(crate) fn new(shape: &ColliderShape) -> Self {
         match *shape {
             ColliderShape::Plane { point, normal } => {
                 let normal = unit(normal);
@@ -88,7 +88,7 @@ impl<R: Float> Solid<R> {
     }
 
     #[inline]
-    pub(super) fn nearest(&self, x: R::Vector) -> Nearest<R> {
+    pub(crate) fn nearest(&self, x: R::Vector) -> Nearest<R> {
         match *self {
             Self::Plane { normal, offset } => {
                 let along = R::dot(normal, x);
@@ -170,7 +170,7 @@ fn unit(v: DVec3) -> DVec3 {
 
 impl Solid<f32> {
     /// The kind and the numbers, at the places that `Solver::obstacle_data` names.
-    pub(super) fn numbers(&self) -> [f32; 20] {
+    pub(crate) fn numbers(&self) -> [f32; 20] {
         let mut numbers = [0.0; 20];
         let mut put = |at: usize, vectors: &[glam::Vec3]| {
             for (k, vector) in vectors.iter().enumerate() {

@@ -27,11 +27,11 @@ use incise_graph::Incidence;
 use super::corner_term::{OTHERS, rows};
 use super::matrix::{Block, add_isotropic, add_outer};
 use super::sweep::solve;
+use crate::constraints::Distance;
+use crate::constraints::ScalarConstraint;
+use crate::constraints::TetVolume;
 use crate::direction::direction;
-use crate::distance::Distance;
 use crate::float::{load, weight};
-use crate::scalar::Scalar;
-use crate::volume::TetVolume;
 use crate::{Float, Solver};
 
 /// Newton steps of a particle with a distance.
@@ -261,7 +261,7 @@ impl<R: Float> ConstraintTerms<R> {
             self.offsets.push(self.terms.len());
         }
         self.elastic.resize(order.len(), 0.0);
-        for tet in &solver.tets {
+        for tet in &solver.tets.list {
             let tet = tet.to_f64();
             for (p, q) in tet.particles.into_iter().zip(rows(&tet)) {
                 self.elastic[p as usize] +=
@@ -312,7 +312,7 @@ impl<R: Float> ConstraintTerms<R> {
             let distance = distance(solver, index).to_f64();
             let [a, b] = distance
                 .particles()
-                .map(|p| R::to_dvec3(solver.previous[p as usize]));
+                .map(|p| R::to_dvec3(solver.particles.previous[p as usize]));
             let spring = self.spring(&distance, a.distance(b) - distance.length(), 1.0, {
                 (solver, time, penalty)
             });
@@ -322,7 +322,7 @@ impl<R: Float> ConstraintTerms<R> {
             let volume = volume_of(solver, index).to_f64();
             let x = volume
                 .particles()
-                .map(|p| R::to_dvec3(solver.previous[p as usize]));
+                .map(|p| R::to_dvec3(solver.particles.previous[p as usize]));
             let spring = match volume.evaluate(x) {
                 Some((value, _)) => self.spring(
                     &volume,
@@ -342,14 +342,14 @@ impl<R: Float> ConstraintTerms<R> {
         }
         self.anchors.clear();
         self.anchor_of.clear();
-        if !solver.attachments.is_soft() {
+        if !solver.constraints.attachments.is_soft() {
             return;
         }
         self.anchor_of.resize(solver.particle_count(), NONE);
-        for attachment in solver.attachments.soft() {
+        for attachment in solver.constraints.attachments.soft() {
             let p = attachment.particle as usize;
             let rate = attachment.damping / time;
-            let lag = R::to_dvec3(solver.previous[p] - attachment.before);
+            let lag = R::to_dvec3(solver.particles.previous[p] - attachment.before);
             let target = R::to_dvec3(attachment.target) + lag * (rate / (1.0 + rate));
             let stiffness = R::from_f64((1.0 + rate) / attachment.compliance);
             let position = R::from_dvec3(target);
@@ -373,7 +373,7 @@ impl<R: Float> ConstraintTerms<R> {
     /// What a constraint is in a substep: `value` at its start, `slope_squared` the square of a gradient at one particle.
     fn spring<const K: usize>(
         &self,
-        constraint: &impl Scalar<f64, K>,
+        constraint: &impl ScalarConstraint<f64, K>,
         value: f64,
         slope_squared: f64,
         (solver, time, penalty): (&Solver<R>, f64, f64),
@@ -389,7 +389,7 @@ impl<R: Float> ConstraintTerms<R> {
         let compliance = constraint.compliance() / (1.0 + rate);
         let free = constraint.particles().into_iter().map(|p| p as usize);
         let yielding: f64 = free
-            .filter(|&p| weight::<R>(&solver.particles[p]) > R::ZERO)
+            .filter(|&p| weight::<R>(&solver.particles.cells[p]) > R::ZERO)
             .map(|p| slope_squared / (solver.mass(p) / (time * time) + self.elastic[p]))
             .sum();
         let per_penalty = yielding / penalty;
@@ -414,7 +414,7 @@ impl<R: Float> ConstraintTerms<R> {
         for index in 0..self.springs.len() {
             let spring = self.springs[index];
             if spring.per_penalty > R::ZERO && spring.stiffness > R::ZERO {
-                let value = self.value(solver, index, &|p| solver.local(p as usize));
+                let value = self.value(solver, index, &|p| solver.particles.local(p as usize));
                 let multiplier = spring.stiffness * spring.excess(R::from_f64(value));
                 if multiplier.is_finite() {
                     self.springs[index].multiplier = multiplier;
@@ -485,7 +485,7 @@ impl<R: Float> ConstraintTerms<R> {
         relaxation: R,
     ) -> (R::Vector, Local<R>) {
         let p = order[place] as usize;
-        let x = load::<R>(&solver.particles[p]);
+        let x = load::<R>(&solver.particles.cells[p]);
         let mut start = *tets;
         let curved = self.add(solver, place, p, x, Curvature::Newton, &mut start);
         let mut step = start.solve();
@@ -644,7 +644,7 @@ impl<R: Float> ConstraintTerms<R> {
                 if p == own {
                     R::to_dvec3(x)
                 } else {
-                    solver.local(p as usize)
+                    solver.particles.local(p as usize)
                 }
             };
             let spring = self.springs[index].to_f64();
@@ -661,7 +661,7 @@ impl<R: Float> ConstraintTerms<R> {
     /// The force of the constraints on the particle at a place of the order.
     pub(super) fn force(&self, solver: &Solver<R>, order: &[u32], place: usize) -> R::Vector {
         let p = order[place] as usize;
-        let x = load::<R>(&solver.particles[p]);
+        let x = load::<R>(&solver.particles.cells[p]);
         let mut local = Local {
             isotropic: R::ZERO,
             h: [R::ZERO; 6],
@@ -683,7 +683,7 @@ impl<R: Float> ConstraintTerms<R> {
         force: &mut R::Vector,
     ) {
         let p = order[row] as usize;
-        let x = load::<R>(&solver.particles[p]);
+        let x = load::<R>(&solver.particles.cells[p]);
         let place_of = |q: u32| match columns[1..].binary_search(&self.row_of[q as usize]) {
             Ok(place) => place + 1,
             // Not beside the diagonal, so on it.
@@ -741,7 +741,7 @@ impl Spring<f64> {
     /// Adds the forces of a constraint at its particles.
     fn pull<const K: usize>(
         &self,
-        constraint: &impl Scalar<f64, K>,
+        constraint: &impl ScalarConstraint<f64, K>,
         position: &impl Fn(u32) -> DVec3,
         out: &mut [DVec3],
     ) {
@@ -760,25 +760,23 @@ impl Spring<f64> {
 #[inline]
 fn corners<R: Float, const K: usize>(
     solver: &Solver<R>,
-    constraint: &impl Scalar<R, K>,
+    constraint: &impl ScalarConstraint<R, K>,
     own: usize,
     x: R::Vector,
 ) -> [R::Vector; K] {
     let mut positions = constraint
         .particles()
-        .map(|p| load::<R>(&solver.particles[p as usize]));
+        .map(|p| load::<R>(&solver.particles.cells[p as usize]));
     positions[own] = x;
     positions
 }
 
 #[inline]
 fn distance<R: Float>(solver: &Solver<R>, index: usize) -> &Distance<R> {
-    let distances = solver.distances.as_ref();
-    &distances.expect("a term belongs to a distance").list[index]
+    &solver.constraints.distances.list[index]
 }
 
 #[inline]
 fn volume_of<R: Float>(solver: &Solver<R>, index: usize) -> &TetVolume<R> {
-    let volumes = solver.volume_constraints.as_ref();
-    &volumes.expect("a term belongs to a volume").list[index]
+    &solver.constraints.volumes.list[index]
 }

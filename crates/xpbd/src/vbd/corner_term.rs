@@ -4,9 +4,9 @@
 //! is `n · a / 6V`, and the pull of `|F|²` is a weighted sum of a, b and c. So a particle needs eight numbers of a tet,
 //! not the nine of its rest matrix, and the deformation gradient is never formed. Cost: about 60 operations.
 
-use crate::float::load;
+use crate::Float;
 use crate::neo_hookean::TetConstraint;
-use crate::{Float, Solver};
+use crate::particles::Particles;
 
 /// The other corners of each corner, such that corner and others are an even permutation.
 pub(super) const OTHERS: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [3, 0, 1], [2, 1, 0]];
@@ -37,10 +37,8 @@ pub(super) struct Corner<R: Float> {
 impl<R: Float> CornerTerm<R> {
     /// The term with its own particle at `x`.
     #[inline]
-    pub(super) fn at(&self, solver: &Solver<R>, x: R::Vector) -> Corner<R> {
-        let others = self
-            .others
-            .map(|p| load::<R>(&solver.particles[p as usize]) - x);
+    pub(super) fn at(&self, particles: &Particles<R>, x: R::Vector) -> Corner<R> {
+        let others = self.others.map(|p| particles.vector(p as usize) - x);
         let ([a, b, c], [wa, wb, wc]) = (others, self.pulls);
         let slope = R::cross(b - a, c - a) * self.slope;
         let excess = R::dot(slope, a) - self.target;

@@ -232,9 +232,9 @@ impl<R: Float> ImplicitStep<'_, R> {
         held.clear();
         base.clear();
         for &p in &self.stars.order {
-            let particle = &self.solver.particles[p as usize];
+            let particle = &self.solver.particles.cells[p as usize];
             let x = load::<R>(particle);
-            let touching = self.obstacles.iter().any(|o| o.touched_at(x).is_some());
+            let touching = self.solver.constraints.colliders.touches(x);
             held.push(weight::<R>(particle) <= R::ZERO || touching);
             base.push(x);
         }
@@ -285,7 +285,12 @@ impl<R: Float> ImplicitStep<'_, R> {
             elastic,
             gain,
         } = self.search(start, base, direction, slope);
-        self.solver.project_to_colliders(&self.obstacles);
+        let Solver {
+            particles,
+            constraints,
+            ..
+        } = &*self.solver;
+        constraints.colliders.project(particles);
         // A full step on a quadratic gains half of the slope, and leaves what the iteration left. Where a new matrix misses
         // the gain by a part, the square of that part is left; where that of an earlier state does, at most the part.
         let expected = 0.5 * slope.max(0.0);
@@ -331,7 +336,7 @@ impl<R: Float> ImplicitStep<'_, R> {
                 let moved = x + d * part;
                 sound &= finite::<R>(moved);
                 store::<R>(
-                    &self.solver.particles[p as usize],
+                    &self.solver.particles.cells[p as usize],
                     if finite::<R>(moved) { moved } else { x },
                 );
             }

@@ -11,8 +11,9 @@
 
 use glam::DVec3;
 
+use crate::Float;
 use crate::float::{load, store, weight};
-use crate::{Float, Solver};
+use crate::particles::Particles;
 
 /// The velocities that BDF2 needs of earlier substeps, by particle.
 #[derive(Clone, Debug)]
@@ -84,10 +85,10 @@ impl<R: Float> History<R> {
     }
 
     /// Begins a history: the next `count` substeps are implicit Euler and make up one of length `time`.
-    pub(super) fn start(&mut self, solver: &Solver<R>, time: f64, count: u32) {
+    pub(super) fn start(&mut self, particles: &Particles<R>, time: f64, count: u32) {
         (self.time, self.startup) = (time, Some(Startup { count, done: 0 }));
         self.particles.clear();
-        let before = solver.velocities.iter().map(|&before| Past {
+        let before = particles.velocities.iter().map(|&before| Past {
             mean: R::Vector::default(),
             before,
             after: before,
@@ -102,21 +103,21 @@ impl<R: Float> History<R> {
     /// New particles, and those whose velocity was changed since, are taken to have moved steadily.
     pub(super) fn begin(
         &mut self,
-        solver: &mut Solver<R>,
+        particles: &mut Particles<R>,
         time: f64,
         gravity: Option<DVec3>,
     ) -> f64 {
         let third = R::from_f64(1.0 / 3.0);
         let fall = R::from_dvec3(gravity.unwrap_or(DVec3::ZERO) * time);
         self.startup = None;
-        self.particles.truncate(solver.particle_count());
-        let velocities = &solver.velocities[self.particles.len()..];
+        self.particles.truncate(particles.len());
+        let velocities = &particles.velocities[self.particles.len()..];
         self.particles
             .extend(velocities.iter().copied().map(Past::steady));
         let step = R::from_f64(time);
         for (p, past) in self.particles.iter_mut().enumerate() {
-            let particle = &solver.particles[p];
-            let velocity = &mut solver.velocities[p];
+            let particle = &particles.cells[p];
+            let velocity = &mut particles.velocities[p];
             if R::components(past.after) != R::components(*velocity) {
                 *past = Past::steady(*velocity);
             }
@@ -130,7 +131,7 @@ impl<R: Float> History<R> {
     }
 
     /// Takes in the velocities after a substep; what `touches` a collider moves steadily from then on.
-    pub(super) fn end(&mut self, solver: &Solver<R>, touches: impl Fn(R::Vector) -> bool) {
+    pub(super) fn end(&mut self, particles: &Particles<R>, touches: impl Fn(R::Vector) -> bool) {
         let [one, two] = [1.0 / 3.0, 2.0 / 3.0].map(R::from_f64);
         // The part of a startup substep, and of the startup that has passed.
         let startup = self.startup.as_mut().map(|startup| {
@@ -139,8 +140,8 @@ impl<R: Float> History<R> {
             [part(1), part(startup.done)]
         });
         for (p, past) in self.particles.iter_mut().enumerate() {
-            let velocity = solver.velocities[p];
-            if touches(load::<R>(&solver.particles[p])) {
+            let velocity = particles.velocities[p];
+            if touches(load::<R>(&particles.cells[p])) {
                 *past = Past::steady(velocity);
                 if let Some([_, passed]) = startup {
                     past.mean = velocity * passed;

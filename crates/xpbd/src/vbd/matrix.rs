@@ -135,12 +135,12 @@ impl<R: Float> Blocks<R> {
         held: &[bool],
         force: &mut [R::Vector],
     ) {
-        let tets = solver.tets.par_iter().with_min_len(PARALLEL_ROWS);
+        let tets = solver.tets.list.par_iter().with_min_len(PARALLEL_ROWS);
         tets.map(|tet| {
             held_excess(
                 tet,
                 tet.particles
-                    .map(|p| load::<R>(&solver.particles[p as usize])),
+                    .map(|p| load::<R>(&solver.particles.cells[p as usize])),
             )
         })
         .collect_into_vec(&mut self.excess);
@@ -173,17 +173,17 @@ impl<R: Float> Blocks<R> {
                     continue;
                 }
                 let p = stars.order[row] as usize;
-                let particle = &solver.particles[p];
+                let particle = &solver.particles.cells[p];
                 let x = load::<R>(particle);
                 let inertia = per_time_squared / weight::<R>(particle);
-                let free = solver.previous[p] + solver.velocities[p] * time;
+                let free = solver.particles.previous[p] + solver.particles.velocities[p] * time;
                 *force = (free - x) * inertia;
                 let mut isotropic = inertia;
                 let lower = upper[row] - offsets[row];
                 let pairs = stars.offsets[row]..stars.offsets[row + 1];
                 for pair in pairs {
                     let term = &stars.terms[pair];
-                    let corner = term.at(solver, x);
+                    let corner = term.at(&solver.particles, x);
                     let ([a, b, c], slope) = (corner.others, corner.slope);
                     *force += corner.force;
                     let [wa, wb, wc] = term.pulls;
@@ -208,7 +208,7 @@ impl<R: Float> Blocks<R> {
                 if let Some(viscosity) = &stars.viscosity {
                     viscosity.add_blocks(row, blocks);
                     *force += viscosity.force(row, &stars.order, |p| {
-                        load::<R>(&solver.particles[p]) - solver.previous[p]
+                        load::<R>(&solver.particles.cells[p]) - solver.particles.previous[p]
                     });
                 }
                 if !stars.constraints.is_empty() {
@@ -236,16 +236,16 @@ impl<R: Float> Blocks<R> {
                 return R::Vector::default();
             }
             let p = stars.order[row] as usize;
-            let particle = &solver.particles[p];
+            let particle = &solver.particles.cells[p];
             let x = load::<R>(particle);
-            let free = solver.previous[p] + solver.velocities[p] * time;
+            let free = solver.particles.previous[p] + solver.particles.velocities[p] * time;
             let mut force = (free - x) * (per_time_squared / weight::<R>(particle));
             for term in stars.of(row) {
-                force += term.at(solver, x).force;
+                force += term.at(&solver.particles, x).force;
             }
             if let Some(viscosity) = &stars.viscosity {
                 force += viscosity.force(row, &stars.order, |p| {
-                    load::<R>(&solver.particles[p]) - solver.previous[p]
+                    load::<R>(&solver.particles.cells[p]) - solver.particles.previous[p]
                 });
             }
             if !stars.constraints.is_empty() {
@@ -403,7 +403,7 @@ mod tests {
         }
         for p in 0..5 {
             solver.set_mass(p, 10.0);
-            let x = solver.local(p);
+            let x = solver.particles.local(p);
             solver.set_position(
                 p,
                 DVec3::new(1.05 * x.x + 0.02 * x.y, 1.04 * x.y, 1.06 * x.z),
@@ -441,7 +441,7 @@ mod tests {
                 let mut motion = vec![DVec3::ZERO; 5];
                 motion[column] = axis;
                 blocks.multiply(&motion, &mut product);
-                let x = step.solver.local(q as usize);
+                let x = step.solver.particles.local(q as usize);
                 let [low, high] = [-1e-6, 1e-6].map(|h| {
                     step.solver.set_position(q as usize, x + axis * h);
                     step.forces(&mut exact);

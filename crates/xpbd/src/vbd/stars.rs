@@ -12,7 +12,7 @@ use super::constraints::ConstraintTerms;
 use super::corner_term::CornerTerm;
 use super::history::History;
 use super::viscosity::Viscosity;
-use crate::scalar::Scalar;
+use crate::constraints::ScalarConstraint;
 use crate::{Float, Solver};
 
 /// What VBD needs of the tets, sorted by the particles of a schedule.
@@ -101,7 +101,7 @@ impl<R: Float> VertexStars<R> {
         for p in schedule.order() {
             for &t in incidence.particles_of(p as usize) {
                 // What comes after the tets are distances and volumes.
-                let Some(tet) = solver.tets.get(t as usize) else {
+                let Some(tet) = solver.tets.list.get(t as usize) else {
                     break;
                 };
                 let tet = tet.to_f64();
@@ -114,7 +114,7 @@ impl<R: Float> VertexStars<R> {
             self.offsets.push(self.terms.len());
         }
         self.tet_count = solver.tet_count();
-        let volume = solver.volumes.iter().sum::<f64>();
+        let volume = solver.tets.rest_volumes.iter().sum::<f64>();
         self.size = (6.0 * volume / self.tet_count.max(1) as f64)
             .max(0.0)
             .cbrt();
@@ -162,7 +162,7 @@ impl<R: Float> VertexStars<R> {
     pub(super) fn parts(&mut self, solver: &Solver<R>) -> &[u32] {
         if self.parts.len() != self.order.len() {
             let mut sets = DisjointSets::new(self.order.len());
-            for tet in &solver.tets {
+            for tet in &solver.tets.list {
                 let [a, others @ ..] = tet.particles;
                 for b in others {
                     sets.unite(a, b);
@@ -188,7 +188,7 @@ impl<R: Float> VertexStars<R> {
     /// Prepares what is constant in a substep: constraints and viscosity.
     pub(super) fn begin(&mut self, solver: &Solver<R>, time: f64, penalty: f64) {
         self.constraints.begin(solver, time, penalty);
-        if !solver.materials.iter().any(|m| m.damping > 0.0) {
+        if !solver.tets.is_damped() {
             self.viscosity = None;
             return;
         }
@@ -245,21 +245,20 @@ impl<R: Float> Solver<R> {
             visit(number, &distinct[..count]);
             number += 1;
         };
-        for tet in &self.tets {
+        for tet in &self.tets.list {
             visit(&tet.particles);
         }
-        for distance in self.distances.iter().flat_map(|d| &d.list) {
+        for distance in &self.constraints.distances.list {
             visit(&distance.particles());
         }
-        if let Some(volumes) = &self.volume_constraints {
-            let mut scheduled = vec![false; volumes.list.len()];
-            for index in volumes.schedule.order() {
-                scheduled[index as usize] = true;
-            }
-            for (volume, scheduled) in volumes.list.iter().zip(scheduled) {
-                let particles = volume.particles();
-                visit(if scheduled { &particles } else { &[] });
-            }
+        let volumes = &self.constraints.volumes;
+        let mut scheduled = vec![false; volumes.list.len()];
+        for index in volumes.schedule.order() {
+            scheduled[index as usize] = true;
+        }
+        for (volume, scheduled) in volumes.list.iter().zip(scheduled) {
+            let particles = volume.particles();
+            visit(if scheduled { &particles } else { &[] });
         }
         number as usize
     }

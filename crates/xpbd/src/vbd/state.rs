@@ -29,23 +29,32 @@ impl<R: Float> ImplicitStep<'_, R> {
         let elastic = |tets: &[TetConstraint<R>]| {
             tets.iter().fold([0.0; 2], |[energy, terms], tet| {
                 let tet = tet.to_f64();
-                let own = energy_and_terms(&tet, tet.particles.map(|p| solver.local(p as usize)));
+                let own = energy_and_terms(
+                    &tet,
+                    tet.particles.map(|p| solver.particles.local(p as usize)),
+                );
                 [energy + own[0], terms + own[1]]
             })
         };
         let inertia = |p: usize| {
-            if weight::<R>(&solver.particles[p]) <= R::ZERO {
+            if weight::<R>(&solver.particles.cells[p]) <= R::ZERO {
                 return 0.0;
             }
-            let lag = solver.local(p) - self.free_position(p);
+            let lag = solver.particles.local(p) - self.free_position(p);
             0.5 * per_time_squared * solver.mass(p) * lag.length_squared()
         };
-        let tets: Vec<[f64; 2]> = solver.tets.par_chunks(PARALLEL_TETS).map(elastic).collect();
+        let tets: Vec<[f64; 2]> = solver
+            .tets
+            .list
+            .par_chunks(PARALLEL_TETS)
+            .map(elastic)
+            .collect();
         let mut parts: Vec<f64> = tets.iter().map(|part| part[0]).collect();
         let elastic = parts.iter().sum();
         parts.extend((0..solver.particle_count()).map(inertia));
         if let Some(viscosity) = &self.stars.viscosity {
-            let motion = |p: usize| solver.local(p) - R::to_dvec3(solver.previous[p]);
+            let motion =
+                |p: usize| solver.particles.local(p) - R::to_dvec3(solver.particles.previous[p]);
             let order = &self.stars.order;
             let rows = (0..order.len()).into_par_iter().with_min_len(PARALLEL_TETS);
             let dissipated = rows.map(|row| {
@@ -56,7 +65,7 @@ impl<R: Float> ImplicitStep<'_, R> {
         }
         let constraints = &self.stars.constraints;
         if !constraints.is_empty() {
-            parts.push(constraints.energy(solver, &|p| solver.local(p as usize)));
+            parts.push(constraints.energy(solver, &|p| solver.particles.local(p as usize)));
         }
         let total: f64 = parts.into_iter().sum();
         let terms = total.abs() + tets.iter().map(|part| part[1]).sum::<f64>();
@@ -72,7 +81,7 @@ impl<R: Float> ImplicitStep<'_, R> {
         let per_time_squared = self.time.to_f64().powi(-2);
         let solver = &*self.solver;
         let each = (0..solver.particle_count()).map(|p| {
-            let way = solver.local(p) - R::to_dvec3(solver.previous[p]);
+            let way = solver.particles.local(p) - R::to_dvec3(solver.particles.previous[p]);
             solver.mass(p) * way.length_squared()
         });
         0.5 * per_time_squared * each.sum::<f64>()
@@ -82,7 +91,7 @@ impl<R: Float> ImplicitStep<'_, R> {
     /// zero in the solution. Those on particles that do
     /// not move, and what a collider bears that a particle touches, are zero as well.
     pub fn forces(&self, out: &mut Vec<DVec3>) {
-        self.forces_at(&|p| self.solver.local(p), out);
+        self.forces_at(&|p| self.solver.particles.local(p), out);
     }
 
     /// The norm of [`ImplicitStep::forces`] over all particles, in N.
@@ -102,14 +111,16 @@ impl<R: Float> ImplicitStep<'_, R> {
 
     /// Where a particle would be if it were free.
     pub(super) fn free_position(&self, p: usize) -> DVec3 {
-        R::to_dvec3(self.solver.previous[p] + self.solver.velocities[p] * self.time)
+        R::to_dvec3(
+            self.solver.particles.previous[p] + self.solver.particles.velocities[p] * self.time,
+        )
     }
 
     fn forces_at(&self, position: &impl Fn(usize) -> DVec3, out: &mut Vec<DVec3>) {
         let solver = &*self.solver;
         out.clear();
         out.resize(solver.particle_count(), DVec3::ZERO);
-        for tet in &solver.tets {
+        for tet in &solver.tets.list {
             let tet = tet.to_f64();
             let e = tet.evaluate(tet.particles.map(|p| position(p as usize)));
             let deviatoric = tet.stiffness * e.deviatoric;
@@ -120,7 +131,7 @@ impl<R: Float> ImplicitStep<'_, R> {
             }
         }
         if let Some(viscosity) = &self.stars.viscosity {
-            let motion = |p: usize| position(p) - R::to_dvec3(solver.previous[p]);
+            let motion = |p: usize| position(p) - R::to_dvec3(solver.particles.previous[p]);
             for (row, &p) in self.stars.order.iter().enumerate() {
                 out[p as usize] += viscosity.exact_force(row, &self.stars.order, &motion);
             }
@@ -133,10 +144,10 @@ impl<R: Float> ImplicitStep<'_, R> {
         for (p, force) in out.iter_mut().enumerate() {
             let x = position(p);
             *force += (self.free_position(p) - x) * (per_time_squared * solver.mass(p));
-            if weight::<R>(&solver.particles[p]) <= R::ZERO {
+            if weight::<R>(&solver.particles.cells[p]) <= R::ZERO {
                 *force = DVec3::ZERO;
             }
-            for obstacle in &self.obstacles {
+            for obstacle in &solver.constraints.colliders.obstacles {
                 *force = obstacle.left_of(*force, R::from_dvec3(x));
             }
         }
@@ -202,7 +213,7 @@ mod tests {
         }
         for p in 0..5 {
             solver.set_mass(p, 10.0 + p as f64);
-            let x = solver.local(p);
+            let x = solver.particles.local(p);
             solver.set_position(
                 p,
                 DVec3::new(1.3 * x.x + 0.2 * x.y, 0.7 * x.y, x.z - 0.4 * x.x),
@@ -250,7 +261,7 @@ mod tests {
         step.forces(&mut forces);
         let size = forces.iter().map(|f| f.length()).fold(0.0, f64::max);
         for (p, force) in forces.iter().enumerate() {
-            let x = step.solver.local(p);
+            let x = step.solver.particles.local(p);
             for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
                 let [low, high] = [-1e-6, 1e-6].map(|h| {
                     step.solver.set_position(p, x + axis * h);

@@ -2,11 +2,11 @@
 
 use super::constraints::SWEEP_PENALTY;
 use super::{Guess, Integrator, VbdSettings, VertexStars};
-use crate::collider::Obstacle;
+use crate::constraints::Constraints;
 use crate::float::{finite, load, store, weight};
 use crate::{Float, Solver, StepReport, StepSettings, XpbdError};
 
-/// What a frame of VBD has to say about itself.
+/// The report of a frame of VBD.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VbdReport {
     /// As in [`StepReport::repaired`].
@@ -46,14 +46,14 @@ impl<R: Float> Solver<R> {
         mut iterate: impl FnMut(&mut ImplicitStep<'_, R>) -> bool,
     ) -> Result<VbdReport, XpbdError> {
         settings.check()?;
-        self.follow_body();
+        self.recenter();
         let mut report = VbdReport::default();
         let (count, time) = (settings.step.substeps, settings.step.substep_time());
         for number in 1..=count {
             let is_bdf2 = settings.integrator == Integrator::Bdf2;
             let startup = stars.history.startup_substeps(time).filter(|_| is_bdf2);
             if let Some(parts) = startup {
-                stars.history.start(self, time, parts);
+                stars.history.start(&self.particles, time, parts);
             }
             let parts = startup.unwrap_or(1);
             for part in 1..=parts {
@@ -96,7 +96,6 @@ pub struct ImplicitStep<'a, R: Float> {
     pub(super) solver: &'a mut Solver<R>,
     pub(super) stars: &'a mut VertexStars<R>,
     pub(super) settings: StepSettings,
-    pub(super) obstacles: Vec<Obstacle<R>>,
     /// Whether the frame ends with it.
     last: bool,
     /// The Δt of the implicit Euler substep that is solved; BDF2 makes it 2/3 of the substep, or less at the start.
@@ -127,7 +126,7 @@ impl<'a, R: Float> ImplicitStep<'a, R> {
         let (count, time) = (settings.step.substeps, settings.step.substep_time());
         let is_startup = stars.history.startup_substeps(time).is_some();
         if is_startup {
-            stars.history.start(solver, time, 1);
+            stars.history.start(&solver.particles, time, 1);
         }
         let substep = Substep {
             number: count,
@@ -165,19 +164,26 @@ impl<'a, R: Float> ImplicitStep<'a, R> {
                 own_time
             }
             Integrator::Bdf2 if substep.is_startup => own_time,
-            Integrator::Bdf2 => stars.history.begin(solver, own_time, own.gravity),
+            Integrator::Bdf2 => {
+                let particles = &mut solver.particles;
+                stars.history.begin(particles, own_time, own.gravity)
+            }
         };
         let time = R::from_f64(implicit_time);
-        solver.predict(&own, time);
+        let gravity = own.gravity.map(|g| R::from_dvec3(g * own_time));
+        solver.particles.predict(gravity, time);
         let ended = f64::from(substep.number) / f64::from(substep.count);
-        let lost = solver.move_held(ended);
+        let Constraints {
+            attachments,
+            colliders,
+            ..
+        } = &mut solver.constraints;
+        let lost = attachments.move_held(&solver.particles, ended);
+        colliders.place(&own, ended * own.time_step, solver.particles.origin);
         stars.begin(solver, implicit_time, penalty);
-        let elapsed = ended * own.time_step;
-        let obstacles = Obstacle::place(&own, elapsed, solver.origin).collect();
         let mut step = Self {
             solver,
             stars,
-            obstacles,
             last: substep.number == substep.count,
             settings: own,
             time,
@@ -250,10 +256,10 @@ impl<'a, R: Float> ImplicitStep<'a, R> {
         self.stars.earlier.resize(count, R::Vector::default());
         let mut taken_back = vec![R::ZERO; count];
         for (p, taken_back) in taken_back.iter_mut().enumerate() {
-            let velocity = self.solver.velocities[p] - change;
+            let velocity = self.solver.particles.velocities[p] - change;
             let followed = R::dot(velocity - self.stars.earlier[p], change) / squared;
             self.stars.earlier[p] = velocity;
-            let is_held = weight::<R>(&self.solver.particles[p]) <= R::ZERO;
+            let is_held = weight::<R>(&self.solver.particles.cells[p]) <= R::ZERO;
             if p < known && followed < R::ONE && !is_held {
                 *taken_back = R::ONE
                     - if followed > R::ZERO {
@@ -268,7 +274,7 @@ impl<'a, R: Float> ImplicitStep<'a, R> {
                 let around = self.stars.of(row).iter().flat_map(|term| term.others);
                 let around = around.filter(|&q| (q as usize) < known);
                 if (p as usize) < known
-                    || weight::<R>(&self.solver.particles[p as usize]) <= R::ZERO
+                    || weight::<R>(&self.solver.particles.cells[p as usize]) <= R::ZERO
                 {
                     continue;
                 }
@@ -282,7 +288,7 @@ impl<'a, R: Float> ImplicitStep<'a, R> {
                 }
             }
         }
-        for (particle, &part) in self.solver.particles.iter().zip(&taken_back) {
+        for (particle, &part) in self.solver.particles.cells.iter().zip(&taken_back) {
             let x = load::<R>(particle) - change * (part * self.time);
             if part > R::ZERO && finite::<R>(x) {
                 store::<R>(particle, x);
@@ -301,24 +307,29 @@ impl<'a, R: Float> ImplicitStep<'a, R> {
         let solver = &*self.solver;
         let parts = &*self.stars.parts;
         let mut is_held = vec![false; parts.len()];
-        let soft = solver.attachments.soft().map(|a| a.particle as usize);
-        let fixed = (0..parts.len()).filter(|&p| weight::<R>(&solver.particles[p]) <= R::ZERO);
+        let soft = solver
+            .constraints
+            .attachments
+            .soft()
+            .map(|a| a.particle as usize);
+        let fixed =
+            (0..parts.len()).filter(|&p| weight::<R>(&solver.particles.cells[p]) <= R::ZERO);
         for p in fixed.chain(soft) {
             is_held[parts[p] as usize] = true;
         }
         // What moves, from where and by how much.
         let (mut moving, mut kinetic) = (Vec::new(), 0.0);
-        for (p, particle) in solver.particles.iter().enumerate() {
+        for (p, particle) in solver.particles.cells.iter().enumerate() {
             if is_held[parts[p] as usize] && weight::<R>(particle) > R::ZERO {
-                let velocity = R::to_dvec3(solver.velocities[p]);
+                let velocity = R::to_dvec3(solver.particles.velocities[p]);
                 kinetic += 0.5 * solver.mass(p) * velocity.length_squared();
-                let from = solver.previous[p];
+                let from = solver.particles.previous[p];
                 moving.push((p, from, load::<R>(particle) - from));
             }
         }
         let at = |part: f64| {
             for &(p, from, way) in &moving {
-                store::<R>(&solver.particles[p], from + way * R::from_f64(part));
+                store::<R>(&solver.particles.cells[p], from + way * R::from_f64(part));
             }
         };
         if moving.is_empty() {
@@ -353,14 +364,19 @@ impl<'a, R: Float> ImplicitStep<'a, R> {
     /// Ends the substep: velocities from the motion.
     pub fn finish(self) -> StepReport {
         let per_time = R::ONE / self.time;
-        let repaired = self.solver.update_velocities(self.time, per_time);
-        self.solver.update_held(per_time);
+        let Solver {
+            particles,
+            constraints,
+            ..
+        } = self.solver;
+        let repaired = particles.update_velocities(self.time, per_time);
+        constraints.attachments.update_held(particles, per_time);
         if self.integrator == Integrator::Bdf2 {
-            let touches = |x| self.obstacles.iter().any(|o| o.touched_at(x).is_some());
-            self.stars.history.end(self.solver, touches);
+            let touches = |x| constraints.colliders.touches(x);
+            self.stars.history.end(particles, touches);
         }
         if self.last {
-            self.solver.arrive();
+            constraints.end_frame();
         }
         StepReport {
             repaired: repaired + self.lost,

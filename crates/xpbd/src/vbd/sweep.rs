@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::constraints::Local;
 use super::matrix::Block;
 use super::{ImplicitStep, VertexStars};
-use crate::collider::{Obstacle, outside};
+use crate::constraints::outside;
 use crate::float::{finite, load, store, weight};
 use crate::{Float, Solver};
 
@@ -37,17 +37,17 @@ impl<R: Float> ImplicitStep<'_, R> {
             nudge: R::from_f64(NUDGE * self.stars.size),
         };
         let threads = rayon::current_num_threads();
-        let (solver, stars, obstacles) = (&*self.solver, &*self.stars, &*self.obstacles);
+        let (solver, stars) = (&*self.solver, &*self.stars);
         for color in 0..stars.color_count() {
             let places = stars.colors[color]..stars.colors[color + 1];
             let pairs = stars.offsets[places.end] - stars.offsets[places.start];
             if threads == 1 || pairs < PARALLEL_PAIRS {
-                places.for_each(|place| sweep.step_vbd(solver, stars, obstacles, place));
+                places.for_each(|place| sweep.step_vbd(solver, stars, place));
             } else {
                 (0..threads).into_par_iter().for_each(|thread| {
                     let share = |part| places.start + places.len() * part / threads;
                     for place in share(thread)..share(thread + 1) {
-                        sweep.step_vbd(solver, stars, obstacles, place);
+                        sweep.step_vbd(solver, stars, place);
                     }
                 });
             }
@@ -58,28 +58,28 @@ impl<R: Float> ImplicitStep<'_, R> {
 impl<R: Float> Sweep<R> {
     /// Moves one particle into its minimum.
     #[inline]
-    fn step_vbd(
-        &self,
-        solver: &Solver<R>,
-        stars: &VertexStars<R>,
-        obstacles: &[Obstacle<R>],
-        place: usize,
-    ) {
+    fn step_vbd(&self, solver: &Solver<R>, stars: &VertexStars<R>, place: usize) {
+        let Solver {
+            particles,
+            constraints,
+            ..
+        } = solver;
+        let obstacles = &*constraints.colliders.obstacles;
         let p = stars.order[place] as usize;
-        let particle = &solver.particles[p];
+        let particle = &particles.cells[p];
         let inverse_mass = weight::<R>(particle);
         if inverse_mass <= R::ZERO {
             return;
         }
         let x = load::<R>(particle);
-        let free = solver.previous[p] + solver.velocities[p] * self.time;
+        let free = particles.previous[p] + particles.velocities[p] * self.time;
         // Minus the gradient, the isotropic part of the matrix, and the rest of it: xx, xy, xz, yy, yz, zz.
         let inertia = self.per_time_squared / inverse_mass;
         let mut force = (free - x) * inertia;
         let mut isotropic = inertia;
         let mut h = [R::ZERO; 6];
         for term in stars.of(place) {
-            let corner = term.at(solver, x);
+            let corner = term.at(particles, x);
             force += corner.force;
             let [wa, wb, wc] = term.pulls;
             isotropic -= wa + wb + wc;
@@ -93,7 +93,7 @@ impl<R: Float> Sweep<R> {
         }
         let collapsed = h[0] + h[3] + h[5] == R::ZERO && !stars.of(place).is_empty();
         if let Some(viscosity) = &stars.viscosity {
-            let motion = |p: usize| load::<R>(&solver.particles[p]) - solver.previous[p];
+            let motion = |p: usize| load::<R>(&particles.cells[p]) - particles.previous[p];
             force += viscosity.force(place, &stars.order, motion);
             viscosity.add_diagonal(place, &mut h);
         }
@@ -119,12 +119,12 @@ impl<R: Float> Sweep<R> {
         let mut moved = x + step;
         for obstacle in obstacles {
             let along = |normal| solve(isotropic, h, normal);
-            let out = obstacle.push_along(x, moved, solver.previous[p], along);
+            let out = obstacle.push_along(x, moved, particles.previous[p], along);
             moved = out.unwrap_or(moved);
         }
         // On a curved collider, or where colliders overlap, it may still be inside of one.
         if !obstacles.is_empty() {
-            moved = outside(obstacles, moved, solver.previous[p]).unwrap_or(moved);
+            moved = outside(obstacles, moved, particles.previous[p]).unwrap_or(moved);
         }
         if finite::<R>(moved) {
             store::<R>(particle, moved);

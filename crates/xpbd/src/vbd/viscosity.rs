@@ -93,14 +93,14 @@ impl<R: Float> Viscosity<R> {
 
     /// Assembles the matrix of a substep from the positions at its start.
     pub(super) fn fill(&mut self, solver: &Solver<R>, stars: &VertexStars<R>, time: f64) {
-        let tets = solver.tets.par_iter().with_min_len(PARALLEL_ROWS);
-        tets.zip(&solver.material_of)
+        let tets = solver.tets.list.par_iter().with_min_len(PARALLEL_ROWS);
+        tets.zip(&solver.tets.material_of)
             .map(|(tet, &material)| {
-                let rate = solver.materials[usize::from(material)].damping / time;
+                let rate = solver.tets.materials[usize::from(material)].damping / time;
                 if rate == 0.0 || tet.stiffness <= R::ZERO {
                     return ViscousTet::none();
                 }
-                let start = |p: u32| R::to_dvec3(solver.previous[p as usize]);
+                let start = |p: u32| R::to_dvec3(solver.particles.previous[p as usize]);
                 ViscousTet::new(&tet.to_f64(), tet.particles.map(start), rate)
             })
             .collect_into_vec(&mut self.tets);
@@ -122,7 +122,7 @@ impl<R: Float> Viscosity<R> {
                     let pairs = stars.offsets[row]..stars.offsets[row + 1];
                     for (pair, places) in pairs.clone().zip(&places[pairs]) {
                         let t = stars.tets[pair] as usize;
-                        let corners = solver.tets[t].particles;
+                        let corners = solver.tets.list[t].particles;
                         let Some(own) = corners.iter().position(|&corner| corner == p) else {
                             continue;
                         };

@@ -1,4 +1,4 @@
-//! [`Constraints`]: constraints of one number on a few particles, solved by colored Gauss-Seidel.
+//! [`ScalarConstraints`]: constraints of one number on a few particles, solved by colored Gauss-Seidel.
 //!
 //! What distances and volumes have in common: a value C, its gradients, a compliance, a damping time, and an order in
 //! which those that share particles do not meet. One step of XPBD is
@@ -10,15 +10,17 @@
 use incise_graph::{ClusterId, Incidence, Schedule};
 use rayon::prelude::*;
 
+use super::ConstraintKind;
 use crate::float::{load, store, weight};
-use crate::step::Factors;
-use crate::{Float, Solver, XpbdError};
+use crate::particles::Particles;
+use crate::substep::{Factors, Substep};
+use crate::{Float, XpbdError};
 
 /// Constraints in a color from which a second thread pays for its wake-up.
 const PARALLEL_CONSTRAINTS: usize = 256;
 
 /// One constraint on `K` particles.
-pub(crate) trait Scalar<R: Float, const K: usize>: Sync {
+pub(crate) trait ScalarConstraint<R: Float, const K: usize>: Sync {
     fn particles(&self) -> [u32; K];
     /// Value and gradients; `None` where there is no gradient.
     fn evaluate(&self, x: [R::Vector; K]) -> Option<(R, [R::Vector; K])>;
@@ -31,7 +33,7 @@ pub(crate) trait Scalar<R: Float, const K: usize>: Sync {
 
 /// All constraints of a kind with their order.
 #[derive(Debug)]
-pub(crate) struct Constraints<R: Float, C> {
+pub(crate) struct ScalarConstraints<R: Float, C, const K: usize> {
     pub(crate) list: Vec<C>,
     pub(crate) schedule: Schedule,
     damped: bool,
@@ -39,33 +41,44 @@ pub(crate) struct Constraints<R: Float, C> {
     multipliers: Vec<R::Atomic>,
 }
 
-impl<R: Float, C: Clone> Clone for Constraints<R, C> {
-    fn clone(&self) -> Self {
+impl<R: Float, C, const K: usize> Default for ScalarConstraints<R, C, K> {
+    fn default() -> Self {
         Self {
-            list: self.list.clone(),
-            schedule: self.schedule.clone(),
-            damped: self.damped,
-            // They begin anew with each substep.
+            list: Vec::new(),
+            schedule: Schedule::default(),
+            damped: false,
             multipliers: Vec::new(),
         }
     }
 }
 
-impl<R: Float, C> Constraints<R, C> {
-    /// Puts constraints and a schedule together that fit. `what` names the kind.
-    pub(crate) fn new<const K: usize>(
+impl<R: Float, C: Clone, const K: usize> Clone for ScalarConstraints<R, C, K> {
+    fn clone(&self) -> Self {
+        Self {
+            list: self.list.clone(),
+            schedule: self.schedule.clone(),
+            damped: self.damped,
+            // Each substep begins with new ones.
+            multipliers: Vec::new(),
+        }
+    }
+}
+
+impl<R: Float, C: ScalarConstraint<R, K>, const K: usize> ScalarConstraints<R, C, K> {
+    /// Constraints and a schedule of theirs. `what` names the kind.
+    pub(crate) fn new(
         what: &'static str,
         particle_count: usize,
         list: Vec<C>,
         schedule: Schedule,
-    ) -> Result<Self, XpbdError>
-    where
-        C: Scalar<R, K>,
-    {
+    ) -> Result<Self, XpbdError> {
         let refuse = |source| XpbdError::Schedule { what, source };
         let particles = list.iter().map(C::particles);
         let incidence = Incidence::from_constraints(particle_count, particles).map_err(refuse)?;
         schedule.check(&incidence).map_err(refuse)?;
+        if list.is_empty() {
+            return Ok(Self::default());
+        }
         let damped = list.iter().any(|c| c.damping() > R::ZERO);
         Ok(Self {
             list,
@@ -75,37 +88,18 @@ impl<R: Float, C> Constraints<R, C> {
         })
     }
 
+    /// The order in which the constraints are solved, if there are any.
+    pub(crate) fn schedule(&self) -> Option<&Schedule> {
+        (!self.list.is_empty()).then_some(&self.schedule)
+    }
+
     /// Replaces a constraint, or appends one.
-    pub(crate) fn put<const K: usize>(&mut self, index: usize, constraint: C)
-    where
-        C: Scalar<R, K>,
-    {
+    pub(crate) fn put(&mut self, index: usize, constraint: C) {
         self.damped |= constraint.damping() > R::ZERO;
         if index == self.list.len() {
             self.list.push(constraint);
         } else {
             self.list[index] = constraint;
-        }
-    }
-
-    /// Begins a substep.
-    pub(crate) fn begin(&mut self, with_multipliers: bool) {
-        self.multipliers.clear();
-        if with_multipliers {
-            self.multipliers
-                .resize_with(self.list.len(), || R::ZERO.cell());
-        }
-    }
-
-    /// One pass over all constraints, color after color, within a color in parallel.
-    pub(crate) fn pass<const K: usize>(&self, solver: &Solver<R>, factors: &Factors<R>)
-    where
-        C: Scalar<R, K>,
-    {
-        if self.damped {
-            self.sweep(|index| self.solve::<K, true>(index, solver, factors));
-        } else {
-            self.sweep(|index| self.solve::<K, false>(index, solver, factors));
         }
     }
 
@@ -134,19 +128,17 @@ impl<R: Float, C> Constraints<R, C> {
     }
 
     #[inline]
-    fn solve<const K: usize, const DAMPED: bool>(
+    fn solve_one<const DAMPED: bool>(
         &self,
         index: usize,
-        solver: &Solver<R>,
+        particles: &Particles<R>,
         factors: &Factors<R>,
-    ) where
-        C: Scalar<R, K>,
-    {
+    ) {
         let constraint = &self.list[index];
         let numbers = constraint.particles();
-        let particles = numbers.map(|p| &solver.particles[p as usize]);
-        let x = particles.map(|particle| load::<R>(particle));
-        let weights = particles.map(|particle| weight::<R>(particle));
+        let cells = numbers.map(|p| &particles.cells[p as usize]);
+        let x = cells.map(|cell| load::<R>(cell));
+        let weights = cells.map(|cell| weight::<R>(cell));
         let Some((value, gradients)) = constraint.evaluate(x) else {
             return;
         };
@@ -154,7 +146,7 @@ impl<R: Float, C> Constraints<R, C> {
         if DAMPED {
             damping = constraint.damping() * factors.per_time;
             for k in 0..K {
-                let motion = x[k] - solver.previous[numbers[k] as usize];
+                let motion = x[k] - particles.previous[numbers[k] as usize];
                 rate += R::dot(gradients[k], motion);
             }
         }
@@ -181,10 +173,40 @@ impl<R: Float, C> Constraints<R, C> {
             return;
         }
         for k in 0..K {
-            store::<R>(particles[k], x[k] + gradients[k] * (weights[k] * change));
+            store::<R>(cells[k], x[k] + gradients[k] * (weights[k] * change));
         }
         if let Some(multiplier) = multiplier {
             (before + change).store(multiplier);
         }
+    }
+}
+
+impl<R: Float, C: ScalarConstraint<R, K>, const K: usize> ConstraintKind<R>
+    for ScalarConstraints<R, C, K>
+{
+    fn begin(&mut self, _particles: &Particles<R>, substep: &Substep<'_, R>) -> usize {
+        self.multipliers.clear();
+        if substep.has_multipliers {
+            self.multipliers
+                .resize_with(self.list.len(), || R::ZERO.cell());
+        }
+        0
+    }
+
+    /// One pass over all constraints, color after color, within a color in parallel.
+    fn solve(&mut self, particles: &Particles<R>, substep: &Substep<'_, R>) {
+        if self.list.is_empty() {
+            return;
+        }
+        let factors = &substep.factors;
+        if self.damped {
+            self.sweep(|index| self.solve_one::<true>(index, particles, factors));
+        } else {
+            self.sweep(|index| self.solve_one::<false>(index, particles, factors));
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        size_of_val(&*self.list)
     }
 }

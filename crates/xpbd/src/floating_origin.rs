@@ -15,9 +15,9 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
+use crate::Float;
 use crate::float::{load, store};
-use crate::step::PARALLEL_PARTICLES;
-use crate::{Float, Solver};
+use crate::particles::{PARALLEL_PARTICLES, Particles};
 
 /// An axis-aligned box.
 #[derive(Clone, Copy, Debug)]
@@ -79,41 +79,33 @@ pub(crate) fn frame_of(positions: &[DVec3]) -> (DVec3, f64) {
     }
 }
 
-impl<R: Float> Solver<R> {
-    /// The point in m that the solver keeps positions relative to, in its own precision. [`Solver::step`] moves it
-    /// when the body has moved on by more than twice its size.
-    #[must_use]
-    pub fn origin(&self) -> DVec3 {
-        self.origin
+/// Gives the body a new origin if it has moved on by more than twice its size, and returns by how much the origin moved.
+///
+/// Particles keep their position in the world but for one rounding in the solver's precision; those that come
+/// closer to the origin, exactly.
+pub(crate) fn recenter<R: Float>(particles: &mut Particles<R>) -> Option<R::Vector> {
+    let bounds = particles
+        .cells
+        .par_iter()
+        .with_min_len(PARALLEL_PARTICLES)
+        .map(|cell| BoundingBox::EMPTY.with(R::to_dvec3(load::<R>(cell))))
+        .reduce(|| BoundingBox::EMPTY, BoundingBox::union);
+    let distance = bounds.center().abs().max_element();
+    let size = particles.size.max(bounds.size());
+    if !(distance.is_finite() && distance > 2.0 * size) {
+        return None;
     }
-
-    /// Gives the body a new origin if it has moved on by more than twice its size.
-    ///
-    /// Particles keep their position in the world but for one rounding in the solver's precision; those that come
-    /// closer to the origin, exactly.
-    pub(crate) fn follow_body(&mut self) {
-        let bounds = self
-            .particles
-            .par_iter()
-            .with_min_len(PARALLEL_PARTICLES)
-            .map(|particle| BoundingBox::EMPTY.with(R::to_dvec3(load::<R>(particle))))
-            .reduce(|| BoundingBox::EMPTY, BoundingBox::union);
-        let distance = bounds.center().abs().max_element();
-        let size = self.size.max(bounds.size());
-        if !(distance.is_finite() && distance > 2.0 * size) {
-            return;
-        }
-        let shift = bounds.origin();
-        // What double precision cannot add to the origin must not be taken from the particles.
-        let origin = self.origin + shift;
-        let shift = R::from_dvec3(origin - self.origin);
-        self.particles
-            .par_iter()
-            .with_min_len(PARALLEL_PARTICLES)
-            .for_each(|particle| store::<R>(particle, load::<R>(particle) - shift));
-        self.attachments.shift(shift);
-        self.origin = origin;
-    }
+    let shift = bounds.origin();
+    // What double precision cannot add to the origin must not be taken from the particles.
+    let origin = particles.origin + shift;
+    let shift = R::from_dvec3(origin - particles.origin);
+    particles
+        .cells
+        .par_iter()
+        .with_min_len(PARALLEL_PARTICLES)
+        .for_each(|cell| store::<R>(cell, load::<R>(cell) - shift));
+    particles.origin = origin;
+    Some(shift)
 }
 
 #[cfg(test)]

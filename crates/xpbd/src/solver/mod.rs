@@ -1,23 +1,26 @@
-//! [`Solver`]: the particles and tet constraints of a simulation, and how a cut edits them.
+//! [`Solver`]: owns the particles, tets and other constraints of a simulation, and applies the edits of a cut.
 //!
-//! Constraints keep the numbers of the mesh's tets; the order of solving is a [`Schedule`]'s business and comes from
-//! outside with every step. Topology changes arrive as single edits (a new particle between two others, a copy, a tet
-//! replaced), each in constant time, and mark what the next step has to look at, so that a cut costs what it touches.
+//! Constraints keep the numbers of the mesh's tets; the order of solving is that of a [`Schedule`], which each step is
+//! given. Topology changes arrive as single edits (a new particle between two others, a copy, a tet replaced), each in
+//! constant time, and mark what the next step has to look at, so that a cut costs what it touches.
+//!
+//! A clone has all that decides what the next steps compute, to the bit: particles, tets, materials, constraints, what was
+//! kept for residuals. It leaves out what a step makes by itself: the layout, which is the largest part and follows from
+//! tets and schedule, and working memory. The first step of a clone lays the tets out, O(tets).
 
-use fearless_simd::Level;
+mod constraints;
+
 use glam::DVec3;
+use incise_graph::Schedule;
 
-use crate::attachment::Attachments;
-use crate::collider::Obstacle;
-use crate::distance::Distance;
-use crate::float::{finite, load, store, weight};
-use crate::jacobi::Jacobi;
-use crate::layout::Layout;
-use crate::neo_hookean::TetConstraint;
-use crate::origin::frame_of;
-use crate::scalar::Constraints;
-use crate::volume::TetVolume;
-use crate::{Changes, Float, KappaLimit, Material, TetSolve, XpbdError};
+use crate::constraints::Constraints;
+use crate::degeneracy_jitter::jitter;
+use crate::float::{finite, store};
+use crate::floating_origin::{frame_of, recenter};
+use crate::particles::Particles;
+use crate::stepper::Stepper;
+use crate::tets::TetSet;
+use crate::{Changes, Float, KappaLimit, Material, StepReport, StepSettings, XpbdError};
 
 /// The state of a simulation in one precision.
 ///
@@ -44,43 +47,40 @@ use crate::{Changes, Float, KappaLimit, Material, TetSolve, XpbdError};
 /// ```
 #[derive(Debug)]
 pub struct Solver<R: Float> {
-    /// What positions are relative to.
-    pub(crate) origin: DVec3,
-    /// The longest side of the bounding box at the start in m.
-    pub(crate) size: f64,
-    /// Position and inverse mass of each particle, together in one cache line part.
-    pub(crate) particles: Vec<R::Particle>,
-    pub(crate) previous: Vec<R::Vector>,
-    pub(crate) velocities: Vec<R::Vector>,
-    pub(crate) masses: Vec<f64>,
-    pub(crate) fixed: Vec<bool>,
-    pub(crate) tets: Vec<TetConstraint<R>>,
-    /// Volumes at rest in m³.
-    pub(crate) volumes: Vec<f64>,
-    pub(crate) material_of: Vec<u16>,
-    pub(crate) materials: Vec<Material>,
-    pub(crate) kappa_limit: Option<KappaLimit>,
-    /// What edits have changed, if somebody follows.
+    pub(crate) particles: Particles<R>,
+    pub(crate) tets: TetSet<R>,
+    pub(crate) constraints: Constraints<R>,
+    pub(crate) stepper: Stepper<R>,
+    /// What edits have changed, while changes are tracked.
     pub(crate) changes: Option<Changes>,
-    /// The tets in solving order.
-    pub(crate) layout: Layout<R>,
-    /// The instructions that this processor has.
-    pub(crate) level: Level,
-    /// By place in the layout; only while a step has more than one iteration or is asked for its residuals.
-    pub(crate) multipliers: Vec<R::Atomic>,
-    /// The multipliers of each tet after the last substep, for residuals, and the constraints that they belong to.
-    pub(crate) kept: Vec<[R; 2]>,
-    pub(crate) kept_form: TetSolve,
-    /// Copies of the velocities that threads may share, while some material is damped.
-    pub(crate) shared_velocities: Vec<R::Particle>,
-    pub(crate) jacobi: Option<Jacobi<R>>,
-    /// The colliders of the present substep.
-    pub(crate) obstacles: Vec<Obstacle<R>>,
-    /// Positions before the constraints are solved, kept only for residuals.
-    pub(crate) predicted: Vec<R::Vector>,
-    pub(crate) attachments: Attachments<R>,
-    pub(crate) distances: Option<Constraints<R, Distance<R>>>,
-    pub(crate) volume_constraints: Option<Constraints<R, TetVolume<R>>>,
+}
+
+/// A copy that goes on as the original would, to the bit. Nobody follows its changes yet: see
+/// [`Solver::track_changes`].
+///
+/// ```
+/// use glam::DVec3;
+/// use incise_graph::Schedule;
+/// use incise_xpbd::{Solver, StepSettings};
+///
+/// let mut solver = Solver::<f32>::new(&[DVec3::ZERO]);
+/// solver.set_mass(0, 1.0);
+/// let before = solver.clone();
+/// let falling = StepSettings { gravity: Some(DVec3::NEG_Z), ..StepSettings::new(0.1) };
+/// solver.step(&Schedule::default(), &falling)?;
+/// assert!(solver.position(0).z < 0.0 && before.position(0).z == 0.0);
+/// # Ok::<(), incise_xpbd::XpbdError>(())
+/// ```
+impl<R: Float> Clone for Solver<R> {
+    fn clone(&self) -> Self {
+        Self {
+            particles: self.particles.clone(),
+            tets: self.tets.clone(),
+            constraints: self.constraints.clone(),
+            stepper: self.stepper.clone(),
+            changes: None,
+        }
+    }
 }
 
 impl<R: Float> Solver<R> {
@@ -95,34 +95,16 @@ impl<R: Float> Solver<R> {
     pub fn new(positions: &[DVec3]) -> Self {
         let (origin, size) = frame_of(positions);
         let mut solver = Self {
-            origin,
-            size,
-            particles: Vec::new(),
-            previous: Vec::new(),
-            velocities: Vec::new(),
-            masses: Vec::new(),
-            fixed: Vec::new(),
-            tets: Vec::new(),
-            volumes: Vec::new(),
-            kappa_limit: None,
+            particles: Particles::new(origin, size),
+            tets: TetSet::default(),
+            constraints: Constraints::default(),
+            stepper: Stepper::default(),
             changes: None,
-            material_of: Vec::new(),
-            materials: Vec::new(),
-            layout: Layout::default(),
-            level: Level::new(),
-            multipliers: Vec::new(),
-            kept: Vec::new(),
-            kept_form: TetSolve::default(),
-            shared_velocities: Vec::new(),
-            jacobi: None,
-            obstacles: Vec::new(),
-            predicted: Vec::new(),
-            attachments: Attachments::default(),
-            distances: None,
-            volume_constraints: None,
         };
         for &x in positions {
-            solver.push_particle(R::from_dvec3(x - origin), R::Vector::default(), false);
+            solver
+                .particles
+                .push(R::from_dvec3(x - origin), R::Vector::default(), false);
         }
         solver
     }
@@ -148,10 +130,10 @@ impl<R: Float> Solver<R> {
     /// With more than 65,536 materials.
     pub fn add_material(&mut self, material: Material) -> Result<u16, XpbdError> {
         material.check()?;
-        self.materials.push(material);
-        self.layout.forget();
+        self.tets.materials.push(material);
+        self.tets.layout.forget();
         self.note(|changes| changes.all_tets = true);
-        Ok(u16::try_from(self.materials.len() - 1).expect("at most 65,536 materials"))
+        Ok(u16::try_from(self.tets.materials.len() - 1).expect("at most 65,536 materials"))
     }
 
     /// Appends a tet with its rest shape. Its mass is not added to the particles: see [`Solver::set_mass`].
@@ -159,11 +141,9 @@ impl<R: Float> Solver<R> {
     /// # Panics
     /// If a particle or the material does not exist.
     pub fn push_tet(&mut self, particles: [u32; 4], rest: [DVec3; 4], material: u16) {
-        let constraint = self.constraint(particles, rest, material);
-        self.tets.push(constraint);
-        self.volumes.push(signed_volume(rest));
-        self.material_of.push(material);
-        self.note_tet(self.tets.len() - 1);
+        self.check_particles(particles);
+        let tet = self.tets.push(particles, rest, material);
+        self.note_tet(tet);
     }
 
     /// Gives a tet's place to another tet of the same material.
@@ -171,18 +151,18 @@ impl<R: Float> Solver<R> {
     /// # Panics
     /// If the tet or a particle does not exist.
     pub fn replace_tet(&mut self, tet: usize, particles: [u32; 4], rest: [DVec3; 4]) {
-        self.tets[tet] = self.constraint(particles, rest, self.material_of[tet]);
-        self.volumes[tet] = signed_volume(rest);
+        self.check_particles(particles);
+        self.tets.replace(tet, particles, rest);
         self.note_tet(tet);
     }
 
-    /// Hangs a tet on other particles that are copies of its own.
+    /// Replaces the particles of a tet by others that are copies of its own.
     ///
     /// # Panics
     /// If the tet or a particle does not exist.
     pub fn relink_tet(&mut self, tet: usize, particles: [u32; 4]) {
         self.check_particles(particles);
-        self.tets[tet].particles = particles;
+        self.tets.list[tet].particles = particles;
         self.note_tet(tet);
     }
 
@@ -192,9 +172,7 @@ impl<R: Float> Solver<R> {
     /// # Panics
     /// If one of them does not exist.
     pub fn move_tet(&mut self, from: usize, to: usize) {
-        self.tets[to] = self.tets[from];
-        self.volumes[to] = self.volumes[from];
-        self.material_of[to] = self.material_of[from];
+        self.tets.copy_to(from, to);
         self.note_tet(to);
     }
 
@@ -223,33 +201,14 @@ impl<R: Float> Solver<R> {
             self.note_tet(tet);
         }
         self.tets.truncate(count);
-        self.volumes.truncate(count);
-        self.material_of.truncate(count);
     }
 
     /// Takes the last particles away until there are `count`, with what attaches them; nothing happens if there are no
     /// more. No tet and no constraint may hang on them when the next step begins. O(particles taken away).
     pub fn truncate_particles(&mut self, count: usize) {
         self.particles.truncate(count);
-        self.previous.truncate(count);
-        self.velocities.truncate(count);
-        self.masses.truncate(count);
-        self.fixed.truncate(count);
-        self.attachments.truncate(count);
+        self.constraints.attachments.truncate(count);
         self.note(|changes| changes.attachments = true);
-    }
-
-    fn constraint(&self, particles: [u32; 4], rest: [DVec3; 4], material: u16) -> TetConstraint<R> {
-        self.check_particles(particles);
-        let material = &self.materials[usize::from(material)];
-        let mut tet = TetConstraint::new(particles, rest, material);
-        if let Some(limit) = self.kappa_limit {
-            let kappa = tet.kappa(material, limit.substep_time);
-            if kappa > limit.kappa {
-                tet.soften(kappa / limit.kappa);
-            }
-        }
-        tet
     }
 
     pub(crate) fn check_particles(&self, particles: [u32; 4]) {
@@ -266,7 +225,7 @@ impl<R: Float> Solver<R> {
     /// The materials, by number.
     #[must_use]
     pub fn materials(&self) -> &[Material] {
-        &self.materials
+        &self.tets.materials
     }
 
     /// The material of a number.
@@ -275,7 +234,7 @@ impl<R: Float> Solver<R> {
     /// If the material does not exist.
     #[must_use]
     pub fn material(&self, material: u16) -> &Material {
-        &self.materials[usize::from(material)]
+        &self.tets.materials[usize::from(material)]
     }
 
     /// The material of a tet.
@@ -284,7 +243,7 @@ impl<R: Float> Solver<R> {
     /// If the tet does not exist.
     #[must_use]
     pub fn material_of(&self, tet: usize) -> u16 {
-        self.material_of[tet]
+        self.tets.material_of[tet]
     }
 
     /// The mass density at rest of a tet's material in kg/m³.
@@ -293,7 +252,7 @@ impl<R: Float> Solver<R> {
     /// If the tet does not exist.
     #[must_use]
     pub fn density_of(&self, tet: usize) -> f64 {
-        self.materials[usize::from(self.material_of[tet])].density
+        self.tets.material(tet).density
     }
 
     /// The particles of a tet.
@@ -302,7 +261,7 @@ impl<R: Float> Solver<R> {
     /// If the tet does not exist.
     #[must_use]
     pub fn tet_particles(&self, tet: usize) -> [u32; 4] {
-        self.tets[tet].particles
+        self.tets.list[tet].particles
     }
 
     /// Appends a particle on the edge from `a` to `b`: position and velocity are interpolated, and it is fixed if both
@@ -312,15 +271,17 @@ impl<R: Float> Solver<R> {
     /// If an end does not exist or the parameter puts the particle nowhere finite.
     pub fn push_particle_between(&mut self, a: usize, b: usize, parameter: f64) {
         let t = R::from_f64(parameter);
-        let [x, y] = [a, b].map(|p| self.vector(p));
-        let [u, v] = [self.velocities[a], self.velocities[b]];
-        self.push_particle(
-            x + (y - x) * t,
-            u + (v - u) * t,
-            self.fixed[a] && self.fixed[b],
-        );
-        let last = self.particles.len() - 1;
-        self.attachments.between([a, b], parameter, last);
+        let Self {
+            particles,
+            constraints,
+            ..
+        } = self;
+        let [x, y] = [a, b].map(|p| particles.vector(p));
+        let [u, v] = [a, b].map(|p| particles.velocities[p]);
+        let fixed = particles.fixed[a] && particles.fixed[b];
+        let last = particles.push(x + (y - x) * t, u + (v - u) * t, fixed);
+        constraints.attachments.between([a, b], parameter, last);
+        self.note_particle(last);
         self.note(|changes| changes.attachments = true);
     }
 
@@ -329,25 +290,16 @@ impl<R: Float> Solver<R> {
     /// # Panics
     /// If the particle does not exist.
     pub fn push_copy(&mut self, of: usize) {
-        self.push_particle(self.vector(of), self.velocities[of], self.fixed[of]);
-        let last = self.particles.len() - 1;
-        self.attachments.copy(of, last);
+        let particles = &mut self.particles;
+        let (x, velocity) = (particles.vector(of), particles.velocities[of]);
+        let last = particles.push(x, velocity, particles.fixed[of]);
+        self.constraints.attachments.copy(of, last);
+        self.note_particle(last);
         self.note(|changes| changes.attachments = true);
     }
 
-    fn push_particle(&mut self, x: R::Vector, velocity: R::Vector, fixed: bool) {
-        assert!(finite::<R>(x), "positions are finite");
-        let [a, b, c] = R::components(x);
-        self.particles.push(R::particle([a, b, c, R::ZERO]));
-        self.previous.push(x);
-        self.velocities.push(velocity);
-        self.masses.push(0.0);
-        self.fixed.push(fixed);
-        self.note_particle(self.masses.len() - 1);
-    }
-
-    /// Sets the mass of a particle in kg. A particle without mass does not move. As it is not known which tets have the
-    /// particle, the next step goes through all: see [`Solver::set_mass_in_star`].
+    /// Sets the mass of a particle in kg. A particle without mass does not move. The next step goes through all tets, since
+    /// those of the particle are not known: see [`Solver::set_mass_in_star`].
     ///
     /// # Panics
     /// If the particle does not exist or the mass is negative or not finite.
@@ -356,7 +308,7 @@ impl<R: Float> Solver<R> {
         self.set_weight(particle);
     }
 
-    /// The same where the star of the particle is known, the tets that it is a corner of, so that the next step has to
+    /// Sets the mass of a particle whose star is known, the tets that it is a corner of, so that the next step has to
     /// look at no others. Tets named without need do no harm; one that is left out is solved with the old mass, which
     /// [`Solver::check_layout`] finds. O(tets of the star).
     ///
@@ -379,7 +331,7 @@ impl<R: Float> Solver<R> {
             mass.is_finite() && mass >= 0.0,
             "a mass is finite and not negative"
         );
-        self.masses[particle] = mass;
+        self.particles.masses[particle] = mass;
     }
 
     /// Fixes a particle where it is, or lets it go.
@@ -387,32 +339,26 @@ impl<R: Float> Solver<R> {
     /// # Panics
     /// If the particle does not exist.
     pub fn set_fixed(&mut self, particle: usize, fixed: bool) {
-        self.fixed[particle] = fixed;
+        self.particles.fixed[particle] = fixed;
         if fixed {
-            self.velocities[particle] = R::Vector::default();
+            self.particles.velocities[particle] = R::Vector::default();
         }
         self.set_weight(particle);
     }
 
-    /// Follows a change of mass or of what holds a particle.
+    /// Updates what depends on the mass of a particle and on what holds it.
     pub(crate) fn set_weight(&mut self, particle: usize) {
         if self.update_weight(particle) {
-            self.layout.forget();
+            self.tets.layout.forget();
             self.note(|changes| changes.all_tets = true);
         }
     }
 
-    /// Computes the inverse mass of a particle anew; returns whether it is another one.
+    /// Recomputes the inverse mass of a particle; returns whether it has changed.
     fn update_weight(&mut self, particle: usize) -> bool {
         self.note_particle(particle);
-        let inverse = R::from_f64(1.0 / self.masses[particle]);
-        // A mass so small that its inverse overflows belongs to a speck that could only do harm if it moved.
-        let held = self.fixed[particle] || self.attachments.holds(particle);
-        let free = !held && inverse.is_finite();
-        let [x, y, z, before] = R::read(&self.particles[particle]);
-        let weight = if free { inverse } else { R::ZERO };
-        R::write(&self.particles[particle], [x, y, z, weight]);
-        weight != before
+        let attached = self.constraints.attachments.holds(particle);
+        self.particles.update_weight(particle, attached)
     }
 
     /// Whether a particle is fixed.
@@ -421,7 +367,7 @@ impl<R: Float> Solver<R> {
     /// If the particle does not exist.
     #[must_use]
     pub fn is_fixed(&self, particle: usize) -> bool {
-        self.fixed[particle]
+        self.particles.fixed[particle]
     }
 
     /// Whether forces move a particle: it is neither fixed nor rigidly attached, and has a mass.
@@ -430,7 +376,7 @@ impl<R: Float> Solver<R> {
     /// If the particle does not exist.
     #[must_use]
     pub fn is_free(&self, particle: usize) -> bool {
-        weight::<R>(&self.particles[particle]) > R::ZERO
+        self.particles.is_free(particle)
     }
 
     /// The mass of a particle in kg.
@@ -439,7 +385,7 @@ impl<R: Float> Solver<R> {
     /// If the particle does not exist.
     #[must_use]
     pub fn mass(&self, particle: usize) -> f64 {
-        self.masses[particle]
+        self.particles.masses[particle]
     }
 
     /// The position of a particle in the world in m.
@@ -448,12 +394,7 @@ impl<R: Float> Solver<R> {
     /// If the particle does not exist.
     #[must_use]
     pub fn position(&self, particle: usize) -> DVec3 {
-        self.origin + self.local(particle)
-    }
-
-    /// The position of a particle relative to the origin.
-    pub(crate) fn local(&self, particle: usize) -> DVec3 {
-        R::to_dvec3(self.vector(particle))
+        self.particles.position(particle)
     }
 
     /// Moves a particle to a position in the world in m.
@@ -461,9 +402,9 @@ impl<R: Float> Solver<R> {
     /// # Panics
     /// If the particle does not exist or the position is not finite in this precision.
     pub fn set_position(&mut self, particle: usize, position: DVec3) {
-        let x = R::from_dvec3(position - self.origin);
+        let x = R::from_dvec3(position - self.particles.origin);
         assert!(finite::<R>(x), "positions are finite");
-        store::<R>(&self.particles[particle], x);
+        store::<R>(&self.particles.cells[particle], x);
         self.note_particle(particle);
     }
 
@@ -473,7 +414,7 @@ impl<R: Float> Solver<R> {
     /// If the particle does not exist.
     #[must_use]
     pub fn velocity(&self, particle: usize) -> DVec3 {
-        R::to_dvec3(self.velocities[particle])
+        R::to_dvec3(self.particles.velocities[particle])
     }
 
     /// Sets the velocity of a particle in m/s.
@@ -483,7 +424,7 @@ impl<R: Float> Solver<R> {
     pub fn set_velocity(&mut self, particle: usize, velocity: DVec3) {
         let v = R::from_dvec3(velocity);
         assert!(finite::<R>(v), "velocities are finite");
-        self.velocities[particle] = v;
+        self.particles.velocities[particle] = v;
         self.note_particle(particle);
     }
 
@@ -493,12 +434,107 @@ impl<R: Float> Solver<R> {
         out.extend((0..self.particles.len()).map(|p| self.position(p)));
     }
 
-    #[inline]
-    pub(crate) fn vector(&self, particle: usize) -> R::Vector {
-        load::<R>(&self.particles[particle])
+    /// The point in m that the solver keeps positions relative to, in its own precision. [`crate::Solver::step`] moves it
+    /// when the body has moved on by more than twice its size.
+    #[must_use]
+    pub fn origin(&self) -> DVec3 {
+        self.particles.origin
+    }
+
+    /// Bytes of the arrays that a clone has: those of particles, tets, attachments and other constraints, without their
+    /// schedules. O(1).
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.particles.bytes()
+            + self.tets.bytes()
+            + self.constraints.bytes()
+            + self.stepper.last.bytes()
+    }
+
+    /// Notes a change while changes are tracked.
+    pub(crate) fn note(&mut self, change: impl FnOnce(&mut Changes)) {
+        if let Some(changes) = &mut self.changes {
+            change(changes);
+        }
+    }
+
+    /// Notes that the corners, the rest shape or the masses of a tet have changed.
+    fn note_tet(&mut self, tet: usize) {
+        self.tets.layout.touch(tet);
+        self.note(|changes| changes.tets.push(number(tet)));
+    }
+
+    /// Notes that a particle is new or has another state or mass.
+    fn note_particle(&mut self, particle: usize) {
+        self.note(|changes| changes.particles.push(number(particle)));
+    }
+
+    /// Softens every new tet whose [`Solver::kappa`] at `substep_time` would exceed `kappa`, so that it just meets it;
+    /// `None` ends this.
+    ///
+    /// Cutting leaves tets so small that no affordable substep follows their vibrations; unsoftened, they do not
+    /// vibrate but collapse and throw their neighbors about. What was softened: [`Solver::softened`].
+    pub fn limit_kappa(&mut self, limit: Option<KappaLimit>) {
+        self.tets.kappa_limit = limit;
+    }
+
+    /// Proves that what the next step with this schedule would solve is what schedule, tets and masses say, to the bit.
+    /// A step carries over only what has changed since the last one; this finds what was forgotten, above all by
+    /// [`Solver::set_mass_in_star`]. O(tets); for tests and on request.
+    ///
+    /// # Errors
+    /// [`XpbdError::Layout`] with the first difference.
+    ///
+    /// # Panics
+    /// If the schedule names a tet that does not exist.
+    pub fn check_layout(&self, schedule: &Schedule) -> Result<(), XpbdError> {
+        let lanes = self.stepper.lanes();
+        self.tets.check_layout(&self.particles, schedule, lanes)
+    }
+
+    /// Puts the tets into the order of a schedule, unless they are.
+    pub(crate) fn update_layout(&mut self, schedule: &Schedule) {
+        let lanes = self.stepper.lanes();
+        self.tets.update_layout(&self.particles, schedule, lanes);
+    }
+
+    /// Gives a body that has moved on by more than twice its size a new origin.
+    pub(crate) fn recenter(&mut self) {
+        if let Some(shift) = recenter(&mut self.particles) {
+            self.constraints.shift(shift);
+        }
+    }
+
+    /// Prepares the state for a step of XPBD: a new origin for a body that has moved on, a little width for one on an exact
+    /// line; returns how many particles the latter moved.
+    pub(crate) fn prepare(&mut self) -> usize {
+        self.recenter();
+        jitter(&self.particles, &self.tets)
+    }
+
+    /// One frame of XPBD.
+    pub(crate) fn frame(
+        &mut self,
+        schedule: &Schedule,
+        settings: &StepSettings,
+        keep: bool,
+    ) -> Result<StepReport, XpbdError> {
+        let _span = tracing::debug_span!("xpbd::step").entered();
+        settings.check()?;
+        self.update_layout(schedule);
+        let unfolded = self.prepare();
+        let Self {
+            particles,
+            tets,
+            constraints,
+            stepper,
+            ..
+        } = self;
+        let repaired = stepper.frame(particles, tets, constraints, settings, keep);
+        Ok(StepReport { repaired, unfolded })
     }
 }
 
-fn signed_volume([a, b, c, d]: [DVec3; 4]) -> f64 {
-    (b - a).cross(c - a).dot(d - a) / 6.0
+fn number(index: usize) -> u32 {
+    u32::try_from(index).expect("particles and tets are numbered by 32 bits")
 }

@@ -1,4 +1,4 @@
-//! [`in_rounds`]: threads that work through rounds of chunks together, a barrier between rounds.
+//! [`parallel_rounds`]: threads that work through rounds of chunks together, a barrier between rounds.
 //!
 //! A color lasts tens of microseconds; waking a thread anew for each would take as long. So the helpers are woken once
 //! for all colors and meet at a counter after each. Whoever is free takes the next chunk of the round. Nobody is waited
@@ -14,12 +14,12 @@ const LOOKS: u32 = 2_000;
 
 /// Calls `work(round, chunk)` for all chunks of all rounds, `chunks(round)` of them in each, on the threads of the
 /// present rayon pool. A round begins when the one before it has ended; what its chunks wrote is visible then.
-pub(crate) fn in_rounds(
+pub(crate) fn parallel_rounds(
     rounds: usize,
     chunks: impl Fn(usize) -> usize + Sync,
     work: impl Fn(usize, usize) + Sync,
 ) {
-    let crew = Crew {
+    let team = Team {
         rounds,
         chunks: &chunks,
         work: &work,
@@ -27,20 +27,20 @@ pub(crate) fn in_rounds(
         done: AtomicU32::new(0),
         parked: AtomicUsize::new(0),
         lock: Mutex::new(()),
-        bell: Condvar::new(),
+        round_ended: Condvar::new(),
     };
     // No more than the largest round can use.
     let most = (0..rounds).map(&chunks).max().unwrap_or(0);
     let helpers = rayon::current_num_threads().min(most).saturating_sub(1);
     rayon::scope(|scope| {
         for _ in 0..helpers {
-            scope.spawn(|_| crew.work());
+            scope.spawn(|_| team.work());
         }
-        crew.work();
+        team.work();
     });
 }
 
-struct Crew<'a, C, W> {
+struct Team<'a, C, W> {
     rounds: usize,
     chunks: &'a C,
     work: &'a W,
@@ -50,10 +50,10 @@ struct Crew<'a, C, W> {
     done: AtomicU32,
     parked: AtomicUsize,
     lock: Mutex<()>,
-    bell: Condvar,
+    round_ended: Condvar,
 }
 
-impl<C: Fn(usize) -> usize, W: Fn(usize, usize)> Crew<'_, C, W> {
+impl<C: Fn(usize) -> usize, W: Fn(usize, usize)> Team<'_, C, W> {
     fn work(&self) {
         let mut seen = self.next.load(Ordering::Acquire);
         loop {
@@ -77,7 +77,7 @@ impl<C: Fn(usize) -> usize, W: Fn(usize, usize)> Crew<'_, C, W> {
                 Err(now) => seen = now,
                 Ok(_) => {
                     // A panic must not leave the others waiting: whatever happens, the chunk ends.
-                    let end = EndOfChunk { crew: self, round };
+                    let end = EndOfChunk { team: self, round };
                     (self.work)(round, chunk);
                     drop(end);
                     seen = self.next.load(Ordering::Acquire);
@@ -108,7 +108,7 @@ impl<C: Fn(usize) -> usize, W: Fn(usize, usize)> Crew<'_, C, W> {
             if self.parked.load(Ordering::SeqCst) > 0 {
                 // Whoever is about to park looks at the counter again under the lock.
                 drop(self.lock.lock().unwrap_or_else(PoisonError::into_inner));
-                self.bell.notify_all();
+                self.round_ended.notify_all();
             }
         }
     }
@@ -131,7 +131,7 @@ impl<C: Fn(usize) -> usize, W: Fn(usize, usize)> Crew<'_, C, W> {
                 break now;
             }
             guard = self
-                .bell
+                .round_ended
                 .wait(guard)
                 .unwrap_or_else(PoisonError::into_inner);
         };
@@ -141,13 +141,13 @@ impl<C: Fn(usize) -> usize, W: Fn(usize, usize)> Crew<'_, C, W> {
 }
 
 struct EndOfChunk<'a, 'b, C: Fn(usize) -> usize, W: Fn(usize, usize)> {
-    crew: &'a Crew<'b, C, W>,
+    team: &'a Team<'b, C, W>,
     round: usize,
 }
 
 impl<C: Fn(usize) -> usize, W: Fn(usize, usize)> Drop for EndOfChunk<'_, '_, C, W> {
     fn drop(&mut self) {
-        self.crew.end_chunk(self.round);
+        self.team.end_chunk(self.round);
     }
 }
 
@@ -165,7 +165,7 @@ mod tests {
             pool.expect("threads start").install(|| {
                 for _ in 0..50 {
                     ended.iter().for_each(|e| e.store(0, Ordering::Relaxed));
-                    in_rounds(
+                    parallel_rounds(
                         sizes.len(),
                         |round| sizes[round],
                         |round, chunk| {
@@ -186,14 +186,14 @@ mod tests {
         }
     }
 
-    /// Two crews in one pool, each called from a thread of it, must not wait for each other's threads.
+    /// Two teams in one pool, each called from a thread of it, must not wait for each other's threads.
     #[test]
-    fn crews_in_one_pool_do_not_block_each_other() {
+    fn teams_in_one_pool_do_not_block_each_other() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build();
         let count = AtomicUsize::new(0);
         pool.expect("threads start").install(|| {
-            let crew = || {
-                in_rounds(
+            let rounds = || {
+                parallel_rounds(
                     100,
                     |_| 4,
                     |_, _| {
@@ -201,7 +201,7 @@ mod tests {
                     },
                 );
             };
-            rayon::join(crew, crew);
+            rayon::join(rounds, rounds);
         });
         assert_eq!(count.into_inner(), 800);
     }
@@ -211,7 +211,7 @@ mod tests {
     fn a_panic_comes_through() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build();
         pool.expect("threads start").install(|| {
-            in_rounds(
+            parallel_rounds(
                 3,
                 |_| 4,
                 |round, chunk| {

@@ -1,0 +1,231 @@
+//! [`Colliders`]: solid obstacles that particles do not enter, with Coulomb friction.
+//!
+//! A [`Collider`] is a shape with a closed form of its signed distance: plane, sphere, capsule or box. After the other
+//! constraints, a particle inside is put on the nearest point of the surface, and what it moved along the surface in
+//! this substep is taken back by at most the coefficient of friction times the depth. The depth is what the normal
+//! force pushed the particle out by, so this is Coulomb's law.
+//!
+//! Contacts are found where a particle is, not along its way: what crosses a collider within one substep passes, and
+//! what got past the middle of a thin box leaves on the other side. A substep must be short against thickness over
+//! speed.
+//!
+//! Source: Macklin, Müller, Chentanez, Kim 2014 (friction, section 6.1). Cost: 20 to 50 operations for each particle
+//! and collider, more for those inside.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::ConstraintKind;
+use crate::collider::{Nearest, Solid};
+use crate::float::{finite, load, store, weight};
+use crate::particles::{PARALLEL_PARTICLES, Particles};
+use crate::substep::Substep;
+use crate::{Collider, Float, StepSettings};
+
+/// How far a particle may be pushed, in depths.
+const LONGEST_PUSH: f64 = 10.0;
+/// How often a particle inside several colliders is handed around among them.
+const ROUNDS: usize = 32;
+
+/// The colliders of the settings, where they are at the end of the present substep.
+#[derive(Debug)]
+pub(crate) struct Colliders<R: Float> {
+    pub(crate) obstacles: Vec<Obstacle<R>>,
+}
+
+impl<R: Float> Default for Colliders<R> {
+    fn default() -> Self {
+        Self {
+            obstacles: Vec::new(),
+        }
+    }
+}
+
+/// Without obstacles: each substep places its own.
+impl<R: Float> Clone for Colliders<R> {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl<R: Float> Colliders<R> {
+    /// Places the colliders `elapsed` s after the start of the frame, at the end of a substep.
+    pub(crate) fn place(&mut self, settings: &StepSettings, elapsed: f64, origin: DVec3) {
+        self.obstacles.clear();
+        self.obstacles
+            .extend(Obstacle::place(settings, elapsed, origin));
+    }
+
+    /// Whether a particle is inside of a collider or, but for rounding, on its surface.
+    pub(crate) fn touches(&self, x: R::Vector) -> bool {
+        self.obstacles.iter().any(|o| o.touched_at(x).is_some())
+    }
+
+    /// Puts the particles inside of colliders on their surface.
+    pub(crate) fn project(&self, particles: &Particles<R>) {
+        if self.obstacles.is_empty() {
+            return;
+        }
+        let cells = particles.cells.par_iter().with_min_len(PARALLEL_PARTICLES);
+        cells
+            .zip(&particles.previous)
+            .for_each(|(cell, &previous)| {
+                if weight::<R>(cell) <= R::ZERO {
+                    return;
+                }
+                if let Some(x) = outside(&self.obstacles, load::<R>(cell), previous) {
+                    store::<R>(cell, x);
+                }
+            });
+    }
+}
+
+impl<R: Float> ConstraintKind<R> for Colliders<R> {
+    fn begin(&mut self, particles: &Particles<R>, substep: &Substep<'_, R>) -> usize {
+        self.place(substep.settings, substep.elapsed, particles.origin);
+        0
+    }
+
+    fn solve(&mut self, particles: &Particles<R>, _substep: &Substep<'_, R>) {
+        self.project(particles);
+    }
+
+    fn bytes(&self) -> usize {
+        0
+    }
+}
+
+/// A collider at the end of a substep.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Obstacle<R: Float> {
+    solid: Solid<R>,
+    friction: R,
+    /// What it moved in the substep.
+    motion: R::Vector,
+}
+
+impl<R: Float> Obstacle<R> {
+    /// The colliders `elapsed` s after the start of the frame, at the end of a substep, relative to an origin.
+    pub(crate) fn place(
+        settings: &StepSettings,
+        elapsed: f64,
+        origin: DVec3,
+    ) -> impl Iterator<Item = Self> {
+        let place = move |collider: &Collider| Self {
+            solid: Solid::new(&collider.moved(elapsed).shifted(-origin).shape),
+            friction: R::from_f64(collider.friction),
+            motion: R::from_dvec3(collider.velocity * settings.substep_time()),
+        };
+        settings.colliders.iter().map(place)
+    }
+
+    /// The outward normal, if a particle is inside or, but for rounding, on the surface.
+    pub(crate) fn touched_at(&self, x: R::Vector) -> Option<R::Vector> {
+        let nearest = self.solid.nearest(x);
+        let [a, b, c] = R::components(x);
+        let size = (a * a + b * b + c * c).sqrt();
+        (nearest.distance <= size * R::EPSILON * R::from_f64(4.0)).then_some(nearest.normal)
+    }
+
+    /// What is left of a force in N on a particle that the collider bears: nothing of what presses the particle into it,
+    /// nor of what friction then holds.
+    pub(crate) fn left_of(&self, force: DVec3, x: R::Vector) -> DVec3 {
+        let Some(normal) = self.touched_at(x).map(R::to_dvec3) else {
+            return force;
+        };
+        let pressure = -normal.dot(force);
+        if pressure < 0.0 {
+            return force;
+        }
+        let along = force + normal * pressure;
+        let (size, held) = (along.length(), self.friction.to_f64() * pressure);
+        if size <= held {
+            return DVec3::ZERO;
+        }
+        along * (1.0 - held / size)
+    }
+
+    /// Where a particle inside is put that was at `previous` before the substep.
+    #[inline]
+    fn push_out(&self, x: R::Vector, previous: R::Vector) -> Option<R::Vector> {
+        let Nearest {
+            distance,
+            normal,
+            point,
+        } = self.solid.nearest(x);
+        if distance >= R::ZERO {
+            return None;
+        }
+        Some(self.rub(point, normal, -distance, x - previous))
+    }
+
+    /// Where a particle at `x` is put that wants to move to `moved` inside: onto the plane that touches the surface
+    /// nearest to `x`, along `along(normal)`. With the direction in which a force along the normal moves the particle,
+    /// what is left over in the end is such a force. `None` if that leads far away.
+    #[inline]
+    pub(crate) fn push_along(
+        &self,
+        x: R::Vector,
+        moved: R::Vector,
+        previous: R::Vector,
+        along: impl Fn(R::Vector) -> R::Vector,
+    ) -> Option<R::Vector> {
+        if self.solid.nearest(moved).distance >= R::ZERO {
+            return None;
+        }
+        let Nearest {
+            distance, normal, ..
+        } = self.solid.nearest(x);
+        let depth = -(distance + R::dot(normal, moved - x));
+        let along = along(normal);
+        let straight = R::dot(normal, along);
+        // A push that goes much further along the surface than out of it throws particles about in extreme states.
+        let limit = straight * R::from_f64(LONGEST_PUSH);
+        let sound = depth > R::ZERO && straight > R::ZERO && R::dot(along, along) <= limit * limit;
+        let out = moved + along * (depth / straight);
+        (sound && finite::<R>(out)).then(|| self.rub(out, normal, depth, out - previous))
+    }
+
+    /// Holds a particle on the surface back by at most the friction's share of the depth it was pushed out of.
+    #[inline]
+    fn rub(&self, x: R::Vector, normal: R::Vector, depth: R, way: R::Vector) -> R::Vector {
+        let way = way - self.motion;
+        let slide = way - normal * R::dot(normal, way);
+        let length = R::dot(slide, slide).sqrt();
+        let hold = self.friction * depth;
+        let share = if length > hold { hold / length } else { R::ONE };
+        x - slide * share
+    }
+}
+
+impl Obstacle<f32> {
+    /// All there is to know, at the places that `Solver::obstacle_data` names.
+    pub(crate) fn numbers(&self) -> [f32; 20] {
+        let mut numbers = self.solid.numbers();
+        numbers[1] = self.friction;
+        numbers[4..7].copy_from_slice(&self.motion.to_array());
+        numbers
+    }
+}
+
+/// Where a particle inside of a collider is put; `None` outside of all. Where colliders overlap, one may push a particle
+/// into another; then they take turns, which ends at a point outside of all if there is one nearby.
+#[inline]
+pub(crate) fn outside<R: Float>(
+    obstacles: &[Obstacle<R>],
+    mut x: R::Vector,
+    previous: R::Vector,
+) -> Option<R::Vector> {
+    // Obstacles in a row that the particle is not inside of.
+    let (mut clear, mut moved) = (0, false);
+    for obstacle in obstacles.iter().cycle().take(ROUNDS * obstacles.len()) {
+        clear += 1;
+        if let Some(out) = obstacle.push_out(x, previous) {
+            (x, clear, moved) = (out, 1, true);
+        }
+        if clear == obstacles.len() {
+            break;
+        }
+    }
+    moved.then_some(x)
+}

@@ -1,0 +1,51 @@
+//! [`Pose`]: position and rotation of a handle that particles are attached to.
+
+use glam::{DQuat, DVec3};
+
+/// Where a handle is and how it is turned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// Position in m.
+    pub position: DVec3,
+    /// Rotation, of length 1.
+    pub rotation: DQuat,
+}
+
+impl Pose {
+    /// At a position, not turned.
+    #[must_use]
+    pub fn at(position: DVec3) -> Self {
+        Self {
+            position,
+            rotation: DQuat::IDENTITY,
+        }
+    }
+
+    /// Where a point of the handle's frame is in the world.
+    #[must_use]
+    pub fn apply(&self, point: DVec3) -> DVec3 {
+        self.position + self.rotation * point
+    }
+
+    /// The pose at a fraction of the way to another one; that one itself at 1.
+    #[must_use]
+    pub fn toward(&self, to: &Self, fraction: f64) -> Self {
+        if fraction >= 1.0 || self == to {
+            return *to;
+        }
+        Self {
+            position: self.position.lerp(to.position, fraction),
+            rotation: self.rotation.slerp(to.rotation, fraction),
+        }
+    }
+
+    /// # Panics
+    /// If the pose is not finite or its rotation not of length 1.
+    pub(crate) fn check(&self) {
+        let sound = self.position.is_finite() && self.rotation.is_finite();
+        assert!(
+            sound && (self.rotation.length() - 1.0).abs() < 1e-6,
+            "poses are finite and their rotations of length 1"
+        );
+    }
+}

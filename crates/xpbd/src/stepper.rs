@@ -1,0 +1,209 @@
+//! [`Stepper`]: one frame of XPBD by colored Gauss-Seidel, and the memory that it works in.
+//!
+//! Each substep moves the particles as if they were free, corrects them tet by tet in the order of the schedule and then
+//! kind by kind of the other constraints, and adds to the velocities what the corrections moved. Clusters of one color
+//! share no particle and run in parallel; a color too small to be worth a second thread stays on one. The result is
+//! bit-identical for any number of threads, which is that of the rayon pool this is called in.
+//!
+//! Source: Macklin, Müller, Chentanez 2016; substeps after Macklin et al. 2019; paper section 3 and 4.1.
+//! Cost: `substeps · iterations` passes over all tets.
+
+use fearless_simd::Level;
+
+use crate::constraints::Constraints;
+use crate::damping::Damping;
+use crate::gauss_seidel;
+use crate::jacobi::Jacobi;
+use crate::layout::Layout;
+use crate::particles::Particles;
+use crate::simd_kernel::Pass;
+use crate::substep::Substep;
+use crate::tets::TetSet;
+use crate::{Float, Method, StepSettings, TetSolve};
+
+/// The report of a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StepReport {
+    /// Particles that would have become infinite or NaN and were put back where they were instead, counted once for
+    /// each substep. Anything but 0 means the step is not to be trusted: use more substeps.
+    pub repaired: usize,
+    /// Particles that were moved by a millionth of a tet's size because all tets lay on one line to the last digit, from
+    /// where no constraint could have brought them back.
+    pub unfolded: usize,
+}
+
+/// What residuals need of the last substep.
+#[derive(Clone, Debug)]
+pub(crate) struct LastSubstep<R: Float> {
+    /// Positions before the constraints were solved; empty if they were not kept.
+    pub(crate) predicted: Vec<R::Vector>,
+    /// The multipliers of each tet after it, and the constraints that they belong to.
+    pub(crate) multipliers: Vec<[R; 2]>,
+    pub(crate) tet_solve: TetSolve,
+}
+
+impl<R: Float> LastSubstep<R> {
+    /// Forgets an earlier substep.
+    pub(crate) fn clear(&mut self) {
+        self.predicted.clear();
+        self.multipliers.clear();
+    }
+
+    /// Bytes of both lists.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(&*self.predicted) + size_of_val(&*self.multipliers)
+    }
+}
+
+/// What steps through frames.
+#[derive(Debug)]
+pub(crate) struct Stepper<R: Float> {
+    /// The instructions that this processor has.
+    level: Level,
+    /// By block and lane of the layout; only while a step has more than one iteration or is asked for its residuals.
+    multipliers: Vec<R::Atomic>,
+    jacobi: Option<Jacobi<R>>,
+    damping: Damping<R>,
+    pub(crate) last: LastSubstep<R>,
+}
+
+impl<R: Float> Default for Stepper<R> {
+    fn default() -> Self {
+        Self {
+            level: Level::new(),
+            multipliers: Vec::new(),
+            jacobi: None,
+            damping: Damping::default(),
+            last: LastSubstep {
+                predicted: Vec::new(),
+                multipliers: Vec::new(),
+                tet_solve: TetSolve::default(),
+            },
+        }
+    }
+}
+
+/// Without working memory, which each step fills again.
+impl<R: Float> Clone for Stepper<R> {
+    fn clone(&self) -> Self {
+        Self {
+            last: self.last.clone(),
+            ..Self::default()
+        }
+    }
+}
+
+impl<R: Float> Stepper<R> {
+    /// The tets in a block of the layout.
+    pub(crate) fn lanes(&self) -> usize {
+        gauss_seidel::lanes::<R>(self.level)
+    }
+
+    /// Advances by one frame; returns how many particles had to be put back. The layout of the tets is up to date.
+    pub(crate) fn frame(
+        &mut self,
+        particles: &mut Particles<R>,
+        tets: &TetSet<R>,
+        constraints: &mut Constraints<R>,
+        settings: &StepSettings,
+        keep: bool,
+    ) -> usize {
+        self.last.clear();
+        let mut repaired = 0;
+        for number in 0..settings.substeps {
+            let keep = keep && number + 1 == settings.substeps;
+            let substep = Substep::new(settings, number, keep);
+            repaired += self.substep(particles, tets, constraints, &substep, keep);
+        }
+        constraints.end_frame();
+        repaired
+    }
+
+    fn substep(
+        &mut self,
+        particles: &mut Particles<R>,
+        tets: &TetSet<R>,
+        constraints: &mut Constraints<R>,
+        substep: &Substep<'_, R>,
+        keep: bool,
+    ) -> usize {
+        let settings = substep.settings;
+        let time = settings.substep_time();
+        let gravity = settings.gravity.map(|g| R::from_dvec3(g * time));
+        particles.predict(gravity, R::from_f64(time));
+        let lost = constraints.begin(particles, substep);
+        self.multipliers.clear();
+        if substep.has_multipliers {
+            let count = 2 * tets.layout.lanes * tets.layout.block_count();
+            self.multipliers.resize_with(count, || R::ZERO.cell());
+        }
+        if keep {
+            let all = 0..particles.len();
+            self.last.predicted.extend(all.map(|p| particles.vector(p)));
+        }
+        if settings.method == Method::GaussSeidel {
+            self.jacobi = None;
+        } else {
+            self.jacobi.get_or_insert_default().restart();
+        }
+        for _ in 0..settings.iterations {
+            self.iterate(particles, &tets.layout, substep);
+            constraints.solve(particles, substep);
+        }
+        if keep {
+            let all = 0..tets.len();
+            let multipliers = all.map(|t| multipliers_of(&tets.layout, &self.multipliers, t));
+            self.last.multipliers.extend(multipliers);
+            self.last.tet_solve = settings.tet_solve;
+        }
+        let repaired = particles.update_velocities(R::from_f64(time), substep.factors.per_time);
+        constraints.end(particles, substep);
+        if tets.is_damped() {
+            self.damping
+                .damp(particles, &tets.layout, substep.factors, self.level);
+        }
+        lost + repaired
+    }
+
+    /// One iteration over the tets.
+    fn iterate(&mut self, particles: &Particles<R>, layout: &Layout<R>, substep: &Substep<'_, R>) {
+        let Self {
+            level,
+            multipliers,
+            jacobi,
+            ..
+        } = self;
+        let settings = substep.settings;
+        if let Some(jacobi) = jacobi {
+            let extrapolating = settings.method != Method::Jacobi;
+            jacobi.begin(&particles.cells, multipliers, extrapolating);
+        }
+        let pass = Pass {
+            layout,
+            particles: &particles.cells,
+            velocities: &[],
+            multipliers,
+            corrections: jacobi.as_ref().map_or(&[], |jacobi| &jacobi.corrections),
+            iterated: settings.iterations > 1,
+            factors: substep.factors,
+        };
+        gauss_seidel::solve(*level, settings.tet_solve, &pass);
+        let Some(jacobi) = jacobi else { return };
+        jacobi.apply(&particles.cells);
+        if let Method::Chebyshev {
+            spectral_radius,
+            delay,
+        } = settings.method
+        {
+            jacobi.extrapolate(&particles.cells, multipliers, spectral_radius, delay);
+        }
+    }
+}
+
+/// The multipliers of a tet after the last substep; zero if the schedule does not solve it.
+fn multipliers_of<R: Float>(layout: &Layout<R>, multipliers: &[R::Atomic], tet: usize) -> [R; 2] {
+    let Some((block, lane)) = layout.place(tet) else {
+        return [R::ZERO; 2];
+    };
+    [0, 1].map(|k| R::load(&multipliers[(2 * block + k) * layout.lanes + lane]))
+}
