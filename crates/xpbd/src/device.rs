@@ -1,8 +1,8 @@
 //! What a device that solves on its own needs of a [`Solver`]: tets and particles as plain numbers, what edits have
 //! changed since it last asked, and the way back of a state.
 //!
-//! The solver here stays the place where tets, masses and materials are edited; a GPU follows it as the layout of this
-//! crate does. Nothing of this costs a solver anything that nobody asked to keep track. Cost: a number an edit.
+//! Tets, masses and materials are edited in the solver here; a GPU applies the same changes that the layout of this crate
+//! applies. Changes are tracked on request only. Cost: a number an edit.
 
 use crate::constraints::Obstacle;
 use crate::layout::{CONSTANTS, REST};

@@ -63,22 +63,22 @@ pub(crate) fn lanes<R: Float>(level: Level) -> usize {
 fn colors<R: Float, S: Simd, K: BlockKernel>(simd: S, pass: &Pass<'_, R>) {
     let layout = pass.layout;
     let threads = rayon::current_num_threads();
-    let chunks = |color: usize| match layout.blocks_of(color) {
+    let chunks = |color: usize| match layout.block_count_of(color) {
         0 => 0,
         blocks => {
-            let groups = layout.groups(color).len();
+            let groups = layout.groups_of(color).len();
             (blocks / BLOCKS_A_THREAD).clamp(1, threads.min(groups))
         }
     };
     let solve = |color: usize, chunk: usize| {
-        let (groups, chunks) = (layout.groups(color), chunks(color));
+        let (groups, chunks) = (layout.groups_of(color), chunks(color));
         let share = |part: usize| groups.len() * part / chunks;
         let groups = &groups[share(chunk)..share(chunk + 1)];
         simd.vectorize(
             #[inline(always)]
             || {
                 for &group in groups {
-                    for block in layout.blocks(group) {
+                    for block in layout.blocks_of(group) {
                         K::run(simd, pass, block);
                     }
                 }

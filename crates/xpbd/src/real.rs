@@ -103,11 +103,11 @@ impl<R: Real> Solver<R> {
         R::step(self, schedule, settings, true)
     }
 
-    /// Puts the tets into the order of a schedule, unless they are, as a step does first. Whoever wants to know what a
-    /// cut costs calls this before the step.
+    /// Puts the tets into the order of a schedule, unless they are, as a step does first. To measure what a cut costs, call
+    /// this before the step.
     ///
-    /// A schedule that has been [updated](Schedule::update) since the last call is followed at the cost of what has
-    /// changed of it and of the tets, amortized; another one, even an equal one, and new materials cost O(tets).
+    /// A schedule that has been [updated](Schedule::update) since the last call costs what has changed of it and of the
+    /// tets, amortized; another one, even an equal one, and new materials cost O(tets).
     ///
     /// # Panics
     /// If the schedule names a tet that does not exist.

@@ -23,7 +23,7 @@
 //!
 //! **Sequential**. The two constraints of the block form one after the other, as in the paper.
 //!
-//! No form needs gradients at the corners. With `G = Σ w q qᵀ` over the corners (see `Layout`), `Σ w |∇C|²` is
+//! No form needs gradients at the corners. With `G = Σ w q qᵀ` over the corners (see `Blocks`), `Σ w |∇C|²` is
 //! `G : AᵀA = |A L|²` for `A = dC/dF` and `G = L Lᵀ`. A correction is one matrix times the gradients of the barycentric coordinates.
 //!
 //! Products and sums are rounded one by one, not fused, so that every instruction set gives the same bits.
@@ -158,9 +158,9 @@ struct Tets<'a, R: Float, S: Simd> {
 #[inline(always)]
 fn solve_block<R: Float, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize, form: TetSolve) {
     let lanes = R::Lanes::<S>::LEN;
-    let layout = pass.layout;
-    let active = layout.active[block];
-    let corners = &layout.particles[block * lanes..(block + 1) * lanes];
+    let blocks = &pass.layout.blocks;
+    let active = blocks.active[block];
+    let corners = &blocks.particles[block * lanes..(block + 1) * lanes];
     let read = |p: u32| R::read(&pass.particles[p as usize]);
     let mut x = gather::<R, S>(simd, corners, read);
     let tets = Tets::<R, S>::new(simd, pass, block);
@@ -224,9 +224,9 @@ fn solve_block<R: Float, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize, for
 #[inline(always)]
 fn damp_block<R: Float, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize) {
     let lanes = R::Lanes::<S>::LEN;
-    let layout = pass.layout;
-    let active = layout.active[block];
-    let corners = &layout.particles[block * lanes..(block + 1) * lanes];
+    let blocks = &pass.layout.blocks;
+    let active = blocks.active[block];
+    let corners = &blocks.particles[block * lanes..(block + 1) * lanes];
     let x = gather::<R, S>(simd, corners, |p| R::read(&pass.particles[p as usize]));
     let mut v = gather::<R, S>(simd, corners, |p| R::read(&pass.velocities[p as usize]));
     let tets = Tets::<R, S>::new(simd, pass, block);
@@ -244,15 +244,15 @@ impl<'a, R: Float, S: Simd> Tets<'a, R, S> {
     #[inline(always)]
     fn new(simd: S, pass: &Pass<'a, R>, block: usize) -> Self {
         let lanes = R::Lanes::<S>::LEN;
-        let layout = pass.layout;
-        let rest = &layout.rest[block * REST * lanes..(block + 1) * REST * lanes];
+        let blocks = &pass.layout.blocks;
+        let rest = &blocks.rest[block * REST * lanes..(block + 1) * REST * lanes];
         let mut constants = [splat::<R, S>(simd, R::ZERO); CONSTANTS];
         for (k, constant) in constants.iter_mut().enumerate() {
-            *constant = if layout.constants.is_empty() {
-                splat::<R, S>(simd, layout.constant[k])
+            *constant = if blocks.constants.is_empty() {
+                splat::<R, S>(simd, blocks.constant[k])
             } else {
                 let start = (block * CONSTANTS + k) * lanes;
-                R::Lanes::<S>::from_slice(simd, &layout.constants[start..start + lanes])
+                R::Lanes::<S>::from_slice(simd, &blocks.constants[start..start + lanes])
             };
         }
         let [ratio, gamma, damping] = constants;

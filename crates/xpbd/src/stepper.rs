@@ -134,7 +134,7 @@ impl<R: Float> Stepper<R> {
         let lost = constraints.begin(particles, substep);
         self.multipliers.clear();
         if substep.has_multipliers {
-            let count = 2 * tets.layout.lanes * tets.layout.block_count();
+            let count = 2 * tets.layout.blocks.lanes * tets.layout.blocks.len();
             self.multipliers.resize_with(count, || R::ZERO.cell());
         }
         if keep {
@@ -202,8 +202,8 @@ impl<R: Float> Stepper<R> {
 
 /// The multipliers of a tet after the last substep; zero if the schedule does not solve it.
 fn multipliers_of<R: Float>(layout: &Layout<R>, multipliers: &[R::Atomic], tet: usize) -> [R; 2] {
-    let Some((block, lane)) = layout.place(tet) else {
+    let Some((block, lane)) = layout.slot(tet) else {
         return [R::ZERO; 2];
     };
-    [0, 1].map(|k| R::load(&multipliers[(2 * block + k) * layout.lanes + lane]))
+    [0, 1].map(|k| R::load(&multipliers[(2 * block + k) * layout.blocks.lanes + lane]))
 }

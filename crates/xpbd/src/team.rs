@@ -1,10 +1,9 @@
 //! [`parallel_rounds`]: threads that work through rounds of chunks together, a barrier between rounds.
 //!
-//! A color lasts tens of microseconds; waking a thread anew for each would take as long. So the helpers are woken once
-//! for all colors and meet at a counter after each. Whoever is free takes the next chunk of the round. Nobody is waited
-//! for who has not come: if the pool is busy elsewhere, the caller does all alone. A thread that finds nothing to do
-//! waits for the round to end by spinning a little and then parks, since on a busy machine the one it waits for may
-//! need its processor.
+//! A color lasts tens of microseconds, and waking a thread takes as long. So helpers are woken once for all colors and meet
+//! at a counter after each. A free thread takes the next chunk of the round. Helpers that have not started are not waited
+//! for: if the pool is busy elsewhere, the caller does all chunks. A thread without a chunk waits for the round to end by
+//! spinning a little and then parks, since on a busy machine the thread it waits for may need its processor.
 
 use std::sync::atomic::{AtomicU32, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
@@ -76,7 +75,7 @@ impl<C: Fn(usize) -> usize, W: Fn(usize, usize)> Team<'_, C, W> {
             {
                 Err(now) => seen = now,
                 Ok(_) => {
-                    // A panic must not leave the others waiting: whatever happens, the chunk ends.
+                    // A panic must not leave the others waiting, so the chunk ends in any case.
                     let end = EndOfChunk { team: self, round };
                     (self.work)(round, chunk);
                     drop(end);
@@ -86,7 +85,7 @@ impl<C: Fn(usize) -> usize, W: Fn(usize, usize)> Team<'_, C, W> {
         }
     }
 
-    /// Begins the next round, unless somebody has.
+    /// Begins the next round, unless another thread has.
     fn enter(&self, from: usize, to: usize) -> u64 {
         let (from, to) = ((from as u64) << 32, (to as u64) << 32);
         let order = Ordering::AcqRel;
@@ -106,7 +105,7 @@ impl<C: Fn(usize) -> usize, W: Fn(usize, usize)> Team<'_, C, W> {
             self.next
                 .store(((round + 1) as u64) << 32, Ordering::SeqCst);
             if self.parked.load(Ordering::SeqCst) > 0 {
-                // Whoever is about to park looks at the counter again under the lock.
+                // A thread that is about to park looks at the counter again under the lock.
                 drop(self.lock.lock().unwrap_or_else(PoisonError::into_inner));
                 self.round_ended.notify_all();
             }

@@ -1,6 +1,6 @@
 //! [`TetSet`]: the tets of a solver at rest, their materials, and their layout for the kernel.
 //!
-//! Tets keep the numbers of the mesh. The order of solving is that of a [`Schedule`], which the layout follows. Cost: an
+//! Tets keep the numbers of the mesh. The order of solving is that of a [`Schedule`], from which the layout is updated. Cost: an
 //! edit is O(1); the next step updates the layout of what was edited.
 
 use glam::DVec3;
@@ -146,7 +146,7 @@ impl<R: Float> TetSet<R> {
         lanes: usize,
     ) {
         let uniform = self.has_one_set_of_constants();
-        layout.follow(schedule, lanes, uniform, |t| self.ingredients(particles, t));
+        layout.update(schedule, lanes, uniform, |t| self.ingredients(particles, t));
     }
 
     /// Compares what the layout becomes with the next schedule with schedule, tets and masses, to the bit. O(tets).

@@ -10,10 +10,26 @@ use crate::experiment::{Page, Part, Table};
 
 /// Features and the modules that are theirs alone: what of a bare frame is in those is paid by who declared nothing.
 const MODULES: [(&str, &[&str]); 12] = [
-    ("attachments", &["xpbd::attachment", "incise::attachment"]),
-    ("distances", &["xpbd::distance", "incise::distance"]),
-    ("volume constraints", &["xpbd::volume", "incise::volume"]),
-    ("colliders, ground", &["xpbd::collider", "incise::collider"]),
+    (
+        "attachments",
+        &["xpbd::constraints::attachments", "incise::attachment"],
+    ),
+    (
+        "distances",
+        &["xpbd::constraints::distances", "incise::distance"],
+    ),
+    (
+        "volume constraints",
+        &["xpbd::constraints::volumes", "incise::volume"],
+    ),
+    (
+        "colliders, ground",
+        &[
+            "xpbd::constraints::colliders",
+            "xpbd::collider",
+            "incise::collider",
+        ],
+    ),
     ("Jacobi, Chebyshev", &["xpbd::jacobi"]),
     ("vbd", &["xpbd::vbd", "incise::vbd"]),
     (
@@ -34,8 +50,8 @@ const MODULES: [(&str, &[&str]); 12] = [
         &["incise::measure", "xpbd::measure", "xpbd::residuals"],
     ),
     ("sleep", &["incise::sleep"]),
-    ("bodies far from the origin", &["xpbd::origin"]),
-    ("bodies on a line", &["xpbd::unfold"]),
+    ("bodies far from the origin", &["xpbd::floating_origin"]),
+    ("bodies on a line", &["xpbd::degeneracy_jitter"]),
 ];
 
 /// The function of the facade that has a pass: what a frame is for.

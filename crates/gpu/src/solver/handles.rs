@@ -5,7 +5,7 @@
 //! their places: rotations and sums in single precision, so places are taken relative to the middle of all places on a
 //! handle, which the host moves in double precision.
 //!
-//! Twin: `attachment.rs` of incise-xpbd, to a few roundings. The place at the start of a frame is that of the handle
+//! Twin: `constraints/attachments.rs` of incise-xpbd, to a few roundings. The place at the start of a frame is that of the handle
 //! there. Cost: 32 bytes an attachment, sent when some have changed; 48 bytes a handle and substep, sent when they
 //! differ from those before.
 

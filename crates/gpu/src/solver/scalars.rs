@@ -2,7 +2,7 @@
 //!
 //! They lie in the order in which they are solved. Sixty-four clusters of a color are a group, as with tets, so the
 //! dispatches are made the same way: one for each color, small colors together. Whatever changes, all of them are sent
-//! again. Twin: `scalar.rs` of incise-xpbd. Cost: 32 bytes a constraint and 8 a cluster.
+//! again. Twin: `constraints/scalar.rs` of incise-xpbd. Cost: 32 bytes a constraint and 8 a cluster.
 
 use incise_graph::{Rows, Schedule};
 use incise_xpbd::Solver;

@@ -1,10 +1,12 @@
-//! What following costs, counted in tets filled in, and that blocks stay well used.
+//! What updates cost, counted in tets filled in, and that blocks stay well used.
 
 use glam::{DQuat, DVec3};
 use incise_graph::{ClusterId, Clustering, ColorId, Coloring, Schedule};
 
+use super::blocks::metric_factor;
 use super::*;
 use crate::Material;
+use crate::neo_hookean::TetConstraint;
 
 const LANES: usize = 8;
 
@@ -41,7 +43,7 @@ impl Plan {
         let coloring = Coloring::new((0..clusters).map(|k| ColorId(k % 30)).collect());
         let schedule = Schedule::new(&clustering, &coloring);
         let mut layout = Layout::default();
-        let filled = layout.follow(&schedule, LANES, true, ingredients);
+        let filled = layout.update(&schedule, LANES, true, ingredients);
         assert_eq!(filled, 5 * clusters as usize);
         Self {
             clustering,
@@ -80,7 +82,7 @@ impl Plan {
             &std::mem::take(&mut self.clusters),
         );
         assert!(!self.layout.fits(&self.schedule));
-        let filled = self.layout.follow(&self.schedule, LANES, true, ingredients);
+        let filled = self.layout.update(&self.schedule, LANES, true, ingredients);
         assert!(self.layout.fits(&self.schedule));
         self.layout.check(&self.schedule, ingredients).unwrap();
         filled
@@ -112,7 +114,7 @@ fn following_a_cut_costs_what_was_cut() {
 fn blocks_stay_well_used() {
     let clusters = 600;
     let (mut plan, mut filled, rounds) = (Plan::new(clusters), 0, 300);
-    let first = plan.layout.block_count();
+    let first = plan.layout.blocks.len();
     for round in 0..rounds {
         for i in 0..20 {
             let k = (round * 20 + i) * 7 % clusters;
@@ -120,11 +122,20 @@ fn blocks_stay_well_used() {
             plan.recolor(ClusterId(k), (i * i + round / 10) % 40);
         }
         filled += plan.follow();
-        let used: usize = plan.layout.usages.iter().map(|u| u.blocks as usize).sum();
-        assert_eq!(used + plan.layout.free_blocks, plan.layout.block_count());
-        assert!(plan.layout.free_blocks <= used);
+        let used: usize = plan
+            .layout
+            .groups
+            .usages
+            .iter()
+            .map(|u| u.blocks as usize)
+            .sum();
+        assert_eq!(
+            used + plan.layout.groups.free_blocks,
+            plan.layout.blocks.len()
+        );
+        assert!(plan.layout.groups.free_blocks <= used);
     }
-    let last = plan.layout.block_count();
+    let last = plan.layout.blocks.len();
     assert!(last < 4 * first, "{last} blocks instead of {first}");
     // A cluster that moves takes its five tets; forming anew costs no more than some times that.
     assert!(filled < 4 * 5 * 20 * rounds as usize, "{filled}");
@@ -138,7 +149,7 @@ fn a_touched_tet_is_filled_in_once() {
         plan.layout.touch(tet);
     }
     assert!(!plan.layout.fits(&plan.schedule));
-    let filled = plan.layout.follow(&plan.schedule, LANES, true, ingredients);
+    let filled = plan.layout.update(&plan.schedule, LANES, true, ingredients);
     assert_eq!(filled, 3);
     // Also if its cluster moves at the same time.
     plan.layout.touch(7);
@@ -154,10 +165,10 @@ fn another_schedule_is_laid_out() {
     assert!(plan.layout.fits(&copy));
     let equal = Schedule::new(&plan.clustering, &plan.coloring);
     assert!(!plan.layout.fits(&equal));
-    assert_eq!(plan.layout.follow(&equal, LANES, true, ingredients), 250);
+    assert_eq!(plan.layout.update(&equal, LANES, true, ingredients), 250);
     plan.layout.forget();
     assert!(!plan.layout.fits(&equal));
-    assert_eq!(plan.layout.follow(&equal, LANES, true, ingredients), 250);
+    assert_eq!(plan.layout.update(&equal, LANES, true, ingredients), 250);
 }
 
 /// A sliver a hundred thousand times as wide as thick does not move along its thin direction, in which its gradients are

@@ -71,7 +71,7 @@ impl<R: Float> Case<R> {
         let schedule = Schedule::new(&Clustering::none(count), &coloring);
         let mut layout = Layout::default();
         let lanes = gauss_seidel::lanes::<R>(level);
-        layout.follow(&schedule, lanes, true, |t| {
+        layout.update(&schedule, lanes, true, |t| {
             let tet = self.tets[t as usize];
             Ingredients {
                 weights: tet.particles.map(|p| self.particles[p as usize][3]),

@@ -55,7 +55,7 @@ pub struct Solver<R: Float> {
     pub(crate) changes: Option<Changes>,
 }
 
-/// A copy that goes on as the original would, to the bit. Nobody follows its changes yet: see
+/// A copy whose next steps are bit-identical to those of the original. Its changes are not tracked yet: see
 /// [`Solver::track_changes`].
 ///
 /// ```
@@ -146,7 +146,7 @@ impl<R: Float> Solver<R> {
         self.note_tet(tet);
     }
 
-    /// Gives a tet's place to another tet of the same material.
+    /// Replaces a tet by another one of the same material.
     ///
     /// # Panics
     /// If the tet or a particle does not exist.
@@ -166,8 +166,8 @@ impl<R: Float> Solver<R> {
         self.note_tet(tet);
     }
 
-    /// Gives a tet's place to another one, with its material; the other one stays where it is, to be taken away by
-    /// [`Solver::truncate_tets`] or replaced. O(1).
+    /// Copies a tet with its material over another one; the copied tet stays, to be removed by [`Solver::truncate_tets`] or
+    /// replaced. O(1).
     ///
     /// # Panics
     /// If one of them does not exist.
@@ -176,8 +176,8 @@ impl<R: Float> Solver<R> {
         self.note_tet(to);
     }
 
-    /// Takes the last tets away until there are `count`; nothing happens if there are no more. Schedules must not name
-    /// them any more. O(tets taken away).
+    /// Removes the last tets until there are `count`; nothing happens if there are no more. Schedules must not name
+    /// them any more. O(tets removed).
     ///
     /// # Example
     /// Tets are kept dense: the last one takes the place of one that is deleted.
@@ -203,8 +203,8 @@ impl<R: Float> Solver<R> {
         self.tets.truncate(count);
     }
 
-    /// Takes the last particles away until there are `count`, with what attaches them; nothing happens if there are no
-    /// more. No tet and no constraint may hang on them when the next step begins. O(particles taken away).
+    /// Removes the last particles until there are `count`, with their attachments; nothing happens if there are no more.
+    /// No tet and no other constraint may name them when the next step begins. O(particles removed).
     pub fn truncate_particles(&mut self, count: usize) {
         self.particles.truncate(count);
         self.constraints.attachments.truncate(count);
@@ -334,7 +334,7 @@ impl<R: Float> Solver<R> {
         self.particles.masses[particle] = mass;
     }
 
-    /// Fixes a particle where it is, or lets it go.
+    /// Fixes a particle where it is, or releases it.
     ///
     /// # Panics
     /// If the particle does not exist.

@@ -1,0 +1,220 @@
+//! How a layout is built and updated with its schedule.
+//!
+//! New groups take the clusters of a color by size, so that few lanes wait. Later a changed cluster stays in its lane if
+//! its color is the same and its group has blocks enough; else it goes to the group of its color that was opened last,
+//! or opens one.
+//!
+//! Bounds: a color whose blocks exceed three halves of what rebuilding it can need is rebuilt; if groups without clusters
+//! come to have half of all blocks, all is rebuilt. Both undo at least as much as they cost, up to a factor of the lanes
+//! times the size of a cluster.
+
+use std::cmp::Reverse;
+
+use incise_graph::{ClusterId, Schedule};
+
+use super::groups::{Group, Usage};
+use super::{Ingredients, Layout, NONE, index};
+use crate::Float;
+
+impl<R: Float> Layout<R> {
+    /// Makes this the layout of a schedule; returns how many tets were filled in. `uniform` says that all tets have the
+    /// same constants.
+    pub(crate) fn update(
+        &mut self,
+        schedule: &Schedule,
+        lanes: usize,
+        uniform: bool,
+        ingredients: impl Fn(u32) -> Ingredients<R>,
+    ) -> usize {
+        let _span = tracing::debug_span!("xpbd::layout").entered();
+        let revision = self.revision;
+        let changes = revision.and_then(|revision| schedule.changes_since(revision));
+        let mut filled = match changes {
+            Some(changes) => self.patch(schedule, changes, &ingredients),
+            None => self.rebuild(schedule, lanes, uniform, &ingredients),
+        };
+        if 2 * self.groups.free_blocks > self.blocks.len() {
+            filled += self.rebuild(schedule, lanes, uniform, &ingredients);
+        }
+        self.revision = Some(schedule.revision());
+        filled
+    }
+
+    fn rebuild(
+        &mut self,
+        schedule: &Schedule,
+        lanes: usize,
+        uniform: bool,
+        ingredients: &impl Fn(u32) -> Ingredients<R>,
+    ) -> usize {
+        self.blocks.reset(lanes, uniform);
+        self.groups.reset(lanes, schedule.color_count());
+        self.slots.clear();
+        self.dirty.clear();
+        self.marked.clear();
+        (0..schedule.color_count())
+            .map(|color| self.build_color(color, schedule, ingredients))
+            .sum()
+    }
+
+    /// Applies the changes of clusters and the marks of tets.
+    fn patch(
+        &mut self,
+        schedule: &Schedule,
+        changes: &[ClusterId],
+        ingredients: &impl Fn(u32) -> Ingredients<R>,
+    ) -> usize {
+        let colors = self.color_count().max(schedule.color_count());
+        self.groups.set_color_count(colors);
+        let mut changed = std::mem::take(&mut self.clusters);
+        changed.clear();
+        changed.extend_from_slice(changes);
+        changed.sort_unstable();
+        changed.dedup();
+
+        // First all lanes are emptied, since tets may have gone from one cluster to another.
+        let mut touched = Vec::new();
+        for &cluster in &changed {
+            let Some((group, _)) = self.groups.slot(cluster) else {
+                continue;
+            };
+            self.empty(cluster);
+            let Group { color, depth, .. } = self.groups.list[group];
+            touched.push(color as usize);
+            let stays = schedule.color(cluster).is_some_and(|c| c.0 == color);
+            if !stays || schedule.constraints(cluster).len() > depth as usize {
+                self.groups.release(cluster);
+            }
+        }
+        let mut filled = 0;
+        let mut unassigned = Vec::new();
+        for &cluster in &changed {
+            let Some(color) = schedule.color(cluster) else {
+                continue;
+            };
+            if self.groups.slot(cluster).is_some() {
+                filled += self.fill_lane(cluster, schedule, ingredients);
+            } else {
+                let length = schedule.constraints(cluster).len();
+                unassigned.push((color.index(), Reverse(length), cluster));
+            }
+        }
+        unassigned.sort_unstable();
+        for &(color, Reverse(length), cluster) in &unassigned {
+            touched.push(color);
+            let with_room = self.groups.with_room(color, length);
+            let group = with_room.unwrap_or_else(|| self.open(color, length));
+            self.groups.assign(cluster, group);
+            filled += self.fill_lane(cluster, schedule, ingredients);
+        }
+        self.clusters = changed;
+
+        let mut dirty = std::mem::take(&mut self.dirty);
+        for tet in dirty.drain(..) {
+            if std::mem::take(&mut self.marked[tet as usize]) {
+                let slot = self.slots[tet as usize];
+                if slot != NONE {
+                    self.blocks.fill(slot as usize, &ingredients(tet));
+                    filled += 1;
+                }
+            }
+        }
+        self.dirty = dirty;
+
+        touched.sort_unstable();
+        touched.dedup();
+        for color in touched {
+            if self.groups.usages[color].is_wasteful(self.blocks.lanes) {
+                self.close_color(color, schedule);
+                filled += self.build_color(color, schedule, ingredients);
+            }
+        }
+        self.groups.set_color_count(schedule.color_count());
+        self.groups.colors.tidy();
+        self.groups.free.tidy();
+        filled
+    }
+
+    /// Makes groups of the clusters of a color, which has none.
+    fn build_color(
+        &mut self,
+        color: usize,
+        schedule: &Schedule,
+        ingredients: &impl Fn(u32) -> Ingredients<R>,
+    ) -> usize {
+        let mut clusters = std::mem::take(&mut self.clusters);
+        clusters.clear();
+        clusters.extend_from_slice(schedule.clusters(color));
+        clusters.sort_by_key(|&cluster| Reverse(schedule.constraints(cluster).len()));
+        let mut filled = 0;
+        for together in clusters.chunks(self.blocks.lanes) {
+            let group = self.open(color, schedule.constraints(together[0]).len());
+            for &cluster in together {
+                self.groups.assign(cluster, group);
+                filled += self.fill_lane(cluster, schedule, ingredients);
+            }
+        }
+        self.clusters = clusters;
+        filled
+    }
+
+    /// Adds a group of so many blocks to a color.
+    fn open(&mut self, color: usize, depth: usize) -> usize {
+        let group = self.groups.open(color, depth, self.blocks.len());
+        let end = self.groups.list[group].blocks().end;
+        self.blocks.grow(end.max(self.blocks.len()));
+        group
+    }
+
+    /// Fills in the tets of a cluster that has an empty lane.
+    fn fill_lane(
+        &mut self,
+        cluster: ClusterId,
+        schedule: &Schedule,
+        ingredients: &impl Fn(u32) -> Ingredients<R>,
+    ) -> usize {
+        let (group, lane) = self.groups.slot(cluster).expect("it has a lane");
+        let Group { first, color, .. } = self.groups.list[group];
+        let tets = schedule.constraints(cluster);
+        for (block, &tet) in (first as usize..).zip(tets) {
+            let slot = block * self.blocks.lanes + lane;
+            if self.slots.len() <= tet as usize {
+                self.slots.resize(tet as usize + 1, NONE);
+                self.marked.resize(tet as usize + 1, false);
+            }
+            self.blocks.active[block] |= 1 << lane;
+            self.blocks.tets[slot] = tet;
+            self.slots[tet as usize] = index(slot);
+            self.blocks.fill(slot, &ingredients(tet));
+            self.marked[tet as usize] = false;
+        }
+        self.groups.usages[color as usize].tets += index(tets.len());
+        tets.len()
+    }
+
+    /// Removes the tets of a cluster from its lane.
+    fn empty(&mut self, cluster: ClusterId) {
+        let (group, lane) = self.groups.slot(cluster).expect("it has a lane");
+        let group = self.groups.list[group];
+        for block in group.blocks() {
+            if self.blocks.active[block] & (1 << lane) == 0 {
+                break;
+            }
+            self.blocks.active[block] &= !(1 << lane);
+            let slot = block * self.blocks.lanes + lane;
+            // A particle that is there as long as any is.
+            self.blocks.particles[slot] = [0; 4];
+            self.slots[self.blocks.tets[slot] as usize] = NONE;
+            self.groups.usages[group.color as usize].tets -= 1;
+        }
+    }
+
+    /// Removes all groups of a color.
+    fn close_color(&mut self, color: usize, schedule: &Schedule) {
+        for &cluster in schedule.clusters(color) {
+            self.empty(cluster);
+            self.groups.release(cluster);
+        }
+        self.groups.usages[color] = Usage::NONE;
+    }
+}
