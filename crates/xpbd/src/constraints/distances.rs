@@ -8,7 +8,7 @@ use super::scalar::{ScalarConstraint, ScalarConstraints};
 use crate::direction::direction;
 use crate::{Float, XpbdError};
 
-/// Keeps two particles at a distance. See [`Solver::set_distances`].
+/// Keeps two particles at a distance. See [`crate::Solver::set_distances`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DistanceConstraint {
     /// The two particles.

@@ -13,7 +13,7 @@ use glam::DVec3;
 use super::scalar::{ScalarConstraint, ScalarConstraints};
 use crate::{Float, XpbdError};
 
-/// Keeps the volume that four particles span. See [`Solver::set_volumes`].
+/// Keeps the volume that four particles span. See [`crate::Solver::set_volumes`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VolumeConstraint {
     /// The corners, as those of a tet.
