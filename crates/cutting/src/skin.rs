@@ -12,6 +12,7 @@ use glam::DVec3;
 use incise_mesh::{ParticleId, TetId};
 
 use crate::delta::{BoundaryTriangle, CutDelta, FaceTag};
+use crate::index::index;
 
 /// A particle on one kind of boundary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -216,8 +217,4 @@ impl Skin {
             change.triangles.push(place);
         }
     }
-}
-
-fn index(place: usize) -> u32 {
-    u32::try_from(place).expect("fewer than 2³² triangles")
 }
