@@ -11,8 +11,9 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
+use incise_mesh::Bounds;
 
-use crate::tree::{Bounds, BoxTree};
+use crate::tree::BoxTree;
 
 /// Closest points this near each other, against the distance to them, are one point of several triangles.
 const SAME_POINT: f64 = 1e-6;

@@ -7,10 +7,10 @@
 //! The children of a split tet inherit what lies behind their parent's faces while tets are split; [`Faces::settle`]
 //! then finds the twins among them. Cost: O(k log k) for k faces of split tets, O(1) for each other edit.
 
-use incise_mesh::{ParticleId, TetId, TetMesh};
+use incise_mesh::{Bounds, ParticleId, TetId, TetMesh};
 
 use crate::delta::{BoundaryTriangle, FaceTag};
-use crate::tree::Bounds;
+use crate::index::index;
 
 /// Marks a place in the list of boundary triangles.
 const BOUNDARY: u32 = 1 << 31;
@@ -179,8 +179,7 @@ impl Faces {
 
     /// Makes a face a boundary triangle. Its link must not be one of the boundary.
     pub(crate) fn open(&mut self, face: Face, tag: FaceTag) {
-        let place =
-            u32::try_from(self.boundary.len()).expect("fewer boundary triangles than faces");
+        let place = index(self.boundary.len());
         self.boundary.push((face, tag));
         self.note_change(place as usize);
         self.links[face.0 as usize] = BOUNDARY | place;

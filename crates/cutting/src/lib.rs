@@ -31,6 +31,7 @@ mod cuttable;
 mod delta;
 mod error;
 mod faces;
+mod index;
 mod level_set;
 mod meet;
 mod memory;

@@ -20,14 +20,13 @@
 //! body.
 
 use glam::DVec3;
-use incise_mesh::{ParticleId, TetId, TetMesh};
+use incise_mesh::{Bounds, ParticleId, TetId, TetMesh};
 
 use crate::delta::FaceTag;
 use crate::faces::{Face, TILE};
 use crate::meet::MovingSegment;
 use crate::parallel;
 use crate::tiles::Tiles;
-use crate::tree::Bounds;
 use crate::{CutDelta, CuttableMesh};
 
 /// A box along axes of its own.

@@ -19,6 +19,7 @@ use std::cmp::Reverse;
 use incise_mesh::{ParticleId, TetId};
 
 use crate::CuttableMesh;
+use crate::index::index;
 
 const NONE: u32 = u32::MAX;
 
@@ -277,9 +278,4 @@ impl List {
             last: one,
         }
     }
-}
-
-/// A number of things that are particles, of which there are fewer than 2³².
-fn index(things: usize) -> u32 {
-    ParticleId::new(things).0
 }

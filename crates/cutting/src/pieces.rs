@@ -17,6 +17,7 @@
 
 use incise_mesh::{ParticleId, TetId, signed_volume};
 
+use crate::index::index;
 use crate::parts::Parts;
 use crate::{CutDelta, CutError, CuttableMesh};
 
@@ -252,7 +253,7 @@ impl PieceTracker {
         let mut parts: Vec<&[TetId]> = self.parts.iter().collect();
         parts.sort_unstable_by_key(|tets| tets[0]);
         for part in parts {
-            let piece = number(self.pieces.len());
+            let piece = index(self.pieces.len());
             let mut volume = Sum::default();
             for &tet in part {
                 self.piece_of[tet.index()] = piece;
@@ -278,7 +279,7 @@ impl PieceTracker {
 
     /// The pieces that exist, ascending by id.
     pub fn iter(&self) -> impl Iterator<Item = Piece> + '_ {
-        (0..self.pieces.len()).filter_map(|id| self.piece(number(id)))
+        (0..self.pieces.len()).filter_map(|id| self.piece(index(id)))
     }
 
     /// How many pieces exist.
@@ -375,8 +376,4 @@ impl PieceTracker {
         }
         Ok(())
     }
-}
-
-fn number(pieces: usize) -> u32 {
-    u32::try_from(pieces).expect("fewer than 2³² pieces")
 }

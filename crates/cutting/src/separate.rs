@@ -12,11 +12,11 @@
 //! surface, where tets lie on it as a whole, and where three or more sheets of boundary meet in an edge, the two differ;
 //! [`crate::Separation`] says how.
 
-use incise_mesh::{ParticleId, TetId};
+use incise_mesh::{DisjointSets, ParticleId, TetId};
 
 use crate::faces::{Behind, Face};
+use crate::index::index;
 use crate::operation::Operation;
-use crate::sides::root;
 
 /// The tets on both sides of a face, with their corners as they were before separation.
 #[derive(Clone, Copy, Debug)]
@@ -30,14 +30,14 @@ struct Star {
     particle: ParticleId,
     /// Ascending.
     tets: Vec<TetId>,
-    parts: Vec<usize>,
+    /// A part is named by its lowest tet.
+    parts: DisjointSets,
 }
 
 impl Star {
     fn join(&mut self, one: usize, other: usize) {
-        let (a, b) = (root(&mut self.parts, one), root(&mut self.parts, other));
-        // The lower index becomes the root, so each part is named by its lowest tet.
-        self.parts[a.max(b)] = a.min(b);
+        let [one, other] = [one, other].map(index);
+        self.parts.unite(one, other);
     }
 }
 
@@ -94,7 +94,7 @@ impl Operation<'_> {
 
     fn separate_with(&mut self, seeds: &[ParticleId], mut join: impl FnMut(&Self, &mut Star)) {
         self.settle();
-        let (tets, parts) = (Vec::new(), Vec::new());
+        let (tets, parts) = (Vec::new(), DisjointSets::default());
         let mut star = Star {
             particle: ParticleId(0),
             tets,
@@ -109,8 +109,7 @@ impl Operation<'_> {
                 star.tets.clear();
                 star.tets.extend(self.cuttable.stars.around(seed));
                 star.tets.sort_unstable();
-                star.parts.clear();
-                star.parts.extend(0..star.tets.len());
+                star.parts.reset(star.tets.len());
                 join(self, &mut star);
                 self.take_apart(&mut star, &mut parted);
             }
@@ -142,8 +141,9 @@ impl Operation<'_> {
 
     /// Gives every part of a star but the first its own copy of the particle.
     fn take_apart(&mut self, star: &mut Star, parted: &mut Vec<ParticleId>) {
-        let part_of: Vec<usize> = (0..star.tets.len())
-            .map(|i| root(&mut star.parts, i))
+        let part_of: Vec<u32> = (0_u32..)
+            .take(star.tets.len())
+            .map(|i| star.parts.root(i))
             .collect();
         if part_of.iter().all(|&part| part == 0) {
             return;
@@ -157,7 +157,7 @@ impl Operation<'_> {
                 }
             }
         }
-        let mut copies: Vec<(usize, ParticleId)> = Vec::new();
+        let mut copies: Vec<(u32, ParticleId)> = Vec::new();
         for (&tet, &part) in star
             .tets
             .iter()

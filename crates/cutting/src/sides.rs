@@ -10,9 +10,10 @@ use std::collections::HashMap;
 
 use foldhash::fast::FixedState;
 use glam::DVec3;
-use incise_mesh::{ParticleId, TetId, TetMesh};
+use incise_mesh::{DisjointSets, ParticleId, TetId, TetMesh};
 
 use crate::CutDelta;
+use crate::index::index;
 use crate::stroke::Blade;
 use crate::surface::CutSurface;
 
@@ -78,17 +79,17 @@ impl Sides {
         let mut side: Vec<Option<bool>> = tets.iter().map(told).collect();
         let open: Vec<usize> = (0..tets.len()).filter(|&i| side[i].is_none()).collect();
         if !open.is_empty() {
-            let mut set: Vec<usize> = (0..tets.len()).collect();
+            let mut sets = DisjointSets::new(tets.len());
             for (_, one, other) in shared_faces(mesh, surface, tets) {
-                let (a, b) = (root(&mut set, one), root(&mut set, other));
-                if a != b && (side[a].is_none() || side[b].is_none()) {
-                    let joined = side[a].or(side[b]);
-                    set[a.max(b)] = a.min(b);
-                    side[a.min(b)] = joined;
+                let (a, b) = (sets.root(one), sets.root(other));
+                let [of_a, of_b] = [a, b].map(|set| side[set as usize]);
+                if a != b && (of_a.is_none() || of_b.is_none()) {
+                    sets.unite(a, b);
+                    side[a.min(b) as usize] = of_a.or(of_b);
                 }
             }
             for i in open {
-                side[i] = side[root(&mut set, i)];
+                side[i] = side[sets.root(index(i)) as usize];
                 given.0.extend(side[i].map(|side| (tets[i], side)));
             }
         }
@@ -136,9 +137,9 @@ pub(crate) fn standing_side(
 }
 
 /// Pairs of tets with a common face, by ascending alignment of the face with the surface.
-fn shared_faces(mesh: &TetMesh, surface: &CutSurface, tets: &[TetId]) -> Vec<(f64, usize, usize)> {
-    let mut faces: Vec<([ParticleId; 3], usize)> = Vec::with_capacity(4 * tets.len());
-    for (i, tet) in tets.iter().enumerate() {
+fn shared_faces(mesh: &TetMesh, surface: &CutSurface, tets: &[TetId]) -> Vec<(f64, u32, u32)> {
+    let mut faces: Vec<([ParticleId; 3], u32)> = Vec::with_capacity(4 * tets.len());
+    for (i, tet) in (0_u32..).zip(tets) {
         let [a, b, c, d] = mesh.tets[tet.index()];
         for mut face in [[b, c, d], [a, c, d], [a, b, d], [a, b, c]] {
             face.sort_unstable();
@@ -149,7 +150,7 @@ fn shared_faces(mesh: &TetMesh, surface: &CutSurface, tets: &[TetId]) -> Vec<(f6
     let pairs = faces
         .chunk_by(|a, b| a.0 == b.0)
         .filter(|same| same.len() == 2);
-    let mut shared: Vec<(f64, usize, usize)> = pairs
+    let mut shared: Vec<(f64, u32, u32)> = pairs
         .map(|same| {
             (
                 surface.alignment(&mesh.positions, same[0].0),
@@ -160,13 +161,4 @@ fn shared_faces(mesh: &TetMesh, surface: &CutSurface, tets: &[TetId]) -> Vec<(f6
         .collect();
     shared.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
     shared
-}
-
-/// The root of `i`, halving the path to it.
-pub(crate) fn root(set: &mut [usize], mut i: usize) -> usize {
-    while set[i] != i {
-        set[i] = set[set[i]];
-        i = set[i];
-    }
-    i
 }

@@ -14,6 +14,7 @@ use glam::DVec3;
 use incise_mesh::{ParticleId, TetId};
 
 use crate::delta::{BoundaryTriangle, CutDelta, FaceTag};
+use crate::index::index;
 
 /// A particle on one kind of boundary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -255,8 +256,4 @@ impl Skin {
             }
         }
     }
-}
-
-fn index(place: usize) -> u32 {
-    u32::try_from(place).expect("fewer than 2³² triangles")
 }

@@ -8,10 +8,10 @@
 //! Cost of a frame: the distances that the particles moved, a test a box, and the boxes near the blade.
 
 use glam::DVec3;
+use incise_mesh::Bounds;
 
 use crate::CuttableMesh;
 use crate::faces::{Faces, TILE};
-use crate::tree::Bounds;
 
 /// More than what rounding adds to a sum over frames.
 const SLACK: f64 = 1.0 + 1e-6;

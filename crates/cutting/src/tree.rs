@@ -3,51 +3,10 @@
 //! Built by halving at the median center along the longest axis. Cost: O(n log n) to build, O(log n + found) a query
 //! where the boxes are small.
 
-use glam::DVec3;
+use incise_mesh::Bounds;
 
 /// Boxes a leaf holds at most.
 const LEAF: usize = 4;
-
-/// A box along the axes.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Bounds {
-    pub(crate) low: DVec3,
-    pub(crate) high: DVec3,
-}
-
-impl Bounds {
-    /// The smallest box around points.
-    pub(crate) fn around(points: impl IntoIterator<Item = DVec3>) -> Self {
-        let nothing = Self {
-            low: DVec3::INFINITY,
-            high: DVec3::NEG_INFINITY,
-        };
-        points.into_iter().fold(nothing, |bounds, x| Self {
-            low: bounds.low.min(x),
-            high: bounds.high.max(x),
-        })
-    }
-
-    /// The box and all within the distance, along the axes, around it.
-    pub(crate) fn widened(self, distance: f64) -> Self {
-        let distance = DVec3::splat(distance);
-        Self {
-            low: self.low - distance,
-            high: self.high + distance,
-        }
-    }
-
-    fn with(self, other: Self) -> Self {
-        Self {
-            low: self.low.min(other.low),
-            high: self.high.max(other.high),
-        }
-    }
-
-    pub(crate) fn overlaps(&self, other: &Self) -> bool {
-        self.low.cmple(other.high).all() && other.low.cmple(self.high).all()
-    }
-}
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
@@ -85,7 +44,7 @@ impl BoxTree {
         let boxes = &self.boxes;
         let bounds = items[1..]
             .iter()
-            .fold(boxes[items[0]], |all, &i| all.with(boxes[i]));
+            .fold(boxes[items[0]], |all, &i| all.union(boxes[i]));
         let node = self.nodes.len();
         self.nodes.push(Node {
             bounds,
@@ -94,7 +53,7 @@ impl BoxTree {
             next: 0,
         });
         if items.len() > LEAF {
-            let size = bounds.high - bounds.low;
+            let size = bounds.size();
             let axis = size.max_position();
             // Halved first: the sum could overflow.
             let center = |i: usize| 0.5 * boxes[i].low[axis] + 0.5 * boxes[i].high[axis];
@@ -137,6 +96,8 @@ impl BoxTree {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
 
     /// Against all boxes, from none to many, with equal ones among them.

@@ -13,7 +13,7 @@
 use std::cmp::Ordering;
 
 use glam::DVec3;
-use incise_mesh::{TetId, TetMesh, orientation};
+use incise_mesh::{Bounds, TetId, TetMesh, orientation};
 
 use crate::closest::Closest;
 use crate::meet::{Meeting, MovingSegment};
@@ -23,7 +23,7 @@ use crate::parallel;
 use crate::plane::require_finite;
 use crate::stroke::{Blade, Motion, SAME_SHEET, Stroke};
 use crate::sweep::require_positions;
-use crate::tree::{Bounds, BoxTree};
+use crate::tree::BoxTree;
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
 /// A triangle is flat if its area is smaller than this fraction of its longest side squared: its normal would be noise.
@@ -373,11 +373,7 @@ fn cut(
 
 /// The box and twice the tolerance around it.
 fn with_margin(bounds: Bounds, tolerance: f64) -> Bounds {
-    let margin = DVec3::splat(2.0 * tolerance * (bounds.high - bounds.low).max_element());
-    Bounds {
-        low: bounds.low - margin,
-        high: bounds.high + margin,
-    }
+    bounds.widened(2.0 * tolerance * bounds.size().max_element())
 }
 
 /// The direction of a triangle, if it has an area.

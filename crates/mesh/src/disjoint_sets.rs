@@ -27,16 +27,26 @@ impl DisjointSets {
     /// If `count` does not fit in 32 bits.
     #[must_use]
     pub fn new(count: usize) -> Self {
+        let mut sets = Self::default();
+        sets.reset(count);
+        sets
+    }
+
+    /// Makes each of `count` numbers a set of its own, and keeps the memory. O(count).
+    ///
+    /// # Panics
+    /// If `count` does not fit in 32 bits.
+    pub fn reset(&mut self, count: usize) {
         let count = u32::try_from(count).expect("the numbers fit in 32 bits");
-        Self {
-            parents: (0..count).collect(),
-        }
+        self.parents.clear();
+        self.parents.extend(0..count);
     }
 
     /// The smallest number of the set of `number`.
     ///
     /// # Panics
     /// If there is no such number.
+    #[inline]
     pub fn root(&mut self, mut number: u32) -> u32 {
         while self.parents[number as usize] != number {
             let parent = self.parents[number as usize];
@@ -50,6 +60,7 @@ impl DisjointSets {
     ///
     /// # Panics
     /// If there is no such number.
+    #[inline]
     pub fn unite(&mut self, a: u32, b: u32) {
         let (a, b) = (self.root(a), self.root(b));
         self.parents[a.max(b) as usize] = a.min(b);

@@ -31,6 +31,7 @@
 //! Conventions: meters; a tet `[a, b, c, d]` is positive when `(b - a) × (c - a) · (d - a) > 0`; orders are by index and
 //! never depend on hashing or threads, so that equal input gives equal output.
 
+mod bounds;
 mod check;
 mod disjoint_sets;
 mod error;
@@ -48,6 +49,7 @@ mod surface;
 mod tet_mesh;
 mod triangle_surface;
 
+pub use bounds::Bounds;
 pub use disjoint_sets::DisjointSets;
 pub use error::MeshError;
 pub use faces::{FaceSide, Faces};

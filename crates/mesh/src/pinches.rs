@@ -5,7 +5,7 @@
 //!
 //! Cost: O(n log n) for n tets.
 
-use crate::{ParticleId, TetMesh};
+use crate::{DisjointSets, ParticleId, TetMesh};
 
 impl TetMesh {
     /// Gives each group of tets around a particle that share faces at it a particle of its own; the number of particles
@@ -37,12 +37,12 @@ impl TetMesh {
         stars.sort_unstable();
         // Both are taken from the mesh as it was, and no two changes concern the same corner.
         let old = self.tets.clone();
-        let mut faces: Vec<([ParticleId; 2], usize)> = Vec::new();
-        let mut group: Vec<usize> = Vec::new();
+        let mut faces: Vec<([ParticleId; 2], u32)> = Vec::new();
+        let mut groups = DisjointSets::default();
         for star in stars.chunk_by(|s, t| s.0 == t.0) {
             let particle = star[0].0;
             faces.clear();
-            for (place, &(_, t)) in star.iter().enumerate() {
+            for (place, &(_, t)) in (0_u32..).zip(star) {
                 let mut others = old[t as usize].into_iter().filter(|&p| p != particle);
                 let (Some(a), Some(b), Some(c)) = (others.next(), others.next(), others.next())
                 else {
@@ -53,16 +53,13 @@ impl TetMesh {
                 }
             }
             faces.sort_unstable();
-            // The lowest tet that a tet is joined with, by way of others.
-            group.clear();
-            group.extend(0..star.len());
+            groups.reset(star.len());
             for pair in faces.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
-                let [low, high] = [pair[0].1, pair[1].1].map(|place| root(&group, place));
-                group[low.max(high)] = low.min(high);
+                groups.unite(pair[0].1, pair[1].1);
             }
-            let mut made: Vec<(usize, ParticleId)> = vec![(0, particle)];
-            for (place, &(_, t)) in star.iter().enumerate() {
-                let lowest = root(&group, place);
+            let mut made: Vec<(u32, ParticleId)> = vec![(0, particle)];
+            for (place, &(_, t)) in (0_u32..).zip(star) {
+                let lowest = groups.root(place);
                 let known = made.iter().find(|entry| entry.0 == lowest);
                 let own = known.map(|entry| entry.1).unwrap_or_else(|| {
                     let own = ParticleId::new(self.positions.len());
@@ -79,11 +76,4 @@ impl TetMesh {
         }
         self.positions.len() - before
     }
-}
-
-fn root(group: &[usize], mut place: usize) -> usize {
-    while group[place] != place {
-        place = group[place];
-    }
-    place
 }

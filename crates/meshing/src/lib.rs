@@ -32,6 +32,7 @@ mod distance;
 mod doubled;
 mod error;
 mod fans;
+mod index;
 mod irregular;
 mod lattice;
 mod neighbors;

@@ -20,6 +20,7 @@ use rayon::prelude::*;
 
 use crate::MeshingError;
 use crate::doubled::Doubled;
+use crate::index::index;
 use crate::lattice::{Lattice, root};
 use crate::neighbors::{NEIGHBORS, add, backward, direction, directions, steps};
 use crate::stencil::{Corner, Node, Side, fill};
@@ -470,10 +471,6 @@ impl Output {
         }
         ParticleId(*entry)
     }
-}
-
-fn index(count: usize) -> u32 {
-    u32::try_from(count).expect("a lattice of 2^26 cells has fewer than 2^32 edges")
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use glam::DVec3;
-use incise_mesh::TetMesh;
+use incise_mesh::{Bounds, TetMesh};
 
 use crate::{Field, MeshFile, MeshIoError, NamedValues, Values, write_atomically};
 
@@ -145,20 +145,17 @@ impl Regions {
 }
 
 fn write_entities(sink: &mut Sink<'_>, mesh: &TetMesh, regions: &Regions) -> io::Result<()> {
-    let mut boxes = vec![(DVec3::INFINITY, DVec3::NEG_INFINITY); regions.groups.len()];
+    let mut boxes = vec![Bounds::EMPTY; regions.groups.len()];
     for (tet, &entity) in mesh.tets.iter().zip(&regions.entities) {
-        let (low, high) = &mut boxes[entity];
-        for corner in tet {
-            let position = mesh.positions[corner.index()];
-            (*low, *high) = (low.min(position), high.max(position));
-        }
+        let tet = Bounds::around(tet.iter().map(|corner| mesh.positions[corner.index()]));
+        boxes[entity] = boxes[entity].union(tet);
     }
     sink.line("$Entities")?;
     for count in [0, 0, 0, regions.groups.len()] {
         sink.size(count)?;
     }
     sink.end()?;
-    for (entity, &(low, high)) in boxes.iter().enumerate() {
+    for (entity, &Bounds { low, high }) in boxes.iter().enumerate() {
         sink.int(regions.number(entity)?)?;
         for corner in [low, high] {
             // Without tets there is no box.

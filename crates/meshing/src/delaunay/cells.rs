@@ -18,6 +18,8 @@ use glam::DVec3;
 use incise_mesh::orientation;
 use robust::{Coord3D, insphere};
 
+use crate::index::tet_index;
+
 /// The vertex at infinity.
 const GHOST: u32 = u32::MAX;
 /// In place of the first vertex of a cell that is no more.
@@ -65,7 +67,7 @@ impl<'a> Cells<'a> {
             cells.vertices.push(ghost);
             cells.neighbors.push([0; 4]);
             let own = (0..4).find(|&k| ghost[k] == GHOST).unwrap_or(opposite);
-            cells.join(code(0, opposite), code(index(opposite + 1), own));
+            cells.join(code(0, opposite), code(tet_index(opposite + 1), own));
         }
         for ghost in 1..5_u32 {
             for k in 0..4 {
@@ -186,7 +188,7 @@ impl<'a> Cells<'a> {
             self.vertices[cell as usize] = vertices;
             return cell;
         }
-        let cell = index(self.vertices.len());
+        let cell = tet_index(self.vertices.len());
         self.vertices.push(vertices);
         self.neighbors.push([0; 4]);
         self.marks.push(0);
@@ -237,12 +239,5 @@ pub(super) fn is_in_sphere(corners: [DVec3; 4], p: DVec3) -> bool {
 }
 
 fn code(cell: u32, vertex: usize) -> u32 {
-    4 * cell + index(vertex)
-}
-
-fn index(count: usize) -> u32 {
-    u32::try_from(count)
-        .ok()
-        .filter(|&count| count < 1 << 30)
-        .expect("fewer than 2^30 cells")
+    4 * cell + tet_index(vertex)
 }

@@ -5,6 +5,7 @@
 //! con BRIO", 2003, with the Z-order of G. M. Morton, 1966. Cost: O(n log n).
 
 use glam::DVec3;
+use incise_mesh::Bounds;
 
 use crate::random::hash;
 
@@ -28,15 +29,11 @@ pub(super) fn insertion_order(points: &[DVec3]) -> Vec<u32> {
 
 /// The place of each point on the Z-order curve through the box around them.
 pub(crate) fn morton_keys(points: &[DVec3]) -> impl Iterator<Item = u64> {
-    let (low, high) = points
-        .iter()
-        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &p| {
-            (low.min(p), high.max(p))
-        });
-    let extent = (high - low).max_element();
+    let bounds = Bounds::around(points.iter().copied());
+    let extent = bounds.size().max_element();
     let scale = f64::from((1_u32 << BITS) - 1) / if extent > 0.0 { extent } else { 1.0 };
     points.iter().map(move |&p| {
-        let cell = (p - low) * scale;
+        let cell = (p - bounds.low) * scale;
         (0..3).fold(0, |key, axis| key | spread(cell[axis]) << axis)
     })
 }

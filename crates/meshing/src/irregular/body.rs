@@ -6,6 +6,8 @@
 use glam::DVec3;
 use incise_mesh::{ParticleId, TetMesh};
 
+use crate::index::tet_index;
+
 /// No neighbor: a boundary face.
 pub(super) const NONE: u32 = u32::MAX;
 /// In place of the first corner of a tet that is no more.
@@ -92,7 +94,7 @@ impl Body {
 
     /// One more than the last tet.
     pub(super) fn end(&self) -> u32 {
-        index(self.tets.len())
+        tet_index(self.tets.len())
     }
 
     /// The corners of a tet; none if it is no more.
@@ -179,7 +181,7 @@ impl Body {
             let t = self.free.pop().unwrap_or_else(|| {
                 self.tets.push(tet);
                 self.neighbors.push([NONE; 4]);
-                index(self.tets.len() - 1)
+                tet_index(self.tets.len() - 1)
             });
             self.tets[t as usize] = tet;
             self.neighbors[t as usize] = [NONE; 4];
@@ -257,14 +259,7 @@ fn face(tet: [u32; 4], corner: usize) -> [u32; 3] {
 }
 
 fn code(tet: u32, corner: usize) -> u32 {
-    4 * tet + index(corner)
-}
-
-fn index(count: usize) -> u32 {
-    u32::try_from(count)
-        .ok()
-        .filter(|&count| count < 1 << 30)
-        .expect("fewer than 2^30 tets")
+    4 * tet + tet_index(corner)
 }
 
 #[cfg(test)]

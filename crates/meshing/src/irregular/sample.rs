@@ -10,6 +10,7 @@
 
 use glam::DVec3;
 
+use crate::index::index;
 use crate::random::{hash, in_cube};
 use crate::{Lattice, MeshingError, Shape};
 
@@ -156,7 +157,7 @@ impl Grid {
         let [i, j, k] = self.cell(p);
         let cell = i + self.cells[0] * (j + self.cells[1] * k);
         self.before.push(self.last[cell]);
-        self.last[cell] = u32::try_from(self.points.len()).expect("fewer than 2^32 points");
+        self.last[cell] = index(self.points.len());
         self.points.push(p);
     }
 

@@ -4,35 +4,12 @@
 //! the left child right behind its parent. Cost: O(n log n) to build, 56 bytes a node and 72 a triangle.
 
 use glam::DVec3;
+use incise_mesh::Bounds;
+
+use crate::index::index;
 
 /// Triangles of a leaf.
 const LEAF: usize = 4;
-
-/// A box along the axes.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Bounds {
-    pub(super) low: DVec3,
-    pub(super) high: DVec3,
-}
-
-impl Bounds {
-    fn around(triangles: &[[DVec3; 3]]) -> Self {
-        let empty = Self {
-            low: DVec3::INFINITY,
-            high: DVec3::NEG_INFINITY,
-        };
-        triangles.iter().flatten().fold(empty, |bounds, &p| Self {
-            low: bounds.low.min(p),
-            high: bounds.high.max(p),
-        })
-    }
-
-    /// The squared distance of a point to the box.
-    pub(super) fn distance_squared(&self, point: DVec3) -> f64 {
-        let beyond = (self.low - point).max(point - self.high).max(DVec3::ZERO);
-        beyond.length_squared()
-    }
-}
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
@@ -142,7 +119,7 @@ impl Tree {
 
 /// Makes the node of some triangles, of which the first is number `start`, and those below it.
 fn split(triangles: &mut [[DVec3; 3]], start: usize, nodes: &mut Vec<Node>) {
-    let bounds = Bounds::around(triangles);
+    let bounds = Bounds::around(triangles.iter().flatten().copied());
     let here = nodes.len();
     nodes.push(Node {
         bounds,
@@ -153,7 +130,7 @@ fn split(triangles: &mut [[DVec3; 3]], start: usize, nodes: &mut Vec<Node>) {
     if triangles.len() <= LEAF {
         return;
     }
-    let size = bounds.high - bounds.low;
+    let size = bounds.size();
     let axis = (0..3).fold(
         0,
         |best, axis| if size[axis] > size[best] { axis } else { best },
@@ -168,8 +145,4 @@ fn split(triangles: &mut [[DVec3; 3]], start: usize, nodes: &mut Vec<Node>) {
     split(left, start, nodes);
     nodes[here].right = index(nodes.len());
     split(right, start + half, nodes);
-}
-
-fn index(count: usize) -> u32 {
-    u32::try_from(count).expect("fewer than 2^31 triangles have fewer than 2^32 nodes")
 }
