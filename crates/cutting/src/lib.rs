@@ -23,6 +23,7 @@
 //! assert_eq!(body.mesh().pieces().count, 2);
 //! # Ok::<(), incise_cutting::CutError>(())
 //! ```
+//!
 //! This crate knows nothing of constraints, solvers, colors or the GPU.
 
 mod bisect;
