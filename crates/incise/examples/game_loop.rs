@@ -5,7 +5,7 @@
 #![expect(clippy::print_stdout, reason = "prints what it did")]
 
 use incise::cutting::Skin;
-use incise::mesh::glam::{DVec3, Vec2};
+use incise::mesh::glam::{DVec2, DVec3};
 use incise::mesh::{ParticleId, TetMesh};
 use incise::scene::ColliderSpec;
 use incise::{Body, Event, Simulation};
@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut skin = Skin::new(simulation.boundary());
     // Texture coordinates of the particles; those that cuts make lie between others.
     let rest = &simulation.mesh().positions;
-    let mut uv: Vec<Vec2> = rest.iter().map(|x| x.as_vec3().truncate()).collect();
+    let mut uv: Vec<DVec2> = rest.iter().map(|x| x.truncate()).collect();
     let blade = |y: f64| [DVec3::new(0.43, y, -1.0), DVec3::new(0.43, y, 1.0)];
     let stroke = simulation.begin_stroke(&blade(-0.1), 0.1)?;
     for frame in 1..=20 {
@@ -61,7 +61,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let changed = skin.follow(delta);
             triangles += changed.triangles.len(); // upload skin.triangles()[i] for each
             vertices += changed.vertices.len();
-            delta.extend_with(&mut uv, |a, b, t| a.lerp(*b, t as f32));
+            delta.extend_with(&mut uv, |a, b, t| a.lerp(*b, t));
         }
         let positions = simulation.positions();
         let at = |p: ParticleId| positions[p.index()].as_vec3();
@@ -70,7 +70,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mapped: Vec<_> = skin
             .vertices()
             .iter()
-            .map(|v| uv[v.particle.index()])
+            .map(|v| uv[v.particle.index()].as_vec2())
             .collect();
         // Two draw calls: skin with its texture, and flesh.
         let (outer, cut) = (skin.outer_triangles(), skin.cut_triangles());

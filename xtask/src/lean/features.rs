@@ -239,7 +239,7 @@ pub(crate) fn cases() -> Vec<Case> {
             s.distance.push(link(true, Some(2.0)));
         }),
         case("distance", Used, "a rod", |s| {
-            s.distance.push(link(false, None))
+            s.distance.push(link(false, None));
         }),
         case("volume constraints", Used, "one a tet", |s| {
             s.body[0].volume_compliance = Some(1e-7);

@@ -45,7 +45,7 @@ impl Simulation {
             let report = &mut self.state.report;
             match quantity {
                 Quantity::Residual => {
-                    report.residual = residual(&self.state.groups, self.state.gravity)
+                    report.residual = residual(&self.state.groups, self.state.gravity);
                 }
                 Quantity::Energy => report.energy = Some(energy(&states)),
                 Quantity::Volume => {

@@ -148,7 +148,7 @@ const MISTAKES: [Mistake; 35] = [
     ("attachment[0].frames", |s| s.attachment[0].frames = [3, 3]),
     ("attachment[0].path", |s| s.attachment[0].path.truncate(1)),
     ("attachment[0].path", |s| {
-        s.attachment[0].path[1][2] = f64::NAN
+        s.attachment[0].path[1][2] = f64::NAN;
     }),
     ("attachment[0].rotation.axis", |s| {
         s.attachment[0].rotation.as_mut().unwrap().axis = [0.0; 3];
@@ -163,27 +163,27 @@ const MISTAKES: [Mistake; 35] = [
         s.attachment[0].rotation.as_mut().unwrap().center[0] = f64::NAN;
     }),
     ("attachment[0].compliance", |s| {
-        s.attachment[0].compliance = -1.0
+        s.attachment[0].compliance = -1.0;
     }),
     ("attachment[1].regions", |s| {
-        s.attachment.push(s.attachment[0].clone())
+        s.attachment.push(s.attachment[0].clone());
     }),
     ("distance[0].from.body", |s| s.distance[0].from.body = 2),
     ("distance[0].to.body", |s| {
-        s.distance[0].to.body = usize::MAX
+        s.distance[0].to.body = usize::MAX;
     }),
     ("distance[0].from.point", |s| {
-        s.distance[0].from.point[0] = f64::NAN
+        s.distance[0].from.point[0] = f64::NAN;
     }),
     ("distance[0].to.point", |s| {
-        s.distance[0].to = s.distance[0].from
+        s.distance[0].to = s.distance[0].from;
     }),
     ("distance[1].length", |s| s.distance[1].length = Some(-1.0)),
     ("distance[1].length", |s| {
-        s.distance[1].length = Some(f64::NAN)
+        s.distance[1].length = Some(f64::NAN);
     }),
     ("distance[0].compliance", |s| {
-        s.distance[0].compliance = -1e-9
+        s.distance[0].compliance = -1e-9;
     }),
     ("distance[0].compliance", |s| {
         s.distance[0].compliance = f64::INFINITY;

@@ -231,7 +231,7 @@ fn bad_ties_are_refused_and_nothing_changes() {
         compliance: f64::NAN,
         ..AttachmentSpec::new(0, vec![end(-1.0)])
     };
-    let nobody = AttachmentSpec::new(2, vec![end(1.0)]);
+    let missing = AttachmentSpec::new(2, vec![end(1.0)]);
     let message = |result: Result<_, incise::Error>| match result {
         Ok(_) => panic!("it was taken"),
         Err(error) => error.to_string(),
@@ -240,7 +240,7 @@ fn bad_ties_are_refused_and_nothing_changes() {
         (message(simulation.add_attachment(&whole)), "regions"),
         (message(simulation.add_attachment(&soft)), "compliance"),
         (
-            message(simulation.add_attachment(&nobody)),
+            message(simulation.add_attachment(&missing)),
             "attachment.body",
         ),
     ];
