@@ -449,7 +449,12 @@ impl Group {
         if moved {
             self.wake();
         }
-        if self.asleep() || self.cuttable.mesh().tets.is_empty() {
+        if self.asleep() {
+            return Ok(StepReport::default());
+        }
+        // Its body was removed; its colliders are those of all groups and move on.
+        if self.cuttable.mesh().tets.is_empty() {
+            collider::advance(&mut self.settings);
             return Ok(StepReport::default());
         }
         for attachment in &self.attachments {

@@ -421,7 +421,6 @@ impl Simulation {
             report: None,
             measuring: 0.0,
         };
-        state.remove_bodies(&mut cut, ms)?;
         state.carry_out(&mut cut, ms)?;
         let Cut {
             report, measuring, ..

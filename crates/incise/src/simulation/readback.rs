@@ -1,4 +1,4 @@
-//! The state of a [`Simulation`]: where it is, what it is worth, and how it gets to whoever asks.
+//! Reading the state of a [`Simulation`]: positions, reported quantities, readback from a device.
 //!
 //! On the processor it is here after each frame. On a device it stays there: reported sums are taken there, and only what
 //! needs every particle fetches it. Cost: a pass over what is reported; a wait for the device where it is asked.

@@ -119,32 +119,8 @@ impl State {
         self.timeline.is_due(self.clock.next_frame) || self.removed.iter().any(|r| !r.is_done)
     }
 
-    /// Carries out the strokes that are due.
+    /// Removes the tets of bodies that are to be removed, then carries out the strokes that are due.
     pub(super) fn carry_out(
-        &mut self,
-        cut: &mut Cut<'_>,
-        ms: &mut Milliseconds,
-    ) -> Result<(), Error> {
-        let Self {
-            timeline,
-            groups,
-            whole,
-            pieces,
-            on_cut,
-            ..
-        } = self;
-        let mut dependents = Dependents {
-            whole,
-            pieces,
-            on_cut,
-        };
-        timeline.advance(cut.number, groups, |number, group, delta| {
-            dependents.apply_delta(number, group, delta, cut, ms)
-        })
-    }
-
-    /// Removes the tets of bodies that are to be removed.
-    pub(super) fn remove_bodies(
         &mut self,
         cut: &mut Cut<'_>,
         ms: &mut Milliseconds,
@@ -176,7 +152,9 @@ impl State {
                 dependents.apply_delta(number, group, &delta, cut, ms)?;
             }
         }
-        Ok(())
+        timeline.advance(cut.number, groups, |number, group, delta| {
+            dependents.apply_delta(number, group, delta, cut, ms)
+        })
     }
 }
 

@@ -321,3 +321,37 @@ fn parts_are_regions_or_lists_of_tets() {
     let error = Simulation::new(&scene).unwrap_err().to_string();
     assert!(error.contains("body[0].fixed[0].tets"), "{error}");
 }
+
+/// A collider with a velocity moves on where the body that was first is gone, for those that are left and those to come.
+#[test]
+fn colliders_move_on_without_the_first_body() {
+    let mut builder = solved(Precision::F64);
+    let first = builder.add_body(ball(0.0));
+    builder.add_body(slab(3.0));
+    let plate = builder.add_collider(incise::scene::ColliderSpec::Plane {
+        point: [0.0, 0.0, 5.0],
+        normal: [0.0, 0.0, -1.0],
+        friction: 0.0,
+        velocity: [0.0, 0.0, -1.0],
+    });
+    let mut simulation = builder.build().unwrap();
+    simulation.step().unwrap();
+    simulation.remove_body(first).unwrap();
+    for _ in 0..9 {
+        simulation.step().unwrap();
+    }
+    let time = 10.0 * simulation.time_step();
+    let height = simulation.collider_position(plate).unwrap().z;
+    assert!((height - (5.0 - time)).abs() < 1e-12, "{height}");
+    // The plate is below this one's top already, and holds it down.
+    simulation
+        .add_body(slab(6.0).position(DVec3::new(6.0, 0.0, 4.5)))
+        .unwrap();
+    simulation.step().unwrap();
+    let top = simulation
+        .positions()
+        .iter()
+        .map(|x| x.z)
+        .fold(f64::MIN, f64::max);
+    assert!(top <= height + 1e-9, "{top} above {height}");
+}
