@@ -441,17 +441,30 @@ impl<R: Float> ConstraintTerms<R> {
 
     /// The energy of all constraints in J, with that of the multipliers.
     pub(super) fn energy(&self, solver: &Solver<R>, position: &impl Fn(u32) -> DVec3) -> f64 {
-        let springs = self.springs.iter().enumerate().map(|(index, spring)| {
+        self.energies(solver, position)
+            .map(|(_, energy)| energy)
+            .sum()
+    }
+
+    /// A particle of each constraint and the constraint's energy in J.
+    pub(super) fn energies(
+        &self,
+        solver: &Solver<R>,
+        position: &impl Fn(u32) -> DVec3,
+    ) -> impl Iterator<Item = (u32, f64)> {
+        let springs = self.springs.iter().enumerate().map(move |(index, spring)| {
             let spring = spring.to_f64();
             let excess = spring.excess(self.value(solver, index, position));
             let held = spring.multiplier * spring.multiplier * spring.per_penalty;
-            0.5 * (spring.stiffness * excess * excess - held)
+            let particle = self.particles(solver, index)[0];
+            (particle, 0.5 * (spring.stiffness * excess * excess - held))
         });
-        let anchors = self.anchors.iter().map(|anchor| {
+        let anchors = self.anchors.iter().map(move |anchor| {
             let away = position(anchor.particle) - R::to_dvec3(anchor.position);
-            0.5 * anchor.stiffness.to_f64() * away.length_squared()
+            let energy = 0.5 * anchor.stiffness.to_f64() * away.length_squared();
+            (anchor.particle, energy)
         });
-        springs.chain(anchors).sum()
+        springs.chain(anchors)
     }
 
     /// Adds the forces of all constraints in N.

@@ -29,6 +29,7 @@ mod history;
 mod matrix;
 mod settings;
 mod stars;
+mod start;
 mod state;
 mod step;
 mod sweep;

@@ -25,7 +25,6 @@ impl<R: Float> ImplicitStep<'_, R> {
     /// [`ImplicitStep::potential`] and what it consists of.
     pub(super) fn potentials(&self) -> Potential {
         let solver = &*self.solver;
-        let per_time_squared = self.time.to_f64().powi(-2);
         let elastic = |tets: &[TetConstraint<R>]| {
             tets.iter().fold([0.0; 2], |[energy, terms], tet| {
                 let tet = tet.to_f64();
@@ -36,13 +35,6 @@ impl<R: Float> ImplicitStep<'_, R> {
                 [energy + own[0], terms + own[1]]
             })
         };
-        let inertia = |p: usize| {
-            if weight::<R>(&solver.particles.cells[p]) <= R::ZERO {
-                return 0.0;
-            }
-            let lag = solver.particles.local(p) - self.free_position(p);
-            0.5 * per_time_squared * solver.mass(p) * lag.length_squared()
-        };
         let tets: Vec<[f64; 2]> = solver
             .tets
             .list
@@ -51,18 +43,8 @@ impl<R: Float> ImplicitStep<'_, R> {
             .collect();
         let mut parts: Vec<f64> = tets.iter().map(|part| part[0]).collect();
         let elastic = parts.iter().sum();
-        parts.extend((0..solver.particle_count()).map(inertia));
-        if let Some(viscosity) = &self.stars.viscosity {
-            let motion =
-                |p: usize| solver.particles.local(p) - R::to_dvec3(solver.particles.previous[p]);
-            let order = &self.stars.order;
-            let rows = (0..order.len()).into_par_iter().with_min_len(PARALLEL_TETS);
-            let dissipated = rows.map(|row| {
-                let force = viscosity.exact_force(row, order, &motion);
-                -0.5 * force.dot(motion(order[row] as usize))
-            });
-            parts.extend(dissipated.collect::<Vec<f64>>());
-        }
+        parts.extend((0..solver.particle_count()).map(|p| self.inertia(p)));
+        parts.extend(self.dissipated());
         let constraints = &self.stars.constraints;
         if !constraints.is_empty() {
             parts.push(constraints.energy(solver, &|p| solver.particles.local(p as usize)));
@@ -74,6 +56,62 @@ impl<R: Float> ImplicitStep<'_, R> {
             elastic,
             rounding: f64::EPSILON * terms,
         }
+    }
+
+    /// Adds the potential of each connected part of the body, in J, to the sum of the part's smallest particle. The parts
+    /// must be known.
+    pub(super) fn add_potentials(&self, sums: &mut [f64]) {
+        let solver = &*self.solver;
+        let parts = &*self.stars.parts;
+        let of = |p: u32| parts[p as usize] as usize;
+        let elastic: Vec<f64> = solver
+            .tets
+            .list
+            .par_iter()
+            .with_min_len(PARALLEL_TETS)
+            .map(|tet| {
+                let at = tet.particles.map(|p| solver.particles.local(p as usize));
+                energy_and_terms(&tet.to_f64(), at)[0]
+            })
+            .collect();
+        for (tet, energy) in solver.tets.list.iter().zip(elastic) {
+            sums[of(tet.particles[0])] += energy;
+        }
+        for (p, &part) in parts.iter().enumerate() {
+            sums[part as usize] += self.inertia(p);
+        }
+        for (&p, energy) in self.stars.order.iter().zip(self.dissipated()) {
+            sums[of(p)] += energy;
+        }
+        let position = |p: u32| solver.particles.local(p as usize);
+        for (p, energy) in self.stars.constraints.energies(solver, &position) {
+            sums[of(p)] += energy;
+        }
+    }
+
+    /// The inertial potential in J of a particle.
+    fn inertia(&self, p: usize) -> f64 {
+        if weight::<R>(&self.solver.particles.cells[p]) <= R::ZERO {
+            return 0.0;
+        }
+        let lag = self.solver.particles.local(p) - self.free_position(p);
+        0.5 * self.time.to_f64().powi(-2) * self.solver.mass(p) * lag.length_squared()
+    }
+
+    /// What damping takes in J, by rows of the order; empty where nothing is damped.
+    fn dissipated(&self) -> Vec<f64> {
+        let Some(viscosity) = &self.stars.viscosity else {
+            return Vec::new();
+        };
+        let particles = &self.solver.particles;
+        let motion = |p: usize| particles.local(p) - R::to_dvec3(particles.previous[p]);
+        let order = &self.stars.order;
+        let rows = (0..order.len()).into_par_iter().with_min_len(PARALLEL_TETS);
+        rows.map(|row| {
+            let force = viscosity.exact_force(row, order, &motion);
+            -0.5 * force.dot(motion(order[row] as usize))
+        })
+        .collect()
     }
 
     /// The energy in J of the motion in the substep.

@@ -3,7 +3,6 @@
 use super::constraints::SWEEP_PENALTY;
 use super::{Guess, Integrator, VbdSettings, VertexStars};
 use crate::constraints::Constraints;
-use crate::float::{finite, load, store, weight};
 use crate::{Float, Solver, StepReport, StepSettings, XpbdError};
 
 /// The report of a frame of VBD.
@@ -192,13 +191,8 @@ impl<'a, R: Float> ImplicitStep<'a, R> {
             error: None,
             lost,
         };
-        if let (Guess::Adaptive, Some(gravity)) = (settings.guess, step.settings.gravity) {
-            step.start_where_gravity_led(R::from_dvec3(gravity));
-        }
-        if let (Guess::Adaptive, Some(accuracy), true) =
-            (settings.guess, settings.accuracy, step.stars.try_start)
-        {
-            step.stars.try_start = step.start_at_lowest_potential(accuracy);
+        if settings.guess == Guess::Adaptive {
+            step.start(settings.accuracy);
         }
         step
     }
@@ -241,124 +235,6 @@ impl<'a, R: Float> ImplicitStep<'a, R> {
     /// and the forces, which are zero only where the constraints are met as well.
     pub fn update_multipliers(&mut self) {
         self.stars.constraints.update_multipliers(self.solver);
-    }
-
-    /// Takes back the part of gravity that the last substep did not show. A particle that has joined since then goes by
-    /// those around it.
-    fn start_where_gravity_led(&mut self, gravity: R::Vector) {
-        let change = gravity * self.time;
-        let squared = R::dot(change, change);
-        let count = self.solver.particle_count();
-        let known = match self.stars.earlier.len() {
-            known if known <= count => known,
-            _ => 0,
-        };
-        self.stars.earlier.resize(count, R::Vector::default());
-        let mut taken_back = vec![R::ZERO; count];
-        for (p, taken_back) in taken_back.iter_mut().enumerate() {
-            let velocity = self.solver.particles.velocities[p] - change;
-            let followed = R::dot(velocity - self.stars.earlier[p], change) / squared;
-            self.stars.earlier[p] = velocity;
-            let is_held = weight::<R>(&self.solver.particles.cells[p]) <= R::ZERO;
-            if p < known && followed < R::ONE && !is_held {
-                *taken_back = R::ONE
-                    - if followed > R::ZERO {
-                        followed
-                    } else {
-                        R::ZERO
-                    };
-            }
-        }
-        if 0 < known && known < count {
-            for (row, &p) in self.stars.order.iter().enumerate() {
-                let around = self.stars.of(row).iter().flat_map(|term| term.others);
-                let around = around.filter(|&q| (q as usize) < known);
-                if (p as usize) < known
-                    || weight::<R>(&self.solver.particles.cells[p as usize]) <= R::ZERO
-                {
-                    continue;
-                }
-                let (mut sum, mut neighbors) = (R::ZERO, R::ZERO);
-                for q in around {
-                    sum += taken_back[q as usize];
-                    neighbors += R::ONE;
-                }
-                if neighbors > R::ZERO {
-                    taken_back[p as usize] = sum / neighbors;
-                }
-            }
-        }
-        for (particle, &part) in self.solver.particles.cells.iter().zip(&taken_back) {
-            let x = load::<R>(particle) - change * (part * self.time);
-            if part > R::ZERO && finite::<R>(x) {
-                store::<R>(particle, x);
-            }
-        }
-    }
-
-    /// Takes parts of the body that are held back toward where they were, as far as the potential falls, if the energy of their motion is
-    /// below the error that is allowed: a motion that small is mostly what the last substep left over.
-    ///
-    /// Parts that nothing holds keep their velocity: a crumb that falls beside a strained body has little energy too.
-    ///
-    /// Returns whether it helped.
-    fn start_at_lowest_potential(&mut self, accuracy: f64) -> bool {
-        self.stars.parts(self.solver);
-        let solver = &*self.solver;
-        let parts = &*self.stars.parts;
-        let mut is_held = vec![false; parts.len()];
-        let soft = solver
-            .constraints
-            .attachments
-            .soft()
-            .map(|a| a.particle as usize);
-        let fixed =
-            (0..parts.len()).filter(|&p| weight::<R>(&solver.particles.cells[p]) <= R::ZERO);
-        for p in fixed.chain(soft) {
-            is_held[parts[p] as usize] = true;
-        }
-        // What moves, from where and by how much.
-        let (mut moving, mut kinetic) = (Vec::new(), 0.0);
-        for (p, particle) in solver.particles.cells.iter().enumerate() {
-            if is_held[parts[p] as usize] && weight::<R>(particle) > R::ZERO {
-                let velocity = R::to_dvec3(solver.particles.velocities[p]);
-                kinetic += 0.5 * solver.mass(p) * velocity.length_squared();
-                let from = solver.particles.previous[p];
-                moving.push((p, from, load::<R>(particle) - from));
-            }
-        }
-        let at = |part: f64| {
-            for &(p, from, way) in &moving {
-                store::<R>(&solver.particles.cells[p], from + way * R::from_f64(part));
-            }
-        };
-        if moving.is_empty() {
-            return false;
-        }
-        let whole = self.potentials().total;
-        at(0.5);
-        let half = self.potentials().total;
-        if half >= whole || !half.is_finite() {
-            at(1.0);
-            return false;
-        }
-        at(0.0);
-        let none = self.potentials();
-        let allowed = accuracy * accuracy * none.elastic;
-        if kinetic > allowed || !allowed.is_finite() {
-            at(1.0);
-            return false;
-        }
-        // The lowest point of the parabola through the three.
-        let none = none.total;
-        let curvature = 4.0 * (none - 2.0 * half + whole);
-        let slope = 4.0 * half - 3.0 * none - whole;
-        at(if curvature > 0.0 {
-            (-slope / curvature).clamp(0.0, 1.0)
-        } else {
-            0.0
-        });
-        true
     }
 
     /// Ends the substep: velocities from the motion.
