@@ -161,7 +161,8 @@ impl<R: Float> Obstacle<R> {
 
     /// Where a particle at `x` is put that wants to move to `moved` inside: onto the plane that touches the surface
     /// nearest to `x`, along `along(normal)`. With the direction in which a force along the normal moves the particle,
-    /// what is left over in the end is such a force. `None` if that leads far away.
+    /// what is left over in the end is such a force. If that leads far away, as far towards `moved` as it is outside; `None` if
+    /// it is nowhere on the way.
     #[inline]
     pub(crate) fn push_along(
         &self,
@@ -182,8 +183,15 @@ impl<R: Float> Obstacle<R> {
         // A push that goes much further along the surface than out of it throws particles about in extreme states.
         let limit = straight * R::from_f64(LONGEST_PUSH);
         let sound = depth > R::ZERO && straight > R::ZERO && R::dot(along, along) <= limit * limit;
-        let out = moved + along * (depth / straight);
-        (sound && finite::<R>(out)).then(|| self.rub(out, normal, depth, out - previous))
+        let out = if sound {
+            moved + along * (depth / straight)
+        } else if depth > R::ZERO && distance >= R::ZERO {
+            // On the way to the minimum the energy falls at every point, so also at the last one outside.
+            x + (moved - x) * (distance / (distance + depth))
+        } else {
+            return None;
+        };
+        finite::<R>(out).then(|| self.rub(out, normal, depth, out - previous))
     }
 
     /// Holds a particle on the surface back by at most the friction's share of the depth it was pushed out of.

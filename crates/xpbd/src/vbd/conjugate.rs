@@ -12,6 +12,7 @@
 
 use std::ops::Range;
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::coarse::Coarse;
@@ -44,6 +45,9 @@ pub(super) const FEWEST_ITERATIONS: u32 = 4;
 
 /// Rows of a color that a thread relaxes at a time: a color has some hundred.
 const PARALLEL_RELAXED: usize = 128;
+
+/// Last digits of the trace that rounding may have taken from the pivots of a diagonal block.
+const ROUNDING: f64 = 4.0;
 
 /// The vectors of the iteration.
 #[derive(Clone, Debug, Default)]
@@ -219,20 +223,20 @@ fn relax<R: Float>(
         });
 }
 
-/// The inverse of a symmetric block; zero if it has none or the row is held.
+/// The inverse of a symmetric block, in double precision and with the last digits of its trace added to the diagonal, so that it
+/// is as positive as the block was before rounding; zero if it has none or the row is held.
 fn inverse<R: Float>(block: &Block<R>, held: bool) -> Block<R> {
-    let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = block.map(R::components);
-    let axes = [
-        (R::ONE, R::ZERO, R::ZERO),
-        (R::ZERO, R::ONE, R::ZERO),
-        (R::ZERO, R::ZERO, R::ONE),
-    ];
-    let columns =
-        axes.map(|(x, y, z)| solve(R::ZERO, [xx, xy, xz, yy, yz, zz], R::vector(x, y, z)));
-    if held || !columns.into_iter().all(finite::<R>) {
+    let columns = block.map(R::to_dvec3);
+    let trace = columns[0].x + columns[1].y + columns[2].z;
+    let rounding = ROUNDING * R::EPSILON.to_f64() * trace;
+    let [a, b, c] = columns.map(<f64 as Float>::components);
+    let h = [a[0], b[0], c[0], b[1], c[1], c[2]];
+    let [a, b, c] = DVec3::AXES.map(|axis| solve::<f64>(rounding, h, axis));
+    let inverse = [a, b, c].map(R::from_dvec3);
+    if held || !inverse.into_iter().all(finite::<R>) {
         return [R::Vector::default(); 3];
     }
-    columns
+    inverse
 }
 
 fn dot<R: Float>(a: &[R::Vector], b: &[R::Vector]) -> f64 {

@@ -280,11 +280,15 @@ impl<R: Float> ImplicitStep<'_, R> {
         coarse.note(solved.iterations, solved.left);
         self.stars.try_start |= solved.iterations > FEWEST_ITERATIONS;
         let (direction, slope) = (conjugate.solution(), solved.slope);
+        let of_parts = self.potentials_of_parts();
         let Search {
             taken,
             elastic,
             gain,
         } = self.search(start, base, direction, slope);
+        if let Some(before) = of_parts {
+            self.take_back_risen_parts(&before, start.rounding, base);
+        }
         let Solver {
             particles,
             constraints,
@@ -318,6 +322,32 @@ impl<R: Float> ImplicitStep<'_, R> {
             iterations: solved.iterations,
             taken,
             error,
+        }
+    }
+
+    /// The potential of each connected part of the body, at its smallest particle; `None` of a body that is one part.
+    fn potentials_of_parts(&mut self) -> Option<Vec<f64>> {
+        let parts = self.stars.parts(self.solver);
+        if parts.iter().all(|part| *part == parts[0]) {
+            return None;
+        }
+        let mut sums = vec![0.0; parts.len()];
+        self.add_potentials(&mut sums);
+        Some(sums)
+    }
+
+    /// Puts parts whose potential was `before` back to `base` if it has risen. The length of a step is chosen for the whole
+    /// body, in which a crumb that gains energy does not count; gaining a little in each frame it would fly away.
+    fn take_back_risen_parts(&self, before: &[f64], rounding: f64, base: &[R::Vector]) {
+        let mut after = vec![0.0; before.len()];
+        self.add_potentials(&mut after);
+        for (&p, &x) in self.stars.order.iter().zip(base) {
+            let part = self.stars.parts[p as usize] as usize;
+            // What is no number has not fallen.
+            let is_sound = after[part] - before[part] <= rounding;
+            if !is_sound {
+                store::<R>(&self.solver.particles.cells[p as usize], x);
+            }
         }
     }
 

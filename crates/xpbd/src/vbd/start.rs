@@ -11,8 +11,12 @@
 use glam::{DMat3, DQuat, DVec3};
 
 use super::ImplicitStep;
-use crate::Float;
+use crate::constraints::outside;
 use crate::float::{finite, load, store, weight};
+use crate::{Float, Solver};
+
+/// Up to so many times the potential of a safe start, corrections go down from the inertial guess in fewer iterations.
+const CONVERGING: f64 = 100.0;
 
 impl<R: Float> ImplicitStep<'_, R> {
     /// Moves the particles from the inertial guess to where the sweeps start.
@@ -21,12 +25,17 @@ impl<R: Float> ImplicitStep<'_, R> {
         if let Some(gravity) = self.settings.gravity {
             self.start_where_gravity_led(R::from_dvec3(gravity), &is_held);
         }
-        match accuracy {
-            None => self.start_below_safe_potential(&is_held),
-            Some(accuracy) if self.stars.try_start => {
-                self.stars.try_start = self.start_at_lowest_potential(accuracy, &is_held);
+        if let (Some(accuracy), true) = (accuracy, self.stars.try_start) {
+            self.stars.try_start = self.start_at_lowest_potential(accuracy, &is_held);
+            if self.stars.try_start {
+                return;
             }
-            Some(_) => {}
+        }
+        // Where substeps converge, the guess decides about work alone, unless it is beyond all measure.
+        if accuracy.is_none() {
+            self.start_below_safe_potential(&is_held, 1.0);
+        } else if !self.stars.was_accurate {
+            self.start_below_safe_potential(&is_held, CONVERGING);
         }
     }
 
@@ -49,8 +58,15 @@ impl<R: Float> ImplicitStep<'_, R> {
         is_held
     }
 
-    /// Starts every part where its potential is at most that of its safe start.
-    fn start_below_safe_potential(&self, is_held: &[bool]) {
+    /// Starts every part whose guess has more than `tolerated` times the potential of its safe start where it has at most
+    /// that of the safe start.
+    fn start_below_safe_potential(&self, is_held: &[bool], tolerated: f64) {
+        let Solver {
+            particles,
+            constraints,
+            ..
+        } = &*self.solver;
+        constraints.colliders.project(particles);
         let safe = self.safe_start(is_held);
         let solver = &*self.solver;
         let parts = &*self.stars.parts;
@@ -79,7 +95,13 @@ impl<R: Float> ImplicitStep<'_, R> {
         at(&|_| 0.0);
         let none = potentials(self);
         let mut taken: Vec<f64> = (0..count)
-            .map(|part| if whole[part] <= none[part] { 1.0 } else { 0.5 })
+            .map(|part| {
+                if whole[part] <= tolerated * none[part] {
+                    1.0
+                } else {
+                    0.5
+                }
+            })
             .collect();
         if taken.iter().all(|&part| part == 1.0) {
             at(&|_| 1.0);
@@ -139,7 +161,21 @@ impl<R: Float> ImplicitStep<'_, R> {
                 solver.particles.previous[p]
             }
         };
-        (0..parts.len()).map(moved).collect()
+        let mut safe: Vec<R::Vector> = (0..parts.len()).map(moved).collect();
+        let obstacles = &*solver.constraints.colliders.obstacles;
+        if !obstacles.is_empty() {
+            let mut is_inside = vec![false; parts.len()];
+            for (p, &part) in parts.iter().enumerate() {
+                is_inside[part as usize] |=
+                    outside(obstacles, safe[p], solver.particles.previous[p]).is_some();
+            }
+            for (p, &part) in parts.iter().enumerate() {
+                if is_inside[part as usize] {
+                    safe[p] = solver.particles.previous[p];
+                }
+            }
+        }
+        safe
     }
 
     /// Takes back the part of gravity that the last substep did not show. A particle that has joined since then goes by
