@@ -11,6 +11,9 @@ pub enum Guess {
     /// As if gravity were what it seemed to be in the last substep, between none of it and all: a body that lies or
     /// hangs starts where it is. Keeps the velocities of a substep.
     ///
+    /// Each connected part of the body then starts on the line from a safe start to that guess, where its potential is at most
+    /// that of the safe start: where the part was, or moved rigidly with its momentum if nothing holds it.
+    ///
     /// With an accuracy, parts of a body that something holds also start nearer to where they were, as far as that lowers
     /// the potential, if the energy of their motion is below the error allowed: what a substep leaves over
     /// would otherwise come back twice as large in the next one.

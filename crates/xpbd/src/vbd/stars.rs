@@ -38,8 +38,6 @@ pub struct VertexStars<R: Float> {
     pub(super) earlier: Vec<R::Vector>,
     /// Whether a start nearer to the last positions may save work: since a step was not calm, until such a start does not help.
     pub(super) try_start: bool,
-    /// Whether the last substep of these stars ended within the accuracy that was asked for.
-    pub(super) was_accurate: bool,
     /// The smallest particle of each particle's connected part of the body, if known.
     pub(super) parts: Vec<u32>,
     /// Kept only for [`super::Integrator::Bdf2`].
@@ -67,7 +65,6 @@ impl<R: Float> VertexStars<R> {
             size: 0.0,
             earlier: Vec::new(),
             try_start: true,
-            was_accurate: false,
             parts: Vec::new(),
             history: History::default(),
             constraints: ConstraintTerms::default(),
@@ -123,7 +120,6 @@ impl<R: Float> VertexStars<R> {
             .cbrt();
         self.parts.clear();
         self.try_start = true;
-        self.was_accurate = false;
         self.constraints.rebuild(solver, &self.order, incidence);
         self.viscosity = None;
         Ok(())

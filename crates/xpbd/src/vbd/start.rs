@@ -15,9 +15,6 @@ use crate::constraints::outside;
 use crate::float::{finite, load, store, weight};
 use crate::{Float, Solver};
 
-/// Up to so many times the potential of a safe start, corrections go down from the inertial guess in fewer iterations.
-const CONVERGING: f64 = 100.0;
-
 impl<R: Float> ImplicitStep<'_, R> {
     /// Moves the particles from the inertial guess to where the sweeps start.
     pub(super) fn start(&mut self, accuracy: Option<f64>) {
@@ -31,12 +28,7 @@ impl<R: Float> ImplicitStep<'_, R> {
                 return;
             }
         }
-        // Where substeps converge, the guess decides about work alone, unless it is beyond all measure.
-        if accuracy.is_none() {
-            self.start_below_safe_potential(&is_held, 1.0);
-        } else if !self.stars.was_accurate {
-            self.start_below_safe_potential(&is_held, CONVERGING);
-        }
+        self.start_below_safe_potential(&is_held);
     }
 
     /// Whether each connected part, by its smallest particle, has a particle that is held or anchored.
@@ -58,9 +50,8 @@ impl<R: Float> ImplicitStep<'_, R> {
         is_held
     }
 
-    /// Starts every part whose guess has more than `tolerated` times the potential of its safe start where it has at most
-    /// that of the safe start.
-    fn start_below_safe_potential(&self, is_held: &[bool], tolerated: f64) {
+    /// Starts every part where its potential is at most that of its safe start.
+    fn start_below_safe_potential(&self, is_held: &[bool]) {
         let Solver {
             particles,
             constraints,
@@ -95,13 +86,7 @@ impl<R: Float> ImplicitStep<'_, R> {
         at(&|_| 0.0);
         let none = potentials(self);
         let mut taken: Vec<f64> = (0..count)
-            .map(|part| {
-                if whole[part] <= tolerated * none[part] {
-                    1.0
-                } else {
-                    0.5
-                }
-            })
+            .map(|part| if whole[part] <= none[part] { 1.0 } else { 0.5 })
             .collect();
         if taken.iter().all(|&part| part == 1.0) {
             at(&|_| 1.0);
@@ -125,8 +110,8 @@ impl<R: Float> ImplicitStep<'_, R> {
         at(&|part| taken[part]);
     }
 
-    /// Where each particle starts at the latest: where it was, in parts that nothing holds moved with the part's momentum and angular
-    /// momentum.
+    /// The safe start of each particle: where it was; in parts that nothing holds, moved with the part's momentum and
+    /// angular momentum, unless that leads into a collider.
     fn safe_start(&self, is_held: &[bool]) -> Vec<R::Vector> {
         let solver = &*self.solver;
         let parts = &*self.stars.parts;
@@ -242,8 +227,8 @@ impl<R: Float> ImplicitStep<'_, R> {
         }
     }
 
-    /// Takes parts of the body that are held back toward where they were, as far as the potential falls, if the energy of their motion is
-    /// below the error that is allowed: a motion that small is mostly what the last substep left over.
+    /// Takes parts of the body that are held back toward where they were, as far as the potential falls, if the energy of
+    /// their motion is below the error that is allowed: a motion that small is mostly what the last substep left over.
     ///
     /// Parts that nothing holds keep their velocity: a crumb that falls beside a strained body has little energy too.
     ///

@@ -224,10 +224,6 @@ impl<'a, R: Float> ImplicitStep<'a, R> {
                 break;
             }
         }
-        self.stars.was_accurate = match (self.accuracy, self.error) {
-            (Some(accuracy), Some(error)) => error <= accuracy,
-            _ => false,
-        };
         if settings.measure && self.last {
             report.force = Some(self.residual());
             report.potential = Some(self.potential());
