@@ -464,9 +464,9 @@ fn no_number_of_sweeps_adds_energy_to_a_held_body() {
             });
             let at_rest = positions(&solver);
             disturb(&mut solver, speed, seed);
-            for p in 0..solver.particle_count() {
-                let velocity = solver.position(p) - at_rest[p];
-                solver.set_position(p, at_rest[p]);
+            for (p, &rest) in at_rest.iter().enumerate() {
+                let velocity = solver.position(p) - rest;
+                solver.set_position(p, rest);
                 solver.set_velocity(p, velocity);
             }
             let mut stars = stars(&solver);
