@@ -193,13 +193,13 @@ impl<R: Float> Solver<R> {
         correction: &mut CoarseCorrection<R>,
         settings: &VbdSettings,
     ) -> Result<VbdReport, XpbdError> {
-        let (mut idle, accuracy) = (0, settings.accuracy);
+        let mut idle = 0;
         self.frame_of_vbd(stars, settings, CORRECTION_PENALTY, |step| {
             step.sweep();
             let report = step.correct(correction);
             idle = if report.taken > 0.0 { 0 } else { idle + 1 };
             step.error = Some(report.error);
-            idle < IDLE_ROUNDS && accuracy.is_none_or(|accuracy| report.error > accuracy)
+            idle < IDLE_ROUNDS && step.accuracy.is_none_or(|accuracy| report.error > accuracy)
         })
     }
 }

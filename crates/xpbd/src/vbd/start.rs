@@ -15,6 +15,10 @@ use crate::constraints::outside;
 use crate::float::{finite, load, store, weight};
 use crate::{Float, Solver};
 
+/// The part of an accuracy that a substep may use up in which a free part starts from its rigid motion: what is left over
+/// then has the same direction in every substep and adds up. Measured: without it up to 1.65 times the accuracy.
+const RIGID_START_SHARE: f64 = 0.5;
+
 impl<R: Float> ImplicitStep<'_, R> {
     /// Moves the particles from the inertial guess to where the sweeps start.
     pub(super) fn start(&mut self, accuracy: Option<f64>) {
@@ -28,7 +32,9 @@ impl<R: Float> ImplicitStep<'_, R> {
                 return;
             }
         }
-        self.start_below_safe_potential(&is_held);
+        if self.start_below_safe_potential(&is_held) {
+            self.accuracy = accuracy.map(|accuracy| accuracy * RIGID_START_SHARE);
+        }
     }
 
     /// Whether each connected part, by its smallest particle, has a particle that is held or anchored.
@@ -50,8 +56,9 @@ impl<R: Float> ImplicitStep<'_, R> {
         is_held
     }
 
-    /// Starts every part where its potential is at most that of its safe start.
-    fn start_below_safe_potential(&self, is_held: &[bool]) {
+    /// Starts every part where its potential is at most that of its safe start. Returns whether a free part starts
+    /// elsewhere than at the guess.
+    fn start_below_safe_potential(&self, is_held: &[bool]) -> bool {
         let Solver {
             particles,
             constraints,
@@ -90,7 +97,7 @@ impl<R: Float> ImplicitStep<'_, R> {
             .collect();
         if taken.iter().all(|&part| part == 1.0) {
             at(&|_| 1.0);
-            return;
+            return false;
         }
         at(&|part| taken[part]);
         let half = potentials(self);
@@ -108,6 +115,7 @@ impl<R: Float> ImplicitStep<'_, R> {
             }
         }
         at(&|part| taken[part]);
+        (0..count).any(|part| taken[part] < 1.0 && !is_held[part])
     }
 
     /// The safe start of each particle: where it was; in parts that nothing holds, moved with the part's momentum and
