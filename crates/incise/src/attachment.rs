@@ -107,6 +107,11 @@ impl Attachment {
         })
     }
 
+    /// Whether it holds no particle.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.particles.is_empty()
+    }
+
     /// Attaches the particles at the start of a frame, to a frame of the solver that is `spare` or a new one; on an error
     /// none of them.
     pub(crate) fn attach(

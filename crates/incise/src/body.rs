@@ -19,6 +19,8 @@ pub(crate) struct Body {
     pub(crate) material_of: Vec<u16>,
     /// For each particle whether it is fixed.
     pub(crate) fixed: Vec<bool>,
+    /// The regions that contain nothing of it, by their place in the scene.
+    pub(crate) empty_regions: Vec<String>,
     /// Of the volume constraints that it asks for.
     pub(crate) volume_compliance: Option<f64>,
     pub(crate) substeps: Substeps,
@@ -72,11 +74,16 @@ impl Body {
                 ));
             }
         }
+        let mut empty_regions = Vec::new();
         let mut fixed = vec![false; mesh.positions.len()];
         for (i, region) in spec.fixed.iter().enumerate() {
             let field = format!("{field}.fixed[{i}]");
-            for p in particles(&field, region, &mesh.positions)? {
+            let inside = particles(&field, region, &mesh.positions)?;
+            for &p in &inside {
                 fixed[p] = true;
+            }
+            if inside.is_empty() {
+                empty_regions.push(field);
             }
         }
         let mut material_of = vec![0; mesh.tets.len()];
@@ -86,8 +93,13 @@ impl Body {
                 .map_err(|_| value(&field, "one too many", "at most 65,535 a body"))?;
             materials.push(material(&field, spec, part)?);
             for (j, region) in part.regions.iter().enumerate() {
-                for t in tets(&format!("{field}.regions[{j}]"), region, &mesh)? {
+                let field = format!("{field}.regions[{j}]");
+                let inside = tets(&field, region, &mesh)?;
+                for &t in &inside {
                     material_of[t] = index;
+                }
+                if inside.is_empty() {
+                    empty_regions.push(field);
                 }
             }
         }
@@ -96,6 +108,7 @@ impl Body {
             materials,
             material_of,
             fixed,
+            empty_regions,
             volume_compliance,
             substeps: spec.substeps.unwrap_or(substeps),
         })

@@ -250,6 +250,8 @@ impl Group {
         };
         group.solver.positions(&mut group.positions);
         group.judge_settings();
+        let empty = joined.empty_regions.into_iter();
+        group.warnings.extend(empty.map(Warning::of_empty_region));
         Ok(group)
     }
 

@@ -37,6 +37,8 @@ pub(crate) struct Joined {
     /// For each tet the number of its material.
     pub(crate) material_of: Vec<u16>,
     pub(crate) fixed: Vec<bool>,
+    /// See [`Body::empty_regions`].
+    pub(crate) empty_regions: Vec<String>,
     pub(crate) attachments: Vec<Attachment>,
     pub(crate) distances: Distances,
     /// What the body of each material asks for.
@@ -71,8 +73,8 @@ impl Joined {
             let (name, field) = (AttachmentHandle::of_scene(i), format!("attachment[{i}]"));
             existing(&format!("{field}.body"), spec.body, islands.len())?;
             let (positions, first) = particles(spec.body);
-            let attachment = Attachment::new(name, field, spec, positions, |p| first + p)?;
-            attachments.push((islands[spec.body], attachment));
+            let attachment = Attachment::new(name, field.clone(), spec, positions, |p| first + p)?;
+            attachments.push((islands[spec.body], field, attachment));
         }
         for (i, spec) in scene.distance.iter().enumerate() {
             let field = format!("distance[{i}]");
@@ -83,7 +85,10 @@ impl Joined {
             let name = DistanceHandle::of_scene(i);
             distances.push((islands[spec.from.body], name, constraint));
         }
-        for (island, attachment) in attachments {
+        for (island, field, attachment) in attachments {
+            if attachment.is_empty() {
+                all[island].empty_regions.push(field + ".regions");
+            }
             all[island].attachments.push(attachment);
         }
         for (island, name, constraint) in distances {
@@ -121,6 +126,7 @@ impl Joined {
         }
         self.bodies.push(number);
         self.fixed.extend(body.fixed);
+        self.empty_regions.extend(body.empty_regions);
         Ok(())
     }
 

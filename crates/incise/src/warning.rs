@@ -32,6 +32,8 @@ pub enum WarningCode {
     VibrationsDamped,
     /// Cuts have left more than 1% of a body's volume in tets that are solved less accurately than asked for.
     OutsideAccuracy,
+    /// A region of the scene contains no particle, or no tet.
+    EmptyRegion,
     /// The substep is too short for single precision.
     ShortSubstepF32,
     /// Tets were softened to keep `kappa_limit`.
@@ -63,6 +65,15 @@ impl Warning {
             code,
             message,
             location: format!("{noun} {}", numbers.join(", ")),
+        }
+    }
+
+    /// The warning about a region that selects nothing, at a place like `body[0].fixed[0]`.
+    pub(crate) fn of_empty_region(field: String) -> Self {
+        Self {
+            code: WarningCode::EmptyRegion,
+            message: "the region contains nothing of the body: compare it with scale and position of the body".into(),
+            location: field,
         }
     }
 

@@ -109,3 +109,30 @@ fn a_cut_through_held_particles_keeps_holding() {
     }
     assert_eq!(simulation.report().pieces, 2);
 }
+
+/// A region that misses the body, as with a forgotten `scale`, is named in the first frame only; other regions are not.
+#[test]
+fn regions_that_contain_nothing_are_named_once() {
+    let text = format!(
+        "{}fixed = [{{ sphere = {{ center = [9.0, 0.0, 0.0], radius = 1.0 }} }}, {{ particles = [3] }}]\n\
+         [[body.material]]\nyoung_modulus = 2e5\nregions = [{{ sphere = {{ center = [0.0, 9.0, 0.0], radius = 1.0 }} }}]\n\
+         [[attachment]]\nbody = 0\nregions = [{{ sphere = {{ center = [0.0, 0.0, 9.0], radius = 1.0 }} }}]\n",
+        body("box", 300, [0.0; 3])
+    );
+    let mut simulation = simulation(&scene(&text));
+    let named = |report: &incise::FrameReport| -> Vec<String> {
+        let empty = report.warnings().iter();
+        let empty = empty.filter(|w| w.code == incise::WarningCode::EmptyRegion);
+        empty.map(|w| w.location.clone()).collect()
+    };
+    let report = simulation.step().unwrap();
+    assert_eq!(
+        named(report),
+        [
+            "body[0].fixed[0]",
+            "body[0].material[0].regions[0]",
+            "attachment[0].regions"
+        ]
+    );
+    assert!(named(simulation.step().unwrap()).is_empty());
+}
