@@ -1,7 +1,7 @@
 //! The rows of the matrix that are about cutting: scenes with strokes, everything recomputed and compared after each.
 //!
-//! The body is a beam of E = 1e4 Pa, held at one end over a ground for what comes off, or free without one. A body that has grown threefold is
-//! replaced by a fresh one. Strokes are made without snapping, which leaves whatever slivers come.
+//! The body is a beam of E = 1e4 Pa, held at one end over a ground for what comes off, or free without one. A body that
+//! has grown threefold is replaced by a fresh one. Strokes are made without snapping, which leaves whatever slivers come.
 
 use std::sync::Arc;
 
@@ -169,12 +169,13 @@ pub(crate) fn run(
     };
     let mut simulation = fresh()?;
     let (at_start, mut noise) = (simulation.mesh().tets.len(), Random(29));
-    let mut watch = Watch::new(column);
+    // A beam of 62.5 kg and 1 m.
+    let mut watch = Watch::new(column, 62.5 * 9.81);
     for frame in 0..cut.frames(quick) {
         if cut == Cut::Strokes {
             if simulation.mesh().tets.len() > 3 * at_start {
                 simulation = fresh()?;
-                watch.unit = None;
+                watch.start = None;
             }
             let stroke = random_stroke(&simulation, &mut noise);
             simulation.cut(stroke)?;
@@ -223,23 +224,26 @@ fn random_stroke(simulation: &Simulation, noise: &mut Random) -> StrokeSpec {
     }
 }
 
-/// Looks at a scene after every frame.
-struct Watch {
-    outcome: Outcome,
-    /// The energy at the start of the present body, and what energies are told in.
-    unit: Option<[f64; 2]>,
+/// Looks at a simulation after every frame.
+pub(super) struct Watch {
+    pub(super) outcome: Outcome,
+    /// The unit of energies, in J.
+    unit: f64,
+    /// The energy at the start of the present body, in J.
+    start: Option<f64>,
 }
 
 impl Watch {
-    fn new(column: Column) -> Self {
+    pub(super) fn new(column: Column, unit: f64) -> Self {
         Self {
-            unit: None,
+            unit,
+            start: None,
             outcome: Outcome::new(column),
         }
     }
 
     /// Notes what the body is; `false` if it is not finite.
-    fn look(&mut self, simulation: &Simulation) -> anyhow::Result<bool> {
+    pub(super) fn look(&mut self, simulation: &Simulation) -> anyhow::Result<bool> {
         let (report, outcome) = (simulation.report(), &mut self.outcome);
         outcome.frames += 1;
         outcome.repaired += report.repaired;
@@ -258,11 +262,8 @@ impl Watch {
             outcome.not_finite = Some(outcome.frames);
             return Ok(false);
         }
-        let [start, unit] = *self.unit.get_or_insert(
-            // A beam of 62.5 kg and 1 m.
-            [sum, 62.5 * 9.81],
-        );
-        outcome.energy_rise = outcome.energy_rise.max((sum - start) / unit);
+        let start = *self.start.get_or_insert(sum);
+        outcome.energy_rise = outcome.energy_rise.max((sum - start) / self.unit);
         outcome.volume = 1.0 + volume;
         outcome.inverted = report.inverted_tets.unwrap_or(0);
         outcome.kappa = outcome.kappa.max(kappa);
@@ -270,6 +271,7 @@ impl Watch {
         outcome.softened = outcome.softened.max(softened);
         let substeps = report.bodies.iter().map(|body| body.substeps).max();
         outcome.substeps = substeps.unwrap_or(outcome.substeps);
+        outcome.warned |= !report.warnings().is_empty();
         Ok(true)
     }
 }

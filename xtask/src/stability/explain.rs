@@ -17,14 +17,21 @@ pub(super) struct Explanation {
     pub(super) text: &'static str,
 }
 
-use Method::{Block, Chebyshev, Corrected, Jacobi, Paper, Softened, Split, Vbd};
-use Verdict::{Bent, Collapsed, FewInverted, Gains, Inverted, Off, Repaired};
+use Method::{Block, Chebyshev, Corrected, Defaults, Jacobi, Paper, Softened, Split, Vbd};
+use Verdict::{Bent, Collapsed, FewInverted, Gains, Inverted, Off, Refused, Repaired};
 
 /// One step of twenty iterations through constraints.
 const STEP: &[Method] = &[Block, Paper, Jacobi, Chebyshev];
 const EVERY: &[Method] = &Method::ALL;
 
 const TABLE: &[Explanation] = &[
+    Explanation {
+        extremes: &["units-1e6"],
+        methods: &[Defaults],
+        verdicts: &[Refused],
+        kappa: -1.0,
+        text: "A scene's frame is at most 1,000 s; this one would be 16,667 s.",
+    },
     Explanation {
         extremes: &["point-free", "speck-free"],
         methods: EVERY,
@@ -42,12 +49,21 @@ const TABLE: &[Explanation] = &[
             to the limit of kappa, so that they do not throw what is around them.",
     },
     Explanation {
+        extremes: &["sliver"],
+        methods: &[Defaults],
+        verdicts: &[Gains],
+        kappa: 1.0,
+        text: "The energy is that of the sliver alone, which is too stiff for the substep and is solved less accurately \
+            than the rest: a displacement far smaller than an edge is a large strain of so flat a tet. Kinetic and \
+            gravitational energy are the same for slivers of 1e-6 and 1e-9, so the sliver does not move the body.",
+    },
+    Explanation {
         extremes: &["cut"],
-        methods: &[Split, Softened, Block, Jacobi, Chebyshev],
+        methods: &[Defaults, Split, Softened, Block, Jacobi, Chebyshev],
         verdicts: &[Inverted, FewInverted, Off],
         kappa: 1.0,
         text: "Random strokes without snapping leave slivers. In the columns of the block form they are softened to kappa \
-            1, in the split column they are solved less accurately: in both they can be turned over by their neighbors. \
+            1, in the default and split columns they are solved less accurately: in all they can be turned over by their neighbors. \
             Snapping avoids most of them.",
     },
     Explanation {

@@ -6,7 +6,9 @@
 
 use incise::mesh::glam::DVec3;
 use incise::mesh::{TetId, TetMesh, kuhn_box};
+use incise::scene::{MaterialSpec, Quantity, Region, ReportSpec, SolverSpec};
 use incise::xpbd::{KappaLimit, Material, Real, Solver};
+use incise::{Body, Simulation};
 
 use crate::random::Random;
 use crate::solver::body::mixed_body;
@@ -196,23 +198,18 @@ fn with_sliver(mesh: &TetMesh, thickness: f64) -> anyhow::Result<TetMesh> {
 impl Extreme {
     /// The body at its start, softened to a limit.
     pub(crate) fn solver<R: Real>(&self, limit: Option<KappaLimit>) -> anyhow::Result<Solver<R>> {
-        let ends = (DVec3::MAX, DVec3::MIN);
-        let (low, high) = self
-            .mesh
-            .positions
-            .iter()
-            .fold(ends, |(low, high), &x| (low.min(x), high.max(x)));
+        let (low, high) = self.ends();
         let far = Material {
             density: self.material.density * self.density_ratio,
             ..self.material
         };
-        let middle = 0.5 * (low.x + high.x);
+        let middle = 0.5 * (low + high);
         let center = |t| self.mesh.corners(t).into_iter().sum::<DVec3>() / 4.0;
         let mut solver = mixed_body::<R>(
             &self.mesh,
             &[self.material, far],
             |t| usize::from(center(t).x > middle),
-            |x| self.held && x.x == low.x,
+            |x| self.held && x.x == low,
         )?;
         if limit.is_some() {
             solver.limit_kappa(limit);
@@ -227,6 +224,62 @@ impl Extreme {
             }
         }
         Ok(solver)
+    }
+
+    /// The body at its start as a simulation. Of extremes of state it is the body at rest.
+    pub(crate) fn simulation(&self, solver: SolverSpec) -> Result<Simulation, incise::Error> {
+        let (low, high) = self.ends();
+        let far = MaterialSpec {
+            regions: vec![Region::HalfSpace {
+                point: [0.5 * (low + high), 0.0, 0.0],
+                normal: [1.0, 0.0, 0.0],
+            }],
+            density: Some(self.material.density * self.density_ratio),
+            ..MaterialSpec::default()
+        };
+        let body = Body::new(self.mesh.clone())
+            .young_modulus(self.material.young_modulus)
+            .poisson_ratio(self.material.poisson_ratio)
+            .density(self.material.density)
+            .damping(self.material.damping)
+            .pinned(|x| self.held && x.x == low);
+        let mut builder = Simulation::builder();
+        builder.gravity(self.gravity().unwrap_or(DVec3::ZERO));
+        builder.solver(SolverSpec {
+            time_step: self.time_step,
+            ..solver
+        });
+        builder.report(ReportSpec {
+            quantities: vec![Quantity::Energy, Quantity::Volume, Quantity::Kappa],
+            ..ReportSpec::default()
+        });
+        builder.add_body(match self.density_ratio {
+            1.0 => body,
+            _ => body.material(far),
+        });
+        builder.build()
+    }
+
+    /// The smallest and the largest x at rest.
+    fn ends(&self) -> (f64, f64) {
+        let along = self.mesh.positions.iter().map(|x| x.x);
+        along.fold((f64::MAX, f64::MIN), |(low, high), x| {
+            (low.min(x), high.max(x))
+        })
+    }
+
+    /// The work of gravity over the length of the body, in J: the unit of energies.
+    pub(crate) fn work(&self) -> f64 {
+        let (low, high) = self.ends();
+        let middle = 0.5 * (low + high);
+        let tets = (0..self.mesh.tets.len()).map(TetId::new);
+        let mass = tets.map(|t| {
+            let center = self.mesh.corners(t).into_iter().sum::<DVec3>() / 4.0;
+            let is_far = center.x > middle;
+            let ratio = if is_far { self.density_ratio } else { 1.0 };
+            self.mesh.volume(t) * self.material.density * ratio
+        });
+        mass.sum::<f64>() * self.gravity * (high - low)
     }
 
     pub(crate) fn gravity(&self) -> Option<DVec3> {

@@ -1,9 +1,9 @@
 //! The columns of the matrix: methods with the settings that they are looked at with, precisions, backends.
 //!
-//! All but *substeps* take a frame in one step of twenty iterations (five with corrections), which is what a user does who knows nothing of kappa
-//! and what the paper does. *Split* is the default form with as many substeps as bring kappa to 0.5, at most 200, and
-//! nothing softened. *Softened* is the block form with the same substeps, tets that are still too stiff softened to kappa
-//! 1.
+//! *Default* is a simulation with the settings of an empty `[solver]` table, which choose method, substeps and precision.
+//! *Split* is the default form with as many substeps as bring kappa to 0.5, at most 200, and nothing softened. *Softened*
+//! is the block form with the same substeps, tets that are still too stiff softened to kappa 1. All others compute a frame
+//! in one step of twenty iterations (five with corrections), as the paper does.
 
 use incise::mesh::glam::DVec3;
 use incise::scene::{self, SolverSpec, Substeps, TetSolve as SceneTetSolve};
@@ -27,7 +27,9 @@ const ROUNDS: u32 = 5;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Method {
-    /// XPBD in split form, one iteration a substep, substeps by kappa, nothing softened: the default.
+    /// What a scene without settings gets.
+    Defaults,
+    /// XPBD in split form, one iteration a substep, substeps by kappa, nothing softened.
     Split,
     /// XPBD in block form, one iteration a substep, substeps by kappa, softened to a kappa of 1.
     Softened,
@@ -45,15 +47,16 @@ pub(crate) enum Method {
     Corrected,
 }
 
-use Method::{Block, Chebyshev, Corrected, Jacobi, Paper, Softened, Split, Vbd};
+use Method::{Block, Chebyshev, Corrected, Defaults, Jacobi, Paper, Softened, Split, Vbd};
 
 impl Method {
-    pub(crate) const ALL: [Self; 8] = [
-        Split, Softened, Block, Paper, Jacobi, Chebyshev, Vbd, Corrected,
+    pub(crate) const ALL: [Self; 9] = [
+        Defaults, Split, Softened, Block, Paper, Jacobi, Chebyshev, Vbd, Corrected,
     ];
 
     pub(crate) fn name(self) -> &'static str {
         match self {
+            Defaults => "default",
             Split => "split",
             Softened => "softened",
             Block => "block",
@@ -65,15 +68,15 @@ impl Method {
         }
     }
 
-    /// Whether it is a way through constraints, which kappa limits, and which a device can go as well.
+    /// Whether it is XPBD in all rows, which kappa limits, and which a device computes as well.
     pub(crate) fn is_xpbd(self) -> bool {
-        !matches!(self, Vbd | Corrected)
+        !matches!(self, Defaults | Vbd | Corrected)
     }
 
     /// Iterations, sweeps or rounds of a substep.
     fn iterations(self) -> u32 {
         match self {
-            Split | Softened => 1,
+            Defaults | Split | Softened => 1,
             Corrected => ROUNDS,
             _ => ITERATIONS,
         }
@@ -153,6 +156,7 @@ impl Method {
     /// The settings of a scene. What a cut leaves too stiff is softened in the columns of the block form.
     pub(crate) fn spec(self, column: Column) -> SolverSpec {
         let method = match self {
+            Defaults => scene::Method::Auto,
             Split | Softened | Block | Paper => scene::Method::GaussSeidel,
             Jacobi => scene::Method::Jacobi,
             Chebyshev => scene::Method::Chebyshev,
@@ -163,7 +167,7 @@ impl Method {
             _ => SolverSpec::of(method),
         };
         spec.substeps = match self {
-            Split | Softened => Substeps::Auto,
+            Defaults | Split | Softened => Substeps::Auto,
             _ => Substeps::Fixed(1),
         };
         spec.iterations = self.iterations();
@@ -174,6 +178,7 @@ impl Method {
         spec.time_step = 1.0 / 60.0;
         spec.two_level = self == Corrected;
         spec.precision = match column.precision {
+            Precision::Auto => scene::Precision::Auto,
             Precision::F32 => scene::Precision::F32,
             Precision::F64 => scene::Precision::F64,
         };
@@ -185,6 +190,8 @@ impl Method {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Precision {
+    /// Chosen by the simulation.
+    Auto,
     F32,
     F64,
 }
@@ -199,10 +206,17 @@ pub(crate) struct Column {
 }
 
 impl Column {
-    /// Every method in both precisions, and on a device what a device does.
+    /// What a scene without settings gets.
+    pub(crate) const DEFAULTS: Self = Self {
+        method: Defaults,
+        precision: Precision::Auto,
+        gpu: false,
+    };
+
+    /// The defaults, every other method in both precisions, and on a device what a device does.
     pub(crate) fn all(gpu: bool) -> Vec<Self> {
-        let mut columns = Vec::new();
-        for method in Method::ALL {
+        let mut columns = vec![Self::DEFAULTS];
+        for method in Method::ALL.into_iter().filter(|&m| m != Defaults) {
             for precision in [Precision::F32, Precision::F64] {
                 columns.push(Self {
                     method,
@@ -225,6 +239,7 @@ impl Column {
     pub(crate) fn place(self) -> &'static str {
         match (self.gpu, self.precision) {
             (true, _) => "GPU",
+            (false, Precision::Auto) => "auto",
             (false, Precision::F32) => "f32",
             (false, Precision::F64) => "f64",
         }

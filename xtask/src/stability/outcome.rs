@@ -14,6 +14,15 @@ pub(crate) struct Row {
     pub(crate) outcomes: Vec<Outcome>,
 }
 
+impl Row {
+    /// The columns of the row that has most of them.
+    pub(crate) fn columns(rows: &[Self]) -> Vec<Column> {
+        let longest = rows.iter().max_by_key(|row| row.outcomes.len());
+        let outcomes = longest.map_or(&[][..], |row| &row.outcomes);
+        outcomes.iter().map(|outcome| outcome.column).collect()
+    }
+}
+
 /// What became of a body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Outcome {
@@ -45,6 +54,12 @@ pub(crate) struct Outcome {
     pub(crate) softened: usize,
     /// Whether no particle has moved at all.
     pub(crate) frozen: bool,
+    /// Why no simulation of it could be built.
+    #[serde(default)]
+    pub(crate) refused: Option<String>,
+    /// Whether any frame carried a warning; only simulations warn.
+    #[serde(default)]
+    pub(crate) warned: bool,
 }
 
 impl Outcome {
@@ -66,6 +81,8 @@ impl Outcome {
             repaired: 0,
             softened: 0,
             frozen: false,
+            refused: None,
+            warned: false,
         }
     }
 }
@@ -83,6 +100,8 @@ const DISTANCE_TOLERANCE: f64 = 0.1;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Verdict {
     NotFinite,
+    /// A value is out of its range.
+    Refused,
     /// Less than half the volume, or more than twice.
     Collapsed,
     Frozen,
@@ -111,9 +130,12 @@ impl Verdict {
     pub(crate) fn color(self) -> Color {
         match self {
             Self::NotFinite | Self::Collapsed | Self::Frozen | Self::Inverted => Color::Red,
-            Self::Gains | Self::Repaired | Self::FewInverted | Self::Off | Self::Bent => {
-                Color::Yellow
-            }
+            Self::Refused
+            | Self::Gains
+            | Self::Repaired
+            | Self::FewInverted
+            | Self::Off
+            | Self::Bent => Color::Yellow,
             Self::Fine => Color::Green,
         }
     }
@@ -125,6 +147,8 @@ impl Outcome {
         let far = |distance: f64| distance > DISTANCE_TOLERANCE;
         if self.not_finite.is_some() {
             Verdict::NotFinite
+        } else if self.refused.is_some() {
+            Verdict::Refused
         } else if !(0.5..=2.0).contains(&self.volume) {
             Verdict::Collapsed
         } else if self.frozen {
@@ -146,11 +170,17 @@ impl Outcome {
         }
     }
 
-    /// The same in words.
+    /// The verdict in words, with whether the simulation warned.
     pub(crate) fn words(&self, is_state: bool) -> String {
+        let warned = if self.warned { ", warned" } else { "" };
+        self.verdict_in_words(is_state) + warned
+    }
+
+    fn verdict_in_words(&self, is_state: bool) -> String {
         match self.verdict(is_state) {
             Verdict::NotFinite => "NOT FINITE".to_owned(),
             Verdict::Collapsed => format!("collapsed {}", ratio(self.volume)),
+            Verdict::Refused => "refused".to_owned(),
             Verdict::Frozen => "frozen".to_owned(),
             Verdict::Inverted | Verdict::FewInverted => format!("{} inverted", self.inverted),
             Verdict::Gains => format!("energy {:.0e}", self.energy_rise),

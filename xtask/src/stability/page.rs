@@ -11,8 +11,9 @@ A beam of 1 m × 0.25 m × 0.25 m, E = 1e6 Pa, Poisson's ratio 0.45, with one th
 are left alone without gravity, one end held or none; all others are held at one end and fall from rest. Those of cutting \
 are scenes with a softer beam (E = 1e4 Pa), in which everything is recomputed and compared after each stroke.
 
-*split*, the default, is XPBD in split form by as many substeps of one iteration as bring kappa to 0.5, at most 200, \
-nothing softened; *softened* is the block form with the same substeps, tets that are still too stiff softened to kappa 1. \
+*default* is a simulation with an empty `[solver]` table, which chooses method, substeps and precision; `warned` means \
+that it gave a warning. A simulation starts at rest, so this column has no extremes of state. *split* is XPBD in split \
+form by as many substeps of one iteration as bring kappa to 0.5, at most 200, nothing softened; *softened* is the block form with the same substeps, tets that are still too stiff softened to kappa 1. \
 All others take a frame in one step of 20 iterations: *block*, XPBD in \
 block form; *paper*, one constraint of a tet after the other, relaxation 0.8, clusters of 10; *Jacobi* and *Chebyshev* \
 (spectral radius 0.9) with relaxation 0.1; *vbd*, 20 sweeps; *corrected*, 5 sweeps, a correction of the whole body after each.
@@ -22,7 +23,7 @@ that are, at most 2 %; `volume 1.07`, over that at rest; `energy 3e1`, it rose s
 begin with (elastic energy, and the work of gravity over the length of the body); `bent 20 %`, root of the mean squared \
 distance from the shape at rest, up to a rigid motion, over the length of the body; `7 repaired`, particles that would \
 not have been finite and were put back. Red: more tets inverted; `collapsed 0.2`, less than half the volume or more than \
-twice; `frozen`, nothing moved; `NOT FINITE`. Nothing here speaks of accuracy.";
+twice; `frozen`, nothing moved; yellow too: `refused`, a value is out of its range; `NOT FINITE`. Nothing here speaks of accuracy.";
 
 pub(super) fn page(rows: &[Row]) -> anyhow::Result<Page> {
     let mut parts = vec![
@@ -84,7 +85,7 @@ fn words(rows: &[Row]) -> Table {
                 .collect();
             if said.iter().all(|(_, words)| *words == said[0].1) {
                 said.first()
-                    .map_or(String::new(), |(_, words)| words.clone())
+                    .map_or("–".to_owned(), |(_, words)| words.clone())
             } else {
                 let said = said
                     .iter()
@@ -131,7 +132,7 @@ fn recovery(rows: &[Row]) -> Table {
         let cells = Method::ALL.map(|method| {
             let of_method = |o: &&Outcome| o.column.method == method && o.column.place() == "f64";
             let outcome = row.outcomes.iter().find(of_method);
-            outcome.map_or(String::new(), |outcome| {
+            outcome.map_or("–".to_owned(), |outcome| {
                 let time = match outcome.in_shape_from {
                     Some(time) => format!("{time:.2} s"),
                     None => "never".to_owned(),
@@ -160,8 +161,7 @@ fn methods(rows: &[Row]) -> Table {
             "most softened tets",
         ],
     );
-    let columns = rows.first().map_or(&[][..], |row| &row.outcomes);
-    for column in columns.iter().map(|outcome| outcome.column) {
+    for column in Row::columns(rows) {
         let mine = || all(rows).filter(|(_, o)| o.column == column);
         let colored = |color| {
             let verdicts = mine().map(|(row, o)| o.verdict(row.is_state));

@@ -5,15 +5,13 @@ use std::fmt::Write;
 use super::outcome::{Color, Row};
 
 /// Width of a box, height of a line and width of the names in pixels.
-const BOX: usize = 84;
+const BOX: usize = 104;
 const LINE: usize = 18;
 const NAMES: usize = 250;
 
-/// All rows must have the same columns.
 pub(super) fn draw(rows: &[Row]) -> String {
-    let columns: Vec<_> = rows.first().map_or(Vec::new(), |row| {
-        row.outcomes.iter().map(|o| o.column).collect()
-    });
+    let columns = Row::columns(rows);
+    let place = |column| columns.iter().position(|&other| other == column);
     let (width, height) = (NAMES + BOX * columns.len() + 4, LINE * (rows.len() + 2) + 4);
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" \
@@ -37,7 +35,10 @@ pub(super) fn draw(rows: &[Row]) -> String {
         line(4, r + 2, "normal", &row.name);
     }
     for (r, row) in rows.iter().enumerate() {
-        for (c, outcome) in row.outcomes.iter().enumerate() {
+        for outcome in &row.outcomes {
+            let Some(c) = place(outcome.column) else {
+                continue;
+            };
             let fill = match outcome.verdict(row.is_state).color() {
                 Color::Green => "#b7e1b0",
                 Color::Yellow => "#f6e58d",

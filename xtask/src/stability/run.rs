@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
+use anyhow::Context;
 use incise::gpu::{ClusterMapping, GpuContext, GpuSolver};
 use incise::mesh::glam::DVec3;
 use incise::xpbd::{Real, Solver};
 
+use super::cuts;
 use super::extremes::Extreme;
 use super::methods::{Column, Precision};
 use super::outcome::{Outcome, VOLUME_TOLERANCE};
@@ -21,9 +23,34 @@ pub(crate) fn run(
 ) -> anyhow::Result<Outcome> {
     match (gpu.filter(|_| column.gpu), column.precision) {
         (Some(gpu), _) => on_device(extreme, column, gpu),
+        (None, Precision::Auto) => simulate(extreme, column),
         (None, Precision::F32) => on_processor::<f32>(extreme, column),
         (None, Precision::F64) => on_processor::<f64>(extreme, column),
     }
+}
+
+/// Runs it as a simulation, which chooses method, substeps and precision.
+fn simulate(extreme: &Extreme, column: Column) -> anyhow::Result<Outcome> {
+    let mut simulation = match extreme.simulation(column.method.spec(column)) {
+        Ok(simulation) => simulation,
+        Err(error) => {
+            return Ok(Outcome {
+                refused: Some(error.to_string()),
+                ..Outcome::new(column)
+            });
+        }
+    };
+    let start = simulation.positions().to_vec();
+    let mut watch = cuts::Watch::new(column, extreme.work());
+    watch.outcome.frozen = true;
+    for _ in 0..extreme.frames() {
+        simulation.step().context("the default settings")?;
+        watch.outcome.frozen &= simulation.positions() == start;
+        if !watch.look(&simulation)? {
+            break;
+        }
+    }
+    Ok(watch.outcome)
 }
 
 fn on_processor<R: Real>(extreme: &Extreme, column: Column) -> anyhow::Result<Outcome> {
@@ -100,17 +127,12 @@ impl<'a> Watch<'a> {
         solver.positions(&mut start);
         let gravity = extreme.gravity();
         let energy = solver.energy(gravity);
-        let mass: f64 = (0..solver.particle_count()).map(|p| solver.mass(p)).sum();
-        let ends = (f64::MAX, f64::MIN);
-        let along = extreme.mesh.positions.iter().map(|x| x.x);
-        let (low, high) = along.fold(ends, |(low, high), x| (low.min(x), high.max(x)));
-        let work = mass * gravity.map_or(0.0, DVec3::length) * (high - low);
         Self {
             extreme,
             now: start.clone(),
             start,
             energy_at_start: energy.kinetic + energy.elastic + energy.gravity,
-            unit: (energy.elastic + work).max(f64::MIN_POSITIVE),
+            unit: (energy.elastic + extreme.work()).max(f64::MIN_POSITIVE),
             momentum: [0.0; 2],
             outcome: Outcome {
                 tets: solver.tet_count(),
