@@ -22,6 +22,7 @@ use crate::{ClusteringError, greedy_k_neighbor, pressure, serial_neighbor_incide
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Method {
     /// Every constraint alone: `none`.
     #[default]

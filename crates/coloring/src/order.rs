@@ -15,6 +15,7 @@ use crate::{Conflicts, priority_order};
 /// Who chooses first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Order {
     /// By number.
     Natural,

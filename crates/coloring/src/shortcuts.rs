@@ -21,6 +21,7 @@
 /// # Ok::<(), incise_graph::GraphError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Shortcuts {
     /// Pass a neighbor that cannot take the best color any more (lines 6-7).
     pub one: bool,

@@ -23,6 +23,7 @@ use crate::{ColoringError, Conflicts};
 
 /// Who keeps a color that neighbors picked, too.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Tie {
     /// The highest number among neighbors that picked the same color.
     #[default]

@@ -15,6 +15,7 @@ use crate::{BoundaryTriangle, CutError};
 /// it, and a list of the boundary triangles. Strokes change both in place and return what they changed
 /// as a [`crate::CutDelta`].
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CuttableMesh {
     pub(crate) mesh: TetMesh,
     pub(crate) stars: VertexStars,

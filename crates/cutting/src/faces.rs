@@ -24,6 +24,7 @@ const OPPOSITE: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
 /// A face by its place `4 tet + corner it lies opposite to`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Face(u32);
 
 impl Face {
@@ -72,6 +73,7 @@ pub(crate) enum Behind {
 
 /// The faces of all tets.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Faces {
     links: Vec<u32>,
     /// The boundary triangles, in the order in which they came to be.

@@ -14,6 +14,7 @@ const HALVINGS: usize = 60;
 
 /// A segment whose ends move on straight lines.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct MovingSegment {
     pub(crate) before: [DVec3; 2],
     pub(crate) now: [DVec3; 2],

@@ -45,6 +45,7 @@ const ALIGNED: f64 = 0.9;
 /// # Ok::<(), incise_cutting::CutError>(())
 /// ```
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CutMemory {
     /// Strokes so far.
     strokes: u32,

@@ -31,6 +31,7 @@ use crate::{CutDelta, CuttableMesh};
 
 /// A box along axes of its own.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Slabs {
     axes: [DVec3; 3],
     low: [f64; 3],
@@ -89,6 +90,7 @@ impl Slabs {
 
 /// A blade segment with the region it sweeps in a frame.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct SweptSegment {
     pub(crate) segment: MovingSegment,
     swept: Slabs,
@@ -124,6 +126,7 @@ fn scan(mesh: &TetMesh, before: &[DVec3], now: &[DVec3], segment: &SweptSegment)
 
 /// Particles for each segment of a blade.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Lists {
     particles: Vec<ParticleId>,
     ends: Vec<usize>,
@@ -145,6 +148,7 @@ impl Lists {
 ///
 /// It remembers particles, not tets: what becomes of the tets around a particle, the lists around it tell.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Search {
     /// The particles of the tets near each segment in the last frame.
     known: Lists,
@@ -307,6 +311,7 @@ impl<O: Fn(ParticleId) -> u8> Flood<'_, O> {
 
 /// What a flood knows of the particles it came by: the number of the flood and eight bits.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Marks {
     flood: u32,
     marks: Vec<u32>,

@@ -4,6 +4,7 @@ use crate::CutError;
 
 /// How a body comes apart at the particles on a cut.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Separation {
     /// Faces on the surface with tets on both sides are cut; the parts of a particle's star that no uncut face joins
     /// get a particle each. Right for snapped particles, partial cuts, repeated cuts and edges where more than two
@@ -22,6 +23,7 @@ pub enum Separation {
 
 /// How crossings close to a particle are treated.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CutOptions {
     /// A crossing within this fraction of its edge from one end moves to that end: the surface bends to the particle,
     /// the particle stays where it is. From 0 (off) to 0.25. Larger values give fewer and better shaped tets and a

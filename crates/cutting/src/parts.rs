@@ -25,6 +25,7 @@ const NONE: u32 = u32::MAX;
 
 /// Searches and what they have found. Kept from cut to cut so that a cut asks for no memory that another has freed.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Parts {
     /// By particle: the search that found it first.
     search_of: Vec<u32>,
@@ -40,6 +41,7 @@ pub(crate) struct Parts {
 }
 
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Found {
     particle: ParticleId,
     next: u32,
@@ -47,12 +49,14 @@ struct Found {
 
 /// A first-in first-out list through [`Found::next`].
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct List {
     first: u32,
     last: u32,
 }
 
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Search {
     /// The search it has become one with, or itself.
     parent: u32,

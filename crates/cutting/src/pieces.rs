@@ -23,6 +23,7 @@ use crate::{CutDelta, CutError, CuttableMesh};
 
 /// A piece of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Piece {
     /// Its number. Pieces are numbered from 0 as they come to be; no number is used twice.
     pub id: u32,
@@ -82,6 +83,7 @@ pub enum PieceEvent {
 /// # Ok::<(), incise_cutting::CutError>(())
 /// ```
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PieceTracker {
     piece_of: Vec<u32>,
     /// By id, those without tets included.
@@ -91,6 +93,7 @@ pub struct PieceTracker {
 }
 
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Record {
     parent: Option<u32>,
     tets: usize,
@@ -100,6 +103,7 @@ struct Record {
 /// A sum with the rounding error of its additions kept (A. Neumaier, 1974): what is left of a body that is taken away
 /// bit by bit would else be known only as precisely as the whole.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Sum {
     value: f64,
     error: f64,

@@ -13,6 +13,7 @@ use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
 /// A plane through a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Plane {
     /// A point on the plane in m.
     pub point: DVec3,

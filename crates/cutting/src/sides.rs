@@ -19,6 +19,7 @@ use crate::surface::CutSurface;
 
 /// The sides given to tets with all particles on the surface, for as long as they are not split.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct GivenSides(HashMap<TetId, bool, FixedState>);
 
 impl GivenSides {

@@ -10,6 +10,7 @@ const NONE: u32 = u32::MAX;
 
 /// The tets around each particle.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct VertexStars {
     head: Vec<u32>,
     next: Vec<u32>,

@@ -60,6 +60,7 @@ pub(crate) trait Blade: Sync {
 
 /// The particles' positions at the beginning and the end of a frame.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Motion {
     pub(crate) before: Vec<DVec3>,
     pub(crate) now: Vec<DVec3>,
@@ -83,6 +84,7 @@ impl Motion {
 
 /// The state of a stroke.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Stroke {
     options: CutOptions,
     surface: CutSurface,

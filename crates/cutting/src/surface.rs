@@ -17,6 +17,7 @@ use crate::CutDelta;
 
 /// The tangent plane of a surface at a crossing, in the rest shape.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Tangent {
     pub(crate) point: DVec3,
     /// Unit length, towards the positive side.
@@ -31,6 +32,7 @@ impl Tangent {
 
 /// What one particle remembers.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Mark {
     /// The surface there, if the particle is on it.
     pub(crate) tangent: Option<Tangent>,
@@ -55,6 +57,7 @@ impl Mark {
 
 /// On which side of the surface a particle was when one of its edges was met.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 enum Seen {
     #[default]
     Never,
@@ -64,6 +67,7 @@ enum Seen {
 
 /// The particles along the surface of a stroke. The map is never iterated.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct CutSurface {
     marks: HashMap<ParticleId, Mark, FixedState>,
     /// Particles whose marks changed since a memory was last told, if it ever was.

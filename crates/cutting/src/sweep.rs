@@ -19,6 +19,7 @@ use crate::stroke::{Blade, Motion, Stroke};
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
 /// A blade on its way from one pose to the next.
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct MovingBlade(Vec<SweptSegment>);
 
 impl Blade for MovingBlade {
@@ -74,6 +75,7 @@ impl Blade for MovingBlade {
 /// # Ok::<(), incise_cutting::CutError>(())
 /// ```
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sweep {
     blade: Vec<DVec3>,
     /// Positions of the particles at the last pose.

@@ -18,6 +18,7 @@ const SLACK: f64 = 1.0 + 1e-6;
 
 /// A box around the boundary triangles whose places are `TILE` in a row.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Tile {
     bounds: Bounds,
     /// How far the triangles can have moved since it was fit.
@@ -28,6 +29,7 @@ struct Tile {
 
 /// The boxes around all boundary triangles.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Tiles {
     tiles: Vec<Tile>,
     /// How far the particles moved in this frame, at most.

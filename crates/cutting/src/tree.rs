@@ -9,6 +9,7 @@ use incise_mesh::Bounds;
 const LEAF: usize = 4;
 
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Node {
     bounds: Bounds,
     /// The items below it, in the tree's order.
@@ -20,6 +21,7 @@ struct Node {
 
 /// A tree over numbered boxes. The nodes lie in the order of a walk, each before those below it.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct BoxTree {
     nodes: Vec<Node>,
     order: Vec<usize>,

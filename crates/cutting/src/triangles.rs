@@ -38,6 +38,7 @@ const BESIDE: f64 = 1.0 / 64.0;
 /// strip) has a seam somewhere, at which tets may hang together. Surfaces may cross themselves; crossings within one
 /// tet may leave it uncut there, as with two strokes at the same time.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TriangleSurface {
     points: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,

@@ -29,6 +29,7 @@ use crate::{Classes, ClusterId, GraphError};
 /// # Ok::<(), incise_graph::GraphError>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Clustering {
     labels: Vec<ClusterId>,
     sizes: Vec<u32>,

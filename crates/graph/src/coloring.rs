@@ -13,6 +13,7 @@ use crate::{Classes, ColorId, ConstraintGraph, GraphError, Incidence};
 /// recoloring may leave gaps. Nothing here assumes that the coloring is proper: call
 /// [`verify`](Self::verify).
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Coloring {
     colors: Vec<ColorId>,
 }

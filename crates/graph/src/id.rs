@@ -8,12 +8,14 @@ use std::fmt;
 /// The number of a cluster, from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(transparent)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ClusterId(pub u32);
 
 /// The number of a color, from 0. Colors are never limited to a machine word or to 8 bits: one
 /// particle with 600 constraints needs 600 of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(transparent)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ColorId(pub u32);
 
 impl ClusterId {

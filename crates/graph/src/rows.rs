@@ -13,6 +13,7 @@ use crate::csr::offset;
 const SPARE: usize = 64;
 
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Span {
     start: u32,
     length: u32,
@@ -35,6 +36,7 @@ struct Span {
 /// assert_eq!((rows.row(0), rows.row(1)), (&['b', 'd'][..], &['c'][..]));
 /// ```
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Rows<T> {
     spans: Vec<Span>,
     values: Vec<T>,

@@ -22,6 +22,7 @@ const NONE: u32 = u32::MAX;
 /// Color -> clusters -> constraints in solving order. The example is in the [crate
 /// documentation](crate).
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Schedule {
     /// Color -> clusters.
     colors: Rows<ClusterId>,
@@ -35,6 +36,7 @@ pub struct Schedule {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Seat {
     color: u32,
     place: u32,

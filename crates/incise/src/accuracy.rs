@@ -59,6 +59,7 @@ pub(crate) fn is_nearly_incompressible(kappa: f64, poisson_ratio: f64, form: Tet
 
 /// The volume of the tets that are solved less accurately than asked for, kept up to date over cuts.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct OutsideVolume {
     /// The largest accurate kappa by material; empty where no accuracy is judged.
     limits: Vec<f64>,

@@ -17,6 +17,7 @@ use crate::scene::{AttachmentSpec, along};
 
 /// Names an attachment of a simulation from when it is added until it is removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub struct AttachmentHandle(pub(crate) u32);
 
 impl AttachmentHandle {
@@ -28,6 +29,7 @@ impl AttachmentHandle {
 
 /// What moves an attachment.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 enum Motion {
     /// Its path.
     Path,
@@ -37,6 +39,7 @@ enum Motion {
 
 /// An attachment, checked.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Attachment {
     pub(crate) name: AttachmentHandle,
     /// Its key in the scene.

@@ -20,15 +20,19 @@ use crate::vbd::Vbd;
 
 /// A solver in one of both precisions.
 #[derive(Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) enum AnySolver {
     Single(Backend<f32>),
     Double(Backend<f64>),
     #[cfg(feature = "gpu")]
+    #[cfg_attr(feature = "save", serde(skip))]
     Device(Box<Device>),
 }
 
 /// A solver and what its method needs beside it.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "save", serde(bound = ""))]
 pub(crate) struct Backend<R: Real> {
     pub(crate) solver: Solver<R>,
     /// In a scene that is solved by VBD.

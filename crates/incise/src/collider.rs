@@ -24,6 +24,7 @@ pub(crate) fn colliders(scene: &Scene) -> Result<Vec<Collider>, Error> {
 
 /// Names a collider of a simulation from when it is added until it is removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub struct ColliderHandle(u32);
 
 impl ColliderHandle {
@@ -35,6 +36,7 @@ impl ColliderHandle {
 
 /// Which collider of the settings of all groups each handle names.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Colliders {
     /// In the order of the settings; the ground has none.
     handles: Vec<Option<ColliderHandle>>,

@@ -14,6 +14,7 @@ use crate::{Error, Scene};
 
 /// Names a distance constraint of a simulation from when it is added until it is removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub struct DistanceHandle(pub(crate) u32);
 
 impl DistanceHandle {
@@ -92,6 +93,7 @@ pub(crate) fn constraint(
 
 /// The distance constraints of a group.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Distances {
     names: Vec<DistanceHandle>,
     list: Vec<DistanceConstraint>,

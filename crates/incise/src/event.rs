@@ -5,6 +5,7 @@ use crate::report::DetachedReport;
 /// Something that happened in the last frame: [`Simulation::events`](crate::Simulation::events).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub enum Event {
     /// A stroke has changed the mesh for the first time.
     CutBegan {

@@ -25,6 +25,7 @@ pub struct Grab {
 
 /// A handle for grabs.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 struct Grip {
     /// Its number in the solver.
     handle: u32,
@@ -42,6 +43,7 @@ struct Grip {
 
 /// The grabs of a group.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Hand {
     grips: Vec<Grip>,
 }

@@ -36,6 +36,7 @@ use crate::{Error, Scene, collider, distance};
 
 /// Bodies that are solved together. A copy has the state as it is known here, and its solver on the processor.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Group {
     /// The numbers of its bodies in the scene, ascending.
     pub(crate) bodies: Vec<usize>,
@@ -48,6 +49,7 @@ pub(crate) struct Group {
     /// Its colliders are where they are at the start of the next frame.
     pub(crate) settings: StepSettings,
     /// The settings of the solver as a scene says them, with the method that was chosen.
+    #[cfg_attr(feature = "save", serde(with = "crate::saved::as_toml"))]
     pub(crate) spec: SolverSpec,
     /// Whether no body of it names a number of substeps.
     pub(crate) leaves_substeps_open: bool,
@@ -69,6 +71,7 @@ pub(crate) struct Group {
     /// Volume at rest in m³ that strokes have taken away.
     pub(crate) removed_volume: f64,
     /// What was chosen, if the scene left it open.
+    #[cfg_attr(feature = "save", serde(with = "crate::substeps::saved"))]
     pub(crate) choice: Option<Choice>,
     /// The substeps before all cuts.
     first_substeps: u32,
@@ -92,6 +95,7 @@ pub(crate) struct Group {
 
 /// What a group costs and may cost.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Budget {
     /// Milliseconds of a substep for each tet.
     pub(crate) per_tet: f64,
@@ -119,6 +123,7 @@ fn whole(number: f64) -> u32 {
 
 /// What cuts did to kappa.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct CutKappa {
     /// The largest of a tet before.
     pub(crate) before: Option<f64>,

@@ -49,6 +49,8 @@ mod ray;
 mod recluster;
 mod region;
 pub mod report;
+#[cfg(feature = "save")]
+mod saved;
 pub mod scene;
 mod simulation;
 mod sleep;

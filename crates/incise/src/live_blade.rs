@@ -11,6 +11,7 @@ use crate::limits::coordinates;
 
 /// How far a blade is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 enum Progress {
     /// A frame has carried out its pose, or it is its first one, which does not cut.
     Arrived,
@@ -22,6 +23,7 @@ enum Progress {
 
 /// A blade in somebody's hand.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct LiveBlade {
     pose: Vec<DVec3>,
     progress: Progress,

@@ -18,6 +18,7 @@ use crate::report::{DetachedReport, PieceReport};
 
 /// A piece of the scene.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 struct Number {
     group: usize,
     /// Its number in the group.
@@ -28,6 +29,7 @@ struct Number {
 
 /// The pieces of all groups.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct PieceNumbers {
     /// By number in the scene.
     pieces: Vec<Number>,
@@ -37,6 +39,7 @@ pub(crate) struct PieceNumbers {
 
 /// The numbers in the scene of a group's pieces.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 struct Numbers(Vec<u32>);
 
 impl PieceNumbers {

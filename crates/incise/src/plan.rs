@@ -21,6 +21,7 @@ const SLACK: usize = 4;
 
 /// Who is solved when.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Plan {
     pub(crate) clustering: Clustering,
     recoloring: Recoloring,
@@ -28,11 +29,13 @@ pub(crate) struct Plan {
     recipe: Recipe,
     /// Colors and mean cluster size when all was made anew last.
     fresh: [f64; 2],
+    #[cfg_attr(feature = "save", serde(skip))]
     lists: Lists,
 }
 
 /// How a plan is made and kept.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Recipe {
     method: Method,
     algorithm: Algorithm,

@@ -24,6 +24,7 @@ use crate::scene::ReclusterSpec;
 
 /// What watches over the wear of a plan.
 #[derive(Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Recluster {
     spec: ReclusterSpec,
     pending: Option<Pending>,
@@ -41,6 +42,7 @@ impl Clone for Recluster {
 
 /// A plan in the making.
 #[derive(Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 struct Pending {
     /// The frame that takes it.
     due: u64,
@@ -51,9 +53,12 @@ struct Pending {
 
 /// A plan, or who makes it.
 #[derive(Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 enum Making {
-    Thread(JoinHandle<Result<Plan, Error>>),
     Made(Box<Plan>),
+    // Last, since a variant that is skipped must not shift the numbers of others. A snapshot has none.
+    #[cfg_attr(feature = "save", serde(skip))]
+    Thread(JoinHandle<Result<Plan, Error>>),
 }
 
 impl Recluster {

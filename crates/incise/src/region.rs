@@ -9,6 +9,7 @@ use crate::scene::Region;
 
 /// A part of space.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) enum Solid {
     HalfSpace { point: DVec3, normal: DVec3 },
     Box { low: DVec3, high: DVec3 },

@@ -216,6 +216,7 @@ impl Default for CutReport {
 /// A part that came off a piece and is a piece of its own from now on.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
+#[cfg_attr(feature = "save", derive(serde::Deserialize))]
 pub struct DetachedReport {
     /// The number of the new piece.
     pub piece: u32,

@@ -14,6 +14,7 @@ use crate::scene::SleepSpec;
 
 /// The rest of a group.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Rest {
     spec: SleepSpec,
     /// Time at rest so far in s.

@@ -14,6 +14,7 @@ use crate::{Error, Event};
 
 /// A stroke and how far it is.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 struct Stroke {
     field: String,
     tool: Tool,
@@ -28,6 +29,7 @@ struct Stroke {
 
 /// The strokes that are not finished.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Timeline {
     strokes: Vec<Stroke>,
     added: u32,

@@ -24,6 +24,7 @@ const SLIVER_KAPPA: f64 = 4.0;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
+#[cfg_attr(feature = "save", derive(serde::Deserialize))]
 pub enum Missed {
     /// They want more than `max_substeps`.
     Cap,
@@ -59,6 +60,45 @@ pub struct Choice {
     /// Whether VBD takes the place of substeps.
     #[serde(skip)]
     pub(crate) by_vbd: bool,
+}
+
+/// A choice with the fields that reports leave out: `#[serde(with = "saved")]`.
+#[cfg(feature = "save")]
+pub(crate) mod saved {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    use super::{Choice, Missed};
+
+    #[derive(Serialize, Deserialize)]
+    #[serde(remote = "Choice")]
+    struct All {
+        substeps_wanted: u32,
+        substeps_needed: u32,
+        substeps: u32,
+        missed: Option<Missed>,
+        sliver_tets: usize,
+        sliver_volume_fraction: f64,
+        expected_error: f64,
+        nearly_incompressible: bool,
+        by_vbd: bool,
+    }
+
+    #[derive(Serialize, Deserialize)]
+    struct Saved(#[serde(with = "All")] Choice);
+
+    pub(crate) fn serialize<S: Serializer>(
+        choice: &Option<Choice>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        choice.map(Saved).serialize(serializer)
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Option<Choice>, D::Error> {
+        let saved = Option::<Saved>::deserialize(deserializer)?;
+        Ok(saved.map(|saved| saved.0))
+    }
 }
 
 impl Choice {

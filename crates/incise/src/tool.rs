@@ -11,6 +11,7 @@ use crate::scene::{Region, StrokeSpec};
 
 /// What a stroke cuts with.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) enum Tool {
     Plane(Plane),
     Surface(TriangleSurface),

@@ -34,6 +34,8 @@ const MORE_COLORS: usize = 3;
 
 /// The state of VBD beside that of the solver.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "save", serde(bound = ""))]
 pub(crate) struct Vbd<R: Real> {
     stars: VertexStars<R>,
     /// The color of each particle, and how many there were when all were colored.

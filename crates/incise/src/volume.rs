@@ -15,6 +15,7 @@ use crate::backend::{AnySolver, each_mut};
 
 /// What the body of each material of a group asks for.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Volumes {
     compliances: Vec<Option<f64>>,
 }

@@ -16,6 +16,7 @@ use crate::substeps::{Choice, Missed};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
+#[cfg_attr(feature = "save", derive(serde::Deserialize))]
 pub enum WarningCode {
     /// The accuracy wanted needs more substeps than `max_substeps`.
     SubstepsCapped,
@@ -47,6 +48,7 @@ pub enum WarningCode {
 /// What a user of a result must know about it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
+#[cfg_attr(feature = "save", derive(serde::Deserialize))]
 pub struct Warning {
     /// Its kind.
     pub code: WarningCode,

@@ -20,6 +20,7 @@ use crate::group::Group;
 
 /// The numbers in the whole of a group's particles and tets.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 struct Numbers {
     particles: Vec<ParticleId>,
     tets: Vec<TetId>,
@@ -43,6 +44,7 @@ impl Numbers {
 
 /// All groups as one mesh.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Whole {
     pub(crate) mesh: TetMesh,
     pub(crate) positions: Vec<DVec3>,

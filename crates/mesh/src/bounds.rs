@@ -4,6 +4,7 @@ use glam::DVec3;
 
 /// A box along the axes; empty where `low` exceeds `high`.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Bounds {
     /// The low corner.
     pub low: DVec3,

@@ -11,6 +11,7 @@ use crate::{ParticleId, TetId};
 ///
 /// A tet `[a, b, c, d]` is positively oriented when `(b - a) × (c - a) · (d - a) > 0`.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TetMesh {
     /// Position of each particle, in meters.
     pub positions: Vec<DVec3>,

@@ -34,6 +34,7 @@ pub(crate) use solid::{Nearest, Solid};
 /// # Ok::<(), incise_xpbd::XpbdError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Collider {
     /// Its shape and place at the start of the frame.
     pub shape: ColliderShape,
@@ -45,6 +46,7 @@ pub struct Collider {
 
 /// The shape of a collider.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum ColliderShape {
     /// A half space, free on the side that the normal points to.
     Plane {

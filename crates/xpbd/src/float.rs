@@ -12,6 +12,18 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use fearless_simd::{Simd, SimdFloat, SimdFloatElement};
 use glam::{DVec3, Vec3};
 
+/// What can be written and read, with the feature `serde`; everything without it.
+#[cfg(feature = "serde")]
+pub trait Saved: serde::Serialize + serde::de::DeserializeOwned {}
+#[cfg(feature = "serde")]
+impl<T: serde::Serialize + serde::de::DeserializeOwned> Saved for T {}
+
+/// What can be written and read, with the feature `serde`; everything without it.
+#[cfg(not(feature = "serde"))]
+pub trait Saved {}
+#[cfg(not(feature = "serde"))]
+impl<T> Saved for T {}
+
 /// Arithmetic of the scalar that a solver computes with: `f32` or `f64`. Code that steps solvers asks for
 /// [`crate::Real`].
 pub trait Float:
@@ -27,6 +39,7 @@ pub trait Float:
     + Div<Output = Self>
     + Neg<Output = Self>
     + SimdFloatElement
+    + Saved
     + 'static
 {
     /// The vector of three such scalars.
@@ -39,11 +52,12 @@ pub trait Float:
         + AddAssign
         + Sub<Output = Self::Vector>
         + Neg<Output = Self::Vector>
-        + Mul<Self, Output = Self::Vector>;
+        + Mul<Self, Output = Self::Vector>
+        + Saved;
     /// A cell that threads may share.
     type Atomic: Debug + Send + Sync;
     /// Four scalars that threads may share: the position of a particle and its inverse mass.
-    type Particle: Debug + Send + Sync;
+    type Particle: Debug + Send + Sync + Saved;
     /// As many scalars as an instruction of a processor takes.
     #[doc(hidden)]
     type Lanes<S: Simd>: SimdFloat<S, Element = Self>;

@@ -76,6 +76,8 @@ pub use constraints::{
 pub use device::TetData;
 pub use error::XpbdError;
 pub use float::Float;
+#[doc(hidden)]
+pub use float::Saved;
 pub use material::Material;
 pub use measure::{Energy, Softened, Volume};
 pub use pose::Pose;

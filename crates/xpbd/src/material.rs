@@ -9,6 +9,7 @@ use crate::XpbdError;
 
 /// The material of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Material {
     /// Young's modulus in Pa, positive.
     pub young_modulus: f64,

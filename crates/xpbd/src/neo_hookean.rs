@@ -24,6 +24,7 @@ pub(crate) const SHORTENINGS: u32 = 3;
 
 /// A tet with what the solver needs of its rest shape: 64 bytes in single precision.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct TetConstraint<R> {
     pub(crate) particles: [u32; 4],
     /// Inverse of the rest edge matrix, row by row: row i is the gradient of the barycentric coordinate of corner i + 1.

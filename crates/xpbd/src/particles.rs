@@ -15,6 +15,8 @@ pub(crate) const PARALLEL_PARTICLES: usize = 4096;
 
 /// The particles of a solver.
 #[derive(Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub(crate) struct Particles<R: Float> {
     /// What positions are relative to.
     pub(crate) origin: DVec3,

@@ -4,6 +4,7 @@ use glam::{DQuat, DVec3};
 
 /// Where a handle is and how it is turned.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pose {
     /// Position in m.
     pub position: DVec3,

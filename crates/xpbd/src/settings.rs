@@ -12,6 +12,7 @@ use crate::{Collider, XpbdError};
 ///
 /// In single precision a substep can be too short: see [`shortest_substep_of_f32`].
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct StepSettings {
     /// Time of a frame in s, positive.
     pub time_step: f64,
@@ -47,6 +48,7 @@ pub fn shortest_substep_of_f32(size: f64) -> f64 {
 
 /// How an iteration over the constraints is made.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Method {
     /// Color after color, each constraint seeing the corrections before it.
     #[default]
@@ -68,6 +70,7 @@ pub enum Method {
 ///
 /// All three have the same energy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum TetSolve {
     /// A shear part and a volume part that both vanish at rest. A body at rest stays at rest and a loaded body stays
     /// bounded at any stiffness, so the number of substeps is a matter of accuracy alone.

@@ -34,6 +34,8 @@ pub struct StepReport {
 
 /// What residuals need of the last substep.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub(crate) struct LastSubstep<R: Float> {
     /// Positions before the constraints were solved; empty if they were not kept.
     pub(crate) predicted: Vec<R::Vector>,
@@ -57,12 +59,18 @@ impl<R: Float> LastSubstep<R> {
 
 /// What steps through frames.
 #[derive(Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub(crate) struct Stepper<R: Float> {
     /// The instructions that this processor has.
+    #[cfg_attr(feature = "serde", serde(skip, default = "Level::new"))]
     level: Level,
     /// By block and lane of the layout; only while a step has more than one iteration or is asked for its residuals.
+    #[cfg_attr(feature = "serde", serde(skip))]
     multipliers: Vec<R::Atomic>,
+    #[cfg_attr(feature = "serde", serde(skip))]
     jacobi: Option<Jacobi<R>>,
+    #[cfg_attr(feature = "serde", serde(skip))]
     damping: Damping<R>,
     pub(crate) last: LastSubstep<R>,
 }

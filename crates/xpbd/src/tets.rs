@@ -13,6 +13,7 @@ use crate::{Float, Material, XpbdError};
 
 /// A limit of the stiffness of tets; see [`crate::Solver::limit_kappa`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct KappaLimit {
     /// The largest kappa of a tet.
     pub kappa: f64,
@@ -22,6 +23,8 @@ pub struct KappaLimit {
 
 /// Tets and materials.
 #[derive(Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub(crate) struct TetSet<R: Float> {
     pub(crate) list: Vec<TetConstraint<R>>,
     /// Volumes at rest in m³.
@@ -30,6 +33,7 @@ pub(crate) struct TetSet<R: Float> {
     pub(crate) materials: Vec<Material>,
     pub(crate) kappa_limit: Option<KappaLimit>,
     /// The tets in solving order.
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub(crate) layout: Layout<R>,
 }
 

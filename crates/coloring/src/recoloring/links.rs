@@ -13,6 +13,7 @@ use incise_graph::Incidence;
 const NONE: u32 = u32::MAX;
 
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Link {
     vertex: u32,
     particle: u32,
@@ -25,6 +26,7 @@ struct Link {
 
 /// All links.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Links {
     links: Vec<Link>,
     /// Places to use again.

@@ -70,6 +70,7 @@ pub struct Recolored {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Recoloring {
     links: Links,
     coloring: Coloring,

@@ -9,6 +9,7 @@ use incise_graph::ColorId;
 
 /// The colors at each particle.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Taken {
     /// Words per particle, at least 1.
     stride: usize,

@@ -13,6 +13,7 @@ use crate::ClusterId;
 static NEXT: AtomicU64 = AtomicU64::new(1);
 
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Journal {
     revision: u64,
     /// Revisions before each change, ascending, and where in `clusters` its entries begin.

@@ -1,8 +1,9 @@
-//! [`Snapshot`]: a simulation at one moment, to come back to, as a viewer does that takes cuts back.
+//! [`Snapshot`]: a simulation at one moment, to undo cuts, to fork and, with the feature `save`, to continue from a file.
 //!
-//! It is a copy of everything that decides what comes next: meshes, cuts, pieces, solvers, plans, handles, obstacles,
-//! strokes under way. What follows from the rest is left out and made anew: the layout of the solvers, and what a device
-//! has. (Undoing a [`CutDelta`](incise_cutting::CutDelta) takes back a mesh; it does not take back where the body has
+//! It is a copy of all that decides what comes next: meshes, cuts, pieces, solvers, plans, handles, colliders, strokes
+//! under way. What follows from the rest is left out and rebuilt: the layout of the solvers, and buffers on a device.
+//! Types are written by derived serde code, field by field; settings, which leave out defaults, as TOML (`saved.rs`).
+//! (Undoing a [`CutDelta`](incise_cutting::CutDelta) takes back a mesh; it does not take back where the body has
 //! moved since, which is why cuts are taken back this way.)
 //!
 //! Cost: a copy of all arrays, 0.25 to 0.4 kB a tet, with VBD up to 0.6; the first step after coming back lays out
@@ -13,12 +14,14 @@ use std::sync::Arc;
 
 use super::Simulation;
 use super::state::State;
-use crate::Error;
 use crate::group::Group;
 use crate::limits::value;
+use crate::place::{AtHand, Place};
 use crate::recluster::Recluster;
+use crate::report::FrameReport;
 use crate::scene::ReportSpec;
 use crate::whole::Whole;
+use crate::{Error, Scene};
 
 /// A simulation at one moment: see [`Simulation::snapshot`].
 #[derive(Clone, Debug)]
@@ -54,6 +57,50 @@ impl Snapshot {
             + whole.as_ref().map_or(0, Whole::bytes)
             + timeline.bytes(particles, cut)
             + on_cut.len()
+    }
+}
+
+/// Written as the version of this crate and the state; reading refuses what another version wrote.
+#[cfg(feature = "save")]
+impl serde::Serialize for Snapshot {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        (Version, &self.0).serialize(serializer)
+    }
+}
+
+#[cfg(feature = "save")]
+impl<'de> serde::Deserialize<'de> for Snapshot {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let (Version, state) = serde::Deserialize::deserialize(deserializer)?;
+        Ok(Self(state))
+    }
+}
+
+/// The version of this crate, which must be the one that wrote a snapshot.
+#[cfg(feature = "save")]
+struct Version;
+
+#[cfg(feature = "save")]
+impl Version {
+    const NAME: &str = concat!("incise ", env!("CARGO_PKG_VERSION"));
+}
+
+#[cfg(feature = "save")]
+impl serde::Serialize for Version {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        Self::NAME.serialize(serializer)
+    }
+}
+
+#[cfg(feature = "save")]
+impl<'de> serde::Deserialize<'de> for Version {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        if name == Self::NAME {
+            return Ok(Self);
+        }
+        let message = format!("a snapshot of `{name}` cannot be read by `{}`", Self::NAME);
+        Err(serde::de::Error::custom(message))
     }
 }
 
@@ -137,6 +184,64 @@ impl Simulation {
         self.deltas.clear();
         self.events.clear();
         Ok(())
+    }
+
+    /// Makes a simulation of its own that continues from the moment of a snapshot: what follows is to the bit what
+    /// followed then, on a device on the same device and driver. It runs on as many threads as rayon's global pool has.
+    ///
+    /// With the feature `save` a snapshot can be written to a file by any binary format of serde, such as `postcard`,
+    /// and read in another process, by the same version of this crate. A snapshot that was read has no device: one is
+    /// opened if the settings of the solver ask for it. [`Simulation::report`] counts what there is; its measures come
+    /// with the next frame. O(particles + tets).
+    ///
+    /// # Errors
+    /// If the device cannot be opened or is out of memory, or if the parts of the state contradict each other, as in a
+    /// damaged file.
+    ///
+    /// # Panics
+    /// A damaged file can name particles or tets that do not exist.
+    ///
+    /// # Example
+    /// Two hands continue from the same moment.
+    /// ```
+    /// use incise::{Scene, Simulation};
+    ///
+    /// let scene = Scene::from_toml("[[body]]\nshape = { kind = \"sphere\", tets = 300 }")?;
+    /// let mut one = Simulation::new(&scene)?;
+    /// one.step()?;
+    /// let mut other = Simulation::from_snapshot(&one.snapshot()?)?;
+    /// one.step()?;
+    /// other.step()?;
+    /// assert_eq!(one.positions(), other.positions());
+    /// # Ok::<(), incise::Error>(())
+    /// ```
+    pub fn from_snapshot(snapshot: &Snapshot) -> Result<Self, Error> {
+        let mut state = snapshot.0.clone();
+        // Every other choice leaves a note.
+        if !state.place.is_device() && state.place.note.is_none() {
+            let scene = Scene {
+                solver: state.solver.clone(),
+                ..Scene::clone(&state.scene)
+            };
+            state.place = Place::choose(&scene, &AtHand::default())?;
+        }
+        #[cfg(feature = "gpu")]
+        if let Some(gpu) = state.place.gpu.clone() {
+            let groups = std::mem::take(&mut state.groups);
+            state.groups = take_over(&mut [], groups, &gpu, &state.solver)?;
+        }
+        let mut simulation = Self {
+            state,
+            at_hand: AtHand::default(),
+            deltas: Vec::new(),
+            events: Vec::new(),
+            pool: None,
+        };
+        simulation.check()?;
+        if simulation.state.report == FrameReport::default() {
+            simulation.report_before_the_first();
+        }
+        Ok(simulation)
     }
 
     /// Sets what is reported from the next frame on, and how often.

@@ -24,12 +24,16 @@ use crate::{Error, Scene};
 
 /// All of a simulation that changes with time. A copy has its solvers on the processor.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct State {
     /// The scene with all bodies, as each was added.
+    #[cfg_attr(feature = "save", serde(with = "crate::saved::as_toml"))]
     pub(super) scene: Arc<Scene>,
     /// The settings of the solver as they are now.
+    #[cfg_attr(feature = "save", serde(with = "crate::saved::as_toml"))]
     pub(super) solver: SolverSpec,
     pub(super) precision: Precision,
+    #[cfg_attr(feature = "save", serde(skip))]
     pub(super) place: Place,
     pub(super) clock: Clock,
     pub(super) gravity: Option<DVec3>,
@@ -47,6 +51,7 @@ pub(super) struct State {
     /// Whether a particle lies on a cut; empty before the first.
     pub(super) on_cut: Vec<bool>,
     pub(super) timeline: Timeline,
+    #[cfg_attr(feature = "save", serde(skip))]
     pub(super) report: FrameReport,
     /// Whether the solvers have the residuals of the last frame.
     pub(super) residuals_kept: bool,
@@ -54,6 +59,7 @@ pub(super) struct State {
 
 /// A body that a program removed.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Removal {
     /// Its number in the scene.
     pub(super) body: usize,
@@ -160,6 +166,7 @@ impl State {
 
 /// The numbers of the next handles; none is given twice.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct NextNumbers {
     pub(super) attachment: u32,
     pub(super) distance: u32,
@@ -183,6 +190,7 @@ impl NextNumbers {
 
 /// The number of the next frame, and the simulated time of every frame.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Clock {
     /// Length of a frame in s.
     pub(super) time_step: f64,

@@ -37,6 +37,8 @@ mod reports;
 mod residuals;
 mod rest_after_cuts;
 mod retune;
+#[cfg(feature = "save")]
+mod save;
 mod scenarios;
 mod sleep;
 mod snapshot;

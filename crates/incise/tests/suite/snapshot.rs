@@ -48,8 +48,8 @@ pub(crate) fn halving(at: f64) -> StrokeSpec {
     }
 }
 
-/// Goes to a frame, takes a snapshot, goes on, comes back, goes on; comes back in another simulation of the scene, and
-/// goes on there.
+/// Takes a snapshot at a frame and continues; restores it in this and in another simulation of the scene, makes a new
+/// simulation of it, and of one that was written and read; all continue equally.
 fn comes_back(scene: &Scene, first: u32, frames: u32) {
     let mut one = simulation(scene);
     go_on(&mut one, first);
@@ -65,6 +65,17 @@ fn comes_back(scene: &Scene, first: u32, frames: u32) {
         assert!(everything(simulation) == at_that_time);
         assert!(go_on(simulation, frames) == then, "it went on otherwise");
         simulation.check().unwrap();
+    }
+    let mut fresh = Simulation::from_snapshot(&snapshot).unwrap();
+    assert!(everything(&mut fresh) == at_that_time);
+    assert!(go_on(&mut fresh, frames) == then, "a fork differs");
+    #[cfg(feature = "save")]
+    {
+        let bytes = postcard::to_stdvec(&snapshot).unwrap();
+        let read: incise::Snapshot = postcard::from_bytes(&bytes).unwrap();
+        let mut loaded = Simulation::from_snapshot(&read).unwrap();
+        assert!(go_on(&mut loaded, frames) == then, "what was read differs");
+        loaded.check().unwrap();
     }
 }
 

@@ -32,6 +32,7 @@ pub struct AttachmentData {
 }
 
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Handle {
     /// At the start and at the end of the frame.
     from: Pose,
@@ -53,6 +54,8 @@ impl Handle {
 
 /// A particle's place on a handle.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub(crate) struct Attachment<R: Float> {
     pub(crate) particle: u32,
     pub(crate) handle: u32,
@@ -70,6 +73,8 @@ pub(crate) struct Attachment<R: Float> {
 
 /// All handles and the particles attached to them.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub(crate) struct Attachments<R: Float> {
     handles: Vec<Handle>,
     /// Ascending by particle, at most one each.

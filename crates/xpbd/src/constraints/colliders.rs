@@ -29,7 +29,10 @@ const ROUNDS: usize = 32;
 
 /// The colliders of the settings, where they are at the end of the present substep.
 #[derive(Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub(crate) struct Colliders<R: Float> {
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub(crate) obstacles: Vec<Obstacle<R>>,
 }
 

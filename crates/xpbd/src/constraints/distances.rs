@@ -10,6 +10,7 @@ use crate::{Float, XpbdError};
 
 /// Keeps two particles at a distance. See [`crate::Solver::set_distances`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DistanceConstraint {
     /// The two particles.
     pub particles: [u32; 2],
@@ -65,6 +66,7 @@ pub(crate) type Distances<R> = ScalarConstraints<R, Distance<R>, 2>;
 
 /// A distance constraint in the solver's precision.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Distance<R> {
     particles: [u32; 2],
     length: R,

@@ -52,6 +52,8 @@ macro_rules! kinds {
     ($($name:ident: $kind:ident,)*) => {
         /// The constraints of each kind, in solving order.
         #[derive(Clone, Debug, Default)]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+        #[cfg_attr(feature = "serde", serde(bound = ""))]
         pub(crate) struct Constraints<R: Float> {
             $(pub(crate) $name: $kind<R>,)*
         }

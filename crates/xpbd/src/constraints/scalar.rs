@@ -33,11 +33,20 @@ pub(crate) trait ScalarConstraint<R: Float, const K: usize>: Sync {
 
 /// All constraints of a kind with their order.
 #[derive(Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(
+        serialize = "C: serde::Serialize",
+        deserialize = "C: serde::Deserialize<'de>"
+    ))
+)]
 pub(crate) struct ScalarConstraints<R: Float, C, const K: usize> {
     pub(crate) list: Vec<C>,
     pub(crate) schedule: Schedule,
     damped: bool,
     /// Kept only while a step has more than one iteration.
+    #[cfg_attr(feature = "serde", serde(skip))]
     multipliers: Vec<R::Atomic>,
 }
 

@@ -80,6 +80,7 @@ pub(crate) type Volumes<R> = ScalarConstraints<R, TetVolume<R>, 4>;
 
 /// A volume constraint in the solver's precision.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct TetVolume<R> {
     pub(crate) particles: [u32; 4],
     /// One over six times the volume at rest; 0 takes no part.

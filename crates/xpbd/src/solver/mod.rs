@@ -46,12 +46,15 @@ use crate::{Changes, Float, KappaLimit, Material, StepReport, StepSettings, Xpbd
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct Solver<R: Float> {
     pub(crate) particles: Particles<R>,
     pub(crate) tets: TetSet<R>,
     pub(crate) constraints: Constraints<R>,
     pub(crate) stepper: Stepper<R>,
     /// What edits have changed, while changes are tracked.
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub(crate) changes: Option<Changes>,
 }
 

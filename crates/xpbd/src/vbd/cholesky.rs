@@ -15,6 +15,7 @@ const LANES: usize = 8;
 
 /// The factor of a symmetric positive semidefinite matrix.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Cholesky {
     /// The columns that each row stores, and its place in `factor`.
     rows: Vec<(Range<usize>, usize)>,

@@ -32,6 +32,7 @@ const VECTORS: usize = 4;
 
 /// What corrects a body aggregate by aggregate.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Coarse {
     /// The aggregate of each row.
     of: Vec<u32>,
@@ -47,6 +48,7 @@ pub(super) struct Coarse {
 
 /// How well the factor still does.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Age {
     /// The rate of conjugate gradients with the new factor; `None` before it is known.
     first: Option<f64>,

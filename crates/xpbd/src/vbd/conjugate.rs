@@ -51,6 +51,8 @@ const ROUNDING: f64 = 4.0;
 
 /// The vectors of the iteration.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub(super) struct Conjugate<R: Float> {
     inverses: Vec<Block<R>>,
     solution: Vec<R::Vector>,

@@ -48,6 +48,8 @@ const NONE: u32 = u32::MAX;
 
 /// All constraints but the tets, by the particles of the stars. Lists are empty where nothing is declared.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub(super) struct ConstraintTerms<R: Float> {
     /// Where the terms of each particle of the order end, a 0 before the first.
     offsets: Vec<usize>,
@@ -69,6 +71,7 @@ pub(super) struct ConstraintTerms<R: Float> {
 
 /// A constraint on a particle.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Term {
     /// Its number, volumes after distances.
     constraint: u32,
@@ -79,6 +82,7 @@ struct Term {
 
 /// `K/2 (C - s + λ/k)²`.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Spring<R> {
     /// K; 0 takes no part.
     stiffness: R,
@@ -93,6 +97,8 @@ struct Spring<R> {
 
 /// `K/2 |x - y|²`.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 struct Anchor<R: Float> {
     particle: u32,
     stiffness: R,
@@ -102,6 +108,8 @@ struct Anchor<R: Float> {
 
 /// A distance seen from one of its particles.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 struct Stretch<R: Float> {
     /// The value that [`Spring::excess`] returns.
     excess: R,
@@ -113,6 +121,8 @@ struct Stretch<R: Float> {
 
 /// Force and matrix of one particle: `isotropic I + h` with h as xx, xy, xz, yy, yz, zz.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub(super) struct Local<R: Float> {
     pub(super) isotropic: R,
     pub(super) h: [R; 6],
@@ -121,6 +131,7 @@ pub(super) struct Local<R: Float> {
 
 /// What stands for the second derivative of a distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 enum Curvature {
     /// The derivative itself, its geometric term clamped at 0.
     Newton,

@@ -13,6 +13,7 @@ pub(super) const OTHERS: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [3, 0, 1], [2,
 
 /// A tet seen from one of its particles: 32 bytes in single precision.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct CornerTerm<R> {
     /// The other particles, in an order that makes `n · a` positive at rest.
     pub(super) others: [u32; 3],

@@ -26,6 +26,7 @@ use crate::{Float, Solver, XpbdError};
 
 /// How thorough a correction is.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CoarseCorrectionSettings {
     /// Iterations of conjugate gradients, at most.
     pub iterations: u32,
@@ -48,6 +49,7 @@ impl Default for CoarseCorrectionSettings {
 
 /// What a correction did.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CoarseCorrectionReport {
     /// Iterations of conjugate gradients.
     pub iterations: u32,
@@ -85,6 +87,8 @@ const MOTION: f64 = 3e-5;
 
 /// Matrix, aggregates and vectors of a correction. It belongs to the stars it was made of.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct CoarseCorrection<R: Float> {
     settings: CoarseCorrectionSettings,
     /// Rows at first, when aggregates had the size of the settings.

@@ -17,6 +17,8 @@ use crate::particles::Particles;
 
 /// The velocities that BDF2 needs of earlier substeps, by particle.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub(super) struct History<R: Float> {
     particles: Vec<Past<R>>,
     /// The length of the last substep in s.
@@ -30,6 +32,7 @@ const STARTUP_SUBSTEPS: u32 = 4;
 
 /// The progress through the substeps of implicit Euler that begin a history.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Startup {
     count: u32,
     done: u32,
@@ -37,6 +40,8 @@ struct Startup {
 
 /// What is known of a particle at the end of a substep, in m/s.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 struct Past<R: Float> {
     /// The mean velocity during the substep.
     mean: R::Vector,

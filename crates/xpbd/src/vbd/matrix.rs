@@ -21,6 +21,8 @@ pub(super) type Block<R> = [<R as Float>::Vector; 3];
 
 /// A symmetric matrix of blocks with the pattern of a mesh.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub(super) struct Blocks<R: Float> {
     /// Where the blocks of each row end, a 0 before the first.
     pub(super) offsets: Vec<usize>,

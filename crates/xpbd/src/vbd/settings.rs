@@ -24,6 +24,7 @@ pub enum Guess {
 
 /// The rule by which a substep advances in time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Integrator {
     /// Implicit Euler, first order: a vibration of period T loses a factor of `exp(-2 π² Δt / T)` in each period.
     #[default]

@@ -21,6 +21,8 @@ use crate::{Float, Solver};
 /// other change of these, update it with [`VertexStars::rebuild`]. Positions, velocities, masses, attachments and what
 /// is fixed may change at any time.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct VertexStars<R: Float> {
     /// Particles in solving order.
     pub(super) order: Vec<u32>,

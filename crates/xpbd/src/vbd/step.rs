@@ -7,6 +7,7 @@ use crate::{Float, Solver, StepReport, StepSettings, XpbdError};
 
 /// The report of a frame of VBD.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct VbdReport {
     /// As in [`StepReport::repaired`].
     pub repaired: usize,

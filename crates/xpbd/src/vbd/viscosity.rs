@@ -27,6 +27,8 @@ use crate::{Float, Solver};
 
 /// The matrix of the dissipation in a substep.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub(super) struct Viscosity<R: Float> {
     matrix: Blocks<R>,
     tets: Vec<ViscousTet<R>>,
@@ -34,6 +36,8 @@ pub(super) struct Viscosity<R: Float> {
 
 /// What a block is made of, scaled so that a block is `pull · metric + images imagesᵀ + areas areasᵀ`.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 struct ViscousTet<R: Float> {
     /// `√(τ μ V / Δt) Bₖ`.
     images: [R::Vector; 4],
