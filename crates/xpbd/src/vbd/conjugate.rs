@@ -43,8 +43,8 @@ pub(super) struct CgReport {
 /// Gains that say what was left before them: so many iterations late is the estimate, and so many are made at least.
 pub(super) const FEWEST_ITERATIONS: u32 = 4;
 
-/// Rows of a color that a thread relaxes at a time: a color has some hundred.
-const PARALLEL_RELAXED: usize = 128;
+/// Rows of a color that a thread relaxes at a time. Waking a thread costs as much as some hundred of them.
+const PARALLEL_RELAXED: usize = 512;
 
 /// Last digits of the trace that rounding may have taken from the pivots of a diagonal block.
 const ROUNDING: f64 = 4.0;
@@ -80,11 +80,13 @@ impl<R: Float> Conjugate<R> {
         &self.solution
     }
 
-    /// Solves `A x = b` approximately. Rows that are held stay zero.
+    /// Solves `A x = b` approximately. Rows that are held stay zero. `is_new` tells whether the matrix or the held rows have
+    /// changed since the last solution.
     pub(super) fn solve(
         &mut self,
         matrix: &Blocks<R>,
         coarse: &mut Coarse,
+        is_new: bool,
         colors: &[usize],
         b: &[R::Vector],
         held: &[bool],
@@ -102,11 +104,13 @@ impl<R: Float> Conjugate<R> {
         }
         self.residual.clear();
         self.residual.extend(b);
-        (0..rows)
-            .into_par_iter()
-            .with_min_len(PARALLEL_ROWS)
-            .map(|row| inverse::<R>(&matrix.blocks[matrix.offsets[row]], held[row]))
-            .collect_into_vec(&mut self.inverses);
+        if is_new {
+            (0..rows)
+                .into_par_iter()
+                .with_min_len(PARALLEL_ROWS)
+                .map(|row| inverse::<R>(&matrix.blocks[matrix.offsets[row]], held[row]))
+                .collect_into_vec(&mut self.inverses);
+        }
         let mut last = 0.0;
         let mut gains = [f64::INFINITY; FEWEST_ITERATIONS as usize];
         let mut solved = CgReport {
@@ -175,28 +179,25 @@ impl<R: Float> Conjugate<R> {
         } = self;
         // From zero, nothing right of the diagonal matters yet, and nothing but that is left over afterwards.
         for color in colors.windows(2) {
-            relax(matrix, inverses, residual, z, color[0]..color[1], |row| {
-                matrix.lower(row)
-            });
+            relax(matrix, inverses, residual, z, color[0]..color[1], false);
         }
         matrix.multiply_upper(z, product);
         coarse.correct::<R>(product, z, held);
         for color in colors.windows(2).rev() {
-            relax(matrix, inverses, residual, z, color[0]..color[1], |row| {
-                matrix.beside(row)
-            });
+            relax(matrix, inverses, residual, z, color[0]..color[1], true);
         }
     }
 }
 
-/// Solves each row of a color for its own unknown, seeing some of its blocks; no two rows of a color are coupled.
+/// Solves each row of a color for its own unknown. It sees the colors before its own and, on the way back, those after it;
+/// no two rows of a color are coupled.
 fn relax<R: Float>(
     matrix: &Blocks<R>,
     inverses: &[Block<R>],
     b: &[R::Vector],
     z: &mut [R::Vector],
     rows: Range<usize>,
-    seen: impl Fn(usize) -> Range<usize> + Sync,
+    is_way_back: bool,
 ) {
     let start = rows.start;
     let (before, rest) = z.split_at_mut(start);
@@ -207,19 +208,9 @@ fn relax<R: Float>(
         .enumerate()
         .for_each(|(k, z)| {
             let row = start + k;
-            let mut force = b[row];
-            let seen = seen(row);
-            for (&column, block) in matrix.columns[seen.clone()]
-                .iter()
-                .zip(&matrix.blocks[seen])
-            {
-                let column = column as usize;
-                let x = if column < start {
-                    before[column]
-                } else {
-                    after[column - rows.end]
-                };
-                force = force - apply::<R>(block, x);
+            let mut force = matrix.without(b[row], matrix.lower(row), |column| before[column]);
+            if is_way_back {
+                force = matrix.without(force, matrix.upper(row), |column| after[column - rows.end]);
             }
             *z = apply::<R>(&inverses[row], force);
         });

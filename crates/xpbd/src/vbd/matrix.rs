@@ -278,14 +278,15 @@ impl<R: Float> Blocks<R> {
     /// `y = A x`.
     pub(super) fn multiply(&self, x: &[R::Vector], y: &mut [R::Vector]) {
         self.each_row(y, |row| {
-            self.sum(self.offsets[row]..self.offsets[row + 1], x)
+            let all = self.offsets[row]..self.offsets[row + 1];
+            -self.without(R::Vector::default(), all, |column| x[column])
         });
     }
 
     /// `y = -U x` with U what is right of the diagonal.
     pub(super) fn multiply_upper(&self, x: &[R::Vector], y: &mut [R::Vector]) {
         self.each_row(y, |row| {
-            -self.sum(self.upper[row]..self.offsets[row + 1], x)
+            self.without(R::Vector::default(), self.upper(row), |column| x[column])
         });
     }
 
@@ -294,13 +295,18 @@ impl<R: Float> Blocks<R> {
         rows.for_each(|(row, y)| *y = value(row));
     }
 
-    /// The sum of some blocks times what their columns meet.
+    /// `b` less some blocks times the vectors of their columns.
     #[inline]
-    fn sum(&self, range: Range<usize>, x: &[R::Vector]) -> R::Vector {
-        let pairs = self.columns[range.clone()].iter().zip(&self.blocks[range]);
-        pairs.fold(R::Vector::default(), |sum, (&column, block)| {
-            sum + apply::<R>(block, x[column as usize])
-        })
+    pub(super) fn without(
+        &self,
+        mut b: R::Vector,
+        range: Range<usize>,
+        x: impl Fn(usize) -> R::Vector,
+    ) -> R::Vector {
+        for (&column, block) in self.columns[range.clone()].iter().zip(&self.blocks[range]) {
+            b = b - apply::<R>(block, x(column as usize));
+        }
+        b
     }
 
     /// The blocks of a row left of the diagonal.
@@ -308,9 +314,9 @@ impl<R: Float> Blocks<R> {
         self.offsets[row] + 1..self.upper[row]
     }
 
-    /// The blocks of a row but the diagonal.
-    pub(super) fn beside(&self, row: usize) -> Range<usize> {
-        self.offsets[row] + 1..self.offsets[row + 1]
+    /// The blocks of a row right of the diagonal.
+    pub(super) fn upper(&self, row: usize) -> Range<usize> {
+        self.upper[row]..self.offsets[row + 1]
     }
 
     /// Whether this is the pattern of as many rows and pairs.
