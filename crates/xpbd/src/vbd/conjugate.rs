@@ -80,13 +80,21 @@ impl<R: Float> Conjugate<R> {
         &self.solution
     }
 
-    /// Solves `A x = b` approximately. Rows that are held stay zero. `is_new` tells whether the matrix or the held rows have
-    /// changed since the last solution.
+    /// Inverts the diagonal blocks of a matrix, which solutions need until matrix or held rows change.
+    pub(super) fn prepare(&mut self, matrix: &Blocks<R>, held: &[bool]) {
+        (0..held.len())
+            .into_par_iter()
+            .with_min_len(PARALLEL_ROWS)
+            .map(|row| inverse::<R>(&matrix.blocks[matrix.offsets[row]], held[row]))
+            .collect_into_vec(&mut self.inverses);
+    }
+
+    /// Solves `A x = b` approximately. Rows that are held stay zero. The matrix must have been
+    /// prepared with these rows.
     pub(super) fn solve(
         &mut self,
         matrix: &Blocks<R>,
         coarse: &mut Coarse,
-        is_new: bool,
         colors: &[usize],
         b: &[R::Vector],
         held: &[bool],
@@ -104,13 +112,6 @@ impl<R: Float> Conjugate<R> {
         }
         self.residual.clear();
         self.residual.extend(b);
-        if is_new {
-            (0..rows)
-                .into_par_iter()
-                .with_min_len(PARALLEL_ROWS)
-                .map(|row| inverse::<R>(&matrix.blocks[matrix.offsets[row]], held[row]))
-                .collect_into_vec(&mut self.inverses);
-        }
         let mut last = 0.0;
         let mut gains = [f64::INFINITY; FEWEST_ITERATIONS as usize];
         let mut solved = CgReport {

@@ -250,6 +250,7 @@ impl<R: Float> ImplicitStep<'_, R> {
             matrix.forces(self.solver, self.stars, self.time, held, force);
         } else {
             matrix.fill(self.solver, self.stars, self.time, held, force);
+            conjugate.prepare(matrix, held);
             *filled = Some((self.time, held.clone()));
         }
         if coarse.is_stale() {
@@ -274,12 +275,13 @@ impl<R: Float> ImplicitStep<'_, R> {
             energy: |gain: f64| accuracy * accuracy * energy(gain),
         };
         let colors = &self.stars.colors;
-        let mut solved = conjugate.solve(matrix, coarse, !is_kept, colors, force, held, &limits);
+        let mut solved = conjugate.solve(matrix, coarse, colors, force, held, &limits);
         let is_violent = |slope: f64| 0.5 * slope > CALM * energy(0.5 * slope);
         if is_kept && is_violent(solved.slope) {
             is_kept = false;
             matrix.fill(self.solver, self.stars, self.time, held, force);
-            solved = conjugate.solve(matrix, coarse, true, colors, force, held, &limits);
+            conjugate.prepare(matrix, held);
+            solved = conjugate.solve(matrix, coarse, colors, force, held, &limits);
         }
         coarse.note(solved.iterations, solved.left);
         self.stars.try_start |= solved.iterations > FEWEST_ITERATIONS;
