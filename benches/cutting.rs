@@ -1,5 +1,5 @@
-//! Cutting a fresh body, in time per tet cut: by a whole plane at once, and by the frame of a stroke in which the blade is
-//! halfway through. Beside them a frame that cuts nothing (the search for tets near the blade, in tets that the next
+//! Cutting a fresh body, in time per tet cut: by a whole plane at once, and by the frame of a stroke in which the blade
+//! is halfway through. Beside them a frame that cuts nothing (the search for tets near the blade, in tets that the next
 //! frame cuts), and what follows a cut: pieces and skin.
 
 // The same reason as in the library.

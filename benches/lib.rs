@@ -138,7 +138,8 @@ pub fn run(crate_name: &str, bench: impl FnMut(&mut Bench<'_, '_>)) {
     run_with(crate_name, &[], bench);
 }
 
-/// The same with further cases, by name. They are large: `--test`, which runs everything once, leaves them out.
+/// Measures on the cases of [`run`] and on further ones, by name. Those are large: `--test`, which runs everything
+/// once, leaves them out.
 ///
 /// # Panics
 /// If a mesh cannot be read.

@@ -9,8 +9,8 @@ use incise::mesh_io;
 use incise::meshing::Shape;
 use incise_benches::Source;
 
-/// All but the box, which the plate stands for: organic, thin-limbed, of genus 1, with a void, flat, convex, long, of two
-/// pieces.
+/// All but the box, which the plate stands for: organic, thin-limbed, of genus 1, with a void, flat, convex, long, of
+/// two pieces.
 fn bodies() -> impl Iterator<Item = Shape> {
     let all = Shape::ALL.into_iter();
     all.filter(|&shape| shape != Shape::Box)

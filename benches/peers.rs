@@ -1,4 +1,4 @@
-//! From tets to a verified coloring, beside other libraries: who is in whose way is part of the work.
+//! From tets to a verified coloring, beside other libraries: finding the conflicts is part of the work.
 //!
 //! All start from the same lists of particles and end with the same proof. The libraries take a graph; they get it from
 //! `ConstraintGraph`, which is faster than any of them builds one. They take seconds to minutes on meshes of 100,000

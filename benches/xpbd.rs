@@ -30,13 +30,14 @@ fn main() {
         (threads, pool.unwrap())
     });
     incise_benches::run("xpbd", |bench| {
-        for (name, stage, anew) in [
+        for (name, stage, rebuilds) in [
             ("cut-schedule", Stage::Schedule, false),
-            ("cut-schedule-anew", Stage::Schedule, true),
+            ("cut-schedule-rebuilt", Stage::Schedule, true),
             ("cut-layout", Stage::Layout, false),
-            ("cut-layout-anew", Stage::Layout, true),
+            ("cut-layout-rebuilt", Stage::Layout, true),
         ] {
-            let mut following = Following::new(bench.case, solver::<f32>(bench.case, 0.0), anew);
+            let mut following =
+                Following::new(bench.case, solver::<f32>(bench.case, 0.0), rebuilds);
             bench.measure(name, |b| {
                 b.iter_custom(|count| (0..count).map(|_| following.time(stage)).sum());
             });
@@ -81,7 +82,8 @@ fn substeps<R: Real>(
     });
 }
 
-/// The same substeps by the plain kernel, in single precision without damping, after a look that it is the same.
+/// Measures the substeps by the plain kernel, in single precision without damping, after a check that the motion is the
+/// same.
 fn plain_substeps(bench: &mut Bench<'_, '_>, name: &str, schedule: &Schedule) {
     let mut solver = solver::<f32>(bench.case, 0.0);
     let time = calm(&solver);

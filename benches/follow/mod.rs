@@ -21,11 +21,11 @@ pub(crate) enum Stage {
     Layout,
 }
 
-/// A body that is cut, and who follows.
+/// A body that is cut, with its schedule and the solver's layout.
 #[derive(Debug)]
 pub(crate) struct Following {
-    /// Whether nothing is followed but all made anew.
-    anew: bool,
+    /// Whether everything is rebuilt instead of updated.
+    rebuilds: bool,
     solver: Solver<f32>,
     rest: Vec<DVec3>,
     /// Particle -> tets.
@@ -40,7 +40,7 @@ pub(crate) struct Following {
 }
 
 impl Following {
-    pub(crate) fn new(case: &Case, solver: Solver<f32>, anew: bool) -> Self {
+    pub(crate) fn new(case: &Case, solver: Solver<f32>, rebuilds: bool) -> Self {
         let tets = (0..solver.tet_count()).map(|t| solver.tet_particles(t));
         let count = solver.particle_count();
         let incidence = Incidence::from_constraints(count, tets.clone()).unwrap();
@@ -58,7 +58,7 @@ impl Following {
         }
         assert_eq!(case.mesh.tets.len(), solver.tet_count());
         Self {
-            anew,
+            rebuilds,
             rest: (0..count).map(|p| solver.position(p)).collect(),
             recoloring: Recoloring::with_coloring(pairs, coloring, usize::MAX).unwrap(),
             solver,
@@ -71,12 +71,12 @@ impl Following {
         }
     }
 
-    /// Makes an edit and times who follows.
+    /// Makes an edit and times the update of one stage.
     pub(crate) fn time(&mut self, stage: Stage) -> Duration {
         let (tets, clusters) = self.edit();
         let start = Instant::now();
         let coloring = self.recoloring.coloring();
-        if self.anew {
+        if self.rebuilds {
             self.schedule.rebuild(&self.clustering, coloring);
         } else {
             self.schedule
@@ -164,7 +164,7 @@ impl Following {
                 self.solver.density_of(t) * (b - a).cross(c - a).dot(d - a) / 24.0
             });
             let mass = mass.sum();
-            if self.anew {
+            if self.rebuilds {
                 self.solver.set_mass(p, mass);
             } else {
                 let star = self.stars[p].iter().copied();

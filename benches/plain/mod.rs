@@ -1,7 +1,7 @@
 //! The kernel that the solver's is compared with: one tet after the other, as one writes it down.
 //!
-//! The same two constraints solved as one system, gradients at the corners and all, with structures of plain numbers in
-//! the order of the schedule, single precision, one thread. Nothing is left out and nothing is clever.
+//! Solves both constraints of a tet as one system, gradients at the corners and all, with structures of plain numbers
+//! in the order of the schedule, single precision, one thread. Nothing is left out and nothing is clever.
 
 use incise::graph::Schedule;
 use incise::mesh::glam::{DMat3, DVec3, Vec3};

@@ -198,7 +198,7 @@ fn stages(models: &[Model]) -> anyhow::Result<Table> {
     Ok(table)
 }
 
-/// The same stroke at different speeds.
+/// Measures a stroke at different speeds.
 fn speeds(model: &Model, quick: bool) -> anyhow::Result<Table> {
     let mut table = table([
         "frames of the stroke",

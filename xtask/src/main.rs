@@ -11,6 +11,8 @@ mod lean;
 mod models;
 mod paper;
 mod peers;
+#[cfg(test)]
+mod prose;
 mod random;
 mod soak;
 mod solver;
@@ -109,7 +111,8 @@ enum Command {
     Solver(solver::SolverArguments),
     /// Make random strokes by the thousand and check everything after each.
     SoakCut(soak::SoakArguments),
-    /// What becomes of bodies in extreme states, materials, steps and cuts: a matrix, and why what does not recover does not.
+    /// What becomes of bodies in extreme states, materials, steps and cuts: a matrix, and why what does not recover
+    /// does not.
     Stability(ExperimentArguments),
     /// Cut meshes, check everything and write a table.
     Sweep(sweep::SweepArguments),

@@ -1,7 +1,7 @@
 //! `cargo xtask wear`: many small strokes into one mesh, and what becomes of clusters, colors and the time to solve.
 //!
-//! The same scene runs without merging, with it, and with re-clustering in the background, frame by frame in turn, so
-//! that what else the machine does falls on all. Nothing moves: the strokes fall on the mesh at rest, and the solver
+//! One scene runs without merging, with it, and with re-clustering in the background, frame by frame in turn, so that
+//! other load of the machine affects all of them. Nothing moves: the strokes fall on the mesh at rest, and the solver
 //! makes 20 Gauss-Seidel iterations a frame. At the end everything derived is checked.
 
 use std::fmt::Write;

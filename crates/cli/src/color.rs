@@ -144,7 +144,7 @@ fn colored(
     Ok(result)
 }
 
-/// The same on a GPU; sending the graph there is part of the time.
+/// Colors the clusters on a GPU; sending the graph there is part of the time.
 #[cfg(feature = "gpu")]
 fn on_gpu(algorithm: Algorithm, clusters: &impl Conflicts, seed: u64) -> Result<Found, Failure> {
     use incise::gpu::coloring::{ColoringKernels, DeviceGraph, color};

@@ -70,7 +70,7 @@ impl Lines {
 impl Drop for Lines {
     fn drop(&mut self) {
         if self.file.take().is_some() {
-            // The run has failed; there is nobody left to tell about this too.
+            // The run has failed already; an error here is not reported as well.
             let _ = fs::remove_file(&self.temporary);
         }
     }
@@ -153,7 +153,7 @@ impl Output {
         };
         let lines = open().map_err(|error| {
             for folder in missing {
-                // One that was not made, or that somebody has put something into, stays as it is.
+                // A folder that was not made, or that is not empty, stays as it is.
                 let _ = fs::remove_dir(folder);
             }
             Failure::Input(error)

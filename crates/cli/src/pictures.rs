@@ -103,7 +103,8 @@ impl Pictures {
         Ok(())
     }
 
-    /// Follows a frame and draws it if somebody wants it: `saved` says whether it is one whose files are kept.
+    /// Updates the painting after a frame and draws the frame if it is saved or filmed. `saved` says whether the files
+    /// of this frame are kept.
     pub(crate) fn frame(
         &mut self,
         simulation: &mut Simulation,

@@ -162,7 +162,7 @@ fn scene(arguments: &RunArguments) -> Result<Scene, Failure> {
         body.mesh = Some(mesh.clone());
         body.shape = None;
     }
-    // Without a picture, nobody asks what its colors show.
+    // Without pictures, what their colors show has no effect.
     if arguments.draws() && arguments.color_by == ColorBy::Residual {
         if scene.solver.method == Method::Vbd {
             let why = "--color-by residual needs constraints: the scene is solved by vbd";

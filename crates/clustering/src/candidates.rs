@@ -13,9 +13,9 @@ use std::collections::BinaryHeap;
 pub(crate) struct Candidates {
     /// The score of every constraint; 0 for those that are no candidates.
     scores: Vec<u64>,
-    /// Who has a score above 0, each once, in the order they came.
+    /// Constraints with a score above 0, each once, in the order they came.
     touched: Vec<u32>,
-    /// Whose score rose since the heap was last asked, perhaps several times.
+    /// Constraints whose score rose since the heap was last asked, perhaps several times.
     raised: Vec<u32>,
     heap: BinaryHeap<(u64, Reverse<u32>)>,
 }
@@ -56,8 +56,8 @@ impl Candidates {
         None
     }
 
-    /// Everybody who has been a candidate since the last [`clear`](Self::clear), in the order they
-    /// came.
+    /// All constraints that have been candidates since the last [`clear`](Self::clear), in the order
+    /// they came.
     pub(crate) fn touched(&self) -> &[u32] {
         &self.touched
     }

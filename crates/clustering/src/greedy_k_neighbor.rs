@@ -6,8 +6,9 @@
 //! with the member. The next cluster starts beside the ones before it: at the oldest free
 //! constraint of a queue of those that were candidates and not taken.
 //!
-//! Scores are never counted again: when `c` joins, everybody else on each of its particles gains
-//! one. Cost: O(K * arity * valence) score updates per cluster, each with the logarithm of a heap.
+//! Scores are never counted again: when `c` joins, every other constraint on each of its particles
+//! gains one. Cost: O(K * arity * valence) score updates per cluster, each with the logarithm of a
+//! heap.
 
 use std::collections::VecDeque;
 use std::num::NonZeroUsize;
@@ -19,8 +20,8 @@ use crate::candidates::Candidates;
 /// Clusters of up to `max_size` constraints that share as many particles as possible.
 ///
 /// Every constraint is in one cluster. A cluster is connected: each member but the first shares a
-/// particle with an earlier one. It has fewer than `max_size` members only if nobody free was left
-/// around it.
+/// particle with an earlier one. It has fewer than `max_size` members only if no free constraint was
+/// left around it.
 ///
 /// Ties go to the smallest number. Leftovers queue up in the order in which they became candidates:
 /// by the member whose joining made them so, then by the place of the shared particle in that

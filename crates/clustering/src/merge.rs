@@ -44,7 +44,7 @@ pub struct MergeLists {
     /// Other clusters with room, the number of links to each.
     near: Vec<(ClusterId, u32)>,
     placed: Vec<u32>,
-    /// The same, ascending.
+    /// `placed` in ascending order.
     sorted: Vec<u32>,
     moved: Vec<Moved>,
 }

@@ -1,4 +1,4 @@
-//! A clustering under construction: who is where, and the pressure on every particle.
+//! A clustering under construction: the members of clusters, and the pressure on every particle.
 //!
 //! The *pressure* of a particle is the number of clusters that meet at it plus the number of its
 //! constraints that are still free. Before the first cluster it is the valence; each constraint

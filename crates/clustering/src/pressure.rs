@@ -14,10 +14,10 @@
 //!    of it only; then each that is smaller than that is spread over its neighbors, if all its
 //!    members find room there.
 //! 3. **Regrow.** For the worst particles, all clusters there and those around that have room are
-//!    dissolved and grown anew, with the particle apparently under more pressure than it is. The
+//!    dissolved and regrown, with the particle apparently under more pressure than it is. The
 //!    result is kept if the sum over the particles of 2^pressure went down, or the number of
-//!    clusters at the same sum; otherwise all is put back (ruin and recreate, Schrimpf and others
-//!    2000). There are at most two passes over the worst particles, and no attempt begins after as
+//!    clusters at the same sum; otherwise the old clusters are restored (ruin and recreate, Schrimpf
+//!    and others 2000). There are at most two passes over the worst particles, and no attempt begins after as
 //!    many constraints have been dissolved as there are.
 //!
 //! Clusters larger than a particle has constraints relieve it anyhow. There the number of clusters
@@ -269,7 +269,7 @@ impl Growth<'_> {
         }
     }
 
-    /// Grows anew around the worst particles, pass after pass.
+    /// Regrows the clusters around the worst particles, pass after pass.
     fn regrow_worst(&mut self, max_size: usize) {
         let constraints = self.parts.incidence.constraint_count();
         let mut effort = constraints;
@@ -299,7 +299,7 @@ impl Growth<'_> {
         }
     }
 
-    /// Grows the clusters at `p`, and those around that have room, anew; whether that was better.
+    /// Regrows the clusters at `p` and those around that have room; returns whether that was better.
     fn regrow(&mut self, p: u32, max_size: usize, bound: u32, effort: &mut usize) -> bool {
         let clusters = self.clusters_around(p, max_size);
         let mut members = Vec::new();

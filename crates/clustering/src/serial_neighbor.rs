@@ -45,7 +45,7 @@ use incise_graph::{ClusterId, Clustering, ConstraintGraph, Incidence};
 )]
 #[must_use]
 pub fn serial_neighbor(graph: &ConstraintGraph, max_size: NonZeroUsize) -> Clustering {
-    // Line 1: nobody is in a cluster. Lines 3-4: each vertex that still is not starts one.
+    // Line 1: no vertex is in a cluster. Lines 3-4: each vertex that is still in none starts one.
     let mut labels = vec![ClusterId::NONE; graph.vertex_count()];
     let mut clusters = 0;
     for seed in 0..labels.len() {

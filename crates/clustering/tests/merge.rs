@@ -63,7 +63,7 @@ proptest! {
         past_the_end in any::<bool>(),
     ) {
         let count = incidence.constraint_count();
-        // Any labels, but no cluster above the limit: who finds a cluster full is in none.
+        // Any labels, but no cluster above the limit: a constraint whose cluster is full is in none.
         let mut sizes = vec![0; 30.max(count)];
         let labels: Vec<ClusterId> = (0..count)
             .map(|c| {
@@ -110,7 +110,7 @@ proptest! {
         prop_assert_eq!(&again, &after);
         prop_assert_eq!(lists.moved(), &expected);
 
-        // Who moved was, step by step along links, not far from a seed or from what was loose.
+        // Each moved constraint can be reached along links and clusters from a seed or a loose constraint.
         let mut reached: BTreeSet<u32> = loose.iter().chain(&seeds).copied().collect();
         loop {
             let mut more = reached.clone();

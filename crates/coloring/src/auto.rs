@@ -2,7 +2,7 @@
 //!
 //! Constraints on one particle are a clique, so the most crowded particle bounds the number of
 //! colors from below, and a coloring that meets the bound is as good as any. On scanned bodies the
-//! first attempt often does. So the attempts go from cheap to dear and stop at the bound:
+//! first attempt often does. So the attempts go from cheap to costly and stop at the bound:
 //!
 //! 1. first fit, most crowded first ([`Order::Crowded`]);
 //! 2. a few passes of [`iterated_greedy`](crate::iterated_greedy());
@@ -92,7 +92,8 @@ pub fn auto(conflicts: &impl Conflicts) -> Auto {
 }
 
 impl Auto {
-    /// Are there as few colors as can be, as far as can be told? Looks for more cliques in a graph.
+    /// Returns whether the number of colors meets the lower bound. In a graph that does not meet it
+    /// yet, looks for a larger clique first.
     fn is_best(&mut self, conflicts: &impl Conflicts) -> bool {
         let colors = self.coloring.color_count();
         if conflicts.incidence().is_none() && colors > self.bound {

@@ -5,7 +5,7 @@
 //! occupied list are found by walking from where they were: since keys change by one, a take costs
 //! O(1) amortized over the changes.
 
-/// Nobody.
+/// No vertex.
 const NONE: u32 = u32::MAX;
 
 /// Which end of the queue.

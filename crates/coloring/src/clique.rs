@@ -2,10 +2,10 @@
 //!
 //! Incidence shows its cliques, a graph does not, and finding the largest is hard. But the graphs
 //! of constraints are full of cliques, and from a vertex of one most of it can be had greedily:
-//! take the neighbors in order of how many other neighbors they know, each that knows everybody
-//! taken so far. Good vertices to start from are those with many neighbors, and those that got the
-//! last color of a greedy coloring, since each of them has a neighbor of every other color. Cost:
-//! O(starts * degree squared), and one pass over the vertices.
+//! go through its neighbors, those adjacent to most of the other neighbors first, and take each one
+//! that is adjacent to all vertices taken so far. Good vertices to start from are those with many
+//! neighbors, and those that got the last color of a greedy coloring, since each of them has a
+//! neighbor of every other color. Cost: O(starts * degree squared), and one pass over the vertices.
 
 use std::cmp::Reverse;
 

@@ -3,7 +3,7 @@
 //! The palettes of the algorithms that pick any color of a set, not only the smallest: a set starts
 //! as {0, ..., n} with its own n and may lose and get colors up to n. All sets lie in one array.
 //! Words are atomics because several threads may change sets in one pass; changes commute, so the
-//! result does not depend on who was first. `Relaxed` is enough: passes that read are separated
+//! result does not depend on their order. `Relaxed` is enough: passes that read are separated
 //! from passes that write by the joins of the thread pool.
 
 use std::sync::atomic::AtomicU64;

@@ -1,4 +1,4 @@
-//! What a coloring has to know: who is in whose way, from a graph or straight from incidence.
+//! The input of a coloring: which vertices conflict, from a graph or straight from incidence.
 //!
 //! A constraint graph lists the neighbors of every vertex, which for tetrahedra is about 65
 //! neighbors each and costs more to build than to color. But the constraints themselves already say
@@ -24,10 +24,10 @@ use rayon::prelude::*;
 use crate::clique::clique_of_hubs;
 use crate::first_fit::FirstFit;
 
-/// A set of vertices and who is in whose way: [`ConstraintGraph`] (vertices and edges) or
-/// [`Incidence`] (constraints, in each other's way when they share a particle).
+/// A set of vertices and their conflicts: [`ConstraintGraph`] (vertices and edges) or
+/// [`Incidence`] (constraints, which conflict when they share a particle).
 ///
-/// Being in the way is mutual, and nobody is in its own way. Both implementations of one problem
+/// Conflicts are symmetric, and no vertex conflicts with itself. Both implementations of one problem
 /// give equal results in every algorithm of this crate, except where [`crowding`](Self::crowding)
 /// takes part.
 ///
@@ -81,7 +81,7 @@ pub trait Conflicts: Sync {
     fn first_fit(&self, order: &[u32]) -> Vec<ColorId>;
 }
 
-/// The color of a vertex that has none yet: too large to be anybody's.
+/// The color of a vertex that has none yet: larger than any color that a vertex can have.
 pub(crate) const UNCOLORED: ColorId = ColorId(u32::MAX);
 
 impl Conflicts for ConstraintGraph {

@@ -44,7 +44,7 @@ pub struct EclGcStats {
     pub large_rounds: usize,
     /// Passes over the others.
     pub small_rounds: usize,
-    /// Vertices colored while they waited for somebody: by shortcut 1.
+    /// Vertices that shortcut 1 colored while they still waited for a neighbor.
     pub shortcut1: usize,
     /// Edges dropped by shortcut 2.
     pub shortcut2: usize,

@@ -1,4 +1,4 @@
-//! For each vertex its neighbors of higher priority: whom it may have to wait for.
+//! For each vertex its neighbors of higher priority: those it may have to wait for.
 //!
 //! Half of the edges, each at its lower end. Built straight from the input, so that incidence never
 //! has to become a full graph. A neighbor met several times is kept once, and lists ascend but for

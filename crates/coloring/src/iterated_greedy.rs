@@ -1,7 +1,7 @@
 //! Iterated greedy: color again, class by class, and lose a color now and then (Culberson 1992).
 //!
 //! If first fit gets the vertices class after class of a proper coloring, in any order of the
-//! classes, nobody needs a color later than the position of its class, so the number of colors
+//! classes, no vertex needs a color later than the position of its class, so the number of colors
 //! never grows; and vertices that slip into earlier classes may leave a class empty. Which order is
 //! good is a matter of luck, so several kinds take turns. From incidence a pass costs about one
 //! word operation per entry, which makes it the cheapest improvement there is.

@@ -1,18 +1,19 @@
 //! Orders in which vertices get to choose: what makes greedy coloring good or bad.
 //!
 //! First fit uses at most one color more than the largest number of neighbors a vertex has among
-//! those before it. So an order is good if few neighbors come before anybody: hubs first
-//! ([`LargestFirst`](Order::LargestFirst)), or, better, whoever has the fewest neighbors left goes
-//! last ([`SmallestLast`](Order::SmallestLast)), or whoever has the most colored neighbors goes
-//! next ([`MaximumCardinality`](Order::MaximumCardinality)). The last two find an order of least
-//! possible width, the first for any graph (Matula and Beck 1983), the second for chordal ones
-//! (Tarjan and Yannakakis 1984); both pick from buckets in O(vertices + edges).
+//! those before it. So an order is good if few neighbors come before each vertex.
+//! [`LargestFirst`](Order::LargestFirst) puts hubs first. Two orders are better:
+//! [`SmallestLast`](Order::SmallestLast) puts the vertex with the fewest neighbors left last, and
+//! [`MaximumCardinality`](Order::MaximumCardinality) puts the vertex with the most colored neighbors
+//! next. Both find an order of least possible width, `SmallestLast` for any graph (Matula and Beck
+//! 1983), `MaximumCardinality` for chordal ones (Tarjan and Yannakakis 1984). Both pick from buckets
+//! in O(vertices + edges).
 
 use crate::buckets::{Buckets, Extreme};
 use crate::random::Random;
 use crate::{Conflicts, priority_order};
 
-/// Who chooses first.
+/// Which vertices choose first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -28,18 +29,19 @@ pub enum Order {
     /// incidence this needs no edges, but where neighbors share several particles it differs from
     /// what a graph gives.
     Crowded,
-    /// Backwards: last whoever has the fewest neighbors among those not placed yet.
+    /// Filled from the back: always the vertex with the fewest neighbors among those not placed yet.
     SmallestLast,
-    /// Next whoever has the most neighbors among those already placed (maximum cardinality search,
-    /// MCS).
+    /// Next the vertex with the most neighbors among those already placed (maximum cardinality
+    /// search, MCS).
     MaximumCardinality,
 }
 
 /// All vertices of `conflicts`, those that choose first in front.
 ///
 /// Deterministic, and but for `Crowded` the same for a graph and the incidence it came from. O(n)
-/// for `Natural`, O(n + entries) for `Crowded`, O(n) for `Random`, O(n log n + degrees) for `LargestFirst`, O(n + edges) for the other two,
-/// from incidence O(sum over particles of valence squared).
+/// for `Natural`, O(n + entries) for `Crowded`, O(n) for `Random`, O(n log n + degrees) for
+/// `LargestFirst`, O(n + edges) for the other two, from incidence O(sum over particles of valence
+/// squared).
 ///
 /// ```
 /// use incise_coloring::{Order, order};

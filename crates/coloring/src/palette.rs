@@ -6,7 +6,7 @@
 //! and the mark of the decided, 16 bytes a vertex, so that looking at a neighbor is one access in
 //! nearly all cases; further words lie in a second array. Words are atomics because several
 //! neighbors may remove colors from one palette in the same phase; removal commutes, so the result
-//! does not depend on who was first. `Relaxed` is enough: phases that read are separated from
+//! does not depend on the order. `Relaxed` is enough: phases that read are separated from
 //! phases that write by the joins of the thread pool.
 //!
 //! The algorithms are generic in their input and compiled where they are called, so these methods
@@ -124,7 +124,7 @@ impl Palettes {
         color
     }
 
-    /// Finds the best color of undecided `v` anew and returns it.
+    /// Finds the best color of undecided `v` again, stores it and returns it.
     #[inline]
     pub(crate) fn renew(&self, v: u32) -> u32 {
         let mut base = 0;

@@ -19,11 +19,12 @@
 //! finding more parallelism; with exact palettes it is the cheaper test, one comparison instead of
 //! a look into a palette. Beside shortcut 1 it is used as that, and saves neither a round nor the
 //! visit of an edge; debug builds assert the implication at every edge it passes. Alone, it gets
-//! most of what shortcut 1 gets, without anybody looking into the palette of anybody else.
+//! most of what shortcut 1 gets, and no vertex looks into the palette of another.
 //!
 //! **Rounds.** A round decides on the palettes the previous round left, then publishes the new
-//! colors, then renews what the undecided vertices hold, three parallel passes with nobody reading
-//! what another writes. So the result and the statistics are the same for any number of threads.
+//! colors, then renews what the undecided vertices hold: three parallel passes, in each of which no
+//! task reads what another writes. So the result and the statistics are the same for any number of
+//! threads.
 //!
 //! **Work.** Only undecided vertices are visited. A vertex remembers the neighbor that stopped it
 //! and looks there first: as long as that neighbor is in the way, a round costs it one test. Each
@@ -168,7 +169,7 @@ fn in_chunks(conflicts: &impl Conflicts, shortcuts: Shortcuts, grain: usize) -> 
         undecided.extend(left.into_iter().flatten());
         debug_assert!(
             undecided.len() < before,
-            "the undecided vertex of highest priority waits for nobody"
+            "the undecided vertex of highest priority waits for none"
         );
         stats.rounds += 1;
         for part in decisions {

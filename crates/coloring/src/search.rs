@@ -2,9 +2,9 @@
 //! tell the neighbors, renew what it holds.
 //!
 //! A search is a small record that lies next to those of the other undecided vertices, so that a
-//! round streams through them. It remembers who stopped the vertex last. Whoever was in the way
-//! most likely still is, even if the best color has changed, so a round looks there first and, four
-//! times in five, nowhere else.
+//! round streams through them. It remembers the neighbor that stopped the vertex last. That neighbor
+//! most likely still stops it, even if the best color has changed, so a round looks there first and,
+//! four times in five, nowhere else.
 //!
 //! The list of higher neighbors is part of the memory too. Entries that need no more looks, being
 //! decided or removed by shortcut 2, are swapped out of it; those in front of a mark are known not
@@ -129,7 +129,7 @@ impl<'c, C: Conflicts> State<'c, C> {
             "shortcut 3 holds only where shortcut 1 does"
         );
         let passes = (three && smaller) || (one && !self.palettes.contains(u, best));
-        // With shortcut 1 on, whoever is not passed holds the best color of v.
+        // With shortcut 1 on, a neighbor that is not passed holds the best color of v.
         if two && (passes || !one) && self.palettes.disjoint(u, v) {
             Look::Disjoint
         } else if passes {

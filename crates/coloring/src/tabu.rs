@@ -3,7 +3,7 @@
 //! To do with k colors what took k + 1, the last class is uncolored. Then, again and again, one
 //! uncolored vertex takes the color that the fewest neighbors have, and these become uncolored in
 //! turn; they must not go back to that color for a while, or the search would run in circles. When
-//! nobody is left uncolored, k is done and k - 1 is next.
+//! no vertex is left uncolored, k is done and k - 1 is next.
 //!
 //! In constraint graphs at most as many neighbors as a constraint has particles share a color, so
 //! displacements stay small, and starts from a good coloring end after a few hundred steps where
@@ -120,7 +120,7 @@ impl<'a, C: Conflicts> Search<'a, C> {
         }
     }
 
-    /// Whether everybody got a color within the steps.
+    /// Searches for up to `steps` steps; returns whether every vertex got a color.
     fn run(&mut self, steps: usize) -> bool {
         while self.step < steps && !self.uncolored.is_empty() {
             let pick = self.random.below(self.uncolored.len());

@@ -1,11 +1,11 @@
-//! Vivace: everybody picks a color at random, and keeps it if nobody near has the same
+//! Vivace: each vertex picks a color at random, and keeps it if no neighbor has the same
 //! (Fratarcangeli, Tibaldo and Pellacini 2016).
 //!
 //! A vertex of degree d starts with the colors 0 to d / s, rounded down, where s is the shrinking
 //! factor: 1 gives few rounds and many colors (the paper's baseline), 4 the other way round. In
 //! every round each uncolored vertex picks one of its colors. Where neighbors picked the same, a
-//! tie rule says who keeps it; all others try again without the colors that their neighbors now
-//! have. A vertex that runs out is fed: it gets the next color that no neighbor has.
+//! tie rule says which vertex keeps it; all others try again without the colors that their
+//! neighbors now have. A vertex that runs out is fed: it gets the next color that no neighbor has.
 //!
 //! All colors below the fed one are taken around the vertex, so no color is ever larger than the
 //! degree, and palettes of degree + 1 bits are enough.
@@ -21,14 +21,14 @@ use crate::color_sets::ColorSets;
 use crate::random::scramble;
 use crate::{ColoringError, Conflicts};
 
-/// Who keeps a color that neighbors picked, too.
+/// Which vertex keeps a color that neighbors picked, too.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Tie {
     /// The highest number among neighbors that picked the same color.
     #[default]
     HighestOfSame,
-    /// Only who has a higher number than all uncolored neighbors: weaker, so slower.
+    /// Only a vertex of higher number than all uncolored neighbors: weaker, so slower.
     HighestOfAll,
 }
 
@@ -39,7 +39,7 @@ pub struct VivaceOptions {
     pub shrinking: u32,
     /// Chooses the random numbers.
     pub seed: u64,
-    /// Who keeps a color.
+    /// Which vertex keeps a color that neighbors picked, too.
     pub tie: Tie,
     /// Rounds after which vertices without a color are an error.
     pub max_rounds: usize,
@@ -96,8 +96,8 @@ const NONE: u32 = u32::MAX;
 ///
 /// # Errors
 /// [`ColoringError::TooManyRounds`] if vertices are left without a color after the rounds allowed.
-/// It never stalls: whoever is out of colors is fed before the next round, and in it the highest of
-/// the uncolored vertices keeps what it picks.
+/// It never stalls: a vertex that is out of colors is fed before the next round, and in it the
+/// highest of the uncolored vertices keeps what it picks.
 ///
 /// # Panics
 /// If the shrinking factor is 0.

@@ -4,10 +4,10 @@
 //! All vertices of a worklist take the smallest color that their neighbors do not have, at the same
 //! time, so neighbors may take the same. Of two such neighbors the one with the lower number loses
 //! its color and goes to the next worklist. The original finds losers while others are still losing
-//! theirs, so its result depends on timing; here a loser is who has a higher neighbor of the same
-//! color when all have chosen.
+//! theirs, so its result depends on timing; here a vertex loses if it has a higher neighbor of the
+//! same color when all have chosen.
 //!
-//! On a machine whose threads all run at once, everybody near makes the same choice and few win: a
+//! On a machine whose threads all run at once, neighbors make the same choice and few win: a
 //! clique loses all but one of its vertices in every round. Real machines take a worklist in
 //! pieces, and later pieces see what earlier ones chose. The size of a piece is a parameter here,
 //! the *chunk*: 1 is sequential first fit, the whole worklist is the worst case. Not in the
@@ -114,7 +114,7 @@ pub fn wlc(conflicts: &impl Conflicts, chunk: NonZeroUsize) -> Wlc {
         }
         stats.conflicts += losers.len();
         if losers.len() > worklist.len() / 2 {
-            // With one vertex a chunk nobody loses, so this ends.
+            // With one vertex a chunk, no vertex loses, so this ends.
             size = (size / 2).max(1);
         }
         worklist = losers;

@@ -114,7 +114,7 @@ fn check(
     (after, stats)
 }
 
-/// The same from incidence and from its graph, and settled.
+/// Balances from incidence and from its graph, and asserts equal results.
 fn check_both(incidence: &Incidence, before: &Coloring, weights: &[u32]) -> BalanceStats {
     let graph = ConstraintGraph::from_incidence(incidence);
     let result = check(incidence, &graph, before, weights);
@@ -241,8 +241,8 @@ fn a_chain_goes_around_a_block() {
     assert_eq!(after, coloring(&[1, 0, 0, 1, 2, 2]));
 }
 
-/// Nobody in class 0 can enter class 1 or 2, but 0 has only one neighbor in class 1, and that can
-/// enter class 2. 1 and 2 have two neighbors there.
+/// No vertex of class 0 can enter class 1 or 2, but vertex 0 has only one neighbor in class 1, and
+/// that can enter class 2. Vertices 1 and 2 have two neighbors in class 1.
 #[test]
 fn a_detour_pushes_a_neighbor_on() {
     let block = [(0, 5), (1, 5), (2, 5), (4, 5)];
@@ -289,7 +289,7 @@ fn loads_do_not_overflow() {
     assert!(stats.range <= stats.range_before);
 }
 
-/// Vacant clusters keep color 9; color 5 of nobody stays nobody's.
+/// Vacant clusters keep color 9. A color without vertices, such as 5, stays without.
 #[test]
 fn vacant_vertices_and_gaps_stay() {
     let constraints = (0..12u32).map(|v| if v < 10 { vec![v] } else { vec![] });

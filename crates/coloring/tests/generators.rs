@@ -15,7 +15,7 @@ pub(crate) fn golden(coloring: &Coloring) -> u64 {
     })
 }
 
-/// Everybody adjacent to everybody.
+/// Every vertex adjacent to all others.
 pub(crate) fn clique(n: u32) -> ConstraintGraph {
     ConstraintGraph::from_incidence(
         &Incidence::from_constraints(1, (0..n).map(|_| [0u32])).unwrap(),

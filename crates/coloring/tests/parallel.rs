@@ -243,7 +243,7 @@ proptest! {
     }
 }
 
-/// Incidence is only another way to say a graph, also for particles that nobody touches.
+/// Incidence describes a graph, also with particles that no constraint touches.
 #[test]
 fn lonely_constraints_and_particles() {
     check(&Incidence::from_constraints(9, [vec![], vec![3u32], vec![], vec![3, 5]]).unwrap());

@@ -30,7 +30,7 @@ fn width(graph: &ConstraintGraph, order: &[u32], v: u32, at: usize) -> usize {
     neighbors.iter().filter(|u| before.contains(u)).count()
 }
 
-/// Backwards, whoever goes last has the fewest neighbors among those still there.
+/// Asserts, from the back, that each vertex has the fewest neighbors among those still there.
 fn is_smallest_last(graph: &ConstraintGraph, order: &[u32]) {
     for end in (0..order.len()).rev() {
         let left = &order[..=end];
@@ -39,7 +39,7 @@ fn is_smallest_last(graph: &ConstraintGraph, order: &[u32]) {
     }
 }
 
-/// Whoever is next has the most neighbors among those already placed.
+/// Asserts that each next vertex has the most neighbors among those already placed.
 fn is_maximum_cardinality(graph: &ConstraintGraph, order: &[u32]) {
     for at in 0..order.len() {
         let most = order[at..]

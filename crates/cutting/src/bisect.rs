@@ -47,8 +47,9 @@ pub fn split_tet(
     children.extend(family.into_iter().map(|(corners, _)| corners));
 }
 
-/// The same for a tet with a link for each of its faces, by opposite corner. A part of a face gets the link of the
-/// whole, faces between children get [`INNER`].
+/// Splits a tet with a link for each of its faces, by opposite corner, at `edges` in the order given, and writes the
+/// children with their links to `children`. A part of a face gets the link of the whole, faces between children get
+/// [`INNER`].
 pub(crate) fn split_linked(
     tet: ([ParticleId; 4], [u32; 4]),
     edges: &[SplitEdge],

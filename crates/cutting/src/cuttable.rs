@@ -88,7 +88,8 @@ impl CuttableMesh {
     /// [`CutError::Mesh`] if the mesh is broken.
     ///
     /// # Panics
-    /// If the lists around the particles or the links across faces do not belong to the mesh, which would be a defect of this crate.
+    /// If the lists around the particles or the links across faces do not belong to the mesh, which would be a defect
+    /// of this crate.
     pub fn check(&self) -> Result<(), CutError> {
         // A body may have been removed as a whole.
         if !self.mesh.tets.is_empty() {

@@ -113,7 +113,7 @@ pub struct CutDelta {
     pub tets_before: usize,
     /// New particles on edges: point `i` is particle `particles_before + i`.
     pub points: Vec<EdgePoint>,
-    /// New particles where the body came apart, each a copy of the particle named here: copy `i` is particle
+    /// New particles where the body separated, each a copy of the particle named here: copy `i` is particle
     /// `particles_before + points.len() + i`.
     pub copies: Vec<ParticleId>,
     /// The cut tets, ascending.
@@ -179,8 +179,8 @@ impl CutDelta {
         self.extend_with(values, |a, b, t| *a + (*b - *a) * t);
     }
 
-    /// The same for a quantity of any kind, such as texture coordinates or temperatures; `interpolate` gets the values
-    /// at both ends of an edge and the parameter.
+    /// Extends a quantity of any kind carried by particles to the new ones, such as texture coordinates or
+    /// temperatures; `interpolate` gets the values at both ends of an edge and the parameter. Copies repeat the value.
     ///
     /// # Panics
     /// If `values` does not have an entry for each particle before the cut.

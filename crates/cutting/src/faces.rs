@@ -1,7 +1,7 @@
 //! [`Faces`]: for each face of a tet what lies behind it, editable in constant time.
 //!
-//! One number a face, four a tet: the place of the same face in the neighboring tet, or, on the boundary, the place in a
-//! dense list of boundary triangles. So neighbors are found without a search, and the boundary needs no pass over the
+//! One number a face, four a tet: the place of the same face in the neighboring tet, or, on the boundary, the place in
+//! a dense list of boundary triangles. So neighbors are found without a search, and the boundary needs no pass over the
 //! mesh. Face `4 t + k` is the face of tet `t` opposite to its corner `k`.
 //!
 //! The children of a split tet inherit what lies behind their parent's faces while tets are split; [`Faces::settle`]
@@ -65,7 +65,7 @@ pub(crate) fn sorted(mut face: [ParticleId; 3]) -> [ParticleId; 3] {
 /// What lies behind a face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Behind {
-    /// The same face in the neighboring tet.
+    /// The twin of the face in the neighboring tet.
     Twin(Face),
     /// Nothing: it is a boundary triangle.
     Nothing(FaceTag),
@@ -105,8 +105,8 @@ impl Faces {
         &self.boundary
     }
 
-    /// A number for each tile of the boundary triangles that changes when a triangle comes to it. Parts of a triangle that
-    /// take its place do not count.
+    /// A number for each tile of the boundary triangles that changes when a triangle comes to it. Parts of a triangle
+    /// that take its place do not count.
     pub(crate) fn versions(&self) -> &[u32] {
         &self.versions
     }

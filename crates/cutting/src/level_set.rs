@@ -27,15 +27,15 @@ const RESOLUTION: f64 = 1e-15;
 ///
 /// # Returns
 /// What changed. Nothing, if the field has one sign everywhere. The surface is that of the mesh: it is straight within
-/// each tet. An edge that is crossed twice has ends of one sign and is not cut, so what is thinner than a tet is missed.
-/// The same cut again changes nothing; only with snapping, where the surface bends by much within a tet, it may.
+/// each tet. An edge that is crossed twice has ends of one sign and is not cut, so what is thinner than a tet is
+/// missed. Repeating a cut changes nothing; only with snapping, where the surface bends by much within a tet, it may.
 ///
 /// # Errors
 /// If the field is not finite at a particle or on a crossed edge, if the options are not valid, or if `positions` has
 /// another length than the mesh or is not finite; nothing is changed then.
 ///
 /// # Determinism
-/// The same input gives the same bits for any number of threads, if the field itself does.
+/// Equal input gives the same bits for any number of threads, if the field itself does.
 ///
 /// # Example
 /// ```

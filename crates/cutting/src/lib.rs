@@ -1,14 +1,14 @@
 //! Cutting tetrahedral meshes: planes and swept blades in, one [`CutDelta`] out.
 //!
 //! A [`CuttableMesh`] holds a mesh at rest. [`cut_plane`] cuts it with a whole plane at once, [`cut_level_set`] along
-//! the zero set of a field, [`cut_surface`] along triangles; a [`Sweep`] moves a blade through it frame by frame. All work where the blade is, in the body's present, deformed state, and cut the rest
-//! shape at the same fractions of its edges. All change the mesh in place and return what they changed; nobody has to
-//! compare before and after.
+//! the zero set of a field, [`cut_surface`] along triangles; a [`Sweep`] moves a blade through it frame by frame. All
+//! work where the blade is, in the body's present, deformed state, and cut the rest shape at the same fractions of its
+//! edges. All change the mesh in place and return what they changed, so the mesh need not be compared before and after.
 //!
 //! - Crossed edges get a particle, the tets around them are split by ordered bisection ([`split_tet`]): the mesh
 //!   conforms by construction, no tet is ever flat or inverted, volume is kept.
 //! - Crossings close to a particle move to it ([`CutOptions::snap`]), which keeps the new tets well shaped.
-//! - The body comes apart where faces are cut through and stays whole around the front of an unfinished stroke.
+//! - The body separates where faces are cut through and stays whole around the front of an unfinished stroke.
 //!
 //! ```
 //! use glam::DVec3;

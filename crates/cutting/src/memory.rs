@@ -1,6 +1,6 @@
 //! [`CutMemory`]: what finished strokes leave for later ones to join.
 //!
-//! A face opens where all three particles lie on the surface of one stroke, so a stroke that goes on where another
+//! A face opens where all three particles lie on the surface of one stroke, so a stroke that continues where another
 //! stopped would leave the tets between both fronts as threads. The memory keeps, for each particle along earlier
 //! strokes, what they knew of it. Where a new stroke meets an edge, it looks at the particles around the edge's ends:
 //! those on an earlier surface that runs the same way (within some 25 degrees) and closely (a quarter of an edge) show
@@ -21,7 +21,7 @@ use crate::{CutDelta, CutOptions, CuttableMesh};
 /// Surfaces whose normals have at least this cosine run the same way.
 const ALIGNED: f64 = 0.9;
 
-/// What earlier strokes knew of the particles along them, kept by whoever makes the strokes.
+/// What earlier strokes knew of the particles along them. The caller keeps it from stroke to stroke.
 ///
 /// Hand it to [`crate::Sweep::advance_joining`] and [`crate::cut_surface_joining`]; call [`CutMemory::follow`] after
 /// cuts made without it. Without a memory strokes meet only if they overlap by a tet.

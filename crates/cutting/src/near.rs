@@ -152,7 +152,7 @@ impl Lists {
 pub(crate) struct Search {
     /// The particles of the tets near each segment in the last frame.
     known: Lists,
-    /// The same in this frame, until it is known that it counts.
+    /// The particles of the tets near each segment in this frame, until [`Search::keep`] takes them over.
     found: Lists,
     /// Particles that came since the last frame, by whatever cut.
     fresh: Vec<ParticleId>,
@@ -237,7 +237,7 @@ impl Search {
         near
     }
 
-    /// Goes on from what was found last, after the cut it led to.
+    /// Makes what was found last the start of the next search, after the cut it led to.
     pub(crate) fn keep(&mut self, delta: &CutDelta) {
         std::mem::swap(&mut self.known, &mut self.found);
         self.fresh.clear();

@@ -1,9 +1,9 @@
 //! [`Operation`]: one cut in progress: splits, separates and writes the delta.
 //!
 //! The order of work: all crossed edges get their particle, the tets around them are split by ordered bisection, then
-//! each on-surface particle's star comes apart into its components (module `separate`). Every part looks only at the
-//! tets around the particles concerned, so the cost follows the cut. The mesh is changed in place; the first state of
-//! what changed is kept until the delta is written.
+//! each on-surface particle's star separates into its components (module `separate`). Every part looks only at the tets
+//! around the particles concerned, so the cost follows the cut. The mesh is changed in place; the first state of what
+//! changed is kept until the delta is written.
 
 use std::collections::BTreeMap;
 use std::collections::hash_map::Entry;

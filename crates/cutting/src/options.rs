@@ -2,7 +2,7 @@
 
 use crate::CutError;
 
-/// How a body comes apart at the particles on a cut.
+/// How a body separates at the particles on a cut.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Separation {
@@ -15,7 +15,7 @@ pub enum Separation {
     /// was there before the cut. For an unsnapped cut of a sound mesh the same as [`Separation::CutFaces`]. Where a
     /// particle was snapped it is wrong: that particle was there before, so both sides stay tied to it.
     SharedOriginal,
-    /// The same with particles off the surface in place of particles that were there before: right also with snapped
+    /// Two tets at a particle on the cut stay joined if they share a particle off the surface. Right also with snapped
     /// particles. Wrong where tets lie on the surface with all four particles, which then share nothing and come off,
     /// and where a surface grazes particles without crossing an edge, which it then tears.
     SharedOffSurface,
@@ -29,16 +29,16 @@ pub struct CutOptions {
     /// the particle stays where it is. From 0 (off) to 0.25. Larger values give fewer and better shaped tets and a
     /// more jagged rim.
     pub snap: f64,
-    /// The same, never off: it keeps rounding from making zero-volume tets when a surface runs through particles.
-    /// Use about 1e-9 for positions in double and 1e-5 for positions in single precision. Where cuts of cuts would
-    /// leave tets thinner than a few units of the last digit of their coordinates at rest, crossings move to the nearer
-    /// end, however far it is.
+    /// A crossing within this fraction of its edge from one end moves to that end, even where `snap` is off: it keeps
+    /// rounding from making zero-volume tets when a surface runs through particles. Use about 1e-9 for positions in
+    /// double and 1e-5 for positions in single precision. Where cuts of cuts would leave tets thinner than a few units
+    /// of the last digit of their coordinates at rest, crossings move to the nearer end, however far it is.
     pub tolerance: f64,
     /// A guard on the volume of children as a fraction of their parent's, from 0 (off) to 0.015. Where snapping alone
-    /// does not promise it, crossings are snapped from as far as it takes. A tet whose edges were met in several steps of one frame
-    /// counts as many parents.
+    /// does not promise it, crossings are snapped from as far as it takes. A tet whose edges were met in several steps
+    /// of one frame counts as many parents.
     pub min_volume_ratio: f64,
-    /// How the body comes apart.
+    /// How the body separates.
     pub separation: Separation,
     /// The number that the faces laid bare are tagged with ([`crate::FaceTag::Cut`]).
     pub tag: u32,

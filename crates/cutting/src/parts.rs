@@ -1,14 +1,14 @@
 //! [`Parts`]: which parts of a piece have come off, found by searches that stop as soon as they can.
 //!
-//! A search starts at each particle where the piece may have come apart. All advance in lockstep, one particle a round,
+//! A search starts at each particle where the piece may have separated. All advance in lockstep, one particle a round,
 //! from a particle to the particles of the tets around it. Searches that meet become one. A search with nothing left to
 //! find has found a complete part; once a single search is left the others are all parts that came off, and what that
-//! one would still find is the rest. So a slit costs the way around its front, and a part that comes off a few times its
-//! own size, however large the rest is.
+//! one would still find is the rest. So a slit costs the way around its front, and a part that comes off a few times
+//! its own size, however large the rest is.
 //!
 //! Walking from star to star costs some ten times as much for a tet as a pass over all tets in order. So once the
 //! searches have looked at tets a quarter as often as the body has tets, they are given up and the pieces are counted
-//! anew, which costs about as much again.
+//! from scratch, which costs about as much again.
 //!
 //! Source: parallel search from both ends of a deleted edge, as in Y. Shiloach and S. Even, "An On-Line Edge-Deletion
 //! Problem", 1981. Cost: O(seeds + parts × the largest part that came off), at most O(seeds + tets). A piece cut in
@@ -69,7 +69,7 @@ impl Parts {
     /// Finds what came off the piece that all of `seeds` were on. Each part of it holds a seed; seeds are different and
     /// none is without tets. Afterwards [`Parts::iter`] lists the parts.
     ///
-    /// What is left is not among them: it is the part whose search was still going on when all others had ended, or, if
+    /// What is left is not among them: it is the part whose search was still running when all others had ended, or, if
     /// none was or the searches were given up, the one with the most tets, then the one with the lowest tet.
     pub(crate) fn find(&mut self, cuttable: &CuttableMesh, seeds: &[ParticleId]) {
         self.tets.clear();

@@ -6,8 +6,8 @@
 //! their own and the one left keeps its name.
 //!
 //! Cost: [`PieceTracker::new`] a pass over the tets. [`PieceTracker::follow`] what the cut touched, the way around the
-//! front of a slit, and a few times the parts that come off, at most about three such passes. Memory: 4 bytes a tet and a
-//! particle. Measured on grids of 10,000, 80,000 and 660,000 tets, as tets looked at ([`PieceTracker::looks`]): 54 a
+//! front of a slit, and a few times the parts that come off, at most about three such passes. Memory: 4 bytes a tet and
+//! a particle. Measured on grids of 10,000, 80,000 and 660,000 tets, as tets looked at ([`PieceTracker::looks`]): 54 a
 //! frame for a slit four cells wide, whatever the grid; 6,000 for a corner of 426 tets; 220, 430 and 860 a frame for a
 //! blade as wide as the grid while it goes down, and all of the grid when it comes out below.
 //!
@@ -43,7 +43,7 @@ pub enum PieceEvent {
     Detached {
         /// The new piece.
         piece: u32,
-        /// The piece it came off, which goes on with the rest.
+        /// The piece it came off, which keeps the rest.
         from: u32,
         /// Number of tets of the new piece.
         tets: usize,
@@ -79,7 +79,7 @@ pub enum PieceEvent {
 /// // The middle, the smaller end parts came off.
 /// let volumes: Vec<f64> = pieces.iter().map(|piece| piece.volume).collect();
 /// assert!(volumes.iter().zip([2.0, 1.0, 1.0]).all(|(a, b)| (a - b).abs() < 1e-12));
-/// pieces.check(&body)?; // counts anew and compares
+/// pieces.check(&body)?; // recounts and compares
 /// # Ok::<(), incise_cutting::CutError>(())
 /// ```
 #[derive(Clone, Debug)]
@@ -165,7 +165,7 @@ impl PieceTracker {
     /// What happened, ascending by the piece it happened to, then by the lowest tet of the part that came off.
     ///
     /// # Determinism
-    /// The same history gives the same numbers and bits.
+    /// Equal histories give the same numbers and bits.
     ///
     /// # Panics
     /// If the tracker does not follow the deltas of this mesh one by one, or from 2³² pieces on.
@@ -313,15 +313,16 @@ impl PieceTracker {
         self.piece_of[tet.index()]
     }
 
-    /// How often the last [`PieceTracker::follow`] looked at a tet: what it cost. A search looks at a tet once for each of
-    /// its corners, and once more for each if it came off; a count looks once at each.
+    /// How often the last [`PieceTracker::follow`] looked at a tet: what it cost. A search looks at a tet once for each
+    /// of its corners, and once more for each if it came off; a count looks once at each.
     #[must_use]
     pub fn looks(&self) -> usize {
         self.parts.looks
     }
 
-    /// Counts everything anew and compares: partition, numbers of tets, and volumes to 1e-12 of each (and as much of
-    /// the body's as the rounded positions of new particles may make, 1e-15 and more far from the origin). O(tets); for tests and on request.
+    /// Recounts everything and compares: partition, numbers of tets, and volumes to 1e-12 of each (and as much of the
+    /// body's as the rounded positions of new particles may make, 1e-15 and more far from the origin). O(tets); for
+    /// tests and on request.
     ///
     /// # Errors
     /// [`CutError::Pieces`] names the first difference.

@@ -48,11 +48,11 @@ impl Plane {
 /// What changed. Nothing, if the plane misses the body or only touches it.
 ///
 /// # Errors
-/// If the plane or the options are not valid or `positions` has another length than the mesh or is not finite; nothing is
-/// changed then.
+/// If the plane or the options are not valid or `positions` has another length than the mesh or is not finite; nothing
+/// is changed then.
 ///
 /// # Determinism
-/// The same input gives the same bits on every machine.
+/// Equal input gives the same bits on every machine.
 ///
 /// # Example
 /// ```

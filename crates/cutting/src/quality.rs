@@ -58,8 +58,8 @@ impl Dihedrals {
 /// How many units of the last digit of its coordinates a tet must be thick.
 const THICKNESS: f64 = 8.0;
 
-/// Whether rounding may hide the volume of a tet: it is thinner than some units of the last digit of its coordinates, or
-/// inverted.
+/// Whether rounding may hide the volume of a tet: it is thinner than some units of the last digit of its coordinates,
+/// or inverted.
 pub(crate) fn is_thin(corners: [DVec3; 4]) -> bool {
     let [a, b, c, d] = corners;
     let edges = [b - a, c - a, d - a];

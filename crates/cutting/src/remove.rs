@@ -1,10 +1,10 @@
 //! Removal: tets are taken away, leaving a hole where they were.
 //!
 //! Faces behind the removed tets become cut faces, and what hangs together only by a particle or an edge afterwards
-//! comes apart there, by the same rule as after a cut. The last tets move into the free slots, so tets stay dense.
+//! separates there, by the same rule as after a cut. The last tets move into the free slots, so tets stay dense.
 //! Particles keep their numbers, those without a tet are left over. This loses volume and mass: where a smooth cut is
-//! wanted, cut along a closed surface and let the plug go. Source: element deletion as in the carving plugin of SOFA. Cost: that of
-//! the tets removed.
+//! wanted, cut along a closed surface and drop the plug. Source: element deletion as in the carving plugin of SOFA.
+//! Cost: that of the tets removed.
 
 use std::collections::BTreeSet;
 
@@ -23,7 +23,7 @@ use crate::{CutError, CutOptions, CuttableMesh};
 /// [`CutError::NoSuchTet`] names the first tet that does not exist; nothing is changed then.
 ///
 /// # Determinism
-/// The same input gives the same bits on every machine.
+/// Equal input gives the same bits on every machine.
 ///
 /// # Example
 /// ```

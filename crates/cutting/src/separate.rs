@@ -1,4 +1,4 @@
-//! Separation: how the stars of the particles on a cut come apart.
+//! Separation: how the stars of the particles on a cut are split.
 //!
 //! The parts of a star that hang together keep one particle each: the part with the lowest tet the old one, the others
 //! a copy. What hangs together is said by faces ([`Operation::separate`]) or, as in the paper (section 4.3), by shared
@@ -9,8 +9,8 @@
 //! parts. If two tets on one side share a face that is not cut, that face has a particle off the surface, which was
 //! there before. If they share such a particle v besides p, the tets around the edge from p to v form a fan, every face
 //! of the fan holds v, and none of them is cut. Tets on different sides never share one. Where particles lie on the
-//! surface, where tets lie on it as a whole, and where three or more sheets of boundary meet in an edge, the two differ;
-//! [`crate::Separation`] says how.
+//! surface, where tets lie on it as a whole, and where three or more sheets of boundary meet in an edge, the two
+//! differ; [`crate::Separation`] says how.
 
 use incise_mesh::{DisjointSets, ParticleId, TetId};
 
@@ -71,7 +71,7 @@ impl Operation<'_> {
         });
     }
 
-    /// The same by the paper's criterion: tets of a star stay together if they share another particle that `ties`.
+    /// Separates by the paper's criterion: tets of a star stay together if they share another particle that `ties`.
     pub(crate) fn separate_by_particles(
         &mut self,
         seeds: &[ParticleId],

@@ -33,7 +33,7 @@ impl GivenSides {
         self.0.insert(tet, side);
     }
 
-    /// Follows a cut or a removal of somebody else.
+    /// Updates the tets after a cut or a removal made outside of the stroke.
     pub(crate) fn follow(&mut self, delta: &CutDelta) {
         if self.0.is_empty() {
             return;

@@ -153,7 +153,7 @@ fn snap(
 ///
 /// A particle is snapped because of one of its edges. After the cut that edge may belong to a copy, and nothing would
 /// tell the other copies: the same cut again would take chips off. So particles that are no further from this surface
-/// than from the one bent to them, and that have nobody on their side but others of their kind, stay on it.
+/// than from the one bent to them stay on it, if all their neighbors on the same side do as well.
 fn keep_bent(
     cuttable: &CuttableMesh,
     crossings: &[Crossing],

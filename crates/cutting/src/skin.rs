@@ -1,11 +1,11 @@
 //! [`Skin`]: the boundary as a renderer wants it, following cuts.
 //!
-//! A dense list of triangles over render vertices, those of the outer surface first, so that outer and cut faces are two
-//! ranges of one index buffer, to be drawn with two materials. A render vertex is a particle on one kind of boundary: a particle on
-//! the rim of a cut has one for the outer surface and one for each cut surface, so that shading breaks there and is
-//! smooth elsewhere. Positions and attributes, such as texture coordinates, are those of the particle, which
-//! [`CutDelta::extend_with`] interpolates on cut edges. Following a delta costs what the boundary lost and gained; normals cost a pass over the triangles,
-//! since they follow the motion.
+//! A dense list of triangles over render vertices, those of the outer surface first, so that outer and cut faces are
+//! two ranges of one index buffer, to be drawn with two materials. A render vertex is a particle on one kind of
+//! boundary: a particle on the rim of a cut has one for the outer surface and one for each cut surface, so that shading
+//! breaks there and is smooth elsewhere. Positions and attributes, such as texture coordinates, are those of the
+//! particle, which [`CutDelta::extend_with`] interpolates on cut edges. Following a delta costs what the boundary lost
+//! and gained; normals cost a pass over the triangles, since they follow the motion.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -87,8 +87,8 @@ impl Skin {
         skin
     }
 
-    /// The corners of the triangles, counterclockwise seen from outside, as indices of vertices: those of the outer surface
-    /// first, then those of cuts.
+    /// The corners of the triangles, counterclockwise seen from outside, as indices of vertices: those of the outer
+    /// surface first, then those of cuts.
     #[must_use]
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles

@@ -104,7 +104,7 @@ impl VertexStars {
         })
     }
 
-    /// Compares with lists made anew; returns the first particle whose star differs.
+    /// Compares with rebuilt lists; returns the first particle whose star differs.
     pub(crate) fn first_difference(&self, mesh: &TetMesh) -> Option<ParticleId> {
         let fresh = Self::new(mesh);
         (0..mesh.positions.len()).map(ParticleId::new).find(|&p| {

@@ -1,19 +1,20 @@
 //! [`Stroke`]: the engine behind every blade that is not a whole field: from met edges to a cut.
 //!
-//! A [`Blade`] says where it meets an edge; whether it moves (`sweep`) or stands (`triangles`) makes no difference here.
-//! Every edge met gets a particle there, and a face opens as soon as all three of its particles lie on the surface. So
-//! the mesh conforms after every cut, and a surface may end anywhere.
+//! A [`Blade`] says where it meets an edge; whether it moves (`sweep`) or stands (`triangles`) makes no difference
+//! here. Every edge met gets a particle there, and a face opens as soon as all three of its particles lie on the
+//! surface. So the mesh conforms after every cut, and a surface may end anywhere.
 //!
 //! A particle is put on the surface (snapped) only before any of its edges is split, else a corner already cut free
-//! could be cut off again as a chip of its own. So when a moving blade first meets an edge of a particle, the surface is
-//! continued by its tangent plane through all edges of the particle, which decides as a whole plane would. Where the
+//! could be cut off again as a chip of its own. So when a moving blade first meets an edge of a particle, the surface
+//! is continued by its tangent plane through all edges of the particle, which decides as a whole plane would. Where the
 //! body moves, a later meeting may come closer to the particle than foreseen; the new particle then keeps the snap
 //! distance, which bends the surface as snapping does, the other way.
 //!
 //! With a [`CutMemory`] the stroke takes over what earlier strokes of the same surface left beside the edges it meets,
-//! and goes on as if it were one of them.
+//! and continues as if it were one of them.
 //!
-//! Which particles are put on the surface: `snap`. Source: paper section 4.3, with the moving front as described here. Cost: what the edges offered and the cut cost.
+//! Which particles are put on the surface: `snap`. Source: paper section 4.3, with the moving front as described here.
+//! Cost: what the edges offered and the cut cost.
 
 mod snap;
 
@@ -54,7 +55,8 @@ pub(crate) trait Blade: Sync {
     /// On which side of it a point lies, if it stands and can tell. `reach` is a guess at the distance.
     fn side(&self, x: DVec3, reach: f64) -> Option<bool>;
 
-    /// Its normal, of any length, at a point that it touches while it stands. `length` is that of the longest edge there.
+    /// Its normal, of any length, at a point that it touches while it stands. `length` is that of the longest edge
+    /// there.
     fn touches(&self, x: DVec3, length: f64) -> Option<DVec3>;
 }
 
@@ -131,8 +133,8 @@ impl Stroke {
         self.surface.begin();
         self.forgotten.clear();
         let mut operation = Operation::begin(cuttable, &self.options);
-        // A round a meeting of an edge: then nothing is left, but what would be cut off by more is smaller than a tet. Near
-        // the tip of a surface there may be no end to it: every new edge crosses it again, nearer to the tip.
+        // A round a meeting of an edge: then nothing is left, but what would be cut off by more is smaller than a tet.
+        // Near the tip of a surface there may be no end to it: every new edge crosses it again, nearer to the tip.
         let mut rounds = 1 + blade.most_meetings();
         let mut round = 0;
         while round < rounds {
@@ -352,7 +354,7 @@ impl Stroke {
         })
     }
 
-    /// The particles whose stars can come apart: the fresh ones and those on the surface beside them. Ascending.
+    /// The particles whose stars can separate: the fresh ones and those on the surface beside them. Ascending.
     fn seeds(&self, cuttable: &CuttableMesh, fresh: &[ParticleId]) -> Vec<ParticleId> {
         let around = fresh.iter().flat_map(|&p| cuttable.around(p));
         let mut seeds: Vec<ParticleId> = around

@@ -139,8 +139,9 @@ impl CutSurface {
         news.into_iter().map(|p| (p, self.marks[&p])).collect()
     }
 
-    /// Takes over what an earlier stroke of the same surface knew of a particle, if nothing contrary is known; `upright`
-    /// says whether their positive sides are the same. Returns whether the particle came to lie on the surface by it.
+    /// Takes over what an earlier stroke of the same surface knew of a particle, if nothing contrary is known;
+    /// `upright` says whether their positive sides are the same. Returns whether the particle came to lie on the
+    /// surface by it.
     pub(crate) fn adopt(&mut self, particle: ParticleId, mut mark: Mark, upright: bool) -> bool {
         if self.marks.contains_key(&particle) {
             return false;

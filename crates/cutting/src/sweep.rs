@@ -6,7 +6,8 @@
 //! `meet`), so a body that moves or deforms between frames leaves no gap.
 //!
 //! Source: paper section 4.3, with the moving front as described here. Cost: a pass over particles and tets at the
-//! start; in each frame a copy of the positions, the boxes of the boundary triangles (see the module `near`) and the cut.
+//! start; in each frame a copy of the positions, the boxes of the boundary triangles (see the module `near`) and the
+//! cut.
 
 use glam::DVec3;
 use incise_mesh::TetMesh;
@@ -131,12 +132,12 @@ impl Sweep {
     /// What changed; nothing if the blade met no edge.
     ///
     /// # Errors
-    /// If the blade or `positions` are not finite or have another number of points than before and than the mesh, if the
-    /// mesh was changed without [`Sweep::follow`], or if it would grow beyond the options' limit. Mesh and stroke are not
-    /// changed then.
+    /// If the blade or `positions` are not finite or have another number of points than before and than the mesh, if
+    /// the mesh was changed without [`Sweep::follow`], or if it would grow beyond the options' limit. Mesh and stroke
+    /// are not changed then.
     ///
     /// # Determinism
-    /// The same history gives the same bits on every machine.
+    /// Equal histories give the same bits on every machine.
     pub fn advance(
         &mut self,
         cuttable: &mut CuttableMesh,
@@ -146,13 +147,14 @@ impl Sweep {
         self.advance_by(cuttable, positions, blade, None)
     }
 
-    /// The same as [`Sweep::advance`], for a stroke that joins earlier strokes of the same surface: it may go on where
-    /// one stopped, or meet one that came from another side, up to a quarter of an edge beside it.
+    /// Moves the blade to its next pose and cuts what it meets, for a stroke that joins earlier strokes of the same
+    /// surface: it may continue where one stopped, or meet one that came from another side, up to a quarter of an edge
+    /// beside it.
     ///
     /// `memory` holds the earlier strokes and learns this one. Use it for every frame of the stroke or for none.
     ///
     /// # Errors
-    /// As [`Sweep::advance`].
+    /// The errors of [`Sweep::advance`].
     pub fn advance_joining(
         &mut self,
         cuttable: &mut CuttableMesh,
@@ -224,10 +226,10 @@ impl Sweep {
         &mut self.search
     }
 
-    /// Follows a cut or a removal that somebody else made since the last call of [`Sweep::advance`].
+    /// Updates the stroke after a cut or a removal made outside of it since the last call of [`Sweep::advance`].
     ///
-    /// There is no way to follow an undo: what a stroke took back saw of the body is not seen again. Go on with a clone
-    /// of the stroke from before the cut that was undone.
+    /// There is no way to follow an undo: the stroke does not see again what it saw of the body in the undone cut.
+    /// Continue with a clone of the stroke from before the cut that was undone.
     ///
     /// Two strokes at the same time must keep their fronts more than a tet apart where they cross: an edge that one
     /// makes just behind the other's front is not met again, and the body may hang together there.

@@ -239,8 +239,8 @@ impl Blade for StandingBlade<'_> {
 }
 
 impl StandingBlade<'_> {
-    /// Leaves one meeting at each place: ties are those of triangles that share a side or a corner there. Where they run
-    /// different ways, the surface may be crossed or only touched, which its sides before and behind the place say.
+    /// Leaves one meeting at each place: ties are those of triangles that share a side or a corner there. Where they
+    /// run different ways, the surface may be crossed or only touched, which its sides before and behind the place say.
     /// `meetings` ascend.
     fn one_a_place(&self, meetings: &[Meeting], [a, b]: [DVec3; 2]) -> Vec<Meeting> {
         let same = |m: &Meeting, n: &Meeting| n.parameter - m.parameter <= self.tolerance;
@@ -310,7 +310,7 @@ fn without_returns(meetings: &mut Vec<Meeting>, [a, b]: [DVec3; 2], tolerance: f
 /// then.
 ///
 /// # Determinism
-/// The same input gives the same bits for any number of threads.
+/// Equal input gives the same bits for any number of threads.
 ///
 /// # Example
 /// ```
@@ -337,11 +337,11 @@ pub fn cut_surface(
     cut(cuttable, positions, surface, options, None)
 }
 
-/// The same as [`cut_surface`], for a surface that goes on where an earlier one stopped: see [`CutMemory`], which holds
-/// the earlier strokes and learns this one.
+/// Cuts along a surface of triangles that continues where an earlier one stopped: see [`CutMemory`], which holds the
+/// earlier strokes and learns this one.
 ///
 /// # Errors
-/// As [`cut_surface`].
+/// The errors of [`cut_surface`].
 pub fn cut_surface_joining(
     cuttable: &mut CuttableMesh,
     positions: &[DVec3],

@@ -11,8 +11,8 @@ use crate::{CutDelta, CutError, CuttableMesh};
 impl CuttableMesh {
     /// Takes the last cut or removal back.
     ///
-    /// Strokes in progress cannot follow: go on with clones from before, or start them anew. The same goes for a
-    /// [`crate::CutMemory`].
+    /// Strokes in progress cannot follow: continue with clones from before, or start new ones. This holds for a
+    /// [`crate::CutMemory`], too.
     ///
     /// # Errors
     /// [`CutError::NotLast`] if the mesh has not the size that `delta` left it with; nothing is changed then.

@@ -2,8 +2,8 @@
 //
 // Neighbors see of a palette its smallest color and, as it never changes, its largest: shortcut 1 is "my best color
 // lies outside of your interval". A vertex whose best color changed in a pass waits for the next. Smallest color and
-// final color are one word, so that a neighbor is either; the palette itself is its owner's alone. Who sees an old
-// smallest color sees a larger interval and waits. Cost: all edges of the undecided vertices.
+// final color are one word, so that a neighbor is either; the palette itself is its owner's alone. A vertex that sees
+// an old smallest color sees a larger interval and waits. Cost: all edges of the undecided vertices.
 
 @group(0) @binding(2) var<storage, read> offsets: array<u32>;
 @group(0) @binding(3) var<storage, read> higher: array<u32>;

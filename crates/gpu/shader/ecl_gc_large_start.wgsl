@@ -1,4 +1,4 @@
-// Before the first half of ECL-GC: nobody has a color, and vertices of 32 neighbors and more are on the list.
+// Before the first half of ECL-GC: no vertex has a color, and vertices of 32 neighbors and more are on the list.
 
 const LARGE: u32 = 32u;
 

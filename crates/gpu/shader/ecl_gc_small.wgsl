@@ -1,9 +1,9 @@
 // A pass of the second half of ECL-GC (Alabandi, Powers and Burtscher 2020): vertices of less than 32 neighbors.
 //
 // Shortcut 2 drops the edge to a neighbor with which no color is shared, and with it the largest color left; shortcut 1
-// colors who has a best color that no neighbor waited for can take. A palette is one word, which its owner alone
-// writes, and has one color more than there are neighbors to wait for, so the last of them leaves one color. Who sees
-// an old palette sees too many colors and waits. Cost: the edges that are waited for.
+// colors a vertex whose best color no neighbor waited for can take. A palette is one word, which its owner alone
+// writes, and has one color more than there are neighbors to wait for, so the last of them leaves one color. A vertex
+// that sees an old palette sees too many colors and waits. Cost: the edges that are waited for.
 
 @group(0) @binding(2) var<storage, read> offsets: array<u32>;
 @group(0) @binding(3) var<storage, read> higher: array<u32>;

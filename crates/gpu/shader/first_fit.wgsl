@@ -1,7 +1,7 @@
 // The smallest color that none of a row of neighbors has.
 //
-// Looks for it in windows of 64 colors, so there is no limit to their number and nothing is stored; who includes this
-// says what `color_around` is. Cost: one walk over the row per window, mostly one.
+// Looks for it in windows of 64 colors, so there is no limit to their number and nothing is stored. The including
+// shader defines `color_around`. Cost: one walk over the row per window, mostly one.
 
 fn first_fit(begin: u32, end: u32) -> u32 {
     var base = 0u;

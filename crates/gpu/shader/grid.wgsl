@@ -3,7 +3,7 @@
 // Most workgroups along one axis.
 const WIDEST: u32 = 65535u;
 
-// As the host does it: rows of equal length, so the last one may be longer than asked for.
+// Rows of equal length, like in the host's grid, so the last one may be longer than asked for.
 fn grid(threads: u32) -> array<u32, 3> {
     let groups = threads / THREADS + u32(threads % THREADS > 0u);
     let rows = max((groups + WIDEST - 1u) / WIDEST, 1u);

@@ -1,4 +1,4 @@
-// Who is in whose way, told by particles: constraints that share one are.
+// Which constraints conflict, told by particles: those that share one.
 //
 // Rows of both directions, each in one array: offsets, then values, and the offsets count from the front of the array.
 

@@ -1,4 +1,5 @@
-// A round of Jones and Plassmann (1993), largest degree first: who waits for nobody takes the smallest color left.
+// A round of Jones and Plassmann (1993), largest degree first: a vertex that waits for none takes the smallest color
+// left.
 //
 // A color is final once it is seen, and a vertex remembers how far down its row it has waited, so each neighbor is
 // waited for once in all rounds together. Colors are atomics because others are deciding at the same time; whether

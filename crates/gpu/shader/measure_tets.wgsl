@@ -11,7 +11,7 @@ override UNIFORM: bool = true;
 override TILED: bool = false;
 
 const NUMBERS: u32 = 16u;
-// As in `tiles.wgsl`.
+// Sizes of a tile, the same as in `tiles.wgsl`.
 override TILE_TETS: u32 = 64u;
 override TILE_NUMBERS: u32 = 2u + 5u * TILE_TETS;
 

@@ -2,8 +2,8 @@
 //
 // The first word of v is number (offsets[v] >> 5) + v: between it and that of v + 1 there is room enough, and no
 // prefix sum is needed. Words are atomics because neighbors take colors away while others look; palettes only shrink,
-// so who reads an old word sees too many colors and waits too long, which costs a round and no color. Who includes
-// this binds `offsets` and `palettes`.
+// so a thread that reads an old word sees too many colors and waits too long, which costs a round and no color. The
+// including shader binds `offsets` and `palettes`.
 
 fn palette_begin(v: u32) -> u32 {
     return (offsets[v] >> 5u) + v;

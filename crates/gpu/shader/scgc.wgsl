@@ -6,10 +6,10 @@
 //
 // Others decide in the same dispatch, and nothing says in which order one sees what they write. That is sound, since
 // each test needs one word of u only and stays true whatever happens later: a color is final, palettes shrink,
-// smallest colors grow. A decided vertex keeps its color in its palette, so that who takes it for undecided does not
-// take its color. v takes away the colors of those it sees decided itself, before it counts whom it still waits for:
-// their own telling may not have arrived. Hence the colors are those of the sequential algorithm and only the number
-// of rounds depends on the device.
+// smallest colors grow. A decided vertex keeps its color in its palette, so that a vertex that takes it for undecided
+// does not take its color. v takes away the colors of those it sees decided itself, before it counts those it still
+// waits for: their own telling may not have arrived. Hence the colors are those of the sequential algorithm and only
+// the number of rounds depends on the device.
 //
 // Cost: each edge twice for the telling, and once for each smallest color that its lower vertex gets past.
 
@@ -63,7 +63,7 @@ fn decides(v: u32) -> bool {
     var search = searches[v];
     var best = palette_first(v, atomicLoad(&colors[v]) & ~PENDING);
     if search.passed_for != best {
-        // Who stopped v most likely still does, so it is looked at first.
+        // The neighbor that stopped v most likely still does, so it is looked at first.
         if search.passed < search.left {
             exchange(begin, begin + search.passed);
         }

@@ -2,14 +2,14 @@
 //
 // Constraints on one particle all differ, so a particle has a bit per color for "taken here", and what a constraint
 // may get is what none of its particles has taken: a few words instead of all neighbors. To be without a limit on
-// colors and with two words a particle, this works in windows of 64 colors: who finds none in the first window waits
-// for the second. That gives the colors of one pass with all colors, since whether a constraint fits into a window
-// depends only on those that got a color in it.
+// colors and with two words a particle, this works in windows of 64 colors: a constraint that finds none in the first
+// window waits for the second. That gives the colors of one pass with all colors, since whether a constraint fits into
+// a window depends only on those that got a color in it.
 //
 // Neighbors of higher priority are waited for as in `scgc.wgsl`, with shortcuts 1 and 3, and for the reasons given
-// there the colors do not depend on who sees whom. Shortcut 2 drops edges, and there are none. A neighbor that shares
-// several particles is looked at several times. Cost: a round walks the neighbors of the constraints whose last
-// obstacle is gone, and looks at one word for all others.
+// there the colors do not depend on what a constraint sees of the others in a round. Shortcut 2 drops edges, and there
+// are none. A neighbor that shares several particles is looked at several times. Cost: a round walks the neighbors of
+// the constraints whose last obstacle is gone, and looks at one word for all others.
 
 @group(0) @binding(4) var<storage, read> degrees: array<u32>;
 @group(0) @binding(5) var<storage, read_write> colors: array<atomic<u32>>;
@@ -28,7 +28,7 @@ fn taken_around(v: u32) -> vec2<u32> {
     return around;
 }
 
-// Does u, of higher priority, keep somebody from taking `best`, color `place` of the window?
+// Does u keep a constraint of lower priority from taking `best`, color `place` of the window?
 fn stops(u: u32, best: u32, place: u32) -> bool {
     let held = atomicLoad(&colors[u]);
     if held < PENDING {

@@ -1,8 +1,8 @@
-// Second part of a round of Vivace: who keeps what it picked.
+// Second part of a round of Vivace: which vertices keep what they picked.
 //
 // A vertex keeps its color against uncolored neighbors that picked the same if it has the highest number among them;
 // by the weaker rule, if it has the highest number among all its uncolored neighbors. Marks of this round are made
-// while others look, so who is marked with this round counts as uncolored.
+// while others look, so a vertex marked with this round counts as uncolored.
 
 @group(0) @binding(2) var<uniform> settings: VivaceSettings;
 @group(0) @binding(3) var<storage, read> offsets: array<u32>;

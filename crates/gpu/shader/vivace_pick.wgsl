@@ -1,4 +1,5 @@
-// First part of a round of Vivace (Fratarcangeli, Tibaldo and Pellacini 2016): everybody picks a color at random.
+// First part of a round of Vivace (Fratarcangeli, Tibaldo and Pellacini 2016): every uncolored vertex picks a
+// color at random.
 //
 // The random number is a hash of seed, vertex and round, so it is the same on any device.
 

@@ -1,7 +1,7 @@
 // Third part of a round of Vivace: the others lose the colors that their neighbors now have.
 //
-// Who is out of colors is fed: it gets the smallest that no neighbor has. All colors below it are taken, so it is not
-// larger than the degree.
+// A vertex that is out of colors is fed: it gets the smallest that no neighbor has. All colors below it are taken, so
+// it is not larger than the degree.
 
 @group(0) @binding(2) var<storage, read> offsets: array<u32>;
 @group(0) @binding(3) var<storage, read> neighbors: array<u32>;

@@ -1,4 +1,4 @@
-// Before the first round of Vivace: palettes of degree / s + 1 colors, and everybody is on the list.
+// Before the first round of Vivace: palettes of degree / s + 1 colors, and all vertices are on the list.
 
 @group(0) @binding(2) var<uniform> settings: VivaceSettings;
 @group(0) @binding(3) var<storage, read> offsets: array<u32>;

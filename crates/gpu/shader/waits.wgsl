@@ -3,6 +3,6 @@
 struct Wait {
     // The colors of the window that it cannot get, a bit each.
     taken: array<atomic<u32>, 2>,
-    // Who stopped it last, plus one.
+    // The neighbor that stopped it last, plus one.
     stopped_by: u32,
 }

@@ -1,7 +1,7 @@
 // Third part of a step of WLC: winners get their color, losers go to the next worklist, in order, and the next chunk
 // is set.
 //
-// One workgroup, each thread a part of the chunk: the order of the list decides who is in a chunk with whom, so it has
+// One workgroup, each thread a part of the chunk: the order of the list decides which vertices share a chunk, so it has
 // to be kept. After a round that more than half of the list lost, chunks are halved. Cost: O(chunk / 64).
 
 @group(0) @binding(1) var<storage, read_write> work: WlcWork;

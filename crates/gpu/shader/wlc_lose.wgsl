@@ -1,6 +1,6 @@
 // Second part of a step of WLC: of two neighbors that chose the same, the one with the lower number loses.
 //
-// Who is not of the chunk has picked nothing, and nobody chose the color of a colored neighbor.
+// Vertices outside of the chunk have picked nothing, and no vertex chose the color of a colored neighbor.
 
 @group(0) @binding(1) var<storage, read> work: WlcWork;
 @group(0) @binding(2) var<storage, read> offsets: array<u32>;

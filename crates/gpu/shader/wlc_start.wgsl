@@ -1,4 +1,4 @@
-// Before the first round of WLC: everybody is on the list.
+// Before the first round of WLC: all vertices are on the list.
 
 @group(0) @binding(1) var<storage, read_write> work: WlcWork;
 @group(0) @binding(2) var<uniform> settings: WlcSettings;

@@ -26,7 +26,7 @@ pub(crate) struct Array<T> {
 }
 
 impl<T: NoUninit + AnyBitPattern> Array<T> {
-    /// As many zeros.
+    /// An array of `len` zeros in a storage buffer.
     pub(crate) fn zeros(
         gpu: &GpuContext,
         what: &'static str,
@@ -35,7 +35,7 @@ impl<T: NoUninit + AnyBitPattern> Array<T> {
         Self::with_usage(gpu, what, len, BufferUsages::STORAGE)
     }
 
-    /// The same for another use than as storage of kernels.
+    /// An array of `len` zeros in a buffer for `usage` and for copies from and to it.
     pub(crate) fn with_usage(
         gpu: &GpuContext,
         what: &'static str,
@@ -179,7 +179,7 @@ impl<T: NoUninit + AnyBitPattern> Copy<T> {
         let wanted = ..aligned::<T>(self.len);
         self.buffer
             .map_async(wgpu::MapMode::Read, wanted, move |result| {
-                // Nobody waits if the staging buffer was dropped.
+                // The receiver is gone if the staging buffer was dropped.
                 let _ = sender.send(result.map_err(|error| error.to_string()));
             });
         Staging {

@@ -63,7 +63,7 @@ impl AdapterDescription {
     }
 }
 
-/// What a driver reported when nobody could be told.
+/// The error that a driver reported outside of any call that could return it.
 type Report = Arc<Mutex<Option<GpuError>>>;
 
 /// A device with its queue.
@@ -129,7 +129,7 @@ impl GpuContext {
         }
     }
 
-    /// Takes a device that somebody else has opened, a renderer above all: what is computed here can be drawn there
+    /// Takes a device that other code has opened, typically a renderer: what is computed here can be drawn there
     /// without a copy. It must allow WebGPU's default limits, see [`GpuContext::descriptor`].
     #[must_use]
     pub fn from_device(device: Device, queue: Queue) -> Self {

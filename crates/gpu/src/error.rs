@@ -42,7 +42,7 @@ pub enum GpuError {
         /// The size in bytes.
         bytes: u64,
     },
-    /// The device is gone: driver crash, timeout, or somebody destroyed it. What it held is lost.
+    /// The device is gone: driver crash, timeout, or explicit destruction. What it held is lost.
     #[error("the GPU is lost: {message}")]
     Lost {
         /// What the driver said.

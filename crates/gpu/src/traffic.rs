@@ -1,6 +1,6 @@
 //! [`Traffic`]: what went to a device and came back, counted.
 //!
-//! Uploads, readbacks and passes are what makes a GPU path slow, and nobody sees them in the results. So they are
+//! Uploads, readbacks and passes are what makes a GPU path slow, and results do not show them. So they are
 //! counted where they happen, and tests hold them to what they should be. Cost: an atomic addition each.
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};

@@ -55,7 +55,7 @@ impl Clustering {
     /// The clustering with the given label per constraint; [`ClusterId::NONE`] for one in no
     /// cluster.
     ///
-    /// Numbers below the largest label that nobody carries are vacant; the smallest is used first.
+    /// Numbers below the largest label that no constraint has are vacant; the smallest is used first.
     /// O(labels).
     ///
     /// # Errors
@@ -174,7 +174,8 @@ impl Clustering {
     /// a new one. Amortized O(1).
     ///
     /// # Panics
-    /// As [`assign`](Self::assign), and if the numbers are used up.
+    /// If `c` is in a cluster already ([`remove`](Self::remove) it first), or if the numbers are used
+    /// up.
     pub fn new_cluster(&mut self, c: usize) -> ClusterId {
         self.place(c);
         let cluster = self.vacant.pop().unwrap_or_else(|| {

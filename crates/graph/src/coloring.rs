@@ -1,4 +1,4 @@
-//! Who runs when: a color per vertex, and the proof that it is proper.
+//! When each vertex runs: a color per vertex, and the proof that the coloring is proper.
 //!
 //! Vertices of one color run at the same time, colors one after the other. A coloring is *proper*
 //! if adjacent vertices differ. The two proofs here look at the result only and share nothing with

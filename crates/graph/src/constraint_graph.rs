@@ -1,4 +1,4 @@
-//! Who is in whose way: an undirected graph in flat arrays.
+//! Conflicts between constraints or clusters: an undirected graph in flat arrays.
 //!
 //! A vertex is a constraint or a cluster; an edge joins two that share a particle. Rows are
 //! symmetric, ascending and free of loops and repeats, which every algorithm relies on, so only
@@ -112,8 +112,8 @@ impl ConstraintGraph {
     ///
     /// A row may list its neighbors in any order and name one several times; rows are sorted and
     /// repeats count once. Both directions of an edge must be there. O(vertices + values), by two
-    /// transpositions: the first says who lists a vertex, the second sorts the rows, and a graph is
-    /// symmetric if they agree.
+    /// transpositions: the first says which vertices list a vertex, the second sorts the rows, and a
+    /// graph is symmetric if they agree.
     ///
     /// # Errors
     /// Offsets that do not start at 0, go down or end elsewhere than at `values.len()`; a neighbor

@@ -75,7 +75,8 @@ impl Incidence {
     /// Takes constraints as anything that yields lists of particle numbers. O(particles + entries).
     ///
     /// # Errors
-    /// As [`new`](Self::new).
+    /// A particle not below `particles`; a constraint that names a particle twice; more than
+    /// `u32::MAX` particles or entries.
     ///
     /// ```
     /// use incise_graph::Incidence;

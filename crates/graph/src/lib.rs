@@ -2,10 +2,11 @@
 //!
 //! A Gauss-Seidel solver visits constraints one after the other, because two constraints on one
 //! particle must not move it at the same time. Constraints that share no particle may run together.
-//! This crate holds the values that say which: who touches what ([`Incidence`]), who is in whose
-//! way ([`ConstraintGraph`]), who is solved as one block ([`Clustering`]), who runs when
-//! ([`Coloring`]), and the flat order a solver walks ([`Schedule`]). It holds no algorithm that
-//! chooses among them; those are in `incise-coloring` and `incise-clustering`.
+//! This crate holds the values that say which: the particles that a constraint touches
+//! ([`Incidence`]), the constraints that conflict ([`ConstraintGraph`]), the constraints solved as
+//! one block ([`Clustering`]), when each one runs ([`Coloring`]), and the flat order a solver walks
+//! ([`Schedule`]). It holds no algorithm that chooses among them; those are in `incise-coloring` and
+//! `incise-clustering`.
 //!
 //! Constraints, particles and graph vertices are plain `u32` numbers from 0, so any constraint of
 //! any arity fits: a spring, a bending angle, a tetrahedron. Ragged arrays are stored as `offsets`

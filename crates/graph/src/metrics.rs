@@ -38,8 +38,8 @@ pub struct ColoringMetrics {
     /// Share of busy lanes when each class runs in groups of 32, the last one filled up with idle
     /// lanes: `N / sum_c (32 ceil(n_c / 32))`. 32 lanes are a warp of a GPU.
     pub lanes_32: f64,
-    /// The same for groups of 256: `N / sum_c (256 ceil(n_c / 256))`. 256 lanes are a common thread
-    /// block or workgroup.
+    /// Share of busy lanes when each class runs in groups of 256, the last one filled up with idle
+    /// lanes: `N / sum_c (256 ceil(n_c / 256))`. 256 lanes are a common thread block or workgroup.
     pub lanes_256: f64,
 }
 

@@ -1,7 +1,7 @@
 //! Ragged arrays that change: rows one after the other, each with some room to grow.
 //!
-//! As in CSR all values lie in one array, but a row names its start, its length and its room, so a
-//! row that runs out of room moves to the end and leaves a hole. Rooms grow by a quarter and 4, and
+//! All values lie in one array, like in CSR, but a row names its start, its length and its room, so
+//! a row that runs out of room moves to the end and leaves a hole. Rooms grow by a quarter and 4, and
 //! [`Rows::tidy`] closes the holes once more than two thirds of the array are holes and room, so
 //! memory stays within three times the values (and a constant), and each value pushed costs O(1)
 //! amortized: between two tidy-ups at least a number of values proportional to all is pushed or

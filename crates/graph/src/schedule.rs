@@ -4,8 +4,8 @@
 //! A schedule is two ragged arrays, color -> clusters and cluster -> constraints, made by two
 //! counting sorts. Both have [`Rows`] that can change by themselves, so that after a cut
 //! [`Schedule::update`] costs what the cut changed: a constraint leaves its cluster or enters one, a
-//! cluster leaves its color or enters one. A journal of the clusters that changed lets whoever
-//! derived something from the schedule follow in turn. Cost: O(constraints + clusters + colors) for
+//! cluster leaves its color or enters one. A journal of the clusters that changed lets structures
+//! derived from the schedule be updated in turn. Cost: O(constraints + clusters + colors) for
 //! a new schedule, and no allocation once the arrays have grown; O(members of the changed clusters)
 //! amortized for an update.
 

@@ -289,7 +289,7 @@ fn the_cost_of_an_update_follows_the_edit() {
     }
 }
 
-/// Edits that go on forever do not let the arrays grow: what is vacated is used again.
+/// The arrays do not grow under endless edits: what is vacated is used again.
 #[test]
 fn memory_stays_in_proportion() {
     let mut clustering = Clustering::none(100);

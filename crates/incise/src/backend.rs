@@ -61,7 +61,7 @@ pub(crate) enum LastSubstep {
     Vbd { force: f64, potential: f64 },
 }
 
-/// What the state of a group is worth, as far as somebody asked.
+/// Measured quantities of a group's state; `None` for those that were not requested.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Measures {
     pub(crate) energy: Option<Energy>,
@@ -69,8 +69,8 @@ pub(crate) struct Measures {
     pub(crate) max_speed: Option<f64>,
 }
 
-/// Does the same with whichever solver it is. On a device: with the host's, whose state is that of the last time it was
-/// read back.
+/// Evaluates an expression with the solver of any variant. On a device this is the host's solver, whose state is that
+/// of the last readback.
 macro_rules! each {
     ($any:expr, $solver:ident => $body:expr) => {
         match $any {
@@ -92,7 +92,8 @@ macro_rules! each {
 }
 pub(crate) use each;
 
-/// The same to change it, in a function that may return an error. What is on a device is read back first.
+/// Evaluates an expression with the solver of any variant, mutable, in a function that may return an error. The state
+/// of a device is read back first.
 macro_rules! each_mut {
     ($any:expr, $solver:ident => $body:expr) => {
         match $any {
@@ -238,7 +239,7 @@ impl AnySolver {
         }
     }
 
-    /// How many particles a device had to put back since the last time, as far as is known here.
+    /// Returns how many particles a device had to put back since the last call, as of the last readback or measurement.
     pub(crate) fn news(&mut self) -> usize {
         match self {
             Self::Single(_) | Self::Double(_) => 0,
@@ -247,7 +248,7 @@ impl AnySolver {
         }
     }
 
-    /// Measures the state as far as the quantities ask; on a device without fetching it.
+    /// Measures the requested quantities of the state; on a device without fetching it.
     pub(crate) fn state(
         &mut self,
         gravity: Option<DVec3>,
@@ -311,8 +312,8 @@ impl AnySolver {
         }
     }
 
-    /// Softens every tet, present and to come, that exceeds the limit, and no other one: those that were softened to an
-    /// earlier limit are made anew from their rest shapes. O(tets), but O(1) from a limit to the same.
+    /// Softens every tet, present and to come, that exceeds the limit, and no other one. Tets that were softened to an
+    /// earlier limit are rebuilt from their rest shapes. O(tets), or O(1) if the limit stays the same.
     pub(crate) fn limit_kappa(
         &mut self,
         before: Option<KappaLimit>,

@@ -1,7 +1,7 @@
 //! [`Device`]: the solver of a group on a GPU.
 //!
-//! Cuts and edits are made on the host's solver, which the device follows; the state is on the device until somebody
-//! asks. Cost: a submit a frame.
+//! Cuts and edits are made on the host's solver and then applied to the device. The state stays on the device until it
+//! is requested. Cost: a submit a frame.
 
 use std::sync::Arc;
 
@@ -53,13 +53,13 @@ impl Device {
         Ok(StepReport::default())
     }
 
-    /// Makes the state known here; returns how many particles had to be put back since the last time.
+    /// Reads the state back to the host; returns how many particles had to be put back since the last call.
     pub(crate) fn read_back(&mut self) -> Result<usize, Error> {
         self.solver.host()?;
         Ok(self.news())
     }
 
-    /// The same as far as is known here.
+    /// Returns how many particles had to be put back since the last call, as of the last readback or measurement.
     pub(crate) fn news(&mut self) -> usize {
         let repaired = self.solver.repaired();
         let news = repaired.wrapping_sub(self.told) as usize;
@@ -68,7 +68,7 @@ impl Device {
     }
 }
 
-/// Who solves a cluster.
+/// Returns whether a thread or a workgroup solves each cluster.
 fn form(spec: &SolverSpec) -> Result<ClusterMapping, Error> {
     let method: Method = spec.clustering.parse()?;
     Ok(ClusterMapping::for_clusters_of(method.max_size().get()))

@@ -1,11 +1,11 @@
-//! [`Hand`]: what somebody holds of a group of bodies and moves, in grabs that come and go.
+//! [`Hand`]: the interactive grabs of a group of bodies.
 //!
-//! A grab hangs particles on a handle of the solver that only it moves, and never turns. A handle that is let go is taken
-//! by the next grab, so the solver grows with the most that are held at a time, not with how often somebody grabs.
+//! A grab attaches particles to a handle of the solver that only this grab moves, and never turns. A released handle is
+//! reused by the next grab, so the solver grows with the largest number of grabs held at a time, not with their total.
 //!
-//! Source: handles as in `incise_xpbd::Pose`. Cost: a pass over the particles to take hold and one over what hangs on
-//! handles to let go. Where particles are held rigidly both change whose mass counts, so the next step lays out all tets
-//! anew, O(tets); with a compliance it does not. A frame costs what its handles cost.
+//! Source: handles as in `incise_xpbd::Pose`. Cost: a pass over the particles for a grab, and one over all attachments
+//! for a release. Rigid grabs and their releases change which masses count, so the next step rebuilds the layout of all
+//! tets, O(tets); grabs with a compliance do not. A frame costs what its handles cost.
 
 use glam::DVec3;
 use incise_xpbd::Pose;
@@ -29,7 +29,7 @@ pub struct Grab {
 struct Grip {
     /// Its number in the solver.
     handle: u32,
-    /// Grabs that have let it go.
+    /// Number of grabs that have released it.
     user: u64,
     held: bool,
     /// The point that was grabbed, and where it is to be at the end of the next frame.
@@ -74,7 +74,7 @@ impl Hand {
         true
     }
 
-    /// Lets go of all that hangs on a grab's handle; tells whether there is such a grab.
+    /// Releases all particles attached to a grab's handle; tells whether there is such a grab.
     pub(crate) fn release(&mut self, solver: &mut AnySolver, grab: Grab) -> Result<bool, Error> {
         let Some(grip) = self.find(grab) else {
             return Ok(false);
@@ -130,7 +130,7 @@ impl Hand {
         })
     }
 
-    /// Refuses a solver where something hangs on a handle that nobody holds.
+    /// Returns an error if a particle is attached to a released handle.
     pub(crate) fn check(&self, solver: &AnySolver) -> Result<(), Error> {
         let free = |handle| {
             let mut grips = self.grips.iter();

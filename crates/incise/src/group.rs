@@ -59,7 +59,7 @@ pub(crate) struct Group {
     /// Frames of removed attachments in the solver, for new ones.
     spare_frames: Vec<u32>,
     pub(crate) distances: Distances,
-    /// What somebody holds.
+    /// The interactive grabs.
     pub(crate) hand: Hand,
     volumes: Option<Volumes>,
     /// The present positions.

@@ -17,11 +17,11 @@ enum Progress {
     Arrived,
     /// Its pose is that of the next frame.
     Moved,
-    /// The same, and that frame is its last.
+    /// Its pose is that of the next frame, which is its last.
     Ended,
 }
 
-/// A blade in somebody's hand.
+/// A blade that is moved interactively, frame by frame.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct LiveBlade {
@@ -73,7 +73,7 @@ impl LiveBlade {
         self.progress == Progress::Ended
     }
 
-    /// Notes that a frame has carried out its pose; tells whether it goes on.
+    /// Notes that a frame has carried out its pose; tells whether its stroke continues.
     pub(crate) fn arrive(&mut self) -> bool {
         let goes_on = !self.is_ended();
         self.progress = Progress::Arrived;

@@ -20,7 +20,7 @@ pub(crate) fn is_of_state(quantity: &Quantity) -> bool {
     )
 }
 
-/// Measures the state of each group where it is; nothing if nobody asks.
+/// Measures the state of each group where it is. Returns an empty list if no quantity of the state is requested.
 pub(crate) fn states(
     groups: &mut [Group],
     gravity: Option<DVec3>,

@@ -13,13 +13,14 @@ use crate::report::{Milliseconds, milliseconds};
 use crate::scene::SolverSpec;
 use crate::{Error, Scene};
 
-/// Colors that cuts may add before all clusters are colored anew: each color is a barrier in every iteration, but a
-/// full coloring with the schedule that it takes anew costs more than a frame. With 2, one stroke through a body of
-/// 11 000 tets took two of them; with 4 none. The price: the new schedule also packs the tets anew, and without it
-/// solving that stroke took 7 % more instructions.
+/// Number of colors that cuts may add before all clusters are recolored.
+///
+/// Each color is a barrier in every iteration, but a full coloring with its new schedule costs more than a frame. With
+/// 2, one stroke through a body of 11 000 tets took two full colorings; with 4 none. The price: a new schedule also
+/// repacks the tets, and without it solving that stroke took 7 % more instructions.
 const SLACK: usize = 4;
 
-/// Who is solved when.
+/// The clusters of a mesh, their colors, and the schedule in which they are solved.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Plan {
@@ -27,7 +28,7 @@ pub(crate) struct Plan {
     recoloring: Recoloring,
     pub(crate) schedule: Schedule,
     recipe: Recipe,
-    /// Colors and mean cluster size when all was made anew last.
+    /// Number of colors and mean cluster size after the last complete rebuild.
     fresh: [f64; 2],
     #[cfg_attr(feature = "save", serde(skip))]
     lists: Lists,
@@ -133,9 +134,10 @@ impl Plan {
         self.recoloring.coloring()
     }
 
-    /// Follows a cut: cut and deleted tets leave their clusters, the children join small clusters around or become new
-    /// ones, what stays small is merged, and who has new particles gets a color; everything else stays. Without merging
-    /// the children on each side of a cut tet become clusters of their own. `cuttable` is the mesh after the cut.
+    /// Updates clusters, colors and schedule after a cut. Cut and deleted tets leave their clusters, the children join
+    /// small clusters around or become new ones, clusters that stay small are merged, and clusters with new particles
+    /// get a color; everything else stays. Without merging the children on each side of a cut tet become clusters of
+    /// their own. `cuttable` is the mesh after the cut.
     pub(crate) fn follow(
         &mut self,
         delta: &CutDelta,
@@ -343,7 +345,7 @@ impl Plan {
         }
     }
 
-    /// Colors new clusters, and old ones that have new particles. Returns whether all clusters have been colored anew.
+    /// Colors new clusters, and old ones that have new particles. Returns whether all clusters have been recolored.
     fn recolor(&mut self) -> Result<bool, Error> {
         let _span = tracing::debug_span!("incise::color").entered();
         // A new cluster may have been merged away at once, but its number is in use.

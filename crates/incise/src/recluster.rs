@@ -51,7 +51,7 @@ struct Pending {
     deltas: Vec<CutDelta>,
 }
 
-/// A plan, or who makes it.
+/// A plan, or the thread that makes it.
 #[derive(Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 enum Making {
@@ -69,7 +69,7 @@ impl Recluster {
         }
     }
 
-    /// The same under another spec; what is in the making is taken when it would have been.
+    /// Replaces the spec. A plan in the making is still taken in the frame that was set before.
     pub(crate) fn with(self, spec: ReclusterSpec) -> Self {
         Self { spec, ..self }
     }

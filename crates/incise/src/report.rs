@@ -75,7 +75,7 @@ pub struct FrameReport {
     /// What must be known about the frame; absent if nothing. See [`Warning`].
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<Warning>,
-    /// Groups of joined bodies whose clusters and colors were made anew in the background and taken in this frame; absent
+    /// Groups of joined bodies whose clusters and colors were rebuilt in the background and taken in this frame; absent
     /// if none.
     #[serde(skip_serializing_if = "is_zero")]
     pub reclustered: usize,
@@ -150,7 +150,8 @@ pub struct BodyReport {
     /// The largest `E Δt² / (ρ h²)` of a tet, had none been softened; where kappa is reported.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kappa: Option<f64>,
-    /// The same before the cut of this frame; where kappa is reported.
+    /// The largest `E Δt² / (ρ h²)` of a tet before the cut of this frame, had none been softened; where kappa is
+    /// reported.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kappa_before_cut: Option<f64>,
     /// The largest kappa of the tets that the cut of this frame has made, had none been softened.
@@ -220,7 +221,7 @@ impl Default for CutReport {
 pub struct DetachedReport {
     /// The number of the new piece.
     pub piece: u32,
-    /// The piece that it came off, which goes on with the rest.
+    /// The piece that it came off, which keeps the rest.
     pub from: u32,
     /// Its tets.
     pub tets: usize,
@@ -265,7 +266,7 @@ pub struct Milliseconds {
     /// Solving. On a device: telling it what to do, after waiting for the frame before the last one if that is not done; it
     /// works on by itself.
     pub solve: f64,
-    /// Waiting for a device and fetching from it, where somebody asked: a blade, a reported quantity.
+    /// Waiting for a device and fetching from it, where that is needed: for a blade, for a reported quantity.
     pub readback: f64,
     /// Everything else: positions and reported quantities.
     pub other: f64,
@@ -280,7 +281,7 @@ pub struct ResidualReport {
     /// What XPBD drops, in kg·m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub primal: Option<f64>,
-    /// The same as a part of the weight's norm times the square of the substep; absent without gravity.
+    /// `primal` as a part of the weight's norm times the square of the substep; absent without gravity.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub primal_relative: Option<f64>,
     /// What it iterates on, without unit.
@@ -292,7 +293,7 @@ pub struct ResidualReport {
     /// The unbalanced force of the implicit step in N, from positions alone. XPBD counts that of colliders as
     /// unbalanced; VBD leaves out what they bear.
     pub force: f64,
-    /// The same as a part of the weight's norm; absent without gravity.
+    /// `force` as a part of the weight's norm; absent without gravity.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub force_relative: Option<f64>,
     /// The energy in J that the implicit step would make least.

@@ -103,10 +103,10 @@ impl Simulation {
         SimulationBuilder::default()
     }
 
-    /// The same on a number of threads of its own. The result is the same to the bit for any number.
+    /// Sets a scene up, on a pool of `threads` threads of its own. Results are bit-identical for any number of threads.
     ///
     /// # Errors
-    /// As [`Simulation::new`], and if the threads cannot be started.
+    /// Returns the errors of [`Simulation::new`], and one if the threads cannot be started.
     pub fn with_threads(scene: &Scene, threads: usize) -> Result<Self, Error> {
         let mut builder = SimulationBuilder::from_scene(scene.clone());
         builder.threads(threads);
@@ -117,7 +117,7 @@ impl Simulation {
     /// simulation.
     ///
     /// # Errors
-    /// As [`Simulation::new`], and if the device cannot do what the scene asks for.
+    /// Returns the errors of [`Simulation::new`], and one if the device cannot do what the scene asks for.
     #[cfg(feature = "gpu")]
     pub fn on_device(scene: &Scene, gpu: Arc<crate::gpu::GpuContext>) -> Result<Self, Error> {
         let mut builder = SimulationBuilder::from_scene(scene.clone());
@@ -353,6 +353,9 @@ impl Simulation {
     /// Puts the warnings of all groups into the report, and looks for divergence.
     fn collect_warnings(&mut self) {
         let elapsed = self.state.report.time_s;
+        let missed = self.state.timeline.take_missed().into_iter();
+        let missed = missed.map(Warning::of_missed_stroke);
+        self.state.report.warnings.extend(missed);
         for group in &mut self.state.groups {
             self.state.report.warnings.append(&mut group.warnings);
             let speed = match group.solver.host_max_speed() {
@@ -472,7 +475,7 @@ impl Simulation {
     }
 
     /// What the strokes of the last frame changed, in the order in which they did, in the numbers of
-    /// [`Simulation::mesh`]: for renderers ([`incise_cutting::Skin`]), recorders and whoever else follows the mesh.
+    /// [`Simulation::mesh`]: for renderers ([`incise_cutting::Skin`]), recorders and other consumers of the mesh.
     #[must_use]
     pub fn deltas(&self) -> &[CutDelta] {
         &self.deltas
@@ -498,11 +501,11 @@ impl Simulation {
         &self.state.on_cut
     }
 
-    /// The pieces of all bodies with their numbers, ascending: what a cut took off whom, and how much each weighs.
+    /// The pieces of all bodies with their numbers, ascending: which piece each one came off, and how much it weighs.
     ///
     /// Before all cuts the pieces are numbered body by body (bodies that links join count where the first of them
     /// stands), those of a body by their first tets; what comes off gets the next numbers, stroke by stroke and within a
-    /// stroke body by body. The larger part of a piece that comes apart mostly keeps its number, see
+    /// stroke body by body. The larger part of a piece that is split mostly keeps its number, see
     /// [`PieceTracker::follow`](incise_cutting::PieceTracker::follow). No number is used twice. O(pieces there ever
     /// were).
     #[must_use]

@@ -2,7 +2,7 @@
 //!
 //! A body whose fastest particle has stayed below a speed for a time is no longer solved: it keeps its positions to the
 //! bit, its velocities become zero, and it costs nothing until it is cut or one of its handles moves. A collider with a
-//! velocity keeps everybody awake, wherever it is: nobody foresees whom it will meet.
+//! velocity keeps all bodies awake, wherever it is: which bodies it will meet is not predicted.
 //!
 //! The trade: what is left of its motion, at most that speed, and slow creep are lost. Shear is damped only by the
 //! substeps, so that a large soft body rings for seconds before it rests. The time keeps a body awake that only turns

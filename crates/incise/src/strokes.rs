@@ -39,6 +39,8 @@ pub(crate) struct Timeline {
     memories: Vec<CutMemory>,
     /// Strokes that began or ended to cut since the events were taken.
     events: Vec<Event>,
+    /// Strokes of the scene that ended without a cut since they were taken, by their keys in the scene.
+    missed: Vec<String>,
 }
 
 impl Timeline {
@@ -115,7 +117,7 @@ impl Timeline {
         Ok(())
     }
 
-    /// A live stroke that goes on: its place in the list, its name and its blade.
+    /// Finds a live stroke that has not ended: its place in the list, its name and its blade.
     fn live(&mut self, number: u32) -> Result<(usize, &str, &mut LiveBlade), Error> {
         let strokes = self.strokes.iter_mut().enumerate();
         let mut live = strokes.filter_map(|(place, stroke)| match &mut stroke.tool {
@@ -147,7 +149,12 @@ impl Timeline {
         std::mem::take(&mut self.events)
     }
 
-    /// Whether a stroke begins or goes on in a frame.
+    /// The strokes of the scene that have ended without a cut since the last call, by their keys in the scene.
+    pub(crate) fn take_missed(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.missed)
+    }
+
+    /// Whether a stroke begins or continues in a frame.
     pub(crate) fn is_due(&self, frame: u64) -> bool {
         self.strokes.iter().any(|stroke| stroke.frames[0] <= frame)
     }
@@ -198,7 +205,7 @@ impl Timeline {
                 follow(g, group, &delta)?;
             }
         }
-        let events = &mut self.events;
+        let (events, missed) = (&mut self.events, &mut self.missed);
         self.strokes.retain_mut(|stroke| {
             let goes_on = match &mut stroke.tool {
                 Tool::Live(blade) => blade.arrive(),
@@ -206,6 +213,10 @@ impl Timeline {
             };
             if !goes_on {
                 events.extend(stroke.end());
+                // A live blade may pass by the bodies.
+                if !stroke.has_cut && !matches!(stroke.tool, Tool::Live(_)) {
+                    missed.push(std::mem::take(&mut stroke.field));
+                }
             }
             goes_on
         });

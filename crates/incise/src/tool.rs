@@ -24,7 +24,7 @@ pub(crate) enum Tool {
         blade: Vec<DVec3>,
         path: Vec<[f64; 3]>,
     },
-    /// A polyline that somebody moves.
+    /// A polyline that is moved interactively.
     Live(LiveBlade),
 }
 

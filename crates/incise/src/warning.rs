@@ -35,6 +35,8 @@ pub enum WarningCode {
     OutsideAccuracy,
     /// A region of the scene contains no particle, or no tet.
     EmptyRegion,
+    /// A stroke of the scene has ended without cutting a tet.
+    StrokeMissed,
     /// The substep is too short for single precision.
     ShortSubstepF32,
     /// Tets were softened to keep `kappa_limit`.
@@ -75,6 +77,15 @@ impl Warning {
         Self {
             code: WarningCode::EmptyRegion,
             message: "the region contains nothing of the body: compare it with scale and position of the body".into(),
+            location: field,
+        }
+    }
+
+    /// The warning about a stroke that cut nothing, at a place like `stroke[0]`.
+    pub(crate) fn of_missed_stroke(field: String) -> Self {
+        Self {
+            code: WarningCode::StrokeMissed,
+            message: "the stroke has not cut a tet: compare it with the positions of the bodies in its frames".into(),
             location: field,
         }
     }

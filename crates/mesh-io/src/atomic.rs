@@ -85,7 +85,7 @@ impl Remover {
 impl Drop for Remover {
     fn drop(&mut self) {
         if let Some(temporary) = &self.0 {
-            // Nobody to tell: an error is being reported already.
+            // This error cannot be reported: another one is being reported already.
             fs::remove_file(temporary).ok();
         }
     }

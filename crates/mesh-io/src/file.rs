@@ -1,7 +1,7 @@
 //! [`MeshFile`]: a mesh with what its file says beside it.
 //!
-//! Formats name values and number regions; a [`TetMesh`] knows neither. So what a reader finds is kept here, and a writer
-//! puts in what its format has a place for. Cost: O(values).
+//! Formats name values and number regions; a [`TetMesh`] knows neither. So what a reader finds is kept here, and a
+//! writer puts in what its format has a place for. Cost: O(values).
 
 use glam::DVec3;
 use incise_mesh::{Repaired, TetMesh};
@@ -49,7 +49,7 @@ impl From<TetMesh> for MeshFile {
 }
 
 impl NamedValues {
-    /// The same, borrowed.
+    /// Borrows name and values as a [`Field`].
     #[must_use]
     pub fn as_field(&self) -> Field<'_> {
         Field {

@@ -54,7 +54,7 @@ pub fn read_file(path: impl AsRef<Path>) -> Result<MeshFile, MeshIoError> {
 /// [`parse_tetgen`](crate::parse_tetgen).
 ///
 /// # Errors
-/// As [`read_file`], but [`MeshIoError::Io`]; [`MeshIoError::UnknownFormat`] for `.node` and `.ele`, too.
+/// The errors of [`read_file`] except [`MeshIoError::Io`]; [`MeshIoError::UnknownFormat`] for `.node` and `.ele`, too.
 ///
 /// # Example
 /// ```
@@ -82,7 +82,7 @@ pub fn parse_file(path: impl AsRef<Path>, bytes: &[u8]) -> Result<MeshFile, Mesh
 /// The mesh alone of what [`read_file`] reads.
 ///
 /// # Errors
-/// As [`read_file`].
+/// The errors of [`read_file`].
 ///
 /// # Example
 /// ```
@@ -137,7 +137,7 @@ pub fn write_file(path: impl AsRef<Path>, file: &MeshFile) -> Result<(), MeshIoE
 /// Writes a mesh with nothing beside it.
 ///
 /// # Errors
-/// As [`write_file`].
+/// The errors of [`write_file`].
 pub fn write(path: impl AsRef<Path>, mesh: &TetMesh) -> Result<(), MeshIoError> {
     let path = path.as_ref();
     match ending(path).as_str() {

@@ -1,9 +1,9 @@
 //! glTF 2.0 (`.glb` and `.gltf`): surfaces for viewers, engines and browsers. Written only.
 //!
 //! One mesh with positions, smooth normals (the mean over the triangles around a point, weighted by area) and 32-bit
-//! indices; points without triangles are left out. glTF stores floats: coordinates are rounded to 24 bits, 6e-8 of their
-//! size. Its second axis points up, ours is the third: a rotation of the node says so, and the numbers stay ours. Both
-//! forms are one file; `.gltf` has the numbers in base64 and is a third larger.
+//! indices; points without triangles are left out. glTF stores floats: coordinates are rounded to 24 bits, 6e-8 of
+//! their size. Its second axis points up, ours is the third: a rotation of the node says so, and the numbers stay ours.
+//! Both forms are one file; `.gltf` has the numbers in base64 and is a third larger.
 //!
 //! A writer of our own, because the whole file is one text with a dozen numbers; the crate `gltf-json` would bring
 //! `serde_json` and derived types for all of glTF. Source: "glTF 2.0 Specification" (Khronos). Linear.

@@ -1,8 +1,8 @@
 //! Wavefront `.obj`: `v` lines with positions and `f` lines with polygons.
 //!
 //! Corners count from 1, or backwards from the last point when negative; what follows a slash (texture, normal) is
-//! skipped, as are all other statements. A backslash continues a line. Source: "Object Files (.obj)", Advanced Visualizer
-//! manual, appendix B1 (Wavefront). Linear.
+//! skipped, as are all other statements. A backslash continues a line. Source: "Object Files (.obj)", Advanced
+//! Visualizer manual, appendix B1 (Wavefront). Linear.
 
 use std::io::{self, Write};
 use std::path::Path;

@@ -1,8 +1,8 @@
 //! Stereolithography `.stl`: triangles, each with its own three corners, as text or binary.
 //!
-//! Corners with equal coordinates, to the bit, become one point, in the order they are first met. Normals and attributes
-//! are skipped, and the triangles of several solids come together. Many binary files start with the word of text files,
-//! `solid`: a file that has exactly the size its count asks for is binary. Binary coordinates are `f32`.
+//! Corners with equal coordinates, to the bit, become one point, in the order they are first met. Normals and
+//! attributes are skipped, and the triangles of several solids come together. Many binary files start with the word of
+//! text files, `solid`: a file that has exactly the size its count asks for is binary. Binary coordinates are `f32`.
 //!
 //! Source: M. Burns, "Automated Fabrication" (1993), section 6.5. Linear in expectation, for the merging.
 
@@ -44,7 +44,8 @@ pub(super) fn write(out: &mut dyn Write, surface: &TriangleSurface) -> io::Resul
 /// Points closer than that become one when read. [`write_surface`](crate::write_surface) keeps every bit.
 ///
 /// # Errors
-/// [`MeshIoError::Io`] if the file cannot be written, or a coordinate is too large for an `f32`, or there are 2³² triangles.
+/// [`MeshIoError::Io`] if the file cannot be written, or a coordinate is too large for an `f32`, or there are 2³²
+/// triangles.
 ///
 /// # Panics
 /// If a corner has no position.

@@ -3,7 +3,7 @@
 //! Readers of our own, because what a tetrahedralization needs is the same in all four: coordinates as doubles, corners
 //! within bounds, the line or byte of what is wrong, and memory bounded by the size of the file. Of the crates for
 //! these formats, `stl_io` keeps coordinates as `f32`, ASCII ones too; `tobj` names no line, splits a file into models
-//! that number their points anew, and has doubles as a feature of the whole build only; `ply-rs-bw` makes as many
+//! with point numbers of their own, and has doubles as a feature of the whole build only; `ply-rs-bw` makes as many
 //! elements as a header announces when they have no properties, so that a file of 100 bytes fills the memory.
 //!
 //! Polygons become fans of triangles around their first corner, right for convex ones. Linear.
@@ -61,7 +61,7 @@ pub fn read_surface(path: impl AsRef<Path>) -> Result<TriangleSurface, MeshIoErr
 /// the format, and errors name the path; it need not exist.
 ///
 /// # Errors
-/// As [`read_surface`], but [`MeshIoError::Io`].
+/// The errors of [`read_surface`] except [`MeshIoError::Io`].
 ///
 /// # Example
 /// ```

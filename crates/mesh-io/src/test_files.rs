@@ -23,8 +23,8 @@ pub(super) fn sample() -> MeshFile {
     }
 }
 
-/// Reads all parts of a file that start where it does. A part must be an error that names the place, or is `accepted` with
-/// its length.
+/// Reads all parts of a file that start where it does. A part must be an error that names the place, or is `accepted`
+/// with its length.
 #[track_caller]
 pub(super) fn cut<T>(
     whole: &[u8],

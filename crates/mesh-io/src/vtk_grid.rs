@@ -44,8 +44,8 @@ impl Grid {
     /// The tets. There is one type and one value for each cell and one value for each point.
     ///
     /// # Errors
-    /// [`MeshIoError::Empty`] without cells, else what `error` makes of a cell, the number of points of the cells before it
-    /// and what is wrong with it.
+    /// [`MeshIoError::Empty`] without cells, else what `error` makes of a cell, the number of points of the cells
+    /// before it and what is wrong with it.
     pub(crate) fn into_file(
         self,
         error: impl Fn(usize, usize, String) -> MeshIoError,

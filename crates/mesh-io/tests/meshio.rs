@@ -65,7 +65,8 @@ struct List<'a> {
 }
 
 impl List<'_> {
-    /// A file of cells of meshio's name, which keeps all points or else what `kept` says, and the first values of fields.
+    /// A file of cells of meshio's name, which keeps all points or else what `kept` says, and the first values of
+    /// fields.
     fn add(&mut self, name: &'static str, cell: &str, kept: &str, fields: &str) {
         self.names.push(name);
         let line = writeln!(self.lines, "{name}\t{cell}\t{kept}\t{fields}");

@@ -3,7 +3,8 @@
 //! Union-find with path halving; the smallest number of a set is its root, so that results depend on which pairs were
 //! united but not on their order.
 //!
-//! Source: R. E. Tarjan and J. van Leeuwen, "Worst-case Analysis of Set Union Algorithms", 1984. Cost: about O(1) a call.
+//! Source: R. E. Tarjan and J. van Leeuwen, "Worst-case Analysis of Set Union Algorithms", 1984. Cost: about O(1) a
+//! call.
 
 /// Disjoint sets of the numbers from 0 on.
 ///

@@ -1,7 +1,7 @@
 //! [`QualityHistograms`]: how the shapes of all tets are spread, not only the worst.
 //!
-//! Classes have round, fixed limits, so that histograms of different meshes can be laid beside each other. Linear in the
-//! number of tets.
+//! Classes have round, fixed limits, so that histograms of different meshes can be laid beside each other. Linear in
+//! the number of tets.
 
 use crate::quality::{dihedral_angles, tet_quality};
 use crate::{TetId, TetMesh};

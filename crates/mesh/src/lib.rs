@@ -29,8 +29,8 @@
 //! # Ok::<(), incise_mesh::MeshError>(())
 //! ```
 //!
-//! Conventions: meters; a tet `[a, b, c, d]` is positive when `(b - a) × (c - a) · (d - a) > 0`; orders are by index and
-//! never depend on hashing or threads, so that equal input gives equal output.
+//! Conventions: meters; a tet `[a, b, c, d]` is positive when `(b - a) × (c - a) · (d - a) > 0`; orders are by index
+//! and never depend on hashing or threads, so that equal input gives equal output.
 
 mod bounds;
 mod check;

@@ -1,7 +1,8 @@
 //! Parts of a mesh that hang together at a single particle, taken apart.
 //!
-//! Where two parts meet at a particle but in no face around it, the surface touches itself there, and a simulation would
-//! join the parts by a ball joint without any material. Each further part gets a particle of its own at the same place.
+//! Where two parts meet at a particle but in no face around it, the surface touches itself there, and a simulation
+//! would join the parts by a ball joint without any material. Each further part gets a particle of its own at the same
+//! place.
 //!
 //! Cost: O(n log n) for n tets.
 

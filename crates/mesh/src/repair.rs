@@ -1,9 +1,9 @@
-//! [`repair`]: what is commonly wrong with meshes of other programs, put right on request and told item by item.
+//! [`repair`]: repairs common faults of meshes of other programs, on request, and reports them item by item.
 //!
-//! Nothing is done that was not asked for, and everything that was done is counted. Steps are taken in an order in which
-//! each may need those before: particles at one place become one, which may leave tets without volume; those go; tets
-//! inside out are turned; tets that are there twice go but once; of several pieces the largest stays; what no tet uses
-//! goes. Overlapping bodies and holes are not repaired: [`TetMesh::check`] finds them.
+//! Nothing is done that was not asked for, and everything that was done is counted. Steps are taken in an order in
+//! which each may need those before: particles at one place become one, which may leave tets without volume; those go;
+//! tets inside out are turned; tets that are there twice go but once; of several pieces the largest stays; what no tet
+//! uses goes. Overlapping bodies and holes are not repaired: [`TetMesh::check`] finds them.
 //!
 //! Particles are merged across a distance by a sweep along x with union-find, so chains of close particles become one.
 //! Cost: O(n log n), and O(n times the particles within the distance in x) to merge across a distance.
@@ -109,7 +109,7 @@ pub struct Repaired {
 ///
 /// let mut mesh = kuhn_box([2, 1, 1], DVec3::ONE);
 /// mesh.tets[0].swap(0, 1); // inside out
-/// mesh.positions.push(DVec3::ZERO); // used by nobody
+/// mesh.positions.push(DVec3::ZERO); // used by no tet
 /// let repaired = repair(&mesh, &RepairOptions::ALL);
 /// assert_eq!(repaired.mesh, kuhn_box([2, 1, 1], DVec3::ONE));
 /// assert_eq!((repaired.report.flipped, repaired.report.merged), (1, 1));
@@ -181,7 +181,8 @@ pub fn repair(mesh: &TetMesh, options: &RepairOptions) -> Repaired {
     }
 }
 
-/// Which particles stay: all, or those of tets; those merged with another never do, unless a tet could not be redirected.
+/// Which particles stay: all, or those of tets; those merged with another never do, unless a tet could not be
+/// redirected.
 fn kept(
     mesh: &TetMesh,
     tets: &[(TetId, [ParticleId; 4])],

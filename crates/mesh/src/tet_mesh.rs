@@ -1,7 +1,7 @@
 //! [`TetMesh`]: positions and four corners per tetrahedron, nothing derived.
 //!
 //! A mesh is a plain value with public fields. Whatever follows from it (surface, pieces, quality) is computed by
-//! functions and stored by whoever needs it for longer, so that nothing here can be out of date.
+//! functions and stored elsewhere if needed for longer, so that nothing here can be out of date.
 
 use glam::DVec3;
 

@@ -1,4 +1,4 @@
-//! Fills the boundaries of given meshes anew and says how well the bodies fit: `fill MESH TETS [TETS ..]`.
+//! Fills the boundaries of given meshes again and says how well the bodies fit: `fill MESH TETS [TETS ..]`.
 //!
 //! Distances are told in spacings of the lattice, the cube root of twelve times the volume of a tet.
 

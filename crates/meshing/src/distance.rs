@@ -29,8 +29,8 @@ pub(super) fn ellipsoid(p: DVec3, center: DVec3, radii: DVec3) -> f64 {
 
 /// A ball that moves from one end to the other while its radius changes evenly. Exact.
 ///
-/// The nearest ball on the way is where the line to its center leans by the slope of the radius, unless that lies beyond
-/// an end; the ends must be farther apart than their radii differ.
+/// The nearest ball on the way is where the line to its center leans by the slope of the radius, unless that lies
+/// beyond an end; the ends must be farther apart than their radii differ.
 pub(super) fn round_cone(p: DVec3, [from, to]: [DVec3; 2], [first, last]: [f64; 2]) -> f64 {
     let axis = to - from;
     let length = axis.length();

@@ -1,13 +1,14 @@
 //! [`Doubled`]: cells of a lattice joined to larger ones where nothing needs small ones, and the tets that fill them.
 //!
-//! Cubes of 2, 4, 8 .. cells a side become one cell each, so that cells form the leaves of octrees whose neighbors, also at
-//! edges and corners, differ by a factor of two at most. A face between cells of one size is filled as in the lattice: four
-//! tets around the line between the two centers, two each where an edge of the face is halved by a smaller cell. A face
-//! between a cell and four smaller ones is cut into eight triangles that meet in its middle; each is joined to the center
-//! on either side. Both sides of a face and all cells around an edge see the same triangles and halves, so faces match.
+//! Cubes of 2, 4, 8 .. cells a side become one cell each, so that cells form the leaves of octrees whose neighbors,
+//! also at edges and corners, differ by a factor of two at most. A face between cells of one size is filled as in the
+//! lattice: four tets around the line between the two centers, two each where an edge of the face is halved by a
+//! smaller cell. A face between a cell and four smaller ones is cut into eight triangles that meet in its middle; each
+//! is joined to the center on either side. Both sides of a face and all cells around an edge see the same triangles and
+//! halves, so faces match.
 //!
-//! Source: the graded interior of F. Labelle and J. R. Shewchuk, "Isosurface Stuffing", 2007, with tets of our own choice
-//! between sizes. Cost: linear in the number of cells, a byte each.
+//! Source: the graded interior of F. Labelle and J. R. Shewchuk, "Isosurface Stuffing", 2007, with tets of our own
+//! choice between sizes. Cost: linear in the number of cells, a byte each.
 
 /// Coordinates of a lattice vertex in half spacings.
 type At = [i32; 3];

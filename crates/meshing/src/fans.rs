@@ -1,8 +1,8 @@
 //! Bodies with known answers: tets around one edge, tets around one particle, and copies of any mesh side by side.
 //!
-//! What is asked of the graph that joins tets with a common particle, of pieces, and of tets per particle can be checked
-//! against these exactly. Their coordinates are exact or rounded once; their tets are positive, but as thin as it takes.
-//! Linear in the number of tets.
+//! What is asked of the graph that joins tets with a common particle, of pieces, and of tets per particle can be
+//! checked against these exactly. Their coordinates are exact or rounded once; their tets are positive, but as thin as
+//! it takes. Linear in the number of tets.
 
 use glam::{DVec3, dvec3};
 use incise_mesh::{ParticleId, TetMesh};
@@ -10,8 +10,8 @@ use incise_mesh::{ParticleId, TetMesh};
 /// `tets` tets around one common edge, from the particle 0 to the particle 1, closing a ring.
 ///
 /// Any two tets share the edge: the graph of tets with a common particle is complete, with `tets` colors needed and
-/// `tets - 1` neighbors each. The particles 0 and 1 have `tets` tets, all others two. One piece by faces; the surface is
-/// a double pyramid. The edge is 1 m long, on the z axis around the origin; the ring has the radius 1 m.
+/// `tets - 1` neighbors each. The particles 0 and 1 have `tets` tets, all others two. One piece by faces; the surface
+/// is a double pyramid. The edge is 1 m long, on the z axis around the origin; the ring has the radius 1 m.
 ///
 /// # Panics
 /// For fewer than three tets, which leave the ring open.
@@ -90,9 +90,9 @@ pub fn star(tets: usize) -> TetMesh {
 
 /// `count` copies of a mesh, each moved by `offset` (meters) from the one before, none joined with another.
 ///
-/// Everything that is counted is multiplied: particles, tets, pieces, edges of the graph of tets with a common particle.
-/// The largest number of tets at a particle and the number of colors needed stay as they are. The first copy comes
-/// first, unmoved. Copies overlap when the offset is too short.
+/// Everything that is counted is multiplied: particles, tets, pieces, edges of the graph of tets with a common
+/// particle. The largest number of tets at a particle and the number of colors needed stay as they are. The first copy
+/// comes first, unmoved. Copies overlap when the offset is too short.
 ///
 /// # Panics
 /// From 2³² particles on.

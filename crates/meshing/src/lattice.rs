@@ -27,8 +27,8 @@ impl Lattice {
     /// `shift`, in spacings, moves the lattice vertices away from the box; whole numbers change nothing.
     ///
     /// # Errors
-    /// [`MeshingError::Lattice`] if a number is not finite, the spacing is not positive, the box is inside out, or there
-    /// would be more than 2²⁶ cells.
+    /// [`MeshingError::Lattice`] if a number is not finite, the spacing is not positive, the box is inside out, or
+    /// there would be more than 2²⁶ cells.
     pub fn covering(
         low: DVec3,
         high: DVec3,

@@ -1,5 +1,5 @@
-//! Makes tetrahedral meshes: shapes by isosurface stuffing, closed surfaces filled with tets, Delaunay tetrahedralizations,
-//! irregular bodies, and bodies with known answers.
+//! Makes tetrahedral meshes: shapes by isosurface stuffing, closed surfaces filled with tets, Delaunay
+//! tetrahedralizations, irregular bodies, and bodies with known answers.
 //!
 //! ```
 //! use incise_mesh::{TriangleSurface, glam::DVec3};

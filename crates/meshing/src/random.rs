@@ -1,7 +1,7 @@
 //! Random numbers from counters: the same for the same arguments on every platform, in any order.
 //!
-//! The finalizer of `SplitMix64` (Steele, Lea and Flood, "Fast Splittable Pseudorandom Number Generators", 2014), applied
-//! to a seed and a counter. Constant time.
+//! The finalizer of `SplitMix64` (Steele, Lea and Flood, "Fast Splittable Pseudorandom Number Generators", 2014),
+//! applied to a seed and a counter. Constant time.
 
 use glam::{DVec3, dvec3};
 

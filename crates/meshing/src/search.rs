@@ -1,10 +1,10 @@
 //! Generating a shape with a wanted number of tets.
 //!
 //! The number of tets is close to 12 volume / spacing³, but jumps whenever a layer of lattice vertices enters or leaves
-//! the shape, by several percent for flat sides and small meshes. The spacing is searched by bisection sped up with that
-//! law; when a jump straddles the wanted number, the lattice is shifted against the shape and the search repeated, at
-//! last also turned, so that its layers meet no flat side all at once. Shifts follow a low-discrepancy sequence: they
-//! are all different and the same for everyone.
+//! the shape, by several percent for flat sides and small meshes. The spacing is searched by bisection sped up with
+//! that law; when a jump straddles the wanted number, the lattice is shifted against the shape and the search repeated,
+//! at last also turned, so that its layers meet no flat side all at once. Shifts follow a low-discrepancy sequence:
+//! they are all different and the same for everyone.
 //!
 //! Cost: a few stuffings for curved shapes, some dozens for flat ones.
 
@@ -25,8 +25,8 @@ const DIHEDRAL_COSINES: [f64; 2] = [-0.965_016, 0.982_613];
 
 /// A mesh of the shape with `tets` tets to within 2 %.
 ///
-/// The mesh is sound ([`TetMesh::check`]), of as many pieces as the shape, also by faces, with a manifold surface of the
-/// shape's topology and all dihedral angles between 10.7 and 164.8 degrees. Deterministic on all platforms, for any
+/// The mesh is sound ([`TetMesh::check`]), of as many pieces as the shape, also by faces, with a manifold surface of
+/// the shape's topology and all dihedral angles between 10.7 and 164.8 degrees. Deterministic on all platforms, for any
 /// number of threads.
 ///
 /// With few tets, parts thinner than a tet are lost or come out as stumps, such as ears and limbs.

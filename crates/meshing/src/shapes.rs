@@ -100,8 +100,8 @@ impl Shape {
         Self::NAMES[self as usize]
     }
 
-    /// Distance from the surface in meters, negative inside. Exact for the simple solids; for the liver, the animals and
-    /// the gear it is right in sign, and in size at most the distance.
+    /// Distance from the surface in meters, negative inside. Exact for the simple solids; for the liver, the animals
+    /// and the gear it is right in sign, and in size at most the distance.
     ///
     /// The values at two places differ by no more than the distance between these, up to rounding.
     #[must_use]
@@ -135,8 +135,8 @@ impl Shape {
         }
     }
 
-    /// The Euler characteristic of the surface: 0 for the torus and the gear, 4 for the two surfaces of the shell and of
-    /// the pair, 2 for the others.
+    /// The Euler characteristic of the surface: 0 for the torus and the gear, 4 for the two surfaces of the shell and
+    /// of the pair, 2 for the others.
     #[must_use]
     pub const fn euler_characteristic(self) -> isize {
         match self {

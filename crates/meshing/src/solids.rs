@@ -1,9 +1,9 @@
 //! The solids of [`Shape`](crate::Shape) that are blended from several parts, as signed distance functions.
 //!
-//! Animals and organs are stand-ins of our own: balls, cones with round ends and ellipsoids, joined with filled creases.
-//! Animals look along x and stand along z; y mirrors left and right. Each is drawn at a size of its own and then scaled
-//! and moved so that the box around it has a longest side of 1 m and its center at the origin. No value exceeds the
-//! distance in size. Constant time.
+//! Animals and organs are stand-ins of our own: balls, cones with round ends and ellipsoids, joined with filled
+//! creases. Animals look along x and stand along z; y mirrors left and right. Each is drawn at a size of its own and
+//! then scaled and moved so that the box around it has a longest side of 1 m and its center at the origin. No value
+//! exceeds the distance in size. Constant time.
 
 use glam::{DVec3, dvec3};
 

@@ -7,15 +7,16 @@
 //!
 //! - the long edge is cut: the diagonal runs from the cut of the long edge to the inside end of the short one;
 //! - both short edges are cut: the *parity rule*. The ends of the long edge differ in one of the signs of their offset
-//!   from the lost corner, so exactly one of them exceeds it in an even number of coordinates. The diagonal starts there.
+//!   from the lost corner, so exactly one of them exceeds it in an even number of coordinates. The diagonal starts
+//!   there.
 //!
 //! In the prism with two + and two - corners the two shared diagonals then always have different ends, and only one
 //! diagonal of the third quadrilateral, which lies on the surface, makes three tets possible.
 //!
-//! With moved vertices and cuts at their extremes, all angles lie between 9.3 and 161.7 degrees (a test tries them all).
-//! The paper states 10.7 to 164.8 degrees for the same parts of edges. No table of diagonals gives that here: three moved
-//! vertices and an inside one make a single tet, without a diagonal, that can have 9.3 degrees (a test builds it). The
-//! opposite choice in the first rule falls to 7.2 degrees.
+//! With moved vertices and cuts at their extremes, all angles lie between 9.3 and 161.7 degrees (a test tries them
+//! all). The paper states 10.7 to 164.8 degrees for the same parts of edges. No table of diagonals gives that here:
+//! three moved vertices and an inside one make a single tet, without a diagonal, that can have 9.3 degrees (a test
+//! builds it). The opposite choice in the first rule falls to 7.2 degrees.
 //!
 //! Source: F. Labelle and J. R. Shewchuk, "Isosurface Stuffing: Fast Tetrahedral Meshes with Good Dihedral Angles",
 //! 2007. Constant time per tet.

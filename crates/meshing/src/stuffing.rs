@@ -2,13 +2,13 @@
 //!
 //! The function is sampled at the vertices of a body-centered cubic lattice. On each edge between an inside and an
 //! outside vertex the surface is located on the function itself (not on its linear interpolant). A vertex with a cut
-//! point so near that slivers would follow is moved onto it, which removes the other cuts at its edges. Each lattice tet
-//! is then filled from the stencils of the module `stencil`.
+//! point so near that slivers would follow is moved onto it, which removes the other cuts at its edges. Each lattice
+//! tet is then filled from the stencils of the module `stencil`.
 //!
-//! Whatever the function, faces match, every tet is positive, and the dihedral angles stay between 9.3 and 161.7 degrees.
-//! These bounds are not proved but found by trying all extremes of the stencils; they are not the 10.7 and 164.8 degrees
-//! that the paper proves, which smooth surfaces keep as a rule but not always. Features thinner than the spacing are
-//! lost, sharp edges are beveled.
+//! Whatever the function, faces match, every tet is positive, and the dihedral angles stay between 9.3 and 161.7
+//! degrees. These bounds are not proved but found by trying all extremes of the stencils; they are not the 10.7 and
+//! 164.8 degrees that the paper proves, which smooth surfaces keep as a rule but not always. Features thinner than the
+//! spacing are lost, sharp edges are beveled.
 //!
 //! Source: F. Labelle and J. R. Shewchuk, "Isosurface Stuffing: Fast Tetrahedral Meshes with Good Dihedral Angles",
 //! 2007, for a uniform lattice. Cost: linear in the number of lattice cells, with two samples each and 26 bytes; only
@@ -27,7 +27,7 @@ use crate::stencil::{Corner, Node, Side, fill};
 
 /// A vertex moves onto a cut on a long edge nearer than this part of the edge (values of the paper).
 pub(super) const ALPHA_LONG: f64 = 0.24999;
-/// The same for short edges.
+/// A vertex moves onto a cut on a short edge nearer than this part of the edge (values of the paper).
 pub(super) const ALPHA_SHORT: f64 = 0.41189;
 /// No entry in a table of indices.
 const NONE: u32 = u32::MAX;
@@ -43,8 +43,8 @@ const NONE: u32 = u32::MAX;
 /// order of their first use.
 ///
 /// # Errors
-/// [`MeshingError::Lattice`] if `distance` is not finite somewhere, the region reaches the outermost layer of cells, or the
-/// lattice has more than 2²⁶ cells.
+/// [`MeshingError::Lattice`] if `distance` is not finite somewhere, the region reaches the outermost layer of cells, or
+/// the lattice has more than 2²⁶ cells.
 ///
 /// # Example
 /// ```
@@ -65,15 +65,15 @@ pub fn stuff(
     stuff_graded(lattice, 0, distance)
 }
 
-/// As [`stuff`], with up to `levels` times doubled cells inside: where a cube of cells and all around it lies inside, it
-/// may become one, and eight of those again one, while neighbors, also at edges and corners, differ by one doubling at
-/// most.
+/// Fills the region where `distance` is negative with tets, with up to `levels` times doubled cells inside: where a
+/// cube of cells and all around it lies inside, it may become one, and eight of those again one, while neighbors, also
+/// at edges and corners, differ by one doubling at most.
 ///
-/// The surface is the same, and tets at it are as small. Of the others, those of doubled cells have dihedral angles of 45
-/// to 120 degrees. A thick body of n tets keeps some n^(2/3).
+/// The surface is that of [`stuff`], and tets at it are as small. Of the others, those of doubled cells have dihedral
+/// angles of 45 to 120 degrees. A thick body of n tets keeps some n^(2/3).
 ///
 /// # Errors
-/// As [`stuff`].
+/// The errors of [`stuff`].
 ///
 /// # Example
 /// ```
@@ -109,7 +109,8 @@ pub(super) enum Slope {
 
 /// The lattice with what is known about it. Vertex `2 c` is the low corner of cell `c`, vertex `2 c + 1` its center.
 ///
-/// All vertices of the rim lie outside. A step over the rim, which may land on the opposite rim, is thus a step outside.
+/// All vertices of the rim lie outside. A step over the rim, which may land on the opposite rim, is thus a step
+/// outside.
 pub(super) struct Grid {
     lattice: Lattice,
     /// Steps of the index to the neighbors of a corner and of a center, in the order of [`NEIGHBORS`].

@@ -1,12 +1,12 @@
 //! From a closed triangle surface to a body: isosurface stuffing of the inside of a [`Solid`].
 //!
-//! The surface itself is not kept: its inside is sampled on a lattice, whose spacing is found by bisection such that the
-//! wanted number of tets comes out, and filled by the stencils of the module `stencil`. Edges and corners come out beveled
-//! over about a spacing, and parts thinner than that are lost or torn: every point of the result lies within a spacing of
-//! the surface, but not the other way around. A curved surface loses volume, as its chords lie inside. Dihedral angles
-//! keep the bound of [`stuff`](crate::stuff) whatever the surface. Where the body would touch itself at a single
-//! particle it is taken apart there; where it still touches itself along an edge, or falls into more pieces than the
-//! surface has shells, another place of the lattice is tried.
+//! The surface itself is not kept: its inside is sampled on a lattice, whose spacing is found by bisection such that
+//! the wanted number of tets comes out, and filled by the stencils of the module `stencil`. Edges and corners come out
+//! beveled over about a spacing, and parts thinner than that are lost or torn: every point of the result lies within a
+//! spacing of the surface, but not the other way around. A curved surface loses volume, as its chords lie inside.
+//! Dihedral angles keep the bound of [`stuff`](crate::stuff) whatever the surface. Where the body would touch itself at
+//! a single particle it is taken apart there; where it still touches itself along an edge, or falls into more pieces
+//! than the surface has shells, another place of the lattice is tried.
 //!
 //! Cost: some three to ten stuffings, six times as many where thin parts tear, each two samples a cell of the box
 //! around the surface at O(log n) for n triangles.
@@ -36,7 +36,8 @@ const TETS: std::ops::RangeInclusive<usize> = 100..=4_000_000;
 /// # Errors
 /// [`MeshingError::Surface`] if fewer than 100 or more than four million tets are asked for, or if no lattice was found
 /// with which that many come out and the body does not touch itself: thin parts need more.
-/// [`MeshingError::Lattice`] if the box around the solid has too many cells, as that of a thin long body across its box.
+/// [`MeshingError::Lattice`] if the box around the solid has too many cells, as that of a thin long body across its
+/// box.
 ///
 /// # Example
 /// ```

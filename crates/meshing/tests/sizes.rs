@@ -4,8 +4,8 @@ use incise_meshing::Shape;
 
 use crate::shapes::assert_sound;
 
-/// All but the box, which the plate stands for: organic, thin-limbed, of genus 1, with a void, flat, convex, long, of two
-/// pieces.
+/// All but the box, which the plate stands for: organic, thin-limbed, of genus 1, with a void, flat, convex, long, of
+/// two pieces.
 fn bodies() -> impl Iterator<Item = Shape> {
     let all = Shape::ALL.into_iter();
     all.filter(|&shape| shape != Shape::Box)

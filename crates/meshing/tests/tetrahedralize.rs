@@ -1,5 +1,5 @@
-//! Solids and the bodies that fill them: winding numbers against an obvious count, what is refused, and the surfaces of the
-//! given meshes filled anew.
+//! Solids and the bodies that fill them: winding numbers against an obvious count, what is refused, and the surfaces of
+//! the given meshes filled again.
 
 #![expect(
     clippy::unwrap_used,

@@ -146,10 +146,10 @@ impl Body {
 
     /// Advances by `time_step` s under `gravity` in m/s², by implicit Euler.
     ///
-    /// The new positions are a minimum of `Σ m/2 |x - x̃|²/Δt² + U(x)` with the prediction `x̃ = x + Δt v + Δt² g`, found
-    /// by Newton's method: see [`Report`] for what that promises. Fixed particles stay where they were put. Of several
-    /// minima, which large steps have, it is the one found downhill from the prediction or from the present state,
-    /// whichever has less of this sum.
+    /// The new positions are a minimum of `Σ m/2 |x - x̃|²/Δt² + U(x)` with the prediction `x̃ = x + Δt v + Δt² g`,
+    /// found by Newton's method: see [`Report`] for what that promises. Fixed particles stay where they were put. Of
+    /// several minima, which large steps have, it is the one found downhill from the prediction or from the present
+    /// state, whichever has less of this sum.
     ///
     /// # Errors
     /// [`ReferenceError::Setting`] for a time step that is not positive or a gravity that is not finite,

@@ -81,7 +81,8 @@ impl StableNeoHookean {
         self.mu * square(f).sqrt() + self.l * (f.determinant().abs() + self.gamma) * cofactor
     }
 
-    /// The same for the energy density, in J/m³.
+    /// What bounds the size of each term of the energy density, in J/m³: near rest the terms cancel and only their
+    /// rounding is left.
     pub(crate) fn energy_terms(&self, f: DMat3) -> f64 {
         let bulge = f.determinant().abs() + self.gamma;
         0.5 * self.mu * (square(f) + 3.0) + 0.5 * self.l * bulge * bulge

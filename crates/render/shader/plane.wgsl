@@ -65,7 +65,7 @@ fn fragment(seen: Seen) -> @location(0) vec4<f32> {
         line(seen.u, seen.numbers.x, place, right, down),
         line(seen.v, seen.numbers.x, place, right, down),
     );
-    // Everybody looks it up: what only some do in a square of pixels is not defined.
+    // All pixels look it up: a lookup by only some in a square of pixels is not defined.
     let from_center = vec2<f32>(dot(place - seen.center.xyz, seen.u.xyz), dot(place - seen.center.xyz, seen.v.xyz));
     let at = from_center / (SHARE * seen.center.w) * 0.5 + 0.5;
     let dark = textureSampleLevel(impression, between, at, 0.0).x;

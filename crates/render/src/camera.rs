@@ -1,7 +1,7 @@
 //! [`Camera`]: from where a scene is seen.
 //!
-//! It looks at a target from a distance, in a direction given by two angles; z is up. All that the renderers and whoever
-//! picks with a mouse need follows from these five numbers: axes, rays, projections. In double precision throughout.
+//! It looks at a target from a distance, in a direction given by two angles; z is up. All that renderers and picking
+//! with a mouse need follows from these five numbers: axes, rays, projections. In double precision throughout.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 

@@ -27,7 +27,7 @@ pub enum RenderError {
     /// Residuals are to be shown, and none were given.
     #[error("colors by residual need a residual of each tet")]
     NoResiduals,
-    /// As many residuals as tets were expected.
+    /// The number of given residuals is not the number of tets.
     #[error("{given} residuals were given for {tets} tets")]
     Residuals {
         /// How many were given.

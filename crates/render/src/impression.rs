@@ -48,7 +48,7 @@ impl Impression {
         let inside = |x: Vec3| x.x >= 0.0 && x.y >= 0.0 && x.x <= SIDE as f32 && x.y <= SIDE as f32;
         for corners in triangles {
             let corners = corners.map(|v| places[v as usize]);
-            // Not clipped: what sticks out of the square is far from where anybody looks.
+            // Not clipped: what sticks out of the square is far from what pictures show.
             if !corners.into_iter().all(inside) {
                 continue;
             }
@@ -68,7 +68,7 @@ impl Impression {
             bounds = [[SIDE as f32, 0.0], [(first / SIDE) as f32, 0.0]];
             for i in (first..texels.len()).filter(dark) {
                 for (bounds, at) in bounds.iter_mut().zip([i % SIDE, i / SIDE]) {
-                    // A texel reaches as far as to the middle of the next one.
+                    // A texel reaches to the middle of the next one.
                     bounds[0] = bounds[0].min(at as f32 - 1.0).max(0.0);
                     bounds[1] = bounds[1].max(at as f32 + 1.0).min((SIDE - 1) as f32);
                 }

@@ -59,7 +59,7 @@ pub struct Painting {
     made_for: Option<(ColorBy, u64)>,
     /// Of the skin.
     topology: u64,
-    /// Of clusters and colors, which change with each cut and when they are made anew.
+    /// Of clusters and colors, which change with each cut and when they are rebuilt.
     plan: u64,
     /// Of the triangles' colors.
     coloring: u64,
@@ -104,7 +104,7 @@ impl Painting {
     /// Follows a step of the simulation. To be called after each; a second call after the same one does nothing.
     ///
     /// # Panics
-    /// If a step with a cut was left out: [`Painting::reset`] starts anew.
+    /// If a step with a cut was left out: [`Painting::reset`] starts over.
     pub fn follow(&mut self, simulation: &Simulation) {
         let now = simulation.report().time_s;
         if now == self.followed {
@@ -136,8 +136,8 @@ impl Painting {
         self.plan = self.topology;
     }
 
-    /// Starts anew from what the simulation is now: after a jump to another state, or a change of how the same one is
-    /// solved. Until the next step, positions are those that the host knows. O(tets).
+    /// Rebuilds everything from the present state of the simulation: after a jump to another state, or a change of how
+    /// the same one is solved. Until the next step, positions are those that the host knows. O(tets).
     pub fn reset(&mut self, simulation: &Simulation) {
         self.skin = Skin::new(simulation.boundary());
         self.topology = revision();
@@ -249,7 +249,7 @@ impl Painting {
         self.blade_ends.push(self.blade_points.len());
     }
 
-    /// The box of all bodies as far as the host knows their positions: see [`Simulation::read_back`]. O(triangles).
+    /// The box of all bodies at the positions that the host knows: see [`Simulation::read_back`]. O(triangles).
     #[must_use]
     pub fn bounds(&self, simulation: &Simulation) -> [DVec3; 2] {
         let positions = simulation.positions();

@@ -1,6 +1,6 @@
 //! Obstacles, ground and blade as triangles and planes relative to the eye.
 //!
-//! Made anew for each picture: some thousand triangles at most, and obstacles move. Round shapes have as many facets as
+//! Rebuilt for each picture: some thousand triangles at most, and obstacles move. Round shapes have as many facets as
 //! make no corner visible at usual sizes. Infinite planes are drawn as patches that fade out.
 
 use glam::{DQuat, DVec3, Vec3};

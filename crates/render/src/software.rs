@@ -38,7 +38,7 @@ const NOTHING: u32 = u32::MAX;
 
 /// Draws a picture on the processor, of the positions that the host knows: see [`Simulation::read_back`].
 ///
-/// The same input gives the same bytes for any number of threads.
+/// Equal input gives equal bytes for any number of threads.
 ///
 /// # Errors
 /// If a side of the picture is 0 or more than [`LARGEST_SIDE`].

@@ -145,7 +145,7 @@ impl Viewer {
                 (self.working, self.line) = (false, Vec::new());
                 self.pace.pause();
             }
-            // What was loaded before goes on.
+            // What was loaded before continues.
             Err(error) => self.error = Some(format!("{error:#}")),
         }
     }

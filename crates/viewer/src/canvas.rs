@@ -12,7 +12,7 @@ use incise_render::{GpuRenderer, Style, software_picture};
 
 use crate::stage::Stage;
 
-/// Who draws.
+/// Where pictures are drawn: on the window's device or on the processor.
 pub(crate) enum Canvas {
     /// The window's device.
     Device {

@@ -17,7 +17,7 @@ const FEWEST: usize = 10;
 /// Turns that are remembered.
 const TURNS: usize = 6;
 
-/// A frame as far as it matters here.
+/// What is measured of a frame.
 #[derive(Clone, Copy, Debug)]
 struct Sample {
     ms: f64,
@@ -34,7 +34,7 @@ pub(crate) struct Measure {
 /// A turn of a knob and what it did.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Effect {
-    /// As `substeps 5 to 10`.
+    /// The change as text, for example `substeps 5 to 10`.
     pub(crate) what: String,
     pub(crate) before: Option<Measure>,
     /// Of the frames so far.
@@ -123,12 +123,12 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
 }
 
 impl Effect {
-    /// As `1.20 to 2.31 ms (×1.93)`.
+    /// The time of a frame before and after, for example `1.20 to 2.31 ms (×1.93)`.
     pub(crate) fn time(&self) -> String {
         compare(self.before.map(|m| m.ms), self.after.map(|m| m.ms), "ms")
     }
 
-    /// The same for what is left unsolved; empty if nobody measures it.
+    /// The residual before and after, in the format of [`Effect::time`]; empty if it was not measured.
     pub(crate) fn residual(&self) -> String {
         let of = |measure: Option<Measure>| measure.and_then(|measure| measure.residual);
         match (of(self.before), of(self.after)) {

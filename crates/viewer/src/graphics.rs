@@ -44,7 +44,7 @@ pub(crate) fn share(state: &RenderState) -> Result<Arc<GpuContext>, String> {
     ))
 }
 
-/// A sentence for whoever gets no window.
+/// The message shown if no window can be opened.
 pub(crate) fn why_no_window(error: &eframe::Error) -> String {
     match error {
         eframe::Error::WinitEventLoop(error) => {

@@ -119,7 +119,7 @@ const MOUSE: [(&str, &str); 5] = [
     ("drop a file", "load a scene, a mesh or a surface"),
 ];
 
-/// What the keys pressed since the last frame ask for. Nothing while somebody types into a field.
+/// Actions of the keys pressed since the last frame; none while a text field has the keyboard.
 pub(crate) fn actions(context: &Context) -> Vec<Action> {
     if context.egui_wants_keyboard_input() {
         return Vec::new();

@@ -16,9 +16,9 @@ pub(crate) struct Moment {
     pub(crate) snapshot: Snapshot,
     /// Whether the stroke is the scene's: it will begin again.
     pub(crate) scripted: bool,
-    /// The stroke that somebody was drawing.
+    /// The stroke in progress at that moment.
     pub(crate) stroke: Option<u32>,
-    /// What somebody held.
+    /// The grab in use at that moment.
     pub(crate) grab: Option<Grab>,
 }
 

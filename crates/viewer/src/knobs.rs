@@ -69,7 +69,7 @@ fn joined(kind: &str, size: u32) -> String {
 /// `on_gpu` whether one computes.
 pub(crate) fn show(ui: &mut Ui, spec: &SolverSpec, has_gpu: bool, on_gpu: bool) -> Option<Turn> {
     let mut turn = None;
-    // Whoever left the choice open sees what was chosen.
+    // `Auto` is shown as the backend that was chosen.
     let present = match spec.backend {
         Backend::Auto if on_gpu => Backend::Gpu,
         Backend::Auto => Backend::Cpu,

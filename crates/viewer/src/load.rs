@@ -16,7 +16,7 @@ use incise::scene::{Backend, GroundSpec};
 use incise::{Body, Scene, Simulation, SimulationBuilder};
 use incise::{mesh_io, meshing};
 
-/// Tets to fill a surface with if nobody says.
+/// Default number of tets to fill a surface with.
 pub(crate) const TETS: u32 = 11_000;
 
 /// The longest side of a mesh that comes without a scene, in m.
@@ -149,7 +149,7 @@ impl Loading {
         let (sender, receiver) = channel();
         let name = source.name();
         std::thread::spawn(move || {
-            // Nobody may be left to take it.
+            // The receiver may be gone.
             let _ = sender.send(load(&source, backend, gpu));
             wake();
         });

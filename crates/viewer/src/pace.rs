@@ -1,7 +1,7 @@
 //! [`Pace`]: how many frames of the simulation a frame of the window carries.
 //!
-//! Simulated time follows real time. Who is too slow falls behind instead of freezing the window: what does not fit into
-//! [`PATIENCE`] is dropped, and the panel tells by how much the body lags.
+//! Simulated time follows real time. A simulation that is too slow falls behind instead of freezing the window: what
+//! does not fit into [`PATIENCE`] is dropped, and the panel tells by how much the body lags.
 
 use std::time::{Duration, Instant};
 
@@ -35,7 +35,7 @@ impl Default for Pace {
 }
 
 impl Pace {
-    /// Starts anew, after a pause.
+    /// Resets the clock: time that passes during a pause is not caught up.
     pub(crate) fn pause(&mut self) {
         (self.last, self.due) = (None, 0.0);
     }

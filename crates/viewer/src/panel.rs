@@ -22,7 +22,7 @@ pub(crate) struct Controls<'a> {
     pub(crate) pace: &'a mut Pace,
     /// Whether a GPU can be chosen.
     pub(crate) has_gpu: bool,
-    /// A file that somebody types.
+    /// The text of the field for a file.
     pub(crate) file: &'a mut String,
     /// What is to be said about where it is computed and drawn.
     pub(crate) notes: &'a [String],

@@ -4,9 +4,9 @@
 //! [SWEEPS] [OMEGA] [AGGREGATE] [REDUCTION]`
 //!
 //! A body 0.2 m long of Young's modulus 1e7 Pa and Poisson's ratio 0.49, held where x is smallest, falls under gravity
-//! or starts at twice its size; a step is 16 ms. Residuals are relative to the weight of the body or to the start. A round
-//! is some sweeps and, unless AGGREGATE is 0, a correction. Without a mesh file the body is a box. Threads: those of
-//! rayon (`RAYON_NUM_THREADS`).
+//! or starts at twice its size; a step is 16 ms. Residuals are relative to the weight of the body or to the start. A
+//! round is some sweeps and, unless AGGREGATE is 0, a correction. Without a mesh file the body is a box. Threads: those
+//! of rayon (`RAYON_NUM_THREADS`).
 
 #![expect(clippy::print_stdout, reason = "a program that prints a table")]
 

@@ -6,7 +6,8 @@
 pub struct Changes {
     /// Masses or materials have changed and their tets are not named: all tets are to be read again.
     pub all_tets: bool,
-    /// Tets with other corners, another rest shape or corners of another mass, with repetitions; some may be gone since.
+    /// Tets with other corners, another rest shape or corners of another mass, with repetitions; some may be gone
+    /// since.
     pub tets: Vec<u32>,
     /// The origin has moved: all particles are to be read again.
     pub all_particles: bool,

@@ -1,9 +1,10 @@
 //! [`jitter`]: a body on an exact line is given a little width.
 //!
 //! Where all tets lie on one line, det F is zero to second order: the constraint of volume has no slope, the other one
-//! pulls along the line, and nothing can ever leave it. The state is as unstable as a pencil on its tip; what is missing
-//! is only the first touch, which rounding provides on most lines that are not along an axis. On a plane the constraint of
-//! volume has a slope and nothing is needed; on a point no touch helps, because that is a minimum of the energy.
+//! pulls along the line, and nothing can ever leave it. The state is as unstable as a pencil on its tip; what is
+//! missing is only the first touch, which rounding provides on most lines that are not along an axis. On a plane the
+//! constraint of volume has a slope and nothing is needed; on a point no touch helps, because that is a minimum of the
+//! energy.
 //!
 //! Cost: the look at one tet in a frame, unless that is degenerate.
 
@@ -63,8 +64,8 @@ fn displace<R: Float>(particles: &Particles<R>, particle: usize, mut amount: f64
     }
 }
 
-/// A vector of coordinates between 1/2 and 1, each of either sign, that depends on `number` alone (`SplitMix64`: Steele,
-/// Lea, Flood 2014).
+/// A vector of coordinates between 1/2 and 1, each of either sign, that depends on `number` alone (`SplitMix64`:
+/// Steele, Lea, Flood 2014).
 fn direction(number: u64) -> DVec3 {
     let coordinate = |axis: u64| {
         let mut z = (3 * number + axis + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);

@@ -1,8 +1,8 @@
 //! What a device that solves on its own needs of a [`Solver`]: tets and particles as plain numbers, what edits have
 //! changed since it last asked, and the way back of a state.
 //!
-//! Tets, masses and materials are edited in the solver here; a GPU applies the same changes that the layout of this crate
-//! applies. Changes are tracked on request only. Cost: a number an edit.
+//! Tets, masses and materials are edited in the solver here; a GPU applies the same changes that the layout of this
+//! crate applies. Changes are tracked on request only. Cost: a number an edit.
 
 use crate::constraints::Obstacle;
 use crate::layout::{CONSTANTS, REST};
@@ -99,7 +99,8 @@ impl<R: Float> Solver<R> {
         self.tets.is_damped()
     }
 
-    /// Position relative to [`Solver::origin`] in m and inverse mass in 1/kg, which is 0 for what is held; velocity in m/s.
+    /// Position relative to [`Solver::origin`] in m and inverse mass in 1/kg, which is 0 for what is held; velocity in
+    /// m/s.
     ///
     /// # Panics
     /// If the particle does not exist.
@@ -109,8 +110,8 @@ impl<R: Float> Solver<R> {
         (data, R::components(self.particles.velocities[particle]))
     }
 
-    /// What a step of this solver does with its state before it begins: gives a body that has moved on a new origin, and
-    /// one on an exact line a little width; returns how many particles that moved.
+    /// What a step of this solver does with its state before it begins: gives a body that has moved on a new origin,
+    /// and one on an exact line a little width; returns how many particles that moved.
     pub fn prepare_state(&mut self) -> usize {
         let origin = self.particles.origin;
         let unfolded = self.prepare();
@@ -146,8 +147,8 @@ impl<R: Float> Solver<R> {
     }
 
     /// Takes over what [`Solver::residuals`] needs of a last substep that was made elsewhere: the positions before the
-    /// constraints were solved (the fourth number is ignored), the two multipliers of each tet, and the form that solved
-    /// the tets.
+    /// constraints were solved (the fourth number is ignored), the two multipliers of each tet, and the form that
+    /// solved the tets.
     ///
     /// # Panics
     /// If there is not one of the first for every particle and one of the second for every tet.
@@ -174,18 +175,18 @@ impl<R: Float> Solver<R> {
 }
 
 impl Solver<f32> {
-    /// The norm of the derivative of det F (√3 at rest) up to which tets resist a change of volume as their material says;
-    /// from there on derivative, det F and γ are scaled down to it.
+    /// The norm of the derivative of det F (√3 at rest) up to which tets resist a change of volume as their material
+    /// says; from there on derivative, det F and γ are scaled down to it.
     pub const MAX_COFACTOR_NORM: f64 = MAX_COFACTOR_NORM;
 
     /// The colliders `elapsed` s after the start of the frame, at the end of a substep, relative to the origin, as 20
     /// numbers each.
     ///
-    /// The first is the kind: 0 plane, 1 capsule or sphere, 2 box; the second the friction; the fifth to seventh what it
-    /// moved in the substep. Of a plane follow the offset along the normal in the third place and the unit normal from the
-    /// ninth on; of a capsule the radius in the third, one over the squared length of the axis in the fourth (0 for a
-    /// sphere), and from the ninth on its start, its axis and the normal of points on the axis; of a box half its edges in
-    /// the third, fourth and eighth, and from the ninth on its center and its three axes.
+    /// The first is the kind: 0 plane, 1 capsule or sphere, 2 box; the second the friction; the fifth to seventh what
+    /// it moved in the substep. Of a plane follow the offset along the normal in the third place and the unit normal
+    /// from the ninth on; of a capsule the radius in the third, one over the squared length of the axis in the fourth
+    /// (0 for a sphere), and from the ninth on its start, its axis and the normal of points on the axis; of a box half
+    /// its edges in the third, fourth and eighth, and from the ninth on its center and its three axes.
     pub fn obstacle_data<'a>(
         &self,
         settings: &'a StepSettings,

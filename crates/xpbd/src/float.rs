@@ -58,7 +58,7 @@ pub trait Float:
     type Atomic: Debug + Send + Sync;
     /// Four scalars that threads may share: the position of a particle and its inverse mass.
     type Particle: Debug + Send + Sync + Saved;
-    /// As many scalars as an instruction of a processor takes.
+    /// A SIMD vector: as many scalars as an instruction of a processor takes.
     #[doc(hidden)]
     type Lanes<S: Simd>: SimdFloat<S, Element = Self>;
 

@@ -79,7 +79,8 @@ pub(crate) fn frame_of(positions: &[DVec3]) -> (DVec3, f64) {
     }
 }
 
-/// Gives the body a new origin if it has moved on by more than twice its size, and returns by how much the origin moved.
+/// Gives the body a new origin if it has moved on by more than twice its size, and returns by how much the origin
+/// moved.
 ///
 /// Particles keep their position in the world but for one rounding in the solver's precision; those that come
 /// closer to the origin, exactly.

@@ -2,8 +2,8 @@
 //!
 //! Clusters of one color share no particle. They are dealt to the threads in equal parts, and within a thread to the
 //! lanes of the processor; a color too small to be worth a second thread stays on one. Every tet sees the same numbers
-//! and rounds them in the same way whoever solves it, so threads and instruction sets change nothing but the time.
-//! A Jacobi pass goes the same way and writes elsewhere.
+//! and rounds them in the same way on every thread and lane, so threads and instruction sets change nothing but the
+//! time. A Jacobi pass goes the same way and writes elsewhere.
 //!
 //! Source: paper sections 3 and 4.1. Cost: see [`crate::simd_kernel`]; a barrier a color.
 

@@ -1,8 +1,7 @@
 //! XPBD soft bodies: Stable Neo-Hookean tetrahedra solved by colored Gauss-Seidel.
 //!
 //! A [`Solver`] holds particles and tets in single or double precision from one source; [`Solver::step`] advances a
-//! frame over an `incise_graph::Schedule`, whoever made it. The result is the same to the bit for any number of
-//! threads.
+//! frame over an `incise_graph::Schedule` from any source. The result is the same to the bit for any number of threads.
 //!
 //! ```
 //! use glam::DVec3;

@@ -10,12 +10,12 @@ use glam::{DMat3, DVec3};
 use crate::{Float, Material};
 
 /// The norm of the derivative of det F, √3 at rest, up to which tets follow their material exactly: that of a tet
-/// stretched two and a half times along each axis, or fifty times along one at constant volume. Beyond it derivative and
-/// value of the volume term are scaled down.
+/// stretched two and a half times along each axis, or fifty times along one at constant volume. Beyond it derivative
+/// and value of the volume term are scaled down.
 pub(crate) const MAX_COFACTOR_NORM: f64 = 10.0;
 
-/// The trace of E beyond which `Ψ_D` is computed as `tr E / 2 - (J - 1) + (J - 1)² / 2`. Near rest that loses all digits, and
-/// far from it the form without `tr E` does, in which terms of sixth degree cancel.
+/// The trace of E beyond which `Ψ_D` is computed as `tr E / 2 - (J - 1) + (J - 1)² / 2`. Near rest that loses all
+/// digits, and far from it the form without `tr E` does, in which terms of sixth degree cancel.
 pub(crate) const LARGE_STRAIN: f64 = 2.0;
 
 /// How often a step that raises the energy of its tet is shortened. Of two million random tets three left one whose
@@ -27,7 +27,8 @@ pub(crate) const SHORTENINGS: u32 = 3;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct TetConstraint<R> {
     pub(crate) particles: [u32; 4],
-    /// Inverse of the rest edge matrix, row by row: row i is the gradient of the barycentric coordinate of corner i + 1.
+    /// Inverse of the rest edge matrix, row by row: row i is the gradient of the barycentric coordinate of corner
+    /// i + 1.
     pub(crate) inverse_rest: [R; 9],
     /// `μV` in J: one over the compliance of the deviatoric constraint.
     pub(crate) stiffness: R,
@@ -87,7 +88,7 @@ impl<R: Float> TetConstraint<R> {
         [ratio, material.gamma()].map(R::from_f64)
     }
 
-    /// The same tet in double precision, for measurements.
+    /// Converts the tet to double precision, for measurements.
     pub(crate) fn to_f64(self) -> TetConstraint<f64> {
         TetConstraint {
             particles: self.particles,
@@ -237,7 +238,8 @@ impl TetConstraint<f64> {
 
 #[cfg(test)]
 impl<R: Float> Evaluation<R> {
-    /// What solvers scale the hydrostatic constraint by: 1, or less where det F has a slope beyond [`MAX_COFACTOR_NORM`].
+    /// What solvers scale the hydrostatic constraint by: 1, or less where det F has a slope beyond
+    /// [`MAX_COFACTOR_NORM`].
     pub(crate) fn hydrostatic_scale(&self) -> R {
         let limit = R::from_f64(MAX_COFACTOR_NORM);
         if self.slope_squared > limit * limit {
@@ -252,8 +254,9 @@ impl<R: Float> Evaluation<R> {
 impl<R: Float> TetConstraint<R> {
     /// The changes of both multipliers that satisfy both constraints to first order, `None` if there is no way to.
     ///
-    /// The equations are multiplied by stiffness and time squared, which makes the matrix one plus numbers of the order of kappa: as
-    /// they are usually written, with compliances, they leave the range of single precision for a body of micrometers.
+    /// The equations are multiplied by stiffness and time squared, which makes the matrix one plus numbers of the order
+    /// of kappa: as they are usually written, with compliances, they leave the range of single precision for a body of
+    /// micrometers.
     pub(crate) fn solve(
         &self,
         e: &Evaluation<R>,

@@ -1,8 +1,8 @@
 //! [`Particles`]: positions, velocities and masses, and the two passes over them that begin and end a substep.
 //!
-//! A position shares a cell with the inverse mass, which is 0 for a particle that constraints do not move: fixed, rigidly
-//! attached or without mass. Cells are atomic ([`Float::Particle`]), so constraints move particles through a shared
-//! reference. Cost: one pass each over the particles.
+//! A position shares a cell with the inverse mass, which is 0 for a particle that constraints do not move: fixed,
+//! rigidly attached or without mass. Cells are atomic ([`Float::Particle`]), so constraints move particles through a
+//! shared reference. Cost: one pass each over the particles.
 
 use glam::DVec3;
 use rayon::prelude::*;

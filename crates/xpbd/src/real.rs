@@ -103,8 +103,8 @@ impl<R: Real> Solver<R> {
         R::step(self, schedule, settings, true)
     }
 
-    /// Puts the tets into the order of a schedule, unless they are, as a step does first. To measure what a cut costs, call
-    /// this before the step.
+    /// Puts the tets into the order of a schedule, unless they are, as a step does first. To measure what a cut costs,
+    /// call this before the step.
     ///
     /// A schedule that has been [updated](Schedule::update) since the last call costs what has changed of it and of the
     /// tets, amortized; another one, even an equal one, and new materials cost O(tets).
@@ -118,8 +118,8 @@ impl<R: Real> Solver<R> {
     /// Advances by one frame of `settings.step.time_step` by sweeps of vertex block descent. May take turns with
     /// [`Solver::step`].
     ///
-    /// Damping, distances, volume constraints and attachments mean what they mean to [`Solver::step`]: both go to the same
-    /// motion with smaller substeps. Hard constraints (compliance 0) are met by multipliers that each iteration
+    /// Damping, distances, volume constraints and attachments mean what they mean to [`Solver::step`]: both go to the
+    /// same motion with smaller substeps. Hard constraints (compliance 0) are met by multipliers that each iteration
     /// improves; with few iterations a part of their violation is left.
     ///
     /// # Errors
@@ -168,9 +168,9 @@ impl<R: Real> Solver<R> {
         R::step_vbd(self, stars, None, settings)
     }
 
-    /// Advances by one frame of VBD with a coarse correction after each sweep. A substep also ends when the accuracy of the
-    /// settings is reached, or when two corrections in a row find nothing to gain: in single precision that is soon so in a
-    /// stiff body.
+    /// Advances by one frame of VBD with a coarse correction after each sweep. A substep also ends when the accuracy of
+    /// the settings is reached, or when two corrections in a row find nothing to gain: in single precision that is soon
+    /// so in a stiff body.
     ///
     /// # Errors
     /// Those of [`Solver::step_vbd`].

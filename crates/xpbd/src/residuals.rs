@@ -1,9 +1,9 @@
 //! [`Residuals`]: how far the last substep is from a solution of its equations, in stated norms and units.
 //!
-//! Backward Euler asks for `M (x - x̃) = ∇Cᵀ λ` and `C + α̃ λ = 0` at once; XPBD iterates on the second alone, so a small
-//! dual residual proves nothing. Without multipliers both are one equation, `M (x - x̃) / Δt² + ∇U(x) = 0`, the slope of
-//! the incremental potential `‖x - x̃‖²_M / (2 Δt²) + U(x)`: the force residual is taken from positions alone, and no
-//! state that fails to move as it should, collapsed or stalled, can make it small.
+//! Backward Euler asks for `M (x - x̃) = ∇Cᵀ λ` and `C + α̃ λ = 0` at once; XPBD iterates on the second alone, so a
+//! small dual residual proves nothing. Without multipliers both are one equation, `M (x - x̃) / Δt² + ∇U(x) = 0`, the
+//! slope of the incremental potential `‖x - x̃‖²_M / (2 Δt²) + U(x)`: the force residual is taken from positions alone,
+//! and no state that fails to move as it should, collapsed or stalled, can make it small.
 //!
 //! Sources: Macklin, Müller, Chentanez 2016 (primal and dual); Gast et al. 2015 (incremental potential). Everything is
 //! in double precision and summed in the order of particles and tets. Cost: one pass over the tets, on request only.
@@ -33,7 +33,8 @@ pub struct Residuals {
     /// `‖M (x - x̃) / Δt² + ∇U(x)‖` in N, from positions alone: what backward Euler makes zero. To be compared with
     /// [`Solver::load`].
     pub force: f64,
-    /// The incremental potential `‖x - x̃‖²_M / (2 Δt²) + U(x)` in J, which backward Euler makes least. `U` is 0 at rest.
+    /// The incremental potential `‖x - x̃‖²_M / (2 Δt²) + U(x)` in J, which backward Euler makes least. `U` is 0 at
+    /// rest.
     pub potential: f64,
 }
 
@@ -124,7 +125,8 @@ impl<R: Float> Solver<R> {
     }
 
     /// For each tet how far its constraints are from solved: `‖C + α̃ λ‖` over its two, without unit, 0 if it takes no
-    /// part. The root of the sum of their squares is [`Residuals::dual`]. `None` where [`Solver::residuals`] is. O(tets).
+    /// part. The root of the sum of their squares is [`Residuals::dual`]. `None` where [`Solver::residuals`] is.
+    /// O(tets).
     ///
     /// # Example
     /// ```
@@ -204,8 +206,8 @@ impl<R: Float> Solver<R> {
     }
 }
 
-/// `C + α̃ λ` of both constraints of a tet; `None` if it takes no part, or so little that its compliance overflows: it has
-/// nothing to satisfy.
+/// `C + α̃ λ` of both constraints of a tet; `None` if it takes no part, or so little that its compliance overflows: it
+/// has nothing to satisfy.
 fn unsatisfied(
     stiffness: [f64; 2],
     values: [f64; 2],

@@ -35,8 +35,8 @@ pub struct StepSettings {
 /// The shortest substep in s in which single precision is sound for a body whose longest side is `size` m.
 ///
 /// A position is rounded to 6e-8 of the body's size. Over a shorter substep gravity moves a particle by less than four
-/// times that, and each rounding becomes a kick to its velocity: the body heats up, at an eighth of this substep to several
-/// times its energy within 100,000 substeps. Use double precision below it.
+/// times that, and each rounding becomes a kick to its velocity: the body heats up, at an eighth of this substep to
+/// several times its energy within 100,000 substeps. Use double precision below it.
 ///
 /// ```
 /// assert!((incise_xpbd::shortest_substep_of_f32(1.0) - 1.56e-4).abs() < 1e-6);
@@ -76,8 +76,8 @@ pub enum TetSolve {
     /// bounded at any stiffness, so the number of substeps is a matter of accuracy alone.
     #[default]
     Split,
-    /// `|F|` and `det F - γ` as one system of two unknowns. Unstable from a kappa of about 2 on, unless tets are softened
-    /// by [`crate::KappaLimit`].
+    /// `|F|` and `det F - γ` as one system of two unknowns. Unstable from a kappa of about 2 on, unless tets are
+    /// softened by [`crate::KappaLimit`].
     Block,
     /// The constraints of the block form one after the other, deviatoric first, as in the paper and in most
     /// implementations.

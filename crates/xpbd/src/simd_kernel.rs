@@ -4,19 +4,19 @@
 //! [`TetSolve`] names the three ways to solve a tet.
 //!
 //! **Split** (default). With deformation gradient F, `J = det F` and `E = Fᵀ F - I` the energy density is
-//! `Ψ = Ψ_D + λ/2 (J - 1)²`, where `Ψ_D = μ ((J - 1)² - (I₂(E) + I₃(E)) / 2)` is never negative and 0 only for rotations
-//! (and at F = 0). Both parts and both derivatives vanish at rest, so a body at rest stays at rest at any stiffness. The
-//! shear part moves the corners along its own force, by `Δt² f(ρ)` with `ρ = Δt² S / (2U)`, `U = V Ψ_D` and S the sum of
-//! the squared force over the masses. The volume part is a constraint `J - 1` that sees this step; its implicit factor
-//! `1 / (1 + r)` is replaced by `f(r)`. Here `f(r) = (1 - e⁻ʳ) / r`, the exact decay over the substep: the implicit
-//! factor makes each tet too soft and the explicit one too stiff, by the same amount to first order, and a colored pass
-//! adds these errors up. With f their first order cancels, so sag at rest is off by kappa squared in place of kappa. As f
-//! is at most 1 and about `1 / ρ` beyond, a step never goes far beyond the linearized zero of `√U`. Far from rest that
-//! zero may be far away: `Ψ_D` has a saddle at F = 0.54, where its slope is 0 and its value is not, and the slope of the
-//! volume vanishes where a tet collapses to a line. There, and where a tet is strained by more than 0.8, a step that
-//! would raise the energy of its tet is shortened ([`Tets::descent`]). In a substep of
-//! several iterations both parts are XPBD constraints with multipliers (shear is `√(2 Ψ_D)`), since such steps must not
-//! be repeated. E, not F, enters `Ψ_D`: in single precision `|F|² - 3` loses all digits at a strain of 1e-4.
+//! `Ψ = Ψ_D + λ/2 (J - 1)²`, where `Ψ_D = μ ((J - 1)² - (I₂(E) + I₃(E)) / 2)` is never negative and 0 only for
+//! rotations (and at F = 0). Both parts and both derivatives vanish at rest, so a body at rest stays at rest at any
+//! stiffness. The shear part moves the corners along its own force, by `Δt² f(ρ)` with `ρ = Δt² S / (2U)`, `U = V Ψ_D`
+//! and S the sum of the squared force over the masses. The volume part is a constraint `J - 1` that sees this step; its
+//! implicit factor `1 / (1 + r)` is replaced by `f(r)`. Here `f(r) = (1 - e⁻ʳ) / r`, the exact decay over the substep:
+//! the implicit factor makes each tet too soft and the explicit one too stiff, by the same amount to first order, and a
+//! colored pass adds these errors up. With f their first order cancels, so sag at rest is off by kappa squared in place
+//! of kappa. As f is at most 1 and about `1 / ρ` beyond, a step never goes far beyond the linearized zero of `√U`. Far
+//! from rest that zero may be far away: `Ψ_D` has a saddle at F = 0.54, where its slope is 0 and its value is not, and
+//! the slope of the volume vanishes where a tet collapses to a line. There, and where a tet is strained by more than
+//! 0.8, a step that would raise the energy of its tet is shortened ([`Tets::descent`]). In a substep of several
+//! iterations both parts are XPBD constraints with multipliers (shear is `√(2 Ψ_D)`), since such steps must not be
+//! repeated. E, not F, enters `Ψ_D`: in single precision `|F|² - 3` loses all digits at a strain of 1e-4.
 //!
 //! **Block**. `C_D = |F|` and `C_H = J - γ` as one 2×2 system. The deviatoric constraint is not 0 at rest, so shear is
 //! explicit without a limit: from a kappa of 2 to 4 on a body at rest becomes unstable.
@@ -24,16 +24,16 @@
 //! **Sequential**. The two constraints of the block form one after the other, as in the paper.
 //!
 //! No form needs gradients at the corners. With `G = Σ w q qᵀ` over the corners (see `Blocks`), `Σ w |∇C|²` is
-//! `G : AᵀA = |A L|²` for `A = dC/dF` and `G = L Lᵀ`. A correction is one matrix times the gradients of the barycentric coordinates.
+//! `G : AᵀA = |A L|²` for `A = dC/dF` and `G = L Lᵀ`. A correction is one matrix times the gradients of the barycentric
+//! coordinates.
 //!
 //! Products and sums are rounded one by one, not fused, so that every instruction set gives the same bits.
 //!
-//! Source: Smith, de Goes, Kim 2018 (energy), Macklin and Müller 2021 (constraints), Ton-That et al. 2023 (block solve),
-//! paper equations 5 and 6 (the paper prints a minus in its equation 6; its equation 3 gives the plus used here). The
-//! split is derived in `docs/solver.md`.
-//! Cost: about 420 operations and three divisions a tet (split), 330, one square root and two divisions (block); in single
-//! precision 80 bytes of the layout and four corners of 16 bytes, read and written. Moving corners between memory and
-//! lanes is more than half of the instructions.
+//! Source: Smith, de Goes, Kim 2018 (energy), Macklin and Müller 2021 (constraints), Ton-That et al. 2023 (block
+//! solve), paper equations 5 and 6 (the paper prints a minus in its equation 6; its equation 3 gives the plus used
+//! here). The split is derived in `docs/solver.md`. Cost: about 420 operations and three divisions a tet (split), 330,
+//! one square root and two divisions (block); in single precision 80 bytes of the layout and four corners of 16 bytes,
+//! read and written. Moving corners between memory and lanes is more than half of the instructions.
 
 mod memory;
 
@@ -321,8 +321,8 @@ impl<'a, R: Float, S: Simd> Tets<'a, R, S> {
         self.rest(15) * self.time_squared
     }
 
-    /// The norm of F and one over it; at F = 0 the gradient has no direction, no correction is finite, and the tet waits
-    /// for its neighbors.
+    /// The norm of F and one over it; at F = 0 the gradient has no direction, no correction is finite, and the tet
+    /// waits for its neighbors.
     #[inline(always)]
     fn norm(&self, f: &Matrix<R::Lanes<S>>) -> (R::Lanes<S>, R::Lanes<S>) {
         let square =
@@ -331,7 +331,8 @@ impl<'a, R: Float, S: Simd> Tets<'a, R, S> {
         (norm, self.splat(R::ONE) / norm)
     }
 
-    /// The derivative of det F, det F and γ; where the first is longer than [`MAX_COFACTOR_NORM`], all three are scaled down to that.
+    /// The derivative of det F, det F and γ; where the first is longer than [`MAX_COFACTOR_NORM`], all three are scaled
+    /// down to that.
     ///
     /// The stiffness against a change of volume grows with the square of the derivative, which is that of an area. In a
     /// tet stretched a hundred times it is 10⁸ times what kappa says, and such tets throw their corners away, farther
@@ -363,8 +364,8 @@ impl<'a, R: Float, S: Simd> Tets<'a, R, S> {
 
     /// The two parts of the energy: `Ψ_D / μ`, its derivative, the derivative of the volume term and `J - 1`.
     ///
-    /// Beyond [`MAX_COFACTOR_NORM`] the volume terms of *both* parts are scaled down. Scaled in one of them alone the two
-    /// no longer cancel, and torn slivers throw their corners.
+    /// Beyond [`MAX_COFACTOR_NORM`] the volume terms of *both* parts are scaled down. Scaled in one of them alone the
+    /// two no longer cancel, and torn slivers throw their corners.
     #[inline(always)]
     fn energies(&self, f: &Matrix<R::Lanes<S>>) -> EnergiesOf<R, S> {
         let (one, half) = (self.splat(R::ONE), self.splat(R::HALF));
@@ -413,9 +414,9 @@ impl<'a, R: Float, S: Simd> Tets<'a, R, S> {
         }
     }
 
-    /// The part of a step that is taken where all of it would raise the energy of a tet that is far from rest, else 1: that
-    /// of the minimum of the parabola through the energy and its slope before the step and the energy after it, and so on
-    /// up to [`SHORTENINGS`] times while the energy still rises.
+    /// The part of a step that is taken where all of it would raise the energy of a tet that is far from rest, else 1:
+    /// that of the minimum of the parabola through the energy and its slope before the step and the energy after it,
+    /// and so on up to [`SHORTENINGS`] times while the energy still rises.
     ///
     /// Compiled once and called with copies, so that the loop over tets near rest keeps its registers.
     #[cold]
@@ -520,8 +521,8 @@ impl<'a, R: Float, S: Simd> Tets<'a, R, S> {
         (six + r) / (six + r * (four + r))
     }
 
-    /// The change of the corners per weight by the split form in a single iteration. `keeps` asks for multipliers, which
-    /// are those of this iteration.
+    /// The change of the corners per weight by the split form in a single iteration. `keeps` asks for multipliers,
+    /// which are those of this iteration.
     #[inline(always)]
     fn split(
         &self,
@@ -595,8 +596,8 @@ impl<'a, R: Float, S: Simd> Tets<'a, R, S> {
 
     /// The change of the corners' velocities per weight by the viscosity of shear: one implicit step along its force.
     ///
-    /// With `D = sym(Fᵀ Ḟ)` the dissipation is `τ V μ |D|²` and its force along `A = F D`. Moving by `-σ w A q` changes D
-    /// by `-σ B`, `B = sym(Fᵀ A G)`; the minimum over σ of kinetic energy and dissipation is taken.
+    /// With `D = sym(Fᵀ Ḟ)` the dissipation is `τ V μ |D|²` and its force along `A = F D`. Moving by `-σ w A q` changes
+    /// D by `-σ B`, `B = sym(Fᵀ A G)`; the minimum over σ of kinetic energy and dissipation is taken.
     #[inline(always)]
     fn damped_shear(
         &self,
@@ -719,7 +720,8 @@ impl<'a, R: Float, S: Simd> Tets<'a, R, S> {
         self.alone(&cofactor, one, stiffness, constraint, m, multiplier)
     }
 
-    /// The change of a multiplier that satisfies its constraint, whose derivative is `scale` times a matrix, times that.
+    /// The change of a multiplier that satisfies its constraint, whose derivative is `scale` times a matrix, times
+    /// that.
     #[inline(always)]
     fn alone(
         &self,

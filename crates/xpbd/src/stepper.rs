@@ -1,9 +1,9 @@
 //! [`Stepper`]: one frame of XPBD by colored Gauss-Seidel, and the memory that it works in.
 //!
-//! Each substep moves the particles as if they were free, corrects them tet by tet in the order of the schedule and then
-//! kind by kind of the other constraints, and adds to the velocities what the corrections moved. Clusters of one color
-//! share no particle and run in parallel; a color too small to be worth a second thread stays on one. The result is
-//! bit-identical for any number of threads, which is that of the rayon pool this is called in.
+//! Each substep moves the particles as if they were free, corrects them tet by tet in the order of the schedule and
+//! then kind by kind of the other constraints, and adds to the velocities what the corrections moved. Clusters of one
+//! color share no particle and run in parallel; a color too small to be worth a second thread stays on one. The result
+//! is bit-identical for any number of threads, which is that of the rayon pool this is called in.
 //!
 //! Source: Macklin, Müller, Chentanez 2016; substeps after Macklin et al. 2019; paper section 3 and 4.1.
 //! Cost: `substeps · iterations` passes over all tets.
@@ -27,8 +27,8 @@ pub struct StepReport {
     /// Particles that would have become infinite or NaN and were put back where they were instead, counted once for
     /// each substep. Anything but 0 means the step is not to be trusted: use more substeps.
     pub repaired: usize,
-    /// Particles that were moved by a millionth of a tet's size because all tets lay on one line to the last digit, from
-    /// where no constraint could have brought them back.
+    /// Particles that were moved by a millionth of a tet's size because all tets lay on one line to the last digit,
+    /// from where no constraint could have brought them back.
     pub unfolded: usize,
 }
 

@@ -1,7 +1,7 @@
 //! [`TetSet`]: the tets of a solver at rest, their materials, and their layout for the kernel.
 //!
-//! Tets keep the numbers of the mesh. The order of solving is that of a [`Schedule`], from which the layout is updated. Cost: an
-//! edit is O(1); the next step updates the layout of what was edited.
+//! Tets keep the numbers of the mesh. The order of solving is that of a [`Schedule`], from which the layout is updated.
+//! Cost: an edit is O(1); the next step updates the layout of what was edited.
 
 use glam::DVec3;
 use incise_graph::Schedule;

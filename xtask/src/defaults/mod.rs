@@ -1,8 +1,8 @@
 //! `cargo xtask defaults`: what a scene with default settings gets, accuracy and stability, without tuning.
 //!
-//! Four parts: default scenes beside Newton's method, with the warnings they gave; a stiff organ with stated accuracies;
-//! bodies under load after cuts, from soft to rigid; bodies at rest after cuts. A result over its bar is counted at the top
-//! of the page.
+//! Four parts: default scenes beside Newton's method, with the warnings they gave; a stiff organ with stated
+//! accuracies; bodies under load after cuts, from soft to rigid; bodies at rest after cuts. A result over its bar is
+//! counted at the top of the page.
 
 mod cut;
 mod newton;

@@ -1,8 +1,8 @@
 //! Scenes with default settings beside Newton's method: hanging, pressed and freely spinning bodies.
 //!
-//! The settled state is compared with a static equilibrium by `incise-reference`, the motion with implicit Euler at three
-//! step sizes, extrapolated twice. Both references have the mesh and the energy of the scene. Default scenes have no
-//! damping, so the settled state is the mean over six periods, weighted by a Hann window.
+//! The settled state is compared with a static equilibrium by `incise-reference`, the motion with implicit Euler at
+//! three step sizes, extrapolated twice. Both references have the mesh and the energy of the scene. Default scenes have
+//! no damping, so the settled state is the mean over six periods, weighted by a Hann window.
 
 use std::f64::consts::TAU;
 use std::fs;
@@ -436,8 +436,8 @@ impl Setup {
         Ok(run)
     }
 
-    /// The root of the mean squared distance of all free particles in all states, over that of the displacement, or over
-    /// `sag` if that is more.
+    /// The root of the mean squared distance of all free particles in all states, over that of the displacement, or
+    /// over `sag` if that is more.
     fn error(&self, states: &[Vec<DVec3>], exact: &[Vec<DVec3>], sag: f64) -> f64 {
         let (mut off, mut moved) = (0.0, 0.0);
         for (state, exact) in states.iter().zip(exact) {
@@ -477,7 +477,8 @@ impl Span {
             Load::Hanging | Load::Pressed => (STEPS, 2.0),
         };
         let stride = count(period / frame / steps_wanted);
-        // No more than 24 steps a frame: of vibrations faster than that the reference is not converged, which is stated.
+        // No more than 24 steps a frame: of vibrations faster than that the reference is not converged, which is
+        // stated.
         let steps = count((steps_wanted * frame / period).ceil().min(STEPS));
         let strides = |periods: f64| count((periods * period / frame / stride as f64).ceil());
         let ramp = if load == Load::Pressed {

@@ -1,4 +1,5 @@
-//! A stiff organ whose end is pulled, uncut and while a blade is swept through it: time and error of the accuracy asked for.
+//! A stiff organ whose end is pulled, uncut and while a blade is swept through it: time and error of the accuracy asked
+//! for.
 
 use std::path::Path;
 
@@ -42,7 +43,8 @@ pub(crate) struct OrganRow {
     pub(super) method: String,
     pub(super) substeps: u32,
     pub(super) precision: String,
-    /// Median of the frames of the pull but the first two, the slowest frame that cuts, and the median of the last 20, in ms.
+    /// Median of the frames of the pull but the first two, the slowest frame that cuts, and the median of the last 20,
+    /// in ms.
     pub(super) pulled_ms: f64,
     pub(super) slowest_cut_ms: Option<f64>,
     pub(super) last_ms: f64,

@@ -21,7 +21,7 @@ pub(crate) struct ExperimentArguments {
     /// Where to compute what both can.
     #[arg(long, value_enum, default_value_t = Backend::Cpu)]
     pub(crate) backend: Backend,
-    /// Keep measurements, pages and pictures in this folder, and go on from what it holds.
+    /// Keep measurements, pages and pictures in this folder, and continue from what it holds.
     #[arg(long, value_name = "DIR", default_value = "out/experiments")]
     pub(crate) out: PathBuf,
     /// Measure one share of the cells only, as 2/5 for the second of five, and write no page: see `cargo xtask merge`.

@@ -1,7 +1,7 @@
 //! `cargo xtask merge`: gathers the cells that several runs measured, and writes the pages.
 //!
-//! The cells of an experiment that are then all there need no measuring: running its command with the same folder writes
-//! its page. Cells that are missing in all folders are measured by that.
+//! The cells of an experiment that are then all there need no measuring: running its command with the same folder
+//! writes its page. Cells that are missing in all folders are measured by that.
 
 use std::fs;
 use std::path::PathBuf;

@@ -1,8 +1,8 @@
 //! [`Experiment`]: cells that are measured one by one, and the page that is made of them.
 //!
-//! Each cell is written as it is done, so that a run that was broken off goes on where it was, and so that the cells of a
-//! long run can be shared out among machines: `--shard 2/5` measures every fifth one, and `cargo xtask merge` gathers what
-//! came of it. A page is a function of the rows alone.
+//! Each cell is written as it is done, so that a run that was broken off continues where it was, and so that the cells
+//! of a long run can be shared out among machines: `--shard 2/5` measures every fifth one, and `cargo xtask merge`
+//! gathers what came of it. A page is a function of the rows alone.
 
 mod arguments;
 mod machine;

@@ -63,7 +63,7 @@ impl Table {
         self.rows.push(row);
     }
 
-    /// As Markdown.
+    /// Renders the table as Markdown.
     pub(super) fn markdown(&self) -> String {
         let mut table = crate::table(self.header.clone());
         table.add_rows(self.rows.clone());

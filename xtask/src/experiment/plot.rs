@@ -73,7 +73,7 @@ const COLORS: [RGBColor; 12] = [
 ];
 
 impl Plot {
-    /// As a drawing.
+    /// Draws the plot as SVG.
     pub(super) fn svg(&self) -> anyhow::Result<String> {
         let mut svg = String::new();
         {

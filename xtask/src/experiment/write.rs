@@ -53,7 +53,7 @@ pub(super) fn write<R: Serialize>(
     index(out)
 }
 
-/// The command as anybody would give it: without the folder that it writes to, and with names in place of other paths.
+/// The command in a general form: without the folder that it writes to, and with names in place of other paths.
 fn command(mut words: impl Iterator<Item = String>) -> String {
     let mut command = Vec::new();
     while let Some(word) = words.next() {

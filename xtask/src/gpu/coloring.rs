@@ -1,7 +1,7 @@
 //! Colorings on the device: every algorithm, every mesh, clustered and not, each equal to its twin on the host.
 //!
-//! A coloring ends with the host knowing how many colors there are, so each is a round trip at least. Bringing the graph
-//! to the device is timed by itself: in a frame it would be there.
+//! A coloring ends with the host knowing how many colors there are, so each is a round trip at least. Bringing the
+//! graph to the device is timed by itself: in a frame it would be there.
 
 use std::num::NonZeroUsize;
 use std::time::Instant;

@@ -1,9 +1,9 @@
 //! Whole frames of a scene, with a cut and without, on the device and on the host.
 //!
 //! The scene is the built-in one on another mesh, without its floor: a body held at one side falls, and a blade comes
-//! down through its middle. Without a cut nothing is read back, so frames are timed many in a row, and each with a wait,
-//! as somebody needs who looks at every frame. A frame with a cut waits for the device by itself, since a blade has to
-//! know where the body is; the wait for the end of the frame is added.
+//! down through its middle. Without a cut nothing is read back, so frames are timed many in a row, and each with a
+//! wait, as needed to look at every frame. A frame with a cut waits for the device by itself, since a blade has to know
+//! where the body is; the wait for the end of the frame is added.
 
 use std::sync::Arc;
 use std::time::Instant;

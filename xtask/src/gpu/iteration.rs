@@ -1,12 +1,13 @@
 //! One iteration over the tets of a body: a thread for a cluster, a workgroup for a cluster, Jacobi.
 //!
 //! The time of an iteration is the difference between a frame of many iterations and one of few, over how many more
-//! they are, so prediction and velocities are not in it. Multipliers are kept, as they are with more than one iteration.
+//! they are, so prediction and velocities are not in it. Multipliers are kept, as they are with more than one
+//! iteration.
 //!
 //! **Bytes.** What an iteration has to move at least: of each tet 64 bytes of rest shape, 16 of corners and 8 of
 //! multipliers there and back; of each cluster its particles, 16 bytes there and back, once; where a workgroup solves
-//! it, also its list of particles, 4 bytes each. Places without a tet, and what is fetched twice, are not counted, so the
-//! share of the bandwidth is what is used well. Bodies that fit into a cache may go beyond 100 %.
+//! it, also its list of particles, 4 bytes each. Places without a tet, and what is fetched twice, are not counted, so
+//! the share of the bandwidth is what is used well. Bodies that fit into a cache may go beyond 100 %.
 
 use std::sync::Arc;
 use std::time::Instant;

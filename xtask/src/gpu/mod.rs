@@ -1,7 +1,7 @@
 //! `cargo xtask gpu-sweep`: is the GPU path right, and what does it take?
 //!
-//! Checks first, then the bandwidth of copies, colorings, iterations, frames with a cut and without, and coloring after a
-//! cut, all on the same device in the same run. What was found goes to a JSON file, and as tables to a page. On a
+//! Checks first, then the bandwidth of copies, colorings, iterations, frames with a cut and without, and coloring after
+//! a cut, all on the same device in the same run. What was found goes to a JSON file, and as tables to a page. On a
 //! processor that plays a GPU the times say nothing about GPUs, and the page says so.
 
 mod bandwidth;

@@ -51,7 +51,7 @@ pub(crate) fn page(report: &Report) -> anyhow::Result<String> {
     section("Coloring", &words, colorings(report))?;
     section(
         "Colors after a cut",
-        "*following* is what a frame with a cut does now: the host colors the clusters that changed. Coloring anew on the \
+        "*following* is what a frame with a cut does now: the host colors the clusters that changed. A full coloring on the \
          device takes listing the particles of clusters, upload, coloring and reading back; from a graph, making the graph \
          as well. Medians in ms.",
         recolorings(report),

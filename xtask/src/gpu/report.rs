@@ -156,7 +156,7 @@ pub(crate) struct FrameRow {
     /// Where and with which clusters.
     pub(crate) place: String,
     pub(crate) substeps: u32,
-    /// Many in a row before somebody waits.
+    /// Many frames in a row before a wait.
     pub(crate) quiet: Times,
     /// Waited for, each.
     pub(crate) waited: Times,
@@ -178,7 +178,7 @@ pub(crate) struct CuttingFrames {
     pub(crate) upload: f64,
 }
 
-/// Coloring after a cut: what a frame does, and all anew, on the host and on the device. In ms.
+/// Coloring after a cut: what a frame does, and a full coloring, on the host and on the device. In ms.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct RecoloringRow {
     pub(crate) mesh: String,
@@ -189,16 +189,16 @@ pub(crate) struct RecoloringRow {
     pub(crate) following: f64,
     pub(crate) following_largest: f64,
     pub(crate) following_colors: usize,
-    /// What the host takes to list the particles of clusters, which any coloring anew needs.
+    /// What the host takes to list the particles of clusters, which any full coloring needs.
     pub(crate) incidence: f64,
-    /// All anew on the host, by `auto`.
+    /// A full coloring on the host, by `auto`.
     pub(crate) host: f64,
     pub(crate) host_colors: usize,
-    /// All anew on the device from the particles of clusters.
+    /// A full coloring on the device from the particles of clusters.
     pub(crate) from_incidence: Option<ColoringRun>,
     /// What the host takes to make a graph.
     pub(crate) graph: f64,
-    /// All anew on the device from the graph.
+    /// A full coloring on the device from the graph.
     pub(crate) from_graph: Option<ColoringRun>,
     /// Reading the colors back.
     pub(crate) readback: f64,

@@ -221,7 +221,7 @@ pub(super) fn recolorings(report: &Report) -> Table {
         "following",
         "its largest",
         "colors",
-        "all anew on the host",
+        "full coloring on the host",
         "colors",
         "particles of clusters",
         "their upload",

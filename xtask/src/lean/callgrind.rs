@@ -1,9 +1,9 @@
 //! Instructions of some frames, counted by Callgrind, and whose functions they were in.
 //!
-//! This program runs itself under `valgrind --tool=callgrind` as a child that simulates a scene (`probe.rs`), and counts
-//! only while the child is in the function that the frames are in, so set-up and first frames do not count. One thread,
-//! which computes the frames itself: counts repeat to the instruction, but for what the allocator does. Valgrind knows
-//! AVX 2 at most, so of the kernel's widths that one is counted, on newer processors too.
+//! This program runs itself under `valgrind --tool=callgrind` as a child that simulates a scene (`probe.rs`), and
+//! counts only while the child is in the function that the frames are in, so set-up and first frames do not count. One
+//! thread, which computes the frames itself: counts repeat to the instruction, but for what the allocator does.
+//! Valgrind knows AVX 2 at most, so of the kernel's widths that one is counted, on newer processors too.
 //!
 //! Format: Callgrind manual, "Callgrind Format Specification". Cost: valgrind is some 50 times as slow as the program.
 

@@ -1,8 +1,8 @@
 //! The scenes: a bare one, and for each feature that one with it declared and idle, and declared and used.
 //!
 //! The bare scene is a beam of soft material that floats at rest, in two substeps of one iteration: no forces, nothing
-//! held, nothing reported, no limit of kappa. A case names the scene that it is compared with: mostly the bare one; what
-//! only makes sense together with something else is compared with that alone.
+//! held, nothing reported, no limit of kappa. A case names the scene that it is compared with: mostly the bare one;
+//! what only makes sense together with something else is compared with that alone.
 
 use incise::Scene;
 use incise::scene::{
@@ -328,7 +328,7 @@ pub(crate) fn cases() -> Vec<Case> {
             s.solver.method = Method::Chebyshev;
             s.solver.relaxation = 0.1;
         }),
-        case("kappa limit", Idle, "1e9, nobody is softened", |s| {
+        case("kappa limit", Idle, "1e9, nothing is softened", |s| {
             s.solver.kappa_limit = 1e9;
         }),
         case("kappa limit", Used, "1e-6, all are softened", |s| {

@@ -1,8 +1,8 @@
 //! Bytes, allocations, instructions and device traffic of one scene.
 //!
 //! Bytes are what the scene holds on the heap after some frames, capacity included, allocations those of later frames;
-//! both on a thread of its own, by a counting allocator. Traffic is what a device, a software one too, was told in later
-//! frames. All of that repeats exactly.
+//! both on a thread of its own, by a counting allocator. Traffic is what a device, a software one too, was told in
+//! later frames. All of that repeats exactly.
 
 use std::cell::OnceCell;
 use std::path::Path;
@@ -114,8 +114,8 @@ fn instructions(scene: &Scene, way: Way, folder: &Path) -> anyhow::Result<Counts
 
 /// What a scene asks of the heap.
 ///
-/// A simulation keeps the description it was made from, to be turned to other settings later; that is as long as what
-/// somebody wrote, whatever is simulated, and not counted.
+/// A simulation keeps the description it was made from, to be turned to other settings later; it is as long as the
+/// scene was written, whatever is simulated, and not counted.
 pub(crate) fn memory(scene: &Scene, way: Way) -> anyhow::Result<Memory> {
     let pool = ThreadPoolBuilder::new().num_threads(1).build()?;
     pool.install(|| {

@@ -1,8 +1,8 @@
 //! `cargo xtask lean`: what a scene pays for what it does not use.
 //!
 //! Each feature is declared in an otherwise bare scene, once with nothing to do and once at work, in two sizes, and the
-//! differences to the bare scene are listed: instructions, branches, bytes, and what a GPU is told. The bare scene itself
-//! is held against a loop by hand over the solver alone, which has never heard of any feature of the facade.
+//! differences to the bare scene are listed: instructions, branches, bytes, and what a GPU is told. The bare scene
+//! itself is held against a loop by hand over the solver alone, which has never heard of any feature of the facade.
 
 mod callgrind;
 mod features;
@@ -50,7 +50,7 @@ const BY_HAND: [(Way, &str); 2] = [
 
 #[expect(
     clippy::print_stderr,
-    reason = "whoever waits for a page wants to know at once what will be missing from it"
+    reason = "a user who waits for a page wants to know at once what will be missing from it"
 )]
 pub(crate) fn lean(arguments: &LeanArguments) -> anyhow::Result<()> {
     let valgrind = match arguments.no_valgrind {
@@ -66,7 +66,7 @@ pub(crate) fn lean(arguments: &LeanArguments) -> anyhow::Result<()> {
     experiment(arguments.experiment.quick, &valgrind).run(&arguments.experiment)
 }
 
-/// As one of all experiments.
+/// Runs this experiment as one of all experiments.
 pub(crate) fn run(arguments: &ExperimentArguments) -> anyhow::Result<()> {
     lean(&LeanArguments {
         experiment: arguments.clone(),

@@ -8,7 +8,8 @@ use super::features::{BARE, State};
 use super::measure::{Device, FRAMES, Measured};
 use crate::experiment::{Page, Part, Table};
 
-/// Features and the modules that are theirs alone: what of a bare frame is in those is paid by who declared nothing.
+/// Features and the modules that are theirs alone: what of a bare frame is in those is paid by a scene that declares
+/// nothing.
 const MODULES: [(&str, &[&str]); 12] = [
     (
         "attachments",
@@ -75,7 +76,7 @@ What these miss: a branch within the loops over particles and tets, which both l
 block of 4 to 16 tets, the same every time (whether multipliers are kept, whether corrections are collected as Jacobi \
 does, whether materials differ); for each particle, whether it is held, and whether there is gravity. And bytes that the \
 solver holds whatever a scene declares: a byte a particle for being fixed, two a tet for its material, eight a tet for \
-its volume at rest. One pass a frame is for what nobody declares: the bounding box, by which a body that moves far away \
+its volume at rest. One pass a frame is for what no scene declares: the bounding box, by which a body that moves far away \
 keeps its precision. Any simulation can be cut at any time, so each keeps neighbors, boundary and pieces of its mesh, and \
 clusters and colors that can follow.
 

@@ -1,7 +1,7 @@
 //! What is run under Callgrind: some frames of a scene, through the facade or by hand.
 //!
-//! By hand is the least that somebody writes who has the same mesh and schedule: the solver of incise-xpbd, a step and
-//! a copy of the positions. It has never heard of scenes, strokes, pieces, handles, sleep or reports.
+//! By hand is the least code for the same mesh and schedule: the solver of incise-xpbd, a step and a copy of the
+//! positions. It knows nothing of scenes, strokes, pieces, handles, sleep or reports.
 
 use std::path::PathBuf;
 
@@ -37,7 +37,7 @@ pub(crate) struct ProbeArguments {
 /// How a scene is run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Way {
-    /// As a simulation.
+    /// By the facade, in a simulation.
     Facade,
     /// By the solver, without the facade.
     Hand,
@@ -57,7 +57,7 @@ impl Way {
 
 /// Runs the frames.
 pub(crate) fn probe(arguments: &ProbeArguments) -> anyhow::Result<()> {
-    // This thread is the pool: nobody is woken, nobody waits.
+    // This thread is the pool: no thread is woken or waits.
     let pool = ThreadPoolBuilder::new().num_threads(1).use_current_thread();
     pool.build_global()?;
     let scene = Scene::load(&arguments.scene)?;

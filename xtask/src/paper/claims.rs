@@ -1,7 +1,8 @@
-//! What the paper claims, and whether it was found: each claim with a rule, decided from the rows of the tables and figures.
+//! What the paper claims, and whether it was found: each claim with a rule, decided from the rows of the tables and
+//! figures.
 //!
-//! Cells of the tables that are there are taken, missing ones measured. The rules are about the paper's methods as they are
-//! here, on a processor.
+//! Cells of the tables that are there are taken, missing ones measured. The rules are about the paper's methods as they
+//! are here, on a processor.
 
 pub(super) mod rules;
 

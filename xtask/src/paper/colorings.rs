@@ -18,12 +18,12 @@ use crate::solver::body::{body, scaled};
 pub(super) const ITERATIONS: u32 = 4;
 /// Rounds of turns; the fastest counts.
 const ROUNDS: usize = 3;
-/// Whoever takes longer than this in ms has no second turn.
+/// An algorithm that takes longer than this in ms has no second turn.
 const PATIENCE: f64 = 300.0;
 /// The last of [`ALGORITHMS`], which is more than an algorithm.
 pub(super) const BALANCED: &str = "auto, balanced";
-/// The paper's of Table 2 in its order; SCGC without the third shortcut, which is what the paper adds to ECL-GC, in the same
-/// code; then what the paper has elsewhere, then ours.
+/// The paper's of Table 2 in its order; SCGC without the third shortcut, which is what the paper adds to ECL-GC, in the
+/// same code; then what the paper has elsewhere, then ours.
 pub(super) const ALGORITHMS: [&str; 11] = [
     "vivace", "wlc", "ecl-gc", "scgc", "scgc:12", "vivace:4", "mcs", "greedy", "dsatur", "auto",
     BALANCED,
@@ -38,7 +38,7 @@ pub(super) struct Colored {
     pub(super) std: f64,
     pub(super) range: u64,
     pub(super) chi2: f64,
-    /// The same of their sizes in tets.
+    /// Of the sizes of the colors in tets: standard deviation, range, and chi-squared over k - 1.
     pub(super) tets: [f64; 3],
     pub(super) color_ms: f64,
     /// A step of [`ITERATIONS`] in this order, in the paper's form and single precision.
@@ -51,7 +51,7 @@ impl Colored {
         1e3 / (cut_ms + self.color_ms + self.solve_ms)
     }
 
-    /// The same chi-squared statistic before it is divided by k - 1.
+    /// The chi-squared statistic of the sizes in clusters, before it is divided by k - 1.
     pub(super) fn chi2_sum(&self) -> f64 {
         self.chi2 * self.colors.saturating_sub(1) as f64
     }
@@ -197,7 +197,7 @@ pub(super) fn one_thread<T: Send>(
     pool.install(run)
 }
 
-/// The clusters that still hold tets, numbered without gaps: empty ones are in nobody's way and need no color.
+/// The clusters that still hold tets, numbered without gaps: empty ones conflict with no other and need no color.
 pub(super) fn occupied(clustering: &Clustering) -> anyhow::Result<Clustering> {
     let mut numbers = vec![None; clustering.cluster_count()];
     let mut next = 0;

@@ -1,9 +1,10 @@
 //! One step of the liver from a known state by each method: the ground of Table 3 and Figures 7 and 10.
 //!
-//! The paper gives material and time step (section 5.2), not density, size or what its residual is the norm of. Its start is
-//! "the first frame after a 2.0x scaling-restoration cycle", taken here as the body at twice its size, at rest, let go.
-//! Three setups: of organ size, where its numbers make iterating a large step hopeless (kappa of a million), so large that
-//! the step is well-posed near rest (kappa 1/2), and the same let go closer to rest, where it is well-posed all the way. A step's iterations cannot be watched from outside, so each count is a run of its own.
+//! The paper gives material and time step (section 5.2), not density, size or what its residual is the norm of. Its
+//! start is "the first frame after a 2.0x scaling-restoration cycle", taken here as the body at twice its size,
+//! released at rest. Three setups: of organ size, where its numbers make iterating a large step hopeless (kappa of a
+//! million), so large that the step is well-posed near rest (kappa 1/2), and the same released closer to rest, where it
+//! is well-posed all the way. A step's iterations cannot be watched from outside, so each count is a run of its own.
 
 use std::time::Instant;
 
@@ -27,7 +28,7 @@ pub(super) const MATERIAL: Material = Material {
 };
 /// In s.
 pub(super) const TIME_STEP: f64 = 0.016;
-/// How large the body is, and by how much it is scaled before it is let go.
+/// How large the body is, and by how much it is scaled before it is released.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Setup {
     Organ,
@@ -86,7 +87,7 @@ impl PaperMethod {
         Self::Split,
     ];
 
-    /// As in the paper's table.
+    /// The method and its cluster size, as in the paper's table.
     pub(super) fn parts(self) -> (&'static str, u32) {
         match self {
             Self::GaussSeidel(size) => ("gauss-seidel", size),
@@ -162,7 +163,7 @@ pub(super) struct Trial {
     pub(super) mesh: TetMesh,
     schedule: Schedule,
     solving: PaperMethod,
-    /// By how much the body is scaled before it is let go.
+    /// By how much the body is scaled before it is released.
     scaled: f64,
     /// The force at the start in N.
     start: f64,
@@ -239,7 +240,7 @@ impl Trial {
     }
 
     /// The force on each particle that the implicit step leaves out of balance, in N: `M (x - x̃) / Δt² + ∇U(x)`, where
-    /// the prediction x̃ is the state it was let go in, as there is neither speed nor gravity.
+    /// the prediction x̃ is the state it was released in, as there is neither speed nor gravity.
     pub(super) fn forces(&self, solver: &Solver<f64>) -> anyhow::Result<Vec<DVec3>> {
         let tets: Vec<[u32; 4]> = self.mesh.tets.iter().map(|tet| tet.map(|p| p.0)).collect();
         let material = incise_reference::Material {

@@ -2,8 +2,8 @@
 //!
 //! The paper does not say of which sequence its spectrum is. Two readings of the force out of balance at the particles:
 //! over space, `|Σ_p f_p exp(2πi k·x_p)|² / N` with the rest positions, mean over 64 directions of wave vectors of each
-//! length, which tells coarse errors from fine ones; and over the numbers of the particles, as an array handed to a Fourier
-//! transform, which depends on how the mesh is numbered. Each as a part of the mean square force at the start.
+//! length, which tells coarse errors from fine ones; and over the numbers of the particles, as an array handed to a
+//! Fourier transform, which depends on how the mesh is numbered. Each as a part of the mean square force at the start.
 
 use std::f64::consts::{PI, TAU};
 
@@ -81,7 +81,7 @@ fn measure(
     for iterations in counts {
         let (solver, _) = trial.step(iterations)?;
         let forces = trial.forces(&solver)?;
-        // Whoever has left every scale has no spectrum.
+        // Forces beyond every scale have no spectrum.
         if !norm(&forces).is_finite() || norm(&forces) > 1e100 {
             break;
         }
@@ -104,8 +104,8 @@ fn measure(
     })
 }
 
-/// Mean power over directions, by waves on the longest side of the body: from 1 to half a wave on the mean distance between
-/// particles.
+/// Mean power over directions, by waves on the longest side of the body: from 1 to half a wave on the mean distance
+/// between particles.
 fn over_space(positions: &[DVec3], forces: &[DVec3]) -> Vec<(f64, f64)> {
     let low = positions.iter().copied().fold(DVec3::MAX, DVec3::min);
     let high = positions.iter().copied().fold(DVec3::MIN, DVec3::max);

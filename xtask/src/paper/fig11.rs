@@ -105,7 +105,7 @@ fn page(rows: &[Row]) -> anyhow::Result<Page> {
             Part::Text(format!(
                 "Means of the frames in which a blade cuts the liver of {tets} tets, three blades in {FRAMES} frames, clusters of \
                  10 that are never merged, {ITERATIONS} iterations, one thread. As the paper makes a frame, the graph of all \
-                 clusters is built and colored anew by SCGC and the order of solving sorted anew (every {STRIDE}th frame that \
+                 clusters is rebuilt and recolored by SCGC and the order of solving sorted again (every {STRIDE}th frame that \
                  cuts), in the sequential form; as the simulation makes it, only what was cut is colored and sorted, in the \
                  block form. The paper prints a diagram without numbers: cutting, coloring and solving take most."
             )),

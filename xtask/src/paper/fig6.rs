@@ -1,7 +1,7 @@
 //! Figure 6: pictures of bodies that are cut.
 //!
-//! The built-in scene with each of the paper's three bodies: held at one side, gravity, a blade from above. Cut faces have a
-//! tint of their own.
+//! The built-in scene with each of the paper's three bodies: held at one side, gravity, a blade from above. Cut faces
+//! have a tint of their own.
 
 use incise::cutting::FaceTag;
 use incise::{Scene, Simulation};

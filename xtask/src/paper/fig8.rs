@@ -1,9 +1,10 @@
 //! Figure 8: colors and time of a frame while a body is cut, by coloring algorithm.
 //!
-//! One course of cutting for all: clusters of 10, three blades, new clusters never merged. At some frames its clusters are
-//! colored anew by each algorithm and a step is solved in each order, as the paper does in every frame. Beside them what the
-//! simulation itself does, which keeps colors and recolors only what was cut. The caption of Figure 6 has the rows as liver,
-//! bunny, armadillo, the text as liver, armadillo, bunny; so both bodies are cut in 180 frames and in 280.
+//! One course of cutting for all: clusters of 10, three blades, new clusters never merged. At some frames its clusters
+//! are recolored by each algorithm and a step is solved in each order, as the paper does in every frame. Beside them
+//! what the simulation itself does, which keeps colors and recolors only what was cut. The caption of Figure 6 has the
+//! rows as liver, bunny, armadillo, the text as liver, armadillo, bunny; so both bodies are cut in 180 frames and
+//! in 280.
 
 use incise::Simulation;
 use serde::{Deserialize, Serialize};
@@ -121,7 +122,7 @@ fn measure(name: &str, frames: u64, arguments: &ExperimentArguments) -> anyhow::
 fn page(rows: &[Row]) -> anyhow::Result<Page> {
     let mut parts = vec![Part::Text(format!(
         "Three blades through bodies at rest, clusters of 10 that are never merged, as in the paper. By algorithm: the clusters \
-         of that frame colored anew, with the time of cutting (the mean of the frames that cut since the last point), coloring \
+         of that frame recolored, with the time of cutting (the mean of the frames that cut since the last point), coloring \
          from a graph that is there, and {ITERATIONS} iterations. `kept`: what the simulation does by itself, which colors \
          only what was cut; its time is that of all its stages. One thread.\n\n\
          The paper gives 220, 180 and 280 frames for its rows from top to bottom. Figure 6, of which they are said to be, has \

@@ -1,8 +1,8 @@
 //! Figure 9: colors of three bodies at rest by five algorithms, with pictures of the colored bodies.
 //!
-//! The paper's counts of clusters are those of clusters of 10 (Table 1 has 1177 for the liver, too). It prints 20 colors of
-//! greedy for the bunny where SCGC has 28, though both, as said, are greedy in an order of degrees; "greedy" is run in the
-//! orders that the word may mean.
+//! The paper's counts of clusters are those of clusters of 10 (Table 1 has 1177 for the liver, too). It prints 20
+//! colors of greedy for the bunny where SCGC has 28, though both, as said, are greedy in an order of degrees; "greedy"
+//! is run in the orders that the word may mean.
 
 use incise::clustering::{Method, cluster};
 use incise::graph::Coloring;

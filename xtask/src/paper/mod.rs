@@ -1,7 +1,7 @@
 //! `cargo xtask paper`: the tables and figures of the paper, its numbers and ours side by side.
 //!
-//! One module per table or figure, each an experiment of the common frame. The paper's numbers are data in `printed`, its
-//! bodies stand in `body`. Where the paper leaves open what it means, every reading is run and the page says so.
+//! One module per table or figure, each an experiment of the common frame. The paper's numbers are data in `printed`,
+//! its bodies stand in `body`. Where the paper leaves open what it means, every reading is run and the page says so.
 
 mod body;
 mod claims;

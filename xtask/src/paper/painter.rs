@@ -1,8 +1,8 @@
 //! Pictures of bodies as SVG: the triangles of the boundary, far ones first, each filled with a color of its own.
 //!
-//! The painter's algorithm (Newell et al. 1972) from the front, above and to the left. Triangles that look away are left
-//! out, and so are those no pixel of which is in front: a picture holds what is seen of a body, not the body. Cost:
-//! O(triangles log triangles + pixels).
+//! The painter's algorithm (Newell et al. 1972) from the front, above and to the left. Triangles that look away are
+//! left out, and so are those no pixel of which is in front: a picture holds what is seen of a body, not the body.
+//! Cost: O(triangles log triangles + pixels).
 
 use std::fmt::Write;
 

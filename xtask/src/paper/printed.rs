@@ -1,7 +1,8 @@
 //! The numbers that the paper prints, as data: what our measurements are set beside.
 //!
-//! "Parallel Constraint Graph Partitioning and Coloring for Realtime Soft-Body Cutting", measured with CUDA on an RTX 3090
-//! and an i9-10900X (section 5). Names of algorithms and clusterings are ours. Figures 4, 7, 8, 10 and 11 print no numbers.
+//! "Parallel Constraint Graph Partitioning and Coloring for Realtime Soft-Body Cutting", measured with CUDA on an RTX
+//! 3090 and an i9-10900X (section 5). Names of algorithms and clusterings are ours. Figures 4, 7, 8, 10 and 11 print no
+//! numbers.
 
 /// A row of Table 1 (section 5.1.1): clusterings of the liver of 11,367 tets.
 pub(super) struct Clustered {

@@ -1,8 +1,8 @@
 //! Table 1: serial neighbor clustering and Greedy K-Neighbor by cluster size.
 //!
-//! Two readings of the paper's Algorithm 2: Ks counts the seed, as the algorithm says, or not, as its printed counts imply
-//! (1972 clusters of 5 cannot hold 11,367 tets). Greedy K-Neighbor (Ton-That et al. 2023) is a reconstruction that keeps
-//! scores in a heap where the paper speaks of frequent breadth-first searches.
+//! Two readings of the paper's Algorithm 2: Ks counts the seed, as the algorithm says, or not, as its printed counts
+//! imply (1972 clusters of 5 cannot hold 11,367 tets). Greedy K-Neighbor (Ton-That et al. 2023) is a reconstruction
+//! that keeps scores in a heap where the paper speaks of frequent breadth-first searches.
 
 use std::time::Instant;
 
@@ -50,7 +50,7 @@ pub(super) struct Clustered {
 }
 
 impl Clustered {
-    /// Frames a second of solving and coloring anew.
+    /// Frames a second of solving and recoloring.
     pub(super) fn fps(&self) -> f64 {
         1e3 / (self.color_ms + self.solve_ms)
     }

@@ -1,7 +1,7 @@
 //! Table 3: iterations and milliseconds to a residual of 1.5 by method and cluster size.
 //!
-//! 1.5 of what the paper does not say. Read literally, as the norm of what XPBD iterates on over all constraints; and as a
-//! part of the force at the start, for which a fifth is asked (iterated XPBD stops at a tenth).
+//! 1.5 of what the paper does not say. Read literally, as the norm of what XPBD iterates on over all constraints; and
+//! as a part of the force at the start, for which a fifth is asked (iterated XPBD stops at a tenth).
 
 use serde::{Deserialize, Serialize};
 

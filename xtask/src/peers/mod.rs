@@ -80,7 +80,7 @@ const QUICK: Extent = Extent {
     compiles: false,
 };
 
-/// As one of all experiments, where the scripts are at the usual place.
+/// Runs this experiment as one of all experiments, if the scripts are at the usual place.
 #[expect(clippy::print_stderr, reason = "says what is left out")]
 pub(crate) fn usual(arguments: &ExperimentArguments) -> anyhow::Result<()> {
     let peers = PathBuf::from(FOLDER);

@@ -149,7 +149,7 @@ mod tests {
         }
     }
 
-    /// What ran is in the table with its ratios, what did not says why, and nobody is passed over.
+    /// What ran is in the table with its ratios, what did not says why, and no system is left out.
     #[test]
     fn every_system_is_on_the_page() {
         let mut rows: Vec<Row> = PEERS

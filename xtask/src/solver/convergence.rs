@@ -2,8 +2,8 @@
 //!
 //! One implicit step of a liver that hangs by one end, from rest, with the paper's material and time step, once of
 //! organ size and once so large that its setting is well-posed (kappa at most 0.5). The residual is the force that is
-//! left, `‖M (x - x̃) / Δt² + ∇U(x)‖`, over the weight `‖M g‖`: 1 is doing nothing. XPBD drops a part of the equations, so
-//! its residual stops at a floor, which the table shows.
+//! left, `‖M (x - x̃) / Δt² + ∇U(x)‖`, over the weight `‖M g‖`: 1 is doing nothing. XPBD drops a part of the equations,
+//! so its residual stops at a floor, which the table shows.
 
 use std::time::Instant;
 
@@ -189,7 +189,7 @@ fn checkpoints(most: u32) -> Vec<u32> {
     points
 }
 
-/// XPBD, run anew for each number of iterations: once for the time and once for the residual.
+/// Runs XPBD for each number of iterations from the start: for the time, and again for the residual.
 fn xpbd(
     mesh: &TetMesh,
     clustering: &str,

@@ -1,7 +1,7 @@
 //! What kappa is worth at rest: where a beam under gravity settles by XPBD, and where it should.
 //!
-//! With one iteration a substep XPBD is off even where nothing moves, in proportion to kappa and, as kappa knows Young's
-//! modulus only, nearly in proportion to `l/μ = 1 / (1 - 2 ν)`. The beam starts where Newton's method finds the
+//! With one iteration a substep XPBD is off even where nothing moves, in proportion to kappa and, as kappa knows
+//! Young's modulus only, nearly in proportion to `l/μ = 1 / (1 - 2 ν)`. The beam starts where Newton's method finds the
 //! equilibrium, and velocities are damped at about the critical rate until it stays: at rest the damping does nothing.
 //! With some more iterations the error hardly depends on Poisson's ratio until close to 1/2: the second table.
 

@@ -1,7 +1,7 @@
 //! What a Gauss-Seidel pass costs: nanoseconds a tet and milliseconds an iteration, on one thread and on two.
 //!
-//! A beam of Kuhn cubes, 1 m by 0.25 by 0.25, of 11,520 or 92,160 tets, E = 1e6 Pa, Poisson's ratio 0.45, held at one end
-//! and swinging, and the liver. One frame of 20 substeps of one iteration, the fastest of many, over the number of
+//! A beam of Kuhn cubes, 1 m by 0.25 by 0.25, of 11,520 or 92,160 tets, E = 1e6 Pa, Poisson's ratio 0.45, held at one
+//! end and swinging, and the liver. One frame of 20 substeps of one iteration, the fastest of many, over the number of
 //! tets and substeps: everything is in it, prediction and velocities, too.
 
 use std::time::Instant;

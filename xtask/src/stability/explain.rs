@@ -1,7 +1,7 @@
 //! Why a body has not come back: sentences by extreme and method.
 //!
-//! The first that fits is taken. Each is for some extremes, some methods and some verdicts, and says no more than what is
-//! known of them: an outcome that none fits is a finding.
+//! The first that fits is taken. Each is for some extremes, some methods and some verdicts, and says no more than what
+//! is known of them: an outcome that none fits is a finding.
 
 use super::methods::Method;
 use super::outcome::{Outcome, Row, Verdict};
@@ -125,7 +125,7 @@ const TABLE: &[Explanation] = &[
         verdicts: &[Gains, Off],
         kappa: 0.0,
         text: "Kappa speaks of E and not of how stiff a nearly incompressible body is against changes of volume: its error \
-            grows about as `l / μ`, and so does the energy in errors of volume that nobody sees. Take a smaller kappa or \
+            grows about as `l / μ`, and so does the energy in errors of volume that are not visible. Take a smaller kappa or \
             four iterations a substep.",
     },
     Explanation {
@@ -166,7 +166,7 @@ const TABLE: &[Explanation] = &[
         verdicts: &[Inverted, FewInverted, Off, Gains],
         kappa: 1.0,
         text: "20 sweeps are far from the solution of a step at this kappa. What they leave over is elastic energy that \
-            nobody put in, the more the stiffer the body, and now and then an inverted tet at the held end. More sweeps, a \
+            was not put in, the more the stiffer the body, and now and then an inverted tet at the held end. More sweeps, a \
             relaxation of 1.9, or a coarse correction.",
     },
     Explanation {
@@ -191,7 +191,7 @@ const STATES: &[&str] = &[
     "stretched",
 ];
 
-/// The reason for what is not fine; `None` if it is fine or nobody knows.
+/// The reason for what is not fine; `None` if it is fine or the reason is not known.
 pub(super) fn explain(row: &Row, outcome: &Outcome) -> Option<&'static Explanation> {
     let verdict = outcome.verdict(row.is_state);
     TABLE.iter().find(|e| {
@@ -202,7 +202,7 @@ pub(super) fn explain(row: &Row, outcome: &Outcome) -> Option<&'static Explanati
     })
 }
 
-/// Whether an id is `start` or goes on with a dash after it, so that `young-1e1` is not the start of `young-1e12`.
+/// Whether an id is `start` or continues with a dash after it, so that `young-1e1` is not the start of `young-1e12`.
 fn begins(id: &str, start: &str) -> bool {
     let rest = id.strip_prefix(start);
     rest.is_some_and(|rest| start.is_empty() || rest.is_empty() || rest.starts_with('-'))

@@ -2,7 +2,8 @@
 //!
 //! Each is a beam of 1 m × 0.25 m × 0.25 m of E = 1e6 Pa and Poisson's ratio 0.45, with one thing changed. Extremes of
 //! state are left alone, without gravity, one end held or none, so that the shape at rest is what they should come back
-//! to. All others are held at one end and fall from rest under gravity, which no method that loses its stiffness survives.
+//! to. All others are held at one end and fall from rest under gravity, which no method that loses its stiffness
+//! survives.
 
 use incise::mesh::glam::DVec3;
 use incise::mesh::{TetId, TetMesh, kuhn_box};

@@ -1,9 +1,9 @@
 //! The columns of the matrix: methods with the settings that they are looked at with, precisions, backends.
 //!
-//! *Default* is a simulation with the settings of an empty `[solver]` table, which choose method, substeps and precision.
-//! *Split* is the default form with as many substeps as bring kappa to 0.5, at most 200, and nothing softened. *Softened*
-//! is the block form with the same substeps, tets that are still too stiff softened to kappa 1. All others compute a frame
-//! in one step of twenty iterations (five with corrections), as the paper does.
+//! *Default* is a simulation with the settings of an empty `[solver]` table, which choose method, substeps and
+//! precision. *Split* is the default form with as many substeps as bring kappa to 0.5, at most 200, and nothing
+//! softened. *Softened* is the block form with the same substeps, tets that are still too stiff softened to kappa 1.
+//! All others compute a frame in one step of twenty iterations (five with corrections), as the paper does.
 
 use incise::mesh::glam::DVec3;
 use incise::scene::{self, SolverSpec, Substeps, TetSolve as SceneTetSolve};

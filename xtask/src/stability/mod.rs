@@ -1,8 +1,8 @@
-//! `cargo xtask stability`: what becomes of bodies in extreme states, materials, steps and cuts, by method, precision and
-//! backend.
+//! `cargo xtask stability`: what becomes of bodies in extreme states, materials, steps and cuts, by method, precision
+//! and backend.
 //!
-//! The matrix is about shape and finiteness, not about accuracy: nothing may be infinite or NaN, ever, and what does not
-//! come back to its shape is explained. Rows: `extremes` and `cuts`; columns: `methods`.
+//! The matrix is about shape and finiteness, not about accuracy: nothing may be infinite or NaN, ever, and what does
+//! not come back to its shape is explained. Rows: `extremes` and `cuts`; columns: `methods`.
 
 mod cuts;
 mod explain;
@@ -32,7 +32,8 @@ pub(crate) fn stability(arguments: &ExperimentArguments) -> anyhow::Result<()> {
     experiment(arguments.quick, arguments.backend)?.run_and_check(arguments, check)
 }
 
-/// What holds of every cell whatever its verdict: finite, explained where it is not green, momentum kept by constraints.
+/// What holds of every cell whatever its verdict: finite, explained where it is not green, momentum kept by
+/// constraints.
 ///
 /// # Errors
 /// On the first outcome of which it does not hold.

@@ -9,8 +9,8 @@ use incise::mesh::glam::{DMat3, DMat4, DQuat, DVec3, DVec4};
 /// Squarings: eigenvalues apart by a part in 1e9 are told apart.
 const SQUARINGS: usize = 40;
 
-/// The root of the mean squared distance between `shape` and `rest` moved onto it as well as it can be, over the longest
-/// side of `rest`.
+/// The root of the mean squared distance between `shape` and `rest` moved onto it as well as it can be, over the
+/// longest side of `rest`.
 pub(crate) fn distance(rest: &[DVec3], shape: &[DVec3]) -> f64 {
     let count = rest.len().max(1) as f64;
     let middle = |points: &[DVec3]| points.iter().sum::<DVec3>() / count;
@@ -108,7 +108,8 @@ mod tests {
         assert!(distance(&small, &small) < 1e-7);
     }
 
-    /// A point is as far as the root of the mean square of the distances from the middle; a mirror image is not the shape.
+    /// A point is as far as the root of the mean square of the distances from the middle; a mirror image is not the
+    /// shape.
     #[test]
     fn other_shapes_are_a_distance() {
         let rest = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];

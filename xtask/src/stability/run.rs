@@ -89,7 +89,7 @@ fn on_device(extreme: &Extreme, column: Column, gpu: &Arc<GpuContext>) -> anyhow
     Ok(watch.outcome)
 }
 
-/// A body at its start, how it will be moved, and who watches it.
+/// A body at its start, how it will be moved, and what watches it.
 fn start<R: Real>(
     extreme: &Extreme,
     column: Column,

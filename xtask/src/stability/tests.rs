@@ -56,8 +56,8 @@ fn rows_are_finite_explained_and_shown() {
     assert_eq!(boxes, 1 + outcomes.sum::<usize>());
 }
 
-/// What substeps by kappa are there for: no state of a body that is held, no Poisson's ratio, no distance from the origin
-/// breaks a body.
+/// What substeps by kappa are there for: no state of a body that is held, no Poisson's ratio, no distance from the
+/// origin breaks a body.
 #[test]
 fn substeps_by_kappa_hold_a_body_together() {
     for extreme in extremes::extremes(true).unwrap() {

@@ -2,8 +2,8 @@
 //! method can do it as well.
 //!
 //! A hanging beam bends far, at three of Poisson's ratios; a bar is twisted by a handle; a liver is pressed by a handle
-//! (prescribed motion in the place of a contact, which the reference does not know); a liver that a plane has cut before
-//! it moves falls open; a stiff beam is stitched to a soft one. Frames are 1/60 s.
+//! (prescribed motion in the place of a contact, which the reference does not know); a liver that a plane has cut
+//! before it moves falls open; a stiff beam is stitched to a soft one. Frames are 1/60 s.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -36,7 +36,7 @@ impl Kind {
         Self::Bilayer,
     ];
 
-    /// As the name of a cell.
+    /// The name of the scene's cell.
     pub(super) fn id(self) -> String {
         match self {
             Self::HangingBeam(ratio) => format!("hanging-beam-0.{ratio}"),

@@ -1,9 +1,9 @@
 //! `cargo xtask viewer-smoke`: a synthetic hand uses the viewer on a screen without a monitor.
 //!
-//! It builds the viewer, shows it a block on a table, cuts that in two with the mouse, takes the cut back, pulls the body
-//! and looks at what the screen shows after each: the picture is not blank, the panel is there, one piece has become two.
-//! Needs Xvfb and an adapter that can show windows there, such as Mesa's lavapipe; the normal gates only compile the
-//! viewer.
+//! It builds the viewer, shows it a block on a table, cuts that in two with the mouse, takes the cut back, pulls the
+//! body and looks at what the screen shows after each: the picture is not blank, the panel is there, one piece has
+//! become two. Needs Xvfb and an adapter that can show windows there, such as Mesa's lavapipe; the normal gates only
+//! compile the viewer.
 
 mod screen;
 

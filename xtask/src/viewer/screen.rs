@@ -39,7 +39,7 @@ pub(super) enum Button {
 
 /// An X server and a connection to it.
 pub(super) struct Screen {
-    /// As in `DISPLAY`.
+    /// The name of the display, for the variable `DISPLAY`.
     pub(super) display: String,
     connection: RustConnection,
     root: Window,
@@ -143,12 +143,12 @@ impl Screen {
         self.release(button)
     }
 
-    /// Lets a button go.
+    /// Releases a button.
     pub(super) fn release(&self, button: Button) -> anyhow::Result<()> {
         self.send(BUTTON_RELEASE_EVENT, button as u8, [0, 0])
     }
 
-    /// The same without letting go.
+    /// Drags from one place to another in some steps and keeps the button pressed.
     pub(super) fn hold(
         &self,
         button: Button,

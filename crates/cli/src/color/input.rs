@@ -117,7 +117,7 @@ fn read_graph(
 }
 
 impl Source {
-    /// Finds out who is in whose way.
+    /// Determines which constraints or vertices conflict.
     pub(crate) fn problem(self) -> anyhow::Result<Problem> {
         match self {
             Self::Graph(graph) => Ok(Problem::Graph(graph)),

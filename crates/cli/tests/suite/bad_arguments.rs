@@ -7,7 +7,7 @@ use crate::support::SCENE;
 fn places_that_cannot_be_written() {
     let place = place();
     let run = |rest: &[&'static str]| [&["run", "scene.toml", "--frames", "2"], rest].concat();
-    // A path below a regular file exists for nobody, not even for the administrator.
+    // A path below a regular file exists for no user, not even for the administrator.
     for (rest, part) in [
         (&["--out", "tet.vtk/out"][..], "tet.vtk/out"),
         (&["--out", "tet.vtk"], "tet.vtk"),

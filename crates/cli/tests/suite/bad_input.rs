@@ -34,7 +34,7 @@ pub(crate) fn refused(place: &Place, arguments: &[&str], parts: &[&str]) -> Stri
     message
 }
 
-/// The same, where the message is one line that says nothing twice.
+/// Runs the binary on bad input; the message must contain all of `parts` and be one line that says nothing twice.
 pub(crate) fn refused_in_a_sentence(place: &Place, arguments: &[&str], parts: &[&str]) {
     let message = refused(place, arguments, parts);
     assert!(

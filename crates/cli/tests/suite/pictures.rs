@@ -163,7 +163,7 @@ fn residuals_are_shown_where_there_are_some() {
     place.write("vbd.toml", scene);
     let command = [&["run", "vbd.toml"], &usual[..]].concat();
     refused_in_a_sentence(&place, &command, &["--color-by residual", "vbd"]);
-    // Where nothing is drawn, they are nobody's.
+    // Where nothing is drawn, residuals are not needed.
     let nothing = [&command[..], &["--no-pictures"]].concat();
     place.good(&nothing);
     run(&place, &[&usual[..], &["--no-pictures"]].concat());
@@ -179,7 +179,7 @@ fn pictures_of_an_earlier_run_are_not_left_among_those_of_this_one() {
     let usual = ["--size", "30x20", "--quiet", "--frames"];
     run(&place, &[&usual[..], &["4"]].concat());
     for name in ["frame_1.png", "frame_0000x.png", "my_frame_00001.png"] {
-        place.write(&format!("out/{name}"), "somebody's");
+        place.write(&format!("out/{name}"), "of a user");
     }
     // What is refused removes nothing.
     let refused = [

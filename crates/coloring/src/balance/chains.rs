@@ -8,7 +8,7 @@
 //! the heavy one.
 //!
 //! Where that leads to no light class, a *detour* may: v takes the place of its only neighbor u in
-//! a class B, and u goes on to C. B keeps its load. A chain has at most one detour, and passes by B
+//! a class B, and u moves to C. B keeps its load. A chain has at most one detour, and passes by B
 //! only there, so that its moves still do not meet.
 //!
 //! The graph of classes is never built: a search asks the members of the classes it comes by. A
@@ -229,7 +229,7 @@ impl Chains {
                     let pushes = mover != NONE
                         && mover != MANY
                         && partition.weights[mover as usize] == partition.weights[pusher as usize];
-                    // From closed classes nobody can go on.
+                    // No chain continues from a closed class.
                     if pushes && !has(&self.closed, detour) {
                         let step = Step {
                             mover,

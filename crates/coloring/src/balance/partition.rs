@@ -1,8 +1,8 @@
-//! The classes while they are balanced: who is in which, how heavy each one is.
+//! The classes while they are balanced: the members and the load of each one.
 //!
 //! Classes are the colors that carry weight, numbered without gaps. A color that only vertices of
-//! weight 0 have is no class: nobody enters or leaves it. Members are listed by links through the
-//! vertices, so that one can change class in O(1).
+//! weight 0 have is not a class: no vertex enters or leaves it. Members are listed by links through
+//! the vertices, so that one can change class in O(1).
 
 use incise_graph::{ColorId, Coloring};
 

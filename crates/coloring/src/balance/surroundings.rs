@@ -11,7 +11,7 @@ use incise_graph::Incidence;
 use super::partition::NONE;
 use crate::Conflicts;
 
-/// Who is around a vertex, while vertices change class.
+/// The neighbors of a vertex and their classes, while vertices change class.
 pub(super) trait Surroundings {
     /// Adds to `words`, a bit per class, the classes of the neighbors of `v`. The class of `v`
     /// itself may or may not be among them.
@@ -23,7 +23,7 @@ pub(super) trait Surroundings {
     /// `v` is about to leave `class`.
     fn leave(&mut self, v: u32, class: u32);
 
-    /// `v` is about to enter `class`. Whoever is in its way there has left.
+    /// `v` is about to enter `class`. All its neighbors in there have left.
     fn enter(&mut self, v: u32, class: u32);
 
     /// Calls `join(v, u)` for all neighbors `v` and `u` in the one and the other of two classes, in

@@ -1,4 +1,4 @@
-//! Incidence that changes: who is at which particle, in linked lists.
+//! Incidence that changes: which vertices are at which particle, in linked lists.
 //!
 //! A link joins a vertex (a constraint or a cluster) and a particle. It lies in two lists, that of
 //! its particle and that of its vertex. A cluster may be at a particle with several constraints, so
@@ -97,7 +97,8 @@ impl Links {
         place.is_some()
     }
 
-    /// The same, where a link could only be the last that came to the particle. O(1).
+    /// Counts a link once more if it is the last that came to the particle; false if it is not. Does
+    /// what [`repeat`](Self::repeat) does where no other link can be meant. O(1).
     pub(super) fn repeat_last(&mut self, vertex: u32, particle: u32) -> bool {
         let place = self.at_particle.get(particle as usize).copied();
         let last = place.and_then(|place| self.links.get_mut(place as usize));

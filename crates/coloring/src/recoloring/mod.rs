@@ -1,15 +1,15 @@
 //! A coloring that follows edits: cut a constraint out, put others in, recolor only these.
 //!
-//! Removing constraints never makes a coloring improper, so everybody keeps their color. A vertex
-//! that got new particles keeps its color unless a neighbor has it. Whoever is left without one
+//! Removing constraints never makes a coloring improper, so every vertex keeps its color. A vertex
+//! that got new particles keeps its color unless a neighbor has it. A vertex left without a color
 //! takes the smallest free color if the number of colors need not grow for it; else the first color
 //! whose holders around can all move to another one; else a new color. If that makes more colors
-//! than the limit, all is colored anew with [`auto`].
+//! than the limit, all vertices are recolored with [`auto`].
 //!
 //! The limit is the larger of two numbers, the colors of the last full coloring and the present
 //! clique bound, plus the slack. So colors grow only where the constraints themselves grow denser,
-//! or by the slack. The last full coloring may be one of a denser scene, though: whoever removes
-//! much should call [`recolor`](Recoloring::recolor) at a quiet moment.
+//! or by the slack. The last full coloring may be one of a denser scene, though: after removing
+//! many constraints, call [`recolor`](Recoloring::recolor) at a quiet moment.
 //!
 //! Cost of an edit: the links of the edited vertices and of those at their particles, counted in
 //! [`Recolored::visited`]; moving neighbors costs their neighborhoods in turn. None of it depends
@@ -38,7 +38,7 @@ pub struct Recolored {
     pub displaced: usize,
     /// Links looked at, the work of this edit; a full coloring is not counted.
     pub visited: u64,
-    /// Was all colored anew?
+    /// Whether all vertices were recolored.
     pub full: bool,
     /// The number of colors now.
     pub colors: usize,
@@ -92,9 +92,9 @@ pub struct Recoloring {
 impl Recoloring {
     /// Colors the constraints of `incidence` with [`auto`] and gets ready for edits.
     ///
-    /// Edits may add up to `slack` colors before all is colored anew: 0 keeps the count as low as
-    /// full colorings do, `usize::MAX` never colors anew. Costs what [`auto`] does, plus O(sum over
-    /// particles of valence squared) once.
+    /// Edits may add up to `slack` colors before all vertices are recolored: 0 keeps the count as
+    /// low as full colorings do, `usize::MAX` never recolors all. Costs what [`auto`] does, plus
+    /// O(sum over particles of valence squared) once.
     #[must_use]
     pub fn new(incidence: &Incidence, slack: usize) -> Self {
         let rows = (0..).take(incidence.constraint_count());
@@ -182,7 +182,7 @@ impl Recoloring {
         self.links.bound()
     }
 
-    /// The most colors before all is colored anew.
+    /// The largest number of colors that an edit may leave without recoloring all vertices.
     #[must_use]
     pub fn limit(&self) -> usize {
         self.reference.max(self.bound()).saturating_add(self.slack)
@@ -239,7 +239,7 @@ impl Recoloring {
             }
         }
         let mut waiting = std::mem::take(&mut self.waiting);
-        // Who can keep the old color does, before anybody takes another one.
+        // Vertices that can keep their old color do so before any vertex takes another one.
         waiting.sort_unstable();
         waiting.retain(|&(v, old)| {
             report.visited += self.links.of(v).count() as u64;
@@ -279,7 +279,7 @@ impl Recoloring {
         Ok(report)
     }
 
-    /// Colors all anew with [`auto`], whose cost it has.
+    /// Recolors all vertices with [`auto`], at the cost of [`auto`].
     pub fn recolor(&mut self) {
         let incidence = self.links.incidence();
         self.coloring = auto(&incidence).coloring;
@@ -290,7 +290,7 @@ impl Recoloring {
 
     /// Counts the classes of a coloring that is all new, and notes its colors at the particles.
     fn count(&mut self) {
-        self.taken = self.taken_anew();
+        self.taken = self.recomputed_taken();
         self.sizes = vec![0; self.coloring.color_count()];
         for color in self.coloring.colors() {
             self.sizes[color.index()] += 1;
@@ -299,7 +299,7 @@ impl Recoloring {
     }
 
     /// The colors at each particle, from the links.
-    fn taken_anew(&self) -> Taken {
+    fn recomputed_taken(&self) -> Taken {
         let mut taken = Taken::default();
         taken.reserve_particles(self.links.particle_count());
         for (v, &color) in (0..).zip(self.coloring.colors()) {
@@ -319,7 +319,7 @@ impl Recoloring {
         for color in self.coloring.colors() {
             sizes[color.index()] += 1;
         }
-        let at_particles = self.taken.agrees_with(&self.taken_anew());
+        let at_particles = self.taken.agrees_with(&self.recomputed_taken());
         if sizes == self.sizes && at_particles && self.links.counts_agree(&incidence) {
             Ok(())
         } else {
@@ -349,8 +349,8 @@ impl Recoloring {
         Ok(())
     }
 
-    /// Adds pairs. Notes the vertices that came to new particles, each once, with the color that they had: they have none
-    /// now.
+    /// Adds pairs. Notes the vertices that came to new particles, each once, with the color that
+    /// they had: they have none now.
     fn link(&mut self, added: &[(u32, u32)]) {
         self.waiting.clear();
         for run in added.chunk_by(|a, b| a.0 == b.0) {
@@ -361,7 +361,8 @@ impl Recoloring {
                 self.reserve(v as usize + 1);
                 self.changed.extend((0..=v).skip(vertices));
             }
-            // Who was nowhere has no color to keep, and no links but those of this run, which come first at particles.
+            // A vertex without particles has no color to keep, and its links are all of this run: they come first at
+            // particles.
             let is_new = !self.links.has(v);
             for &(_, particle) in run {
                 let known = if is_new {
@@ -408,8 +409,8 @@ impl Recoloring {
     /// Gives `v` the first color below `accepted` whose holders around can all move to other colors
     /// below `accepted`.
     ///
-    /// The holders of one color are not neighbors of each other, so none is in another's way, and
-    /// `v`, having no color yet, is in nobody's.
+    /// The holders of one color are not neighbors of each other, so none blocks another. `v` has no
+    /// color yet, so it blocks none of them.
     fn displace(&mut self, v: u32, accepted: usize, report: &mut Recolored) -> bool {
         let mut around: Vec<(ColorId, u32)> = self
             .links

@@ -1,8 +1,8 @@
 //! Snapping of a stroke: which particles are put on the surface instead of being cut off beside it.
 //!
-//! Decided once a particle, when the first of its edges is met; see the head of [`super`]. A crossing within the tolerance
-//! is always snapped, and so is one that a repeated stroke would only take a chip off with. Cost: for a particle on a met
-//! edge the tets around it.
+//! Decided once a particle, when the first of its edges is met; see the head of [`super`]. A crossing within the
+//! tolerance is always snapped, and so is one that a repeated stroke would only take a chip off with. Cost: for a
+//! particle on a met edge the tets around it.
 
 use incise_mesh::ParticleId;
 

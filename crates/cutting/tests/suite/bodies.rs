@@ -236,7 +236,7 @@ pub(crate) fn volumes(body: &CuttableMesh) -> Vec<f64> {
     volumes
 }
 
-/// The same mesh with its particles renamed at random, and the new name of each particle.
+/// Renames the particles of a mesh at random; returns it with the new name of each particle.
 pub(crate) fn relabelled(mesh: &TetMesh, seed: u64) -> (TetMesh, Vec<usize>) {
     let mut order: Vec<usize> = (0..mesh.positions.len()).collect();
     order.sort_by(|&a, &b| noise(seed, a).total_cmp(&noise(seed, b)));

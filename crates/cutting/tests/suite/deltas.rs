@@ -1,5 +1,5 @@
-//! Deltas carry everything: they can be written, read and replayed; a cut that would be too large or too fine is refused
-//! or kept in bounds.
+//! Deltas carry everything: they can be written, read and replayed; a cut that would be too large or too fine is
+//! refused or kept in bounds.
 
 use std::collections::BTreeSet;
 
@@ -168,7 +168,7 @@ fn upload(copy: &mut (Vec<[u32; 3]>, Vec<SkinVertex>), skin: &Skin, change: &Ski
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(30))]
 
-    /// A skin that follows cuts and removals is the skin made anew, whatever was uploaded of it in parts.
+    /// A skin that follows cuts and removals equals a rebuilt one, whatever was uploaded of it in parts.
     #[test]
     fn a_skin_follows(kind in 0_usize..6, seed in any::<u32>()) {
         let mut cuttable = CuttableMesh::new(body(kind, seed.into())).unwrap();

@@ -51,8 +51,8 @@ fn z(from: f64, to: f64) -> [DVec3; 2] {
     [DVec3::Z * from, DVec3::Z * to]
 }
 
-/// Stopped half-way, and a new stroke goes on: from the same line, from the other side meeting exactly or overlapping a
-/// little, or beside it by a tenth of an edge.
+/// A stroke stops half-way, and a new one continues: from the same line, from the other side meeting exactly or
+/// overlapping a little, or beside it by a tenth of an edge.
 #[test]
 fn strokes_that_go_on() {
     let h = 0.2;
@@ -140,7 +140,7 @@ fn a_plane_in_parts() {
     }
 }
 
-/// The same stroke again and again changes nothing after the first time.
+/// Repeating a stroke changes nothing after the first time.
 #[test]
 fn the_same_again() {
     for snap in [0.0, 0.1, 0.2] {

@@ -89,7 +89,8 @@ proptest! {
             other.len() == expected.len() && other.iter().zip(&expected).all(|(a, b)| (a - b).abs() < slack)
         };
         prop_assert!(same(&cut(&mesh, |x| -field(x), snap), 1e-12));
-        // Ties of edge length go by the names: bent quads are halved along other diagonals, which matters in a tet alone.
+        // Ties of edge length go by the names: bent quads are halved along other diagonals, which matters in a tet
+        // alone.
         let (renamed, _) = relabelled(&mesh, seed);
         let slack = mesh.total_volume() * if kind == 0 { 1.0 } else { 0.02 };
         prop_assert!(same(&cut(&renamed, field, snap), slack));

@@ -1,4 +1,4 @@
-//! Pieces followed cut by cut against the count anew.
+//! Pieces followed cut by cut against a full count.
 
 use glam::DVec3;
 use incise_cutting::{
@@ -357,8 +357,8 @@ fn a_tracker_left_behind() {
     assert!(error.contains("pieces"), "{error}");
 }
 
-/// Opening a slit looks at tets near its front only; cutting a corner off looks at about what came off; halving looks at
-/// about everything; and where the sides hang together far away the search goes there.
+/// Opening a slit looks at tets near its front only; cutting a corner off looks at about what came off; halving looks
+/// at about everything; and where the sides hang together far away the search goes there.
 #[test]
 fn looks_follow_the_cut() {
     // A short blade opens a slit from above, two cells deep into 24.

@@ -125,7 +125,7 @@ fn a_cube_diced_into_a_thousand() {
     assert!((body.mesh().total_volume() - 1.0).abs() < 1e-12);
 }
 
-/// Planes through whole layers of particles, rounding included: nothing is split, everything comes apart.
+/// Planes through whole layers of particles, rounding included: nothing is split, everything separates.
 #[test]
 fn plane_through_particles() {
     for nudge in [0.0, 1e-17, -1e-13, 1e-13] {

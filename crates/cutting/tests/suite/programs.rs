@@ -1,8 +1,8 @@
 //! Programs: any bytes read as a body and a list of strokes, to be run with every invariant checked after each.
 //!
 //! The property test here runs random ones; the fuzz target (`fuzz/` at the top) lets a fuzzer search for bad ones.
-//! Coordinates are mostly eighths, so that strokes run exactly through particles, edges and faces of lattices, sometimes
-//! a rounding error off that, and now and then absurd.
+//! Coordinates are mostly eighths, so that strokes run exactly through particles, edges and faces of lattices,
+//! sometimes a rounding error off that, and now and then absurd.
 
 use glam::DVec3;
 use incise_cutting::{

@@ -54,7 +54,7 @@ proptest! {
     }
 }
 
-/// Two boxes that touch in an edge after the tets between them are gone come apart there.
+/// Two boxes that touch in an edge after the tets between them are gone separate there.
 #[test]
 fn what_hangs_by_an_edge_comes_apart() {
     let mesh = kuhn_box([2, 2, 1], DVec3::new(2.0, 2.0, 1.0));

@@ -276,8 +276,8 @@ fn a_tube() {
     }
 }
 
-/// The same stroke once more changes nothing, in as many frames or in fewer. Where it stops inside it splits nothing
-/// either, but may open a face at its front that stayed closed the first time.
+/// Repeating a stroke changes nothing, in as many frames or in fewer. Where it stops inside it splits nothing either,
+/// but may open a face at its front that stayed closed the first time.
 #[test]
 fn the_same_stroke_again() {
     for snap in [0.0, 0.1] {

@@ -74,7 +74,7 @@ fn literal_criterion_fails_at_snapped_particles() {
     assert_eq!(pieces(&mesh, &plane, 0.1, Separation::SharedOriginal), 1);
 }
 
-/// A tet with all four particles on the surface shares nothing with anybody and comes off as a chip.
+/// A tet with all four particles on the surface shares nothing with other tets and comes off as a chip.
 #[test]
 fn a_tet_on_the_surface_floats_off() {
     // A thin tet between four others: its particles lie within 0.02 of the plane x = 0.
@@ -105,7 +105,7 @@ fn a_tet_on_the_surface_floats_off() {
 }
 
 /// Two tets on the positive side of a bent sheet of snapped particles: no edge between them is crossed, so nothing may
-/// come apart there. The particle criterion tears them.
+/// separate there. The particle criterion tears them.
 #[test]
 fn a_grazed_sheet_holds() {
     let mesh = oriented(

@@ -168,7 +168,7 @@ fn a_slit() {
     }
 }
 
-/// Through whole layers of particles, through edges and faces of a lattice: nothing is flat, everything comes apart.
+/// Through whole layers of particles, through edges and faces of a lattice: nothing is flat, everything separates.
 #[test]
 fn exactly_through_particles() {
     let mesh = kuhn_box([4; 3], DVec3::ONE);
@@ -386,8 +386,8 @@ fn octahedron(center: DVec3, radius: f64) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     (points, triangles)
 }
 
-/// Closed surfaces whose faces, edges and corners run exactly along faces, through edges and particles of a lattice: the
-/// core falls out with its exact volume, and the same again changes nothing.
+/// Closed surfaces whose faces, edges and corners run exactly along faces, through edges and particles of a lattice:
+/// the core falls out with its exact volume, and the same again changes nothing.
 #[test]
 fn closed_surfaces_on_a_lattice() {
     let half = DVec3::splat(0.5);
@@ -491,8 +491,8 @@ fn coarse_balls() {
         let found = volumes(&body);
         let core = found[found.len() - 2];
         let exact = 2.5362 * radius.powi(3);
-        // The mesh cuts corners along 30 folds of 1.05 radii by at most what an edge of half a cell at 41 degrees spans,
-        // and snaps to both sides: a fifth of the whole at these sizes.
+        // The mesh cuts corners along 30 folds of 1.05 radii by at most what an edge of half a cell at 41 degrees
+        // spans, and snaps to both sides: a fifth of the whole at these sizes.
         assert!(
             (core / exact - 1.0).abs() < 0.2,
             "cells {n}, seed {seed}, snap {snap}: {found:?} for {exact}"

@@ -109,7 +109,7 @@ proptest! {
         }
     }
 
-    /// A body that swings and bends meanwhile comes apart all the same, with no thread left between frames.
+    /// A body that swings and bends meanwhile separates all the same, with no thread left between frames.
     #[test]
     fn a_moving_body(
         kind in prop::sample::select(vec![1_usize, 2, 4]), seed in any::<u64>(), frames in 5_usize..60,
@@ -128,7 +128,7 @@ proptest! {
         };
         let mut cut = CuttableMesh::new(mesh.clone()).unwrap();
         sweep(&mut cut, &blade, |t| from.lerp(to, t), motion, frames, snap);
-        // Thick convex bodies come apart in two; chips at the rim may come off besides where the cut is curved.
+        // Thick convex bodies separate into two pieces; chips at the rim may come off besides where the cut is curved.
         let pieces = cut.mesh().pieces();
         let mut volumes = pieces.volumes(cut.mesh());
         volumes.sort_by(f64::total_cmp);
@@ -138,7 +138,7 @@ proptest! {
     }
 }
 
-/// The blade stops half-way: one piece. It goes on: two.
+/// The blade stops half-way: one piece. It continues: two.
 #[test]
 fn half_way_and_on() {
     let mut body = CuttableMesh::new(jittered_box(5, 0.2, 3)).unwrap();
@@ -491,8 +491,8 @@ fn bad_positions_are_refused() {
     }
 }
 
-/// Tets are taken away, also beside the front, and a stroke that follows goes on; one that does not, or that an undo has
-/// overtaken, is refused.
+/// Tets are taken away, also beside the front, and a stroke that follows continues; one that does not, or that an undo
+/// has overtaken, is refused.
 #[test]
 fn removals_and_undo_on_the_way() {
     for snap in [0.0, 0.2] {

@@ -67,7 +67,7 @@ impl Case {
         }
     }
 
-    /// The same with other numbers for all particles and tets.
+    /// Gives all particles and tets other numbers.
     fn renamed(&self, seed: u64) -> Self {
         let shuffled = |count: usize, seed: u64| {
             let mut order: Vec<usize> = (0..count).collect();
@@ -100,7 +100,7 @@ impl Case {
         }
     }
 
-    /// The same in a mirror.
+    /// Mirrors mesh, positions and plane in x.
     fn mirrored(&self) -> Self {
         let flip = |x: &DVec3| *x * dvec3(-1.0, 1.0, 1.0);
         Self {
@@ -182,9 +182,10 @@ proptest! {
         same(&case.outcome(&options(snap)), &outcome)?;
     }
 
-    /// Positions as single precision leaves them, and the tolerance for them: a sound mesh, and with snapping, which keeps
-    /// new edges longer than the rounding, the same plane again changes nothing. Where a particle lies closer to the plane
-    /// than the rounding of its new neighbors, the two may be found on different sides of it: that case is left out.
+    /// Positions as single precision leaves them, and the tolerance for them: a sound mesh, and with snapping, which
+    /// keeps new edges longer than the rounding, the same plane again changes nothing. Where a particle lies closer to
+    /// the plane than the rounding of its new neighbors, the two may be found on different sides of it: that case is
+    /// left out.
     #[test]
     fn single_precision(kind in 0_usize..6, seed in any::<u64>(), snap in snaps(), bent in any::<bool>()) {
         let mut case = Case::new(kind, seed, bent);

@@ -79,7 +79,7 @@ pub fn ecl_gc(
         algorithm: "ecl_gc",
         vertices,
         max_rounds: usize::MAX,
-        // Rounds and colors go on.
+        // The counts of rounds and colors continue.
         clear: vec![],
         first: vec![kernels.bind(gpu, &ECL_GC_SMALL_START, &start)?],
         round: vec![kernels.bind(gpu, &ECL_GC_SMALL, &pass)?],

@@ -1,7 +1,7 @@
 //! [`DeviceGraph`]: a graph in device memory.
 //!
 //! The rows as they are on the host, offsets and neighbors. Degrees, priorities and everything else that a coloring
-//! needs is computed on the device, by each coloring anew. Cost: one upload of 4 bytes per vertex and 8 per edge.
+//! needs is computed on the device, again for each coloring. Cost: one upload of 4 bytes per vertex and 8 per edge.
 
 use incise_graph::ConstraintGraph;
 

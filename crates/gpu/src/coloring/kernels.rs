@@ -60,7 +60,7 @@ impl ColoringKernels {
         Ok(BoundKernel { kernel, group })
     }
 
-    /// A work array with room for so many numbers, which are anything.
+    /// The work array `what` for storage, with room for at least `len` numbers of undefined values.
     pub(super) fn array(
         &mut self,
         gpu: &GpuContext,
@@ -70,7 +70,7 @@ impl ColoringKernels {
         self.array_for(gpu, what, len, BufferUsages::STORAGE)
     }
 
-    /// The same for other uses.
+    /// The work array `what` for `usage`, with room for at least `len` numbers of undefined values.
     pub(super) fn array_for(
         &mut self,
         gpu: &GpuContext,

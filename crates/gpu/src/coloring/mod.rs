@@ -5,7 +5,7 @@
 //! which never lists an edge. Each coloring equals that of its CPU twin bit for bit, on any device. There is no limit
 //! to colors or degrees.
 //!
-//! **Rounds.** A GPU promises nothing about who runs when, so nobody waits in a kernel. A round visits the vertices on
+//! **Rounds.** A GPU guarantees no order of threads, so no thread waits in a kernel. A round visits the vertices on
 //! a worklist, and those that cannot be colored yet go to the next one. A kernel of one thread writes the size of the
 //! next dispatch, so 32 rounds are handed over at once, and then the host reads a few words to learn whether vertices
 //! are left. Rounds beyond the last are dispatches of nothing. Every round colors at least one vertex; if not,
@@ -13,7 +13,8 @@
 //!
 //! **Rounds may differ, colors may not.** Where a vertex decides while its neighbors do, whether it sees them in this
 //! round or in the next depends on the device; why the colors do not is told in the shaders. [`vivace`] and [`wlc`]
-//! depend on who sees whom, so there a round has several dispatches, and rounds are those of the CPU, too.
+//! depend on what a vertex sees of its neighbors, so there a round has several dispatches, and rounds are those of the
+//! CPU, too.
 //!
 //! **Traffic.** Nothing is uploaded, but 16 bytes with the options of [`vivace`] and [`wlc`]; what is read back is 24 bytes
 //! per 32 rounds.

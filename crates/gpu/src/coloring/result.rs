@@ -41,7 +41,7 @@ impl DeviceColoring {
         self.rounds
     }
 
-    /// The colors, a `u32` per vertex, for kernels that go on from here. May be larger than that.
+    /// The buffer of colors, a `u32` per vertex, for later kernels. May be larger than that.
     #[must_use]
     pub fn buffer(&self) -> &wgpu::Buffer {
         self.colors.buffer()

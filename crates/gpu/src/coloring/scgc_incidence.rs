@@ -101,7 +101,7 @@ pub fn scgc_incidence(
             round: vec![kernels.bind(gpu, &SCGC_INCIDENCE, &pass)?],
         };
         let next = window.run(gpu, kernels, &incidence.parts)?;
-        // Every window colors somebody.
+        // Every window colors a constraint.
         if next.rest >= state.rest {
             return Err(GpuError::Stalled {
                 algorithm: "scgc_incidence",

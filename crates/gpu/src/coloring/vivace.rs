@@ -1,4 +1,4 @@
-//! Vivace: random colors, kept by who is alone with them (Fratarcangeli, Tibaldo and Pellacini 2016).
+//! Vivace: random colors, kept where no neighbor has the same (Fratarcangeli, Tibaldo and Pellacini 2016).
 //!
 //! Twin of [`incise_coloring::vivace`]: the random numbers are the same hash of seed, vertex and round. Cost: three
 //! dispatches a round, each over the edges of the uncolored vertices.
@@ -14,7 +14,7 @@ use super::{DeviceColoring, DeviceGraph};
 use crate::array::Array;
 use crate::{GpuContext, GpuError};
 
-/// The same struct in the shaders.
+/// Options of a coloring, laid out like `VivaceSettings` in the shaders.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(crate) struct VivaceSettings {

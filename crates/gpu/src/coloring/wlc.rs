@@ -20,7 +20,7 @@ use crate::{GpuContext, GpuError};
 /// Steps per submit: at least, and at most however many chunks a worklist has.
 const STEPS: [usize; 2] = [32, 2048];
 
-/// The same struct in the shaders, up to the list.
+/// Work state of a coloring, laid out like `WlcWork` in the shaders up to the list.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(crate) struct WlcWork {
@@ -92,7 +92,7 @@ pub fn wlc(
     let buffers = [parts, &work, &arguments, &lost, &picked, colors];
     let gather = kernels.bind(gpu, &WLC_GATHER, &buffers)?;
 
-    // Each round halves the list or the chunk, and chunks of one lose nobody.
+    // Each round halves the list or the chunk, and chunks of one lose no vertex.
     let max_rounds = vertices.ilog2() + chunk.ilog2() + 3;
     let mut remaining = vertices.div_ceil(chunk);
     let mut before = None;

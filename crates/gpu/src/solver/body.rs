@@ -95,7 +95,7 @@ impl Body {
         }
         let various = !solver.is_uniform();
         let places = self.layout.place_count();
-        if patch.anew {
+        if patch.is_rebuilt {
             self.corners = Array::zeros(gpu, "corners of tets", places)?;
         }
         self.corners.resize(gpu, places)?;

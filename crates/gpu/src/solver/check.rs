@@ -1,6 +1,6 @@
 //! [`GpuSolver::check`]: whether the device has what schedule, tets and masses say.
 //!
-//! Everything that is derived is read back and compared with what the host computes anew, tet by tet. Shares nothing with
+//! Everything that is derived is read back and compared with what the host recomputes, tet by tet. Shares nothing with
 //! the code that sends patches but the numbers of a tet. Cost: reads all arrays, O(tets).
 
 use incise_graph::Schedule;
@@ -90,7 +90,7 @@ impl GpuSolver {
         Ok(())
     }
 
-    /// Goes through the dispatches as the device does and looks who is solved when.
+    /// Goes through the dispatches as the device does and checks when each tet is solved.
     fn check_order(&self, schedule: &Schedule, copy: &Copy) -> Result<(), GpuError> {
         // Colors without clusters have no dispatch.
         let colors = (0..schedule.color_count()).filter(|&c| !schedule.clusters(c).is_empty());

@@ -209,7 +209,7 @@ impl Frame {
         }
     }
 
-    /// What times stages, if somebody asked.
+    /// What times stages, if that was requested.
     pub(crate) fn clock(&mut self) -> &mut Option<Clock> {
         &mut self.clock
     }

@@ -86,7 +86,7 @@ impl Handles {
         solver: &Solver<f32>,
         changes: &Changes,
     ) -> Result<(), GpuError> {
-        // A particle that was fixed or let go may hang on a handle.
+        // A particle that was fixed or freed may be attached to a handle.
         if !changes.attachments && changes.particles.is_empty() {
             return Ok(());
         }

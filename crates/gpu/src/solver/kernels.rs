@@ -573,7 +573,7 @@ impl Variant {
             Flag::Jacobi => ("JACOBI", self.jacobi),
             Flag::Uniform => ("UNIFORM", !self.various),
             Flag::Tiled => ("TILED", self.tile > 0),
-            // A size of 0 is none that a compiler may divide by, even where nobody does.
+            // Never 0: a compiler must not divide by that, even in code that does not run.
             Flag::TileTets => return ("TILE_TETS", f64::from(self.tile.max(1))),
         };
         (name, f64::from(u8::from(on)))

@@ -21,7 +21,7 @@ pub(crate) const THREADS: usize = 64;
 /// Nowhere.
 const NONE: u32 = u32::MAX;
 
-/// Who solves a cluster.
+/// The unit of the device that solves a cluster.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ClusterMapping {
     /// A thread, tet after tet (paper section 4.1).
@@ -47,7 +47,7 @@ impl ClusterMapping {
     }
 }
 
-/// Who is where.
+/// The places of clusters and tets on the device.
 #[derive(Debug)]
 pub(crate) struct Layout {
     pub(crate) form: ClusterMapping,
@@ -66,7 +66,7 @@ pub(crate) struct Layout {
 #[derive(Debug, Default)]
 pub(crate) struct Patch {
     /// Whether nothing on the device is of use any more.
-    pub(crate) anew: bool,
+    pub(crate) is_rebuilt: bool,
     /// No two of one place.
     pub(crate) tets: Vec<TetPatch>,
     /// Tiles by number.
@@ -161,7 +161,7 @@ impl Layout {
         }
         let seats = match moved {
             Moved::All => {
-                patch.anew = true;
+                patch.is_rebuilt = true;
                 let seats: Vec<u32> = (0..index(self.seats.seat_count())).collect();
                 let largest = self.largest(&seats, schedule)?;
                 self.depth = match self.form {
@@ -174,12 +174,12 @@ impl Layout {
             }
             Moved::Seats(seats) => self.with_changed(seats, changes, solver, &mut patch),
         };
-        patch.regrouped = patch.anew || !seats.is_empty();
+        patch.regrouped = patch.is_rebuilt || !seats.is_empty();
         self.filled.resize(self.seats.seat_count(), 0);
         self.tets.resize(self.place_count(), NONE);
         self.places
             .resize(solver.tet_count().max(self.places.len()), NONE);
-        // All go before anybody comes: a tet may have changed its seat.
+        // All seats are emptied before any is filled: a tet may have changed its seat.
         for &seat in &seats {
             self.empty(seat);
         }
@@ -205,7 +205,7 @@ impl Layout {
         Ok(tets)
     }
 
-    /// Patches changed tets in their places; a tile with one is made anew.
+    /// Patches changed tets in their places; a tile with one is rebuilt.
     fn with_changed(
         &mut self,
         mut seats: Vec<u32>,
@@ -303,7 +303,7 @@ fn filled_in(place: usize, tet: u32, solver: &Solver<f32>) -> TetPatch {
     }
 }
 
-/// What rounding of ratio and γ left of the slope of the elastic energy at rest, for those who measure it.
+/// What rounding of ratio and γ left of the slope of the elastic energy at rest, for measurements of it.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "the device computes in single precision"

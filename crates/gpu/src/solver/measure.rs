@@ -208,9 +208,10 @@ impl GpuSolver {
     /// [`Solver::max_speed`] of the same state, bodies of up to 20,000 tets on lavapipe differ by at most 1e-7 of kinetic
     /// energy and speed, 3e-8 of the volume, 1e-7 of the least ratio, 5e-8 of mass times gravity times size for gravity, and
     /// 3e-6 of the elastic energy at a strain of 4e-4, 1e-6 at a hundredth (a strain has an error of about 2e-8 on average;
-    /// in slivers more). Whoever needs more asks the solver of [`GpuSolver::host`]. A tet whose volume is within rounding of
-    /// zero may count as inverted here and not there. The host's numbers, with the state fetched, are given where single
-    /// precision overflows and where the schedule does not solve all tets; nothing is asked where the host has the state.
+    /// in slivers more). For more precision, ask the solver of [`GpuSolver::host`]. A tet whose volume is within
+    /// rounding of zero may count as inverted here and not there. The host's numbers, with the state fetched, are given
+    /// where single precision overflows and where the schedule does not solve all tets; nothing is asked where the host
+    /// has the state.
     ///
     /// # Example
     /// A particle of 2 kg falls for a tenth of a second.

@@ -3,8 +3,8 @@
 //! A [`Solver`] on the host stays where tets, masses, materials and what holds particles are edited; the device has a
 //! copy of all of it and the state. A step is recorded as one pass and handed over in one submit: predict, put what is
 //! held to its handles, solve color by color, pull at attachments, solve distances and volumes, collide, update and damp
-//! velocities, substep by substep. What a scene does not have takes no memory and no dispatch. Nothing is read back:
-//! whoever wants to know something asks ([`GpuSolver::host`], [`GpuSolver::measure`]), and that waits for the device.
+//! velocities, substep by substep. What a scene does not have takes no memory and no dispatch. A step reads nothing
+//! back: results come from calls that wait for the device ([`GpuSolver::host`], [`GpuSolver::measure`]).
 //!
 //! Twin: `Solver::step` of incise-xpbd, with the same schedule in the form [`ClusterMapping::Threads`]. Positions agree up to the
 //! rounding of sums, which compilers of shaders may take in another order or fuse.
@@ -98,15 +98,15 @@ const FRAMES_IN_FLIGHT: usize = 2;
 pub struct GpuSolver {
     gpu: Arc<GpuContext>,
     host: Solver<f32>,
-    /// Whether the device has gone on since the host saw its state.
+    /// Whether the device has advanced since the host last had its state.
     ahead: bool,
     kernels: Kernels,
     body: Body,
     frame: Frame,
     repaired: Array<u32>,
-    /// Particles that the device put back, as far as the host knows.
+    /// Particles that the device put back, as last reported to the host.
     known_repaired: u32,
-    /// If somebody has measured.
+    /// `Some` from the first measurement on.
     measuring: Option<Measuring>,
     /// The last frames, oldest first.
     in_flight: VecDeque<SubmissionIndex>,
@@ -143,7 +143,7 @@ impl GpuSolver {
         &self.gpu
     }
 
-    /// Who solves a cluster.
+    /// The unit of the device that solves a cluster.
     #[must_use]
     pub fn form(&self) -> ClusterMapping {
         self.body.layout.form
@@ -152,8 +152,8 @@ impl GpuSolver {
     /// Advances by one frame of `settings.time_step`; returns when the commands are with the driver, not when they are
     /// done. Waits first until the device is done with the frame before the last one, so that frames do not pile up.
     ///
-    /// A schedule that was [updated](Schedule::update) since the last step is followed at the cost of what changed, as
-    /// are edits of the solver; another one is laid out anew.
+    /// A schedule that was [updated](Schedule::update) since the last step is followed at the cost of what changed, and
+    /// so are edits of the solver. Another schedule is laid out from scratch.
     ///
     /// # Errors
     /// If the settings do not pass [`StepSettings::check`]; if they ask for Jacobi or Chebyshev iterations in
@@ -168,13 +168,14 @@ impl GpuSolver {
         self.advance(schedule, settings, false)
     }
 
-    /// The same, keeping what [`Solver::residuals`] needs of the last substep; [`GpuSolver::host`] then has it.
+    /// Advances by one frame like [`GpuSolver::step`] and keeps what [`Solver::residuals`] needs of the last substep;
+    /// [`GpuSolver::host`] then has it.
     ///
     /// # Errors
-    /// As [`GpuSolver::step`].
+    /// Those of [`GpuSolver::step`].
     ///
     /// # Panics
-    /// As [`GpuSolver::step`].
+    /// If the schedule names a tet that does not exist.
     pub fn step_keeping_residuals(
         &mut self,
         schedule: &Schedule,
@@ -191,7 +192,7 @@ impl GpuSolver {
     ) -> Result<(), GpuError> {
         let _span = tracing::debug_span!("gpu::step").entered();
         settings.check()?;
-        // Who is faster than the device waits here, and not at the end of memory.
+        // A caller that is faster than the device waits here, before memory runs out.
         while self.in_flight.len() >= FRAMES_IN_FLIGHT {
             let oldest = self.in_flight.pop_front();
             oldest.map_or(Ok(()), |oldest| self.gpu.wait_for(oldest))?;
@@ -220,11 +221,11 @@ impl GpuSolver {
         Ok(())
     }
 
-    /// Sends what edits and the schedule have changed, as a step does first. Whoever wants to know what a cut costs calls
-    /// this before the step.
+    /// Sends what edits and the schedule have changed, as a step does first. To measure what a cut costs, call this
+    /// before the step.
     ///
     /// # Errors
-    /// As [`GpuSolver::step`].
+    /// If a cluster is larger than the form allows; if the device is lost or out of memory.
     ///
     /// # Panics
     /// If the schedule names a tet that does not exist.
@@ -251,7 +252,7 @@ impl GpuSolver {
         followed
     }
 
-    /// The solver with the state of the device, which is waited for if it has gone on.
+    /// The solver with the state of the device, which is waited for if it has advanced.
     ///
     /// # Errors
     /// If the device is lost.
@@ -260,7 +261,7 @@ impl GpuSolver {
         Ok(&self.host)
     }
 
-    /// The same to edit; the next step sends what was changed.
+    /// The solver with the state of the device, to edit; the next step sends what was changed.
     ///
     /// # Errors
     /// If the device is lost.
@@ -270,7 +271,7 @@ impl GpuSolver {
     }
 
     /// Puts another solver in the place of the host's; the device takes over all of it, with its state, in the next step.
-    /// Kernels and memory stay. The state of the device is lost: who wants it, or the count of repairs up to now, calls
+    /// Kernels and memory stay. The state of the device is lost: to keep it, or the count of repairs up to now, call
     /// [`GpuSolver::host`] before. O(particles + tets) in the next step.
     pub fn replace(&mut self, mut solver: Solver<f32>) {
         solver.track_changes();

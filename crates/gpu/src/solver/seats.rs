@@ -10,10 +10,10 @@ use incise_graph::{ClusterId, Rows, Schedule};
 /// No seat, no group, no color.
 const NONE: u32 = u32::MAX;
 
-/// Groups of a color that may be empty beside half of all seats before everything is seated anew.
+/// Groups of a color that may be empty beside half of all seats before all clusters are seated again.
 const SPARE: usize = 2;
 
-/// Who sits where.
+/// Which cluster is in which seat.
 #[derive(Debug)]
 pub(crate) struct Seats {
     /// Seats of a group, at most 64.
@@ -147,7 +147,7 @@ impl Seats {
             let color = schedule.color(cluster).map(|color| color.index());
             color.filter(|_| !schedule.constraints(cluster).is_empty())
         };
-        // All go before anybody comes, so that emptied groups can be used again.
+        // All clusters leave before any is seated, so that emptied groups can be used again.
         for &cluster in &changed {
             let Some(&seat) = self
                 .seats
@@ -285,7 +285,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
 
-        /// Whatever happens to a schedule, every cluster has a seat in a group of its color, and nobody else moves.
+        /// Whatever happens to a schedule, every cluster has a seat in a group of its color, and no other one moves.
         #[test]
         fn seats_follow_a_schedule(
             width in prop::sample::select(vec![1usize, 2, 3, 64]),

@@ -27,7 +27,7 @@ impl Turns {
         self.array.buffer()
     }
 
-    /// Sends the turns of a frame unless they are there; nothing is kept where nobody `asks`.
+    /// Sends the turns of a frame unless they are there; keeps none unless the frame `asks` for them.
     pub(crate) fn follow(
         this: &mut Option<Self>,
         gpu: &GpuContext,
@@ -77,7 +77,7 @@ impl Turns {
 /// Where the turn of an iteration is, in bytes.
 pub(crate) fn offset(settings: &StepSettings, substep: u32, iteration: u32) -> u32 {
     let number = u64::from(substep) * u64::from(settings.iterations) + u64::from(iteration);
-    // More than a buffer holds are refused when they are sent; without turns nobody looks.
+    // More than a buffer holds are refused when they are sent; without turns the offset is not used.
     u32::try_from(number * u64::from(STRIDE)).unwrap_or(u32::MAX)
 }
 

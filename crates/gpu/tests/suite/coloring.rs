@@ -55,7 +55,7 @@ fn read(name: &str, gpu: &GpuContext, coloring: &DeviceColoring) -> Coloring {
     read
 }
 
-/// The same, proved proper.
+/// Reads the device's coloring and proves it proper.
 fn checked(
     name: &str,
     gpu: &GpuContext,
@@ -69,7 +69,7 @@ fn checked(
     read
 }
 
-/// The algorithms whose colors do not depend on who sees whom.
+/// Checks the algorithms whose colors do not depend on what vertices see of each other in a round.
 fn check_largest_first(gpu: &GpuContext, kernels: &mut ColoringKernels, graph: &ConstraintGraph) {
     let expected = [
         incise_coloring::jones_plassmann(graph).coloring,
@@ -166,7 +166,7 @@ fn check_both(gpu: &GpuContext, incidence: &Incidence) {
     check(gpu, &ConstraintGraph::from_incidence(incidence));
 }
 
-/// So many constraints on one particle: everybody adjacent to everybody.
+/// So many constraints on one particle: each one adjacent to all others.
 fn fan(n: u32) -> Incidence {
     Incidence::from_constraints(1, (0..n).map(|_| [0u32])).unwrap()
 }
@@ -231,7 +231,7 @@ fn sizes_around_workgroups() {
         check_both(gpu, &springs(n));
     }
     for n in [0, 1, 65] {
-        // Nobody is in anybody's way: no particles, and no edges.
+        // No conflicts: no particles, and no edges.
         let lonely = Incidence::from_constraints(0, (0..n).map(|_| [0u32; 0])).unwrap();
         check_both(gpu, &lonely);
     }

@@ -50,7 +50,7 @@ fn without_drivers_there_is_an_error_and_no_panic() {
         backends: Some(wgpu::Backends::empty()),
         ..GpuOptions::default()
     };
-    let error = GpuContext::new(&options).expect_err("nobody was asked");
+    let error = GpuContext::new(&options).expect_err("no device was asked for");
     assert!(matches!(error, GpuError::NoAdapter { .. }), "{error}");
 }
 

@@ -22,7 +22,7 @@ enum Edit {
     Attach(Index, bool, bool),
     Detach(Index),
     Fix(Index, bool),
-    /// A tet lets go of its neighbors at one corner.
+    /// A tet is separated from its neighbors at one corner.
     Tear(Index, usize),
     /// A tet grows or shrinks.
     Resize(Index, i8),

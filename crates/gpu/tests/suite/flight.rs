@@ -1,4 +1,4 @@
-//! Frames that nobody waits for, and what is read back at all.
+//! Frames that are not waited for, and what is read back at all.
 
 use std::sync::Arc;
 
@@ -33,7 +33,7 @@ fn frames_that_nobody_reads() {
     }
 }
 
-/// Who asks a device that is gone does not wait for ever, and then gets an error.
+/// A call on a lost device does not wait for ever, and then returns an error.
 #[test]
 fn a_lost_device_ends_the_waiting() {
     if gpu("a_lost_device_ends_the_waiting").is_none() {

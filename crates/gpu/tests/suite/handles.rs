@@ -103,7 +103,7 @@ fn hanging_particles_keep_multipliers_over_iterations() {
     );
 }
 
-/// A particle that a handle holds is fixed and let go again, which is no change of what is attached.
+/// A particle that a handle holds is fixed and freed again, which does not change what is attached.
 #[test]
 fn held_particles_can_be_fixed_and_let_go() {
     let Some(gpu) = gpu("held_particles_can_be_fixed_and_let_go") else {
@@ -157,7 +157,7 @@ fn places_far_from_the_middle_of_a_handle_are_exact() {
     assert!(twins.apart() < 1e-5);
 }
 
-/// Handles at rest are sent once, and who hangs on nothing pays nothing.
+/// Handles at rest are sent once, and without attachments there are no dispatches for them.
 #[test]
 fn handles_at_rest_are_sent_once() {
     let Some(gpu) = gpu("handles_at_rest_are_sent_once") else {

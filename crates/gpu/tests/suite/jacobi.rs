@@ -118,7 +118,7 @@ fn chebyshev_leaps_between_handles_and_colliders() {
     });
 }
 
-/// The same device goes from one method to another.
+/// One device switches from method to method.
 #[test]
 fn methods_take_turns() {
     let Some(gpu) = gpu("methods_take_turns") else {

@@ -1,4 +1,4 @@
-//! Another solver in the place of the host's: the device goes on with it as one that never knew the first.
+//! Another solver in the place of the host's: results equal those of a device that never had the first.
 
 use glam::{DVec3, dvec3};
 use incise_gpu::GpuSolver;

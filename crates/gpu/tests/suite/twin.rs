@@ -61,7 +61,7 @@ impl Twins {
         self.host.step(&self.order, settings).unwrap();
     }
 
-    /// The same edit of both.
+    /// Applies one edit to both.
     pub(crate) fn edit(&mut self, edit: impl Fn(&mut Solver<f32>)) {
         edit(self.device.edit().unwrap());
         edit(&mut self.host);
@@ -75,7 +75,7 @@ impl Twins {
     }
 }
 
-/// Lets go of all particles.
+/// Frees all particles.
 pub(crate) fn free(solver: &mut Solver<f32>) {
     (0..solver.particle_count()).for_each(|p| solver.set_fixed(p, false));
 }

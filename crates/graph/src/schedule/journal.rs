@@ -1,8 +1,8 @@
-//! [`Journal`]: which clusters changed when, for those who follow a schedule.
+//! [`Journal`]: which clusters changed when, for structures that follow a schedule.
 //!
 //! Each change gets a number that no other schedule has, so a follower that remembers the number
 //! it has seen last can tell whether it follows this schedule, and finds what changed since. As many
-//! changes are kept as there are clusters: a follower that is further behind had better start anew.
+//! changes are kept as there are clusters: a follower that is further behind has to be rebuilt.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 

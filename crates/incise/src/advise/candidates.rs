@@ -16,7 +16,7 @@ const ACCURACIES: [f64; 4] = [0.2, 0.1, 0.05, 0.02];
 /// The substeps that `auto` wants for a scene, without its cap: the most of all its bodies.
 ///
 /// # Errors
-/// As [`Simulation::new`].
+/// Returns the errors of [`Simulation::new`].
 pub fn accurate_substeps(scene: &Scene) -> Result<u32, Error> {
     let solver = SolverSpec {
         substeps: Substeps::Auto,

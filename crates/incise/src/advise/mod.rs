@@ -88,9 +88,9 @@ pub struct Against {
 /// The answer.
 #[derive(Clone, Debug, Serialize)]
 pub struct Advice {
-    /// As asked, in ms.
+    /// Time budget of a frame in ms, from [`Question::budget_ms`].
     pub budget_ms: f64,
-    /// As asked.
+    /// Number of measured frames, from [`Question::frames`].
     pub frames: u32,
     /// Tets of the scene before all cuts.
     pub tets: usize,

@@ -38,7 +38,8 @@ pub struct Deviation {
     /// Of the positions, the largest of all frames: the root mean square distance of the particles, as a part of the
     /// size of what moves.
     pub largest: f64,
-    /// The same in the last frame.
+    /// Of the positions, in the last frame: the root mean square distance of the particles, as a part of the size of
+    /// what moves.
     pub end: f64,
     /// Of the volume, the largest of all frames, as a part of that at rest.
     pub volume: f64,

@@ -1,9 +1,9 @@
-//! [`Newton`]: a scene by implicit Euler and Newton's method, as far as it has only what the reference knows.
+//! [`Newton`]: a scene by implicit Euler and Newton's method, if it has only what the reference knows.
 //!
 //! The reference of `incise-reference` knows tets, fixed particles and gravity. A rigid handle is a fixed particle that
 //! is moved, along the same way within a frame as in the solver. Strokes of frame 0 act before anything has moved, so
 //! the body is given to the reference as they leave it. A link of no length and no compliance makes two particles one.
-//! Everything else (obstacles, damping, springs, later strokes) it does not know, and says so.
+//! Everything else (obstacles, damping, springs, later strokes) is refused with a message.
 //!
 //! Source: `incise-reference`. Cost: some sparse factorizations a step.
 

@@ -49,8 +49,8 @@ impl Reference {
     /// By Newton's method with `steps`, twice and four times as many steps a frame.
     ///
     /// # Errors
-    /// [`Error::Advise`] if the scene has something that the reference does not know or a step cannot be solved; as
-    /// [`crate::Simulation::new`].
+    /// Returns [`Error::Advise`] if the scene has something that the reference does not know or a step cannot be
+    /// solved, and the errors of [`crate::Simulation::new`].
     pub fn newton(scene: &Scene, frames: u32, steps: u32) -> Result<Self, Error> {
         let newton = newton(scene)?;
         let steps = [1, 2, 4].map(|n| n * steps.max(1));
@@ -72,7 +72,7 @@ impl Reference {
     /// By the solver itself with `substeps`, twice and four times as many substeps a frame, all bodies with the same.
     ///
     /// # Errors
-    /// As [`Motion::of`].
+    /// Returns the errors of [`Motion::of`].
     pub fn xpbd(scene: &Scene, frames: u32, substeps: u32) -> Result<Self, Error> {
         let steps = [1, 2, 4].map(|n| n * substeps.max(1));
         let run = |n| {
@@ -123,7 +123,7 @@ impl Reference {
 /// The motion of a scene by implicit Euler and Newton's method with `steps` steps a frame.
 ///
 /// # Errors
-/// As [`Reference::newton`].
+/// Returns the errors of [`Reference::newton`].
 pub fn newton_motion(scene: &Scene, frames: u32, steps: u32) -> Result<Motion, Error> {
     run(&newton(scene)?, frames, steps)
 }

@@ -52,15 +52,16 @@ pub struct SolverSpec {
     pub integrator: Integrator,
     /// How constraints are put together: `none` or `serial:K`.
     pub clustering: String,
-    /// Whether clusters that a cut leaves small are merged with neighbors. It makes a cut a little dearer, and all frames
-    /// after many cuts cheaper; without it clusters shrink and colors grow with every cut, as in the paper.
+    /// Whether clusters that a cut leaves small are merged with neighbors. This makes a cut a little more expensive
+    /// and all frames after many cuts cheaper; without it clusters shrink and colors grow with every cut, as in the
+    /// paper.
     #[serde(skip_serializing_if = "is_true")]
     pub merge_clusters: bool,
-    /// When clusters and colors that many cuts have worn are made anew, in the background; absent: never.
+    /// When clusters and colors that many cuts have worn are rebuilt, in the background; absent: never.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub recluster: Option<ReclusterSpec>,
     /// How clusters are colored, by the name of an [`Algorithm`](incise_coloring::Algorithm). Clusters that cuts make are
-    /// colored one by one, until they need more colors than they should; then all are colored anew, with `auto`.
+    /// colored one by one, until they need more colors than they should; then all are recolored, with `auto`.
     pub coloring: String,
     /// Width of the numbers.
     pub precision: Precision,
@@ -150,7 +151,7 @@ impl Backend {
     }
 }
 
-/// When clusters and colors are made anew in the background, and how long that may take.
+/// When clusters and colors are rebuilt in the background, and how long that may take.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ReclusterSpec {

@@ -12,8 +12,8 @@ use crate::limits::{coordinates, value, within};
 use crate::{Error, Grab};
 
 impl Simulation {
-    /// Begins a stroke whose blade somebody moves, and returns its number: faces that it lays bare are tagged with it, as
-    /// those of the scene's strokes are.
+    /// Begins a stroke whose blade is moved interactively, and returns its number: faces that it lays bare are tagged
+    /// with it, as those of the scene's strokes are.
     ///
     /// `blade` is a polyline of at least two points in m: its first pose, taken at the start of the next frame, which
     /// does not cut yet. `snap` is the snap distance as in [`StrokeSpec`](crate::scene::StrokeSpec), from 0 to 0.25 of an
@@ -146,10 +146,10 @@ impl Simulation {
         }
     }
 
-    /// Lets go; what was held keeps its velocity, that of the hand in the last frame.
+    /// Releases a grab; what was held keeps its velocity, that of the hand in the last frame.
     ///
-    /// What cuts made of it is let go, too. O(what hangs on handles); after a grab with a compliance of 0 the next step
-    /// costs O(tets) more. On a device the positions are fetched.
+    /// What cuts made of it is released, too. O(particles attached to handles); after a grab with a compliance of 0 the
+    /// next step costs O(tets) more. On a device the positions are fetched.
     ///
     /// # Errors
     /// If the grab was released before, or the device is lost.

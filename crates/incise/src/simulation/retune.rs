@@ -52,17 +52,17 @@ impl Simulation {
         &self.state.solver
     }
 
-    /// Has the simulation go on with other settings of the solver from the next frame on. Whatever is cut, moves and
+    /// Continues the simulation with other settings of the solver from the next frame on. Whatever is cut, moves and
     /// holds stays as it is. At frame 0 the result is to the bit a simulation set up with these settings.
     ///
     /// * `time_step`: handles and strokes go by frames, so they pass through the world faster or slower; obstacles keep
-    ///   their velocities; the simulated time goes on from where it is.
-    /// * `substeps`, `max_substeps`: `auto` chooses anew, from the tets as they are now, if one of these, `time_step` or
+    ///   their velocities; the simulated time continues from where it is.
+    /// * `substeps`, `max_substeps`: `auto` chooses again, from the present tets, if one of these, `time_step` or
     ///   `accuracy`, `tet_solve` changes. Substeps that bodies ask for themselves stay.
     /// * `kappa_limit`, or another time of a substep: tets are softened to the new limit, and those that need not be any
     ///   more are what their material says.
-    /// * `clustering`, `coloring`, `merge_clusters`: clusters and colors of all tets are made anew.
-    /// * `recluster`: counts the wear since clusters and colors were made anew last. Those in the making are still taken,
+    /// * `clustering`, `coloring`, `merge_clusters`: clusters and colors of all tets are rebuilt.
+    /// * `recluster`: counts the wear since clusters and colors were last rebuilt. Those in the making are still taken,
     ///   unless they are those of other settings.
     /// * `backend`, and with `auto` also `method` and `clustering`: the state goes over to a device or comes back. The
     ///   device is the present one, or that of `offer_device`, or one that the simulation has left, or else it is opened.
@@ -76,7 +76,8 @@ impl Simulation {
     /// VBD cost nothing.
     ///
     /// # Errors
-    /// As [`Simulation::new`] for these settings, and if `precision` differs. Nothing has changed then.
+    /// Returns the errors of [`Simulation::new`] for these settings, and one if `precision` differs. Nothing has
+    /// changed then.
     ///
     /// # Example
     /// ```

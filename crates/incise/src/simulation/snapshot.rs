@@ -39,8 +39,8 @@ const PIECES: usize = 4;
 const POSITION: usize = 24;
 
 impl Snapshot {
-    /// About the bytes that it takes, for who keeps a budget: solvers and the whole to the byte, the rest by what a tet
-    /// and a particle take there. Off by a fifth at most in the scenes of the tests; what strokes remember of earlier
+    /// About the bytes that it takes, for memory budgets: solvers and the whole to the byte, the rest by what a tet and
+    /// a particle take there. Off by a fifth at most in the scenes of the tests; what strokes remember of earlier
     /// cuts is the least certain. O(bodies + particles).
     #[must_use]
     pub fn bytes(&self) -> usize {

@@ -1,4 +1,4 @@
-//! Threads change who computes, never what.
+//! The number of threads changes which thread computes what, never the result.
 
 use incise::scene::Precision;
 use incise::{Scene, Simulation};

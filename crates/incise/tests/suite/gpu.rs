@@ -1,4 +1,4 @@
-//! Scenes on a GPU: the same as on the processor, and nothing fetched that nobody asked for.
+//! Scenes on a GPU: the same as on the processor, and nothing fetched that was not requested.
 //!
 //! They need an adapter (Mesa's lavapipe will do) and skip with a line on stderr without one, unless
 //! `INCISE_REQUIRE_GPU` is set: then they fail.

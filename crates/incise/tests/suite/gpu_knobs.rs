@@ -22,7 +22,7 @@ fn two_bodies() -> Scene {
     scene
 }
 
-/// Goes on for three frames, the second with a cut; what is to be seen after each.
+/// Simulates three more frames, the second with a cut; returns all that is visible after each.
 fn go_on(simulation: &mut Simulation) -> Vec<Vec<u64>> {
     let frames = (0..3).map(|frame| {
         if frame == 1 {
@@ -69,7 +69,7 @@ fn a_device_goes_on_as_it_did() {
         let snapshot = there.snapshot().unwrap();
         let then = go_on(&mut there);
         assert_eq!(there.report().pieces, 6);
-        // In the same, in one that is set up anew, and in one that was on the processor.
+        // In the same simulation, in a newly set up one, and in one that was on the processor.
         let mut fresh = Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap();
         let mut here = Simulation::new(&scene).unwrap();
         for simulation in [&mut there, &mut fresh, &mut here] {
@@ -233,7 +233,7 @@ fn a_device_is_refused_what_it_does_not_do() {
     assert_eq!(there.step().unwrap().backend, name);
 }
 
-/// As on the processor but for rounding, and only in the frames that report them.
+/// Residuals match those on the processor except for rounding, and exist only in the frames that report them.
 #[test]
 fn a_device_knows_the_residuals_of_its_tets() {
     let Some(gpu) = gpu("a_device_knows_the_residuals_of_its_tets") else {
@@ -247,7 +247,7 @@ fn a_device_knows_the_residuals_of_its_tets() {
         there.step().unwrap();
         let Some(of_tets) = there.residuals_of_tets() else {
             assert!(frame % 2 == 1, "{frame}");
-            // Nor does the frame before the last one count when somebody looks.
+            // A readback does not bring back those of the frame before the last one, either.
             there.read_back().unwrap();
             assert!(there.residuals_of_tets().is_none());
             continue;

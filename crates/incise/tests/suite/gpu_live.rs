@@ -87,7 +87,8 @@ fn a_hand_does_the_same() {
     assert!(there.positions().iter().all(|x| x.is_finite()));
 }
 
-/// The same as a sweep of the scene to the bit, on the same device; once it has ended nothing is fetched any more.
+/// A live blade and a sweep of the scene are bit-identical on the same device; once the stroke has ended nothing is
+/// fetched any more.
 #[test]
 fn a_live_blade_does_the_same_as_a_sweep() {
     let Some(gpu) = gpu("a_live_blade_does_the_same_as_a_sweep") else {

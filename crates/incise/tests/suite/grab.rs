@@ -1,4 +1,4 @@
-//! What a hand holds goes where the hand goes, the body follows, and what is let go swings free.
+//! What a hand holds goes where the hand goes, the body follows, and what is released swings free.
 
 use incise::mesh::glam::{DVec3, dvec3};
 use incise::scene::{Method, Precision, Quantity, Region, SolverSpec, StrokeSpec};
@@ -95,7 +95,7 @@ fn what_is_held_goes_there_and_the_body_follows() {
             assert!((0.1..1.0).contains(&(middle.z / way.z)), "{middle}");
             let report = simulation.report();
             assert_eq!((report.repaired, report.pieces), (0, 1));
-            // Nobody moves it: it stays there.
+            // Without another call it stays there.
             simulation.step().unwrap();
             let off = simulation.positions()[held[0]] - before[held[0]] - way;
             assert!(off.length() < rounding(precision), "{off}");
@@ -162,7 +162,7 @@ fn a_hand_may_take_hold_again_at_once() {
     }
 }
 
-/// All of a body in a hand that moves evenly: let go, it moves on as it did.
+/// All of a body in a hand that moves evenly: once released, it keeps moving as before.
 #[test]
 fn what_is_let_go_keeps_its_velocity() {
     for precision in [Precision::F32, Precision::F64] {
@@ -248,9 +248,9 @@ fn a_cut_through_what_is_held_leaves_both_sides_held_and_both_are_let_go() {
             assert!(middle.z > 0.1, "{side}: {middle}");
         }
         simulation.release(grab).unwrap();
-        // No copy hangs on what was let go.
+        // No copy is attached to the released handle.
         simulation.check().unwrap();
-        // The next hand takes the same handle: what was let go does not come along.
+        // The next grab takes the same handle: what was released does not come along.
         let before = [-1.0, 1.0].map(|side| middle(&simulation, |x| (x.x - 0.03) * side > 0.0));
         let left = simulation.positions()
             [within(&simulation.mesh().positions, dvec3(-0.5, 0.0, 0.0), 0.3)[0]];
@@ -282,7 +282,7 @@ fn what_is_fixed_or_held_cannot_be_grabbed() {
     for (point, radius) in [(top, 0.3), (bottom, 0.05), (DVec3::Z * 3.0, 1.0)] {
         assert_eq!(simulation.grab(point, radius, 0.0).unwrap(), None);
     }
-    // As far as the free ones: these are held, the fixed ones stay.
+    // A radius that reaches the free ones: these are held, the fixed ones stay.
     let before = simulation.positions().to_vec();
     let grab = take(&mut simulation, top, 0.6, 0.0);
     assert_eq!(simulation.grab(top, 0.6, 0.0).unwrap(), None);
@@ -341,7 +341,7 @@ fn nothing_is_tied_together_that_hangs_apart() {
     simulation.check().unwrap();
 }
 
-/// All that is held is taken away by a stroke, and then the whole body with it; then it is let go.
+/// A stroke removes all that is held, or even the whole body; then the grab is released.
 #[test]
 fn what_is_held_may_be_cut_away() {
     for (precision, radius) in [
@@ -452,7 +452,7 @@ fn what_cannot_be_is_refused_by_name() {
         field(simulation.move_grab(grab, DVec3::ZERO).unwrap_err()),
         "grab"
     );
-    // Its handle is somebody else's now.
+    // Its handle belongs to another grab now.
     let other = take(&mut simulation, DVec3::ZERO, 0.5, 0.0);
     assert_eq!(field(simulation.release(grab).unwrap_err()), "grab");
     simulation.release(other).unwrap();

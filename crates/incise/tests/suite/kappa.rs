@@ -17,7 +17,7 @@ fn cut_sphere() -> Scene {
     scene
 }
 
-/// The same scene without a limit.
+/// Sets up a scene with its kappa limit removed.
 fn unlimited(scene: &Scene) -> Simulation {
     let mut scene = scene.clone();
     scene.solver.kappa_limit = f64::INFINITY;

@@ -22,7 +22,7 @@ fn pose(fraction: f64) -> [DVec3; 2] {
     BLADE.map(|x| DVec3::from_array(x) + offset)
 }
 
-/// The same to the bit: all that a frame leaves behind, and what its report counts.
+/// Asserts that two simulations are bit-identical in all that a frame leaves behind, and in what its report counts.
 fn assert_same(one: &Simulation, other: &Simulation, frame: u64) {
     assert!(state(one) == state(other), "frame {frame}");
     assert_eq!(one.report().cut, other.report().cut, "frame {frame}");
@@ -108,7 +108,7 @@ fn a_body_falls_through_a_blade_that_is_held() {
     assert_eq!(live.report().pieces, 3);
 }
 
-/// A stroke may stop in the body, and another one goes on where it stopped; a third one is held meanwhile elsewhere.
+/// A stroke may stop in the body, and another one continues where it stopped; a third one is held meanwhile elsewhere.
 #[test]
 fn a_stroke_goes_on_where_another_stopped() {
     let mut scene = scene(&body("box", 600, [0.0; 3]));
@@ -123,7 +123,7 @@ fn a_stroke_goes_on_where_another_stopped() {
     simulation.move_blade(other, &along(-0.3)).unwrap();
     let cut = simulation.step().unwrap().cut.unwrap();
     assert!(cut.tets_cut > 0);
-    // Nothing is pending: it is done at once, and the other one goes on.
+    // Nothing is pending: it ends at once, and the other one continues.
     simulation.end_stroke(first).unwrap();
     assert_eq!(simulation.step().unwrap().cut, None);
     assert_eq!(simulation.report().pieces, 1);
@@ -183,7 +183,7 @@ fn what_is_no_blade_is_refused_and_nothing_changes() {
     refused(simulation.end_stroke(stroke), "stroke is 0");
     refused(simulation.end_stroke(7), "stroke is 7");
 
-    // Strokes of the scene are not in anybody's hand.
+    // Strokes of the scene cannot be moved interactively.
     simulation
         .cut(scene(&sweep([4, 40], BLADE, WAY)).stroke[0].clone())
         .unwrap();
@@ -225,7 +225,7 @@ fn particles_are_found_in_their_groups() {
     assert_eq!(simulation.next_frame(), 3);
 }
 
-/// Velocities reach what nothing holds, wake who sleeps, and are refused together.
+/// Velocities reach what nothing holds, wake what sleeps, and are refused together.
 #[test]
 fn velocities_are_set_between_frames() {
     for precision in [Precision::F32, Precision::F64] {

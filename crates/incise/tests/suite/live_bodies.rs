@@ -153,7 +153,7 @@ fn bodies_come_and_go_among_cuts() {
     simulation.step().unwrap();
     simulation.check().unwrap();
     assert!(simulation.pieces().is_empty() && simulation.mesh().tets.is_empty());
-    // An empty world goes on, and takes bodies.
+    // An empty world continues, and takes bodies.
     simulation.step().unwrap();
     simulation.add_body(ball(0.0)).unwrap();
     assert_eq!(simulation.step().unwrap().pieces, 1);

@@ -1,4 +1,4 @@
-//! The facade as its users see it: scenes in, frames out, and everything derived proved anew after every frame.
+//! The facade as its users see it: scenes in, frames out, and all derived data verified after every frame.
 
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 

@@ -1,4 +1,4 @@
-//! Worn clusters and colors are made anew in the background, in frames that the scene alone determines.
+//! Worn clusters and colors are rebuilt in the background, in frames that the scene alone determines.
 
 use incise::{Scene, Simulation};
 

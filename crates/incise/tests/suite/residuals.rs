@@ -81,7 +81,7 @@ fn who_sleeps_has_none_left() {
     });
     let mut simulation = simulation(&scene);
     (0..3).for_each(|_| assert!(simulation.step().is_ok()));
-    assert!(simulation.report().residual.is_none(), "somebody is awake");
+    assert!(simulation.report().residual.is_none(), "a body is awake");
     let residuals = simulation.residuals_of_tets().unwrap();
     assert!(residuals.len() >= 490 && residuals.iter().all(|left| *left == 0.0));
 }

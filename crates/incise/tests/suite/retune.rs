@@ -128,7 +128,7 @@ fn a_cut_body_keeps_its_state() {
     assert!(simulation.report().pieces > 2);
 }
 
-/// A floor that rises by 1 m/s carries a body: it goes on from where it is, and so does the time.
+/// A floor that rises by 1 m/s carries a body: it continues from where it is, and so does the time.
 #[test]
 fn obstacles_go_on_from_where_they_are() {
     let mut simulation = simulation(&scene(&format!(
@@ -196,7 +196,7 @@ fn detours_leave_no_trace() {
     let mut simulation = simulation(&two_bodies());
     (0..5).for_each(|_| assert!(simulation.step().is_ok()));
     let snapshot = simulation.snapshot().unwrap();
-    // But for clusters and colors, which are made anew only by settings that ask for others.
+    // Except for clusters and colors, which are rebuilt only by settings that ask for others.
     let mut settings = settings();
     settings.retain(|(name, _)| !["clusters", "wear"].contains(name));
     let mut end = |way: &[&SolverSpec]| {
@@ -211,7 +211,7 @@ fn detours_leave_no_trace() {
     let mut detours = settings.iter().map(|(_, solver)| solver).cycle().skip(3);
     for (name, solver) in &settings {
         if *name == "nothing" {
-            // Which would not wake who sleeps.
+            // This one would not wake sleeping bodies.
             continue;
         }
         let straight = end(&[solver]);

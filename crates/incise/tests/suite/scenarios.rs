@@ -1,4 +1,4 @@
-//! What happens after a cut: who falls, who holds, who springs back.
+//! What happens after a cut: which parts fall, which hold, which spring back.
 
 use incise::Simulation;
 use incise::mesh::glam::DVec3;
@@ -136,7 +136,7 @@ fn cut_while_stretched() {
         assert!(far > 1.3, "the beam is twice as long");
         for _ in 0..1000 {
             let report = simulation.step().unwrap();
-            // Nothing adds energy any more. Waves in rubber go at sqrt(E / ρ) = 10 m/s, and so do ends that are let go.
+            // Nothing adds energy any more. Waves in rubber go at sqrt(E / ρ) = 10 m/s, and so do released ends.
             assert!(report.energy.unwrap().elastic <= 1.01 * strain);
             assert!(report.max_speed.unwrap() < 50.0 && report.repaired == 0);
         }
@@ -158,7 +158,7 @@ fn cut_while_stretched() {
     }
 }
 
-/// A blade that stops half-way through a beam between two walls while it sags, and goes on later.
+/// A blade that stops half-way through a beam between two walls while it sags, and continues later.
 #[test]
 fn half_way_and_on() {
     let wall = |side: f64| {

@@ -1,4 +1,4 @@
-//! A simulation comes back to a moment, and goes on from there as it did, to the bit.
+//! A restored simulation continues from its snapshot as it did before, to the bit.
 
 use std::path::Path;
 
@@ -28,7 +28,7 @@ pub(crate) fn everything(simulation: &mut Simulation) -> Vec<u64> {
     words
 }
 
-/// Goes on for some frames; what is to be seen after each.
+/// Simulates some more frames; returns all that is visible after each.
 fn go_on(simulation: &mut Simulation, frames: u32) -> Vec<Vec<u64>> {
     (0..frames)
         .map(|_| {

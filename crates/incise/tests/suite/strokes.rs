@@ -1,7 +1,10 @@
 //! Every kind of stroke in a scene, on one body and on several, followed by everything that follows cuts.
 
 use incise::cutting::{FaceTag, Skin};
-use incise::{Scene, Simulation};
+use incise::mesh::glam::DVec3;
+use incise::{Scene, Simulation, WarningCode};
+
+use crate::support::{body, plane, simulation, sweep};
 
 /// All kinds of strokes on the first body of a scene.
 const STROKES: &str = r#"
@@ -113,7 +116,7 @@ fn all_kinds_with_volume_constraints() {
     assert!(run(&scene(1, "volume_compliance = 0.0")) > 4);
 }
 
-/// A body that is removed as a whole leaves a simulation that goes on with nothing.
+/// A simulation continues with nothing after its bodies are removed as a whole.
 #[test]
 fn everything_removed() {
     for bodies in [1, 2] {
@@ -195,4 +198,34 @@ fn bites_that_leave_parts_hanging() {
         }
     }
     assert!(came_apart > 5, "{came_apart} removals separated something");
+}
+
+/// A stroke beside the body is named in the frame in which it ends, one that cuts is not, and a live blade may miss.
+#[test]
+fn strokes_that_cut_nothing_are_named() {
+    let text = format!(
+        "{}{}{}{}",
+        body("box", 300, [0.0; 3]),
+        plane(1, [0.02, 0.0, 0.0], [1.0, 0.1, 0.0]),
+        plane(2, [9.0, 0.0, 0.0], [1.0, 0.0, 0.0]),
+        sweep(
+            [1, 3],
+            [[9.0, -1.0, 0.6], [9.0, 1.0, 0.6]],
+            [0.0, 0.0, -1.2]
+        ),
+    );
+    let mut simulation = simulation(&Scene::from_toml(&text).unwrap());
+    let blade = [DVec3::new(5.0, 0.0, 0.0), DVec3::new(5.0, 1.0, 0.0)];
+    let live = simulation.begin_stroke(&blade, 0.1).unwrap();
+    let mut named = Vec::new();
+    for frame in 0..6 {
+        if frame == 3 {
+            simulation.end_stroke(live).unwrap();
+        }
+        let report = simulation.step().unwrap();
+        let missed = report.warnings().iter();
+        let missed = missed.filter(|w| w.code == WarningCode::StrokeMissed);
+        named.extend(missed.map(|w| (report.frame, w.location.clone())));
+    }
+    assert_eq!(named, [(2, "stroke[1]".into()), (3, "stroke[2]".into())]);
 }

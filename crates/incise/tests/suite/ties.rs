@@ -100,7 +100,7 @@ fn adding_at_the_start_is_declaring() {
 }
 
 /// An attachment turns its particles about their center and displaces them, exactly where it is rigid; a path that it had
-/// no longer counts; what it let go moves freely.
+/// no longer counts; released particles move freely.
 #[test]
 fn an_attachment_is_moved_made_soft_and_removed() {
     for solver in solvers() {

@@ -69,7 +69,7 @@ pub fn read_medit(path: impl AsRef<Path>) -> Result<MeshFile, MeshIoError> {
     parse_medit(&load(path)?, path)
 }
 
-/// The same for a file in memory.
+/// Reads the content of a Medit file from memory, ASCII or binary as its first byte tells.
 pub(crate) fn parse_medit(bytes: &[u8], path: &Path) -> Result<MeshFile, MeshIoError> {
     // A binary file starts with the number 1, in either byte order.
     if matches!(bytes.first(), Some(0 | 1)) {

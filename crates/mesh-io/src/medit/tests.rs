@@ -39,7 +39,7 @@ fn files() -> impl Strategy<Value = MeshFile> {
     )
 }
 
-/// The same file in all forms that are written.
+/// Writes a file in all forms that exist.
 fn forms(file: &MeshFile) -> [Vec<u8>; 4] {
     let mut forms = [const { Vec::new() }; 4];
     ascii::write(&mut forms[0], file).unwrap();

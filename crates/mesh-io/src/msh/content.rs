@@ -120,8 +120,8 @@ impl Content {
                 "two tetrahedra have the number {tag}, so that its values belong to neither, renumber them"
             )));
         }
-        // Data of a few elements become fields of all: a file of many such sections would fill the memory. One number is
-        // allowed for each byte of the file.
+        // Data of a few elements become fields of all: a file of many such sections would fill the memory. One number
+        // is allowed for each byte of the file.
         let mut allowed = source.len();
         for data in self.data {
             let of_nodes = data.of_nodes;

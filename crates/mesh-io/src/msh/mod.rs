@@ -8,9 +8,9 @@
 //! one, the elementary entities. A single entity 1 without a group, which Gmsh writes for want of anything else, is no
 //! region at all. The names of groups (`$PhysicalNames`) are not kept: no other format has a place for them.
 //!
-//! `$NodeData` and `$ElementData` with 1 or 3 components are fields; each time step is one; elements without a value have
-//! NaN, and a file is refused that needs more than eight times its size for them. Orientation is kept as it is. Cost:
-//! O(n log n), for the numbers of nodes may have gaps and be in any order.
+//! `$NodeData` and `$ElementData` with 1 or 3 components are fields; each time step is one; elements without a value
+//! have NaN, and a file is refused that needs more than eight times its size for them. Orientation is kept as it is.
+//! Cost: O(n log n), for the numbers of nodes may have gaps and be in any order.
 //!
 //! Source: the Gmsh reference manual, sections "MSH file format", "MSH file format version 2" and "version 1" (Geuzaine
 //! and Remacle).
@@ -37,7 +37,7 @@ use crate::{MeshFile, MeshIoError};
 /// Reads the tets of a Gmsh file, versions 1, 2 and 4.1, text or binary, with regions and fields.
 ///
 /// # Errors
-/// As for [`read`](crate::read); [`MeshIoError::ParseBytes`] for what is wrong in a binary file.
+/// The errors of [`read`](crate::read); [`MeshIoError::ParseBytes`] for what is wrong in a binary file.
 pub fn read_msh(path: impl AsRef<Path>) -> Result<MeshFile, MeshIoError> {
     let path = path.as_ref();
     parse_msh(&load(path)?, path)

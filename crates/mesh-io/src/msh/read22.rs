@@ -1,9 +1,9 @@
 //! Nodes and elements of MSH versions 1 and 2.
 //!
-//! Version 1 is a text: `$NOD` and `$ELM`, each element with its physical group, its entity and the number of its nodes.
-//! Version 2 has a list of tags for each element, of which the first is the physical group and the second the entity; in
-//! binary files elements stand in batches of one type. Gmsh also writes `$ParametricNodes` in place of `$Nodes`, which
-//! the manual does not mention. Linear.
+//! Version 1 is a text: `$NOD` and `$ELM`, each element with its physical group, its entity and the number of its
+//! nodes. Version 2 has a list of tags for each element, of which the first is the physical group and the second the
+//! entity; in binary files elements stand in batches of one type. Gmsh also writes `$ParametricNodes` in place of
+//! `$Nodes`, which the manual does not mention. Linear.
 
 use glam::DVec3;
 

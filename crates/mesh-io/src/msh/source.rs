@@ -12,11 +12,11 @@ use crate::text::show;
 /// How the numbers of a file are stored.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Encoding {
-    /// As words.
+    /// Words of text.
     Text,
-    /// As bytes, the lowest first.
+    /// Bytes, the lowest first.
     Little,
-    /// As bytes, the highest first.
+    /// Bytes, the highest first.
     Big,
 }
 

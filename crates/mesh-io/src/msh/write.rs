@@ -1,8 +1,8 @@
 //! Writing MSH files of versions 2.2 and 4.1, text and binary.
 //!
 //! Gmsh has one physical group for each region, and an entity for each, numbered from 1 in ascending order of the
-//! regions. Tets keep their order: in version 4.1, where elements stand in blocks of one entity, each run of tets of one
-//! region is a block. Numbers in a text are the shortest that give the same bits back. Cost: O(n log n).
+//! regions. Tets keep their order: in version 4.1, where elements stand in blocks of one entity, each run of tets of
+//! one region is a block. Numbers in a text are the shortest that give the same bits back. Cost: O(n log n).
 //!
 //! Source: the Gmsh reference manual, sections "MSH file format" and "MSH file format version 2".
 
@@ -46,8 +46,9 @@ impl MshKind {
 /// another in a text.
 ///
 /// # Errors
-/// [`MeshIoError::FieldLength`] for values or regions of the wrong number, [`MeshIoError::Io`] if the file cannot be written
-/// or something does not fit in it: a field whose name has a line end, more than 2³¹ - 1 elements in version 2.2.
+/// [`MeshIoError::FieldLength`] for values or regions of the wrong number, [`MeshIoError::Io`] if the file cannot be
+/// written or something does not fit in it: a field whose name has a line end, more than 2³¹ - 1 elements in version
+/// 2.2.
 ///
 /// # Example
 /// ```

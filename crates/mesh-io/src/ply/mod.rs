@@ -1,9 +1,9 @@
 //! Stanford's `.ply`: a text that declares elements and their properties, then the elements as text or binary.
 //!
-//! Needed are the elements `vertex` with `x`, `y`, `z` and `face` with a list `vertex_indices` or `vertex_index`; all else
-//! is skipped. All types have at most 32 bits or are `f64`, so that each value is read as an `f64` without loss. Text
-//! keeps the digits of doubles even where `float` is declared. Source: G. Turk, "The PLY Polygon File Format" (1994).
-//! Linear.
+//! Needed are the elements `vertex` with `x`, `y`, `z` and `face` with a list `vertex_indices` or `vertex_index`; all
+//! else is skipped. All types have at most 32 bits or are `f64`, so that each value is read as an `f64` without loss.
+//! Text keeps the digits of doubles even where `float` is declared. Source: G. Turk, "The PLY Polygon File Format"
+//! (1994). Linear.
 
 mod body;
 mod header;

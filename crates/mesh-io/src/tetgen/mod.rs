@@ -5,8 +5,8 @@
 //! programs write either kind, so that negative tets are turned on reading.
 //!
 //! Attributes have no names: they are called `attribute 1` and so on, and the markers of points `boundary marker`. The
-//! last attribute of tets is where TetGen puts the region: it is the region if it is a whole number for all. There may be
-//! 256 attributes at most. Linear.
+//! last attribute of tets is where TetGen puts the region: it is the region if it is a whole number for all. There may
+//! be 256 attributes at most. Linear.
 //!
 //! Source: H. Si, "TetGen User's Manual", file formats.
 
@@ -28,7 +28,7 @@ pub use write::{write_tetgen, write_tetgen_file};
 /// The name of the values that hold the boundary markers of points.
 const MARKER: &str = "boundary marker";
 
-/// The same numbers as integers, if all are.
+/// Converts numbers to integers; `None` unless all are whole numbers of 32 bits.
 fn all_whole(values: &[f64]) -> Option<Vec<i32>> {
     values.iter().map(|&value| whole(value)).collect()
 }
@@ -36,15 +36,16 @@ fn all_whole(values: &[f64]) -> Option<Vec<i32>> {
 /// Reads the `.node` and `.ele` files with the stem of `path`; see [`read`](crate::read). Tets are oriented positively.
 ///
 /// # Errors
-/// As for [`read`](crate::read).
+/// The errors of [`read`](crate::read).
 pub fn read_tetgen(path: impl AsRef<Path>) -> Result<TetMesh, MeshIoError> {
     read_tetgen_file(path).map(|file| file.mesh)
 }
 
-/// The same with attributes, boundary markers and regions.
+/// Reads the `.node` and `.ele` files with the stem of `path`, with attributes, boundary markers and regions. Tets are
+/// oriented positively.
 ///
 /// # Errors
-/// As for [`read`](crate::read).
+/// The errors of [`read`](crate::read).
 ///
 /// # Example
 /// ```
@@ -65,10 +66,11 @@ pub fn read_tetgen_file(path: impl AsRef<Path>) -> Result<MeshFile, MeshIoError>
     parse_tetgen(path, &nodes?, &elements?)
 }
 
-/// The same for files that are in memory; errors name `path` with the ending `.node` or `.ele`.
+/// Reads the content of a `.node` and an `.ele` file from memory, with attributes, boundary markers and regions. Errors
+/// name `path` with the ending `.node` or `.ele`.
 ///
 /// # Errors
-/// As for [`parse_file`](crate::parse_file).
+/// The errors of [`parse_file`](crate::parse_file).
 ///
 /// # Example
 /// ```

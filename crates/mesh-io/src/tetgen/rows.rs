@@ -28,7 +28,7 @@ impl<'t, I: Iterator<Item = &'t [u8]>> Row<'t, '_, I> {
         self.text.count(word, what)
     }
 
-    /// The same where older files have nothing.
+    /// Reads a count, or returns 0 if the row has ended, as in older files.
     pub(super) fn count_or_0(&mut self, what: &str) -> Result<usize, MeshIoError> {
         let line = self.line;
         self.words

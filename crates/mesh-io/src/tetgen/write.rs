@@ -18,12 +18,13 @@ pub fn write_tetgen(path: impl AsRef<Path>, mesh: &TetMesh) -> Result<(), MeshIo
     write_pair(path.as_ref(), mesh, &[], &[], &[])
 }
 
-/// The same with the scalars of a file as attributes, in their order, and its regions as the last attribute of tets.
-/// The scalars `boundary marker` of particles are markers if whole numbers of 32 bits. Vectors have no place.
+/// Writes `.node` and `.ele` files with the stem of `path`, with the scalars of `file` as attributes, in their order,
+/// and its regions as the last attribute of tets. The scalars `boundary marker` of particles are markers if whole
+/// numbers of 32 bits. Vectors have no place in the format.
 ///
 /// # Errors
-/// [`MeshIoError::FieldLength`] if regions or values are not one for each element, [`MeshIoError::Io`] if a file cannot be
-/// written or has more than 256 attributes.
+/// [`MeshIoError::FieldLength`] if regions or values are not one for each element, [`MeshIoError::Io`] if a file cannot
+/// be written or has more than 256 attributes.
 pub fn write_tetgen_file(path: impl AsRef<Path>, file: &MeshFile) -> Result<(), MeshIoError> {
     file.check()?;
     write_pair(

@@ -1,14 +1,14 @@
 //! Legacy VTK files with an unstructured grid, ASCII and binary.
 //!
-//! Read are versions 1 to 5.1: the cells as lists with sizes, or (from 5.0 on) as offsets and connectivity. Keywords may
-//! be in any case and sections in any order. Of mixed cells the tets are taken, cells of lower dimension are left out,
-//! and other volume cells refused. Point and cell data with one or three components become fields, the first cell array
-//! named as programs name regions becomes the regions; other data, tables and metadata are skipped. Orientation is kept
-//! as it is. Linear.
+//! Read are versions 1 to 5.1: the cells as lists with sizes, or (from 5.0 on) as offsets and connectivity. Keywords
+//! may be in any case and sections in any order. Of mixed cells the tets are taken, cells of lower dimension are left
+//! out, and other volume cells refused. Point and cell data with one or three components become fields, the first cell
+//! array named as programs name regions becomes the regions; other data, tables and metadata are skipped. Orientation
+//! is kept as it is. Linear.
 //!
-//! The crate `vtkio` (0.7.0-rc2) has both the legacy and the XML formats, but it trusts the numbers in a compressed file:
-//! it slices and multiplies by them unchecked and reserves what they say. It takes a last block of length 0 for an empty
-//! one, and its errors name no place. So the reader is our own.
+//! The crate `vtkio` (0.7.0-rc2) has both the legacy and the XML formats, but it trusts the numbers in a compressed
+//! file: it slices and multiplies by them unchecked and reserves what they say. It takes a last block of length 0 for
+//! an empty one, and its errors name no place. So the reader is our own.
 //!
 //! Source: "VTK File Formats for VTK Version 4.2" (Kitware) and the 5.1 format as the VTK library writes it.
 
@@ -32,7 +32,7 @@ use crate::{MeshFile, MeshIoError};
 /// Reads the tets of a legacy VTK file; see [`read`](crate::read). Point and cell data are not looked at.
 ///
 /// # Errors
-/// As for [`read`](crate::read), and [`MeshIoError::ParseBytes`] if a binary file has wrong content.
+/// The errors of [`read`](crate::read), and [`MeshIoError::ParseBytes`] if a binary file has wrong content.
 pub fn read_vtk(path: impl AsRef<Path>) -> Result<TetMesh, MeshIoError> {
     let path = path.as_ref();
     parse_vtk_mesh(&load(path)?, path)
@@ -44,8 +44,8 @@ pub fn read_vtk(path: impl AsRef<Path>) -> Result<TetMesh, MeshIoError> {
 /// named `regions`, `medit:ref`, `gmsh:physical`, `tetgen:ref` or `CellEntityIds`.
 ///
 /// # Errors
-/// [`MeshIoError::Io`] if the file cannot be read, [`MeshIoError::Parse`] or, for a binary file, [`MeshIoError::ParseBytes`]
-/// if its content is wrong, [`MeshIoError::Empty`] if it has no cells.
+/// [`MeshIoError::Io`] if the file cannot be read, [`MeshIoError::Parse`] or, for a binary file,
+/// [`MeshIoError::ParseBytes`] if its content is wrong, [`MeshIoError::Empty`] if it has no cells.
 ///
 /// # Example
 /// ```

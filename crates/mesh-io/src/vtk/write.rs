@@ -24,17 +24,18 @@ pub fn write_vtk(path: impl AsRef<Path>, mesh: &TetMesh) -> Result<(), MeshIoErr
 /// Finite numbers keep every bit. A field without a name gets the name `values`.
 ///
 /// # Errors
-/// [`MeshIoError::FieldLength`] if the values or regions are of the wrong number, [`MeshIoError::Io`] if the file cannot be
-/// written.
+/// [`MeshIoError::FieldLength`] if the values or regions are of the wrong number, [`MeshIoError::Io`] if the file
+/// cannot be written.
 pub fn write_vtk_file(path: impl AsRef<Path>, file: &MeshFile) -> Result<(), MeshIoError> {
     file.check()?;
     write_atomically(path, |out| text(out, file))
 }
 
-/// Writes the same as a binary file of version 5.1; all numbers keep every bit.
+/// Writes a legacy VTK file, version 5.1, binary, with regions (as a cell array `regions`) and fields; all numbers keep
+/// every bit.
 ///
 /// # Errors
-/// As for [`write_vtk_file`].
+/// The errors of [`write_vtk_file`].
 pub fn write_vtk_binary(path: impl AsRef<Path>, file: &MeshFile) -> Result<(), MeshIoError> {
     file.check()?;
     write_atomically(path, |out| binary(out, file))

@@ -1,7 +1,8 @@
-//! VTK XML unstructured grids in their smallest form: arrays compressed by zlib, appended behind the elements as they are.
+//! VTK XML unstructured grids in their smallest form: arrays compressed by zlib, appended behind the elements as they
+//! are.
 //!
-//! Each array is cut into blocks of 32 KiB, which readers may load one by one. A third to a half of the size of the plain
-//! form, and some ten times the time to write. Source: "VTK XML Formats" (Kitware), "Appended Data". Linear.
+//! Each array is cut into blocks of 32 KiB, which readers may load one by one. A third to a half of the size of the
+//! plain form, and some ten times the time to write. Source: "VTK XML Formats" (Kitware), "Appended Data". Linear.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -21,8 +22,8 @@ const LEVEL: u8 = 6;
 /// Writes a mesh as [`write_vtu_file`](super::write_vtu_file) does, compressed: a third to a half of the size.
 ///
 /// # Errors
-/// [`MeshIoError::FieldLength`] if the values or regions are of the wrong number, [`MeshIoError::Io`] if the file cannot be
-/// written.
+/// [`MeshIoError::FieldLength`] if the values or regions are of the wrong number, [`MeshIoError::Io`] if the file
+/// cannot be written.
 ///
 /// # Example
 /// ```

@@ -2,8 +2,8 @@
 //!
 //! An array starts with a header of whole numbers: its length in bytes, or, if compressed, the number of blocks, their
 //! length, that of a last shorter block or 0, and the compressed length of each. Header and data may be one base64 text
-//! or each their own with its padding, so padding is accepted at any group of four and decoding goes on behind it; the
-//! crate `base64` refuses that. How long the array must be is known from elsewhere and checked before anything is
+//! or each their own with its padding, so padding is accepted at any group of four and decoding continues behind it;
+//! the crate `base64` refuses that. How long the array must be is known from elsewhere and checked before anything is
 //! decompressed; `miniz_oxide` stops at a limit. Memory is linear in the size of the file, but zlib can make a thousand
 //! bytes of one. Linear.
 //!

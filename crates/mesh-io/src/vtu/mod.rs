@@ -34,8 +34,8 @@ const TETRA: u8 = 10;
 /// Regions and fields are found as by [`read_vtk_file`](crate::read_vtk_file).
 ///
 /// # Errors
-/// [`MeshIoError::Io`] if the file cannot be read, [`MeshIoError::Parse`] if its content is wrong, [`MeshIoError::ParseBytes`]
-/// if its appended data are, [`MeshIoError::Empty`] if it has no cells.
+/// [`MeshIoError::Io`] if the file cannot be read, [`MeshIoError::Parse`] if its content is wrong,
+/// [`MeshIoError::ParseBytes`] if its appended data are, [`MeshIoError::Empty`] if it has no cells.
 ///
 /// # Example
 /// ```
@@ -57,8 +57,8 @@ pub fn read_vtu(path: impl AsRef<Path>) -> Result<MeshFile, MeshIoError> {
 /// Writes a mesh with its regions (as a cell array `regions`) and fields; all numbers keep every bit.
 ///
 /// # Errors
-/// [`MeshIoError::FieldLength`] if the values or regions are of the wrong number, [`MeshIoError::Io`] if the file cannot be
-/// written.
+/// [`MeshIoError::FieldLength`] if the values or regions are of the wrong number, [`MeshIoError::Io`] if the file
+/// cannot be written.
 pub fn write_vtu_file(path: impl AsRef<Path>, file: &MeshFile) -> Result<(), MeshIoError> {
     file.check()?;
     write_atomically(path, |out| put_file(out, file))
@@ -83,8 +83,8 @@ fn put_file(out: &mut dyn Write, file: &MeshFile) -> io::Result<()> {
 /// Writes tets at the given (rest or deformed) positions in meters, with fields.
 ///
 /// # Errors
-/// [`MeshIoError::FieldLength`] for a field without exactly one value per particle or tet, [`MeshIoError::Io`] if the file
-/// cannot be written.
+/// [`MeshIoError::FieldLength`] for a field without exactly one value per particle or tet, [`MeshIoError::Io`] if the
+/// file cannot be written.
 ///
 /// # Example
 /// ```

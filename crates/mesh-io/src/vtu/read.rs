@@ -1,8 +1,8 @@
 //! Reading VTK XML unstructured grids.
 //!
 //! The elements are walked once, up to the appended data, which need not be XML; the arrays are remembered where they
-//! are and decoded afterwards, when all counts are known. Errors name the line of the array, or the byte of the appended
-//! data. Linear.
+//! are and decoded afterwards, when all counts are known. Errors name the line of the array, or the byte of the
+//! appended data. Linear.
 
 use std::path::Path;
 

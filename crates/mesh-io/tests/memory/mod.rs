@@ -232,8 +232,8 @@ fn compressed(points: usize, block: u64, content: &[u8]) -> Vec<u8> {
     file
 }
 
-/// zlib makes up to 1032 bytes of one, and a file may do so if it says it first, twice: by its counts and by the header of
-/// the block. What a block holds beyond that is not decompressed, and what it only claims takes no memory.
+/// zlib makes up to 1032 bytes of one, and a file may do so if it says it first, twice: by its counts and by the header
+/// of the block. What a block holds beyond that is not decompressed, and what it only claims takes no memory.
 #[test]
 fn compressed_files() {
     let (points, size) = (100_000, 2_400_000_u64);

@@ -1,14 +1,14 @@
 //! The triangulation under construction: flat arrays of cells, and the insertion of one point.
 //!
-//! The outside is filled with ghost cells, one on each face of the hull, that share a vertex at infinity; a point outside
-//! is then inserted like any other. A cell is in conflict with a new point that lies strictly inside its circumsphere,
-//! for ghosts: strictly beyond their face of the hull, or in its plane and strictly inside its circumcircle. The cells in
-//! conflict form a cavity that is star-shaped around the point; they are replaced by the cone from the point over the
-//! cavity's boundary.
+//! The outside is filled with ghost cells, one on each face of the hull, that share a vertex at infinity; a point
+//! outside is then inserted like any other. A cell is in conflict with a new point that lies strictly inside its
+//! circumsphere, for ghosts: strictly beyond their face of the hull, or in its plane and strictly inside its
+//! circumcircle. The cells in conflict form a cavity that is star-shaped around the point; they are replaced by the
+//! cone from the point over the cavity's boundary.
 //!
 //! Signs are exact, and points on a sphere count as outside. This is the rule for points raised a little above the
-//! paraboloid, each less than the next by far, and so is consistent: no flat cell ever arises, since a point in the plane of
-//! a boundary face is on the same side of both its circumspheres.
+//! paraboloid, each less than the next by far, and so is consistent: no flat cell ever arises, since a point in the
+//! plane of a boundary face is on the same side of both its circumspheres.
 //!
 //! Sources: A. Bowyer and D. F. Watson (independently), 1981; ghosts as in J. R. Shewchuk, "Lecture Notes on Geometric
 //! Robustness" and "Delaunay mesh generation", 2012. Cost of an insertion: linear in the length of the walk, O(k log k)

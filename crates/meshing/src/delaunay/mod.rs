@@ -18,19 +18,20 @@ pub(super) use self::order::morton_keys;
 use crate::MeshingError;
 use incise_mesh::{ParticleId, TetMesh, orientation};
 
-/// The Delaunay tetrahedralization of `points` (meters): tets that fill their convex hull, with no point strictly inside
-/// the circumsphere of any.
+/// The Delaunay tetrahedralization of `points` (meters): tets that fill their convex hull, with no point strictly
+/// inside the circumsphere of any.
 ///
 /// The particles are the points in the given order. A point equal to an earlier one may be left out of all tets, or the
 /// earlier one; exactly one of equal points is in tets. All others are used, and no tet is flat. Where more than four
 /// points lie on an empty sphere, several answers are right; the one given depends on the points and their order alone,
 /// not on the platform.
 ///
-/// Signs are exact as long as the smallest difference of two coordinates, zero aside, is no less than about 1e-60 of the
-/// largest coordinate, whatever the scale.
+/// Signs are exact as long as the smallest difference of two coordinates, zero aside, is no less than about 1e-60 of
+/// the largest coordinate, whatever the scale.
 ///
 /// # Errors
-/// [`MeshingError::Points`] if a coordinate is not finite, or all points lie in one plane, as fewer than four always do.
+/// [`MeshingError::Points`] if a coordinate is not finite, or all points lie in one plane, as fewer than four always
+/// do.
 ///
 /// # Panics
 /// From 2³⁰ tets on.

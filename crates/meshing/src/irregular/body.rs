@@ -1,5 +1,5 @@
-//! A tetrahedral mesh that can be changed locally: each tet knows its neighbors, and a few tets at a time are replaced by
-//! others that fill the same room.
+//! A tetrahedral mesh that can be changed locally: each tet knows its neighbors, and a few tets at a time are replaced
+//! by others that fill the same room.
 //!
 //! Cost: constant time a change.
 
@@ -110,7 +110,8 @@ impl Body {
         tet.map(|p| self.positions[p as usize])
     }
 
-    /// The tets and the particles around an inner edge `a b` of a tet, counterclockwise seen from `b`; false at the surface.
+    /// The tets and the particles around an inner edge `a b` of a tet, counterclockwise seen from `b`; false at the
+    /// surface.
     ///
     /// Tet `k` lies between the particles `k` and `k + 1` of the ring.
     pub(super) fn ring(&self, t: u32, [i, j]: [usize; 2], ring: &mut Ring) -> bool {

@@ -1,8 +1,8 @@
 //! Which Delaunay tets lie inside a solid, chosen so that their surface is a manifold.
 //!
-//! A tet is inside when its centroid is. Flat tets between surface particles can lie on either side, and where the choice
-//! leaves an edge or a particle at which the surface touches itself, those at hand are dropped or taken in by turns until
-//! none is left. Cost: O(n log n) a round; rounds after the first are rarely more than three.
+//! A tet is inside when its centroid is. Flat tets between surface particles can lie on either side, and where the
+//! choice leaves an edge or a particle at which the surface touches itself, those at hand are dropped or taken in by
+//! turns until none is left. Cost: O(n log n) a round; rounds after the first are rarely more than three.
 
 use std::cmp::Reverse;
 

@@ -1,14 +1,14 @@
 //! Removing slivers: local changes, each of which raises the worst tet it touches.
 //!
-//! For each bad tet: the best of all edge removals (the tets around an edge are replaced by two for each triangle of a fan
-//! in the polygon around it) and face removals (two tets become three), else small random moves of its corners, else, at
-//! the surface, dropping it where that leaves the topology as it is. Only bad tets and what surrounds them change, so that
-//! the mesh stays irregular.
+//! For each bad tet: the best of all edge removals (the tets around an edge are replaced by two for each triangle of a
+//! fan in the polygon around it) and face removals (two tets become three), else small random moves of its corners,
+//! else, at the surface, dropping it where that leaves the topology as it is. Only bad tets and what surrounds them
+//! change, so that the mesh stays irregular.
 //!
-//! Source: L. A. Freitag and C. Ollivier-Gooch, "Tetrahedral mesh improvement using swapping and smoothing", 1997; quality
-//! is the smallest sine of the dihedral angles, which is small for angles near 0 and near 180 degrees, or twice the radius
-//! ratio, which is small for needles too, whichever is less. Cost: linear in the
-//! number of bad tets and of passes.
+//! Source: L. A. Freitag and C. Ollivier-Gooch, "Tetrahedral mesh improvement using swapping and smoothing", 1997;
+//! quality is the smallest sine of the dihedral angles, which is small for angles near 0 and near 180 degrees, or twice
+//! the radius ratio, which is small for needles too, whichever is less. Cost: linear in the number of bad tets and of
+//! passes.
 
 use glam::DVec3;
 use incise_mesh::{outward_normals, signed_volume};
@@ -24,7 +24,8 @@ const LARGEST_RING: usize = 8;
 const MOVES: [f64; 4] = [0.2, 0.1, 0.05, 0.02];
 const TRIES: u64 = 6;
 
-/// The smallest sine of the dihedral angles, or twice the radius ratio if less; not positive for a flat or inverted tet.
+/// The smallest sine of the dihedral angles, or twice the radius ratio if less; not positive for a flat or inverted
+/// tet.
 pub(super) fn quality(corners: [DVec3; 4]) -> f64 {
     let normals = outward_normals(corners);
     let volume = 6.0 * signed_volume(corners);
@@ -209,8 +210,8 @@ fn worst_of(body: &Body, tets: &[u32]) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Removes a tet at the surface if that keeps the body and its surface manifolds of the same topology: with one boundary
-/// face if the corner opposite lies inside, with two if the edge opposite does, with three always.
+/// Removes a tet at the surface if that keeps the body and its surface manifolds of the same topology: with one
+/// boundary face if the corner opposite lies inside, with two if the edge opposite does, with three always.
 fn peel(body: &mut Body, t: u32, ring: &mut Ring) -> bool {
     let Some(tet) = body.tet(t) else {
         return false;

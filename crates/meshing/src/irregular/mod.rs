@@ -3,8 +3,8 @@
 //!
 //! Lattice meshes have nearly equal numbers everywhere (24 in stuffed ones), which hides what makes coloring and
 //! clustering hard. Here points are strewn over the surface and the inside of a solid (module `sample`) and joined
-//! ([`delaunay`]), the tets inside are kept (`carve`), and slivers are removed by local changes (`improve`). The number of
-//! tets is met by repeating that with other spacings and other points.
+//! ([`delaunay`]), the tets inside are kept (`carve`), and slivers are removed by local changes (`improve`). The number
+//! of tets is met by repeating that with other spacings and other points.
 //!
 //! Measured with seed 1 by the tests `as_irregular_as_other_meshes` and, for the last rows, the ignored
 //! `large_and_as_irregular_as_other_meshes`. For comparison, TetGen's meshes of a ball with 6,846, 27,755 and
@@ -54,15 +54,15 @@ const LARGEST: usize = 1_000_000;
 
 /// A mesh of the shape with `tets` tets to within 2 %, as irregular as those of other mesh generators.
 ///
-/// The mesh is sound ([`TetMesh::check`]), a single piece also by faces, with a manifold surface of the shape's topology.
-/// All dihedral angles lie between 14.4 and 165.6 degrees, all radius ratios above 0.124. Particles come along a
-/// space-filling curve, tets by their lowest particle. Sharp edges and corners of the shape get
-/// particles of their own, but may be beveled in places where slivers were dropped. Another `seed` gives another mesh
-/// of the same kind. Deterministic on all platforms.
+/// The mesh is sound ([`TetMesh::check`]), a single piece also by faces, with a manifold surface of the shape's
+/// topology. All dihedral angles lie between 14.4 and 165.6 degrees, all radius ratios above 0.124. Particles come
+/// along a space-filling curve, tets by their lowest particle. Sharp edges and corners of the shape get particles of
+/// their own, but may be beveled in places where slivers were dropped. Another `seed` gives another mesh of the same
+/// kind. Deterministic on all platforms.
 ///
 /// # Errors
-/// [`MeshingError::TetCount`] for fewer than [`Shape::smallest_tet_count`] or more than a million tets, or when no attempt
-/// meets all promises.
+/// [`MeshingError::TetCount`] for fewer than [`Shape::smallest_tet_count`] or more than a million tets, or when no
+/// attempt meets all promises.
 ///
 /// # Example
 /// ```

@@ -2,11 +2,12 @@
 //!
 //! Surface points come from dense random candidates near the surface, moved onto it by Newton steps along the gradient,
 //! and taken in random order as long as they keep a distance from those taken (maximal Poisson disk sampling: no gap is
-//! larger than the distance). Candidates on edges and corners go first, so that these stay sharp. Inside, the vertices of
-//! a body-centered cubic lattice are moved at random.
+//! larger than the distance). Candidates on edges and corners go first, so that these stay sharp. Inside, the vertices
+//! of a body-centered cubic lattice are moved at random.
 //!
-//! Source: Delaunay meshing of jittered lattices is folklore; for the surface M. S. Ebeida and others, "Efficient maximal
-//! Poisson-disk sampling", 2011. Cost: linear in the volume over the spacing cubed, some thirty distances per point.
+//! Source: Delaunay meshing of jittered lattices is folklore; for the surface M. S. Ebeida and others, "Efficient
+//! maximal Poisson-disk sampling", 2011. Cost: linear in the volume over the spacing cubed, some thirty distances per
+//! point.
 
 use glam::DVec3;
 

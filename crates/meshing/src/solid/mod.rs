@@ -3,8 +3,8 @@
 //! What is inside is a matter of the winding number, which is decided exactly (module `winding`), so that points at any
 //! distance from the surface, along its edges and in its planes are on the side they should be. It is well defined for
 //! every surface in which each directed edge is matched by an opposite one: also for surfaces that cut through
-//! themselves, touch themselves or consist of many shells. Module `prepare` brings a surface into that form or says what
-//! keeps it from it. Questions go through a tree of boxes (module `tree`).
+//! themselves, touch themselves or consist of many shells. Module `prepare` brings a surface into that form or says
+//! what keeps it from it. Questions go through a tree of boxes (module `tree`).
 //!
 //! Cost: O(n log n) to build for n triangles, O(log n) a question as a rule.
 
@@ -52,8 +52,8 @@ impl Solid {
     /// [`prepared`](Self::prepared) tells what was done.
     ///
     /// # Errors
-    /// [`MeshingError::Surface`] if a position is not finite or absent, if there is no triangle, or if the surface has a
-    /// rim or cannot be oriented: with the first edge where that shows.
+    /// [`MeshingError::Surface`] if a position is not finite or absent, if there is no triangle, or if the surface has
+    /// a rim or cannot be oriented: with the first edge where that shows.
     pub fn new(surface: &TriangleSurface) -> Result<Self, MeshingError> {
         let (prepared, triangles) = prepare::prepare(surface)?;
         let volume = volume(&triangles);
@@ -64,7 +64,7 @@ impl Solid {
         })
     }
 
-    /// What had to be put right in the surface.
+    /// What had to be repaired in the surface.
     #[must_use]
     pub const fn prepared(&self) -> &Prepared {
         &self.prepared
@@ -129,8 +129,8 @@ impl Solid {
         nearest::distance_within(&self.tree, point, reach)
     }
 
-    /// The largest distance of points of `surface` to this solid's surface, in meters: of its corners, the middles of its
-    /// edges and of its triangles. Half a Hausdorff distance, sampled.
+    /// The largest distance of points of `surface` to this solid's surface, in meters: of its corners, the middles of
+    /// its edges and of its triangles. Half a Hausdorff distance, sampled.
     #[must_use]
     pub fn farthest(&self, surface: &TriangleSurface) -> f64 {
         let mut farthest = 0.0_f64;

@@ -1,7 +1,7 @@
 //! Brings a surface into the form in which it has an inside: welded, without flat triangles, facing one way, closed.
 //!
 //! A surface has an inside where each directed edge of its triangles is matched by one in the opposite direction. Files
-//! often miss that only because points are doubled along seams or triangles turned, which is put right. The rest is
+//! often miss that only because points are doubled along seams or triangles turned, which is repaired. The rest is
 //! refused with the first edge where it shows: a rim, or a part that has no two sides.
 //!
 //! Cost: O(n log n).
@@ -11,7 +11,7 @@ use incise_mesh::{DisjointSets, ParticleId, TriangleSurface};
 
 use crate::MeshingError;
 
-/// What was put right in a surface to take it as the boundary of a solid.
+/// What was repaired in a surface to take it as the boundary of a solid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Prepared {

@@ -1,7 +1,7 @@
 //! [`Tree`]: triangles in a binary tree of boxes, for questions about what is near a point or a ray.
 //!
-//! Triangles are halved by the middles of their boxes along the longest side until few are left. Nodes lie in one array,
-//! the left child right behind its parent. Cost: O(n log n) to build, 56 bytes a node and 72 a triangle.
+//! Triangles are halved by the middles of their boxes along the longest side until few are left. Nodes lie in one
+//! array, the left child right behind its parent. Cost: O(n log n) to build, 56 bytes a node and 72 a triangle.
 
 use glam::DVec3;
 use incise_mesh::Bounds;

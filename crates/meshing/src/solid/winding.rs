@@ -1,14 +1,14 @@
 //! The winding number of a surface around a point, without error.
 //!
 //! A ray runs from the point along +x. Each triangle that it leaves the surface through counts 1, each that it enters
-//! through -1. Whether it meets a triangle is a question of three orientations in the yz plane, whether it does so ahead
-//! of the point one of an orientation in space; both come from exact predicates. Where the ray meets an edge or a corner,
-//! it is taken as moved by an infinitely small step along y, and by a much smaller one along z, so that it passes through
-//! exactly one of the triangles there (simulation of simplicity).
+//! through -1. Whether it meets a triangle is a question of three orientations in the yz plane, whether it does so
+//! ahead of the point one of an orientation in space; both come from exact predicates. Where the ray meets an edge or a
+//! corner, it is taken as moved by an infinitely small step along y, and by a much smaller one along z, so that it
+//! passes through exactly one of the triangles there (simulation of simplicity).
 //!
-//! Source: J. R. Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates", 1997 (the
-//! predicates, from the crate `robust`); H. Edelsbrunner and E. Mücke, "Simulation of Simplicity", 1990. Cost: O(log n)
-//! and the triangles whose boxes the ray meets.
+//! Source: J. R. Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates", 1997
+//! (the predicates, from the crate `robust`); H. Edelsbrunner and E. Mücke, "Simulation of Simplicity", 1990. Cost:
+//! O(log n) and the triangles whose boxes the ray meets.
 
 use glam::DVec3;
 use robust::{Coord, Coord3D, orient2d, orient3d};
@@ -45,7 +45,8 @@ fn crossing(triangle: &[DVec3; 3], point: DVec3) -> i32 {
     if ahead { side } else { 0 }
 }
 
-/// On which side of the edge the moved ray passes, seen along -x: 1 on the left, -1 on the right, 0 for an edge along x.
+/// On which side of the edge the moved ray passes, seen along -x: 1 on the left, -1 on the right, 0 for an edge along
+/// x.
 fn side_in_plane(from: DVec3, to: DVec3, point: DVec3) -> i32 {
     let sign = |x: f64| i32::from(x > 0.0) - i32::from(x < 0.0);
     let exact = orient2d(planar(from), planar(to), planar(point));

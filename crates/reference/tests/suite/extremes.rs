@@ -48,7 +48,7 @@ fn statics_finds_an_equilibrium() {
             let forces = body.elastic_forces();
             let free = (0..forces.len()).filter(|&p| !body.fixed[p]);
             let left = free.map(|p| forces[p].length_squared()).sum::<f64>().sqrt();
-            // The residual, computed anew from rounded positions.
+            // The residual, recomputed from rounded positions.
             within("left", left, report.residual() + report.rounding);
             if state != "scrambled" {
                 assert_eq!(body.inverted(), 0, "{nu} {state}");
@@ -81,8 +81,8 @@ fn motion_recovers() {
     }
 }
 
-/// Stiffness, step and size over twenty orders of magnitude: a balanced state, or an error and the state from before. Of
-/// the 27 two fail: steps of a day in which a body comes to hang that weighs ten thousand times what it can bear.
+/// Stiffness, step and size over twenty orders of magnitude: a balanced state, or an error and the state from before.
+/// Of the 27 two fail: steps of a day in which a body comes to hang that weighs ten thousand times what it can bear.
 #[test]
 fn whatever_the_numbers_a_result_is_balanced_or_refused() {
     for young_modulus in [1e-3, 1e6, 1e17] {

@@ -38,7 +38,7 @@ proptest! {
         }
     }
 
-    /// The same reasoning one derivative further.
+    /// The errors of central differences of the stress are bounded like those of the energy above.
     #[test]
     fn stiffness_is_the_slope_of_stress(law in law(), f in matrix(2.0)) {
         let stiffness = law.stiffness(f);

@@ -202,12 +202,12 @@ impl Drop for Film {
     fn drop(&mut self) {
         // Closed before it is removed: not every system removes an open file.
         self.writer = None;
-        // Gone already if it was finished; else there is nobody left to tell.
+        // The file is gone already if the film was finished; else an error here is not reported.
         let _ = fs::remove_file(&self.temporary);
     }
 }
 
-/// Why a film without a writer does not go on.
+/// The error of a film without a writer.
 fn broken() -> io::Error {
     io::Error::other("an earlier picture could not be written")
 }

@@ -287,10 +287,10 @@ impl GpuRenderer {
     /// Draws, waits and reads the picture back.
     ///
     /// # Errors
-    /// As [`GpuRenderer::draw`].
+    /// Returns the errors of [`GpuRenderer::draw`].
     ///
     /// # Panics
-    /// As [`GpuRenderer::draw`].
+    /// Panics where [`GpuRenderer::draw`] does.
     pub fn picture(
         &mut self,
         painting: &Painting,

@@ -46,7 +46,7 @@ impl Pipelines {
     /// # Errors
     /// If the device refuses one of them.
     pub(super) fn new(gpu: &GpuContext) -> Result<Self, RenderError> {
-        // A device that lacks something says so here and not in everybody's report.
+        // What a device lacks is reported here and not by its handler of uncaptured errors.
         let refused = gpu.device().push_error_scope(wgpu::ErrorFilter::Validation);
         let how = How {
             shader: "",

@@ -25,7 +25,7 @@ pub(super) struct Target {
     pub(super) samples: wgpu::TextureView,
     pub(super) depth: wgpu::TextureView,
     pub(super) resolved: wgpu::TextureView,
-    /// The same texture as it is stored, for windows that take colors as they are.
+    /// View of the resolved texture as it is stored, for windows that take colors as they are.
     pub(super) shown: wgpu::TextureView,
     texture: wgpu::Texture,
 }
@@ -139,7 +139,7 @@ fn collect(
     gpu.queue().submit([encoder.finish()]);
     let (sender, receiver) = mpsc::channel();
     staging.map_async(wgpu::MapMode::Read, .., move |result| {
-        // Nobody waits if this function has returned.
+        // The receiver is gone if this function has returned.
         let _ = sender.send(result.map_err(|error| error.to_string()));
     });
     gpu.wait()?;

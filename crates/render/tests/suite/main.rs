@@ -1,8 +1,8 @@
 //! Tests of pictures and of what they are made from.
 //!
 //! Pictures are compared with stored ones, `tests/references/*.png`. `INCISE_BLESS=1 cargo test -p incise-render` draws
-//! these anew by software: look at them before they are committed. What needs an adapter skips without one, with a line on
-//! stderr, unless `INCISE_REQUIRE_GPU` is set: then it fails. Mesa's lavapipe, which is a processor, will do.
+//! these again by software: look at them before they are committed. What needs an adapter skips without one, with a
+//! line on stderr, unless `INCISE_REQUIRE_GPU` is set: then it fails. Mesa's lavapipe, which is a processor, will do.
 
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 

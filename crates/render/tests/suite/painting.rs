@@ -1,4 +1,5 @@
-//! Paintings: the skin and its colors after any strokes are those made anew; rays hit what they should; stretch is known.
+//! Paintings: the skin and its colors after any strokes equal rebuilt ones; rays hit what they should.
+//! Stretch is known.
 
 use glam::{DMat3, DQuat, DVec3};
 use incise::cutting::FaceTag;
@@ -72,10 +73,10 @@ fn following_is_starting_anew() {
                 .color(&mut shown.simulation, by, None)
                 .unwrap();
             assert_eq!(legend.is_some(), by == ColorBy::Stretch);
-            let mut anew = Painting::new(&shown.simulation, &shown.scene);
-            anew.color(&mut shown.simulation, by, None).unwrap();
+            let mut rebuilt = Painting::new(&shown.simulation, &shown.scene);
+            rebuilt.color(&mut shown.simulation, by, None).unwrap();
             let all = triangles(&shown.painting);
-            assert_eq!(all, triangles(&anew), "{by}");
+            assert_eq!(all, triangles(&rebuilt), "{by}");
             assert!(all.iter().all(|t| t.3.is_some() == (by != ColorBy::Tissue)));
         }
         assert!(triangles(&shown.painting).len() > before);
@@ -126,7 +127,7 @@ fn pieces_keep_their_colors_and_new_ones_get_others() {
     assert!(colors[6].len() > 3, "{} pieces", colors[6].len());
 }
 
-/// The triangles of the second body, by their particles, which no cut numbers anew, with their colors.
+/// The triangles of the second body, by their particles, which no cut renumbers, with their colors.
 fn triangles_of_ball(shown: &Shown) -> Vec<([ParticleId; 3], Option<[u8; 3]>)> {
     let rest = &shown.simulation.mesh().positions;
     let mut all: Vec<_> = triangles(&shown.painting)

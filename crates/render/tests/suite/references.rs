@@ -1,4 +1,4 @@
-//! Pictures are those that somebody has looked at, by software and, where there is an adapter, by a device.
+//! Pictures equal stored ones that were checked by eye, by software and, where there is an adapter, by a device.
 
 use std::path::Path;
 

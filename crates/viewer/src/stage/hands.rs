@@ -232,10 +232,10 @@ impl Stage {
         Ok(self.simulation.move_grab(hold.grab, hold.to)?)
     }
 
-    /// Lets go.
+    /// Releases the grab, if there is one.
     pub(crate) fn let_go(&mut self) {
         if let Some(hold) = self.hold.take() {
-            // What a jump in time has let go already is let go.
+            // A jump in time may have released it already.
             let _ = self.simulation.release(hold.grab);
         }
     }

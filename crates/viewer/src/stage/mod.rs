@@ -1,4 +1,4 @@
-//! [`Stage`]: a simulation that somebody is looking at and working on.
+//! [`Stage`]: a simulation that is shown and edited in the window.
 //!
 //! It holds what belongs to a loaded scene: the simulation, what is drawn of it, the strokes that can be taken back, the
 //! blade and the hand in use. Input comes as pixels; what it means in space is decided here.
@@ -160,7 +160,7 @@ impl Stage {
         Ok(())
     }
 
-    /// Shows the blade of the scene's own strokes in a frame, unless somebody holds one.
+    /// Shows the blade of the scene's own strokes in a frame, unless a line is being drawn or cut.
     fn show_scripted_blade(&mut self, frame: u64) {
         if self.lines.is_empty() && !self.scripted.is_empty() {
             let strokes = self.scene.stroke.iter();
@@ -250,7 +250,7 @@ impl Stage {
         self.let_go();
         let spec = self.simulation.solver_spec().clone();
         self.simulation.restore(&moment.snapshot)?;
-        // What was in somebody's hands then is so again, and nobody is there to let it go.
+        // The stroke and the grab of that moment are active again, but no input ends them: end them here.
         if let Some(stroke) = moment.stroke {
             self.simulation.end_stroke(stroke)?;
         }
@@ -265,7 +265,7 @@ impl Stage {
         measured
     }
 
-    /// Draws anew from what is known here; a device has its part again after the next step.
+    /// Redraws from the host's state; a device's state is drawn again after the next step.
     fn repaint(&mut self) -> anyhow::Result<()> {
         self.simulation.read_back()?;
         self.painting.reset(&self.simulation);

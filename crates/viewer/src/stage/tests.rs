@@ -63,7 +63,7 @@ fn a_drawn_line_cuts_and_is_taken_back() {
     assert_eq!(stage.undo().unwrap(), Some(false));
     assert_eq!((stage.report().pieces, stage.report().tets), (1, tets));
     assert_eq!(stage.undo().unwrap(), None);
-    // And again: what is taken back can be cut anew.
+    // A cut that was taken back can be made again.
     cut(&mut stage);
     assert_eq!(stage.report().pieces, 2);
     stage.reset().unwrap();

@@ -1,9 +1,9 @@
 //! [`Attachments`]: particles that are attached to moving handles, such as an instrument's jaws or a bone.
 //!
 //! A handle goes from pose to pose, one a frame; in between, its position is interpolated linearly and its rotation
-//! along the shortest arc. An attached particle has a place in the handle's frame. With a compliance of 0 it is there at
-//! the end of every substep, to the bit, whatever pulls on it: it moves as a fixed particle does, by itself only. With a
-//! compliance it is pulled there by a spring of rest length 0, `C = x - target` in all three directions at once.
+//! along the shortest arc. An attached particle has a place in the handle's frame. With a compliance of 0 it is there
+//! at the end of every substep, to the bit, whatever pulls on it: it moves as a fixed particle does, by itself only.
+//! With a compliance it is pulled there by a spring of rest length 0, `C = x - target` in all three directions at once.
 //!
 //! Source: Macklin, Müller, Chentanez 2016 (compliance, damping). Cost: 40 operations an attachment.
 
@@ -245,8 +245,8 @@ impl<R: Float> Attachments<R> {
         index.is_ok()
     }
 
-    /// Moves handles, and the particles that are attached rigidly, to where they are at a fraction of the frame; returns how
-    /// many particles could not be moved because their target is out of the range of numbers.
+    /// Moves handles, and the particles that are attached rigidly, to where they are at a fraction of the frame;
+    /// returns how many particles could not be moved because their target is out of the range of numbers.
     pub(crate) fn move_held(&mut self, particles: &Particles<R>, fraction: f64) -> usize {
         let Self { handles, list } = self;
         for handle in handles.iter_mut() {

@@ -130,8 +130,8 @@ impl<R: Float> Obstacle<R> {
         (nearest.distance <= size * R::EPSILON * R::from_f64(4.0)).then_some(nearest.normal)
     }
 
-    /// What is left of a force in N on a particle that the collider bears: nothing of what presses the particle into it,
-    /// nor of what friction then holds.
+    /// What is left of a force in N on a particle that the collider bears: nothing of what presses the particle into
+    /// it, nor of what friction then holds.
     pub(crate) fn left_of(&self, force: DVec3, x: R::Vector) -> DVec3 {
         let Some(normal) = self.touched_at(x).map(R::to_dvec3) else {
             return force;
@@ -164,8 +164,8 @@ impl<R: Float> Obstacle<R> {
 
     /// Where a particle at `x` is put that wants to move to `moved` inside: onto the plane that touches the surface
     /// nearest to `x`, along `along(normal)`. With the direction in which a force along the normal moves the particle,
-    /// what is left over in the end is such a force. If that leads far away, as far towards `moved` as it is outside; `None` if
-    /// it is nowhere on the way.
+    /// what is left over in the end is such a force. If that leads far away, as far towards `moved` as it is outside;
+    /// `None` if it is nowhere on the way.
     #[inline]
     pub(crate) fn push_along(
         &self,
@@ -219,8 +219,8 @@ impl Obstacle<f32> {
     }
 }
 
-/// Where a particle inside of a collider is put; `None` outside of all. Where colliders overlap, one may push a particle
-/// into another; then they take turns, which ends at a point outside of all if there is one nearby.
+/// Where a particle inside of a collider is put; `None` outside of all. Where colliders overlap, one may push a
+/// particle into another; then they take turns, which ends at a point outside of all if there is one nearby.
 #[inline]
 pub(crate) fn outside<R: Float>(
     obstacles: &[Obstacle<R>],

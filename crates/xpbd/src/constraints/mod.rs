@@ -1,8 +1,8 @@
 //! [`Constraints`]: all constraints of a solver besides its tets, kind by kind.
 //!
-//! A kind is a type that implements [`ConstraintKind`] in a file of its own, and a line in the list below, which says in
-//! which order kinds are solved: each iteration goes over the tets, then over the kinds. A kind that holds no constraints
-//! takes no memory and no pass.
+//! A kind is a type that implements [`ConstraintKind`] in a file of its own, and a line in the list below, which says
+//! in which order kinds are solved: each iteration goes over the tets, then over the kinds. A kind that holds no
+//! constraints takes no memory and no pass.
 
 mod attachments;
 mod colliders;

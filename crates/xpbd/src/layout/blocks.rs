@@ -138,12 +138,12 @@ impl<R: Float> Blocks<R> {
     }
 }
 
-/// The lower triangle L of the Cholesky factorization `G = L Lᵀ` of `G = μV Σ w q qᵀ`, the sum over the corners with inverse
-/// mass w and gradient q of the barycentric coordinate. In this order: its diagonal, then yx, zx, zy.
+/// The lower triangle L of the Cholesky factorization `G = L Lᵀ` of `G = μV Σ w q qᵀ`, the sum over the corners with
+/// inverse mass w and gradient q of the barycentric coordinate. In this order: its diagonal, then yx, zx, zy.
 ///
-/// With it `Σ w |∇C|²` needs no gradients at the corners: it is `|A L|²` for `A = dC/dF`. A sum of squares loses nothing to
-/// rounding; `G : AᵀA`, which is the same, loses all of a sliver whose steep direction A hardly sees. L comes from an
-/// orthogonalization of the weighted gradients in double precision, since G itself would lose as much.
+/// With it `Σ w |∇C|²` needs no gradients at the corners: it is `|A L|²` for `A = dC/dF`. A sum of squares loses
+/// nothing to rounding; `G : AᵀA`, which is the same, loses all of a sliver whose steep direction A hardly sees. L
+/// comes from an orthogonalization of the weighted gradients in double precision, since G itself would lose as much.
 pub(super) fn metric_factor<R: Float>(tet: &TetConstraint<R>, weights: [R; 4]) -> [R; 6] {
     let q = tet.inverse_rest.map(R::to_f64);
     let stiffness = tet.stiffness.to_f64();

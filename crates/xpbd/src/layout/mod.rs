@@ -1,15 +1,16 @@
 //! [`Layout`]: the tets in the order and the grouping in which a processor solves them, several at a time.
 //!
 //! Clusters of one color share no particle, so as many of them as a processor has lanes are solved side by side: lane
-//! by lane the first tet of each, then the second. A *group* is such a set of clusters (`groups.rs`), a *block* one tet of
-//! each (`blocks.rs`). The grouping changes the order of work only, since each cluster sees only its own particles.
+//! by lane the first tet of each, then the second. A *group* is such a set of clusters (`groups.rs`), a *block* one tet
+//! of each (`blocks.rs`). The grouping changes the order of work only, since each cluster sees only its own particles.
 //!
-//! A layout is updated with its schedule (`update.rs`): groups keep their blocks, a changed cluster is moved from its lane
-//! to a free one, and a tet whose corners, rest shape or masses changed is marked and filled in again. So a frame after a
-//! cut costs what the cut touched. Another schedule, another material or a changed mass whose incident tets were not named
-//! rebuilds all.
+//! A layout is updated with its schedule (`update.rs`): groups keep their blocks, a changed cluster is moved from its
+//! lane to a free one, and a tet whose corners, rest shape or masses changed is marked and filled in again. So a frame
+//! after a cut costs what the cut touched. Another schedule, another material or a changed mass whose incident tets
+//! were not named rebuilds all.
 //!
-//! Cost: O(tets) to build, 80 bytes a tet in single precision; to update, O(changed clusters and marked tets), amortized.
+//! Cost: O(tets) to build, 80 bytes a tet in single precision; to update, O(changed clusters and marked tets),
+//! amortized.
 
 mod blocks;
 mod check;

@@ -89,8 +89,8 @@ impl Plan {
     }
 }
 
-/// A cut of 20 tets changes up to 20 clusters of 5 and makes 20 of 2, whatever the size of the body. What is formed
-/// anew now and then is less than that in the long run.
+/// A cut of 20 tets changes up to 20 clusters of 5 and makes 20 of 2, whatever the size of the body. What is rebuilt
+/// now and then is less than that in the long run.
 #[test]
 fn following_a_cut_costs_what_was_cut() {
     for clusters in [2_000, 20_000] {
@@ -108,8 +108,8 @@ fn following_a_cut_costs_what_was_cut() {
     }
 }
 
-/// Clusters that wander leave holes everywhere: colors are formed anew (the check proves that none is wasteful), and
-/// blocks without clusters do not pile up.
+/// Clusters that wander leave holes everywhere: colors are rebuilt (the check proves that none is wasteful), and blocks
+/// without clusters do not pile up.
 #[test]
 fn blocks_stay_well_used() {
     let clusters = 600;
@@ -137,7 +137,7 @@ fn blocks_stay_well_used() {
     }
     let last = plan.layout.blocks.len();
     assert!(last < 4 * first, "{last} blocks instead of {first}");
-    // A cluster that moves takes its five tets; forming anew costs no more than some times that.
+    // A cluster that moves takes its five tets; rebuilding colors costs no more than some times that.
     assert!(filled < 4 * 5 * 20 * rounds as usize, "{filled}");
 }
 
@@ -171,8 +171,8 @@ fn another_schedule_is_laid_out() {
     assert_eq!(plan.layout.update(&equal, LANES, true, ingredients), 250);
 }
 
-/// A sliver a hundred thousand times as wide as thick does not move along its thin direction, in which its gradients are
-/// that much longer. Computed as `G : AᵀA` in single precision, the sum was wrong by any factor, and even negative.
+/// A sliver a hundred thousand times as wide as thick does not move along its thin direction, in which its gradients
+/// are that much longer. Computed as `G : AᵀA` in single precision, the sum was wrong by any factor, and even negative.
 #[test]
 fn the_metric_factor_bears_slivers_in_single_precision() {
     let rubber = Material {

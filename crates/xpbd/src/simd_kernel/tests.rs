@@ -223,8 +223,8 @@ proptest! {
         }
     }
 
-    /// However far a tet is from rest and whatever the stiffness, a step of the split form does not raise its energy, up
-    /// to what three shortenings leave of a rise in one tet of a million.
+    /// However far a tet is from rest and whatever the stiffness, a step of the split form does not raise its energy,
+    /// up to what three shortenings leave of a rise in one tet of a million.
     #[test]
     fn a_step_far_from_rest_does_not_raise_the_energy(
         tets in tets(),
@@ -297,8 +297,8 @@ proptest! {
     }
 }
 
-/// Near the saddle of the shear energy, at `F = s` with `s⁴ - 2 s + 1 = 0`, and near a line, where the slope of the volume
-/// vanishes, the linearized zeros of the constraints are far away.
+/// Near the saddle of the shear energy, at `F = s` with `s⁴ - 2 s + 1 = 0`, and near a line, where the slope of the
+/// volume vanishes, the linearized zeros of the constraints are far away.
 #[test]
 fn no_corner_is_thrown_near_saddles_and_lines() {
     let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];

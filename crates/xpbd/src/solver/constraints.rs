@@ -49,10 +49,10 @@ impl<R: Float> Solver<R> {
     /// Attaches a particle, from where it is now, to a handle as that is now. A particle has one attachment: another
     /// one replaces the first.
     ///
-    /// `compliance` is one over the stiffness in m/N, 0 is rigid; `damping` is a time in s, by which the motion relative
-    /// to the handle is resisted times the stiffness (nothing with a compliance of 0). A fixed particle stays fixed. A
-    /// cut attaches copies like their originals, and a particle between two others if both are attached to the same handle; with
-    /// a compliance, each has a spring of its own.
+    /// `compliance` is one over the stiffness in m/N, 0 is rigid; `damping` is a time in s, by which the motion
+    /// relative to the handle is resisted times the stiffness (nothing with a compliance of 0). A fixed particle stays
+    /// fixed. A cut attaches copies like their originals, and a particle between two others if both are attached to the
+    /// same handle; with a compliance, each has a spring of its own.
     ///
     /// O(log n + attachments of higher particles).
     ///
@@ -140,7 +140,8 @@ impl<R: Float> Solver<R> {
     }
 
     /// Replaces all distance constraints; none at all takes neither memory nor time. They are solved after the tets of
-    /// each iteration, in the order of their own `schedule`, which a coloring of any kind may have made. O(constraints).
+    /// each iteration, in the order of their own `schedule`, which a coloring of any kind may have made.
+    /// O(constraints).
     ///
     /// A cut leaves them on their particles: a copy of a particle has none of them.
     ///

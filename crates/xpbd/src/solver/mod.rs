@@ -4,9 +4,9 @@
 //! given. Topology changes arrive as single edits (a new particle between two others, a copy, a tet replaced), each in
 //! constant time, and mark what the next step has to look at, so that a cut costs what it touches.
 //!
-//! A clone has all that decides what the next steps compute, to the bit: particles, tets, materials, constraints, what was
-//! kept for residuals. It leaves out what a step makes by itself: the layout, which is the largest part and follows from
-//! tets and schedule, and working memory. The first step of a clone lays the tets out, O(tets).
+//! A clone has all that decides what the next steps compute, to the bit: particles, tets, materials, constraints, what
+//! was kept for residuals. It leaves out what a step makes by itself: the layout, which is the largest part and follows
+//! from tets and schedule, and working memory. The first step of a clone lays the tets out, O(tets).
 
 mod constraints;
 
@@ -169,8 +169,8 @@ impl<R: Float> Solver<R> {
         self.note_tet(tet);
     }
 
-    /// Copies a tet with its material over another one; the copied tet stays, to be removed by [`Solver::truncate_tets`] or
-    /// replaced. O(1).
+    /// Copies a tet with its material over another one; the copied tet stays, to be removed by
+    /// [`Solver::truncate_tets`] or replaced. O(1).
     ///
     /// # Panics
     /// If one of them does not exist.
@@ -206,8 +206,8 @@ impl<R: Float> Solver<R> {
         self.tets.truncate(count);
     }
 
-    /// Removes the last particles until there are `count`, with their attachments; nothing happens if there are no more.
-    /// No tet and no other constraint may name them when the next step begins. O(particles removed).
+    /// Removes the last particles until there are `count`, with their attachments; nothing happens if there are no
+    /// more. No tet and no other constraint may name them when the next step begins. O(particles removed).
     pub fn truncate_particles(&mut self, count: usize) {
         self.particles.truncate(count);
         self.constraints.attachments.truncate(count);
@@ -301,8 +301,8 @@ impl<R: Float> Solver<R> {
         self.note(|changes| changes.attachments = true);
     }
 
-    /// Sets the mass of a particle in kg. A particle without mass does not move. The next step goes through all tets, since
-    /// those of the particle are not known: see [`Solver::set_mass_in_star`].
+    /// Sets the mass of a particle in kg. A particle without mass does not move. The next step goes through all tets,
+    /// since those of the particle are not known: see [`Solver::set_mass_in_star`].
     ///
     /// # Panics
     /// If the particle does not exist or the mass is negative or not finite.
@@ -437,8 +437,8 @@ impl<R: Float> Solver<R> {
         out.extend((0..self.particles.len()).map(|p| self.position(p)));
     }
 
-    /// The point in m that the solver keeps positions relative to, in its own precision. [`crate::Solver::step`] moves it
-    /// when the body has moved on by more than twice its size.
+    /// The point in m that the solver keeps positions relative to, in its own precision. [`crate::Solver::step`] moves
+    /// it when the body has moved on by more than twice its size.
     #[must_use]
     pub fn origin(&self) -> DVec3 {
         self.particles.origin
@@ -508,8 +508,8 @@ impl<R: Float> Solver<R> {
         }
     }
 
-    /// Prepares the state for a step of XPBD: a new origin for a body that has moved on, a little width for one on an exact
-    /// line; returns how many particles the latter moved.
+    /// Prepares the state for a step of XPBD: a new origin for a body that has moved on, a little width for one on an
+    /// exact line; returns how many particles the latter moved.
     pub(crate) fn prepare(&mut self) -> usize {
         self.recenter();
         jitter(&self.particles, &self.tets)

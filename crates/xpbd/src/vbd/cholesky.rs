@@ -2,9 +2,9 @@
 //!
 //! `A = L Lᵀ`, row by row, so that everything is a dot product of contiguous rows, summed in eight lanes whatever the
 //! machine: the bits are the same everywhere. A row is stored from its first entry on, since L has no entry before that
-//! of A: what is not coupled, such as the pieces of a body that was cut, costs as if each had a matrix of its own. A pivot
-//! that has vanished beside its diagonal belongs to an unknown that others already span (the turn of an aggregate on a
-//! line); it is left out.
+//! of A: what is not coupled, such as the pieces of a body that was cut, costs as if each had a matrix of its own. A
+//! pivot that has vanished beside its diagonal belongs to an unknown that others already span (the turn of an aggregate
+//! on a line); it is left out.
 //!
 //! Source: the envelope method after Jennings 1966. Cost: n³ / 6 multiplications for n coupled unknowns, n² to solve.
 

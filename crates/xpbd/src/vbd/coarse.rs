@@ -1,21 +1,22 @@
 //! [`Coarse`]: the affine motions of aggregates, their Galerkin matrix `Pᵀ A P` and its factor.
 //!
-//! An aggregate has twelve motions: `δx = u₀ + (r₁ u₁ + r₂ u₂ + r₃ u₃)` with r the place of the particle relative to the
-//! aggregate's center over its radius. They contain its turns, stretches and shears, of which bending and bulging of
-//! the body are made. A block of A between two particles contributes itself times the products of their r: no more
+//! An aggregate has twelve motions: `δx = u₀ + (r₁ u₁ + r₂ u₂ + r₃ u₃)` with r the place of the particle relative to
+//! the aggregate's center over its radius. They contain its turns, stretches and shears, of which bending and bulging
+//! of the body are made. A block of A between two particles contributes itself times the products of their r: no more
 //! than 16 scaled copies. The matrix of a connected piece is dense, because its aggregates are few.
 //!
-//! The factor is kept from one correction to the next until conjugate gradients converge at less than [`AGED`] of the rate
-//! that they had when it was new: a preconditioner need not be that of the present matrix, only symmetric and positive.
-//! Affine motions also stay what they are when the body turns. A cut changes neither aggregates nor factor: new particles
-//! join the aggregates of their neighbors, and all aggregates are grown again once the factor has aged. Cost: 36 operations
-//! a block, then a factorization of 12 unknowns an aggregate, only where the factor has aged.
+//! The factor is kept from one correction to the next until conjugate gradients converge at less than [`AGED`] of the
+//! rate that they had when it was new: a preconditioner need not be that of the present matrix, only symmetric and
+//! positive. Affine motions also stay what they are when the body turns. A cut changes neither aggregates nor factor:
+//! new particles join the aggregates of their neighbors, and all aggregates are grown again once the factor has aged.
+//! Cost: 36 operations a block, then a factorization of 12 unknowns an aggregate, only where the factor has aged.
 
 use super::cholesky::Cholesky;
 use super::matrix::Blocks;
 use crate::Float;
 
-/// A factor is stale when conjugate gradients converge at less than this part of the rate that they had when it was new.
+/// A factor is stale when conjugate gradients converge at less than this part of the rate that they had when it was
+/// new.
 const AGED: f64 = 0.75;
 
 /// Iterations from which the rate of convergence of a solution is judged: fewer say nothing about the factor.
@@ -85,8 +86,8 @@ impl Coarse {
         self.worn
     }
 
-    /// Follows another order of the particles, of which some are new: these join aggregates of their neighbors, with the
-    /// mean of their motions. O(blocks).
+    /// Follows another order of the particles, of which some are new: these join aggregates of their neighbors, with
+    /// the mean of their motions. O(blocks).
     pub(super) fn follow<R: Float>(&mut self, old: &[u32], new: &[u32], matrix: &Blocks<R>) {
         self.worn = true;
         let mut before = vec![(NONE, [0.0; VECTORS]); new.len()];

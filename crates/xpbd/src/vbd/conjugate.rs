@@ -3,9 +3,9 @@
 //! The preconditioner is one symmetric cycle: a Gauss-Seidel sweep over the rows in the colors of the stars, the
 //! coarse correction, and a sweep backwards. Dot products are summed in double precision, row after row.
 //!
-//! Each iteration lowers the energy `x·Ax/2 - b·x` by a gain that is at hand, and the gains of all iterations together are
-//! the energy between start and solution. So the last few gains tell what is left, which the residual does not where rows
-//! of very different stiffness meet.
+//! Each iteration lowers the energy `x·Ax/2 - b·x` by a gain that is at hand, and the gains of all iterations together
+//! are the energy between start and solution. So the last few gains tell what is left, which the residual does not
+//! where rows of very different stiffness meet.
 //!
 //! Source of the estimate: Hestenes, Stiefel 1952; Strakoš, Tichý 2002.
 //! Cost of an iteration: three products, and a coarse solution.
@@ -190,8 +190,8 @@ impl<R: Float> Conjugate<R> {
     }
 }
 
-/// Solves each row of a color for its own unknown. It sees the colors before its own and, on the way back, those after it;
-/// no two rows of a color are coupled.
+/// Solves each row of a color for its own unknown. It sees the colors before its own and, on the way back, those after
+/// it; no two rows of a color are coupled.
 fn relax<R: Float>(
     matrix: &Blocks<R>,
     inverses: &[Block<R>],
@@ -217,8 +217,8 @@ fn relax<R: Float>(
         });
 }
 
-/// The inverse of a symmetric block, in double precision and with the last digits of its trace added to the diagonal, so that it
-/// is as positive as the block was before rounding; zero if it has none or the row is held.
+/// The inverse of a symmetric block, in double precision and with the last digits of its trace added to the diagonal,
+/// so that it is as positive as the block was before rounding; zero if it has none or the row is held.
 fn inverse<R: Float>(block: &Block<R>, held: bool) -> Block<R> {
     let columns = block.map(R::to_dvec3);
     let trace = columns[0].x + columns[1].y + columns[2].z;

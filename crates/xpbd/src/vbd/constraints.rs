@@ -1,25 +1,25 @@
 //! [`ConstraintTerms`]: distances, volumes and soft attachments as energies of the incremental potential.
 //!
-//! A constraint C of compliance α has the energy `C² / 2α`; one that is one-sided has it for `C > 0` only. With a damping
-//! time τ the step dissipates `τ / (2α Δt) (C - Cₙ)²`, with `Cₙ` at the start of the substep. Both together are one
-//! quadratic `K/2 (C - s)²` with `K = (1 + τ/Δt) / α` and `s = Cₙ τ / (τ + Δt)`. A one-sided constraint takes the positive
-//! part of `Cₙ`, so it never pushes.
+//! A constraint C of compliance α has the energy `C² / 2α`; one that is one-sided has it for `C > 0` only. With a
+//! damping time τ the step dissipates `τ / (2α Δt) (C - Cₙ)²`, with `Cₙ` at the start of the substep. Both together are
+//! one quadratic `K/2 (C - s)²` with `K = (1 + τ/Δt) / α` and `s = Cₙ τ / (τ + Δt)`. A one-sided constraint takes the
+//! positive part of `Cₙ`, so it never pushes.
 //!
 //! A constraint that is hard (α = 0) or stiffer than a penalty k is solved by the method of multipliers: the energy is
 //! `(C - s + λ/k)² / 2 (α + 1/k)`, and after every iteration of the substep the multiplier becomes
 //! `λ = (C - s + λ/k) / (α + 1/k)`. What converges is C, to `s - α λ`; one round divides what is left by about one plus
 //! k over the stiffness that the bodies oppose to it. The penalty is a multiple of the stiffness and inertia of the
-//! constraint's particles, so a sweep does not stall on it. Multipliers start from 0 in each substep: carried over, they
-//! let slow vibrations of long chains grow.
+//! constraint's particles, so a sweep does not stall on it. Multipliers start from 0 in each substep: carried over,
+//! they let slow vibrations of long chains grow.
 //!
-//! Along one particle volumes and attachments are quadratic. A distance is not: a particle takes three Newton steps with
-//! the geometric term clamped at 0; if they raise the energy of its star, it takes one step with a quadratic that bounds
-//! the energy from above (`K |x|² / 2` in place of the distance, since the length is convex). The energy of a distance
-//! under tension has a kink where its particles coincide; there a particle moves only if the other forces exceed the
-//! tension. So no sweep raises the potential.
+//! Along one particle volumes and attachments are quadratic. A distance is not: a particle takes three Newton steps
+//! with the geometric term clamped at 0; if they raise the energy of its star, it takes one step with a quadratic that
+//! bounds the energy from above (`K |x|² / 2` in place of the distance, since the length is convex). The energy of a
+//! distance under tension has a kink where its particles coincide; there a particle moves only if the other forces
+//! exceed the tension. So no sweep raises the potential.
 //!
-//! Source: method of multipliers after Hestenes 1969 and Powell 1969; in VBD after Giles, Diaz, Yuksel 2025 (without their
-//! ramps). Cost: 60 operations a distance and particle and Newton step, 150 a volume, 10 an attachment.
+//! Source: method of multipliers after Hestenes 1969 and Powell 1969; in VBD after Giles, Diaz, Yuksel 2025 (without
+//! their ramps). Cost: 60 operations a distance and particle and Newton step, 150 a volume, 10 an attachment.
 
 use glam::DVec3;
 use incise_graph::Incidence;
@@ -185,7 +185,8 @@ impl<R: Float> Local<R> {
         solve(self.isotropic, self.h, self.force)
     }
 
-    /// The minimum along the force of the quadratic plus `tension · |step|`: 0 if the force does not exceed the tension.
+    /// The minimum along the force of the quadratic plus `tension · |step|`: 0 if the force does not exceed the
+    /// tension.
     fn solve_against(&self, tension: R) -> R::Vector {
         let size = R::dot(self.force, self.force).sqrt();
         if size > tension {
@@ -381,7 +382,8 @@ impl<R: Float> ConstraintTerms<R> {
         }
     }
 
-    /// What a constraint is in a substep: `value` at its start, `slope_squared` the square of a gradient at one particle.
+    /// What a constraint is in a substep: `value` at its start, `slope_squared` the square of a gradient at one
+    /// particle.
     fn spring<const K: usize>(
         &self,
         constraint: &impl ScalarConstraint<f64, K>,
@@ -695,8 +697,8 @@ impl<R: Float> ConstraintTerms<R> {
         local.force
     }
 
-    /// Adds force and blocks of the constraints of the particle at a place of the order; `columns` are those of its row,
-    /// the diagonal first.
+    /// Adds force and blocks of the constraints of the particle at a place of the order; `columns` are those of its
+    /// row, the diagonal first.
     pub(super) fn add_row(
         &self,
         solver: &Solver<R>,

@@ -30,8 +30,8 @@ use crate::{Float, Solver, XpbdError};
 pub struct CoarseCorrectionSettings {
     /// Iterations of conjugate gradients, at most.
     pub iterations: u32,
-    /// Ends them once the distance to the solution of the linear system, in the norm of the energy, is estimated to have
-    /// fallen to this part.
+    /// Ends them once the distance to the solution of the linear system, in the norm of the energy, is estimated to
+    /// have fallen to this part.
     pub reduction: f64,
     /// Particles of an aggregate before all cuts, about: see [`CoarseCorrection::new`].
     pub aggregate: usize,
@@ -55,9 +55,9 @@ pub struct CoarseCorrectionReport {
     pub iterations: u32,
     /// The part of the direction that was taken; 0 if no part of it lowers the potential.
     pub taken: f64,
-    /// The distance to the solution after the correction, as a part of the state's own energy: the root of the energy that
-    /// is estimated to be left to gain over that of the tets and 3e-5 of that of the motion. Infinite for a
-    /// state without energy that is no solution.
+    /// The distance to the solution after the correction, as a part of the state's own energy: the root of the energy
+    /// that is estimated to be left to gain over that of the tets and 3e-5 of that of the motion. Infinite for a state
+    /// without energy that is no solution.
     pub error: f64,
 }
 
@@ -81,8 +81,8 @@ impl Search {
     }
 }
 
-/// The weight of the energy of the motion in the measure of an error: what is lost of a motion in one step adds up in the
-/// steps to come.
+/// The weight of the energy of the motion in the measure of an error: what is lost of a motion in one step adds up in
+/// the steps to come.
 const MOTION: f64 = 3e-5;
 
 /// Matrix, aggregates and vectors of a correction. It belongs to the stars it was made of.
@@ -173,8 +173,8 @@ impl<R: Float> CoarseCorrection<R> {
     }
 
     /// Follows stars that were rebuilt, after a cut for example. Particles keep their aggregates, new ones join those
-    /// around them, and the factor stays in use. When it has aged, aggregates are grown again, as many in all: larger ones where
-    /// cuts have made more particles. O(pairs).
+    /// around them, and the factor stays in use. When it has aged, aggregates are grown again, as many in all: larger
+    /// ones where cuts have made more particles. O(pairs).
     pub fn follow(&mut self, stars: &VertexStars<R>) {
         let old = std::mem::replace(&mut self.order, stars.order.clone());
         self.matrix.follow(stars);
@@ -301,8 +301,9 @@ impl<R: Float> ImplicitStep<'_, R> {
             ..
         } = &*self.solver;
         constraints.colliders.project(particles);
-        // A full step on a quadratic gains half of the slope, and leaves what the iteration left. Where a new matrix misses
-        // the gain by a part, the square of that part is left; where that of an earlier state does, at most the part.
+        // A full step on a quadratic gains half of the slope, and leaves what the iteration left. Where a new matrix
+        // misses the gain by a part, the square of that part is left; where that of an earlier state does, at most the
+        // part.
         let expected = 0.5 * slope.max(0.0);
         let mismatch = if expected > start.rounding {
             (1.0 - gain / expected).abs()
@@ -342,8 +343,8 @@ impl<R: Float> ImplicitStep<'_, R> {
         Some(sums)
     }
 
-    /// Puts parts whose potential was `before` back to `base` if it has risen. The length of a step is chosen for the whole
-    /// body, in which a crumb that gains energy does not count; gaining a little in each frame it would fly away.
+    /// Puts parts whose potential was `before` back to `base` if it has risen. The length of a step is chosen for the
+    /// whole body, in which a crumb that gains energy does not count; gaining a little in each frame it would fly away.
     fn take_back_risen_parts(&self, before: &[f64], rounding: f64, base: &[R::Vector]) {
         let mut after = vec![0.0; before.len()];
         self.add_potentials(&mut after);

@@ -1,12 +1,13 @@
 //! The second derivatives of the potential, made positive semidefinite without a decomposition of F.
 //!
 //! In F the energy density over μ has the Hessian `I + l c cᵀ + p ∂²J` with `J = det F`, `c = ∂J/∂F`, l in units of μ
-//! and `p = l (J - γ)`. Only `∂²J` is indefinite. With the singular values σ of F its eigenvalues are `±σᵢ` and the three
-//! roots λ of `λ³ - |F|² λ - 2J`, the latter in the space of stretches, where c lies. So p is held
+//! and `p = l (J - γ)`. Only `∂²J` is indefinite. With the singular values σ of F its eigenvalues are `±σᵢ` and the
+//! three roots λ of `λ³ - |F|² λ - 2J`, the latter in the space of stretches, where c lies. So p is held
 //! - below `1 / y`, with -y the smallest root: it is the lowest eigenvalue of all;
-//! - above `-1 / σ_max`, for the sake of the `±σᵢ`. Of the stretches at most one is then negative, and `l c cᵀ` makes up
-//!   for it if and only if the determinant on that space, `1 - p² |F|² + 2 p³ J + l (|c|² - 2 p J |F|² + 3 p² J²)`, is
-//!   not negative. If it is (a tet pressed nearly flat or inside out), p is held above `-1 / z` with z the largest root.
+//! - above `-1 / σ_max`, for the sake of the `±σᵢ`. Of the stretches at most one is then negative, and `l c cᵀ` makes
+//!   up for it if and only if the determinant on that space, `1 - p² |F|² + 2 p³ J + l (|c|² - 2 p J |F|² + 3 p² J²)`,
+//!   is not negative. If it is (a tet pressed nearly flat or inside out), p is held above `-1 / z` with z the largest
+//!   root.
 //!
 //! At rest `p = -1` is just the second bound, so nothing is changed there: a turn of the whole has no stiffness, and
 //! Newton's method is Newton's.

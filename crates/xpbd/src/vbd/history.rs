@@ -1,9 +1,9 @@
 //! [`History`]: what BDF2 remembers of each particle, and how it turns a substep into one of implicit Euler.
 //!
 //! BDF2 asks for `3 x₁ - 4 x₀ + x₋₁ = 2 Δt v₁` and the like for v. With `τ = 2 Δt / 3`, `w = (x₀ - x₋₁) / Δt` and
-//! `x' = x₀ + w Δt / 3`, `v' = v₀ + (v₀ - v₋₁) / 3` that is `x₁ = x' + τ v₁` and `v₁ = v' + τ a₁`: an implicit Euler substep
-//! of length τ from other positions and velocities. After it `w` becomes `(2 v₁ + w) / 3`, so no positions are kept, whose
-//! rounding over a short substep would show.
+//! `x' = x₀ + w Δt / 3`, `v' = v₀ + (v₀ - v₋₁) / 3` that is `x₁ = x' + τ v₁` and `v₁ = v' + τ a₁`: an implicit Euler
+//! substep of length τ from other positions and velocities. After it `w` becomes `(2 v₁ + w) / 3`, so no positions are
+//! kept, whose rounding over a short substep would show.
 //!
 //! A substep without a history is split into [`STARTUP_SUBSTEPS`] substeps of implicit Euler: a single one would cost a
 //! spinning body a part of `(ω Δt)²` of its angular momentum. Cost: a pass over the particles before and after each
@@ -83,7 +83,8 @@ impl<R: Float> History<R> {
         self.particles.clear();
     }
 
-    /// The number of implicit Euler substeps that replace the next substep of length `time`: `None` if it has a history.
+    /// The number of implicit Euler substeps that replace the next substep of length `time`: `None` if it has a
+    /// history.
     pub(super) fn startup_substeps(&self, time: f64) -> Option<u32> {
         let has_history = !self.particles.is_empty() && self.time.to_bits() == time.to_bits();
         (!has_history).then_some(STARTUP_SUBSTEPS)
@@ -101,9 +102,9 @@ impl<R: Float> History<R> {
         self.particles.extend(before);
     }
 
-    /// Moves particles and velocities to where an implicit Euler substep starts that does what BDF2 does, and returns the
-    /// length of that substep: 2/3 of `time`. Such a substep adds all of `time` times gravity to velocities, of which a
-    /// third is taken off here.
+    /// Moves particles and velocities to where an implicit Euler substep starts that does what BDF2 does, and returns
+    /// the length of that substep: 2/3 of `time`. Such a substep adds all of `time` times gravity to velocities, of
+    /// which a third is taken off here.
     ///
     /// New particles, and those whose velocity was changed since, are taken to have moved steadily.
     pub(super) fn begin(

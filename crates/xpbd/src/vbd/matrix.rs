@@ -1,8 +1,8 @@
 //! [`Blocks`]: the matrix of a Newton step, one 3×3 block for each pair of particles with a common tet.
 //!
 //! Rows and columns follow the solving order of the stars, so colors are contiguous and rows are filled from the terms,
-//! every row by itself: no two threads write the same block, and each sum has one order. What is right of the diagonal is
-//! copied from the left. Cost: 9 numbers an edge and direction; a product is twice as many operations as numbers.
+//! every row by itself: no two threads write the same block, and each sum has one order. What is right of the diagonal
+//! is copied from the left. Cost: 9 numbers an edge and direction; a product is twice as many operations as numbers.
 
 use std::ops::Range;
 

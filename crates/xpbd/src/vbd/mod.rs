@@ -5,15 +5,16 @@
 //! Neo-Hookean energy `Σ V (μ/2 |F|² + l/2 (det F - γ)²)`. A sweep visits the particles in the colors of a particle
 //! coloring and puts each into the minimum of `E` over its own position, all others held.
 //!
-//! That minimum is exact, not a Newton step towards it: `|F|²` is quadratic in a position and `det F` is *linear* in it,
-//! so along one particle `E` is a convex quadratic with the matrix
+//! That minimum is exact, not a Newton step towards it: `|F|²` is quadratic in a position and `det F` is *linear* in
+//! it, so along one particle `E` is a convex quadratic with the matrix
 //! `(m / Δt² + Σ μV |q|²) I + Σ lV (cof F q) (cof F q)ᵀ` (q the gradient of the particle's barycentric coordinate; the
 //! sum runs over its tets). So no sweep raises the potential, whatever the stiffness, the step and the deformation, and
 //! no line search is needed: nothing can overshoot. With over-relaxation by ω from 0 to 2 the same holds, because a
 //! quadratic falls by `ω (2 - ω)` of the most it can.
 //!
 //! Sweeps damp what varies from tet to tet and hardly touch what varies over the body, the more so the stiffer
-//! it is. [`CoarseCorrection`] adds a truncated Newton step for the whole body, preconditioned by aggregates of particles.
+//! it is. [`CoarseCorrection`] adds a truncated Newton step for the whole body, preconditioned by aggregates of
+//! particles.
 //!
 //! Source: Chen, Liu, Yang, Yuksel 2024 (vertex block VBD). Cost: see [`VertexStars`] and [`ImplicitStep::sweep`].
 

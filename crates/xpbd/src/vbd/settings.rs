@@ -8,15 +8,15 @@ pub enum Guess {
     /// Where the particles would be if they were free: exact in free fall.
     #[default]
     Inertia,
-    /// As if gravity were what it seemed to be in the last substep, between none of it and all: a body that lies or
-    /// hangs starts where it is. Keeps the velocities of a substep.
+    /// Where free particles would be if gravity were what it seemed to be in the last substep, between none of it and
+    /// all: a body that lies or hangs starts where it is. Keeps the velocities of a substep.
     ///
-    /// Each connected part of the body then starts on the line from a safe start to that guess, where its potential is at most
-    /// that of the safe start: where the part was, or moved rigidly with its momentum if nothing holds it.
+    /// Each connected part of the body then starts on the line from a safe start to that guess, where its potential is
+    /// at most that of the safe start: where the part was, or moved rigidly with its momentum if nothing holds it.
     ///
-    /// With an accuracy, parts of a body that something holds also start nearer to where they were, as far as that lowers
-    /// the potential, if the energy of their motion is below the error allowed: what a substep leaves over
-    /// would otherwise come back twice as large in the next one.
+    /// With an accuracy, parts of a body that something holds also start nearer to where they were, as far as that
+    /// lowers the potential, if the energy of their motion is below the error allowed: what a substep leaves over would
+    /// otherwise come back twice as large in the next one.
     ///
     /// Source: Chen et al. 2024, section 3.7, for gravity.
     Adaptive,
@@ -32,8 +32,8 @@ pub enum Integrator {
     /// The backward differentiation formula of two steps (BDF2), second order and as stable: the factor is
     /// `exp(-4 π⁴ (Δt / T)³)`. Keeps three vectors a particle; costs a pass over the particles.
     ///
-    /// The first substep, and each that has another length than the one before, is one of implicit Euler. A particle whose
-    /// velocity was changed from outside or that touches a collider is taken to have moved steadily before.
+    /// The first substep, and each that has another length than the one before, is one of implicit Euler. A particle
+    /// whose velocity was changed from outside or that touches a collider is taken to have moved steadily before.
     ///
     /// Source: Curtiss and Hirschfelder 1952; Hairer, Wanner 1996, section III.3.
     Bdf2,

@@ -38,7 +38,8 @@ pub struct VertexStars<R: Float> {
     pub(super) size: f64,
     /// Velocities a substep ago, kept only for [`super::Guess::Adaptive`].
     pub(super) earlier: Vec<R::Vector>,
-    /// Whether a start nearer to the last positions may save work: since a step was not calm, until such a start does not help.
+    /// Whether a start nearer to the last positions may save work: since a step was not calm, until such a start does
+    /// not help.
     pub(super) try_start: bool,
     /// The smallest particle of each particle's connected part of the body, if known.
     pub(super) parts: Vec<u32>,
@@ -76,8 +77,8 @@ impl<R: Float> VertexStars<R> {
         Ok(stars)
     }
 
-    /// Rebuilds the stars in place after tets have changed, given the [`Solver::star_incidence`] of the present tets; memory
-    /// is used again. O(tets).
+    /// Rebuilds the stars in place after tets have changed, given the [`Solver::star_incidence`] of the present tets;
+    /// memory is used again. O(tets).
     ///
     /// # Errors
     /// Those of [`VertexStars::new`]; nothing has changed then.
@@ -160,7 +161,8 @@ impl<R: Float> VertexStars<R> {
         &self.terms[self.offsets[place]..self.offsets[place + 1]]
     }
 
-    /// The smallest particle of each particle's connected part of the body. O(tets), but nothing while the stars stay the same.
+    /// The smallest particle of each particle's connected part of the body. O(tets), but nothing while the stars stay
+    /// the same.
     pub(super) fn parts(&mut self, solver: &Solver<R>) -> &[u32] {
         if self.parts.len() != self.order.len() {
             let mut sets = DisjointSets::new(self.order.len());
@@ -202,8 +204,8 @@ impl<R: Float> VertexStars<R> {
 }
 
 impl<R: Float> Solver<R> {
-    /// The tets, distances and volume constraints that each particle belongs to. Particle p is constraint p of the result;
-    /// its particles are the tets, then the distances, then the volume constraints. Color and schedule this for
+    /// The tets, distances and volume constraints that each particle belongs to. Particle p is constraint p of the
+    /// result; its particles are the tets, then the distances, then the volume constraints. Color and schedule this for
     /// [`VertexStars`]: particles of one color share none of them. O(tets + constraints).
     ///
     /// # Panics

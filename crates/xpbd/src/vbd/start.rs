@@ -1,12 +1,12 @@
 //! [`Guess::Adaptive`](super::Guess::Adaptive): where the sweeps of a substep start.
 //!
-//! Sweeps that do not converge keep much of what they start with, so the start decides how a stiff body moves. The inertial
-//! guess `x + Δt v` can hold any energy: with slivers it inverts tets by multiples of their height, and descent from there
-//! ends in a tangle above the energy that the body had. Each connected part of a body therefore starts on the line from a
-//! safe start to that guess, nowhere above the potential of the safe start. That is where the part was; for a part
-//! that nothing holds, the rigid motion with its momentum and angular momentum. From `E(x) ≤ E(x_n)` follows
-//! `½ ‖v_{n+1} - v_n‖²_M + U(x_{n+1}) ≤ ½ ‖v_n‖²_M + U(x_n)` for implicit Euler, at any stiffness and after any number of
-//! sweeps. Cost: two to four evaluations of the potential, about half a sweep each.
+//! Sweeps that do not converge keep much of what they start with, so the start decides how a stiff body moves. The
+//! inertial guess `x + Δt v` can hold any energy: with slivers it inverts tets by multiples of their height, and
+//! descent from there ends in a tangle above the energy that the body had. Each connected part of a body therefore
+//! starts on the line from a safe start to that guess, nowhere above the potential of the safe start. That is where the
+//! part was; for a part that nothing holds, the rigid motion with its momentum and angular momentum. From
+//! `E(x) ≤ E(x_n)` follows `½ ‖v_{n+1} - v_n‖²_M + U(x_{n+1}) ≤ ½ ‖v_n‖²_M + U(x_n)` for implicit Euler, at any
+//! stiffness and after any number of sweeps. Cost: two to four evaluations of the potential, about half a sweep each.
 
 use glam::{DMat3, DQuat, DVec3};
 
@@ -15,8 +15,8 @@ use crate::constraints::outside;
 use crate::float::{finite, load, store, weight};
 use crate::{Float, Solver};
 
-/// The part of an accuracy that a substep may use up in which a free part starts from its rigid motion: what is left over
-/// then has the same direction in every substep and adds up. Measured: without it up to 1.65 times the accuracy.
+/// The part of an accuracy that a substep may use up in which a free part starts from its rigid motion: what is left
+/// over then has the same direction in every substep and adds up. Measured: without it up to 1.65 times the accuracy.
 const RIGID_START_SHARE: f64 = 0.5;
 
 impl<R: Float> ImplicitStep<'_, R> {
@@ -235,8 +235,9 @@ impl<R: Float> ImplicitStep<'_, R> {
         }
     }
 
-    /// Takes parts of the body that are held back toward where they were, as far as the potential falls, if the energy of
-    /// their motion is below the error that is allowed: a motion that small is mostly what the last substep left over.
+    /// Takes parts of the body that are held back toward where they were, as far as the potential falls, if the energy
+    /// of their motion is below the error that is allowed: a motion that small is mostly what the last substep left
+    /// over.
     ///
     /// Parts that nothing holds keep their velocity: a crumb that falls beside a strained body has little energy too.
     ///
@@ -281,7 +282,8 @@ impl<R: Float> ImplicitStep<'_, R> {
     }
 }
 
-/// The lowest point in 0 .. 1 of the parabola with the values `none` at 0, `half` at 1/2 and `whole` at 1; 0 if it has none.
+/// The lowest point in 0 .. 1 of the parabola with the values `none` at 0, `half` at 1/2 and `whole` at 1; 0 if it has
+/// none.
 fn lowest_of_parabola(none: f64, half: f64, whole: f64) -> f64 {
     let curvature = 4.0 * (none - 2.0 * half + whole);
     let slope = 4.0 * half - 3.0 * none - whole;

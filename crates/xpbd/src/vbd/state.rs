@@ -58,8 +58,8 @@ impl<R: Float> ImplicitStep<'_, R> {
         }
     }
 
-    /// Adds the potential of each connected part of the body, in J, to the sum of the part's smallest particle. The parts
-    /// must be known.
+    /// Adds the potential of each connected part of the body, in J, to the sum of the part's smallest particle. The
+    /// parts must be known.
     pub(super) fn add_potentials(&self, sums: &mut [f64]) {
         let solver = &*self.solver;
         let parts = &*self.stars.parts;
@@ -125,9 +125,9 @@ impl<R: Float> ImplicitStep<'_, R> {
         0.5 * per_time_squared * each.sum::<f64>()
     }
 
-    /// The forces in N that are left over, `M (x̃ - x) / Δt² - ∇U(x)` with the energy U of tets, damping and constraints;
-    /// zero in the solution. Those on particles that do
-    /// not move, and what a collider bears that a particle touches, are zero as well.
+    /// The forces in N that are left over, `M (x̃ - x) / Δt² - ∇U(x)` with the energy U of tets, damping and
+    /// constraints; zero in the solution. Those on particles that do not move, and what a collider bears that a
+    /// particle touches, are zero as well.
     pub fn forces(&self, out: &mut Vec<DVec3>) {
         self.forces_at(&|p| self.solver.particles.local(p), out);
     }

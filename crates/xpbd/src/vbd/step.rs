@@ -9,7 +9,7 @@ use crate::{Float, Solver, StepReport, StepSettings, XpbdError};
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct VbdReport {
-    /// As in [`StepReport::repaired`].
+    /// Particles put back where they were, see [`StepReport::repaired`].
     pub repaired: usize,
     /// Iterations made, over all substeps.
     pub iterations: u32,
@@ -85,8 +85,8 @@ pub(super) struct Substep {
     is_startup: bool,
 }
 
-/// One substep of VBD between its prediction and its end, for those who choose themselves what to do in it, or
-/// want to look at it while it converges.
+/// One substep of VBD between its prediction and its end, for callers that choose what to do in it or look at it while
+/// it converges.
 ///
 /// The positions of the solver are the iterate. Velocities follow only in [`ImplicitStep::finish`]: a step dropped
 /// before that leaves the solver with velocities that do not belong to its positions.
@@ -232,8 +232,8 @@ impl<'a, R: Float> ImplicitStep<'a, R> {
     }
 
     /// Brings the multipliers of hard constraints to the forces that these exert at the present positions, as
-    /// [`Solver::step_vbd`] does after each iteration; nothing happens without hard constraints. It changes the potential
-    /// and the forces, which are zero only where the constraints are met as well.
+    /// [`Solver::step_vbd`] does after each iteration; nothing happens without hard constraints. It changes the
+    /// potential and the forces, which are zero only where the constraints are met as well.
     pub fn update_multipliers(&mut self) {
         self.stars.constraints.update_multipliers(self.solver);
     }

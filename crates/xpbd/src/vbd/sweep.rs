@@ -138,9 +138,9 @@ impl<R: Float> Sweep<R> {
 /// Solves `(isotropic I + h) y = force` with h symmetric, positive semidefinite and given as xx, xy, xz, yy, yz, zz.
 ///
 /// Gaussian elimination without square roots. No pivot of such a matrix is smaller than its isotropic part; where
-/// rounding says otherwise, it is noise. Rounding acts like a matrix of some last digits of the trace, which beside a sliver can be
-/// stiffer than everything else: a solution that lives on it is shortened, so that the quadratic with this matrix and force
-/// does not rise along it.
+/// rounding says otherwise, it is noise. Rounding acts like a matrix of some last digits of the trace, which beside a
+/// sliver can be stiffer than everything else: a solution that lives on it is shortened, so that the quadratic with
+/// this matrix and force does not rise along it.
 #[inline]
 pub(super) fn solve<R: Float>(isotropic: R, h: [R; 6], force: R::Vector) -> R::Vector {
     let [f0, f1, f2] = R::components(force);

@@ -1,14 +1,15 @@
 //! [`Viscosity`]: the damping of materials as a dissipation potential of the substep.
 //!
-//! With `Fₙ` the deformation gradient at the start of the substep and `dF = F - Fₙ`, a tet of volume V and damping time τ
-//! dissipates `R = τ V / Δt (μ |D|² + λ/2 j²)` with the rate of Green's strain `D = sym(Fₙᵀ dF)` and the rate of volume
-//! `j = cof Fₙ : dF`. It is the stiffness of linear elasticity times τ: a Kelvin-Voigt viscosity. It is convex, its
-//! gradient vanishes where nothing has moved, so an equilibrium stays where it is, and a rigid motion costs nothing to
-//! first order. A vibration of angular frequency ω loses the fraction `τ ω / 2` of critical damping.
+//! With `Fₙ` the deformation gradient at the start of the substep and `dF = F - Fₙ`, a tet of volume V and damping time
+//! τ dissipates `R = τ V / Δt (μ |D|² + λ/2 j²)` with the rate of Green's strain `D = sym(Fₙᵀ dF)` and the rate of
+//! volume `j = cof Fₙ : dF`. It is the stiffness of linear elasticity times τ: a Kelvin-Voigt viscosity. It is convex,
+//! its gradient vanishes where nothing has moved, so an equilibrium stays where it is, and a rigid motion costs nothing
+//! to first order. A vibration of angular frequency ω loses the fraction `τ ω / 2` of critical damping.
 //!
-//! R is quadratic in the positions, so it is one matrix for the whole substep: with `Bₖ = Fₙ qₖ` and `cₖ = cof Fₙ qₖ` for
-//! the gradients q of the barycentric coordinates, its blocks are
-//! `τ V / Δt (μ (qₖ·qₘ) Fₙ Fₙᵀ + μ Bₘ Bₖᵀ + λ cₖ cₘᵀ)`. They are assembled once a substep, and a sweep multiplies a row.
+//! R is quadratic in the positions, so it is one matrix for the whole substep: with `Bₖ = Fₙ qₖ` and `cₖ = cof Fₙ qₖ`
+//! for the gradients q of the barycentric coordinates, its blocks are
+//! `τ V / Δt (μ (qₖ·qₘ) Fₙ Fₙᵀ + μ Bₘ Bₖᵀ + λ cₖ cₘᵀ)`. They are assembled once a substep, and a sweep multiplies a
+//! row.
 //!
 //! Source: Kelvin-Voigt solid; Rayleigh damping on the strain rate after Brown, Overby, Forootaninia, Narain 2018.
 //! Cost: a matrix with the pattern of the mesh, only where a material is damped; filling it is some ten sweeps, then a

@@ -57,7 +57,7 @@ fn held_exactly<R: Real>() {
         }
     }
     assert_eq!(solver.handle_of(held[0]), Some(handle));
-    // Let go they keep the velocity that they had, and fall.
+    // Released, they keep the velocity that they had, and fall.
     let p = held[0];
     let velocity = solver.velocity(p);
     assert!(velocity.length() > 0.01);
@@ -283,7 +283,7 @@ fn a_pose_out_of_range_is_reported() {
     assert_eq!(solver.position(0), DVec3::ONE);
 }
 
-/// The same bits on any number of threads: attachments are solved in parallel, 4096 at a time.
+/// Attachments are solved in parallel, 4096 at a time, with the same bits on any number of threads.
 #[test]
 fn threads_do_not_change_a_bit() {
     let run = |threads: usize| {

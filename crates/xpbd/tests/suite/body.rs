@@ -73,11 +73,11 @@ pub(crate) fn frames(time: f64, settings: &StepSettings) -> usize {
 pub(crate) enum Method {
     /// Colored Gauss-Seidel, both constraints of a tet at once.
     GaussSeidel,
-    /// The same, one after the other.
+    /// Colored Gauss-Seidel, the constraints of a tet one after the other.
     Sequential,
     /// Corrections added up, the paper's relaxation.
     Jacobi,
-    /// The same, extrapolated.
+    /// Corrections added up, the paper's relaxation, extrapolated.
     Chebyshev,
 }
 

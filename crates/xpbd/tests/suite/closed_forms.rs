@@ -83,8 +83,8 @@ fn force_inside(distance: f64) -> f64 {
     forces.fold(0.0, f64::max) / (RUBBER.young_modulus / 16.0)
 }
 
-/// An affine stretch of any mesh has the same stress everywhere and so no force on an inner particle: what is left is of
-/// the order of kappa, measured 8e-8. A thousandth of an edge from there the force is 3e-2.
+/// An affine stretch of any mesh has the same stress everywhere and so no force on an inner particle: what is left is
+/// of the order of kappa, measured 8e-8. A thousandth of an edge from there the force is 3e-2.
 #[test]
 fn an_affine_stretch_leaves_no_force_inside() {
     within("affine", force_inside(0.0), 1e-6);
@@ -110,8 +110,8 @@ fn a_patch_comes_to_rest_where_it_should() {
 /// A bar of square section drawn to `stretch` times its length, its ends free to narrow: the relative errors of its
 /// width and of the pull on its end where it comes to rest.
 ///
-/// With width t the side is free of stress, `μ t + l (J - γ) s t = 0`, so `J = γ - μ / (l s)` and `t² = J / s`; the pull
-/// on the unit area is `μ s + l (J - γ) t²`.
+/// With width t the side is free of stress, `μ t + l (J - γ) s t = 0`, so `J = γ - μ / (l s)` and `t² = J / s`; the
+/// pull on the unit area is `μ s + l (J - γ) t²`.
 fn drawn<R: Real>(poisson_ratio: f64, stretch: f64, kappa: f64) -> [f64; 2] {
     const WIDTH: f64 = 0.5;
     let mesh = kuhn_box([4, 2, 2], dvec3(1.0, WIDTH, WIDTH));

@@ -6,7 +6,7 @@ use incise_xpbd::StepSettings;
 
 use crate::body::{GRAVITY, RUBBER, body, plain, positions, substep};
 
-/// A beam let go under its weight, after four frames of that many substeps; kappa is 0.5 with ten.
+/// A beam released under its weight, after four frames of that many substeps; kappa is 0.5 with ten.
 fn fallen(substeps: u32) -> Vec<DVec3> {
     let mesh = kuhn_box([8, 2, 2], dvec3(0.8, 0.2, 0.2));
     let mut solver = body::<f64>(&mesh, RUBBER);

@@ -1,4 +1,4 @@
-//! A copy of a solver goes on as the original does, to the bit, and weighs what it says.
+//! A copy of a solver continues as the original does, to the bit, and weighs what it says.
 
 use glam::{DVec3, dvec3};
 use incise_graph::{Clustering, ColorId, Coloring, Schedule};

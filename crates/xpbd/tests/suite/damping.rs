@@ -10,8 +10,8 @@ use crate::body::{
 
 const LENGTH: f64 = 0.8;
 
-/// A slender bar held at one end and let go from its first longitudinal mode: the amplitudes of
-/// the far end at its turning points, and the angular frequency between them.
+/// A slender bar held at one end and released from its first longitudinal mode: the amplitudes of the far end at its
+/// turning points, and the angular frequency between them.
 fn ringing<R: Real>(material: Material, kappa: f64) -> (Vec<f64>, f64) {
     let mesh = kuhn_box([16, 2, 2], dvec3(LENGTH, 0.1, 0.1));
     let mut solver = body::<R>(&mesh, material);
@@ -156,8 +156,8 @@ fn the_half_life_of_a_vibration_doubles_with_half_the_substep() {
     }
 }
 
-/// The largest and the last energy of a disturbed body that nobody touches, as parts of what it was given: the substep
-/// itself damps the fast vibrations (measured 0.28 to 0.84 after the first substep, below 1e-5 after 2000).
+/// The largest and the last energy of a disturbed body without external forces, as parts of what it was given: the
+/// substep itself damps the fast vibrations (measured 0.28 to 0.84 after the first substep, below 1e-5 after 2000).
 fn largest_gain<R: Real>(kappa: f64) -> [f64; 2] {
     let mesh = kuhn_box([4, 2, 2], dvec3(0.4, 0.2, 0.2));
     let mut solver = body::<R>(&mesh, RUBBER);

@@ -1,4 +1,4 @@
-//! The same bits for any number of threads, and from one release to the next.
+//! Results have the same bits for any number of threads, and from one release to the next.
 
 use glam::{DVec3, dvec3};
 use incise_mesh::kuhn_box;
@@ -38,7 +38,8 @@ const DAMPED: Material = Material {
 fn state<R: Real>(threads: usize, clustering: &str, settings: &StepSettings) -> u64 {
     let mesh = kuhn_box([20, 20, 20], DVec3::ONE);
     let schedule = schedule(&mesh, "scgc", clustering);
-    // The solver shares a color out from 128 tets on, or fewer on narrower processors: most colors of this body are larger by far.
+    // The solver shares a color out from 128 tets on, or fewer on narrower processors: most colors of this body are
+    // larger by far.
     let large =
         (0..schedule.color_count()).filter(|&c| schedule.color_constraints(c).count() > 1024);
     assert!(large.count() > 10);

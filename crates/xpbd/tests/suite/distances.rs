@@ -114,8 +114,8 @@ fn a_chain_settles_where_each_spring_carries_what_hangs_below() {
     }
 }
 
-/// The frequency of a mass on a spring is `sqrt(k / m) / 2π`: after one period it is back. The method is implicit, which
-/// lengthens and damps by the order of the substep times the angular frequency, here 10 / 10000.
+/// The frequency of a mass on a spring is `sqrt(k / m) / 2π`: after one period it is back. The method is implicit,
+/// which lengthens and damps by the order of the substep times the angular frequency, here 10 / 10000.
 #[test]
 fn a_spring_swings_at_its_frequency() {
     let mut solver = hanging::<f64>(2, 1.0, 0.01);
@@ -176,7 +176,7 @@ fn a_pendulum_swings_at_its_period() {
     );
 }
 
-/// A thread lets go what comes nearer, and stops what falls.
+/// A thread does not push what comes nearer, and stops what falls.
 #[test]
 fn a_thread_pulls_but_does_not_push() {
     let mut solver = Solver::<f64>::new(&[DVec3::ZERO, dvec3(0.0, 0.0, -0.5)]);

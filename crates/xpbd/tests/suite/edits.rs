@@ -87,7 +87,7 @@ fn two_tets<R: Real>() -> Solver<R> {
     solver
 }
 
-/// Halves both tets through the middle of their common edge 2-3; then the lower half lets go of the upper one.
+/// Halves both tets through the middle of their common edge 2-3; then the lower half separates from the upper one.
 fn cut<R: Real>(tolerance: f64) {
     let mut solver = two_tets::<R>();
     let before = sums(&solver);

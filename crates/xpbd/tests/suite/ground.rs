@@ -37,7 +37,7 @@ fn fixed_particles_stay<R: Real>() {
         assert_eq!(held.map(|p| solver.velocity(p)), [DVec3::ZERO; 4]);
     }
     assert!(solver.max_speed() > 0.0);
-    // Let go, they move again.
+    // Released, they move again.
     solver.set_fixed(0, false);
     assert!(!solver.is_fixed(0) && solver.is_fixed(7));
     solver.step(&plain(&mesh), &settings).unwrap();

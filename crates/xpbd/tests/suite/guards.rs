@@ -1,4 +1,5 @@
-//! One test for each guard of the solver that no other test misses: what it keeps working, not only that nothing blows up.
+//! One test for each guard of the solver that no other test misses: what it keeps working, not only that nothing blows
+//! up.
 
 use glam::{DQuat, DVec3};
 use incise_graph::{Clustering, ColorId, Coloring, Schedule};
@@ -47,8 +48,8 @@ fn a_speck_does_not_keep_its_tet_from_moving() {
     run::<f64>(1e-310);
 }
 
-/// No share of an infinite correction is not a number: a corner that is held stays where it is all the same. The split form
-/// does not take a step whose energy is infinite, so there is nothing to repair.
+/// No share of an infinite correction is not a number: a corner that is held stays where it is all the same. The split
+/// form does not take a step whose energy is infinite, so there is nothing to repair.
 #[test]
 fn an_infinite_correction_does_not_move_what_is_held() {
     infinite_correction(TetSolve::Block, 4);
@@ -149,8 +150,8 @@ fn a_line_at_the_end_of_the_range_stays_in_it() {
 }
 
 /// At rest, turned any way, the gradients are parallel and the determinant is the difference of two equal products of
-/// kappa each. Where rounding makes it negative, the factor that divides by it runs through zero. Measured 1.4e-5 of the
-/// tet times kappa, which is the rounding of the positions; 1.7e-4 and 1.1e-4 were noise not held back.
+/// kappa each. Where rounding makes it negative, the factor that divides by it runs through zero. Measured 1.4e-5 of
+/// the tet times kappa, which is the rounding of the positions; 1.7e-4 and 1.1e-4 were noise not held back.
 #[test]
 fn rounding_does_not_turn_the_correction_of_a_stiff_tet_around() {
     let mut noise = Noise(26);

@@ -48,7 +48,7 @@ fn volume_is_kept_up_to_incompressibility() {
     }
 }
 
-/// The distance in lengths from its rest shape of a bar that was twisted by a full turn in a second and let go.
+/// The distance in lengths from its rest shape of a bar that was twisted by a full turn in a second and released.
 fn untwisted<R: Real>() -> f64 {
     let mesh = kuhn_box([12, 3, 3], dvec3(1.0, 0.25, 0.25));
     let mut solver = body::<R>(&mesh, RUBBER);

@@ -1,4 +1,4 @@
-//! A solver that follows edits step by step against one that makes everything anew: the same to the bit.
+//! A solver that follows edits step by step against one that rebuilds everything: the same to the bit.
 
 use glam::{DVec3, dvec3};
 use incise_graph::{ClusterId, Clustering, ColorId, Coloring, Schedule};
@@ -235,7 +235,7 @@ impl<R: Real> Body<R> {
         }
     }
 
-    /// A step of both; the other one by a schedule that nobody has seen before.
+    /// Steps both solvers, the other one by a new schedule.
     fn step(&mut self, settings: &StepSettings) {
         self.follower.check_layout(&self.schedule).unwrap();
         let new = Schedule::new(&self.clustering, &self.coloring);
@@ -309,7 +309,7 @@ fn following_is_the_same_as_starting_anew() {
     edits::<f64>(&[HEAVY, RUBBER], 4);
 }
 
-/// Several edits between two steps, and a follower that must start anew because the schedule has forgotten.
+/// Several edits between two steps, and a follower that must rebuild because the schedule no longer knows the changes.
 #[test]
 fn a_solver_may_fall_behind() {
     let mesh = kuhn_box([3, 2, 2], dvec3(0.3, 0.2, 0.2));

@@ -1,4 +1,4 @@
-//! The solver against closed forms, conservation laws, finite elements on the same mesh, and states nobody sane enters.
+//! The solver against closed forms, conservation laws, finite elements on the same mesh, and extreme states.
 //!
 //! Every tolerance is stated where it is used, with the reason for its size; measured values lie a factor below it so
 //! that another processor's rounding does not fail a sound solver.

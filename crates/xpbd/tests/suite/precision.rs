@@ -37,9 +37,9 @@ fn energy<R: Real>(size: f64, substep: f64, substeps: u32) -> f64 {
     sum / f64::from(count)
 }
 
-/// Down to a substep of `√(2.4e-7 · size / g)`, here 1.6e-4 s and 4.9e-5 s, single precision neither heats nor cools the
-/// beam: its mean energy over 100,000 substeps is that of double precision. At half of that substep it was 9 % apart, at
-/// an eighth 3.5 times, at a sixteenth 90 times as much.
+/// Down to a substep of `√(2.4e-7 · size / g)`, here 1.6e-4 s and 4.9e-5 s, single precision neither heats nor cools
+/// the beam: its mean energy over 100,000 substeps is that of double precision. At half of that substep it was 9 %
+/// apart, at an eighth 3.5 times, at a sixteenth 90 times as much.
 #[test]
 fn single_precision_keeps_the_energy_down_to_a_stated_substep() {
     for size in [1.0, 0.1] {

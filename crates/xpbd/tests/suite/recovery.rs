@@ -26,7 +26,7 @@ const STATES: [(&str, Place); 9] = [
     ("twice as large", |_, x| x * 2.0),
 ];
 
-/// The same for a beam whose one end is held in place.
+/// What a beam of 1 m whose one end is held in place is made into.
 const HELD: [(&str, Place); 4] = [
     ("a point", |_, _| DVec3::ZERO),
     ("a point inside", |_, _| dvec3(0.3, 0.1, 0.1)),
@@ -132,9 +132,10 @@ fn shrunk(part: f64) -> f64 {
     solver.volume().total / solver.volume().rest
 }
 
-/// What it cannot do. The energy `μ/2 |F|² + l/2 (det F - γ)²` has a second minimum at F = 0: shrunk to a part s, a body
-/// is pulled together by `μ s` and blown up by `l γ s²`, so below `s = μ / (l γ)`, here 9 %, it goes on shrinking.
-/// On a point, up to any small noise, a free body stays there: it falls as a point. Something has to hold or hit it.
+/// What it cannot do. The energy `μ/2 |F|² + l/2 (det F - γ)²` has a second minimum at F = 0: shrunk to a part s, a
+/// body is pulled together by `μ s` and blown up by `l γ s²`, so below `s = μ / (l γ)`, here 9 %, it continues to
+/// shrink. On a point, up to any small noise, a free body stays there: it falls as a point. Something has to hold or
+/// hit it.
 #[test]
 fn a_free_body_on_a_point_stays_there() {
     let barrier = RUBBER.mu() / (RUBBER.volume_stiffness() * RUBBER.gamma());

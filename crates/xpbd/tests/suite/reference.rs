@@ -1,10 +1,11 @@
 //! Against the motion and the equilibria of the same tets by implicit Euler and Newton, which shares no code with the
-//! solver: a beam under gravity, a bar whose end is twisted, a block that is compressed; a bar stretched to a closed form.
+//! solver: a beam under gravity, a bar whose end is twisted, a block that is compressed; a bar stretched to a closed
+//! form.
 //!
-//! The meshes are the same, so locking and other errors of the mesh do not count; what is left is the solver's own error.
-//! It has two parts. One is of first order in the step: damping, as that of implicit Euler. The other is of the order of
-//! kappa, which is of second order in the step, and displaces even a body at rest; it grows with Poisson's ratio, nearly
-//! with `l/μ`, because kappa knows Young's modulus only: a beam's sag is off by 2 to 5 % of `kappa l/μ`.
+//! The meshes are the same, so locking and other errors of the mesh do not count; what is left is the solver's own
+//! error. It has two parts. One is of first order in the step: damping, as that of implicit Euler. The other is of the
+//! order of kappa, which is of second order in the step, and displaces even a body at rest; it grows with Poisson's
+//! ratio, nearly with `l/μ`, because kappa knows Young's modulus only: a beam's sag is off by 2 to 5 % of `kappa l/μ`.
 
 use glam::{DQuat, DVec3, dvec3};
 use incise_mesh::{ParticleId, TetMesh, kuhn_box};
@@ -22,11 +23,11 @@ const CHECKPOINTS: usize = 4;
 
 /// Angular frequency of the beam's slowest vibration in 1/s by Euler and Bernoulli, `1.875² √(E I / ρ A L⁴)`.
 const BEAM_RATE: f64 = 3.6;
-/// The same for the bar held at both ends, roughly.
+/// Angular frequency in 1/s of the slowest vibration of the bar held at both ends, roughly.
 const BAR_RATE: f64 = 15.0;
 
-/// How much the last extrapolation of the limit may change, in errors of the finest run. What is left of the limit's own
-/// error is of the next order and several times smaller.
+/// How much the last extrapolation of the limit may change, in errors of the finest run. What is left of the limit's
+/// own error is of the next order and several times smaller.
 const EXTRAPOLATED: f64 = 0.5;
 
 /// A body and what happens to it.
@@ -266,8 +267,8 @@ fn falling_beam_approaches_the_limit_to_first_order() {
     assert_order(falling_beam(0.49).errors(0.5), 0.7..2.3, 0.006);
 }
 
-/// Measured from kappa 0.5 on: 7.7, 4.2, 2.2, 1.1 % at Poisson's ratio 0.3, 7.3, 4.1, 2.2, 1.1 % at 0.45; 6.2, 2.9, 1.7,
-/// 0.9 % at 0.49. Implicit Euler with the same step has the same errors to a fifth.
+/// Measured from kappa 0.5 on: 7.7, 4.2, 2.2, 1.1 % at Poisson's ratio 0.3, 7.3, 4.1, 2.2, 1.1 % at 0.45; 6.2, 2.9,
+/// 1.7, 0.9 % at 0.49. Implicit Euler with the same step has the same errors to a fifth.
 #[test]
 fn twisted_bar_approaches_the_limit_to_first_order() {
     for nu in [0.3, 0.45, 0.49] {
@@ -276,8 +277,8 @@ fn twisted_bar_approaches_the_limit_to_first_order() {
 }
 
 /// The block is compressed over a few of its periods and hardly swings, so there is little to damp, and the part of
-/// second order rules. Measured from kappa 0.5 on: 4.4, 1.1, 0.3, 0.09 % at Poisson's ratio 0.3, 7.8, 1.9, 0.5, 0.12 % at
-/// 0.45; 15, 5.9, 1.6, 0.4 % at 0.49, orders 1.39 to 2.02.
+/// second order rules. Measured from kappa 0.5 on: 4.4, 1.1, 0.3, 0.09 % at Poisson's ratio 0.3, 7.8, 1.9, 0.5, 0.12 %
+/// at 0.45; 15, 5.9, 1.6, 0.4 % at 0.49, orders 1.39 to 2.02.
 #[test]
 fn compressed_block_approaches_the_limit_to_second_order() {
     for nu in [0.3, 0.45, 0.49] {
@@ -286,8 +287,9 @@ fn compressed_block_approaches_the_limit_to_second_order() {
 }
 
 impl Scene {
-    /// The state where XPBD comes to rest from `start`, with all velocities damped at twice `rate`, the angular frequency
-    /// of the slowest vibration: nearly critical. At rest velocities are zero, so the damping does not move it.
+    /// The state where XPBD comes to rest from `start`, with all velocities damped at twice `rate`, the angular
+    /// frequency of the slowest vibration: nearly critical. At rest velocities are zero, so the damping does not move
+    /// it.
     fn settled(&self, kappa: f64, rate: f64, start: &[DVec3]) -> Vec<DVec3> {
         let mut solver = self.solver();
         for (p, &x) in start.iter().enumerate() {
@@ -349,10 +351,10 @@ fn small_loads_give_the_equilibrium_of_linear_elasticity() {
     }
 }
 
-/// The tip sinks by up to a third of the length. With `(1 - e⁻ʳ) / r` in place of `1 / (1 + r)` the part of the error of
-/// first order in kappa cancels but for an eighth: measured at kappa 0.5, 0.25 and 0.125 1.7, 0.6 and 0.3 % at Poisson's
-/// ratio 0, 2.5, 0.8 and 0.3 % at 0.3, 12.6, 4.2 and 1.3 % at 0.45, 62, 30 and 12 % at 0.49 (4 % at 1/16, 1.2 % at 1/32).
-/// The block form has 1.3, 3.5, 20 and 68 % at kappa 0.5.
+/// The tip sinks by up to a third of the length. With `(1 - e⁻ʳ) / r` in place of `1 / (1 + r)` the part of the error
+/// of first order in kappa cancels but for an eighth: measured at kappa 0.5, 0.25 and 0.125 1.7, 0.6 and 0.3 % at
+/// Poisson's ratio 0, 2.5, 0.8 and 0.3 % at 0.3, 12.6, 4.2 and 1.3 % at 0.45, 62, 30 and 12 % at 0.49 (4 % at 1/16, 1.2
+/// % at 1/32). The block form has 1.3, 3.5, 20 and 68 % at kappa 0.5.
 #[test]
 fn sag_under_a_large_load_approaches_equilibrium_with_kappa() {
     for (nu, kappa, at_start) in [
@@ -383,8 +385,8 @@ fn uniaxial(material: &Material, s: f64) -> f64 {
     let l = 2.0 * mu * nu / (1.0 - 2.0 * nu) + mu;
     ((1.0 + mu / l - mu / (l * s)) / s).sqrt()
 }
-/// The ends are put where the closed form says and the sides have to find their places. Measured at kappa 1/2048: 0.02 to
-/// 0.054 % of the way they have to go; at 1/16 it is 2.8 to 7 %.
+/// The ends are put where the closed form says and the sides have to find their places. Measured at kappa 1/2048: 0.02
+/// to 0.054 % of the way they have to go; at 1/16 it is 2.8 to 7 %.
 #[test]
 fn stretched_bar_is_the_closed_form() {
     for nu in [0.3, 0.45, 0.49] {
@@ -439,8 +441,8 @@ fn vbd_iterated_to_convergence_is_backward_euler() {
     }
 }
 
-/// A beam whose far half is a hundred times stiffer, heavier and nearly incompressible: the large steps of VBD are those of
-/// backward Euler, to the same tolerance as with one material.
+/// A beam whose far half is a hundred times stiffer, heavier and nearly incompressible: the large steps of VBD are
+/// those of backward Euler, to the same tolerance as with one material.
 #[test]
 fn vbd_of_two_materials_is_backward_euler() {
     let scene = falling_beam(0.3);

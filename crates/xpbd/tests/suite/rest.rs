@@ -58,8 +58,9 @@ fn rest_trembles_up_to_kappa_two() {
     }
 }
 
-/// The split form keeps a body at rest at any kappa. The block form is explicit in shear, so from kappa 4 on such a body
-/// becomes unstable, cells moving by many of their lengths, from kappa 100 on in its first substep; it stays finite.
+/// The split form keeps a body at rest at any kappa. The block form is explicit in shear, so from kappa 4 on such a
+/// body becomes unstable, cells moving by many of their lengths, from kappa 100 on in its first substep; it stays
+/// finite.
 #[test]
 fn rest_is_kept_at_any_kappa_by_the_split_form_alone() {
     for kappa in [2.0, 4.0, 1e1, 1e2, 1e4, 1e6] {

@@ -206,8 +206,8 @@ fn free_fall_is_the_closed_form() {
     }
 }
 
-/// A beam that has come to rest by large steps of VBD goes on by small ones of XPBD, and back. The sag of XPBD is
-/// too large by a share of kappa, so the tip swings by twice that: 20 % at kappa 0.3, below 3 % at the 0.02 used here.
+/// A beam that has come to rest by large steps of VBD continues by small ones of XPBD, and back. The sag of XPBD is too
+/// large by a share of kappa, so the tip swings by twice that: 20 % at kappa 0.3, below 3 % at the 0.02 used here.
 #[test]
 fn methods_may_change_between_frames() {
     let mesh = kuhn_box([6, 2, 2], dvec3(0.6, 0.2, 0.2));
@@ -363,8 +363,8 @@ fn held_particles_stay_and_the_ground_holds() {
     }
 }
 
-/// A body cut in two falls apart: after `rebuild` the halves know nothing of each other, and the stars are those that
-/// would be made anew.
+/// A body cut in two falls apart: after `rebuild` the halves know nothing of each other, and the stars equal rebuilt
+/// ones.
 #[test]
 fn stars_follow_a_cut() {
     let mesh: TetMesh = kuhn_box([4, 2, 2], dvec3(0.4, 0.2, 0.2));
@@ -416,8 +416,8 @@ fn stars_follow_a_cut() {
     assert_eq!(solver.volume().inverted, 0);
 }
 
-/// A block pressed onto a frictionless slope and into a ball: sweeps converge to where the only forces that are left are
-/// those of the colliders, along their normals. (`residual` leaves those out.)
+/// A block pressed onto a frictionless slope and into a ball: sweeps converge to where the only forces that are left
+/// are those of the colliders, along their normals. (`residual` leaves those out.)
 #[test]
 fn sweeps_converge_on_colliders() {
     let mesh = kuhn_box([3, 3, 3], DVec3::splat(0.3));
@@ -446,9 +446,9 @@ fn sweeps_converge_on_colliders() {
     }
 }
 
-/// The bound that holds without convergence: one sweep or three, at any stiffness, from moderate and from insane velocities that
-/// turn tets inside out, `½ ‖v' - v‖²_M + U(x') ≤ ½ ‖v‖²_M + U(x)`. From the inertial guess alone it fails: energy stays in
-/// tets that the guess inverts.
+/// The bound that holds without convergence: one sweep or three, at any stiffness, from moderate and from insane
+/// velocities that turn tets inside out, `½ ‖v' - v‖²_M + U(x') ≤ ½ ‖v‖²_M + U(x)`. From the inertial guess alone it
+/// fails: energy stays in tets that the guess inverts.
 #[test]
 fn no_number_of_sweeps_adds_energy_to_a_held_body() {
     let mut inertial_fails = 0;
@@ -504,8 +504,9 @@ fn no_number_of_sweeps_adds_energy_to_a_held_body() {
     assert!(inertial_fails > 0);
 }
 
-/// What nothing holds falls as a free body and keeps its momentum and its rotation, however stiff it is and however few the sweeps.
-/// Before, gravity that sweeps had not shown yet was taken from the guess of a loose piece again and again, and it hung in the air.
+/// What nothing holds falls as a free body and keeps its momentum and its rotation, however stiff it is and however few
+/// the sweeps. Before, gravity that sweeps had not shown yet was taken from the guess of a loose piece again and again,
+/// and it hung in the air.
 #[test]
 fn a_stiff_free_body_falls_and_spins_by_few_sweeps() {
     let mesh = kuhn_box([4, 2, 2], dvec3(0.4, 0.2, 0.2));

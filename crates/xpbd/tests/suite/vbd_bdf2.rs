@@ -19,8 +19,8 @@ fn settings(integrator: Integrator, time_step: f64, iterations: u32) -> VbdSetti
     }
 }
 
-/// BDF2 is exact for a parabola. What remains is the start by four steps of implicit Euler, an eighth of g Δt² too far, which
-/// the formula's other root raises by a half: 9.375e-6 of the way after 200 steps.
+/// BDF2 is exact for a parabola. What remains is the start by four steps of implicit Euler, an eighth of g Δt² too far,
+/// which the formula's other root raises by a half: 9.375e-6 of the way after 200 steps.
 #[test]
 fn free_fall_is_the_parabola() {
     fn gap<R: Real>() -> f64 {
@@ -41,8 +41,9 @@ fn free_fall_is_the_parabola() {
     within("f32", gap::<f32>(), 1e-4);
 }
 
-/// A mass on a spring, 40 steps a period, after ten periods. Euler keeps exp(-2 π² / 40) of the amplitude in each, which
-/// the second order of its expansion changes by a percent; BDF2 keeps exp(-4 π⁴ / 40³), up to 2.4 z² = 6% of the exponent, with z = 2 π / 40.
+/// A mass on a spring, 40 steps a period, after ten periods. Euler keeps exp(-2 π² / 40) of the amplitude in each,
+/// which the second order of its expansion changes by a percent; BDF2 keeps exp(-4 π⁴ / 40³), up to 2.4 z² = 6% of the
+/// exponent, with z = 2 π / 40.
 #[test]
 fn a_spring_decays_as_derived() {
     for (integrator, expected, tolerance) in [

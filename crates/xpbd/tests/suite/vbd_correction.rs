@@ -106,8 +106,8 @@ fn errors_of_accuracies(
     all.collect()
 }
 
-/// A beam that sinks, vibrates and comes to rest, with matrices that are kept from one substep to the next: in every frame
-/// its positions differ from those of converged steps by at most the accuracy asked for, as a part of the motion.
+/// A beam that sinks, vibrates and comes to rest, with matrices that are kept from one substep to the next: in every
+/// frame its positions differ from those of converged steps by at most the accuracy asked for, as a part of the motion.
 #[test]
 fn an_accuracy_bounds_the_error() {
     for (young_modulus, poisson_ratio) in [(1e5, 0.3), (1e7, 0.49), (1e9, 0.4999)] {

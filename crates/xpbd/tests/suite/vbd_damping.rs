@@ -37,8 +37,8 @@ fn equilibria_do_not_depend_on_damping() {
     }
 }
 
-/// A slender bar is let go from its first longitudinal mode. The logarithmic decay of the amplitude for each radian and
-/// the angular frequency, from the turning points.
+/// A slender bar is released from its first longitudinal mode. The logarithmic decay of the amplitude for each radian
+/// and the angular frequency, from the turning points.
 fn decay<R: Real>(material: Material, time: f64) -> [f64; 2] {
     const LENGTH: f64 = 0.8;
     let mesh = kuhn_box([8, 1, 1], dvec3(LENGTH, 0.1, 0.1));
@@ -125,9 +125,9 @@ fn a_corner_is_a_damped_oscillator() {
     }
 }
 
-/// Of a mode of angular frequency ω the ratio of critical damping is `τ ω / 2`, for any mode and Poisson's ratio, because
-/// the viscosity is proportional to the stiffness. What the bar loses without damping, to the step and to other modes, is
-/// subtracted; 15 % of the rest remain, as damping changes what other modes get.
+/// Of a mode of angular frequency ω the ratio of critical damping is `τ ω / 2`, for any mode and Poisson's ratio,
+/// because the viscosity is proportional to the stiffness. What the bar loses without damping, to the step and to other
+/// modes, is subtracted; 15 % of the rest remain, as damping changes what other modes get.
 #[test]
 fn vibrations_decay_as_the_closed_form_says() {
     for nu in [0.0, 0.3, 0.45] {

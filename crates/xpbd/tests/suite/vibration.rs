@@ -44,7 +44,7 @@ fn lowest_mode(mesh: &TetMesh) -> (f64, Vec<DVec3>) {
     (omega / std::f64::consts::TAU, shape)
 }
 
-/// The frequency of the solver, let go from the lowest mode at a hundredth of the length, from that many passages of
+/// The frequency of the solver, released from the lowest mode at a hundredth of the length, from that many passages of
 /// the tip through rest.
 fn frequency(mesh: &TetMesh, shape: &[DVec3], kappa: f64, passages: usize) -> f64 {
     let mut solver = body::<f64>(mesh, STUFF);

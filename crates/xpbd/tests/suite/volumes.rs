@@ -179,7 +179,7 @@ fn constraints_follow_a_cut() {
         let child = VolumeConstraint::of_tet(particles, rest, 0.0);
         solver.put_volume(place, child).unwrap();
     }
-    // The upper child lets go: it gets copies of what it shares.
+    // The upper child separates: it gets copies of what it shares.
     for p in [0, 1, 4] {
         solver.push_copy(p);
     }
