@@ -48,7 +48,7 @@ pub(crate) struct Attachment {
     /// The origin of its frame before the first move, in m.
     origin: DVec3,
     motion: Motion,
-    /// The particles that are attached at first, as numbered in their group of bodies.
+    /// The particles that are attached at first, as numbered in their island of bodies.
     particles: Vec<usize>,
     /// Center of these particles when they were attached, in m.
     middle: DVec3,
@@ -58,7 +58,7 @@ pub(crate) struct Attachment {
 
 impl Attachment {
     /// Checks an attachment. `positions` are those of its body's particles at rest, and `number_of` gives the number of
-    /// each in its group.
+    /// each in its island.
     pub(crate) fn new(
         name: AttachmentHandle,
         field: String,

@@ -61,7 +61,7 @@ pub(crate) enum LastSubstep {
     Vbd { force: f64, potential: f64 },
 }
 
-/// Measured quantities of a group's state; `None` for those that were not requested.
+/// Measured quantities of an island's state; `None` for those that were not requested.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Measures {
     pub(crate) energy: Option<Energy>,

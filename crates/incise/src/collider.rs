@@ -34,7 +34,7 @@ impl ColliderHandle {
     }
 }
 
-/// Which collider of the settings of all groups each handle names.
+/// Which collider of the settings of all islands each handle names.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Colliders {

@@ -1,4 +1,4 @@
-//! [`Device`]: the solver of a group on a GPU.
+//! [`Device`]: the solver of an island on a GPU.
 //!
 //! Cuts and edits are made on the host's solver and then applied to the device. The state stays on the device until it
 //! is requested. Cost: a submit a frame.

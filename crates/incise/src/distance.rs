@@ -1,6 +1,6 @@
 //! Sutures and springs between two points of bodies, checked and handed to a solver.
 //!
-//! A change of one of them hands all of a group to the solver again: O(distances of the group).
+//! A change of one of them hands all of an island to the solver again: O(distances of the island).
 
 use glam::DVec3;
 use incise_coloring::{Order, greedy};
@@ -54,7 +54,7 @@ pub(crate) fn nearest(point: [f64; 3], positions: &[DVec3]) -> Option<(DVec3, us
 }
 
 /// Checks a distance constraint. `particle` gives the position at rest of the particle of an end, and its number in its
-/// group; nothing if its body has none.
+/// island; nothing if its body has none.
 pub(crate) fn constraint(
     field: &str,
     spec: &DistanceSpec,
@@ -91,7 +91,7 @@ pub(crate) fn constraint(
     })
 }
 
-/// The distance constraints of a group.
+/// The distance constraints of an island.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Distances {

@@ -1,4 +1,4 @@
-//! [`Hand`]: the interactive grabs of a group of bodies.
+//! [`Hand`]: the interactive grabs of an island of bodies.
 //!
 //! A grab attaches particles to a handle of the solver that only this grab moves, and never turns. A released handle is
 //! reused by the next grab, so the solver grows with the largest number of grabs held at a time, not with their total.
@@ -17,8 +17,8 @@ use crate::backend::{AnySolver, each, each_mut};
 /// Something that is held, in the simulation that gave it: see [`Simulation::grab`](crate::Simulation::grab).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Grab {
-    pub(crate) group: usize,
-    /// Its grip in the group, and which user of the grip it is.
+    pub(crate) island: usize,
+    /// Its grip in the island, and which user of the grip it is.
     slot: usize,
     user: u64,
 }
@@ -41,7 +41,7 @@ struct Grip {
     moved: bool,
 }
 
-/// The grabs of a group.
+/// The grabs of an island.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Hand {
@@ -90,10 +90,10 @@ impl Hand {
         (grip.held && grip.user == grab.user).then_some(grip)
     }
 
-    /// Hangs particles on a handle that is free. `group` is the number of the group.
+    /// Hangs particles on a handle that is free. `island` is the number of the island.
     pub(crate) fn take(
         &mut self,
-        group: usize,
+        island: usize,
         solver: &mut AnySolver,
         particles: &[usize],
         point: DVec3,
@@ -126,7 +126,7 @@ impl Hand {
                 Some(old) => *old = grip,
                 None => self.grips.push(grip),
             }
-            Ok(Grab { group, slot, user })
+            Ok(Grab { island, slot, user })
         })
     }
 

@@ -1,6 +1,6 @@
-//! What all groups of bodies together are worth: the quantities of a report.
+//! What all islands of bodies together are worth: the quantities of a report.
 //!
-//! Sums, and the largest or smallest value where that is what is asked. For a single group they are its own numbers to
+//! Sums, and the largest or smallest value where that is what is asked. For a single island they are its own numbers to
 //! the bit. Cost: a pass over the particles or tets each.
 
 use glam::DVec3;
@@ -8,7 +8,7 @@ use incise_xpbd::Volume;
 
 use crate::Error;
 use crate::backend::{LastSubstep, Measures, each};
-use crate::group::Group;
+use crate::island::Island;
 use crate::report::{BodyReport, ChosenMethod, EnergyReport, ResidualReport, SoftenedReport};
 use crate::scene::{Method, Quantity};
 
@@ -20,35 +20,35 @@ pub(crate) fn is_of_state(quantity: &Quantity) -> bool {
     )
 }
 
-/// Measures the state of each group where it is. Returns an empty list if no quantity of the state is requested.
+/// Measures the state of each island where it is. Returns an empty list if no quantity of the state is requested.
 pub(crate) fn states(
-    groups: &mut [Group],
+    islands: &mut [Island],
     gravity: Option<DVec3>,
     quantities: &[Quantity],
 ) -> Result<Vec<Measures>, Error> {
     if !quantities.iter().any(is_of_state) {
         return Ok(Vec::new());
     }
-    let state = |group: &mut Group| group.solver.state(gravity, quantities);
-    groups.iter_mut().map(state).collect()
+    let state = |island: &mut Island| island.solver.state(gravity, quantities);
+    islands.iter_mut().map(state).collect()
 }
 
-/// Residuals of the last substep of each group awake, as one vector's length, and their potentials' sum; `None` if all
+/// Residuals of the last substep of each island awake, as one vector's length, and their potentials' sum; `None` if all
 /// sleep or one has not kept its own. What is too large for a double is the largest one.
-pub(crate) fn residual(groups: &[Group], gravity: Option<DVec3>) -> Option<ResidualReport> {
-    let awake = || groups.iter().filter(|group| !group.asleep());
-    // The weight's norm in N, and the same times the square of each group's substep.
+pub(crate) fn residual(islands: &[Island], gravity: Option<DVec3>) -> Option<ResidualReport> {
+    let awake = || islands.iter().filter(|island| !island.asleep());
+    // The weight's norm in N, and the same times the square of each island's substep.
     let (mut weight, mut moved) = (0.0_f64, 0.0_f64);
     let (mut primal, mut dual, mut force) = (0.0_f64, 0.0_f64, 0.0_f64);
     let (mut potential, mut constraints, mut descends) = (0.0, 0, false);
-    for group in awake() {
-        let time = group.settings.substep_time();
+    for island in awake() {
+        let time = island.settings.substep_time();
         if let Some(gravity) = gravity {
-            let load = each!(&group.solver, solver => solver.load(gravity));
+            let load = each!(&island.solver, solver => solver.load(gravity));
             weight = weight.hypot(load);
             moved = moved.hypot(load * time * time);
         }
-        match group.solver.last_substep(time)? {
+        match island.solver.last_substep(time)? {
             LastSubstep::Constraints(residuals) => {
                 primal = primal.hypot(residuals.primal);
                 dual = dual.hypot(residuals.dual);
@@ -58,10 +58,10 @@ pub(crate) fn residual(groups: &[Group], gravity: Option<DVec3>) -> Option<Resid
             }
             LastSubstep::Vbd {
                 force: left,
-                potential: of_group,
+                potential: of_island,
             } => {
                 force = force.hypot(left);
-                potential += of_group;
+                potential += of_island;
                 descends = true;
             }
         }
@@ -80,16 +80,16 @@ pub(crate) fn residual(groups: &[Group], gravity: Option<DVec3>) -> Option<Resid
     })
 }
 
-/// The residual of each tet of a group in the last substep: none asleep; `None` if they were not kept.
-pub(crate) fn residuals_of_tets(group: &Group) -> Option<Vec<f64>> {
-    if group.asleep() {
-        return Some(vec![0.0; group.cuttable.mesh().tets.len()]);
+/// The residual of each tet of an island in the last substep: none asleep; `None` if they were not kept.
+pub(crate) fn residuals_of_tets(island: &Island) -> Option<Vec<f64>> {
+    if island.asleep() {
+        return Some(vec![0.0; island.cuttable.mesh().tets.len()]);
     }
-    if group.spec.method == Method::Vbd {
+    if island.spec.method == Method::Vbd {
         return None;
     }
-    let time = group.settings.substep_time();
-    group.solver.residuals_of_tets(time)
+    let time = island.settings.substep_time();
+    island.solver.residuals_of_tets(time)
 }
 
 pub(crate) fn energy(states: &[Measures]) -> EnergyReport {
@@ -128,14 +128,14 @@ pub(crate) fn max_speed(states: &[Measures]) -> f64 {
     speeds.fold(0.0, f64::max)
 }
 
-/// The largest kappa of a tet, each at the substep of its group.
-pub(crate) fn kappa(groups: &[Group]) -> f64 {
-    groups.iter().map(Group::kappa).fold(0.0, f64::max)
+/// The largest kappa of a tet, each at the substep of its island.
+pub(crate) fn kappa(islands: &[Island]) -> f64 {
+    islands.iter().map(Island::kappa).fold(0.0, f64::max)
 }
 
-pub(crate) fn softened(groups: &[Group]) -> SoftenedReport {
-    if let [group] = groups {
-        return softened_of(group);
+pub(crate) fn softened(islands: &[Island]) -> SoftenedReport {
+    if let [island] = islands {
+        return softened_of(island);
     }
     let mut sum = SoftenedReport {
         tets: 0,
@@ -143,37 +143,37 @@ pub(crate) fn softened(groups: &[Group]) -> SoftenedReport {
         strongest: 1.0,
     };
     let mut volume = 0.0;
-    for group in groups {
-        let softened = softened_of(group);
+    for island in islands {
+        let softened = softened_of(island);
         sum.tets += softened.tets;
-        sum.volume_fraction += softened.volume_fraction * group.initial_volume;
+        sum.volume_fraction += softened.volume_fraction * island.initial_volume;
         sum.strongest = sum.strongest.max(softened.strongest);
-        volume += group.initial_volume;
+        volume += island.initial_volume;
     }
     sum.volume_fraction /= volume;
     sum
 }
 
-fn softened_of(group: &Group) -> SoftenedReport {
-    each!(&group.solver, solver => solver.softened()).into()
+fn softened_of(island: &Island) -> SoftenedReport {
+    each!(&island.solver, solver => solver.softened()).into()
 }
 
-/// Substeps and what cuts did to kappa by group; `with_kappa` also those that take a pass over the tets.
-pub(crate) fn by_body(groups: &mut [Group], with_kappa: bool) -> Vec<BodyReport> {
-    let report = |group: &mut Group| {
-        let cut = group.cut_kappa.take();
+/// Substeps and what cuts did to kappa by island; `with_kappa` also those that take a pass over the tets.
+pub(crate) fn by_body(islands: &mut [Island], with_kappa: bool) -> Vec<BodyReport> {
+    let report = |island: &mut Island| {
+        let cut = island.cut_kappa.take();
         BodyReport {
-            bodies: group.bodies.clone(),
-            substeps: group.settings.substeps,
-            method: group.choice.map(|_| ChosenMethod::of(&group.spec)),
-            iterations: group.choice.map(|_| group.settings.iterations),
-            asleep: group.rest.map(|rest| rest.asleep()),
-            choice: group.choice,
-            kappa: with_kappa.then(|| group.kappa()),
+            bodies: island.bodies.clone(),
+            substeps: island.settings.substeps,
+            method: island.choice.map(|_| ChosenMethod::of(&island.spec)),
+            iterations: island.choice.map(|_| island.settings.iterations),
+            asleep: island.rest.map(|rest| rest.asleep()),
+            choice: island.choice,
+            kappa: with_kappa.then(|| island.kappa()),
             kappa_before_cut: cut.and_then(|cut| cut.before),
             kappa_of_new_tets: cut.map(|cut| cut.new_tets),
-            softened: with_kappa.then(|| softened_of(group)),
+            softened: with_kappa.then(|| softened_of(island)),
         }
     };
-    groups.iter_mut().map(report).collect()
+    islands.iter_mut().map(report).collect()
 }

@@ -34,7 +34,7 @@ pub(crate) fn integrator(integrator: Integrator) -> incise_xpbd::Integrator {
     }
 }
 
-/// The settings of a scene, checked; each group of bodies puts in its own substeps.
+/// The settings of a scene, checked; each island of bodies puts in its own substeps.
 pub(crate) fn settings(scene: &Scene) -> Result<StepSettings, Error> {
     let solver = &scene.solver;
     let gravity = scene.world.gravity;
@@ -74,7 +74,7 @@ pub(crate) fn settings(scene: &Scene) -> Result<StepSettings, Error> {
     Ok(settings)
 }
 
-/// The settings of one group, in which `auto` is replaced by the method for it. `choice` is that of its substeps, which
+/// The settings of one island, in which `auto` is replaced by the method for it. `choice` is that of its substeps, which
 /// becomes that of VBD where VBD is taken; `is_open` is [`leaves_open`].
 ///
 /// VBD solves a frame in one step, so its motion is accurate only for bodies so stiff that they follow their loads within

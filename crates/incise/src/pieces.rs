@@ -1,10 +1,10 @@
-//! [`PieceNumbers`]: the pieces of all groups under one numbering.
+//! [`PieceNumbers`]: the pieces of all islands under one numbering.
 //!
-//! Each group follows its own pieces ([`incise_cutting::PieceTracker`]) and numbers them from 0. Here each gets a number
-//! in the scene: at the start group by group, then as they come off, stroke by stroke and within a stroke group by
-//! group. Numbers stay and none is used twice. A piece belongs to one body, as bodies share no particles.
+//! Each island follows its own pieces ([`incise_cutting::PieceTracker`]) and numbers them from 0. Here each gets a number
+//! in the scene: at the start island by island, then as they come off, stroke by stroke and within a stroke island by
+//! island. Numbers stay and none is used twice. A piece belongs to one body, as bodies share no particles.
 //!
-//! Cost: a pass over the tets at the start, then O(1) for each piece that comes off. Where a group has several densities,
+//! Cost: a pass over the tets at the start, then O(1) for each piece that comes off. Where an island has several densities,
 //! the masses of pieces are summed over its tets: O(tets) when some come off, and for a report.
 
 use std::collections::BTreeMap;
@@ -13,59 +13,59 @@ use incise_cutting::PieceEvent;
 use incise_mesh::TetId;
 
 use crate::Error;
-use crate::group::Group;
+use crate::island::Island;
 use crate::report::{DetachedReport, PieceReport};
 
 /// A piece of the scene.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 struct Number {
-    group: usize,
-    /// Its number in the group.
+    island: usize,
+    /// Its number in the island.
     piece: u32,
     /// The number of its body in the scene.
     body: usize,
 }
 
-/// The pieces of all groups.
+/// The pieces of all islands.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct PieceNumbers {
     /// By number in the scene.
     pieces: Vec<Number>,
-    /// For each group the numbers of its pieces in the scene, in the order of their own.
-    of_group: Vec<Numbers>,
+    /// For each island the numbers of its pieces in the scene, in the order of their own.
+    of_island: Vec<Numbers>,
 }
 
-/// The numbers in the scene of a group's pieces.
+/// The numbers in the scene of an island's pieces.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 struct Numbers(Vec<u32>);
 
 impl PieceNumbers {
     /// The pieces before all cuts.
-    pub(crate) fn new(groups: &[Group]) -> Self {
+    pub(crate) fn new(islands: &[Island]) -> Self {
         let mut numbers = Self::default();
-        for group in groups {
-            numbers.add_group(group);
+        for island in islands {
+            numbers.add_island(island);
         }
         numbers
     }
 
-    /// Numbers the pieces of a group that is added to those there are.
-    pub(crate) fn add_group(&mut self, group: &Group) {
-        let number = self.of_group.len();
-        self.of_group.push(Numbers::default());
+    /// Numbers the pieces of an island that is added to those there are.
+    pub(crate) fn add_island(&mut self, island: &Island) {
+        let number = self.of_island.len();
+        self.of_island.push(Numbers::default());
         let mut known = 0;
-        for t in (0..group.cuttable.mesh().tets.len()).map(TetId::new) {
-            let piece = group.pieces.piece_of(t);
+        for t in (0..island.cuttable.mesh().tets.len()).map(TetId::new) {
+            let piece = island.pieces.piece_of(t);
             // Pieces are numbered in the order of their first tets.
             if piece == known {
                 known += 1;
                 self.add(Number {
-                    group: number,
+                    island: number,
                     piece,
-                    body: group.body_of_tet(t),
+                    body: island.body_of_tet(t),
                 });
             }
         }
@@ -74,15 +74,15 @@ impl PieceNumbers {
     fn add(&mut self, number: Number) -> u32 {
         let id = u32::try_from(self.pieces.len()).expect("fewer pieces than particles");
         self.pieces.push(number);
-        self.of_group[number.group].0.push(id);
+        self.of_island[number.island].0.push(id);
         id
     }
 
-    /// Notes what came off in a group of a number; adds it to `detached`.
+    /// Notes what came off in an island of a number; adds it to `detached`.
     pub(crate) fn follow(
         &mut self,
         number: usize,
-        group: &Group,
+        island: &Island,
         events: &[PieceEvent],
         detached: &mut Vec<DetachedReport>,
     ) {
@@ -90,10 +90,10 @@ impl PieceNumbers {
             PieceEvent::Detached { piece, .. } => Some(piece),
             _ => None,
         };
-        let density = group.density();
+        let density = island.density();
         let masses = match density {
             None if events.iter().any(|event| new(event).is_some()) => {
-                group.masses(|piece| events.iter().any(|event| new(event) == Some(piece)))
+                island.masses(|piece| events.iter().any(|event| new(event) == Some(piece)))
             }
             _ => BTreeMap::new(),
         };
@@ -108,7 +108,7 @@ impl PieceNumbers {
             else {
                 continue;
             };
-            let from = self.of_group[number].0[from as usize];
+            let from = self.of_island[number].0[from as usize];
             let parent = self.pieces[from as usize];
             detached.push(DetachedReport {
                 piece: self.add(Number { piece, ..parent }),
@@ -121,26 +121,26 @@ impl PieceNumbers {
     }
 
     /// All pieces that exist, in the order of their numbers.
-    pub(crate) fn report(&self, groups: &[Group]) -> Vec<PieceReport> {
-        let densities: Vec<_> = groups.iter().map(Group::density).collect();
-        let masses = groups.iter().zip(&densities);
+    pub(crate) fn report(&self, islands: &[Island]) -> Vec<PieceReport> {
+        let densities: Vec<_> = islands.iter().map(Island::density).collect();
+        let masses = islands.iter().zip(&densities);
         let masses: Vec<_> = masses
-            .map(|(group, density)| match density {
+            .map(|(island, density)| match density {
                 Some(_) => BTreeMap::new(),
-                None => group.masses(|_| true),
+                None => island.masses(|_| true),
             })
             .collect();
         let reports = self.pieces.iter().zip(0..).filter_map(|(number, id)| {
-            let piece = groups[number.group].pieces.piece(number.piece)?;
-            let of_group = &self.of_group[number.group].0;
+            let piece = islands[number.island].pieces.piece(number.piece)?;
+            let of_island = &self.of_island[number.island].0;
             Some(PieceReport {
                 id,
-                parent: piece.parent.map(|parent| of_group[parent as usize]),
+                parent: piece.parent.map(|parent| of_island[parent as usize]),
                 body: number.body,
                 tets: piece.tets,
                 volume: piece.volume,
                 mass: {
-                    let (density, masses) = (densities[number.group], &masses[number.group]);
+                    let (density, masses) = (densities[number.island], &masses[number.island]);
                     mass_of(density, masses, number.piece, piece.volume)
                 },
             })
@@ -148,32 +148,32 @@ impl PieceNumbers {
         reports.collect()
     }
 
-    /// The number of the piece of each tet of a group of a number, in the order of its tets. O(tets).
+    /// The number of the piece of each tet of an island of a number, in the order of its tets. O(tets).
     pub(crate) fn of_tets<'a>(
         &'a self,
         number: usize,
-        group: &'a Group,
+        island: &'a Island,
     ) -> impl ExactSizeIterator<Item = u32> + 'a {
-        let tets = 0..group.cuttable.mesh().tets.len();
+        let tets = 0..island.cuttable.mesh().tets.len();
         tets.map(move |t| {
-            let piece = group.pieces.piece_of(TetId::new(t));
-            self.of_group[number].0[piece as usize]
+            let piece = island.pieces.piece_of(TetId::new(t));
+            self.of_island[number].0[piece as usize]
         })
     }
 
-    /// Compares with the groups: each of their pieces has one number, and it is on the body that its tets are of.
-    pub(crate) fn check(&self, groups: &[Group]) -> Result<(), Error> {
+    /// Compares with the islands: each of their pieces has one number, and it is on the body that its tets are of.
+    pub(crate) fn check(&self, islands: &[Island]) -> Result<(), Error> {
         let differs = |what: String| Err(Error::Inconsistent(what));
-        for (g, group) in groups.iter().enumerate() {
-            for t in 0..group.cuttable.mesh().tets.len() {
-                let piece = group.pieces.piece_of(TetId::new(t));
-                let number = self.of_group[g].0.get(piece as usize);
+        for (g, island) in islands.iter().enumerate() {
+            for t in 0..island.cuttable.mesh().tets.len() {
+                let piece = island.pieces.piece_of(TetId::new(t));
+                let number = self.of_island[g].0.get(piece as usize);
                 let Some(number) = number.map(|&id| &self.pieces[id as usize]) else {
-                    return differs(format!("piece {piece} of group {g} has no number"));
+                    return differs(format!("piece {piece} of island {g} has no number"));
                 };
-                let expected = (g, piece, group.body_of_tet(TetId::new(t)));
-                if (number.group, number.piece, number.body) != expected {
-                    return differs(format!("piece {piece} of group {g} has another's number"));
+                let expected = (g, piece, island.body_of_tet(TetId::new(t)));
+                if (number.island, number.piece, number.body) != expected {
+                    return differs(format!("piece {piece} of island {g} has another's number"));
                 }
             }
         }
@@ -181,7 +181,7 @@ impl PieceNumbers {
     }
 }
 
-/// The mass of a piece in kg: its volume times the density of its group, or the sum over its tets.
+/// The mass of a piece in kg: its volume times the density of its island, or the sum over its tets.
 fn mass_of(density: Option<f64>, masses: &BTreeMap<u32, f64>, piece: u32, volume: f64) -> f64 {
     density.map_or_else(
         || masses.get(&piece).copied().unwrap_or(0.0),

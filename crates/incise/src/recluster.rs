@@ -1,11 +1,11 @@
-//! [`Recluster`]: fresh clusters and colors for a worn plan, made in the background.
+//! [`Recluster`]: fresh clusters and colors for a worn partition, made in the background.
 //!
-//! Cuts change clusters where they are, so a plan wears: after many cuts it has more colors and smaller clusters than one
+//! Cuts change clusters where they are, so a partition wears: after many cuts it has more colors and smaller clusters than one
 //! made from the mesh as it is now. When it has worn enough, a copy of the mesh goes to a thread of its own, which
-//! clusters and colors it as at the start. A fixed number of frames later, after the strokes of that frame, the new plan
+//! clusters and colors it as at the start. A fixed number of frames later, after the strokes of that frame, the new partition
 //! takes the place of the old one, and follows the cuts made meanwhile: first each by itself, then small clusters around
 //! all of them are merged. If the thread is not done by then the frame waits. So it depends on the scene alone in which
-//! frame which plan comes, never on time or on the number of threads.
+//! frame which partition comes, never on time or on the number of threads.
 //!
 //! The trade: the thread needs a core; the frame that starts it copies the mesh, the one that swaps costs what following
 //! the cuts of the frames between took, and a schedule and layout, as any frame with a cut. More frames between wait less
@@ -19,10 +19,10 @@ use std::thread::JoinHandle;
 use incise_cutting::{CutDelta, CuttableMesh};
 
 use crate::Error;
-use crate::plan::{Plan, Recipe};
+use crate::partition::{Partition, PartitionSettings};
 use crate::scene::ReclusterSpec;
 
-/// What watches over the wear of a plan.
+/// What watches over the wear of a partition.
 #[derive(Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Recluster {
@@ -30,7 +30,7 @@ pub(crate) struct Recluster {
     pending: Option<Pending>,
 }
 
-/// A copy has no thread: a plan in the making is left out, unless [`Recluster::settle`] was called.
+/// A copy has no thread: a partition in the making is left out, unless [`Recluster::settle`] was called.
 impl Clone for Recluster {
     fn clone(&self) -> Self {
         Self {
@@ -40,7 +40,7 @@ impl Clone for Recluster {
     }
 }
 
-/// A plan in the making.
+/// A partition in the making.
 #[derive(Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 struct Pending {
@@ -51,14 +51,14 @@ struct Pending {
     deltas: Vec<CutDelta>,
 }
 
-/// A plan, or the thread that makes it.
+/// A partition, or the thread that makes it.
 #[derive(Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 enum Making {
-    Made(Box<Plan>),
+    Made(Box<Partition>),
     // Last, since a variant that is skipped must not shift the numbers of others. A snapshot has none.
     #[cfg_attr(feature = "save", serde(skip))]
-    Thread(JoinHandle<Result<Plan, Error>>),
+    Thread(JoinHandle<Result<Partition, Error>>),
 }
 
 impl Recluster {
@@ -69,56 +69,60 @@ impl Recluster {
         }
     }
 
-    /// Replaces the spec. A plan in the making is still taken in the frame that was set before.
+    /// Replaces the spec. A partition in the making is still taken in the frame that was set before.
     pub(crate) fn with(self, spec: ReclusterSpec) -> Self {
         Self { spec, ..self }
     }
 
-    /// Notes a cut for the plan in the making.
+    /// Notes a cut for the partition in the making.
     pub(crate) fn note(&mut self, delta: &CutDelta) {
         if let Some(pending) = &mut self.pending {
             pending.deltas.push(delta.clone());
         }
     }
 
-    /// Takes the new plan if this is its frame, else starts one if the present one has worn; tells whether it was taken.
+    /// Takes the new partition if this is its frame, else starts one if the present one has worn; tells whether it was taken.
     pub(crate) fn advance(
         &mut self,
         frame: u64,
-        plan: &mut Plan,
+        partition: &mut Partition,
         cuttable: &CuttableMesh,
     ) -> Result<bool, Error> {
-        if self.pending.is_none() && plan.wear() >= self.spec.wear {
+        if self.pending.is_none() && partition.wear() >= self.spec.wear {
             let due = frame + u64::from(self.spec.frames.get());
-            self.pending = Some(Pending::start(due, plan.recipe(), cuttable)?);
+            self.pending = Some(Pending::start(due, partition.settings(), cuttable)?);
         }
         let Some(pending) = self.pending.take_if(|pending| pending.due == frame) else {
             return Ok(false);
         };
-        *plan = pending.finish(cuttable)?;
+        *partition = pending.finish(cuttable)?;
         Ok(true)
     }
 
-    /// Waits for a plan in the making, so that a copy has it, too. It is taken in the same frame as it would be.
+    /// Waits for a partition in the making, so that a copy has it, too. It is taken in the same frame as it would be.
     pub(crate) fn settle(&mut self) -> Result<(), Error> {
         let Some(pending) = self.pending.take() else {
             return Ok(());
         };
         self.pending = Some(Pending {
-            making: Making::Made(Box::new(pending.making.plan()?)),
+            making: Making::Made(Box::new(pending.making.partition()?)),
             ..pending
         });
         Ok(())
     }
 
-    /// Whether a plan is in the making.
+    /// Whether a partition is in the making.
     pub(crate) fn is_pending(&self) -> bool {
         self.pending.is_some()
     }
 }
 
 impl Pending {
-    fn start(due: u64, recipe: Recipe, cuttable: &CuttableMesh) -> Result<Self, Error> {
+    fn start(
+        due: u64,
+        settings: PartitionSettings,
+        cuttable: &CuttableMesh,
+    ) -> Result<Self, Error> {
         let refused = |message: String| Error::Threads {
             threads: 1,
             message,
@@ -129,7 +133,7 @@ impl Pending {
         let pool = pool.map_err(|error| refused(error.to_string()))?;
         let thread = std::thread::Builder::new()
             .name("incise-recluster".to_owned())
-            .spawn(move || pool.install(|| Plan::of(recipe, &mesh)))
+            .spawn(move || pool.install(|| Partition::of(settings, &mesh)))
             .map_err(|error| refused(error.to_string()))?;
         Ok(Self {
             due,
@@ -141,29 +145,29 @@ impl Pending {
     fn copy(&self) -> Option<Self> {
         match &self.making {
             Making::Thread(_) => None,
-            Making::Made(plan) => Some(Self {
+            Making::Made(partition) => Some(Self {
                 due: self.due,
-                making: Making::Made(plan.clone()),
+                making: Making::Made(partition.clone()),
                 deltas: self.deltas.clone(),
             }),
         }
     }
 
-    /// Waits for the plan and lets it follow what has been cut meanwhile.
-    fn finish(self, cuttable: &CuttableMesh) -> Result<Plan, Error> {
-        let mut plan = self.making.plan()?;
-        plan.catch_up(&self.deltas, cuttable)?;
-        Ok(plan)
+    /// Waits for the partition and lets it follow what has been cut meanwhile.
+    fn finish(self, cuttable: &CuttableMesh) -> Result<Partition, Error> {
+        let mut partition = self.making.partition()?;
+        partition.catch_up(&self.deltas, cuttable)?;
+        Ok(partition)
     }
 }
 
 impl Making {
-    /// The plan; waits for it.
-    fn plan(self) -> Result<Plan, Error> {
+    /// The partition; waits for it.
+    fn partition(self) -> Result<Partition, Error> {
         let failed = |_| Error::Inconsistent("clustering in the background failed".into());
         match self {
             Self::Thread(thread) => thread.join().map_err(failed)?,
-            Self::Made(plan) => Ok(*plan),
+            Self::Made(partition) => Ok(*partition),
         }
     }
 }

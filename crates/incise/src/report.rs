@@ -75,7 +75,7 @@ pub struct FrameReport {
     /// What must be known about the frame; absent if nothing. See [`Warning`].
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<Warning>,
-    /// Groups of joined bodies whose clusters and colors were rebuilt in the background and taken in this frame; absent
+    /// Islands of joined bodies whose clusters and colors were rebuilt in the background and taken in this frame; absent
     /// if none.
     #[serde(skip_serializing_if = "is_zero")]
     pub reclustered: usize,

@@ -1,7 +1,7 @@
 //! [`Simulation`]: a scene in motion.
 //!
 //! One frame: strokes that are due cut the meshes; their deltas go to solver, clusters, colors and schedule; the solvers
-//! advance, those of different groups of bodies in parallel; the report is made. A frame without a cut touches only the
+//! advance, those of different islands of bodies in parallel; the report is made. A frame without a cut touches only the
 //! solvers.
 
 mod builder;
@@ -26,11 +26,12 @@ use rayon::prelude::*;
 use crate::body;
 use crate::budget;
 use crate::collider::Colliders;
-use crate::group::Group;
-use crate::islands::islands;
-use crate::joined::Joined;
+use crate::island::Island;
+use crate::island_builder::IslandBuilder;
+use crate::islands::island_of_bodies;
 use crate::limits::value;
 use crate::measure::{kappa, softened};
+use crate::merged_mesh::MergedMesh;
 use crate::method::settings;
 use crate::pieces::PieceNumbers;
 use crate::place::{AtHand, Place};
@@ -40,7 +41,6 @@ use crate::report::{
 use crate::scene::{Precision, Quantity, StrokeSpec};
 use crate::strokes::Timeline;
 use crate::warning::{Warning, WarningCode};
-use crate::whole::Whole;
 use crate::{Error, Event, Scene, collider, distance};
 
 pub use builder::{Body, BodyHandle, SimulationBuilder};
@@ -139,15 +139,15 @@ impl Simulation {
         }
         crate::scene::check(scene)?;
         let bodies = body::Body::all(scene, meshes)?;
-        let islands = islands(bodies.len(), &distance::pairs(scene, bodies.len())?);
-        let several = islands.iter().any(|&island| island > 0);
-        let whole = several.then(|| Whole::new(&bodies, &islands));
-        let joined = Joined::all(scene, bodies, &islands)?;
-        let make_groups = |precision: Precision, joined: Vec<Joined>| {
+        let island_of = island_of_bodies(bodies.len(), &distance::pairs(scene, bodies.len())?);
+        let several = island_of.iter().any(|&island| island > 0);
+        let merged = several.then(|| MergedMesh::new(&bodies, &island_of));
+        let joined = IslandBuilder::all(scene, bodies, &island_of)?;
+        let make_islands = |precision: Precision, joined: Vec<IslandBuilder>| {
             let make = || {
-                let groups = joined.into_par_iter();
-                groups
-                    .map(|joined| Group::new(scene, &place, precision, settings.clone(), joined))
+                let islands = joined.into_par_iter();
+                islands
+                    .map(|joined| Island::new(scene, &place, precision, settings.clone(), joined))
                     .collect::<Result<Vec<_>, _>>()
             };
             match &pool {
@@ -159,18 +159,18 @@ impl Simulation {
             Precision::Auto => Precision::F32,
             given => given,
         };
-        let mut groups = make_groups(precision, joined)?;
+        let mut islands = make_islands(precision, joined)?;
         let short = || {
-            let mut groups = groups.iter();
-            groups.any(|group| group.is_too_short_for_f32() || group.chose_vbd())
+            let mut islands = islands.iter();
+            islands.any(|island| island.is_too_short_for_f32() || island.chose_vbd())
         };
         if scene.solver.precision == Precision::Auto && !place.is_device() && short() {
             precision = Precision::F64;
             let bodies = body::Body::all(scene, meshes)?;
-            groups = make_groups(precision, Joined::all(scene, bodies, &islands)?)?;
+            islands = make_islands(precision, IslandBuilder::all(scene, bodies, &island_of)?)?;
         }
         if let Some(budget) = scene.solver.budget_ms {
-            let mut fit = || budget::fit(&mut groups, &scene.solver, budget);
+            let mut fit = || budget::fit(&mut islands, &scene.solver, budget);
             match &pool {
                 Some(pool) => pool.install(fit),
                 None => fit(),
@@ -195,9 +195,9 @@ impl Simulation {
                 next: NextNumbers::new(scene),
                 removed: Vec::new(),
                 reporting: scene.report.clone(),
-                pieces: PieceNumbers::new(&groups),
-                groups,
-                whole,
+                pieces: PieceNumbers::new(&islands),
+                islands,
+                merged,
                 on_cut: Vec::new(),
                 timeline,
                 report: FrameReport::default(),
@@ -221,15 +221,15 @@ impl Simulation {
     }
 
     #[cfg(feature = "advise")]
-    pub(crate) fn groups(&self) -> &[Group] {
-        &self.state.groups
+    pub(crate) fn islands(&self) -> &[Island] {
+        &self.state.islands
     }
 
-    /// The number in the whole of a particle of a group.
+    /// The number in the merged mesh of a particle of an island.
     #[cfg(feature = "advise")]
-    pub(crate) fn particle(&self, group: usize, particle: usize) -> usize {
-        match &self.state.whole {
-            Some(whole) => whole.particle(group, particle),
+    pub(crate) fn particle(&self, island: usize, particle: usize) -> usize {
+        match &self.state.merged {
+            Some(merged) => merged.particle(island, particle),
             None => particle,
         }
     }
@@ -283,29 +283,30 @@ impl Simulation {
             self.judge_cuts();
         }
         let mut reclustered = 0;
-        for group in &mut self.state.groups {
-            reclustered += usize::from(group.renew_plan(self.state.clock.next_frame, &mut ms)?);
+        for island in &mut self.state.islands {
+            reclustered +=
+                usize::from(island.renew_partition(self.state.clock.next_frame, &mut ms)?);
         }
 
         let before_solve = Instant::now();
         let (frame, residual) = (self.state.clock.next_frame, self.wants(Quantity::Residual));
         let moves = self.state.colliders.take_moves();
-        for group in &mut self.state.groups {
+        for island in &mut self.state.islands {
             for &(place, to) in &moves {
                 collider::send(
-                    &mut group.settings.colliders[place],
+                    &mut island.settings.colliders[place],
                     to,
                     self.state.clock.time_step,
                 );
             }
         }
-        let groups = self.state.groups.par_iter_mut();
-        let solved = groups
-            .map(|group| group.step(frame, residual).map(|step| step.repaired))
+        let islands = self.state.islands.par_iter_mut();
+        let solved = islands
+            .map(|island| island.step(frame, residual).map(|step| step.repaired))
             .try_reduce(|| 0, |a, b| Ok(a + b));
-        for group in &mut self.state.groups {
+        for island in &mut self.state.islands {
             for &(place, to) in &moves {
-                collider::arrive(&mut group.settings.colliders[place], to);
+                collider::arrive(&mut island.settings.colliders[place], to);
             }
         }
         repaired += solved?;
@@ -336,44 +337,44 @@ impl Simulation {
         Ok(())
     }
 
-    /// Lets groups that were cut choose substeps again where that is due.
+    /// Lets islands that were cut choose substeps again where that is due.
     fn judge_cuts(&mut self) {
         let State {
-            groups,
+            islands,
             scene,
             solver,
             ..
         } = &mut self.state;
-        for group in groups {
-            let asked = group.asked(|body| scene.body[body].substeps.unwrap_or(solver.substeps));
-            group.judge_cut(&asked);
+        for island in islands {
+            let asked = island.asked(|body| scene.body[body].substeps.unwrap_or(solver.substeps));
+            island.judge_cut(&asked);
         }
     }
 
-    /// Puts the warnings of all groups into the report, and looks for divergence.
+    /// Puts the warnings of all islands into the report, and looks for divergence.
     fn collect_warnings(&mut self) {
         let elapsed = self.state.report.time_s;
         let missed = self.state.timeline.take_missed().into_iter();
         let missed = missed.map(Warning::of_missed_stroke);
         self.state.report.warnings.extend(missed);
-        for group in &mut self.state.groups {
-            self.state.report.warnings.append(&mut group.warnings);
-            let speed = match group.solver.host_max_speed() {
+        for island in &mut self.state.islands {
+            self.state.report.warnings.append(&mut island.warnings);
+            let speed = match island.solver.host_max_speed() {
                 Some(speed) => speed,
                 None => self.state.report.max_speed.unwrap_or(0.0),
             };
-            if group.is_absurd(speed, elapsed) {
+            if island.is_absurd(speed, elapsed) {
                 let message = format!(
                     "the solution has diverged: a particle moves at {speed:.1e} m/s; check method, relaxation and substeps"
                 );
-                let warning = Warning::new(WarningCode::Diverged, &group.bodies, message);
+                let warning = Warning::new(WarningCode::Diverged, &island.bodies, message);
                 self.state.report.warnings.push(warning);
             }
         }
         if self.state.report.repaired > 0 {
             let bodies: Vec<usize> = self
                 .state
-                .groups
+                .islands
                 .iter()
                 .flat_map(|g| g.bodies.clone())
                 .collect();
@@ -397,12 +398,18 @@ impl Simulation {
 
     /// Whether substeps are chosen for a body.
     fn chooses(&self) -> bool {
-        self.state.groups.iter().any(|group| group.choice.is_some())
+        self.state
+            .islands
+            .iter()
+            .any(|island| island.choice.is_some())
     }
 
     /// Whether bodies may sleep.
     fn sleeps(&self) -> bool {
-        self.state.groups.iter().any(|group| group.rest.is_some())
+        self.state
+            .islands
+            .iter()
+            .any(|island| island.rest.is_some())
     }
 
     /// Removes bodies and cuts what is due, with all that depends on the meshes; adds what comes off to `detached`.
@@ -443,9 +450,9 @@ impl Simulation {
     /// fetched: see [`Simulation::read_back`].
     #[must_use]
     pub fn positions(&self) -> &[DVec3] {
-        match &self.state.whole {
-            Some(whole) => &whole.positions,
-            None => &self.state.groups[0].positions,
+        match &self.state.merged {
+            Some(merged) => &merged.positions,
+            None => &self.state.islands[0].positions,
         }
     }
 
@@ -456,9 +463,9 @@ impl Simulation {
     /// stroke and within a stroke body by body.
     #[must_use]
     pub fn mesh(&self) -> &TetMesh {
-        match &self.state.whole {
-            Some(whole) => &whole.mesh,
-            None => self.state.groups[0].cuttable.mesh(),
+        match &self.state.merged {
+            Some(merged) => &merged.mesh,
+            None => self.state.islands[0].cuttable.mesh(),
         }
     }
 
@@ -484,11 +491,11 @@ impl Simulation {
     /// The boundary triangles with what each of them is: outer surface or laid bare by the stroke of a number, counted
     /// from 0 in the order of the scene, of [`Simulation::cut`] and of [`Simulation::begin_stroke`]. No pass over the mesh.
     pub fn boundary(&self) -> impl Iterator<Item = BoundaryTriangle> + '_ {
-        let groups = self.state.groups.iter().enumerate();
-        groups.flat_map(move |(g, group)| {
-            let triangles = group.cuttable.boundary();
-            triangles.map(move |triangle| match &self.state.whole {
-                Some(whole) => whole.triangle(g, &triangle),
+        let islands = self.state.islands.iter().enumerate();
+        islands.flat_map(move |(g, island)| {
+            let triangles = island.cuttable.boundary();
+            triangles.map(move |triangle| match &self.state.merged {
+                Some(merged) => merged.triangle(g, &triangle),
                 None => triangle,
             })
         })
@@ -510,25 +517,25 @@ impl Simulation {
     /// were).
     #[must_use]
     pub fn pieces(&self) -> Vec<PieceReport> {
-        self.state.pieces.report(&self.state.groups)
+        self.state.pieces.report(&self.state.islands)
     }
 
     /// The number of the piece of each tet of [`Simulation::mesh`], as [`Simulation::pieces`] numbers them. O(tets).
     #[must_use]
     pub fn piece_numbers(&self) -> Vec<u32> {
         let State {
-            groups,
-            whole,
+            islands,
+            merged,
             pieces,
             ..
         } = &self.state;
-        let groups = groups.iter().enumerate();
-        let mut of_groups: Vec<Vec<u32>> = groups
-            .map(|(number, group)| pieces.of_tets(number, group).collect())
+        let islands = islands.iter().enumerate();
+        let mut of_islands: Vec<Vec<u32>> = islands
+            .map(|(number, island)| pieces.of_tets(number, island).collect())
             .collect();
-        match whole {
-            Some(whole) => whole.of_tets(&of_groups),
-            None => of_groups.swap_remove(0),
+        match merged {
+            Some(merged) => merged.of_tets(&of_islands),
+            None => of_islands.swap_remove(0),
         }
     }
 
@@ -536,18 +543,18 @@ impl Simulation {
     /// numbered after those of the bodies before it, so that a cut can change their numbers.
     #[must_use]
     pub fn clustering(&self) -> Cow<'_, Clustering> {
-        match &self.state.whole {
-            Some(whole) => Cow::Owned(whole.plan(&self.state.groups).0),
-            None => Cow::Borrowed(&self.state.groups[0].plan.clustering),
+        match &self.state.merged {
+            Some(merged) => Cow::Owned(merged.partition(&self.state.islands).0),
+            None => Cow::Borrowed(&self.state.islands[0].partition.clustering),
         }
     }
 
     /// The colors of the clusters. With several bodies they are put together: O(tets).
     #[must_use]
     pub fn coloring(&self) -> Cow<'_, Coloring> {
-        match &self.state.whole {
-            Some(whole) => Cow::Owned(whole.plan(&self.state.groups).1),
-            None => Cow::Borrowed(self.state.groups[0].plan.coloring()),
+        match &self.state.merged {
+            Some(merged) => Cow::Owned(merged.partition(&self.state.islands).1),
+            None => Cow::Borrowed(self.state.islands[0].partition.coloring()),
         }
     }
 
@@ -555,12 +562,12 @@ impl Simulation {
     /// none waits for another.
     #[must_use]
     pub fn schedule(&self) -> Cow<'_, Schedule> {
-        match &self.state.whole {
-            Some(whole) => {
-                let (clustering, coloring) = whole.plan(&self.state.groups);
+        match &self.state.merged {
+            Some(merged) => {
+                let (clustering, coloring) = merged.partition(&self.state.islands);
                 Cow::Owned(Schedule::new(&clustering, &coloring))
             }
-            None => Cow::Borrowed(&self.state.groups[0].plan.schedule),
+            None => Cow::Borrowed(&self.state.islands[0].partition.schedule),
         }
     }
 
@@ -568,13 +575,13 @@ impl Simulation {
     /// substep of the tet's body.
     #[must_use]
     pub fn kappa(&self) -> f64 {
-        kappa(&self.state.groups)
+        kappa(&self.state.islands)
     }
 
     /// The tets that are softer than their material to keep the scene's limit of kappa.
     #[must_use]
     pub fn softened(&self) -> SoftenedReport {
-        softened(&self.state.groups)
+        softened(&self.state.islands)
     }
 
     /// Recomputes everything derived and compares: the mesh, the lists around its particles, volume, masses, clusters,
@@ -584,11 +591,11 @@ impl Simulation {
     /// # Errors
     /// [`Error::Inconsistent`] or [`Error::Cut`] name the first difference.
     pub fn check(&self) -> Result<(), Error> {
-        self.state.groups.iter().try_for_each(Group::check)?;
-        self.state.pieces.check(&self.state.groups)?;
+        self.state.islands.iter().try_for_each(Island::check)?;
+        self.state.pieces.check(&self.state.islands)?;
         self.state
-            .whole
+            .merged
             .as_ref()
-            .map_or(Ok(()), |whole| whole.check(&self.state.groups))
+            .map_or(Ok(()), |merged| merged.check(&self.state.islands))
     }
 }

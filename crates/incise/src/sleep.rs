@@ -1,4 +1,4 @@
-//! [`Rest`]: how long a group of bodies has been at rest, and whether it sleeps.
+//! [`Rest`]: how long an island of bodies has been at rest, and whether it sleeps.
 //!
 //! A body whose fastest particle has stayed below a speed for a time is no longer solved: it keeps its positions to the
 //! bit, its velocities become zero, and it costs nothing until it is cut or one of its handles moves. A collider with a
@@ -12,7 +12,7 @@
 
 use crate::scene::SleepSpec;
 
-/// The rest of a group.
+/// The rest of an island.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Rest {
@@ -39,7 +39,7 @@ impl Rest {
         *self = Self::new(self.spec);
     }
 
-    /// Counts a frame of `time` s at whose end the largest speed is `speed`; tells whether the group falls asleep now.
+    /// Counts a frame of `time` s at whose end the largest speed is `speed`; tells whether the island falls asleep now.
     pub(crate) fn count(&mut self, speed: f64, time: f64) -> bool {
         self.still = if speed <= self.spec.speed {
             self.still + time

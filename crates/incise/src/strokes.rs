@@ -5,7 +5,7 @@ use incise_cutting::{
     CutDelta, CutMemory, CutOptions, Sweep, carve, cut_level_set, cut_plane, cut_surface_joining,
 };
 
-use crate::group::Group;
+use crate::island::Island;
 use crate::limits::value;
 use crate::live_blade::LiveBlade;
 use crate::scene::{StrokeSpec, pose};
@@ -21,7 +21,7 @@ struct Stroke {
     options: CutOptions,
     /// The frames in which it cuts first and last; a live one from the start on and for as long as it is held.
     frames: [u64; 2],
-    /// One for each group of bodies once a blade has its first pose.
+    /// One for each island of bodies once a blade has its first pose.
     sweeps: Vec<Sweep>,
     /// Whether it has changed a mesh.
     has_cut: bool,
@@ -35,7 +35,7 @@ pub(crate) struct Timeline {
     added: u32,
     /// Smallest snap distance: rounding of the positions in the solver's precision.
     tolerance: f64,
-    /// For each group what its strokes leave for later ones to join; empty before the first stroke.
+    /// For each island what its strokes leave for later ones to join; empty before the first stroke.
     memories: Vec<CutMemory>,
     /// Strokes that began or ended to cut since the events were taken.
     events: Vec<Event>,
@@ -159,34 +159,34 @@ impl Timeline {
         self.strokes.iter().any(|stroke| stroke.frames[0] <= frame)
     }
 
-    /// Applies a delta of a group that no stroke made to what strokes keep of its mesh.
-    pub(crate) fn apply_delta(&mut self, number: usize, group: &Group, delta: &CutDelta) {
+    /// Applies a delta of an island that no stroke made to what strokes keep of its mesh.
+    pub(crate) fn apply_delta(&mut self, number: usize, island: &Island, delta: &CutDelta) {
         for stroke in &mut self.strokes {
             if let Some(sweep) = stroke.sweeps.get_mut(number) {
-                sweep.follow(&group.cuttable, delta);
+                sweep.follow(&island.cuttable, delta);
             }
         }
         if let Some(memory) = self.memories.get_mut(number) {
-            memory.follow(&group.cuttable, delta, &CutOptions::default());
+            memory.follow(&island.cuttable, delta, &CutOptions::default());
         }
     }
 
-    /// Carries out what is due in `frame` on every group; hands each delta to `follow` before the next stroke moves. The
-    /// groups' positions are kept current.
+    /// Carries out what is due in `frame` on every island; hands each delta to `follow` before the next stroke moves. The
+    /// islands' positions are kept current.
     pub(crate) fn advance(
         &mut self,
         frame: u64,
-        groups: &mut [Group],
-        mut follow: impl FnMut(usize, &mut Group, &CutDelta) -> Result<(), Error>,
+        islands: &mut [Island],
+        mut follow: impl FnMut(usize, &mut Island, &CutDelta) -> Result<(), Error>,
     ) -> Result<(), Error> {
         if self.strokes.is_empty() {
             return Ok(());
         }
-        self.memories.resize_with(groups.len(), CutMemory::default);
+        self.memories.resize_with(islands.len(), CutMemory::default);
         for i in 0..self.strokes.len() {
-            for (g, group) in groups.iter_mut().enumerate() {
+            for (g, island) in islands.iter_mut().enumerate() {
                 let stroke = &mut self.strokes[i];
-                let Some(delta) = stroke.advance(frame, g, group, &mut self.memories[g])? else {
+                let Some(delta) = stroke.advance(frame, g, island, &mut self.memories[g])? else {
                     continue;
                 };
                 if delta.is_empty() {
@@ -196,13 +196,13 @@ impl Timeline {
                     let stroke = stroke.options.tag;
                     self.events.push(Event::CutBegan { stroke });
                 }
-                delta.extend_particles(&mut group.positions);
+                delta.extend_particles(&mut island.positions);
                 for other in self.strokes.iter_mut().enumerate().filter(|(j, _)| *j != i) {
                     if let Some(sweep) = other.1.sweeps.get_mut(g) {
-                        sweep.follow(&group.cuttable, &delta);
+                        sweep.follow(&island.cuttable, &delta);
                     }
                 }
-                follow(g, group, &delta)?;
+                follow(g, island, &delta)?;
             }
         }
         let (events, missed) = (&mut self.events, &mut self.missed);
@@ -231,19 +231,20 @@ impl Stroke {
         self.has_cut.then_some(Event::CutEnded { stroke })
     }
 
-    /// Cuts, or moves, in the group of the given number.
+    /// Cuts, or moves, in the island of the given number.
     fn advance(
         &mut self,
         frame: u64,
         number: usize,
-        group: &mut Group,
+        island: &mut Island,
         memory: &mut CutMemory,
     ) -> Result<Option<CutDelta>, Error> {
         let [first, last] = self.frames;
         if frame < first {
             return Ok(None);
         }
-        let (cuttable, positions, options) = (&mut group.cuttable, &group.positions, &self.options);
+        let (cuttable, positions, options) =
+            (&mut island.cuttable, &island.positions, &self.options);
         let sweeps = &mut self.sweeps;
         let mut sweep = |pose: &[DVec3]| match sweeps.get_mut(number) {
             Some(sweep) => sweep.advance_joining(cuttable, positions, pose, memory),
@@ -273,7 +274,7 @@ impl Stroke {
             Tool::Sweep { .. } | Tool::Live(_) | Tool::Surface(_)
         );
         if !joins && !delta.is_empty() {
-            memory.follow(&group.cuttable, &delta, &self.options);
+            memory.follow(&island.cuttable, &delta, &self.options);
         }
         Ok(Some(delta))
     }

@@ -1,4 +1,4 @@
-//! [`VBD`]: what a group that is solved by VBD keeps, and how it follows a cut.
+//! [`VBD`]: what an island that is solved by VBD keeps, and how it follows a cut.
 //!
 //! VBD visits particles, so these have colors of their own; tets, clusters and their colors stay as they are for
 //! reports and renderers. After a cut particles keep their colors; only new ones, and those that now share a tet

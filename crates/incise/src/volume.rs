@@ -1,7 +1,7 @@
-//! [`Volumes`]: the volume constraints of a group's bodies that ask for them, one for each tet, and how they follow a
+//! [`Volumes`]: the volume constraints of an island's bodies that ask for them, one for each tet, and how they follow a
 //! cut.
 //!
-//! Constraint `i` is that of tet `i`, so the schedule of the tets is theirs as well. Tets of other bodies of the group
+//! Constraint `i` is that of tet `i`, so the schedule of the tets is theirs as well. Tets of other bodies of the island
 //! take no part. Cost: O(tets) at the start, then what a cut touched and a copy of the schedule.
 
 use glam::DVec3;
@@ -13,7 +13,7 @@ use incise_xpbd::{VolumeConstraint, XpbdError};
 use crate::Error;
 use crate::backend::{AnySolver, each_mut};
 
-/// What the body of each material of a group asks for.
+/// What the body of each material of an island asks for.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Volumes {

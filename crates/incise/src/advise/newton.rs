@@ -13,7 +13,7 @@ use incise_xpbd::Pose;
 
 use super::motion::{Motion, volume};
 use crate::backend::{AnySolver, each};
-use crate::group::Group;
+use crate::island::Island;
 use crate::{Error, Scene, Simulation};
 
 /// A scene that the reference can do.
@@ -27,7 +27,7 @@ pub(super) struct Newton {
     particles: usize,
 }
 
-/// A group of bodies as the reference sees it.
+/// An island of bodies as the reference sees it.
 #[derive(Debug)]
 struct Part {
     mesh_at_rest: Vec<DVec3>,
@@ -78,7 +78,7 @@ impl Newton {
         let mut simulation = Simulation::with_threads(&scene, 1)?;
         let particles = simulation.positions().len();
         simulation.cut_now()?;
-        let parts = simulation.groups().iter().map(Part::new);
+        let parts = simulation.islands().iter().map(Part::new);
         Ok(Self {
             parts: parts.collect::<Result<_, _>>()?,
             simulation,
@@ -102,10 +102,10 @@ impl Newton {
             let all = self
                 .parts
                 .iter()
-                .zip(self.simulation.groups())
+                .zip(self.simulation.islands())
                 .zip(&mut bodies);
-            for (g, ((part, group), body)) in all.enumerate() {
-                let poses: Vec<[Pose; 2]> = group
+            for (g, ((part, island), body)) in all.enumerate() {
+                let poses: Vec<[Pose; 2]> = island
                     .attachments
                     .iter()
                     .map(|attachment| [frame, frame + 1].map(|f| attachment.pose(f)))
@@ -130,10 +130,10 @@ impl Newton {
 }
 
 impl Part {
-    fn new(group: &Group) -> Result<Self, Error> {
-        let mesh = group.cuttable.mesh();
+    fn new(island: &Island) -> Result<Self, Error> {
+        let mesh = island.cuttable.mesh();
         let count = mesh.positions.len();
-        each!(&group.solver, solver => {
+        each!(&island.solver, solver => {
             let materials = (0..mesh.tets.len()).map(|t| {
                 let material = solver.material(solver.material_of(t));
                 Material {
@@ -142,7 +142,7 @@ impl Part {
                     density: material.density,
                 }
             });
-            let mut seat = seats(&group.solver, count);
+            let mut seat = seats(&island.solver, count);
             let mut at_rest = Vec::new();
             let mut fixed: Vec<bool> = Vec::new();
             let mut held = Vec::new();
@@ -158,9 +158,9 @@ impl Part {
                 let seat = seat[p] as usize;
                 fixed[seat] |= solver.is_fixed(p);
                 if let Some(number) = solver.handle_of(p).filter(|_| !solver.is_fixed(p)) {
-                    let handle = group.attachments.iter().position(|a| a.number == number);
-                    let handle = handle.expect("attachments of a group hold its particles");
-                    let pose = group.attachments[handle].pose(0);
+                    let handle = island.attachments.iter().position(|a| a.number == number);
+                    let handle = handle.expect("attachments of an island hold its particles");
+                    let pose = island.attachments[handle].pose(0);
                     let place = pose.rotation.inverse() * (mesh.positions[p] - pose.position);
                     fixed[seat] = true;
                     held.push((handle, p, place));

@@ -155,7 +155,7 @@ impl Backend {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ReclusterSpec {
-    /// How far they may wear first, above 1: the number of colors over that of the last whole plan, or the mean cluster
+    /// How far they may wear first, above 1: the number of colors over that of the last full coloring, or the mean cluster
     /// size of that over the present one, whichever is larger.
     #[serde(default = "five_quarters")]
     pub wear: f64,

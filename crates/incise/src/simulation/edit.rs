@@ -1,6 +1,6 @@
 //! What a program changes between frames: bodies, gravity, colliders, attachments, distances, impulses; and what it asks, by rays.
 //!
-//! Every group of bodies has the colliders of the world among its settings, so a change goes to all of them. Cost: that of
+//! Every island of bodies has the colliders of the world among its settings, so a change goes to all of them. Cost: that of
 //! the change; an impulse wakes what sleeps and, on a device, fetches the positions.
 
 use std::sync::Arc;
@@ -15,13 +15,13 @@ use crate::attachment::{Attachment, AttachmentHandle};
 use crate::backend::{AnySolver, each, each_mut};
 use crate::collider::{self, ColliderHandle};
 use crate::distance::DistanceHandle;
-use crate::group::Group;
-use crate::joined::Joined;
+use crate::island::Island;
+use crate::island_builder::IslandBuilder;
 use crate::limits::{LARGEST_COORDINATE, coordinates, value, within};
+use crate::merged_mesh::MergedMesh;
 use crate::method::settings;
 use crate::ray::{RayHit, first_hit};
 use crate::scene::{AttachmentSpec, ColliderSpec, DistanceSpec};
-use crate::whole::Whole;
 use crate::{Error, Scene, body, budget};
 
 impl Simulation {
@@ -34,9 +34,9 @@ impl Simulation {
             coordinates("gravity", gravity.to_array())?;
         }
         self.state.gravity = gravity;
-        for group in &mut self.state.groups {
-            group.settings.gravity = gravity;
-            group.wake();
+        for island in &mut self.state.islands {
+            island.settings.gravity = gravity;
+            island.wake();
         }
         Ok(())
     }
@@ -76,9 +76,9 @@ impl Simulation {
     pub fn add_collider(&mut self, collider: &ColliderSpec) -> Result<ColliderHandle, Error> {
         let added = collider::collider("collider", collider)?;
         let handle = self.state.colliders.add();
-        for group in &mut self.state.groups {
-            group.settings.colliders.push(added);
-            group.wake();
+        for island in &mut self.state.islands {
+            island.settings.colliders.push(added);
+            island.wake();
         }
         Ok(handle)
     }
@@ -108,9 +108,9 @@ impl Simulation {
         let place = self.collider_place(handle)?;
         let new = collider::collider("collider", collider)?;
         self.state.colliders.stay(handle);
-        for group in &mut self.state.groups {
-            group.settings.colliders[place] = new;
-            group.wake();
+        for island in &mut self.state.islands {
+            island.settings.colliders[place] = new;
+            island.wake();
         }
         Ok(())
     }
@@ -122,7 +122,7 @@ impl Simulation {
     pub fn collider_position(&self, handle: ColliderHandle) -> Result<DVec3, Error> {
         let place = self.collider_place(handle)?;
         Ok(collider::position(
-            &self.state.groups[0].settings.colliders[place].shape,
+            &self.state.islands[0].settings.colliders[place].shape,
         ))
     }
 
@@ -133,9 +133,9 @@ impl Simulation {
     pub fn remove_collider(&mut self, handle: ColliderHandle) -> Result<(), Error> {
         let place = self.collider_place(handle)?;
         self.state.colliders.remove(place);
-        for group in &mut self.state.groups {
-            group.settings.colliders.remove(place);
-            group.wake();
+        for island in &mut self.state.islands {
+            island.settings.colliders.remove(place);
+            island.wake();
         }
         Ok(())
     }
@@ -177,11 +177,11 @@ impl Simulation {
     /// # Ok::<(), incise::Error>(())
     /// ```
     pub fn add_attachment(&mut self, spec: &AttachmentSpec) -> Result<AttachmentHandle, Error> {
-        let group = self.group_of("attachment.body", spec.body)?;
+        let island = self.island_of("attachment.body", spec.body)?;
         self.read_back()?;
         let name = AttachmentHandle(self.state.next.attachment);
         let frame = self.state.clock.next_frame;
-        self.state.groups[group].add_attachment(name, spec, frame)?;
+        self.state.islands[island].add_attachment(name, spec, frame)?;
         self.state.next.attachment += 1;
         Ok(name)
     }
@@ -230,8 +230,8 @@ impl Simulation {
     /// If it was removed before, or the device is lost; nothing has changed then.
     pub fn remove_attachment(&mut self, handle: AttachmentHandle) -> Result<(), Error> {
         self.read_back()?;
-        for group in &mut self.state.groups {
-            if group.remove_attachment(handle)? {
+        for island in &mut self.state.islands {
+            if island.remove_attachment(handle)? {
                 return Ok(());
             }
         }
@@ -242,10 +242,10 @@ impl Simulation {
         &mut self,
         handle: AttachmentHandle,
     ) -> Result<(&mut AnySolver, &mut Attachment), Error> {
-        for group in &mut self.state.groups {
-            let mut all = group.attachments.iter_mut();
+        for island in &mut self.state.islands {
+            let mut all = island.attachments.iter_mut();
             if let Some(attachment) = all.find(|attachment| attachment.name == handle) {
-                return Ok((&mut group.solver, attachment));
+                return Ok((&mut island.solver, attachment));
             }
         }
         Err(removed("attachment", handle))
@@ -261,13 +261,13 @@ impl Simulation {
     /// If a body does not exist, the bodies have solvers of their own, a value lies outside its range, both ends are on one
     /// particle, or the device is lost; nothing has changed then.
     pub fn add_distance(&mut self, spec: &DistanceSpec) -> Result<DistanceHandle, Error> {
-        let group = self.group_of_both(spec)?;
+        let island = self.island_of_both(spec)?;
         self.read_back()?;
         let name = DistanceHandle(self.state.next.distance);
-        let group = &mut self.state.groups[group];
-        let constraint = group.distance(spec)?;
-        group.distances.add(name, constraint);
-        group.update_distances()?;
+        let island = &mut self.state.islands[island];
+        let constraint = island.distance(spec)?;
+        island.distances.add(name, constraint);
+        island.update_distances()?;
         self.state.next.distance += 1;
         Ok(name)
     }
@@ -286,10 +286,10 @@ impl Simulation {
         let length = within("distance.length", length, 0.0, 2.0 * LARGEST_COORDINATE)?;
         let compliance = within("distance.compliance", compliance, 0.0, 1e9)?;
         self.read_back()?;
-        for group in &mut self.state.groups {
-            if let Some(constraint) = group.distances.get_mut(handle) {
+        for island in &mut self.state.islands {
+            if let Some(constraint) = island.distances.get_mut(handle) {
                 (constraint.length, constraint.compliance) = (length, compliance);
-                return group.update_distances();
+                return island.update_distances();
             }
         }
         Err(removed("distance", handle))
@@ -301,9 +301,9 @@ impl Simulation {
     /// If it was removed before, or the device is lost; nothing has changed then.
     pub fn remove_distance(&mut self, handle: DistanceHandle) -> Result<(), Error> {
         self.read_back()?;
-        for group in &mut self.state.groups {
-            if group.distances.remove(handle) {
-                return group.update_distances();
+        for island in &mut self.state.islands {
+            if island.distances.remove(handle) {
+                return island.update_distances();
             }
         }
         Err(removed("distance", handle))
@@ -341,7 +341,7 @@ impl Simulation {
         let number = state.scene.body.len();
         let field = format!("body[{number}]");
         let made = body::Body::new(&field, &body.spec, Some(&body.mesh), state.solver.substeps)?;
-        let joined = Joined::of_one(number, made)?;
+        let joined = IslandBuilder::of_one(number, made)?;
         let mut scene = (*state.scene).clone();
         scene.body.push(body.spec);
         let present = Scene {
@@ -350,23 +350,23 @@ impl Simulation {
         };
         let settings = StepSettings {
             gravity: state.gravity,
-            colliders: state.groups[0].settings.colliders.clone(),
+            colliders: state.islands[0].settings.colliders.clone(),
             ..settings(&present)?
         };
-        let make = || Group::new(&present, &state.place, state.precision, settings, joined);
-        let group = match &self.pool {
+        let make = || Island::new(&present, &state.place, state.precision, settings, joined);
+        let island = match &self.pool {
             Some(pool) => pool.install(make),
             None => make(),
         }?;
 
         let state = &mut self.state;
-        let groups = &mut state.groups;
-        let whole = &mut state.whole;
-        whole
-            .get_or_insert_with(|| Whole::of_one(&groups[0]))
-            .add_group(&group);
-        state.pieces.add_group(&group);
-        groups.push(group);
+        let islands = &mut state.islands;
+        let merged = &mut state.merged;
+        merged
+            .get_or_insert_with(|| MergedMesh::of_one(&islands[0]))
+            .add_island(&island);
+        state.pieces.add_island(&island);
+        islands.push(island);
         state.scene = Arc::new(scene);
         state.residuals_kept = false;
         if !state.on_cut.is_empty() {
@@ -374,8 +374,10 @@ impl Simulation {
             self.state.on_cut.resize(particles, false);
         }
         if let Some(budget) = self.state.solver.budget_ms {
-            let State { groups, solver, .. } = &mut self.state;
-            let mut fit = || budget::fit(groups, solver, budget);
+            let State {
+                islands, solver, ..
+            } = &mut self.state;
+            let mut fit = || budget::fit(islands, solver, budget);
             match &self.pool {
                 Some(pool) => pool.install(fit),
                 None => fit(),
@@ -391,7 +393,7 @@ impl Simulation {
     /// # Errors
     /// If it was removed before.
     pub fn remove_body(&mut self, body: BodyHandle) -> Result<(), Error> {
-        self.group_of("body", body.index())?;
+        self.island_of("body", body.index())?;
         self.state.removed.push(Removal {
             body: body.index(),
             is_done: false,
@@ -399,8 +401,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// The number of the group of a body.
-    fn group_of(&self, field: &str, body: usize) -> Result<usize, Error> {
+    /// The number of the island of a body.
+    fn island_of(&self, field: &str, body: usize) -> Result<usize, Error> {
         if self
             .state
             .removed
@@ -409,15 +411,15 @@ impl Simulation {
         {
             return Err(removed(field, body));
         }
-        let mut groups = self.state.groups.iter();
-        let group = groups.position(|group| group.bodies.contains(&body));
-        group.ok_or_else(|| value(field, body, "the number of a body, counted from 0"))
+        let mut islands = self.state.islands.iter();
+        let island = islands.position(|island| island.bodies.contains(&body));
+        island.ok_or_else(|| value(field, body, "the number of a body, counted from 0"))
     }
 
-    /// The number of the group of both bodies of a distance constraint.
-    fn group_of_both(&self, spec: &DistanceSpec) -> Result<usize, Error> {
-        let from = self.group_of("distance.from.body", spec.from.body)?;
-        let to = self.group_of("distance.to.body", spec.to.body)?;
+    /// The number of the island of both bodies of a distance constraint.
+    fn island_of_both(&self, spec: &DistanceSpec) -> Result<usize, Error> {
+        let from = self.island_of("distance.from.body", spec.from.body)?;
+        let to = self.island_of("distance.to.body", spec.to.body)?;
         if from != to {
             let range = format!(
                 "a body that a distance has tied to body {} since the simulation started",
@@ -446,8 +448,8 @@ impl Simulation {
         self.read_back()?;
         let mut hit = Vec::new();
         let mut mass = 0.0;
-        for (g, group) in self.state.groups.iter().enumerate() {
-            each!(&group.solver, solver => {
+        for (g, island) in self.state.islands.iter().enumerate() {
+            each!(&island.solver, solver => {
                 for p in 0..solver.particle_count() {
                     let is_near = solver.position(p).distance(point) <= radius;
                     if is_near && solver.is_free(p) {
@@ -463,9 +465,9 @@ impl Simulation {
         let change = impulse / mass;
         coordinates("impulse over the mass it meets", change.to_array())?;
         for (g, p) in hit {
-            let group = &mut self.state.groups[g];
-            group.wake();
-            each_mut!(&mut group.solver, solver => {
+            let island = &mut self.state.islands[g];
+            island.wake();
+            each_mut!(&mut island.solver, solver => {
                 solver.set_velocity(p, solver.velocity(p) + change);
             });
         }

@@ -116,16 +116,16 @@ impl Simulation {
         within("grab.radius", radius, 0.0, 1e9)?;
         within("grab.compliance", compliance, 0.0, 1e9)?;
         self.read_back()?;
-        let groups = self.state.groups.iter().enumerate();
-        let nearest = groups.filter_map(|(g, group)| {
-            let (distance, particle) = group.nearest(point, radius)?;
+        let islands = self.state.islands.iter().enumerate();
+        let nearest = islands.filter_map(|(g, island)| {
+            let (distance, particle) = island.nearest(point, radius)?;
             Some((distance, g, particle))
         });
         let nearest = nearest.min_by(|a, b| a.0.total_cmp(&b.0));
         let Some((_, g, particle)) = nearest else {
             return Ok(None);
         };
-        let grab = self.state.groups[g].grab(g, particle, point, radius, compliance)?;
+        let grab = self.state.islands[g].grab(g, particle, point, radius, compliance)?;
         Ok(Some(grab))
     }
 
@@ -139,8 +139,8 @@ impl Simulation {
     /// If the grab was released, or if a coordinate is not finite or beyond 1e9 m. The hand stays where it was then.
     pub fn move_grab(&mut self, grab: Grab, to: DVec3) -> Result<(), Error> {
         coordinates("grab.to", to.to_array())?;
-        let group = self.state.groups.get_mut(grab.group);
-        match group.is_some_and(|group| group.move_grab(grab, to)) {
+        let island = self.state.islands.get_mut(grab.island);
+        match island.is_some_and(|island| island.move_grab(grab, to)) {
             true => Ok(()),
             false => Err(unknown(grab)),
         }
@@ -154,8 +154,8 @@ impl Simulation {
     /// # Errors
     /// If the grab was released before, or the device is lost.
     pub fn release(&mut self, grab: Grab) -> Result<(), Error> {
-        let group = self.state.groups.get_mut(grab.group);
-        match group.map_or(Ok(false), |group| group.release(grab))? {
+        let island = self.state.islands.get_mut(grab.island);
+        match island.map_or(Ok(false), |island| island.release(grab))? {
             true => Ok(()),
             false => Err(unknown(grab)),
         }
@@ -191,16 +191,16 @@ impl Simulation {
     /// ```
     pub fn set_velocities(&mut self, velocity: impl Fn(DVec3) -> DVec3) -> Result<(), Error> {
         self.read_back()?;
-        for group in &self.state.groups {
-            each!(&group.solver, solver => {
+        for island in &self.state.islands {
+            each!(&island.solver, solver => {
                 for p in 0..solver.particle_count() {
                     coordinates("velocity", velocity(solver.position(p)).to_array())?;
                 }
             });
         }
-        for group in &mut self.state.groups {
-            group.wake();
-            each_mut!(&mut group.solver, solver => {
+        for island in &mut self.state.islands {
+            island.wake();
+            each_mut!(&mut island.solver, solver => {
                 for p in 0..solver.particle_count() {
                     if !solver.is_fixed(p) {
                         solver.set_velocity(p, velocity(solver.position(p)));
@@ -249,7 +249,7 @@ mod tests {
                 simulation.release(other).unwrap();
                 step_at(&mut simulation, 9);
             }
-            let solver = &simulation.state.groups[0].solver;
+            let solver = &simulation.state.islands[0].solver;
             let (handles, hanging) = each!(solver, solver => {
                 let ways = solver.handle_poses(1.0).map(|pose| pose.position);
                 (ways.collect::<Vec<_>>(), solver.attachments().len())

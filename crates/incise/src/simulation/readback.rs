@@ -20,7 +20,7 @@ impl Simulation {
     pub(super) fn measure(&mut self, ms: &mut Milliseconds) -> Result<(), Error> {
         let kappa_too = self.wants(Quantity::Kappa);
         if kappa_too || self.chooses() || self.sleeps() {
-            self.state.report.bodies = by_body(&mut self.state.groups, kappa_too);
+            self.state.report.bodies = by_body(&mut self.state.islands, kappa_too);
         }
         if !self
             .state
@@ -32,20 +32,20 @@ impl Simulation {
         }
         let start = Instant::now();
         let states = states(
-            &mut self.state.groups,
+            &mut self.state.islands,
             self.state.gravity,
             &self.state.reporting.quantities,
         )?;
         if self.state.place.is_device() {
-            let groups = self.state.groups.iter_mut();
-            self.state.report.repaired += groups.map(|group| group.solver.news()).sum::<usize>();
+            let islands = self.state.islands.iter_mut();
+            self.state.report.repaired += islands.map(|island| island.solver.news()).sum::<usize>();
             ms.readback += milliseconds(start.elapsed());
         }
         for quantity in &self.state.reporting.quantities {
             let report = &mut self.state.report;
             match quantity {
                 Quantity::Residual => {
-                    report.residual = residual(&self.state.groups, self.state.gravity);
+                    report.residual = residual(&self.state.islands, self.state.gravity);
                 }
                 Quantity::Energy => report.energy = Some(energy(&states)),
                 Quantity::Volume => {
@@ -59,8 +59,8 @@ impl Simulation {
                 }
                 Quantity::Speed => report.max_speed = Some(max_speed(&states)),
                 Quantity::Kappa => {
-                    report.kappa = Some(kappa(&self.state.groups));
-                    report.softened = Some(softened(&self.state.groups));
+                    report.kappa = Some(kappa(&self.state.islands));
+                    report.softened = Some(softened(&self.state.islands));
                 }
             }
         }
@@ -72,7 +72,7 @@ impl Simulation {
         self.state.report = FrameReport::default();
         self.count();
         if self.chooses() {
-            self.state.report.bodies = by_body(&mut self.state.groups, false);
+            self.state.report.bodies = by_body(&mut self.state.islands, false);
         }
     }
 
@@ -80,9 +80,11 @@ impl Simulation {
     pub(super) fn count(&mut self) {
         let mesh = self.mesh();
         let (particles, tets) = (mesh.positions.len(), mesh.tets.len());
-        let plans = || self.state.groups.iter().map(|group| &group.plan);
-        let clusters = plans().map(|plan| plan.clustering.occupied()).sum();
-        let colors = plans().map(|plan| plan.schedule.color_count());
+        let partitions = || self.state.islands.iter().map(|island| &island.partition);
+        let clusters = partitions()
+            .map(|partition| partition.clustering.occupied())
+            .sum();
+        let colors = partitions().map(|partition| partition.schedule.color_count());
         let colors = colors.max().unwrap_or(0);
         let report = &mut self.state.report;
         report.particles = particles;
@@ -91,9 +93,9 @@ impl Simulation {
         report.colors = colors;
         report.pieces = self
             .state
-            .groups
+            .islands
             .iter()
-            .map(|group| group.pieces.count())
+            .map(|island| island.pieces.count())
             .sum();
         report.backend = self.state.place.name();
         report.precision = self.state.precision.name();
@@ -103,8 +105,8 @@ impl Simulation {
     pub(super) fn fetch(&mut self, ms: &mut Milliseconds) -> Result<usize, Error> {
         let start = Instant::now();
         let mut repaired = 0;
-        for group in &mut self.state.groups {
-            repaired += group.solver.read_back()?;
+        for island in &mut self.state.islands {
+            repaired += island.solver.read_back()?;
         }
         if self.state.place.is_device() {
             ms.readback += milliseconds(start.elapsed());
@@ -147,10 +149,10 @@ impl Simulation {
         self.state.clock.next_frame
     }
 
-    /// In which group of bodies a particle of [`Simulation::mesh`] is solved, and its number there. O(1).
+    /// In which island of bodies a particle of [`Simulation::mesh`] is solved, and its number there. O(1).
     ///
-    /// Bodies that links join are a group, every other one is a group of its own; groups are numbered in the order of
-    /// their first bodies. On a device the group is the number of its solver in `Simulation::device_solvers`: a renderer
+    /// Bodies that links join are an island, every other one is an island of its own; islands are numbered in the order of
+    /// their first bodies. On a device the island is the number of its solver in `Simulation::device_solvers`: a renderer
     /// that draws the whole mesh from the buffers of the solvers looks its particles up here, once at the start and then
     /// those that [`Simulation::deltas`] append. A particle keeps its place for good.
     ///
@@ -181,20 +183,20 @@ impl Simulation {
     pub fn place_of(&self, particle: ParticleId) -> (usize, usize) {
         let count = self.mesh().positions.len();
         assert!(particle.index() < count, "the mesh has {count} particles");
-        match &self.state.whole {
-            Some(whole) => whole.place(particle),
+        match &self.state.merged {
+            Some(merged) => merged.place(particle),
             None => (0, particle.index()),
         }
     }
 
-    /// The device solvers of the scene's groups of bodies, for renderers; none on the processor. Which of them has a
+    /// The device solvers of the scene's islands of bodies, for renderers; none on the processor. Which of them has a
     /// particle: [`Simulation::place_of`].
     #[cfg(feature = "gpu")]
     pub fn device_solvers(&self) -> impl Iterator<Item = &crate::gpu::GpuSolver> + '_ {
         self.state
-            .groups
+            .islands
             .iter()
-            .filter_map(|group| group.solver.device())
+            .filter_map(|island| island.solver.device())
     }
 
     /// For each tet of [`Simulation::mesh`] how far its constraints are from solved in the last substep: the norm of
@@ -222,21 +224,21 @@ impl Simulation {
         if !self.state.residuals_kept {
             return None;
         }
-        let groups = self.state.groups.iter().map(residuals_of_tets);
-        let mut groups = groups.collect::<Option<Vec<_>>>()?;
-        match &self.state.whole {
-            Some(whole) => Some(whole.of_tets(&groups)),
-            None => groups.pop(),
+        let islands = self.state.islands.iter().map(residuals_of_tets);
+        let mut islands = islands.collect::<Option<Vec<_>>>()?;
+        match &self.state.merged {
+            Some(merged) => Some(merged.of_tets(&islands)),
+            None => islands.pop(),
         }
     }
 
     /// Takes over the positions of the solvers.
     pub(super) fn collect_positions(&mut self) {
-        for group in &mut self.state.groups {
-            group.solver.positions(&mut group.positions);
+        for island in &mut self.state.islands {
+            island.solver.positions(&mut island.positions);
         }
-        if let Some(whole) = &mut self.state.whole {
-            whole.collect_positions(&self.state.groups);
+        if let Some(merged) = &mut self.state.merged {
+            merged.collect_positions(&self.state.islands);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! [`Simulation::retune`]: other settings of the solver for a simulation that runs.
 //!
 //! Mesh, cuts, positions, velocities, pieces, handles, obstacles and strokes stay as they are. From the settings follow
-//! substeps, softened tets, plans, what VBD needs and the place: what differs is rebuilt from the body as it is
+//! substeps, softened tets, partitions, what VBD needs and the place: what differs is rebuilt from the body as it is
 //! now, as a new simulation would make it from such a body, and what does not differ is not touched. Everything that can
 //! fail is made first, beside what is there; only then it takes its place.
 //!
@@ -15,19 +15,19 @@ use incise_xpbd::{KappaLimit, StepSettings};
 use super::Simulation;
 use crate::backend::AnySolver;
 use crate::budget;
-use crate::group::{Group, adopt, kappa_limit};
-use crate::joined::substeps;
+use crate::island::{Island, adopt, kappa_limit};
+use crate::island_builder::substeps;
 use crate::limits::value;
 use crate::method::{leaves_open, resolve, settings};
+use crate::partition::{Partition, PartitionSettings};
 use crate::place::Place;
-use crate::plan::{Plan, Recipe};
 use crate::recluster::Recluster;
 use crate::scene::{Method, Precision, ReportSpec, SolverSpec, Substeps};
 use crate::sleep::Rest;
 use crate::substeps::Choice;
 use crate::{Error, Scene};
 
-/// What other settings make of a group; what is `None` stays.
+/// What other settings make of an island; what is `None` stays.
 #[derive(Debug)]
 struct Retuned {
     settings: StepSettings,
@@ -40,7 +40,7 @@ struct Retuned {
     choice: Option<Choice>,
     /// The limit of kappa before and from now on.
     limits: [Option<KappaLimit>; 2],
-    plan: Option<Plan>,
+    partition: Option<Partition>,
     /// With the limit from now on.
     solver: Option<AnySolver>,
 }
@@ -119,9 +119,9 @@ impl Simulation {
             self.read_back()?;
         }
         let retuned = || {
-            let groups = self.state.groups.par_iter();
-            groups
-                .map(|group| Retuned::of(group, &self.state.solver, &scene, &settings, &place))
+            let islands = self.state.islands.par_iter();
+            islands
+                .map(|island| Retuned::of(island, &self.state.solver, &scene, &settings, &place))
                 .collect::<Result<Vec<_>, Error>>()
         };
         let retuned = match &self.pool {
@@ -130,12 +130,12 @@ impl Simulation {
         }?;
 
         // Nothing fails from here on: what is on a device has been fetched.
-        for (group, retuned) in self.state.groups.iter_mut().zip(retuned) {
-            retuned.take_effect(group)?;
-            group.judge_settings();
+        for (island, retuned) in self.state.islands.iter_mut().zip(retuned) {
+            retuned.take_effect(island)?;
+            island.judge_settings();
         }
         if let Some(budget) = solver.budget_ms {
-            let mut fit = || budget::fit(&mut self.state.groups, solver, budget);
+            let mut fit = || budget::fit(&mut self.state.islands, solver, budget);
             match &self.pool {
                 Some(pool) => pool.install(fit),
                 None => fit(),
@@ -225,27 +225,27 @@ fn is_light(before: &SolverSpec, after: &SolverSpec) -> bool {
 }
 
 impl Retuned {
-    /// What becomes of a group under the settings of `scene`.
+    /// What becomes of an island under the settings of `scene`.
     fn of(
-        group: &Group,
+        island: &Island,
         before: &SolverSpec,
         scene: &Scene,
         settings: &StepSettings,
         place: &Place,
     ) -> Result<Self, Error> {
         let after = &scene.solver;
-        let mesh = group.cuttable.mesh();
+        let mesh = island.cuttable.mesh();
         let mut settings = StepSettings {
-            substeps: group.settings.substeps,
-            gravity: group.settings.gravity,
-            colliders: group.settings.colliders.clone(),
+            substeps: island.settings.substeps,
+            gravity: island.settings.gravity,
+            colliders: island.settings.colliders.clone(),
             ..settings.clone()
         };
-        let mut choice = group.choice;
-        let asked = group.asked(|body| scene.body[body].substeps.unwrap_or(after.substeps));
+        let mut choice = island.choice;
+        let asked = island.asked(|body| scene.body[body].substeps.unwrap_or(after.substeps));
         let chosen_anew = substeps_follow_from(before) != substeps_follow_from(after);
         if chosen_anew {
-            (settings.substeps, choice) = substeps(&asked, after, &group.solver, mesh);
+            (settings.substeps, choice) = substeps(&asked, after, &island.solver, mesh);
         }
         let is_open = leaves_open(after, &asked, &settings, place.is_device());
         let (own, choice) = match after.method {
@@ -258,7 +258,7 @@ impl Retuned {
                     substeps,
                     iterations,
                     ..
-                } = group.spec.clone();
+                } = island.spec.clone();
                 let own = SolverSpec {
                     method,
                     two_level,
@@ -273,9 +273,9 @@ impl Retuned {
         if after.method == Method::Auto {
             adopt(&mut settings, &own);
         }
-        let (before, after) = (&group.spec, &own);
+        let (before, after) = (&island.spec, &own);
         let limits = [
-            kappa_limit(before, &group.settings),
+            kappa_limit(before, &island.settings),
             kappa_limit(after, &settings),
         ];
         let planned = |spec: &SolverSpec| {
@@ -286,12 +286,12 @@ impl Retuned {
             } = spec;
             (clustering.clone(), coloring.clone(), spec.merge_clusters)
         };
-        let plan = (planned(before) != planned(after))
-            .then(|| Plan::of(Recipe::new(after)?, mesh))
+        let partition = (planned(before) != planned(after))
+            .then(|| Partition::of(PartitionSettings::new(after)?, mesh))
             .transpose()?;
         let mut solver = None;
-        if Self::needs_another_solver(group, before, after, limits, place)? {
-            let mut copy = group.solver.clone();
+        if Self::needs_another_solver(island, before, after, limits, place)? {
+            let mut copy = island.solver.clone();
             copy.limit_kappa(limits[0], limits[1], mesh)?;
             copy.end_vbd();
             copy.prepare(after, place)?;
@@ -304,65 +304,65 @@ impl Retuned {
             leaves_method_open: is_open,
             choice,
             limits,
-            plan,
+            partition,
             solver,
         })
     }
 
     /// Whether the solver is in the wrong place or form, or knows not, or wrongly, what VBD has to.
     fn needs_another_solver(
-        group: &Group,
+        island: &Island,
         before: &SolverSpec,
         after: &SolverSpec,
         limits: [Option<KappaLimit>; 2],
         place: &Place,
     ) -> Result<bool, Error> {
-        if !group.solver.is_at(place, after)? {
+        if !island.solver.is_at(place, after)? {
             return Ok(true);
         }
         let prepared = |spec: &SolverSpec| {
             let accuracy = spec.accuracy.map(f64::to_bits);
             (spec.method, spec.two_level, spec.integrator, accuracy)
         };
-        let softens = || limits[0] != limits[1] && limits.iter().any(|l| group.solver.exceeds(*l));
+        let softens = || limits[0] != limits[1] && limits.iter().any(|l| island.solver.exceeds(*l));
         Ok(after.method == Method::Vbd && (prepared(before) != prepared(after) || softens()))
     }
 
-    fn take_effect(self, group: &mut Group) -> Result<(), Error> {
+    fn take_effect(self, island: &mut Island) -> Result<(), Error> {
         let spec = self.spec;
         match self.solver {
-            Some(solver) => group.solver = solver,
+            Some(solver) => island.solver = solver,
             None => {
                 let [before, after] = self.limits;
-                let mesh = group.cuttable.mesh();
-                group.solver.limit_kappa(before, after, mesh)?;
+                let mesh = island.cuttable.mesh();
+                island.solver.limit_kappa(before, after, mesh)?;
                 if spec.method != Method::Vbd {
-                    group.solver.end_vbd();
+                    island.solver.end_vbd();
                 }
             }
         }
-        let planned = self.plan.is_some();
-        if let Some(plan) = self.plan {
-            group.plan = plan;
-            group.reschedule_volumes()?;
+        let planned = self.partition.is_some();
+        if let Some(partition) = self.partition {
+            island.partition = partition;
+            island.reschedule_volumes()?;
         }
-        group.recluster = match (spec.recluster, group.recluster.take()) {
+        island.recluster = match (spec.recluster, island.recluster.take()) {
             (Some(spec), Some(old)) if !planned => Some(old.with(spec)),
             (spec, _) => spec.map(Recluster::new),
         };
-        group.rest = spec.sleep.map(Rest::new);
-        group.set_first_substeps(self.settings.substeps);
-        group.settings = self.settings;
-        group.choice = self.choice;
-        group.spec = spec;
-        group.leaves_substeps_open = self.leaves_substeps_open;
-        group.leaves_method_open = self.leaves_method_open;
-        group.budget = None;
+        island.rest = spec.sleep.map(Rest::new);
+        island.set_first_substeps(self.settings.substeps);
+        island.settings = self.settings;
+        island.choice = self.choice;
+        island.spec = spec;
+        island.leaves_substeps_open = self.leaves_substeps_open;
+        island.leaves_method_open = self.leaves_method_open;
+        island.budget = None;
         Ok(())
     }
 }
 
-/// What the substeps of a group follow from.
+/// What the substeps of an island follow from.
 fn substeps_follow_from(spec: &SolverSpec) -> impl PartialEq + use<> {
     (
         spec.time_step.to_bits(),

@@ -1,6 +1,6 @@
 //! [`Snapshot`]: a simulation at one moment, to undo cuts, to fork and, with the feature `save`, to continue from a file.
 //!
-//! It is a copy of all that decides what comes next: meshes, cuts, pieces, solvers, plans, handles, colliders, strokes
+//! It is a copy of all that decides what comes next: meshes, cuts, pieces, solvers, partitions, handles, colliders, strokes
 //! under way. What follows from the rest is left out and rebuilt: the layout of the solvers, and buffers on a device.
 //! Types are written by derived serde code, field by field; settings, which leave out defaults, as TOML (`saved.rs`).
 //! (Undoing a [`CutDelta`](incise_cutting::CutDelta) takes back a mesh; it does not take back where the body has
@@ -14,13 +14,13 @@ use std::sync::Arc;
 
 use super::Simulation;
 use super::state::State;
-use crate::group::Group;
+use crate::island::Island;
 use crate::limits::value;
+use crate::merged_mesh::MergedMesh;
 use crate::place::{AtHand, Place};
 use crate::recluster::Recluster;
 use crate::report::FrameReport;
 use crate::scene::ReportSpec;
-use crate::whole::Whole;
 use crate::{Error, Scene};
 
 /// A simulation at one moment: see [`Simulation::snapshot`].
@@ -39,22 +39,22 @@ const PIECES: usize = 4;
 const POSITION: usize = 24;
 
 impl Snapshot {
-    /// About the bytes that it takes, for memory budgets: solvers and the whole to the byte, the rest by what a tet and
+    /// About the bytes that it takes, for memory budgets: solvers and the merged mesh to the byte, the rest by what a tet and
     /// a particle take there. Off by a fifth at most in the scenes of the tests; what strokes remember of earlier
     /// cuts is the least certain. O(bodies + particles).
     #[must_use]
     pub fn bytes(&self) -> usize {
         let State {
-            groups,
-            whole,
+            islands,
+            merged,
             on_cut,
             timeline,
             ..
         } = &self.0;
-        let particles = groups.iter().map(|group| group.positions.len()).sum();
+        let particles = islands.iter().map(|island| island.positions.len()).sum();
         let cut = on_cut.iter().filter(|on_cut| **on_cut).count();
-        groups.iter().map(Group::bytes).sum::<usize>()
-            + whole.as_ref().map_or(0, Whole::bytes)
+        islands.iter().map(Island::bytes).sum::<usize>()
+            + merged.as_ref().map_or(0, MergedMesh::bytes)
             + timeline.bytes(particles, cut)
             + on_cut.len()
     }
@@ -104,15 +104,15 @@ impl<'de> serde::Deserialize<'de> for Version {
     }
 }
 
-impl Group {
-    /// About the bytes of a copy; a plan in the making counts as one.
+impl Island {
+    /// About the bytes of a copy; a partition in the making counts as one.
     fn bytes(&self) -> usize {
         let mesh = self.cuttable.mesh();
         let (particles, tets) = (mesh.positions.len(), mesh.tets.len());
         let pending = self.recluster.as_ref().is_some_and(Recluster::is_pending);
-        let plans = 1 + usize::from(pending);
+        let partitions = 1 + usize::from(pending);
         self.solver.bytes()
-            + tets * (CUTTING + PIECES + plans * PLAN)
+            + tets * (CUTTING + PIECES + partitions * PLAN)
             + particles * (CUTTING_PARTICLE + POSITION)
     }
 }
@@ -148,8 +148,8 @@ impl Simulation {
     /// ```
     pub fn snapshot(&mut self) -> Result<Snapshot, Error> {
         self.read_back()?;
-        for group in &mut self.state.groups {
-            if let Some(recluster) = &mut group.recluster {
+        for island in &mut self.state.islands {
+            if let Some(recluster) = &mut island.recluster {
                 recluster.settle()?;
             }
         }
@@ -174,8 +174,8 @@ impl Simulation {
         let mut state = snapshot.0.clone();
         #[cfg(feature = "gpu")]
         if let Some(gpu) = state.place.gpu.clone() {
-            let groups = std::mem::take(&mut state.groups);
-            state.groups = take_over(&mut self.state.groups, groups, &gpu, &state.solver)?;
+            let islands = std::mem::take(&mut state.islands);
+            state.islands = take_over(&mut self.state.islands, islands, &gpu, &state.solver)?;
         }
         state.colliders.keep_numbers_of(&self.state.colliders);
         state.next.keep_numbers_of(self.state.next);
@@ -227,8 +227,8 @@ impl Simulation {
         }
         #[cfg(feature = "gpu")]
         if let Some(gpu) = state.place.gpu.clone() {
-            let groups = std::mem::take(&mut state.groups);
-            state.groups = take_over(&mut [], groups, &gpu, &state.solver)?;
+            let islands = std::mem::take(&mut state.islands);
+            state.islands = take_over(&mut [], islands, &gpu, &state.solver)?;
         }
         let mut simulation = Self {
             state,
@@ -257,18 +257,18 @@ impl Simulation {
     }
 }
 
-/// Takes the solvers of `new` groups, which are on the processor, to a device; where `old` ones are there already, they
+/// Takes the solvers of `new` islands, which are on the processor, to a device; where `old` ones are there already, they
 /// lend their kernels and memory.
 ///
 /// # Errors
-/// If the device is lost or out of memory; the old groups are as they were.
+/// If the device is lost or out of memory; the old islands are as they were.
 #[cfg(feature = "gpu")]
 fn take_over(
-    old: &mut [Group],
-    mut new: Vec<Group>,
+    old: &mut [Island],
+    mut new: Vec<Island>,
     gpu: &Arc<crate::gpu::GpuContext>,
     spec: &crate::scene::SolverSpec,
-) -> Result<Vec<Group>, Error> {
+) -> Result<Vec<Island>, Error> {
     use crate::backend::AnySolver;
     let mut lent = Vec::with_capacity(new.len());
     for (i, new) in new.iter_mut().enumerate() {

@@ -13,13 +13,13 @@ use incise_cutting::{BoundaryTriangle, CutDelta, FaceTag};
 use crate::attachment::AttachmentHandle;
 use crate::collider::Colliders;
 use crate::distance::DistanceHandle;
-use crate::group::Group;
+use crate::island::Island;
+use crate::merged_mesh::MergedMesh;
 use crate::pieces::PieceNumbers;
 use crate::place::Place;
 use crate::report::{CutReport, DetachedReport, FrameReport, Milliseconds, milliseconds};
 use crate::scene::{Precision, ReportSpec, SolverSpec};
 use crate::strokes::Timeline;
-use crate::whole::Whole;
 use crate::{Error, Scene};
 
 /// All of a simulation that changes with time. A copy has its solvers on the processor.
@@ -37,16 +37,16 @@ pub(super) struct State {
     pub(super) place: Place,
     pub(super) clock: Clock,
     pub(super) gravity: Option<DVec3>,
-    /// The names of the colliders in the settings of all groups.
+    /// The names of the colliders in the settings of all islands.
     pub(super) colliders: Colliders,
     pub(super) next: NextNumbers,
     /// Bodies that were removed, or will be at the start of the next frame.
     pub(super) removed: Vec<Removal>,
     pub(super) reporting: ReportSpec,
     /// In the order of their first bodies.
-    pub(super) groups: Vec<Group>,
-    /// All groups together, if there are several.
-    pub(super) whole: Option<Whole>,
+    pub(super) islands: Vec<Island>,
+    /// All islands together, if there are several.
+    pub(super) merged: Option<MergedMesh>,
     pub(super) pieces: PieceNumbers,
     /// Whether a particle lies on a cut; empty before the first.
     pub(super) on_cut: Vec<bool>,
@@ -80,33 +80,36 @@ pub(super) struct Cut<'a> {
     pub(super) measuring: f64,
 }
 
-/// All that depends on the mesh of a group, but the group itself.
+/// All that depends on the mesh of an island, but the island itself.
 struct Dependents<'a> {
-    whole: &'a mut Option<Whole>,
+    merged: &'a mut Option<MergedMesh>,
     pieces: &'a mut PieceNumbers,
     on_cut: &'a mut Vec<bool>,
 }
 
 impl Dependents<'_> {
-    /// Applies the delta of the group of a number to all that depends on its mesh.
+    /// Applies the delta of the island of a number to all that depends on its mesh.
     fn apply_delta(
         &mut self,
         number: usize,
-        group: &mut Group,
+        island: &mut Island,
         delta: &CutDelta,
         cut: &mut Cut<'_>,
         ms: &mut Milliseconds,
     ) -> Result<(), Error> {
         if let Some(before) = cut.notes_kappa {
             let start = Instant::now();
-            group.note_kappa(before);
+            island.note_kappa(before);
             cut.measuring += milliseconds(start.elapsed());
         }
-        let events = group.follow(delta, ms)?;
-        self.pieces.follow(number, group, &events, cut.detached);
+        let events = island.follow(delta, ms)?;
+        self.pieces.follow(number, island, &events, cut.detached);
         cut.report.get_or_insert_default().add(delta);
-        let of_whole = self.whole.as_mut().map(|whole| whole.follow(number, delta));
-        let delta = of_whole.as_ref().unwrap_or(delta);
+        let of_merged = self
+            .merged
+            .as_mut()
+            .map(|merged| merged.follow(number, delta));
+        let delta = of_merged.as_ref().unwrap_or(delta);
         self.on_cut.resize(delta.particles_after(), false);
         let bare = |triangle: &&BoundaryTriangle| triangle.tag != FaceTag::Outer;
         for triangle in delta.surface_added.iter().filter(bare) {
@@ -134,32 +137,32 @@ impl State {
         let Self {
             removed,
             timeline,
-            groups,
-            whole,
+            islands,
+            merged,
             pieces,
             on_cut,
             ..
         } = self;
         let mut dependents = Dependents {
-            whole,
+            merged,
             pieces,
             on_cut,
         };
         for removal in removed.iter_mut().filter(|removal| !removal.is_done) {
-            let of_body = |group: &Group| group.bodies.contains(&removal.body);
-            let Some(number) = groups.iter().position(of_body) else {
+            let of_body = |island: &Island| island.bodies.contains(&removal.body);
+            let Some(number) = islands.iter().position(of_body) else {
                 continue;
             };
-            let group = &mut groups[number];
-            let delta = group.remove_tets_of(removal.body)?;
+            let island = &mut islands[number];
+            let delta = island.remove_tets_of(removal.body)?;
             removal.is_done = true;
             if !delta.is_empty() {
-                timeline.apply_delta(number, group, &delta);
-                dependents.apply_delta(number, group, &delta, cut, ms)?;
+                timeline.apply_delta(number, island, &delta);
+                dependents.apply_delta(number, island, &delta, cut, ms)?;
             }
         }
-        timeline.advance(cut.number, groups, |number, group, delta| {
-            dependents.apply_delta(number, group, delta, cut, ms)
+        timeline.advance(cut.number, islands, |number, island, delta| {
+            dependents.apply_delta(number, island, delta, cut, ms)
         })
     }
 }

@@ -247,7 +247,7 @@ fn the_fixture_of_two_bodies_is_cut_in_one_stroke() {
 
 /// The third body of three is tied to the first: they are solved together, the second on its own and as alone.
 #[test]
-fn linked_bodies_share_a_group_and_others_do_not() {
+fn linked_bodies_share_an_island_and_others_do_not() {
     let bodies = three();
     let link = "[[distance]]\nfrom = { body = 2, point = [0, 0.8, 0] }\nto = { body = 0, point = [0, -0.8, 0] }\ncompliance = 1e-5\n";
     let report = "[report]\nquantities = [\"kappa\"]\n[solver]\nsubsteps = 2\n";
@@ -262,14 +262,14 @@ fn linked_bodies_share_a_group_and_others_do_not() {
             simulation.step().unwrap();
             simulation.check().unwrap();
         }
-        let groups = |simulation: &Simulation| {
-            let groups = simulation.report().bodies.iter();
-            groups
-                .map(|group| (group.bodies.clone(), group.substeps))
+        let islands = |simulation: &Simulation| {
+            let islands = simulation.report().bodies.iter();
+            islands
+                .map(|island| (island.bodies.clone(), island.substeps))
                 .collect::<Vec<_>>()
         };
-        assert_eq!(groups(&tied), [(vec![0, 2], 2), (vec![1], 7)]);
-        assert_eq!(groups(&loose), [(vec![0], 2), (vec![1], 7), (vec![2], 2)]);
+        assert_eq!(islands(&tied), [(vec![0, 2], 2), (vec![1], 7)]);
+        assert_eq!(islands(&loose), [(vec![0], 2), (vec![1], 7), (vec![2], 2)]);
         let owner = body_of_tets(&tied, &sizes);
         let own = (0..owner.len()).filter(|t| owner[*t] == 1);
         let all = 0..alone.mesh().tets.len();

@@ -200,7 +200,7 @@ fn what_is_no_blade_is_refused_and_nothing_changes() {
 
 /// Every particle of two bodies is found where it is solved, those that cuts make too.
 #[test]
-fn particles_are_found_in_their_groups() {
+fn particles_are_found_in_their_islands() {
     let bodies = body("box", 200, [0.0; 3]) + &body("sphere", 200, [3.0, 0.0, 0.0]);
     let strokes = plane(1, [0.03, 0.0, 0.0], [1.0, 0.1, 0.0])
         + &plane(2, [0.0, 0.0, 0.02], [0.1, 0.0, 1.0])
@@ -212,11 +212,11 @@ fn particles_are_found_in_their_groups() {
     }
     let mut counts = [0; 2];
     for (p, x) in simulation.mesh().positions.iter().enumerate() {
-        let (group, number) = simulation.place_of(ParticleId::new(p));
-        assert_eq!(group, usize::from(x.x > 1.5));
-        // Particles of a group keep their order.
-        assert_eq!(number, counts[group]);
-        counts[group] += 1;
+        let (island, number) = simulation.place_of(ParticleId::new(p));
+        assert_eq!(island, usize::from(x.x > 1.5));
+        // Particles of an island keep their order.
+        assert_eq!(number, counts[island]);
+        counts[island] += 1;
     }
     assert!(counts[0] > 60 && counts[1] > 60, "{counts:?}");
     let alone = self::simulation(&scene(&body("box", 200, [0.0; 3])));

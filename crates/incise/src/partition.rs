@@ -1,4 +1,4 @@
-//! [`Plan`]: clusters, colors and the schedule of a simulation, and their local update after a cut.
+//! [`Partition`]: clusters, colors and the schedule of a simulation, and their local update after a cut.
 
 use std::num::NonZeroUsize;
 use std::time::Instant;
@@ -23,21 +23,21 @@ const SLACK: usize = 4;
 /// The clusters of a mesh, their colors, and the schedule in which they are solved.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Plan {
+pub(crate) struct Partition {
     pub(crate) clustering: Clustering,
     recoloring: Recoloring,
     pub(crate) schedule: Schedule,
-    recipe: Recipe,
+    settings: PartitionSettings,
     /// Number of colors and mean cluster size after the last complete rebuild.
     fresh: [f64; 2],
     #[cfg_attr(feature = "save", serde(skip))]
     lists: Lists,
 }
 
-/// How a plan is made and kept.
+/// How a partition is made and kept.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Recipe {
+pub(crate) struct PartitionSettings {
     method: Method,
     algorithm: Algorithm,
     /// Whether clusters that a cut leaves small are merged.
@@ -67,7 +67,7 @@ impl Clone for Lists {
     }
 }
 
-impl Recipe {
+impl PartitionSettings {
     /// What settings ask for.
     pub(crate) fn new(solver: &SolverSpec) -> Result<Self, Error> {
         Ok(Self {
@@ -83,35 +83,35 @@ impl Recipe {
     }
 }
 
-impl Plan {
+impl Partition {
     pub(crate) fn new(scene: &Scene, mesh: &TetMesh) -> Result<Self, Error> {
-        Self::of(Recipe::new(&scene.solver)?, mesh)
+        Self::of(PartitionSettings::new(&scene.solver)?, mesh)
     }
 
     /// Clusters and colors a mesh.
-    pub(crate) fn of(recipe: Recipe, mesh: &TetMesh) -> Result<Self, Error> {
-        let _span = tracing::debug_span!("incise::plan").entered();
+    pub(crate) fn of(settings: PartitionSettings, mesh: &TetMesh) -> Result<Self, Error> {
+        let _span = tracing::debug_span!("incise::partition").entered();
         let incidence = incidence(mesh)?;
-        let clustering = cluster(recipe.method, &incidence);
-        let coloring = color(recipe.algorithm, &incidence.quotient(&clustering), 0)?.coloring;
+        let clustering = cluster(settings.method, &incidence);
+        let coloring = color(settings.algorithm, &incidence.quotient(&clustering), 0)?.coloring;
         let schedule = Schedule::new(&clustering, &coloring);
         let tets = mesh.tets.iter().zip(clustering.labels());
         let pairs = tets.flat_map(|(corners, cluster)| corners.map(|p| (cluster.0, p.0)));
         let recoloring = Recoloring::with_coloring(pairs, coloring, SLACK)?;
-        let mut plan = Self {
+        let mut partition = Self {
             clustering,
             recoloring,
             schedule,
-            recipe,
+            settings,
             fresh: [1.0; 2],
             lists: Lists::default(),
         };
-        plan.fresh = plan.measures();
-        Ok(plan)
+        partition.fresh = partition.measures();
+        Ok(partition)
     }
 
-    pub(crate) fn recipe(&self) -> Recipe {
-        self.recipe
+    pub(crate) fn settings(&self) -> PartitionSettings {
+        self.settings
     }
 
     /// How far cuts have worn it: its number of colors over that when it was fresh, or the mean size of its clusters then
@@ -146,7 +146,7 @@ impl Plan {
     ) -> Result<(), Error> {
         let start = Instant::now();
         self.take_out(delta);
-        if self.recipe.merges {
+        if self.settings.merges {
             let Lists { loose, seeds, .. } = &mut self.lists;
             loose.clear();
             loose.extend(delta.added.iter().map(|tet| tet.tet.0));
@@ -159,7 +159,7 @@ impl Plan {
         }
         let clustered = Instant::now();
         self.relink(delta);
-        if self.recipe.merges {
+        if self.settings.merges {
             self.link_merged(delta, cuttable);
         } else {
             self.link_groups(delta);
@@ -186,7 +186,7 @@ impl Plan {
         let mut is_touched = vec![false; self.clustering.cluster_count()];
         for delta in deltas {
             self.take_out(delta);
-            if self.recipe.merges {
+            if self.settings.merges {
                 for &(cluster, _) in &self.lists.removed {
                     is_touched[cluster as usize] = true;
                 }
@@ -198,7 +198,7 @@ impl Plan {
             }
             self.recolor()?;
         }
-        if self.recipe.merges {
+        if self.settings.merges {
             let Lists { loose, seeds, .. } = &mut self.lists;
             loose.clear();
             seeds.clear();
@@ -267,7 +267,7 @@ impl Plan {
                     .map_err(|_| Error::Inconsistent("too many tets".into()))?,
             );
         }
-        let limit = self.recipe.limit();
+        let limit = self.settings.limit();
         update_local(&mut self.clustering, &[], &offsets, &values, limit)?;
         Ok(())
     }
@@ -280,7 +280,7 @@ impl Plan {
             &mut self.clustering,
             &self.lists.loose,
             &self.lists.seeds,
-            self.recipe.limit(),
+            self.settings.limit(),
             |tet| {
                 let neighbors = cuttable.neighbors(TetId(tet)).into_iter();
                 neighbors.flatten().map(|tet| tet.0)
@@ -383,7 +383,7 @@ impl Plan {
     /// Proves clusters, colors and schedule against the mesh, from scratch.
     pub(crate) fn check(&self, mesh: &TetMesh) -> Result<(), Error> {
         self.clustering.check()?;
-        if self.clustering.max_size() > self.recipe.limit().get() {
+        if self.clustering.max_size() > self.settings.limit().get() {
             return Err(Error::Inconsistent(format!(
                 "a cluster has {} tets",
                 self.clustering.max_size()
@@ -453,7 +453,7 @@ mod tests {
             let mut scene = Scene::default();
             scene.solver.merge_clusters = merges;
             let mut mesh = kuhn_box([6, 6, 6], DVec3::ONE);
-            let mut plan = Plan::new(&scene, &mesh).unwrap();
+            let mut partition = Partition::new(&scene, &mesh).unwrap();
             let (mut moved, mut bite) = (0, 0);
             while mesh.tets.len() > 40 {
                 let mut gone: Vec<usize> = if bite % 2 == 0 {
@@ -468,9 +468,9 @@ mod tests {
                 delta.apply(&mut mesh);
                 let cuttable = CuttableMesh::new(mesh.clone()).unwrap();
                 let mut ms = Milliseconds::default();
-                plan.follow(&delta, &cuttable, &mut ms).unwrap();
-                plan.check(&mesh).unwrap();
-                assert_eq!(plan.clustering.constraint_count(), mesh.tets.len());
+                partition.follow(&delta, &cuttable, &mut ms).unwrap();
+                partition.check(&mesh).unwrap();
+                assert_eq!(partition.clustering.constraint_count(), mesh.tets.len());
             }
             assert!(moved > 50 && bite > 5, "{moved} moved in {bite} bites");
         }

@@ -1,6 +1,6 @@
-//! [`Group`]: bodies that are solved together, with all that moves and cuts them.
+//! [`Island`]: bodies that are solved together, with all that moves and cuts them.
 //!
-//! Mostly a single body. A group has its own mesh, solver, plan and substeps, so a stiff body makes no other one wait,
+//! Mostly a single body. An island has its own mesh, solver, partition and substeps, so a stiff body makes no other one wait,
 //! each is precise around its own origin, and a body moves to the bit as it would alone in the scene. Cost: that of its
 //! parts.
 
@@ -19,10 +19,10 @@ use crate::attachment::{Attachment, AttachmentHandle};
 use crate::backend::{AnySolver, each, each_mut};
 use crate::distance::Distances;
 use crate::grab::{Grab, Hand};
-use crate::joined::{Joined, demands, substeps};
+use crate::island_builder::{IslandBuilder, demands, substeps};
 use crate::method::{leaves_open, resolve, tet_solve};
+use crate::partition::Partition;
 use crate::place::Place;
-use crate::plan::Plan;
 use crate::recluster::Recluster;
 use crate::report::{Milliseconds, milliseconds};
 use crate::scene::{
@@ -37,15 +37,15 @@ use crate::{Error, Scene, collider, distance};
 /// Bodies that are solved together. A copy has the state as it is known here, and its solver on the processor.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Group {
+pub(crate) struct Island {
     /// The numbers of its bodies in the scene, ascending.
     pub(crate) bodies: Vec<usize>,
     /// For each material of the solver the index of its body in `bodies`.
     body_of: Vec<usize>,
-    /// Mesh at rest; its particles and tets are numbered within the group.
+    /// Mesh at rest; its particles and tets are numbered within the island.
     pub(crate) cuttable: CuttableMesh,
     pub(crate) solver: AnySolver,
-    pub(crate) plan: Plan,
+    pub(crate) partition: Partition,
     /// Its colliders are where they are at the start of the next frame.
     pub(crate) settings: StepSettings,
     /// The settings of the solver as a scene says them, with the method that was chosen.
@@ -64,7 +64,7 @@ pub(crate) struct Group {
     volumes: Option<Volumes>,
     /// The present positions.
     pub(crate) positions: Vec<DVec3>,
-    /// Its pieces, numbered within the group.
+    /// Its pieces, numbered within the island.
     pub(crate) pieces: PieceTracker,
     /// Volume at rest in m³ before all cuts.
     pub(crate) initial_volume: f64,
@@ -89,11 +89,11 @@ pub(crate) struct Group {
     pub(crate) cut_kappa: Option<CutKappa>,
     /// Whether it sleeps, in a scene where bodies may.
     pub(crate) rest: Option<Rest>,
-    /// What renews the plan, in a scene where plans are renewed.
+    /// What renews the partition, in a scene where partitions are renewed.
     pub(crate) recluster: Option<Recluster>,
 }
 
-/// What a group costs and may cost.
+/// What an island costs and may cost.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Budget {
@@ -181,13 +181,13 @@ fn accuracy_data<R: Real>(
     )
 }
 
-impl Group {
+impl Island {
     pub(crate) fn new(
         scene: &Scene,
         place: &Place,
         precision: Precision,
         mut settings: StepSettings,
-        mut joined: Joined,
+        mut joined: IslandBuilder,
     ) -> Result<Self, Error> {
         let mesh = std::mem::take(&mut joined.mesh);
         let cuttable = CuttableMesh::new(mesh).map_err(|source| Error::Cut {
@@ -215,18 +215,18 @@ impl Group {
         if !joined.distances.is_empty() {
             joined.distances.hand_to(&mut solver)?;
         }
-        let plan = Plan::new(scene, cuttable.mesh())?;
+        let partition = Partition::new(scene, cuttable.mesh())?;
         let volumes = joined.volumes();
         if let Some(volumes) = &volumes {
-            volumes.constrain(&mut solver, &cuttable, &plan.schedule)?;
+            volumes.constrain(&mut solver, &cuttable, &partition.schedule)?;
         }
         solver.prepare(&spec, place)?;
         let recluster = scene.solver.recluster;
         let size = longest_side(&cuttable.mesh().positions);
-        let mut group = Self {
+        let mut island = Self {
             recluster: recluster.map(Recluster::new),
             solver,
-            plan,
+            partition,
             settings: settings.clone(),
             attachments: joined.attachments,
             spare_frames: Vec::new(),
@@ -253,11 +253,11 @@ impl Group {
             cut_kappa: None,
             rest: scene.solver.sleep.map(Rest::new),
         };
-        group.solver.positions(&mut group.positions);
-        group.judge_settings();
+        island.solver.positions(&mut island.positions);
+        island.judge_settings();
         let empty = joined.empty_regions.into_iter();
-        group.warnings.extend(empty.map(Warning::of_empty_region));
-        Ok(group)
+        island.warnings.extend(empty.map(Warning::of_empty_region));
+        Ok(island)
     }
 
     /// Whether VBD was chosen for it.
@@ -459,7 +459,7 @@ impl Group {
         if self.asleep() {
             return Ok(StepReport::default());
         }
-        // Its body was removed; its colliders are those of all groups and move on.
+        // Its body was removed; its colliders are those of all islands and move on.
         if self.cuttable.mesh().tets.is_empty() {
             collider::advance(&mut self.settings);
             return Ok(StepReport::default());
@@ -467,7 +467,7 @@ impl Group {
         for attachment in &self.attachments {
             attachment.advance(frame, &mut self.solver);
         }
-        let (schedule, settings) = (&self.plan.schedule, &self.settings);
+        let (schedule, settings) = (&self.partition.schedule, &self.settings);
         let step = self.solver.step(schedule, settings, keeping_residuals)?;
         self.judge_step();
         collider::advance(&mut self.settings);
@@ -556,7 +556,7 @@ impl Group {
         masses
     }
 
-    /// The particles of a body of the group with their positions at rest.
+    /// The particles of a body of the island with their positions at rest.
     pub(crate) fn particles_of(&self, body: usize) -> (Vec<usize>, Vec<DVec3>) {
         let mesh = self.cuttable.mesh();
         let all = 0..mesh.positions.len();
@@ -573,7 +573,7 @@ impl Group {
         (numbers, positions)
     }
 
-    /// Attaches part of a body of the group at the start of a frame, and wakes it.
+    /// Attaches part of a body of the island at the start of a frame, and wakes it.
     pub(crate) fn add_attachment(
         &mut self,
         name: AttachmentHandle,
@@ -611,7 +611,7 @@ impl Group {
         Ok(())
     }
 
-    /// The constraint of a spec whose bodies are both in the group.
+    /// The constraint of a spec whose bodies are both in the island.
     pub(crate) fn distance(&self, spec: &DistanceSpec) -> Result<DistanceConstraint, Error> {
         distance::constraint("distance", spec, |end| {
             let (numbers, positions) = self.particles_of(end.body);
@@ -663,7 +663,7 @@ impl Group {
     }
 
     /// Takes hold of what can be held within a radius around a point, of the piece of the particle `nearest`. `number` is
-    /// that of the group. Wakes it.
+    /// that of the island. Wakes it.
     pub(crate) fn grab(
         &mut self,
         number: usize,
@@ -686,7 +686,7 @@ impl Group {
         self.hand.move_to(&mut self.solver, grab, to)
     }
 
-    /// Lets go of all that hangs on a grab's handle, and wakes the group; tells whether there is such a grab.
+    /// Lets go of all that hangs on a grab's handle, and wakes the island; tells whether there is such a grab.
     pub(crate) fn release(&mut self, grab: Grab) -> Result<bool, Error> {
         let is_held = self.hand.release(&mut self.solver, grab)?;
         if is_held {
@@ -725,26 +725,35 @@ impl Group {
             noted.new_tets = noted.new_tets.max(stiffest);
         }
         let events = self.pieces.follow(&self.cuttable, delta);
-        self.plan.follow(delta, &self.cuttable, ms)?;
+        self.partition.follow(delta, &self.cuttable, ms)?;
         if let Some(recluster) = &mut self.recluster {
             recluster.note(delta);
         }
         if let Some(volumes) = &self.volumes {
-            volumes.follow(&mut self.solver, delta, &self.cuttable, &self.plan.schedule)?;
+            volumes.follow(
+                &mut self.solver,
+                delta,
+                &self.cuttable,
+                &self.partition.schedule,
+            )?;
         }
         self.solver.update_vbd(ms)?;
-        self.solver.lay_out(&self.plan.schedule, ms)?;
+        self.solver.lay_out(&self.partition.schedule, ms)?;
         Ok(events)
     }
 
     /// Renews clusters, colors and schedule if that is due in the frame of a number, after its strokes; tells whether it
     /// was.
-    pub(crate) fn renew_plan(&mut self, frame: u64, ms: &mut Milliseconds) -> Result<bool, Error> {
+    pub(crate) fn renew_partition(
+        &mut self,
+        frame: u64,
+        ms: &mut Milliseconds,
+    ) -> Result<bool, Error> {
         let Some(recluster) = &mut self.recluster else {
             return Ok(false);
         };
         let start = Instant::now();
-        let renewed = recluster.advance(frame, &mut self.plan, &self.cuttable)?;
+        let renewed = recluster.advance(frame, &mut self.partition, &self.cuttable)?;
         if renewed {
             self.reschedule_volumes()?;
         }
@@ -752,16 +761,16 @@ impl Group {
         Ok(renewed)
     }
 
-    /// Lets volume constraints follow another plan.
+    /// Lets volume constraints follow another partition.
     pub(crate) fn reschedule_volumes(&mut self) -> Result<(), Error> {
         let Some(volumes) = &self.volumes else {
             return Ok(());
         };
-        let (nothing, schedule) = (CutDelta::default(), &self.plan.schedule);
+        let (nothing, schedule) = (CutDelta::default(), &self.partition.schedule);
         volumes.follow(&mut self.solver, &nothing, &self.cuttable, schedule)
     }
 
-    /// Has [`Group::follow`] note the largest kappa of the tets that the cuts of a frame make, and that of all tets before the
+    /// Has [`Island::follow`] note the largest kappa of the tets that the cuts of a frame make, and that of all tets before the
     /// first of them if it is wanted, which is O(tets).
     pub(crate) fn note_kappa(&mut self, before: bool) {
         if self.cut_kappa.is_none() {
@@ -794,9 +803,10 @@ impl Group {
                 "the volume at rest should be {expected} and is {volume}"
             )));
         }
-        self.solver.check(&self.cuttable, &self.plan.schedule)?;
+        self.solver
+            .check(&self.cuttable, &self.partition.schedule)?;
         self.hand.check(&self.solver)?;
-        self.plan.check(mesh)?;
+        self.partition.check(mesh)?;
         self.pieces
             .check(&self.cuttable)
             .map_err(|error| Error::Inconsistent(error.to_string()))

@@ -1,11 +1,11 @@
-//! [`Whole`]: several groups of bodies seen as one mesh.
+//! [`MergedMesh`]: several islands of bodies seen as one mesh.
 //!
 //! At the start particles and tets are numbered body by body in the order of the scene. A cut keeps all numbers: new
-//! particles and tets get the next ones, stroke by stroke and within a stroke group by group, each group's in the order
-//! of its own delta. Each group numbers its own from 0; the lists here translate, and one delta of a group becomes one
-//! of the whole. Only scenes with more than one group have a whole; a single group is its own.
+//! particles and tets get the next ones, stroke by stroke and within a stroke island by island, each island's in the order
+//! of its own delta. Each island numbers its own from 0; the lists here translate, and one delta of an island becomes one
+//! of the merged mesh. Only scenes with more than one island have one; a single island is its own.
 //!
-//! Cost: following a cut costs what the cut touched; clusters and colors of the whole are put together on request.
+//! Cost: following a cut costs what the cut touched; clusters and colors of the merged mesh are put together on request.
 
 use glam::DVec3;
 use incise_cutting::{
@@ -16,9 +16,9 @@ use incise_mesh::{ParticleId, TetId, TetMesh};
 
 use crate::Error;
 use crate::body::Body;
-use crate::group::Group;
+use crate::island::Island;
 
-/// The numbers in the whole of a group's particles and tets.
+/// The numbers in the merged mesh of an island's particles and tets.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 struct Numbers {
@@ -27,40 +27,40 @@ struct Numbers {
 }
 
 impl Numbers {
-    /// Appends particles of the group; their numbers in the whole are the next ones, so `places` gets theirs at its end.
+    /// Appends particles of the island; their numbers in the merged mesh are the next ones, so `places` gets theirs at its end.
     fn add_particles(
         &mut self,
-        group: usize,
+        island: usize,
         new: impl Iterator<Item = ParticleId>,
         places: &mut Vec<(u32, ParticleId)>,
     ) {
-        let group = u32::try_from(group).expect("each group has particles, numbered by 32 bits");
+        let island = u32::try_from(island).expect("each island has particles, numbered by 32 bits");
         for particle in new {
-            places.push((group, ParticleId::new(self.particles.len())));
+            places.push((island, ParticleId::new(self.particles.len())));
             self.particles.push(particle);
         }
     }
 }
 
-/// All groups as one mesh.
+/// All islands as one mesh.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Whole {
+pub(crate) struct MergedMesh {
     pub(crate) mesh: TetMesh,
     pub(crate) positions: Vec<DVec3>,
     numbers: Vec<Numbers>,
-    /// For each particle its group and its number there.
+    /// For each particle its island and its number there.
     places: Vec<(u32, ParticleId)>,
 }
 
-impl Whole {
-    /// The bodies as one mesh, before they go to their `islands`.
-    pub(crate) fn new(bodies: &[Body], islands: &[usize]) -> Self {
+impl MergedMesh {
+    /// The bodies as one mesh, before they go to their `island_of`.
+    pub(crate) fn new(bodies: &[Body], island_of: &[usize]) -> Self {
         let mut mesh = TetMesh::default();
-        let groups = islands.iter().max().map_or(0, |last| last + 1);
-        let mut numbers: Vec<Numbers> = (0..groups).map(|_| Numbers::default()).collect();
+        let islands = island_of.iter().max().map_or(0, |last| last + 1);
+        let mut numbers: Vec<Numbers> = (0..islands).map(|_| Numbers::default()).collect();
         let mut places = Vec::new();
-        for (body, &island) in bodies.iter().zip(islands) {
+        for (body, &island) in bodies.iter().zip(island_of) {
             let first = mesh.positions.len();
             let shifted = |p: ParticleId| ParticleId::new(first + p.index());
             let first_tet = mesh.tets.len();
@@ -81,25 +81,25 @@ impl Whole {
         }
     }
 
-    /// A group that is the only one, seen as one of several.
-    pub(crate) fn of_one(group: &Group) -> Self {
-        let mut whole = Self {
+    /// An island that is the only one, seen as one of several.
+    pub(crate) fn of_one(island: &Island) -> Self {
+        let mut merged = Self {
             mesh: TetMesh::default(),
             positions: Vec::new(),
             numbers: Vec::new(),
             places: Vec::new(),
         };
-        whole.add_group(group);
-        whole
+        merged.add_island(island);
+        merged
     }
 
-    /// Appends a group: its particles and tets get the next numbers.
-    pub(crate) fn add_group(&mut self, group: &Group) {
-        let mesh = group.cuttable.mesh();
+    /// Appends an island: its particles and tets get the next numbers.
+    pub(crate) fn add_island(&mut self, island: &Island) {
+        let mesh = island.cuttable.mesh();
         let (first, first_tet) = (self.mesh.positions.len(), self.mesh.tets.len());
         let shifted = |p: ParticleId| ParticleId::new(first + p.index());
         self.mesh.positions.extend(&mesh.positions);
-        self.positions.extend(&group.positions);
+        self.positions.extend(&island.positions);
         let tets = mesh.tets.iter().map(|tet| tet.map(shifted));
         self.mesh.tets.extend(tets);
         let mut numbers = Numbers::default();
@@ -111,19 +111,19 @@ impl Whole {
         self.numbers.push(numbers);
     }
 
-    /// The group of a particle and its number there. O(1).
+    /// The island of a particle and its number there. O(1).
     pub(crate) fn place(&self, particle: ParticleId) -> (usize, usize) {
-        let (group, number) = self.places[particle.index()];
-        (group as usize, number.index())
+        let (island, number) = self.places[particle.index()];
+        (island as usize, number.index())
     }
 
-    /// Follows a cut in one group; returns what it changed in the numbers of the whole.
-    pub(crate) fn follow(&mut self, group: usize, delta: &CutDelta) -> CutDelta {
-        let numbers = &mut self.numbers[group];
+    /// Follows a cut in one island; returns what it changed in the numbers of the merged mesh.
+    pub(crate) fn follow(&mut self, island: usize, delta: &CutDelta) -> CutDelta {
+        let numbers = &mut self.numbers[island];
         let (particles_before, tets_before) = (self.mesh.positions.len(), self.mesh.tets.len());
         let new = delta.particles_after() - delta.particles_before;
         let particles = (particles_before..particles_before + new).map(ParticleId::new);
-        numbers.add_particles(group, particles, &mut self.places);
+        numbers.add_particles(island, particles, &mut self.places);
         let new = delta.added.len() - delta.removed.len();
         let new = (tets_before..tets_before + new).map(TetId::new);
         numbers.tets.extend(new);
@@ -154,7 +154,7 @@ impl Whole {
             particles: triangle.particles.map(particle),
             ..*triangle
         };
-        let mut whole = CutDelta {
+        let mut merged = CutDelta {
             particles_before,
             tets_before,
             points: delta.points.iter().map(point).collect(),
@@ -171,24 +171,24 @@ impl Whole {
             worst_volume_ratio: delta.worst_volume_ratio,
             dihedral: delta.dihedral,
         };
-        whole.deleted.sort_unstable_by_key(|deleted| deleted.tet);
+        merged.deleted.sort_unstable_by_key(|deleted| deleted.tet);
 
-        // A tet that moves within its group keeps its number in the whole.
+        // A tet that moves within its island keeps its number in the merged mesh.
         for moved in &delta.moved {
             numbers.tets[moved.to.index()] = numbers.tets[moved.from.index()];
         }
         numbers.tets.truncate(delta.tets_after());
-        self.fill_gaps(&mut whole);
+        self.fill_gaps(&mut merged);
         let triangles = delta.surface_added.iter();
-        whole.surface_added = triangles.map(|t| self.triangle(group, t)).collect();
-        whole.apply(&mut self.mesh);
-        whole.extend_particles(&mut self.positions);
-        whole
+        merged.surface_added = triangles.map(|t| self.triangle(island, t)).collect();
+        merged.apply(&mut self.mesh);
+        merged.extend_particles(&mut self.positions);
+        merged
     }
 
-    /// A boundary triangle of a group in the numbers of the whole.
-    pub(crate) fn triangle(&self, group: usize, triangle: &BoundaryTriangle) -> BoundaryTriangle {
-        let numbers = &self.numbers[group];
+    /// A boundary triangle of an island in the numbers of the merged mesh.
+    pub(crate) fn triangle(&self, island: usize, triangle: &BoundaryTriangle) -> BoundaryTriangle {
+        let numbers = &self.numbers[island];
         BoundaryTriangle {
             tet: numbers.tets[triangle.tet.index()],
             particles: triangle.particles.map(|p| numbers.particles[p.index()]),
@@ -196,16 +196,16 @@ impl Whole {
         }
     }
 
-    /// Gives the numbers of deleted tets to the last ones, whichever groups they belong to. O(tets) if there are any.
-    fn fill_gaps(&mut self, whole: &mut CutDelta) {
-        if whole.deleted.is_empty() {
+    /// Gives the numbers of deleted tets to the last ones, whichever islands they belong to. O(tets) if there are any.
+    fn fill_gaps(&mut self, merged: &mut CutDelta) {
+        if merged.deleted.is_empty() {
             return;
         }
-        let after = whole.tets_after();
-        let deleted = |tet: TetId| whole.deleted.binary_search_by_key(&tet, |d| d.tet).is_ok();
-        let gaps = whole.deleted.iter().map(|deleted| deleted.tet);
+        let after = merged.tets_after();
+        let deleted = |tet: TetId| merged.deleted.binary_search_by_key(&tet, |d| d.tet).is_ok();
+        let gaps = merged.deleted.iter().map(|deleted| deleted.tet);
         let gaps = gaps.take_while(|tet| tet.index() < after);
-        let last = (after..whole.tets_before).map(TetId::new);
+        let last = (after..merged.tets_before).map(TetId::new);
         let movers = last.filter(|&tet| !deleted(tet));
         let moves: Vec<(TetId, TetId)> = movers.zip(gaps).collect();
         for numbers in &mut self.numbers {
@@ -214,13 +214,13 @@ impl Whole {
                     let (from, to) = moves[i];
                     *number = to;
                     let corners = self.mesh.tets[from.index()];
-                    let relinked = whole.relinked.iter().find(|relinked| relinked.tet == from);
+                    let relinked = merged.relinked.iter().find(|relinked| relinked.tet == from);
                     let corners = relinked.map_or(corners, |relinked| relinked.after);
-                    whole.moved.push(MovedTet { from, to, corners });
+                    merged.moved.push(MovedTet { from, to, corners });
                 }
             }
         }
-        whole.moved.sort_unstable_by_key(|moved| moved.to);
+        merged.moved.sort_unstable_by_key(|moved| moved.to);
     }
 
     /// Bytes of all arrays.
@@ -232,62 +232,71 @@ impl Whole {
             + self.numbers.iter().map(of).sum::<usize>()
     }
 
-    /// The number of a group's particle.
+    /// The number of an island's particle.
     #[cfg(feature = "advise")]
-    pub(crate) fn particle(&self, group: usize, particle: usize) -> usize {
-        self.numbers[group].particles[particle].index()
+    pub(crate) fn particle(&self, island: usize, particle: usize) -> usize {
+        self.numbers[island].particles[particle].index()
     }
 
-    /// Puts what each group says of its tets in the order of the whole.
-    pub(crate) fn of_tets<T: Copy + Default>(&self, of_groups: &[Vec<T>]) -> Vec<T> {
+    /// Puts what each island says of its tets in the order of the merged mesh.
+    pub(crate) fn of_tets<T: Copy + Default>(&self, of_islands: &[Vec<T>]) -> Vec<T> {
         let mut of_tets = vec![T::default(); self.mesh.tets.len()];
-        for (numbers, of_group) in self.numbers.iter().zip(of_groups) {
-            for (tet, value) in numbers.tets.iter().zip(of_group) {
+        for (numbers, of_island) in self.numbers.iter().zip(of_islands) {
+            for (tet, value) in numbers.tets.iter().zip(of_island) {
                 of_tets[tet.index()] = *value;
             }
         }
         of_tets
     }
 
-    /// Takes over the groups' positions.
-    pub(crate) fn collect_positions(&mut self, groups: &[Group]) {
-        for (numbers, group) in self.numbers.iter().zip(groups) {
-            for (p, x) in numbers.particles.iter().zip(&group.positions) {
+    /// Takes over the islands' positions.
+    pub(crate) fn collect_positions(&mut self, islands: &[Island]) {
+        for (numbers, island) in self.numbers.iter().zip(islands) {
+            for (p, x) in numbers.particles.iter().zip(&island.positions) {
                 self.positions[p.index()] = *x;
             }
         }
     }
 
-    /// The clusters of all groups and their colors: those of a group follow those of the groups before it, vacant numbers
+    /// The clusters of all islands and their colors: those of an island follow those of the islands before it, vacant numbers
     /// are left out. O(tets).
-    pub(crate) fn plan(&self, groups: &[Group]) -> (Clustering, Coloring) {
+    pub(crate) fn partition(&self, islands: &[Island]) -> (Clustering, Coloring) {
         let mut labels = vec![ClusterId::NONE; self.mesh.tets.len()];
         let mut colors = Vec::new();
-        for (numbers, group) in self.numbers.iter().zip(groups) {
-            let plan = &group.plan;
-            let mut names = Vec::with_capacity(plan.clustering.cluster_count());
-            for (&size, &color) in plan.clustering.sizes().iter().zip(plan.coloring().colors()) {
+        for (numbers, island) in self.numbers.iter().zip(islands) {
+            let partition = &island.partition;
+            let mut names = Vec::with_capacity(partition.clustering.cluster_count());
+            for (&size, &color) in partition
+                .clustering
+                .sizes()
+                .iter()
+                .zip(partition.coloring().colors())
+            {
                 names.push(ClusterId::new(colors.len()));
                 colors.extend((size > 0).then_some(color));
             }
             for (t, tet) in numbers.tets.iter().enumerate() {
-                if let Some(cluster) = plan.clustering.cluster_of(t) {
+                if let Some(cluster) = partition.clustering.cluster_of(t) {
                     labels[tet.index()] = names[cluster.index()];
                 }
             }
         }
         let clustering = Clustering::from_labels(labels)
-            .expect("each group has at most as many clusters with a tet as it has tets");
+            .expect("each island has at most as many clusters with a tet as it has tets");
         (clustering, Coloring::new(colors))
     }
 
-    /// Compares with the groups.
-    pub(crate) fn check(&self, groups: &[Group]) -> Result<(), Error> {
+    /// Compares with the islands.
+    pub(crate) fn check(&self, islands: &[Island]) -> Result<(), Error> {
         let mut particles = vec![0_u32; self.mesh.positions.len()];
         let mut tets = vec![0_u32; self.mesh.tets.len()];
-        let differs = |what: &str| Err(Error::Inconsistent(format!("{what} of the whole differs")));
-        for (g, (numbers, group)) in self.numbers.iter().zip(groups).enumerate() {
-            let mesh = group.cuttable.mesh();
+        let differs = |what: &str| {
+            Err(Error::Inconsistent(format!(
+                "{what} of the merged mesh differs"
+            )))
+        };
+        for (g, (numbers, island)) in self.numbers.iter().zip(islands).enumerate() {
+            let mesh = island.cuttable.mesh();
             if (numbers.particles.len(), numbers.tets.len())
                 != (mesh.positions.len(), mesh.tets.len())
             {
@@ -296,7 +305,7 @@ impl Whole {
             for (p, number) in numbers.particles.iter().enumerate() {
                 particles[number.index()] += 1;
                 if self.mesh.positions[number.index()] != mesh.positions[p]
-                    || self.positions[number.index()] != group.positions[p]
+                    || self.positions[number.index()] != island.positions[p]
                     || self.place(*number) != (g, p)
                 {
                     return differs("a particle");

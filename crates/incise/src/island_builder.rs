@@ -1,4 +1,4 @@
-//! [`Joined`]: the bodies of a group as one mesh, with all that is tied to their particles.
+//! [`IslandBuilder`]: the bodies of an island as one mesh, with all that is tied to their particles.
 //!
 //! Particles and tets are numbered body by body in the order of the scene; handles and links, which a scene gives by
 //! bodies and points, are translated here. Cost: O(particles + tets).
@@ -25,9 +25,9 @@ use crate::{Error, Scene, distance};
 const TOO_MANY: &str =
     "at most 65,536 bodies and parts of other materials that are solved together";
 
-/// The bodies of a group before it is set up.
+/// The bodies of an island before it is set up.
 #[derive(Debug, Default)]
-pub(crate) struct Joined {
+pub(crate) struct IslandBuilder {
     /// Their numbers in the scene, ascending.
     pub(crate) bodies: Vec<usize>,
     pub(crate) mesh: TetMesh,
@@ -46,19 +46,19 @@ pub(crate) struct Joined {
     pub(crate) substeps: Vec<Substeps>,
 }
 
-impl Joined {
-    /// The groups of a scene, in the order of their first bodies; `islands` says which body goes to which. The bodies of
+impl IslandBuilder {
+    /// The islands of a scene, in the order of their first bodies; `island_of` says which body goes to which. The bodies of
     /// links exist.
     pub(crate) fn all(
         scene: &Scene,
         bodies: Vec<Body>,
-        islands: &[usize],
+        island_of: &[usize],
     ) -> Result<Vec<Self>, Error> {
-        let groups = islands.iter().max().map_or(0, |last| last + 1);
-        let mut all: Vec<Self> = (0..groups).map(|_| Self::default()).collect();
-        // The particles of each body in its group.
+        let islands = island_of.iter().max().map_or(0, |last| last + 1);
+        let mut all: Vec<Self> = (0..islands).map(|_| Self::default()).collect();
+        // The particles of each body in its island.
         let mut ranges = Vec::with_capacity(bodies.len());
-        for (number, (body, &island)) in bodies.into_iter().zip(islands).enumerate() {
+        for (number, (body, &island)) in bodies.into_iter().zip(island_of).enumerate() {
             let first = all[island].mesh.positions.len();
             all[island].add(number, body)?;
             ranges.push(first..all[island].mesh.positions.len());
@@ -67,14 +67,14 @@ impl Joined {
         let particles = |body: usize| {
             let range: Range<usize> = ranges[body].clone();
             let first = range.start;
-            (&all[islands[body]].mesh.positions[range], first)
+            (&all[island_of[body]].mesh.positions[range], first)
         };
         for (i, spec) in scene.attachment.iter().enumerate() {
             let (name, field) = (AttachmentHandle::of_scene(i), format!("attachment[{i}]"));
-            existing(&format!("{field}.body"), spec.body, islands.len())?;
+            existing(&format!("{field}.body"), spec.body, island_of.len())?;
             let (positions, first) = particles(spec.body);
             let attachment = Attachment::new(name, field.clone(), spec, positions, |p| first + p)?;
-            attachments.push((islands[spec.body], field, attachment));
+            attachments.push((island_of[spec.body], field, attachment));
         }
         for (i, spec) in scene.distance.iter().enumerate() {
             let field = format!("distance[{i}]");
@@ -83,7 +83,7 @@ impl Joined {
                 distance::nearest(end.point, positions).map(|(x, p)| (x, first + p))
             })?;
             let name = DistanceHandle::of_scene(i);
-            distances.push((islands[spec.from.body], name, constraint));
+            distances.push((island_of[spec.from.body], name, constraint));
         }
         for (island, field, attachment) in attachments {
             if attachment.is_empty() {
@@ -112,9 +112,9 @@ impl Joined {
         let tets = body.mesh.tets.iter().map(|tet| tet.map(shifted));
         self.mesh.tets.extend(tets);
         let known = self.materials.len();
-        let of_group = |material: u16| u16::try_from(known + usize::from(material));
+        let of_island = |material: u16| u16::try_from(known + usize::from(material));
         for &material in &body.material_of {
-            let material = of_group(material);
+            let material = of_island(material);
             let material = material.map_err(|_| value("body", "too many", TOO_MANY))?;
             self.material_of.push(material);
         }
@@ -130,12 +130,12 @@ impl Joined {
         Ok(())
     }
 
-    /// The volume constraints of the group, if a body asks for them.
+    /// The volume constraints of the island, if a body asks for them.
     pub(crate) fn volumes(&self) -> Option<Volumes> {
         Volumes::new(self.volume_compliances.clone())
     }
 
-    /// The solver of a group whose mesh is `cuttable`, without what hangs on its particles.
+    /// The solver of an island whose mesh is `cuttable`, without what hangs on its particles.
     pub(crate) fn solver(
         &self,
         precision: Precision,
@@ -162,7 +162,7 @@ impl Joined {
         Ok(any)
     }
 
-    /// The substeps of the group: the most that a body asks for. Where it is left open, also how they were chosen.
+    /// The substeps of the island: the most that a body asks for. Where it is left open, also how they were chosen.
     pub(crate) fn substeps(
         &self,
         scene: &Scene,
@@ -173,7 +173,7 @@ impl Joined {
     }
 }
 
-/// The substeps of a group whose materials ask for these, and how they were chosen where that is left open.
+/// The substeps of an island whose materials ask for these, and how they were chosen where that is left open.
 pub(crate) fn substeps(
     asked: &[Substeps],
     spec: &SolverSpec,
