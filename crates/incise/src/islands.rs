@@ -1,12 +1,12 @@
 //! [`island_of_bodies`]: which bodies are solved together.
 //!
 //! Bodies that nothing joins do not see each other: each gets a solver, a schedule and substeps of its own. Bodies that
-//! are joined, directly or through others, must be solved as one. Source: the island_of of rigid body engines, found as
+//! are joined, directly or through others, must be solved as one. Source: the islands of rigid body engines, found as
 //! connected components by union-find. Cost: O(bodies + pairs).
 
 use incise_graph::DisjointSets;
 
-/// For each of `bodies` bodies the number of its island; island_of are numbered in the order of their first body. `joined`
+/// For each of `bodies` bodies the number of its island; islands are numbered in the order of their first body. `joined`
 /// lists pairs of bodies that must be solved together.
 ///
 /// # Panics

@@ -54,7 +54,7 @@ pub(crate) struct MergedMesh {
 }
 
 impl MergedMesh {
-    /// The bodies as one mesh, before they go to their `island_of`.
+    /// The bodies as one mesh, before they go to their islands; `island_of` says to which.
     pub(crate) fn new(bodies: &[Body], island_of: &[usize]) -> Self {
         let mut mesh = TetMesh::default();
         let islands = island_of.iter().max().map_or(0, |last| last + 1);
