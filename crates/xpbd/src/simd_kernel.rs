@@ -27,7 +27,9 @@
 //! `G : AᵀA = |A L|²` for `A = dC/dF` and `G = L Lᵀ`. A correction is one matrix times the gradients of the barycentric
 //! coordinates.
 //!
-//! Products and sums are rounded one by one, not fused, so that every instruction set gives the same bits.
+//! Products and sums are rounded one by one, not fused, so that every instruction set gives the same bits. Arrays of
+//! lanes are written out: the closure of `[T; N]::map` is compiled without the instructions of the kernel, so each sum
+//! in it becomes a call, which made the split form two thirds slower.
 //!
 //! Source: Smith, de Goes, Kim 2018 (energy), Macklin and Müller 2021 (constraints), Ton-That et al. 2023 (block
 //! solve), paper equations 5 and 6 (the paper prints a minus in its equation 6; its equation 3 gives the plus used
@@ -305,7 +307,14 @@ impl<'a, R: Float, S: Simd> Tets<'a, R, S> {
     /// L: its diagonal, then yx, zx, zy.
     #[inline(always)]
     fn metric_factor(&self) -> [R::Lanes<S>; 6] {
-        [9, 10, 11, 12, 13, 14].map(|number| self.rest(number))
+        [
+            self.rest(9),
+            self.rest(10),
+            self.rest(11),
+            self.rest(12),
+            self.rest(13),
+            self.rest(14),
+        ]
     }
 
     /// `G : AᵀA = |A L|²` in units of the stiffness times time squared.
@@ -372,8 +381,10 @@ impl<'a, R: Float, S: Simd> Tets<'a, R, S> {
         let [a, b, c] = f;
         let mut cofactor = cofactor::<R, S>(f);
         let mut bulge = dot::<R, S>(a, &cofactor[0]) - one;
-        let [aa, bb, cc] = [a, b, c].map(|column| dot::<R, S>(column, column) - one);
-        let [ab, ac, bc] = [(a, b), (a, c), (b, c)].map(|(l, r)| dot::<R, S>(l, r));
+        let aa = dot::<R, S>(a, a) - one;
+        let bb = dot::<R, S>(b, b) - one;
+        let cc = dot::<R, S>(c, c) - one;
+        let (ab, ac, bc) = (dot::<R, S>(a, b), dot::<R, S>(a, c), dot::<R, S>(b, c));
         let minor = bb * cc - bc * bc;
         let second = aa * (bb + cc) + minor - ab * ab - ac * ac;
         let third = aa * minor - ab * (ab * cc - bc * ac) + ac * (ab * bc - bb * ac);
@@ -517,7 +528,7 @@ impl<'a, R: Float, S: Simd> Tets<'a, R, S> {
     /// `(1 - e⁻ʳ) / r` as a quotient that agrees up to `r²` and tends to `1 / r`; times r it is at most 1.1.
     #[inline(always)]
     fn decay(&self, r: R::Lanes<S>) -> R::Lanes<S> {
-        let [four, six] = [4.0, 6.0].map(|value| self.splat(R::from_f64(value)));
+        let (four, six) = (self.splat(R::from_f64(4.0)), self.splat(R::from_f64(6.0)));
         (six + r) / (six + r * (four + r))
     }
 
