@@ -57,6 +57,7 @@ fn scale(case: &Case) -> f64 {
 fn scene(case: &Case, path: PathBuf) -> Scene {
     let mut scene = Scene::built_in();
     scene.stroke.clear();
+    scene.solver.substeps = 30.into();
     let body = &mut scene.body[0];
     body.shape = None;
     body.mesh = Some(path);
