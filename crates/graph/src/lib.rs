@@ -50,6 +50,7 @@ mod id;
 mod incidence;
 #[cfg(feature = "petgraph")]
 mod interop;
+mod lanes;
 mod metrics;
 mod read;
 mod rows;
@@ -63,6 +64,7 @@ pub use disjoint_sets::DisjointSets;
 pub use error::GraphError;
 pub use id::{ClusterId, ColorId};
 pub use incidence::Incidence;
+pub use lanes::{LaneGroup, Lanes};
 pub use metrics::ColoringMetrics;
 pub use read::{read_dimacs, read_matrix_market};
 pub use rows::Rows;

@@ -203,7 +203,7 @@ impl Attachment {
     /// Tells the solver where the frame is at the end of a frame of the simulation.
     pub(crate) fn advance(&self, frame: u64, solver: &mut AnySolver) {
         let pose = self.pose(frame.saturating_add(1));
-        solver.move_handle(self.number, pose);
+        solver.backend_mut().move_handle(self.number, pose);
     }
 
     /// Where its frame is at the start of a frame of the simulation.

@@ -1,4 +1,8 @@
-//! [`AnySolver`]: the solver in the precision and with the method that the scene asks for, and how it follows a cut.
+//! [`SolverBackend`]: what the runtime asks of a solver wherever and however it computes; [`AnySolver`]: the one that the
+//! scene asks for, and how it follows a cut.
+//!
+//! What depends on where the state is, or on the method, is in the trait. Edits and measurements that all solvers of
+//! `incise-xpbd` share are written once, for any precision, by `each!` and `each_mut!`.
 
 use std::time::Instant;
 
@@ -7,7 +11,7 @@ use incise_cutting::{CutDelta, CuttableMesh};
 use incise_graph::Schedule;
 use incise_mesh::{ParticleId, TetId, TetMesh};
 use incise_xpbd::{
-    Energy, KappaLimit, Pose, Real, Residuals, Solver, StepReport, StepSettings, Volume, XpbdError,
+    Energy, KappaLimit, Pose, Real, Residuals, Solver, StepReport, StepSettings, Volume,
 };
 
 use crate::Error;
@@ -69,6 +73,53 @@ pub(crate) struct Measures {
     pub(crate) max_speed: Option<f64>,
 }
 
+/// A solver on the processor in one precision, by XPBD or VBD, or one on a device. Functions that only one of them has a
+/// use for do nothing in the others.
+pub(crate) trait SolverBackend {
+    /// Advances by one frame, keeping what [`SolverBackend::last_substep`] needs if told to.
+    fn step(
+        &mut self,
+        schedule: &Schedule,
+        settings: &StepSettings,
+        keep: bool,
+    ) -> Result<StepReport, Error>;
+
+    /// Brings the layout up to date with the schedule, or sends a device what has changed; the next step would do it
+    /// otherwise. VBD has none.
+    fn lay_out(&mut self, schedule: &Schedule, ms: &mut Milliseconds) -> Result<(), Error>;
+
+    /// Measures the requested quantities of the state; on a device without fetching it.
+    fn state(&mut self, gravity: Option<DVec3>, quantities: &[Quantity])
+    -> Result<Measures, Error>;
+
+    /// The residuals of the last substep, if they were kept.
+    fn last_substep(&self, substep_time: f64) -> Option<LastSubstep>;
+
+    /// Says where a handle is at the end of the next frame.
+    fn move_handle(&mut self, handle: u32, pose: Pose);
+
+    /// Bytes of a copy.
+    fn bytes(&self) -> usize;
+
+    /// The largest speed in m/s, unless the state is on a device.
+    fn host_max_speed(&self) -> Option<f64>;
+
+    /// Updates what VBD keeps after a cut, once tets and volume constraints have been.
+    fn update_vbd(&mut self, ms: &mut Milliseconds) -> Result<(), Error>;
+
+    /// The error that the last frame of two-level VBD left over.
+    fn vbd_error(&self) -> Option<f64>;
+
+    /// Lets go of what only VBD needs.
+    fn end_vbd(&mut self);
+
+    /// Makes the state of a device known here; returns how many particles it had to put back since the last time.
+    fn read_back(&mut self) -> Result<usize, Error>;
+
+    /// Returns how many particles a device had to put back since the last call, as of the last readback or measurement.
+    fn news(&mut self) -> usize;
+}
+
 /// Evaluates an expression with the solver of any variant. On a device this is the host's solver, whose state is that
 /// of the last readback.
 macro_rules! each {
@@ -116,6 +167,24 @@ macro_rules! each_mut {
 pub(crate) use each_mut;
 
 impl AnySolver {
+    pub(crate) fn backend(&self) -> &dyn SolverBackend {
+        match self {
+            Self::Single(backend) => backend,
+            Self::Double(backend) => backend,
+            #[cfg(feature = "gpu")]
+            Self::Device(device) => &**device,
+        }
+    }
+
+    pub(crate) fn backend_mut(&mut self) -> &mut dyn SolverBackend {
+        match self {
+            Self::Single(backend) => backend,
+            Self::Double(backend) => backend,
+            #[cfg(feature = "gpu")]
+            Self::Device(device) => &mut **device,
+        }
+    }
+
     /// A solver with particles, and nothing else yet.
     pub(crate) fn of_particles(precision: Precision, positions: &[DVec3]) -> Self {
         match precision {
@@ -171,16 +240,6 @@ impl AnySolver {
         Ok(())
     }
 
-    /// Updates what VBD keeps after a cut, once tets and volume constraints have been.
-    pub(crate) fn update_vbd(&mut self, ms: &mut Milliseconds) -> Result<(), Error> {
-        match self {
-            Self::Single(backend) => backend.follow(ms),
-            Self::Double(backend) => backend.follow(ms),
-            #[cfg(feature = "gpu")]
-            Self::Device(_) => Ok(()),
-        }
-    }
-
     /// Prepares for the method and the place of the scene, once the tets are what they are.
     pub(crate) fn prepare(&mut self, spec: &SolverSpec, place: &Place) -> Result<(), Error> {
         #[cfg(feature = "gpu")]
@@ -209,107 +268,6 @@ impl AnySolver {
             *self = Self::Device(Box::new(Device::new(gpu, solver, spec)?));
         }
         Ok(())
-    }
-
-    /// Advances by one frame, keeping what [`AnySolver::last_substep`] needs if told to.
-    pub(crate) fn step(
-        &mut self,
-        schedule: &Schedule,
-        settings: &StepSettings,
-        keep: bool,
-    ) -> Result<StepReport, Error> {
-        let step = match self {
-            Self::Single(backend) => backend.step(schedule, settings, keep),
-            Self::Double(backend) => backend.step(schedule, settings, keep),
-            #[cfg(feature = "gpu")]
-            Self::Device(device) => return device.step(schedule, settings, keep),
-        };
-        step.map_err(|source| Error::Xpbd {
-            field: "solver".into(),
-            source,
-        })
-    }
-
-    /// Makes the state of a device known here; returns how many particles it had to put back since the last time.
-    pub(crate) fn read_back(&mut self) -> Result<usize, Error> {
-        match self {
-            Self::Single(_) | Self::Double(_) => Ok(0),
-            #[cfg(feature = "gpu")]
-            Self::Device(device) => device.read_back(),
-        }
-    }
-
-    /// Returns how many particles a device had to put back since the last call, as of the last readback or measurement.
-    pub(crate) fn news(&mut self) -> usize {
-        match self {
-            Self::Single(_) | Self::Double(_) => 0,
-            #[cfg(feature = "gpu")]
-            Self::Device(device) => device.news(),
-        }
-    }
-
-    /// Measures the requested quantities of the state; on a device without fetching it.
-    pub(crate) fn state(
-        &mut self,
-        gravity: Option<DVec3>,
-        quantities: &[Quantity],
-    ) -> Result<Measures, Error> {
-        match self {
-            Self::Single(backend) => Ok(backend.state(gravity, quantities)),
-            Self::Double(backend) => Ok(backend.state(gravity, quantities)),
-            #[cfg(feature = "gpu")]
-            Self::Device(device) => {
-                let measures = device.solver.measure(gravity)?;
-                Ok(Measures {
-                    energy: Some(measures.energy),
-                    volume: Some(measures.volume),
-                    max_speed: Some(measures.max_speed),
-                })
-            }
-        }
-    }
-
-    /// The error that the last frame of two-level VBD left over.
-    pub(crate) fn vbd_error(&self) -> Option<f64> {
-        match self {
-            Self::Single(backend) => backend.vbd_error(),
-            Self::Double(backend) => backend.vbd_error(),
-            #[cfg(feature = "gpu")]
-            Self::Device(_) => None,
-        }
-    }
-
-    /// The largest speed in m/s, unless the state is on a device.
-    pub(crate) fn host_max_speed(&self) -> Option<f64> {
-        match self {
-            Self::Single(backend) => Some(backend.solver.max_speed()),
-            Self::Double(backend) => Some(backend.solver.max_speed()),
-            #[cfg(feature = "gpu")]
-            Self::Device(_) => None,
-        }
-    }
-
-    /// Says where a handle is at the end of the next frame.
-    pub(crate) fn move_handle(&mut self, handle: u32, pose: Pose) {
-        match self {
-            Self::Single(backend) => backend.solver.move_handle(handle, pose),
-            Self::Double(backend) => backend.solver.move_handle(handle, pose),
-            #[cfg(feature = "gpu")]
-            Self::Device(device) => device.solver.move_handle(handle, pose),
-        }
-    }
-
-    /// The residuals of the last substep, if they were kept.
-    pub(crate) fn last_substep(&self, substep_time: f64) -> Option<LastSubstep> {
-        match self {
-            Self::Single(backend) => backend.last_substep(substep_time),
-            Self::Double(backend) => backend.last_substep(substep_time),
-            #[cfg(feature = "gpu")]
-            Self::Device(device) => {
-                let residuals = device.solver.as_last_seen().residuals(substep_time);
-                residuals.map(LastSubstep::Constraints)
-            }
-        }
     }
 
     /// Softens every tet, present and to come, that exceeds the limit, and no other one. Tets that were softened to an
@@ -360,38 +318,6 @@ impl AnySolver {
         }
     }
 
-    /// Lets go of what only VBD needs.
-    pub(crate) fn end_vbd(&mut self) {
-        match self {
-            Self::Single(backend) => backend.vbd = None,
-            Self::Double(backend) => backend.vbd = None,
-            #[cfg(feature = "gpu")]
-            Self::Device(_) => {}
-        }
-    }
-
-    /// Brings the layout up to date with the schedule, or sends a device what has changed; the next step would do it
-    /// otherwise. VBD has none.
-    pub(crate) fn lay_out(
-        &mut self,
-        schedule: &Schedule,
-        ms: &mut Milliseconds,
-    ) -> Result<(), Error> {
-        let start = Instant::now();
-        match self {
-            Self::Single(backend) => backend.lay_out(schedule),
-            Self::Double(backend) => backend.lay_out(schedule),
-            #[cfg(feature = "gpu")]
-            Self::Device(device) => {
-                device.solver.send(schedule)?;
-                ms.upload += milliseconds(start.elapsed());
-                return Ok(());
-            }
-        }
-        ms.schedule += milliseconds(start.elapsed());
-        Ok(())
-    }
-
     /// Recomputes masses, corners and what a step would solve, and compares; for tests and on request.
     pub(crate) fn check(&self, cuttable: &CuttableMesh, schedule: &Schedule) -> Result<(), Error> {
         let mesh = cuttable.mesh();
@@ -430,16 +356,6 @@ impl AnySolver {
         }
     }
 
-    /// Bytes of a copy.
-    pub(crate) fn bytes(&self) -> usize {
-        match self {
-            Self::Single(backend) => backend.bytes(),
-            Self::Double(backend) => backend.bytes(),
-            #[cfg(feature = "gpu")]
-            Self::Device(device) => device.solver.as_last_seen().bytes(),
-        }
-    }
-
     pub(crate) fn positions(&self, out: &mut Vec<DVec3>) {
         each!(self, solver => solver.positions(out));
     }
@@ -459,33 +375,47 @@ impl<R: Real> Backend<R> {
         }
         Ok(())
     }
+}
 
+impl<R: Real> SolverBackend for Backend<R> {
     fn step(
         &mut self,
         schedule: &Schedule,
         settings: &StepSettings,
         keep: bool,
-    ) -> Result<StepReport, XpbdError> {
+    ) -> Result<StepReport, Error> {
         let Self { solver, vbd } = self;
-        match vbd {
+        let step = match vbd {
             Some(vbd) => vbd.step(solver, settings, keep),
             None if keep => solver.step_keeping_residuals(schedule, settings),
             None => solver.step(schedule, settings),
-        }
+        };
+        step.map_err(|source| Error::Xpbd {
+            field: "solver".into(),
+            source,
+        })
     }
 
-    fn state(&self, gravity: Option<DVec3>, quantities: &[Quantity]) -> Measures {
+    fn lay_out(&mut self, schedule: &Schedule, ms: &mut Milliseconds) -> Result<(), Error> {
+        let start = Instant::now();
+        if self.vbd.is_none() {
+            self.solver.lay_out(schedule);
+        }
+        ms.schedule += milliseconds(start.elapsed());
+        Ok(())
+    }
+
+    fn state(
+        &mut self,
+        gravity: Option<DVec3>,
+        quantities: &[Quantity],
+    ) -> Result<Measures, Error> {
         let (solver, asks) = (&self.solver, |quantity| quantities.contains(&quantity));
-        Measures {
+        Ok(Measures {
             energy: asks(Quantity::Energy).then(|| solver.energy(gravity)),
             volume: asks(Quantity::Volume).then(|| solver.volume()),
             max_speed: asks(Quantity::Speed).then(|| solver.max_speed()),
-        }
-    }
-
-    /// The error that the last frame of two-level VBD left over.
-    fn vbd_error(&self) -> Option<f64> {
-        self.vbd.as_ref().and_then(|vbd| vbd.last.error)
+        })
     }
 
     fn last_substep(&self, substep_time: f64) -> Option<LastSubstep> {
@@ -501,20 +431,37 @@ impl<R: Real> Backend<R> {
         }
     }
 
+    fn move_handle(&mut self, handle: u32, pose: Pose) {
+        self.solver.move_handle(handle, pose);
+    }
+
     fn bytes(&self) -> usize {
         self.solver.bytes() + self.vbd.as_ref().map_or(0, Vbd::bytes)
     }
 
-    fn lay_out(&mut self, schedule: &Schedule) {
-        if self.vbd.is_none() {
-            self.solver.lay_out(schedule);
-        }
+    fn host_max_speed(&self) -> Option<f64> {
+        Some(self.solver.max_speed())
     }
 
-    /// Lets VBD follow a cut, after the solver has.
-    pub(crate) fn follow(&mut self, ms: &mut Milliseconds) -> Result<(), Error> {
+    fn update_vbd(&mut self, ms: &mut Milliseconds) -> Result<(), Error> {
         let Self { solver, vbd } = self;
         vbd.as_mut().map_or(Ok(()), |vbd| vbd.follow(solver, ms))
+    }
+
+    fn vbd_error(&self) -> Option<f64> {
+        self.vbd.as_ref().and_then(|vbd| vbd.last.error)
+    }
+
+    fn end_vbd(&mut self) {
+        self.vbd = None;
+    }
+
+    fn read_back(&mut self) -> Result<usize, Error> {
+        Ok(0)
+    }
+
+    fn news(&mut self) -> usize {
+        0
     }
 }
 

@@ -31,13 +31,17 @@ const FRAMES: u32 = 3;
 /// Milliseconds of a frame of a copy of an island's solver with some settings.
 fn measure(island: &Island, spec: &SolverSpec, settings: &StepSettings) -> Result<f64, Error> {
     let mut solver = island.solver.clone();
-    solver.end_vbd();
+    solver.backend_mut().end_vbd();
     solver.prepare(spec, &Place::default())?;
-    solver.lay_out(&island.partition.schedule, &mut Milliseconds::default())?;
+    solver
+        .backend_mut()
+        .lay_out(&island.partition.schedule, &mut Milliseconds::default())?;
     let mut fastest = f64::INFINITY;
     for frame in 0..=FRAMES {
         let start = Instant::now();
-        solver.step(&island.partition.schedule, settings, false)?;
+        solver
+            .backend_mut()
+            .step(&island.partition.schedule, settings, false)?;
         if frame > 0 {
             fastest = fastest.min(milliseconds(start.elapsed()));
         }
@@ -120,7 +124,7 @@ fn try_vbd(island: &mut Island, spec: &SolverSpec, share: f64) -> Result<(), Err
     if measure(island, &own, &settings)? > share {
         return Ok(());
     }
-    island.solver.end_vbd();
+    island.solver.backend_mut().end_vbd();
     island.solver.prepare(&own, &Place::default())?;
     island.settings = settings;
     island.choice = Some(chosen);

@@ -4,14 +4,18 @@
 //! is requested. Cost: a submit a frame.
 
 use std::sync::Arc;
+use std::time::Instant;
 
+use glam::DVec3;
 use incise_clustering::Method;
 use incise_gpu::{ClusterMapping, GpuContext, GpuSolver};
 use incise_graph::Schedule;
-use incise_xpbd::{Solver, StepReport, StepSettings};
+use incise_xpbd::{Pose, Solver, StepReport, StepSettings};
 
 use crate::Error;
-use crate::scene::SolverSpec;
+use crate::backend::{LastSubstep, Measures, SolverBackend};
+use crate::report::{Milliseconds, milliseconds};
+use crate::scene::{Quantity, SolverSpec};
 
 /// A solver on a GPU.
 #[derive(Debug)]
@@ -37,9 +41,10 @@ impl Device {
     pub(crate) fn serves(&self, gpu: &Arc<GpuContext>, spec: &SolverSpec) -> Result<bool, Error> {
         Ok(Arc::ptr_eq(self.solver.gpu(), gpu) && self.solver.form() == form(spec)?)
     }
+}
 
-    /// Tells the device to advance by one frame.
-    pub(crate) fn step(
+impl SolverBackend for Device {
+    fn step(
         &mut self,
         schedule: &Schedule,
         settings: &StepSettings,
@@ -53,14 +58,55 @@ impl Device {
         Ok(StepReport::default())
     }
 
-    /// Reads the state back to the host; returns how many particles had to be put back since the last call.
-    pub(crate) fn read_back(&mut self) -> Result<usize, Error> {
+    fn lay_out(&mut self, schedule: &Schedule, ms: &mut Milliseconds) -> Result<(), Error> {
+        let start = Instant::now();
+        self.solver.send(schedule)?;
+        ms.upload += milliseconds(start.elapsed());
+        Ok(())
+    }
+
+    fn state(&mut self, gravity: Option<DVec3>, _: &[Quantity]) -> Result<Measures, Error> {
+        let measures = self.solver.measure(gravity)?;
+        Ok(Measures {
+            energy: Some(measures.energy),
+            volume: Some(measures.volume),
+            max_speed: Some(measures.max_speed),
+        })
+    }
+
+    fn last_substep(&self, substep_time: f64) -> Option<LastSubstep> {
+        let residuals = self.solver.as_last_seen().residuals(substep_time);
+        residuals.map(LastSubstep::Constraints)
+    }
+
+    fn move_handle(&mut self, handle: u32, pose: Pose) {
+        self.solver.move_handle(handle, pose);
+    }
+
+    fn bytes(&self) -> usize {
+        self.solver.as_last_seen().bytes()
+    }
+
+    fn host_max_speed(&self) -> Option<f64> {
+        None
+    }
+
+    fn update_vbd(&mut self, _: &mut Milliseconds) -> Result<(), Error> {
+        Ok(())
+    }
+
+    fn vbd_error(&self) -> Option<f64> {
+        None
+    }
+
+    fn end_vbd(&mut self) {}
+
+    fn read_back(&mut self) -> Result<usize, Error> {
         self.solver.host()?;
         Ok(self.news())
     }
 
-    /// Returns how many particles had to be put back since the last call, as of the last readback or measurement.
-    pub(crate) fn news(&mut self) -> usize {
+    fn news(&mut self) -> usize {
         let repaired = self.solver.repaired();
         let news = repaired.wrapping_sub(self.told) as usize;
         self.told = repaired;

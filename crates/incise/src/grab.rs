@@ -70,7 +70,7 @@ impl Hand {
         grip.moved |= grip.to != to;
         grip.to = to;
         let pose = Pose::at(grip.start + (to - grip.point));
-        solver.move_handle(grip.handle, pose);
+        solver.backend_mut().move_handle(grip.handle, pose);
         true
     }
 
@@ -151,6 +151,8 @@ impl Hand {
 /// to grab.
 fn let_go(solver: &mut AnySolver, handle: u32) -> Result<(), Error> {
     detach_all(solver, handle)?;
-    solver.move_handle(handle, Pose::at(DVec3::ZERO));
+    solver
+        .backend_mut()
+        .move_handle(handle, Pose::at(DVec3::ZERO));
     Ok(())
 }

@@ -468,7 +468,10 @@ impl Island {
             attachment.advance(frame, &mut self.solver);
         }
         let (schedule, settings) = (&self.partition.schedule, &self.settings);
-        let step = self.solver.step(schedule, settings, keeping_residuals)?;
+        let step = self
+            .solver
+            .backend_mut()
+            .step(schedule, settings, keeping_residuals)?;
         self.judge_step();
         collider::advance(&mut self.settings);
         self.hand.arrive();
@@ -477,7 +480,7 @@ impl Island {
         }
         let time = self.settings.time_step;
         if let Some(rest) = self.rest.as_mut().filter(|_| !moved) {
-            let state = self.solver.state(None, &[Quantity::Speed])?;
+            let state = self.solver.backend_mut().state(None, &[Quantity::Speed])?;
             let falls_asleep = |speed| rest.count(speed, time);
             if state.max_speed.is_some_and(falls_asleep) {
                 each_mut!(&mut self.solver, solver => {
@@ -493,7 +496,7 @@ impl Island {
     /// Warns when VBD begins to miss the accuracy wanted.
     fn judge_step(&mut self) {
         let wanted = self.spec.accuracy.filter(|_| self.chose_vbd());
-        let (Some(wanted), Some(error)) = (wanted, self.solver.vbd_error()) else {
+        let (Some(wanted), Some(error)) = (wanted, self.solver.backend().vbd_error()) else {
             return;
         };
         let misses = error > wanted;
@@ -606,7 +609,9 @@ impl Island {
     /// Hands changed distance constraints to the solver, and wakes it.
     pub(crate) fn update_distances(&mut self) -> Result<(), Error> {
         self.distances.hand_to(&mut self.solver)?;
-        self.solver.update_vbd(&mut Milliseconds::default())?;
+        self.solver
+            .backend_mut()
+            .update_vbd(&mut Milliseconds::default())?;
         self.wake();
         Ok(())
     }
@@ -737,8 +742,10 @@ impl Island {
                 &self.partition.schedule,
             )?;
         }
-        self.solver.update_vbd(ms)?;
-        self.solver.lay_out(&self.partition.schedule, ms)?;
+        self.solver.backend_mut().update_vbd(ms)?;
+        self.solver
+            .backend_mut()
+            .lay_out(&self.partition.schedule, ms)?;
         Ok(events)
     }
 

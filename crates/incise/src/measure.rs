@@ -29,7 +29,7 @@ pub(crate) fn states(
     if !quantities.iter().any(is_of_state) {
         return Ok(Vec::new());
     }
-    let state = |island: &mut Island| island.solver.state(gravity, quantities);
+    let state = |island: &mut Island| island.solver.backend_mut().state(gravity, quantities);
     islands.iter_mut().map(state).collect()
 }
 
@@ -48,7 +48,7 @@ pub(crate) fn residual(islands: &[Island], gravity: Option<DVec3>) -> Option<Res
             weight = weight.hypot(load);
             moved = moved.hypot(load * time * time);
         }
-        match island.solver.last_substep(time)? {
+        match island.solver.backend().last_substep(time)? {
             LastSubstep::Constraints(residuals) => {
                 primal = primal.hypot(residuals.primal);
                 dual = dual.hypot(residuals.dual);

@@ -359,7 +359,7 @@ impl Simulation {
         self.state.report.warnings.extend(missed);
         for island in &mut self.state.islands {
             self.state.report.warnings.append(&mut island.warnings);
-            let speed = match island.solver.host_max_speed() {
+            let speed = match island.solver.backend().host_max_speed() {
                 Some(speed) => speed,
                 None => self.state.report.max_speed.unwrap_or(0.0),
             };

@@ -1,13 +1,12 @@
 //! [`Seats`]: which cluster is where on the device.
 //!
-//! A group is what a workgroup solves: so many seats, all of one color. A cluster has a seat as long as it has tets and
-//! keeps it while its color stays, so that what a cut does not touch does not move. A group whose seats are all empty
-//! goes to whatever color needs one next. Cost: O(changed clusters times groups of their colors / 64) for an update,
-//! O(clusters) to make.
+//! A group of lanes is what a workgroup solves, and a slot of it a seat: a cluster has one as long as it has tets, and keeps
+//! it while its color stays. Cost: O(changed clusters times groups of their colors / 64) for an update, O(clusters) to
+//! make.
 
-use incise_graph::{ClusterId, Rows, Schedule};
+use incise_graph::{ClusterId, Lanes, Rows, Schedule};
 
-/// No seat, no group, no color.
+/// No cluster.
 const NONE: u32 = u32::MAX;
 
 /// Groups of a color that may be empty beside half of all seats before all clusters are seated again.
@@ -16,29 +15,12 @@ const SPARE: usize = 2;
 /// Which cluster is in which seat.
 #[derive(Debug)]
 pub(crate) struct Seats {
-    /// Seats of a group, at most 64.
-    width: usize,
+    lanes: Lanes,
     revision: Option<u64>,
-    /// Color -> groups.
-    colors: Rows<u32>,
-    groups: Vec<Group>,
-    /// Groups without color.
-    free: Vec<u32>,
-    /// Cluster -> seat.
-    seats: Vec<u32>,
     /// Seat -> cluster.
     clusters: Vec<u32>,
     /// Clusters that have a seat.
     seated: usize,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Group {
-    color: u32,
-    /// Its place among the groups of its color.
-    place: u32,
-    /// A bit for each seat that is taken.
-    taken: u64,
 }
 
 /// What changed.
@@ -51,27 +33,14 @@ pub(crate) enum Moved {
 }
 
 impl Seats {
-    /// For groups of so many seats.
+    /// For groups of so many seats, at most 64.
     pub(crate) fn new(width: usize) -> Self {
-        assert!(
-            (1..=64).contains(&width),
-            "a word holds the seats of a group"
-        );
         Self {
-            width,
+            lanes: Lanes::new(width),
             revision: None,
-            colors: Rows::default(),
-            groups: Vec::new(),
-            free: Vec::new(),
-            seats: Vec::new(),
             clusters: Vec::new(),
             seated: 0,
         }
-    }
-
-    #[cfg(test)]
-    pub(crate) fn group_count(&self) -> usize {
-        self.groups.len()
     }
 
     pub(crate) fn seat_count(&self) -> usize {
@@ -79,12 +48,12 @@ impl Seats {
     }
 
     pub(crate) fn color_count(&self) -> usize {
-        self.colors.row_count()
+        self.lanes.color_count()
     }
 
     /// The groups of each color.
     pub(crate) fn groups(&self) -> &Rows<u32> {
-        &self.colors
+        self.lanes.groups()
     }
 
     /// The cluster in a seat.
@@ -94,10 +63,9 @@ impl Seats {
     }
 
     /// The seat of a cluster.
-    #[cfg(test)]
-    pub(crate) fn seat(&self, cluster: ClusterId) -> Option<u32> {
-        let seat = self.seats.get(cluster.index()).copied();
-        seat.filter(|&seat| seat != NONE)
+    fn seat(&self, cluster: ClusterId) -> Option<u32> {
+        let (group, lane) = self.lanes.slot(cluster)?;
+        Some(index(group * self.lanes.width() + lane))
     }
 
     /// From now on nothing here is to be trusted.
@@ -110,7 +78,7 @@ impl Seats {
         let changes = self.revision.and_then(|r| schedule.changes_since(r));
         let moved = changes.map(|changes| self.reseat(schedule, changes));
         self.revision = Some(schedule.revision());
-        let spare = SPARE * self.color_count().max(1) * self.width;
+        let spare = SPARE * self.color_count().max(1) * self.lanes.width();
         match moved {
             Some(seats) if self.seat_count() <= 2 * self.seated + spare => Moved::Seats(seats),
             _ => {
@@ -121,11 +89,8 @@ impl Seats {
     }
 
     fn rebuild(&mut self, schedule: &Schedule) {
-        self.colors
-            .refill(schedule.color_count(), std::iter::empty());
-        self.groups.clear();
-        self.free.clear();
-        self.seats.clear();
+        self.lanes.reset(self.lanes.width());
+        self.lanes.set_color_count(schedule.color_count());
         self.clusters.clear();
         self.seated = 0;
         for color in 0..schedule.color_count() {
@@ -137,7 +102,7 @@ impl Seats {
 
     fn reseat(&mut self, schedule: &Schedule, changes: &[ClusterId]) -> Vec<u32> {
         if self.color_count() < schedule.color_count() {
-            self.colors.set_row_count(schedule.color_count());
+            self.lanes.set_color_count(schedule.color_count());
         }
         let mut changed = changes.to_vec();
         changed.sort_unstable();
@@ -149,28 +114,22 @@ impl Seats {
         };
         // All clusters leave before any is seated, so that emptied groups can be used again.
         for &cluster in &changed {
-            let Some(&seat) = self
-                .seats
-                .get(cluster.index())
-                .filter(|&&seat| seat != NONE)
-            else {
+            let Some(seat) = self.seat(cluster) else {
                 continue;
             };
             touched.push(seat);
-            let here = self.groups[seat as usize / self.width].color as usize;
-            if color_of(cluster) != Some(here) {
-                self.leave(cluster, seat);
+            let group = self.lanes.group(seat as usize / self.lanes.width());
+            if color_of(cluster) != Some(group.color as usize) {
+                self.lanes.release(cluster);
+                self.clusters[seat as usize] = NONE;
+                self.seated -= 1;
             }
         }
         for &cluster in &changed {
             let Some(color) = color_of(cluster) else {
                 continue;
             };
-            if self
-                .seats
-                .get(cluster.index())
-                .is_none_or(|&seat| seat == NONE)
-            {
+            if self.seat(cluster).is_none() {
                 touched.push(self.sit(cluster, color));
             }
         }
@@ -181,65 +140,17 @@ impl Seats {
 
     /// Gives a cluster a seat.
     fn sit(&mut self, cluster: ClusterId, color: usize) -> u32 {
-        let all = u64::MAX >> (64 - self.width);
-        let groups = self.colors.row(color).iter().rev();
+        let groups = self.groups().row(color).iter().rev();
         let roomy = groups
-            .copied()
-            .find(|&g| self.groups[g as usize].taken != all);
-        let group = roomy.unwrap_or_else(|| self.open(color));
-        let taken = &mut self.groups[group as usize].taken;
-        let lane = taken.trailing_ones() as usize;
-        *taken |= 1 << lane;
-        let seat = index(group as usize * self.width + lane);
-        if self.seats.len() <= cluster.index() {
-            self.seats.resize(cluster.index() + 1, NONE);
-        }
-        self.seats[cluster.index()] = seat;
-        self.clusters[seat as usize] = cluster.0;
+            .map(|&group| group as usize)
+            .find(|&group| self.lanes.has_room(group));
+        let group = roomy.unwrap_or_else(|| self.lanes.open(color, 0).0);
+        let seat = self.lanes.assign(cluster, group);
+        let seats = self.lanes.group_count() * self.lanes.width();
+        self.clusters.resize(seats, NONE);
+        self.clusters[seat] = cluster.0;
         self.seated += 1;
-        seat
-    }
-
-    /// Adds a group to a color.
-    fn open(&mut self, color: usize) -> u32 {
-        let group = Group {
-            color: index(color),
-            place: index(self.colors.row(color).len()),
-            taken: 0,
-        };
-        let number = match self.free.pop() {
-            Some(number) => {
-                self.groups[number as usize] = group;
-                number
-            }
-            None => {
-                self.groups.push(group);
-                let seats = self.groups.len() * self.width;
-                self.clusters.resize(seats, NONE);
-                index(self.groups.len() - 1)
-            }
-        };
-        self.colors.push(color, number);
-        number
-    }
-
-    /// Takes its seat from a cluster.
-    fn leave(&mut self, cluster: ClusterId, seat: u32) {
-        self.seats[cluster.index()] = NONE;
-        self.clusters[seat as usize] = NONE;
-        self.seated -= 1;
-        let number = seat as usize / self.width;
-        let group = &mut self.groups[number];
-        group.taken &= !(1 << (seat as usize % self.width));
-        if group.taken == 0 {
-            let Group { color, place, .. } = *group;
-            group.color = NONE;
-            self.colors.swap_remove(color as usize, place as usize);
-            if let Some(&other) = self.colors.row(color as usize).get(place as usize) {
-                self.groups[other as usize].place = place;
-            }
-            self.free.push(index(number));
-        }
+        index(seat)
     }
 }
 
@@ -260,19 +171,13 @@ mod tests {
             for &cluster in schedule.clusters(color) {
                 let seat = seats.seat(cluster).expect("every cluster has a seat");
                 assert_eq!(seats.cluster(seat), Some(cluster));
-                let group = index(seat as usize / seats.width);
+                let group = index(seat as usize / seats.lanes.width());
                 assert!(seats.groups().row(color).contains(&group));
                 seen += 1;
             }
         }
         let taken = (0..seats.seat_count()).filter(|&s| seats.cluster(index(s)).is_some());
         assert_eq!(taken.count(), seen);
-        let mut groups: Vec<u32> = seats.colors.rows().flatten().copied().collect();
-        groups.sort_unstable();
-        let used = groups.len();
-        groups.dedup();
-        assert_eq!(groups.len(), used, "a group has one color");
-        assert_eq!(used + seats.free.len(), seats.group_count());
     }
 
     fn schedule(labels: &[u8], colors: &[u8]) -> (Clustering, Coloring) {

@@ -38,7 +38,9 @@ impl Simulation {
         )?;
         if self.state.place.is_device() {
             let islands = self.state.islands.iter_mut();
-            self.state.report.repaired += islands.map(|island| island.solver.news()).sum::<usize>();
+            self.state.report.repaired += islands
+                .map(|island| island.solver.backend_mut().news())
+                .sum::<usize>();
             ms.readback += milliseconds(start.elapsed());
         }
         for quantity in &self.state.reporting.quantities {
@@ -106,7 +108,7 @@ impl Simulation {
         let start = Instant::now();
         let mut repaired = 0;
         for island in &mut self.state.islands {
-            repaired += island.solver.read_back()?;
+            repaired += island.solver.backend_mut().read_back()?;
         }
         if self.state.place.is_device() {
             ms.readback += milliseconds(start.elapsed());

@@ -293,7 +293,7 @@ impl Retuned {
         if Self::needs_another_solver(island, before, after, limits, place)? {
             let mut copy = island.solver.clone();
             copy.limit_kappa(limits[0], limits[1], mesh)?;
-            copy.end_vbd();
+            copy.backend_mut().end_vbd();
             copy.prepare(after, place)?;
             solver = Some(copy);
         }
@@ -337,7 +337,7 @@ impl Retuned {
                 let mesh = island.cuttable.mesh();
                 island.solver.limit_kappa(before, after, mesh)?;
                 if spec.method != Method::Vbd {
-                    island.solver.end_vbd();
+                    island.solver.backend_mut().end_vbd();
                 }
             }
         }

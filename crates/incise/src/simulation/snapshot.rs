@@ -111,7 +111,7 @@ impl Island {
         let (particles, tets) = (mesh.positions.len(), mesh.tets.len());
         let pending = self.recluster.as_ref().is_some_and(Recluster::is_pending);
         let partitions = 1 + usize::from(pending);
-        self.solver.bytes()
+        self.solver.backend().bytes()
             + tets * (CUTTING + PIECES + partitions * PLAN)
             + particles * (CUTTING_PARTICLE + POSITION)
     }

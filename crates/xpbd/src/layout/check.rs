@@ -21,12 +21,12 @@ impl<R: Float> Layout<R> {
             return wrong("number of colors", self.color_count());
         }
         for (color, usage) in usages.iter_mut().enumerate() {
-            for (at, &group) in (0..).zip(self.groups_of(color)) {
-                let known = self.groups.list[group as usize];
-                if (known.color as usize, known.index) != (color, at) || known.occupied == 0 {
+            for &group in self.groups_of(color) {
+                let known = self.groups.lanes.group(group as usize);
+                if known.color as usize != color || known.occupied == 0 {
                     return wrong("group", group as usize);
                 }
-                for block in known.blocks() {
+                for block in self.blocks_of(group) {
                     if std::mem::replace(&mut owners[block], color) != usize::MAX {
                         return wrong("block", block);
                     }
@@ -34,16 +34,15 @@ impl<R: Float> Layout<R> {
                 usage.blocks += known.depth;
             }
         }
-        let (mut tets, mut taken) = (0, vec![0_u16; self.groups.list.len()]);
+        let (mut tets, mut taken) = (0, vec![0_u64; self.groups.lanes.group_count()]);
         for (color, usage) in usages.iter_mut().enumerate() {
             for &cluster in schedule.clusters(color) {
                 let members = schedule.constraints(cluster);
                 if !self.has_slot(cluster, color, members.len(), &mut taken) {
                     return wrong("cluster", cluster.index());
                 }
-                let (group, lane) = self.groups.slot(cluster).unwrap_or_default();
-                let first = self.groups.list[group].first as usize;
-                for (block, &tet) in (first..).zip(members) {
+                let (group, lane) = self.groups.lanes.slot(cluster).unwrap_or_default();
+                for (block, &tet) in self.groups.blocks(group).zip(members) {
                     let slot = block * self.blocks.lanes + lane;
                     if self.slot(tet as usize) != Some((block, lane))
                         || !self.blocks.has(slot, tet, &ingredients(tet))
@@ -71,7 +70,8 @@ impl<R: Float> Layout<R> {
         if active as usize != tets {
             return wrong("number of active lanes", active as usize);
         }
-        let occupied = self.groups.list.iter().map(|group| group.occupied);
+        let groups = 0..self.groups.lanes.group_count();
+        let occupied = groups.map(|group| self.groups.lanes.group(group).occupied);
         match occupied
             .zip(taken)
             .position(|(known, found)| known != found)
@@ -82,13 +82,13 @@ impl<R: Float> Layout<R> {
     }
 
     /// Whether a cluster has a lane for itself in its color, with blocks enough.
-    fn has_slot(&self, cluster: ClusterId, color: usize, length: usize, taken: &mut [u16]) -> bool {
-        let Some((group, lane)) = self.groups.slot(cluster) else {
+    fn has_slot(&self, cluster: ClusterId, color: usize, length: usize, taken: &mut [u64]) -> bool {
+        let Some((group, lane)) = self.groups.lanes.slot(cluster) else {
             return false;
         };
         let alone = taken[group] & (1 << lane) == 0;
         taken[group] |= 1 << lane;
-        let group = self.groups.list[group];
+        let group = self.groups.lanes.group(group);
         alone && group.color as usize == color && length <= group.depth as usize
     }
 }

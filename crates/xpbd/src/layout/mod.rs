@@ -81,13 +81,13 @@ impl<R: Float> Layout<R> {
     /// The groups of a color.
     #[inline]
     pub(crate) fn groups_of(&self, color: usize) -> &[u32] {
-        self.groups.colors.row(color)
+        self.groups.lanes.groups().row(color)
     }
 
     /// The blocks of a group.
     #[inline]
     pub(crate) fn blocks_of(&self, group: u32) -> Range<usize> {
-        self.groups.list[group as usize].blocks()
+        self.groups.blocks(group as usize)
     }
 
     /// The number of blocks of a color.
@@ -96,7 +96,7 @@ impl<R: Float> Layout<R> {
     }
 
     pub(crate) fn color_count(&self) -> usize {
-        self.groups.colors.row_count()
+        self.groups.lanes.color_count()
     }
 
     /// The block and the lane of a tet; `None` if the schedule does not solve it.

@@ -10,9 +10,9 @@
 
 use std::cmp::Reverse;
 
-use incise_graph::{ClusterId, Schedule};
+use incise_graph::{ClusterId, LaneGroup, Schedule};
 
-use super::groups::{Group, Usage};
+use super::groups::Usage;
 use super::{Ingredients, Layout, NONE, index};
 use crate::Float;
 
@@ -75,11 +75,11 @@ impl<R: Float> Layout<R> {
         // First all lanes are emptied, since tets may have gone from one cluster to another.
         let mut touched = Vec::new();
         for &cluster in &changed {
-            let Some((group, _)) = self.groups.slot(cluster) else {
+            let Some((group, _)) = self.groups.lanes.slot(cluster) else {
                 continue;
             };
             self.empty(cluster);
-            let Group { color, depth, .. } = self.groups.list[group];
+            let LaneGroup { color, depth, .. } = *self.groups.lanes.group(group);
             touched.push(color as usize);
             let stays = schedule.color(cluster).is_some_and(|c| c.0 == color);
             if !stays || schedule.constraints(cluster).len() > depth as usize {
@@ -92,7 +92,7 @@ impl<R: Float> Layout<R> {
             let Some(color) = schedule.color(cluster) else {
                 continue;
             };
-            if self.groups.slot(cluster).is_some() {
+            if self.groups.lanes.slot(cluster).is_some() {
                 filled += self.fill_lane(cluster, schedule, ingredients);
             } else {
                 let length = schedule.constraints(cluster).len();
@@ -104,7 +104,7 @@ impl<R: Float> Layout<R> {
             touched.push(color);
             let with_room = self.groups.with_room(color, length);
             let group = with_room.unwrap_or_else(|| self.open(color, length));
-            self.groups.assign(cluster, group);
+            self.groups.lanes.assign(cluster, group);
             filled += self.fill_lane(cluster, schedule, ingredients);
         }
         self.clusters = changed;
@@ -130,8 +130,7 @@ impl<R: Float> Layout<R> {
             }
         }
         self.groups.set_color_count(schedule.color_count());
-        self.groups.colors.tidy();
-        self.groups.free.tidy();
+        self.groups.lanes.tidy();
         filled
     }
 
@@ -150,7 +149,7 @@ impl<R: Float> Layout<R> {
         for together in clusters.chunks(self.blocks.lanes) {
             let group = self.open(color, schedule.constraints(together[0]).len());
             for &cluster in together {
-                self.groups.assign(cluster, group);
+                self.groups.lanes.assign(cluster, group);
                 filled += self.fill_lane(cluster, schedule, ingredients);
             }
         }
@@ -161,7 +160,7 @@ impl<R: Float> Layout<R> {
     /// Adds a group of so many blocks to a color.
     fn open(&mut self, color: usize, depth: usize) -> usize {
         let group = self.groups.open(color, depth, self.blocks.len());
-        let end = self.groups.list[group].blocks().end;
+        let end = self.groups.blocks(group).end;
         self.blocks.grow(end.max(self.blocks.len()));
         group
     }
@@ -173,10 +172,13 @@ impl<R: Float> Layout<R> {
         schedule: &Schedule,
         ingredients: &impl Fn(u32) -> Ingredients<R>,
     ) -> usize {
-        let (group, lane) = self.groups.slot(cluster).expect("it has a lane");
-        let Group { first, color, .. } = self.groups.list[group];
+        let (group, lane) = self.groups.lanes.slot(cluster).expect("it has a lane");
+        let (blocks, color) = (
+            self.groups.blocks(group),
+            self.groups.lanes.group(group).color,
+        );
         let tets = schedule.constraints(cluster);
-        for (block, &tet) in (first as usize..).zip(tets) {
+        for (block, &tet) in blocks.zip(tets) {
             let slot = block * self.blocks.lanes + lane;
             if self.slots.len() <= tet as usize {
                 self.slots.resize(tet as usize + 1, NONE);
@@ -194,9 +196,9 @@ impl<R: Float> Layout<R> {
 
     /// Removes the tets of a cluster from its lane.
     fn empty(&mut self, cluster: ClusterId) {
-        let (group, lane) = self.groups.slot(cluster).expect("it has a lane");
-        let group = self.groups.list[group];
-        for block in group.blocks() {
+        let (group, lane) = self.groups.lanes.slot(cluster).expect("it has a lane");
+        let color = self.groups.lanes.group(group).color;
+        for block in self.groups.blocks(group) {
             if self.blocks.active[block] & (1 << lane) == 0 {
                 break;
             }
@@ -205,7 +207,7 @@ impl<R: Float> Layout<R> {
             // A particle that is there as long as any is.
             self.blocks.particles[slot] = [0; 4];
             self.slots[self.blocks.tets[slot] as usize] = NONE;
-            self.groups.usages[group.color as usize].tets -= 1;
+            self.groups.usages[color as usize].tets -= 1;
         }
     }
 
