@@ -7,6 +7,7 @@ mod advise;
 mod args;
 mod color;
 mod failure;
+mod files;
 mod mesh;
 mod output;
 mod pictures;

@@ -17,10 +17,8 @@ use incise::mesh_io::{
 use incise::{Scene, Simulation};
 
 use crate::failure::Failure;
+use crate::files::{require_file, save_every};
 use crate::pictures::Pictures;
-
-/// About how many surfaces, and as many pictures, a run saves.
-const SURFACES: u64 = 50;
 
 /// A file of lines that gets its name in the end.
 #[derive(Debug)]
@@ -105,11 +103,6 @@ fn movable(scene: &Scene) -> anyhow::Result<Scene> {
         *mesh = path::absolute(&*mesh)?;
     }
     Ok(scene)
-}
-
-/// Every how many frames a surface is saved, and a picture.
-pub(crate) fn save_every(frames: u64) -> u64 {
-    frames.div_ceil(SURFACES)
 }
 
 /// Where a run's files go.
@@ -273,18 +266,6 @@ pub(crate) fn require_mesh_file(path: &Path) -> Result<(), Failure> {
         .into());
     }
     require_file(path).map_err(Failure::Input)
-}
-
-/// Refuses a path that no file can have.
-pub(crate) fn require_file(path: &Path) -> anyhow::Result<()> {
-    let why = match path.parent() {
-        _ if path.is_dir() => "it is a folder",
-        None => "it names no file",
-        // That of a bare name is empty.
-        Some(folder) if folder != Path::new("") && !folder.is_dir() => "there is no such folder",
-        Some(_) => return Ok(()),
-    };
-    anyhow::bail!("cannot write {}: {why}", path.display())
 }
 
 /// Writes the mesh at rest; as `.vtu` with the deformed positions, which other formats have no place for.

@@ -12,7 +12,7 @@ use incise_render::{
 
 use crate::args::RunArguments;
 use crate::failure::Failure;
-use crate::output::{require_file, save_every};
+use crate::files::{require_file, save_every};
 
 /// Pixels of a picture, across and down.
 const SIZE: [u32; 2] = [640, 480];

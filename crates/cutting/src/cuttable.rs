@@ -55,6 +55,28 @@ impl CuttableMesh {
         self.stars.around(particle)
     }
 
+    /// The tets around the given particles, each once, ascending.
+    pub(crate) fn tets_around(&self, particles: &[ParticleId]) -> Vec<TetId> {
+        let mut tets: Vec<TetId> = particles.iter().flat_map(|&p| self.around(p)).collect();
+        tets.sort_unstable();
+        tets.dedup();
+        tets
+    }
+
+    /// The length at rest of the longest edge of the tets around an edge's ends.
+    pub(crate) fn longest_edge_around(&self, ends: [ParticleId; 2]) -> f64 {
+        let rest = &self.mesh.positions;
+        let mut longest: f64 = 0.0;
+        for end in ends {
+            for tet in self.around(end) {
+                for corner in self.mesh.tets[tet.index()] {
+                    longest = longest.max(rest[corner.index()].distance_squared(rest[end.index()]));
+                }
+            }
+        }
+        longest.sqrt()
+    }
+
     /// The tet behind each face of a tet, by the corner that the face lies opposite to; `None` on the boundary. O(1).
     ///
     /// # Panics

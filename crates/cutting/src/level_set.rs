@@ -8,9 +8,9 @@
 use glam::DVec3;
 use incise_mesh::ParticleId;
 
+use crate::finite::require_positions;
 use crate::parallel;
 use crate::signs::{cut_by_signs, linear};
-use crate::sweep::require_positions;
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
 /// Steps of regula falsi before bisection takes over. Smooth fields need about six.

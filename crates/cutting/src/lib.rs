@@ -27,11 +27,13 @@
 //! This crate knows nothing of constraints, solvers, colors or the GPU.
 
 mod bisect;
+mod blade;
 mod closest;
 mod cuttable;
 mod delta;
 mod error;
 mod faces;
+mod finite;
 mod index;
 mod level_set;
 mod meet;

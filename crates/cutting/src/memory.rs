@@ -14,7 +14,7 @@ use std::collections::HashMap;
 use foldhash::fast::FixedState;
 use incise_mesh::ParticleId;
 
-use crate::stroke::{Hit, SAME_SHEET, longest_around, tets_around};
+use crate::blade::{Hit, SAME_SHEET};
 use crate::surface::{CutSurface, Mark};
 use crate::{CutDelta, CutOptions, CuttableMesh};
 
@@ -113,13 +113,13 @@ impl CutMemory {
         for hit in hits {
             let ends = hit.crossing.ends;
             corners.clear();
-            for tet in tets_around(cuttable, &ends) {
+            for tet in cuttable.tets_around(&ends) {
                 corners.extend(cuttable.mesh.tets[tet.index()]);
             }
             corners.sort_unstable();
             corners.dedup();
             same.clear();
-            let close = SAME_SHEET * longest_around(cuttable, ends);
+            let close = SAME_SHEET * cuttable.longest_edge_around(ends);
             let ours = hit.tangent;
             for &corner in &corners {
                 for (of, mark) in self.entries(corner).filter(|entry| entry.0 != stroke) {

@@ -6,9 +6,9 @@
 
 use glam::DVec3;
 
+use crate::finite::{require_finite, require_positions};
 use crate::parallel;
 use crate::signs::cut_by_signs;
-use crate::sweep::require_positions;
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
 /// A plane through a point.
@@ -83,11 +83,4 @@ pub fn cut_plane(
     let distance = parallel::map(positions, |x| normal.dot(*x - plane.point));
     let what = "the distance of a particle from the plane";
     cut_by_signs(cuttable, distance, what, options, |_, [a, b]| a / (a - b))
-}
-
-pub(crate) fn require_finite(what: &'static str, v: DVec3) -> Result<(), CutError> {
-    match v.to_array().into_iter().find(|c| !c.is_finite()) {
-        Some(value) => Err(CutError::NonFinite { what, value }),
-        None => Ok(()),
-    }
 }

@@ -13,8 +13,8 @@ use incise_mesh::{ParticleId, TetId};
 
 use crate::delta::{BoundaryTriangle, CutDelta, MovedTet, RemovedTet};
 use crate::faces::{Behind, Face};
+use crate::finite::require_positions;
 use crate::operation::Operation;
-use crate::sweep::require_positions;
 use crate::{CutError, CutOptions, CuttableMesh};
 
 /// Removes tets; `tets` may be in any order and repeat. The faces laid bare get the tag `tag`.

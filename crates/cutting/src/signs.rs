@@ -7,9 +7,9 @@
 
 use incise_mesh::ParticleId;
 
+use crate::blade::AGAIN;
 use crate::operation::{Crossing, Operation, Refusal};
 use crate::parallel;
-use crate::stroke::AGAIN;
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh, Separation};
 
 /// Cuts where `values`, one a particle, change their sign. `what` they are is named if one is not finite.

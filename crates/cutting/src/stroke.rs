@@ -21,6 +21,7 @@ mod snap;
 use glam::{DMat3, DVec3};
 use incise_mesh::{ParticleId, TetId, TetMesh};
 
+use crate::blade::{Blade, Hit, SAME_SHEET};
 use crate::meet::{Meeting, MovingSegment};
 use crate::memory::CutMemory;
 use crate::operation::{Crossing, Operation, Refusal};
@@ -29,36 +30,6 @@ use crate::sides::{GivenSides, Sides, standing_side};
 use crate::signs::linear;
 use crate::surface::{CutSurface, Tangent};
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
-
-/// A meeting within this fraction of the edge's length from the tangent plane of an end is that same surface again,
-/// bent to its particles; one further away is another sheet of a stroke that came back.
-pub(crate) const SAME_SHEET: f64 = 0.25;
-/// How much further from the surface than before a particle that it was bent to may be and stay on it: rounding between
-/// two runs of the same stroke, and a body that moved a little in between.
-pub(crate) const AGAIN: f64 = 1.01;
-
-/// Something that cuts.
-pub(crate) trait Blade: Sync {
-    /// Whether it comes by bit by bit, so that a particle must be decided before all meetings are known.
-    const COMES_BY: bool;
-
-    /// The first meeting with an edge that `keep` does not refuse, and how many there are.
-    fn first_meeting(
-        &self,
-        edge: &MovingSegment,
-        keep: impl Fn(&Meeting) -> bool,
-    ) -> Option<(Meeting, usize)>;
-
-    /// How often one edge can be met.
-    fn most_meetings(&self) -> usize;
-
-    /// On which side of it a point lies, if it stands and can tell. `reach` is a guess at the distance.
-    fn side(&self, x: DVec3, reach: f64) -> Option<bool>;
-
-    /// Its normal, of any length, at a point that it touches while it stands. `length` is that of the longest edge
-    /// there.
-    fn touches(&self, x: DVec3, length: f64) -> Option<DVec3>;
-}
 
 /// The particles' positions at the beginning and the end of a frame.
 #[derive(Clone, Debug)]
@@ -95,16 +66,6 @@ pub(crate) struct Stroke {
     forgotten: Vec<(TetId, bool)>,
     /// The number that the memory knows it by.
     number: Option<u32>,
-}
-
-/// An edge met by the blade, with the surface there.
-pub(crate) struct Hit {
-    pub(crate) crossing: Crossing,
-    pub(crate) tangent: Tangent,
-    /// On which side the ends were seen.
-    sides: [Option<bool>; 2],
-    /// How often it is met.
-    meetings: usize,
 }
 
 impl Stroke {
@@ -183,7 +144,7 @@ impl Stroke {
         }
 
         let seeds = self.seeds(operation.cuttable, &fresh);
-        let along = tets_around(operation.cuttable, &seeds);
+        let along = operation.cuttable.tets_around(&seeds);
         let mesh = &operation.cuttable.mesh;
         let standing =
             |corners: [ParticleId; 4]| standing_side(&self.surface, blade, corners, &motion.now);
@@ -277,7 +238,7 @@ impl Stroke {
     fn gaps(&self, cuttable: &CuttableMesh, fresh: &[ParticleId]) -> Vec<Hit> {
         let rest = &cuttable.mesh.positions;
         let mut gaps: Vec<Hit> = Vec::new();
-        for tet in tets_around(cuttable, fresh) {
+        for tet in cuttable.tets_around(fresh) {
             let corners = cuttable.mesh.tets[tet.index()];
             let on = || corners.into_iter().filter(|&p| self.surface.contains(p));
             let joins = on().any(|p| self.surface.is_adopted(p))
@@ -343,7 +304,8 @@ impl Stroke {
                 known.is_some_and(|t| {
                     let distance = t.distance(a.lerp(b, m.parameter)).abs();
                     distance <= SAME_SHEET * a.distance(b)
-                        || (adopted() && distance <= SAME_SHEET * longest_around(cuttable, ends))
+                        || (adopted()
+                            && distance <= SAME_SHEET * cuttable.longest_edge_around(ends))
                 })
             };
             let (meeting, meetings) = blade.first_meeting(&motion.edge(ends), |m| !old(m))?;
@@ -391,14 +353,6 @@ fn touched(
     })
 }
 
-/// The tets around the given particles, each once, ascending.
-pub(crate) fn tets_around(cuttable: &CuttableMesh, particles: &[ParticleId]) -> Vec<TetId> {
-    let mut tets: Vec<TetId> = particles.iter().flat_map(|&p| cuttable.around(p)).collect();
-    tets.sort_unstable();
-    tets.dedup();
-    tets
-}
-
 /// The edges of the given tets, each once, ascending.
 fn edges_of(mesh: &TetMesh, tets: &[TetId]) -> Vec<[ParticleId; 2]> {
     // Both ends in one number, which sorts at less than half the cost of a pair.
@@ -416,20 +370,6 @@ fn edges_of(mesh: &TetMesh, tets: &[TetId]) -> Vec<[ParticleId; 2]> {
         [[a, b, c, d], [e, f, g, h]].map(|end| ParticleId(u32::from_be_bytes(end)))
     };
     edges.into_iter().map(ends).collect()
-}
-
-/// The length at rest of the longest edge of the tets around an edge's ends.
-pub(crate) fn longest_around(cuttable: &CuttableMesh, ends: [ParticleId; 2]) -> f64 {
-    let rest = &cuttable.mesh.positions;
-    let mut longest: f64 = 0.0;
-    for end in ends {
-        for tet in cuttable.around(end) {
-            for corner in cuttable.mesh.tets[tet.index()] {
-                longest = longest.max(rest[corner.index()].distance_squared(rest[end.index()]));
-            }
-        }
-    }
-    longest.sqrt()
 }
 
 /// The direction in the rest shape of a normal among the given tets.

@@ -10,13 +10,13 @@
 //! cut.
 
 use glam::DVec3;
-use incise_mesh::TetMesh;
 
+use crate::blade::Blade;
+use crate::finite::{require_finite, require_positions};
 use crate::meet::{Meeting, MovingSegment, meetings};
 use crate::memory::CutMemory;
 use crate::near::{Search, SweptSegment};
-use crate::plane::require_finite;
-use crate::stroke::{Blade, Motion, Stroke};
+use crate::stroke::{Motion, Stroke};
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
 /// A blade on its way from one pose to the next.
@@ -254,18 +254,4 @@ fn between(before: &[DVec3], now: &[DVec3]) -> Vec<SweptSegment> {
         })
     });
     segments.collect()
-}
-
-/// Refuses positions that are not finite or not one a particle.
-pub(crate) fn require_positions(mesh: &TetMesh, positions: &[DVec3]) -> Result<(), CutError> {
-    let (expected, given) = (mesh.positions.len(), positions.len());
-    if expected != given {
-        return Err(CutError::PositionCount { expected, given });
-    }
-    // Zero times what is not finite is not a number: one sum tells of all, and none is looked at by itself.
-    if positions.iter().map(|x| *x * 0.0).sum::<DVec3>() == DVec3::ZERO {
-        return Ok(());
-    }
-    let mut positions = positions.iter();
-    positions.try_for_each(|&x| require_finite("the position of a particle", x))
 }

@@ -15,14 +15,14 @@ use std::cmp::Ordering;
 use glam::DVec3;
 use incise_mesh::{Bounds, TetId, TetMesh, orientation};
 
+use crate::blade::{Blade, SAME_SHEET};
 use crate::closest::Closest;
+use crate::finite::{require_finite, require_positions};
 use crate::meet::{Meeting, MovingSegment};
 use crate::memory::CutMemory;
 use crate::near::Slabs;
 use crate::parallel;
-use crate::plane::require_finite;
-use crate::stroke::{Blade, Motion, SAME_SHEET, Stroke};
-use crate::sweep::require_positions;
+use crate::stroke::{Motion, Stroke};
 use crate::tree::BoxTree;
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 

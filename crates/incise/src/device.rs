@@ -13,9 +13,9 @@ use incise_graph::Schedule;
 use incise_xpbd::{Pose, Solver, StepReport, StepSettings};
 
 use crate::Error;
-use crate::backend::{LastSubstep, Measures, SolverBackend};
 use crate::report::{Milliseconds, milliseconds};
 use crate::scene::{Quantity, SolverSpec};
+use crate::solver_backend::{LastSubstep, Measures, SolverBackend};
 
 /// A solver on a GPU.
 #[derive(Debug)]

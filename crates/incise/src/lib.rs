@@ -55,6 +55,7 @@ mod saved;
 pub mod scene;
 mod simulation;
 mod sleep;
+mod solver_backend;
 mod strokes;
 mod substeps;
 mod tool;

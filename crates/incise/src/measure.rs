@@ -7,10 +7,11 @@ use glam::DVec3;
 use incise_xpbd::Volume;
 
 use crate::Error;
-use crate::backend::{LastSubstep, Measures, each};
+use crate::backend::each;
 use crate::island::Island;
 use crate::report::{BodyReport, ChosenMethod, EnergyReport, ResidualReport, SoftenedReport};
 use crate::scene::{Method, Quantity};
+use crate::solver_backend::{LastSubstep, Measures};
 
 /// Whether a quantity is one of those.
 pub(crate) fn is_of_state(quantity: &Quantity) -> bool {

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use crate::element::Element;
-use crate::newton::{Problem, minimize};
+use crate::newton::{Parts, Problem, minimize};
 use crate::pieces::first_not_held;
 use crate::system::System;
 use crate::{Material, ReferenceError, Report};
@@ -181,7 +181,7 @@ impl Body {
             gravity,
             held,
         };
-        let (moved, report) = minimize(self, &problem, Some(&predicted))?;
+        let (moved, report) = minimize(&mut self.parts(), &problem, Some(&predicted))?;
         let velocities = self.per_particle(&problem.held, |p| moved[p] / time_step);
         self.commit(&problem.held, &moved, &velocities)?;
         Ok(report)
@@ -212,10 +212,19 @@ impl Body {
             gravity,
             held,
         };
-        let (moved, report) = minimize(self, &problem, None)?;
+        let (moved, report) = minimize(&mut self.parts(), &problem, None)?;
         let still = vec![DVec3::ZERO; moved.len()];
         self.commit(&problem.held, &moved, &still)?;
         Ok(report)
+    }
+
+    fn parts(&mut self) -> Parts<'_> {
+        Parts {
+            positions: &self.positions,
+            masses: &self.masses,
+            elements: &self.elements,
+            system: &mut self.system,
+        }
     }
 
     fn held(&self) -> Vec<bool> {

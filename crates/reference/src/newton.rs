@@ -14,7 +14,9 @@
 
 use glam::DVec3;
 
-use crate::{Body, ReferenceError, clamp_eigenvalues};
+use crate::element::Element;
+use crate::system::System;
+use crate::{ReferenceError, clamp_eigenvalues};
 
 /// The force out of balance as a fraction of the forces at play at which a solution is accepted.
 const TOLERANCE: f64 = 1e-10;
@@ -61,6 +63,15 @@ impl Report {
     }
 }
 
+/// The body whose potential it is.
+pub(crate) struct Parts<'a> {
+    /// At the start.
+    pub(crate) positions: &'a [DVec3],
+    pub(crate) masses: &'a [f64],
+    pub(crate) elements: &'a [Element],
+    pub(crate) system: &'a mut System,
+}
+
 /// What is to be minimized.
 pub(crate) struct Problem {
     /// One over the square of the time step, 0 in statics.
@@ -97,7 +108,7 @@ impl Evaluation {
 
 /// The displacements of a minimum, found downhill from no displacement or from `start`, whichever is lower.
 pub(crate) fn minimize(
-    body: &mut Body,
+    body: &mut Parts<'_>,
     problem: &Problem,
     start: Option<&[DVec3]>,
 ) -> Result<(Vec<DVec3>, Report), ReferenceError> {
@@ -140,7 +151,7 @@ pub(crate) fn minimize(
 
 /// One iteration; `None` if no direction goes downhill.
 fn improve(
-    body: &mut Body,
+    body: &mut Parts<'_>,
     problem: &Problem,
     d: &[DVec3],
     now: &Evaluation,
@@ -162,7 +173,7 @@ fn improve(
 
 /// The first of the whole direction, its half, its quarter and so on that decreases the potential enough.
 fn search(
-    body: &Body,
+    body: &Parts<'_>,
     problem: &Problem,
     d: &[DVec3],
     now: &Evaluation,
@@ -194,13 +205,13 @@ fn search(
     None
 }
 
-fn evaluate(body: &Body, problem: &Problem, d: &[DVec3]) -> Evaluation {
+fn evaluate(body: &Parts<'_>, problem: &Problem, d: &[DVec3]) -> Evaluation {
     let x: Vec<DVec3> = body.positions.iter().zip(d).map(|(x, d)| x + d).collect();
     let (mut energy, mut energy_terms) = (0.0, 0.0);
     let mut gradient = vec![DVec3::ZERO; x.len()];
     // What rounding may leave of the force on each particle.
     let mut noise = vec![0.0; x.len()];
-    for element in &body.elements {
+    for element in body.elements {
         let f = element.deformation(&x);
         let law = &element.law;
         energy += element.volume * law.energy_density(f);
@@ -224,7 +235,7 @@ fn evaluate(body: &Body, problem: &Problem, d: &[DVec3]) -> Evaluation {
         }
     }
     let mut squares = [0.0; 5];
-    for (p, (gradient, &mass)) in gradient.iter_mut().zip(&body.masses).enumerate() {
+    for (p, (gradient, &mass)) in gradient.iter_mut().zip(body.masses).enumerate() {
         let elastic = *gradient;
         let weight = problem.gravity * mass;
         let mut inertia = DVec3::ZERO;
@@ -261,9 +272,9 @@ fn evaluate(body: &Body, problem: &Problem, d: &[DVec3]) -> Evaluation {
 }
 
 /// Fills the matrix with the Hessian, if asked with the eigenvalues of each tet clamped.
-fn assemble(body: &mut Body, problem: &Problem, d: &[DVec3], clamp: bool) {
+fn assemble(body: &mut Parts<'_>, problem: &Problem, d: &[DVec3], clamp: bool) {
     let x: Vec<DVec3> = body.positions.iter().zip(d).map(|(x, d)| x + d).collect();
-    let system = &mut body.system;
+    let system = &mut *body.system;
     system.clear();
     for (p, &held) in problem.held.iter().enumerate() {
         system.add_diagonal(
@@ -275,7 +286,7 @@ fn assemble(body: &mut Body, problem: &Problem, d: &[DVec3], clamp: bool) {
             },
         );
     }
-    for element in &body.elements {
+    for element in body.elements {
         let mut h = element.law.stiffness(element.deformation(&x));
         if clamp {
             clamp_eigenvalues(&mut h, FLOOR * element.law.mu);

@@ -2,10 +2,9 @@
 
 use std::fs;
 use std::process::Command;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
-
-use crate::gpu::measure::today;
 
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub(super) struct Machine {
@@ -48,5 +47,51 @@ impl Machine {
     /// In a line.
     pub(super) fn describe(&self) -> String {
         format!("{}, {}, commit {}", self.processor, self.date, self.commit)
+    }
+}
+
+/// Today in universal time, as year, month and day.
+pub(crate) fn today() -> String {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    let days = since.map_or(0, |since| since.as_secs() / 86_400);
+    let (year, month, day) = date(days);
+    format!("{year}-{month:02}-{day:02}")
+}
+
+/// The date so many days after the first of January 1970.
+fn date(mut days: u64) -> (u64, u64, u64) {
+    let leap = |year: u64| {
+        year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400))
+    };
+    let mut year = 1970;
+    while days >= 365 + u64::from(leap(year)) {
+        days -= 365 + u64::from(leap(year));
+        year += 1;
+    }
+    let february = 28 + u64::from(leap(year));
+    let months = [31, february, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
+    let mut month = 1;
+    for length in months {
+        if days < length {
+            break;
+        }
+        days -= length;
+        month += 1;
+    }
+    (year, month, days + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dates() {
+        assert_eq!(date(0), (1970, 1, 1));
+        // `date -u -d @951782400`, and the days around the turn of a leap year.
+        assert_eq!(date(951_782_400 / 86_400), (2000, 2, 29));
+        assert_eq!(date(19_722), (2023, 12, 31));
+        assert_eq!(date(19_723 + 365), (2024, 12, 31));
+        assert_eq!(date(19_723 + 366), (2025, 1, 1));
     }
 }

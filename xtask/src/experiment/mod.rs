@@ -22,6 +22,7 @@ use serde::{Deserialize, Serialize};
 
 pub(crate) use arguments::{Backend, ExperimentArguments};
 use machine::Machine;
+pub(crate) use machine::today;
 pub(crate) use merge::{MergeArguments, merge};
 pub(crate) use page::{Page, Part, Table};
 pub(crate) use plot::{Axis, Plot, Series, Style};

@@ -2,7 +2,7 @@
 //!
 //! A wait for a device costs more than a small frame, so what is short is repeated before a wait.
 
-use std::time::{Instant, SystemTime, UNIX_EPOCH};
+use std::time::Instant;
 
 use incise::gpu::{GpuContext, GpuError};
 
@@ -56,37 +56,6 @@ pub(crate) fn batch(ms: f64) -> u32 {
         .unwrap_or(MOST)
 }
 
-/// Today in universal time, as year, month and day.
-pub(crate) fn today() -> String {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    let days = since.map_or(0, |since| since.as_secs() / 86_400);
-    let (year, month, day) = date(days);
-    format!("{year}-{month:02}-{day:02}")
-}
-
-/// The date so many days after the first of January 1970.
-fn date(mut days: u64) -> (u64, u64, u64) {
-    let leap = |year: u64| {
-        year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400))
-    };
-    let mut year = 1970;
-    while days >= 365 + u64::from(leap(year)) {
-        days -= 365 + u64::from(leap(year));
-        year += 1;
-    }
-    let february = 28 + u64::from(leap(year));
-    let months = [31, february, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
-    let mut month = 1;
-    for length in months {
-        if days < length {
-            break;
-        }
-        days -= length;
-        month += 1;
-    }
-    (year, month, days + 1)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -112,15 +81,5 @@ mod tests {
     #[test]
     fn short_runs_are_put_together() {
         assert_eq!([1000.0, 50.0, 10.0, 0.0].map(batch), [1, 1, 5, 20]);
-    }
-
-    #[test]
-    fn dates() {
-        assert_eq!(date(0), (1970, 1, 1));
-        // `date -u -d @951782400`, and the days around the turn of a leap year.
-        assert_eq!(date(951_782_400 / 86_400), (2000, 2, 29));
-        assert_eq!(date(19_722), (2023, 12, 31));
-        assert_eq!(date(19_723 + 365), (2024, 12, 31));
-        assert_eq!(date(19_723 + 366), (2025, 1, 1));
     }
 }

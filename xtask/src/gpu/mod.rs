@@ -262,7 +262,7 @@ fn facts(gpu: &GpuContext, date: Option<String>) -> Facts {
     let adapter = gpu.adapter();
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     Facts {
-        date: date.unwrap_or_else(measure::today),
+        date: date.unwrap_or_else(crate::experiment::today),
         command: format!("cargo xtask {}", arguments.join(" ")),
         adapter: adapter.name.clone(),
         driver: adapter.driver.clone(),

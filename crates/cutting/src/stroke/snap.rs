@@ -6,8 +6,9 @@
 
 use incise_mesh::ParticleId;
 
-use super::{AGAIN, Hit, Stroke, longest_around};
+use super::Stroke;
 use crate::CuttableMesh;
+use crate::blade::{AGAIN, Hit};
 use crate::operation::Operation;
 use crate::surface::Tangent;
 
@@ -82,7 +83,7 @@ impl Stroke {
             return false;
         };
         // Level sets note their values, which need not be lengths.
-        let most = self.options.snap * longest_around(cuttable, [particle; 2]);
+        let most = self.options.snap * cuttable.longest_edge_around([particle; 2]);
         let distance = plane.distance(cuttable.mesh.positions[particle.index()]);
         distance.abs() <= (AGAIN * bent).min(most)
     }

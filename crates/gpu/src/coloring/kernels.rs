@@ -6,12 +6,23 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use bytemuck::{Pod, Zeroable};
 use wgpu::{BindGroup, Buffer, BufferUsages};
 
-use super::rounds::PART;
 use crate::array::Array;
 use crate::kernel::{BindingKind, Kernel};
 use crate::{GpuContext, GpuError};
+
+/// `Round` of the shaders.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(crate) struct Round {
+    pub(crate) vertices: u32,
+    pub(crate) parity: u32,
+}
+
+/// How rounds see it.
+const PART: BindingKind = BindingKind::DynamicUniform(size_of::<Round>() as u64);
 
 /// The text of a kernel and how it uses its buffers.
 #[derive(Debug)]

@@ -45,8 +45,9 @@ pub use scgc_incidence::scgc_incidence;
 pub use vivace::vivace;
 pub use wlc::wlc;
 
+pub(crate) use kernels::Round;
 pub(crate) use kernels::SOURCES;
-pub(crate) use rounds::{Round, Work};
+pub(crate) use rounds::Work;
 pub(crate) use scgc::SEARCH_WORDS;
 pub(crate) use scgc_incidence::WAIT_WORDS;
 pub(crate) use vivace::VivaceSettings;

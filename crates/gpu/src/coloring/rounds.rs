@@ -8,9 +8,9 @@ use bytemuck::{Pod, Zeroable};
 use wgpu::{Buffer, BufferUsages};
 
 use super::DeviceColoring;
-use super::kernels::{BoundKernel, ColoringKernels, NEXT};
+use super::kernels::{BoundKernel, ColoringKernels, NEXT, Round};
 use crate::array::Array;
-use crate::kernel::{BindingKind, Recorder, STRIDE};
+use crate::kernel::{Recorder, STRIDE};
 use crate::{GpuContext, GpuError};
 
 /// Rounds per submit.
@@ -18,17 +18,6 @@ const CHUNK: usize = 32;
 
 /// `THREADS` of the shaders.
 pub(super) const THREADS: usize = 64;
-
-/// `Round` of the shaders.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-pub(crate) struct Round {
-    pub(crate) vertices: u32,
-    pub(crate) parity: u32,
-}
-
-/// How rounds see it.
-pub(super) const PART: BindingKind = BindingKind::DynamicUniform(size_of::<Round>() as u64);
 
 /// `Work` of the shaders, up to the lists.
 #[repr(C)]

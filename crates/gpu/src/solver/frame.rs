@@ -16,6 +16,7 @@ use super::kernels::{
 use super::layout::{ClusterMapping, THREADS};
 use super::obstacles::Obstacles;
 use super::scalars;
+use super::shared::Shared;
 use super::stages::{Clock, Stage::*, Track};
 use super::turns::{self, Turns};
 use crate::array::{Array, Copy};
@@ -255,17 +256,6 @@ pub(crate) struct LastSubstep {
     /// Place -> multipliers.
     pub(crate) multipliers: Copy<[f32; 2]>,
     pub(crate) tet_solve: TetSolve,
-}
-
-/// The buffers that what is not a tet may need.
-#[derive(Debug)]
-pub(crate) struct Shared<'a> {
-    pub(crate) settings: &'a Buffer,
-    pub(crate) turns: &'a Buffer,
-    pub(crate) particles: &'a Buffer,
-    pub(crate) previous: &'a Buffer,
-    pub(crate) velocities: &'a Buffer,
-    pub(crate) repaired: &'a Buffer,
 }
 
 /// The kernels of a step, in the order of a substep; those that it does not need are not there.

@@ -12,10 +12,10 @@
 use glam::{DMat3, DVec3, Vec3};
 use incise_xpbd::{AttachmentData, Changes, Solver, StepSettings};
 
-use super::frame::Shared;
 use super::gpu_types::Attachment;
 use super::kernels::{BoundKernel, Kernels, MOVE_HELD, SOLVE_ATTACHMENTS, UPDATE_HELD, Variant};
 use super::layout::THREADS;
+use super::shared::Shared;
 use crate::array::Array;
 use crate::kernel::Recorder;
 use crate::{GpuContext, GpuError};

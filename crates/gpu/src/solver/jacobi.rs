@@ -11,9 +11,9 @@ use incise_xpbd::{Method, StepSettings};
 use wgpu::Buffer;
 
 use super::body::Body;
-use super::frame::Shared;
 use super::kernels::{APPLY_CORRECTIONS, BoundKernel, EXTRAPOLATE_MULTIPLIERS, Kernels, Variant};
 use super::layout::{ClusterMapping, THREADS};
+use super::shared::Shared;
 use crate::array::Array;
 use crate::kernel::Recorder;
 use crate::{GpuContext, GpuError};

@@ -11,9 +11,15 @@ use incise_xpbd::TetSolve;
 use wgpu::{BindGroup, Buffer};
 
 use super::layout::ClusterMapping;
-use super::scalars::Kind;
 use crate::kernel::{BindingKind, Kernel, Recorder};
 use crate::{GpuContext, GpuError};
+
+/// What is constrained.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Distance,
+    Volume,
+}
 
 /// The text of a kernel and how it uses its buffers.
 #[derive(Debug)]

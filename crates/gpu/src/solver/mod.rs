@@ -26,6 +26,7 @@ mod scalars;
 mod seats;
 #[cfg(test)]
 mod shaders;
+mod shared;
 mod stages;
 mod tile;
 mod turns;

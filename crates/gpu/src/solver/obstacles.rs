@@ -6,8 +6,8 @@
 
 use incise_xpbd::{Solver, StepSettings};
 
-use super::frame::Shared;
 use super::kernels::{BoundKernel, Kernels, PROJECT_TO_COLLIDERS, Variant};
+use super::shared::Shared;
 use crate::array::Array;
 use crate::{GpuContext, GpuError};
 

@@ -9,18 +9,11 @@ use incise_xpbd::Solver;
 use wgpu::Buffer;
 
 use super::colors::Colors;
-use super::kernels::{BoundKernel, CLEAR, Kernels, Variant, solve_scalars};
+use super::kernels::{BoundKernel, CLEAR, Kernels, Kind, Variant, solve_scalars};
 use super::layout::THREADS;
 use crate::array::Array;
 use crate::kernel::Recorder;
 use crate::{GpuContext, GpuError};
-
-/// What is constrained.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
-    Distance,
-    Volume,
-}
 
 /// All constraints of a kind.
 #[derive(Debug)]

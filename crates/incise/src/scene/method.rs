@@ -2,8 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::SolverSpec;
-
 /// How a substep is solved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -55,31 +53,4 @@ pub enum TetSolve {
     Block,
     /// One after the other, as in the paper.
     Sequential,
-}
-
-impl SolverSpec {
-    /// The defaults that go with a method: those of [`SolverSpec::default`], but
-    ///
-    /// * Jacobi, Chebyshev and VBD take 20 `iterations`, as one of theirs does little;
-    /// * Jacobi and Chebyshev have a `relaxation` of 0.1: with 1 they overshoot where more than two tets meet;
-    /// * VBD takes one substep, as it is stable at any stiffness.
-    ///
-    /// ```
-    /// let scene = incise::Scene::from_toml("[solver]\nmethod = \"jacobi\"\niterations = 7")?;
-    /// assert_eq!((scene.solver.iterations, scene.solver.relaxation), (7, 0.1));
-    /// # Ok::<(), incise::Error>(())
-    /// ```
-    #[must_use]
-    pub fn of(method: Method) -> Self {
-        let mut spec = Self {
-            method,
-            ..Self::default()
-        };
-        match method {
-            Method::Auto | Method::GaussSeidel => {}
-            Method::Jacobi | Method::Chebyshev => (spec.iterations, spec.relaxation) = (20, 0.1),
-            Method::Vbd => (spec.substeps, spec.iterations) = (1.into(), 20),
-        }
-        spec
-    }
 }

@@ -15,9 +15,9 @@ use std::ops::Range;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::block::{Block, apply, solve};
 use super::coarse::Coarse;
-use super::matrix::{Block, Blocks, PARALLEL_ROWS, apply};
-use super::sweep::solve;
+use super::matrix::{Blocks, PARALLEL_ROWS};
 use crate::Float;
 use crate::float::finite;
 

@@ -24,9 +24,8 @@
 use glam::DVec3;
 use incise_graph::Incidence;
 
+use super::block::{Block, add_isotropic, add_outer, solve};
 use super::corner_term::{OTHERS, rows};
-use super::matrix::{Block, add_isotropic, add_outer};
-use super::sweep::solve;
 use crate::constraints::Distance;
 use crate::constraints::ScalarConstraint;
 use crate::constraints::TetVolume;

@@ -9,15 +9,13 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::VertexStars;
+use super::block::{Block, add_cross, add_isotropic, add_outer, apply};
 use super::hessian::held_excess;
 use crate::float::{load, weight};
 use crate::{Float, Solver};
 
 /// Rows a thread takes at a time.
 pub(super) const PARALLEL_ROWS: usize = 512;
-
-/// A 3×3 matrix by columns.
-pub(super) type Block<R> = [<R as Float>::Vector; 3];
 
 /// A symmetric matrix of blocks with the pattern of a mesh.
 #[derive(Clone, Debug)]
@@ -352,37 +350,6 @@ pub(super) fn row_slices<'a, B>(
         slices.push((start..end, own));
     }
     slices
-}
-
-#[inline]
-pub(super) fn apply<R: Float>(block: &Block<R>, x: R::Vector) -> R::Vector {
-    let [a, b, c] = R::components(x);
-    block[0] * a + block[1] * b + block[2] * c
-}
-
-/// Adds `u vᵀ`.
-#[inline]
-pub(super) fn add_outer<R: Float>(block: &mut Block<R>, u: R::Vector, v: R::Vector) {
-    let v = R::components(v);
-    for k in 0..3 {
-        block[k] += u * v[k];
-    }
-}
-
-#[inline]
-pub(super) fn add_isotropic<R: Float>(block: &mut Block<R>, value: R) {
-    block[0] += R::vector(value, R::ZERO, R::ZERO);
-    block[1] += R::vector(R::ZERO, value, R::ZERO);
-    block[2] += R::vector(R::ZERO, R::ZERO, value);
-}
-
-/// Adds the matrix of `w ×`.
-#[inline]
-fn add_cross<R: Float>(block: &mut Block<R>, w: R::Vector) {
-    let [x, y, z] = R::components(w);
-    block[0] += R::vector(R::ZERO, z, -y);
-    block[1] += R::vector(-z, R::ZERO, x);
-    block[2] += R::vector(y, -x, R::ZERO);
 }
 
 #[cfg(test)]

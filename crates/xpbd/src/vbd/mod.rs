@@ -19,6 +19,7 @@
 //! Source: Chen, Liu, Yang, Yuksel 2024 (vertex block VBD). Cost: see [`VertexStars`] and [`ImplicitStep::sweep`].
 
 mod aggregates;
+mod block;
 mod cholesky;
 mod coarse;
 mod conjugate;

@@ -1,0 +1,47 @@
+//! [`Blade`]: what strokes ask of something that cuts, and [`Hit`]: what they know of an edge that it met.
+
+use glam::DVec3;
+
+use crate::meet::{Meeting, MovingSegment};
+use crate::operation::Crossing;
+use crate::surface::Tangent;
+
+/// A meeting within this fraction of the edge's length from the tangent plane of an end is that same surface again,
+/// bent to its particles; one further away is another sheet of a stroke that came back.
+pub(crate) const SAME_SHEET: f64 = 0.25;
+/// How much further from the surface than before a particle that it was bent to may be and stay on it: rounding between
+/// two runs of the same stroke, and a body that moved a little in between.
+pub(crate) const AGAIN: f64 = 1.01;
+
+/// Something that cuts.
+pub(crate) trait Blade: Sync {
+    /// Whether it comes by bit by bit, so that a particle must be decided before all meetings are known.
+    const COMES_BY: bool;
+
+    /// The first meeting with an edge that `keep` does not refuse, and how many there are.
+    fn first_meeting(
+        &self,
+        edge: &MovingSegment,
+        keep: impl Fn(&Meeting) -> bool,
+    ) -> Option<(Meeting, usize)>;
+
+    /// How often one edge can be met.
+    fn most_meetings(&self) -> usize;
+
+    /// On which side of it a point lies, if it stands and can tell. `reach` is a guess at the distance.
+    fn side(&self, x: DVec3, reach: f64) -> Option<bool>;
+
+    /// Its normal, of any length, at a point that it touches while it stands. `length` is that of the longest edge
+    /// there.
+    fn touches(&self, x: DVec3, length: f64) -> Option<DVec3>;
+}
+
+/// An edge met by the blade, with the surface there.
+pub(crate) struct Hit {
+    pub(crate) crossing: Crossing,
+    pub(crate) tangent: Tangent,
+    /// On which side the ends were seen.
+    pub(crate) sides: [Option<bool>; 2],
+    /// How often it is met.
+    pub(crate) meetings: usize,
+}

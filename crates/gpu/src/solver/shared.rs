@@ -1,0 +1,14 @@
+//! [`Shared`]: buffers of a frame for kernels that do not solve tets.
+
+use wgpu::Buffer;
+
+/// The buffers that what is not a tet may need.
+#[derive(Debug)]
+pub(crate) struct Shared<'a> {
+    pub(crate) settings: &'a Buffer,
+    pub(crate) turns: &'a Buffer,
+    pub(crate) particles: &'a Buffer,
+    pub(crate) previous: &'a Buffer,
+    pub(crate) velocities: &'a Buffer,
+    pub(crate) repaired: &'a Buffer,
+}

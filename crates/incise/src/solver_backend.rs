@@ -1,0 +1,71 @@
+//! [`SolverBackend`]: what the runtime asks of a solver, wherever and however it computes.
+
+use glam::DVec3;
+use incise_graph::Schedule;
+use incise_xpbd::{Energy, Pose, Residuals, StepReport, StepSettings, Volume};
+
+use crate::Error;
+use crate::report::Milliseconds;
+use crate::scene::Quantity;
+
+/// How far the last substep is from a solution of its equations; XPBD knows more than that.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum LastSubstep {
+    Constraints(Residuals),
+    Vbd { force: f64, potential: f64 },
+}
+
+/// Measured quantities of an island's state; `None` for those that were not requested.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Measures {
+    pub(crate) energy: Option<Energy>,
+    pub(crate) volume: Option<Volume>,
+    pub(crate) max_speed: Option<f64>,
+}
+
+/// A solver on the processor in one precision, by XPBD or VBD, or one on a device. Functions that only one of them has a
+/// use for do nothing in the others.
+pub(crate) trait SolverBackend {
+    /// Advances by one frame, keeping what [`SolverBackend::last_substep`] needs if told to.
+    fn step(
+        &mut self,
+        schedule: &Schedule,
+        settings: &StepSettings,
+        keep: bool,
+    ) -> Result<StepReport, Error>;
+
+    /// Brings the layout up to date with the schedule, or sends a device what has changed; the next step would do it
+    /// otherwise. VBD has none.
+    fn lay_out(&mut self, schedule: &Schedule, ms: &mut Milliseconds) -> Result<(), Error>;
+
+    /// Measures the requested quantities of the state; on a device without fetching it.
+    fn state(&mut self, gravity: Option<DVec3>, quantities: &[Quantity])
+    -> Result<Measures, Error>;
+
+    /// The residuals of the last substep, if they were kept.
+    fn last_substep(&self, substep_time: f64) -> Option<LastSubstep>;
+
+    /// Says where a handle is at the end of the next frame.
+    fn move_handle(&mut self, handle: u32, pose: Pose);
+
+    /// Bytes of a copy.
+    fn bytes(&self) -> usize;
+
+    /// The largest speed in m/s, unless the state is on a device.
+    fn host_max_speed(&self) -> Option<f64>;
+
+    /// Updates what VBD keeps after a cut, once tets and volume constraints have been.
+    fn update_vbd(&mut self, ms: &mut Milliseconds) -> Result<(), Error>;
+
+    /// The error that the last frame of two-level VBD left over.
+    fn vbd_error(&self) -> Option<f64>;
+
+    /// Lets go of what only VBD needs.
+    fn end_vbd(&mut self);
+
+    /// Makes the state of a device known here; returns how many particles it had to put back since the last time.
+    fn read_back(&mut self) -> Result<usize, Error>;
+
+    /// Returns how many particles a device had to put back since the last call, as of the last readback or measurement.
+    fn news(&mut self) -> usize;
+}
