@@ -18,10 +18,11 @@ mod summary;
 use std::process::ExitCode;
 
 use args::{Arguments, Command};
-use clap::Parser;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{CommandFactory, Parser};
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let arguments = Arguments::try_parse().unwrap_or_else(|error| with_tip(error).exit());
     let result = match arguments.command {
         None => run::run(&args::RunArguments::default()),
         Some(Command::Run(arguments)) => run::run(&arguments),
@@ -33,4 +34,21 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(),
     }
+}
+
+/// Says where an option belongs that was given without its command.
+fn with_tip(mut error: clap::Error) -> clap::Error {
+    let option = std::env::args().nth(1).unwrap_or_default();
+    let name = option.trim_start_matches("--").split('=').next();
+    let mut all = Arguments::command();
+    let of_run = all.find_subcommand_mut("run").into_iter();
+    let is_of_run = of_run
+        .flat_map(|run| run.get_arguments())
+        .any(|argument| argument.get_long().is_some() && argument.get_long() == name);
+    if error.kind() == ErrorKind::UnknownArgument && option.starts_with("--") && is_of_run {
+        let tip = format!("options of a run follow its command: incise run {option}");
+        let tips = ContextValue::StyledStrs(vec![tip.into()]);
+        error.insert(ContextKind::Suggested, tips);
+    }
+    error
 }

@@ -19,10 +19,12 @@ pub enum RenderError {
         range: String,
     },
     /// A name that means no coloring.
-    #[error("unknown coloring '{given}': known are {known}", known = crate::ColorBy::KNOWN)]
+    #[error("unknown coloring '{given}': known are {known}")]
     UnknownColoring {
         /// What was given.
         given: String,
+        /// The names of all.
+        known: &'static str,
     },
     /// Residuals are to be shown, and none were given.
     #[error("colors by residual need a residual of each tet")]

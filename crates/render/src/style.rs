@@ -72,6 +72,7 @@ impl FromStr for ColorBy {
         let found = Self::ALL.into_iter().find(|by| by.name() == name);
         found.ok_or_else(|| RenderError::UnknownColoring {
             given: name.to_owned(),
+            known: Self::KNOWN,
         })
     }
 }

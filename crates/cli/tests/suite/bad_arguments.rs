@@ -175,3 +175,13 @@ fn arguments_that_do_not_exist() {
         refused(&place, command, parts);
     }
 }
+
+#[test]
+fn an_option_of_a_run_without_its_command() {
+    let place = place();
+    refused(&place, &["--out", "a"], &["incise run --out"]);
+    refused(&place, &["--frames=3"], &["incise run --frames=3"]);
+    for other in [&["--oot", "a"][..], &["mesh", "--out", "a"]] {
+        assert!(!refused(&place, other, &[]).contains("incise run"));
+    }
+}
