@@ -495,8 +495,8 @@ impl Island {
 
     /// Warns when VBD begins to miss the accuracy wanted.
     fn judge_step(&mut self) {
-        let wanted = self.spec.accuracy.filter(|_| self.chose_vbd());
-        let (Some(wanted), Some(error)) = (wanted, self.solver.backend().vbd_error()) else {
+        let error = self.solver.backend().vbd_error();
+        let (Some(wanted), Some(error)) = (self.spec.accuracy, error) else {
             return;
         };
         let misses = error > wanted;

@@ -295,12 +295,6 @@ impl<R: Float> ImplicitStep<'_, R> {
         if let Some(before) = of_parts {
             self.take_back_risen_parts(&before, start.rounding, base);
         }
-        let Solver {
-            particles,
-            constraints,
-            ..
-        } = &*self.solver;
-        constraints.colliders.project(particles);
         // A full step on a quadratic gains half of the slope, and leaves what the iteration left. Where a new matrix
         // misses the gain by a part, the square of that part is left; where that of an earlier state does, at most the
         // part.
@@ -358,7 +352,9 @@ impl<R: Float> ImplicitStep<'_, R> {
         }
     }
 
-    /// Goes from `base`, where the potential is `start`, along a direction on which it falls by `slope` at first.
+    /// Goes from `base`, where the potential is `start`, along a direction on which it falls by `slope` at first, and out of
+    /// colliders: what that adds to the potential counts. Pushed out afterwards, a stiff body that hits the ground had a
+    /// thousand times the energy of its motion.
     fn search(
         &self,
         start: Potential,
@@ -366,6 +362,11 @@ impl<R: Float> ImplicitStep<'_, R> {
         direction: &[R::Vector],
         slope: f64,
     ) -> Search {
+        let Solver {
+            particles,
+            constraints,
+            ..
+        } = &*self.solver;
         let place = |part: f64| {
             let part = R::from_f64(part);
             let mut sound = true;
@@ -373,9 +374,12 @@ impl<R: Float> ImplicitStep<'_, R> {
                 let moved = x + d * part;
                 sound &= finite::<R>(moved);
                 store::<R>(
-                    &self.solver.particles.cells[p as usize],
+                    &particles.cells[p as usize],
                     if finite::<R>(moved) { moved } else { x },
                 );
+            }
+            if part > R::ZERO {
+                constraints.colliders.project(particles);
             }
             sound
         };

@@ -5,7 +5,8 @@ use crate::{StepSettings, XpbdError};
 /// Where the iterations of a substep start. It changes how many are needed, not where they lead.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Guess {
-    /// Where the particles would be if they were free: exact in free fall.
+    /// Where the particles would be if they were free: exact in free fall. In an impact that is inside of a collider, and
+    /// too few iterations leave a stiff body with energy that it did not have.
     #[default]
     Inertia,
     /// Where free particles would be if gravity were what it seemed to be in the last substep, between none of it and
