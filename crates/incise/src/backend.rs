@@ -12,9 +12,9 @@ use incise_mesh::{ParticleId, TetId, TetMesh};
 use incise_xpbd::{KappaLimit, Pose, Real, Solver, StepReport, StepSettings};
 
 use crate::Error;
+use crate::compute_device::ComputeDevice;
 #[cfg(feature = "gpu")]
 use crate::device::Device;
-use crate::place::Place;
 use crate::report::{Milliseconds, milliseconds};
 use crate::scene::{Method, Precision, Quantity, SolverSpec};
 use crate::solver_backend::{LastSubstep, Measures, SolverBackend};
@@ -49,7 +49,7 @@ impl Clone for AnySolver {
             Self::Double(backend) => Self::Double(backend.clone()),
             #[cfg(feature = "gpu")]
             Self::Device(device) => Self::Single(Backend {
-                solver: device.solver.as_last_seen().clone(),
+                solver: device.solver.cached_host().clone(),
                 vbd: None,
             }),
         }
@@ -71,7 +71,7 @@ macro_rules! each {
             }) => $body,
             #[cfg(feature = "gpu")]
             $crate::backend::AnySolver::Device(device) => {
-                let $solver = device.solver.as_last_seen();
+                let $solver = device.solver.cached_host();
                 $body
             }
         }
@@ -176,13 +176,17 @@ impl AnySolver {
         Ok(())
     }
 
-    /// Prepares for the method and the place of the scene, once the tets are what they are.
-    pub(crate) fn prepare(&mut self, spec: &SolverSpec, place: &Place) -> Result<(), Error> {
+    /// Prepares for the method and the device of the scene, once the tets are what they are.
+    pub(crate) fn prepare(
+        &mut self,
+        spec: &SolverSpec,
+        compute_device: &ComputeDevice,
+    ) -> Result<(), Error> {
         #[cfg(feature = "gpu")]
-        if let Some(gpu) = &place.gpu {
+        if let Some(gpu) = &compute_device.gpu {
             return self.take_to(gpu, spec);
         }
-        debug_assert!(!place.is_device(), "a device was prepared");
+        debug_assert!(!compute_device.is_gpu(), "a device was prepared");
         match self {
             Self::Single(backend) => backend.prepare(spec),
             Self::Double(backend) => backend.prepare(spec),
@@ -239,10 +243,14 @@ impl AnySolver {
             && each!(self, solver => (0..solver.tet_count()).any(|t| exceeds(solver, t, limit)))
     }
 
-    /// Whether it is where it should be, in the form that settings ask for there.
-    pub(crate) fn is_at(&self, place: &Place, spec: &SolverSpec) -> Result<bool, Error> {
+    /// Whether it is on a device, in the form that settings ask for there.
+    pub(crate) fn is_on(
+        &self,
+        compute_device: &ComputeDevice,
+        spec: &SolverSpec,
+    ) -> Result<bool, Error> {
         #[cfg(feature = "gpu")]
-        return match (self, &place.gpu) {
+        return match (self, &compute_device.gpu) {
             (Self::Device(device), Some(gpu)) => device.serves(gpu, spec),
             (Self::Device(_), None) | (_, Some(_)) => Ok(false),
             (_, None) => Ok(true),
@@ -250,7 +258,7 @@ impl AnySolver {
         #[cfg(not(feature = "gpu"))]
         {
             let _ = spec;
-            Ok(!place.is_device())
+            Ok(!compute_device.is_gpu())
         }
     }
 
@@ -396,7 +404,7 @@ impl<R: Real> SolverBackend for Backend<R> {
         Ok(0)
     }
 
-    fn news(&mut self) -> usize {
+    fn take_repaired(&mut self) -> usize {
         0
     }
 }

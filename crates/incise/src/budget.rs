@@ -11,10 +11,10 @@ use std::time::Instant;
 use incise_xpbd::StepSettings;
 
 use crate::Error;
+use crate::compute_device::ComputeDevice;
 use crate::island::{Budget, Island, adopt};
 use crate::island_builder::demands;
 use crate::method::{tet_solve, with_vbd};
-use crate::place::Place;
 use crate::report::{Milliseconds, milliseconds};
 use crate::scene::SolverSpec;
 use crate::substeps::{Missed, choose};
@@ -32,7 +32,7 @@ const FRAMES: u32 = 3;
 fn measure(island: &Island, spec: &SolverSpec, settings: &StepSettings) -> Result<f64, Error> {
     let mut solver = island.solver.clone();
     solver.backend_mut().end_vbd();
-    solver.prepare(spec, &Place::default())?;
+    solver.prepare(spec, &ComputeDevice::default())?;
     solver
         .backend_mut()
         .lay_out(&island.partition.schedule, &mut Milliseconds::default())?;
@@ -125,7 +125,7 @@ fn try_vbd(island: &mut Island, spec: &SolverSpec, share: f64) -> Result<(), Err
         return Ok(());
     }
     island.solver.backend_mut().end_vbd();
-    island.solver.prepare(&own, &Place::default())?;
+    island.solver.prepare(&own, &ComputeDevice::default())?;
     island.settings = settings;
     island.choice = Some(chosen);
     island.spec = own;

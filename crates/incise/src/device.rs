@@ -21,8 +21,8 @@ use crate::solver_backend::{LastSubstep, Measures, SolverBackend};
 #[derive(Debug)]
 pub(crate) struct Device {
     pub(crate) solver: GpuSolver,
-    /// Particles put back that were told.
-    told: u32,
+    /// Particles put back that were reported.
+    reported: u32,
 }
 
 impl Device {
@@ -33,7 +33,7 @@ impl Device {
     ) -> Result<Self, Error> {
         Ok(Self {
             solver: GpuSolver::new(Arc::clone(gpu), solver, form(spec)?)?,
-            told: 0,
+            reported: 0,
         })
     }
 
@@ -75,7 +75,7 @@ impl SolverBackend for Device {
     }
 
     fn last_substep(&self, substep_time: f64) -> Option<LastSubstep> {
-        let residuals = self.solver.as_last_seen().residuals(substep_time);
+        let residuals = self.solver.cached_host().residuals(substep_time);
         residuals.map(LastSubstep::Constraints)
     }
 
@@ -84,7 +84,7 @@ impl SolverBackend for Device {
     }
 
     fn bytes(&self) -> usize {
-        self.solver.as_last_seen().bytes()
+        self.solver.cached_host().bytes()
     }
 
     fn host_max_speed(&self) -> Option<f64> {
@@ -103,14 +103,14 @@ impl SolverBackend for Device {
 
     fn read_back(&mut self) -> Result<usize, Error> {
         self.solver.host()?;
-        Ok(self.news())
+        Ok(self.take_repaired())
     }
 
-    fn news(&mut self) -> usize {
+    fn take_repaired(&mut self) -> usize {
         let repaired = self.solver.repaired();
-        let news = repaired.wrapping_sub(self.told) as usize;
-        self.told = repaired;
-        news
+        let fresh = repaired.wrapping_sub(self.reported) as usize;
+        self.reported = repaired;
+        fresh
     }
 }
 

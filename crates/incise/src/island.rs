@@ -17,12 +17,12 @@ use incise_xpbd::{
 use crate::accuracy::{DEFAULT_ACCURACY, OutsideVolume, largest_kappas};
 use crate::attachment::{Attachment, AttachmentHandle};
 use crate::backend::{AnySolver, each, each_mut};
+use crate::compute_device::ComputeDevice;
 use crate::distance::Distances;
 use crate::grab::{Grab, Hand};
 use crate::island_builder::{IslandBuilder, demands, substeps};
 use crate::method::{leaves_open, resolve, tet_solve};
 use crate::partition::Partition;
-use crate::place::Place;
 use crate::recluster::Recluster;
 use crate::report::{Milliseconds, milliseconds};
 use crate::scene::{
@@ -184,7 +184,7 @@ fn accuracy_data<R: Real>(
 impl Island {
     pub(crate) fn new(
         scene: &Scene,
-        place: &Place,
+        compute_device: &ComputeDevice,
         precision: Precision,
         mut settings: StepSettings,
         mut joined: IslandBuilder,
@@ -201,7 +201,7 @@ impl Island {
             &scene.solver,
             &joined.substeps,
             &settings,
-            place.is_device(),
+            compute_device.is_gpu(),
         );
         let (spec, choice) = resolve(&scene.solver, choice, is_open);
         if scene.solver.method == Method::Auto {
@@ -220,7 +220,7 @@ impl Island {
         if let Some(volumes) = &volumes {
             volumes.constrain(&mut solver, &cuttable, &partition.schedule)?;
         }
-        solver.prepare(&spec, place)?;
+        solver.prepare(&spec, compute_device)?;
         let recluster = scene.solver.recluster;
         let size = longest_side(&cuttable.mesh().positions);
         let mut island = Self {

@@ -29,6 +29,7 @@ mod backend;
 mod body;
 mod budget;
 mod collider;
+mod compute_device;
 #[cfg(feature = "gpu")]
 mod device;
 mod distance;
@@ -45,7 +46,6 @@ mod merged_mesh;
 mod method;
 mod partition;
 mod pieces;
-mod place;
 mod ray;
 mod recluster;
 mod region;

@@ -26,6 +26,7 @@ use rayon::prelude::*;
 use crate::body;
 use crate::budget;
 use crate::collider::Colliders;
+use crate::compute_device::{ComputeDevice, OpenDevice};
 use crate::island::Island;
 use crate::island_builder::IslandBuilder;
 use crate::islands::island_of_bodies;
@@ -34,7 +35,6 @@ use crate::measure::{kappa, softened};
 use crate::merged_mesh::MergedMesh;
 use crate::method::settings;
 use crate::pieces::PieceNumbers;
-use crate::place::{AtHand, Place};
 use crate::report::{
     CutReport, DetachedReport, FrameReport, Milliseconds, PieceReport, SoftenedReport, milliseconds,
 };
@@ -80,7 +80,7 @@ pub struct Simulation {
     /// All that changes with time.
     state: State,
     /// The devices that are open, for settings that ask for one.
-    at_hand: AtHand,
+    open_device: OpenDevice,
     /// What the strokes of the last frame changed.
     deltas: Vec<CutDelta>,
     /// What happened in the last frame.
@@ -129,7 +129,7 @@ impl Simulation {
     pub(crate) fn build(
         scene: Scene,
         meshes: &[Option<TetMesh>],
-        place: Place,
+        compute_device: ComputeDevice,
         pool: Option<ThreadPool>,
     ) -> Result<Self, Error> {
         let scene = &scene;
@@ -147,7 +147,9 @@ impl Simulation {
             let make = || {
                 let islands = joined.into_par_iter();
                 islands
-                    .map(|joined| Island::new(scene, &place, precision, settings.clone(), joined))
+                    .map(|joined| {
+                        Island::new(scene, &compute_device, precision, settings.clone(), joined)
+                    })
                     .collect::<Result<Vec<_>, _>>()
             };
             match &pool {
@@ -164,7 +166,7 @@ impl Simulation {
             let mut islands = islands.iter();
             islands.any(|island| island.is_too_short_for_f32() || island.chose_vbd())
         };
-        if scene.solver.precision == Precision::Auto && !place.is_device() && short() {
+        if scene.solver.precision == Precision::Auto && !compute_device.is_gpu() && short() {
             precision = Precision::F64;
             let bodies = body::Body::all(scene, meshes)?;
             islands = make_islands(precision, IslandBuilder::all(scene, bodies, &island_of)?)?;
@@ -188,7 +190,7 @@ impl Simulation {
                 scene: Arc::new(scene.clone()),
                 solver: scene.solver.clone(),
                 precision,
-                place,
+                compute_device,
                 clock: Clock::new(settings.time_step),
                 gravity: settings.gravity,
                 colliders: Colliders::new(scene),
@@ -203,7 +205,7 @@ impl Simulation {
                 report: FrameReport::default(),
                 residuals_kept: false,
             },
-            at_hand: AtHand::default(),
+            open_device: OpenDevice::default(),
             deltas: Vec::new(),
             events: Vec::new(),
             pool,
@@ -266,7 +268,7 @@ impl Simulation {
         let mut ms = Milliseconds::default();
         let mut detached = Vec::new();
         let mut repaired = 0;
-        if self.state.place.is_device() && self.state.changes_meshes() {
+        if self.state.compute_device.is_gpu() && self.state.changes_meshes() {
             repaired += self.fetch(&mut ms)?;
         }
         let cut = self.carry_out_strokes(&mut detached, &mut ms)?;
@@ -314,7 +316,7 @@ impl Simulation {
         self.state.residuals_kept = residual;
 
         // A device measures what it has; residuals need positions and multipliers of all.
-        if !self.state.place.is_device() || residual {
+        if !self.state.compute_device.is_gpu() || residual {
             repaired += self.fetch(&mut ms)?;
         }
         self.state.report = FrameReport {

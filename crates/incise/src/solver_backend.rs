@@ -67,5 +67,5 @@ pub(crate) trait SolverBackend {
     fn read_back(&mut self) -> Result<usize, Error>;
 
     /// Returns how many particles a device had to put back since the last call, as of the last readback or measurement.
-    fn news(&mut self) -> usize;
+    fn take_repaired(&mut self) -> usize;
 }

@@ -82,7 +82,7 @@ fn on_device(extreme: &Extreme, column: Column, gpu: &Arc<GpuContext>) -> anyhow
         body.host()?;
         let repaired = (body.repaired() - before) as usize;
         before = body.repaired();
-        if !watch.look(body.as_last_seen(), repaired) {
+        if !watch.look(body.cached_host(), repaired) {
             break;
         }
     }

@@ -91,7 +91,7 @@ impl Body {
         }
         let patch = self.layout.follow(schedule, solver, changes)?;
         if patch.regrouped {
-            self.colors.follow(gpu, self.layout.seats.groups())?;
+            self.colors.follow(gpu, self.layout.slots.groups())?;
         }
         let various = !solver.is_uniform();
         let places = self.layout.place_count();
@@ -105,7 +105,7 @@ impl Body {
             self.constants.resize(gpu, places)?;
         }
         if self.layout.form == ClusterMapping::Workgroups {
-            let tiles = self.layout.seats.seat_count();
+            let tiles = self.layout.slots.slot_count();
             let room = self.layout.depth();
             let numbers_of_tile = number_count(room);
             self.tiles.resize(gpu, tiles * numbers_of_tile)?;

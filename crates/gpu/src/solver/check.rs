@@ -149,11 +149,11 @@ impl GpuSolver {
         if self.form() == ClusterMapping::Threads {
             return Ok(());
         }
-        let seats = &self.body.layout.seats;
+        let slots = &self.body.layout.slots;
         let room = self.body.layout.depth();
-        for tile in 0..seats.seat_count() {
+        for tile in 0..slots.slot_count() {
             // What is said of a tile without cluster is old.
-            if u32::try_from(tile).is_ok_and(|seat| seats.cluster(seat).is_none()) {
+            if u32::try_from(tile).is_ok_and(|slot| slots.cluster(slot).is_none()) {
                 continue;
             }
             let (steps, ends) = steps(tile, room, copy);

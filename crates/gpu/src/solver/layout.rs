@@ -3,7 +3,7 @@
 //! Two forms of the same schedule. [`ClusterMapping::Threads`] is the paper's: a thread solves a cluster, tet after tet, 64
 //! clusters of a color a workgroup. [`ClusterMapping::Workgroups`] takes clusters of up to 128 tets: a workgroup solves one, with
 //! its particles in workgroup memory and its tets in steps that share no particle, so that a small body needs few colors
-//! and thus few dispatches. Either way a cluster has a seat (`seats.rs`) and its tets the places of that seat.
+//! and thus few dispatches. Either way a cluster has a slot (`slots.rs`) and its tets the places of that slot.
 //!
 //! Cost: O(tets of changed clusters and changed tets), O(tets) for another schedule or other masses.
 
@@ -11,7 +11,7 @@ use incise_graph::{ClusterId, Schedule};
 use incise_xpbd::{Changes, Solver};
 
 use super::gpu_types::TetPatch;
-use super::seats::{Moved, Seats};
+use super::slots::{Moved, Slots};
 use super::tile::{self, Tile};
 use crate::GpuError;
 
@@ -51,10 +51,10 @@ impl ClusterMapping {
 #[derive(Debug)]
 pub(crate) struct Layout {
     pub(crate) form: ClusterMapping,
-    /// Tets that a seat has places for.
+    /// Tets that a slot has places for.
     depth: usize,
-    pub(crate) seats: Seats,
-    /// Seat -> tets in it.
+    pub(crate) slots: Slots,
+    /// Slot -> tets in it.
     filled: Vec<u32>,
     /// Tet -> place.
     places: Vec<u32>,
@@ -84,7 +84,7 @@ impl Layout {
         Self {
             form,
             depth: 1,
-            seats: Seats::new(width),
+            slots: Slots::new(width),
             filled: Vec::new(),
             places: Vec::new(),
             tets: Vec::new(),
@@ -93,7 +93,7 @@ impl Layout {
 
     /// Places on the device.
     pub(crate) fn place_count(&self) -> usize {
-        self.seats.seat_count() * self.depth
+        self.slots.slot_count() * self.depth
     }
 
     /// Tets that the schedule solves.
@@ -127,14 +127,14 @@ impl Layout {
         self.tets[place]
     }
 
-    /// Where the `k`-th tet of a seat is.
-    fn place_of(&self, seat: u32, k: usize) -> usize {
-        let seat = seat as usize;
+    /// Where the `k`-th tet of a slot is.
+    fn place_of(&self, slot: u32, k: usize) -> usize {
+        let slot = slot as usize;
         match self.form {
             ClusterMapping::Threads => {
-                ((seat / THREADS) * self.depth + k) * THREADS + seat % THREADS
+                ((slot / THREADS) * self.depth + k) * THREADS + slot % THREADS
             }
-            ClusterMapping::Workgroups => seat * self.depth + k,
+            ClusterMapping::Workgroups => slot * self.depth + k,
         }
     }
 
@@ -149,53 +149,53 @@ impl Layout {
         changes: &Changes,
     ) -> Result<Patch, GpuError> {
         if changes.all_tets {
-            self.seats.forget();
+            self.slots.forget();
         }
         let mut patch = Patch::default();
-        let mut moved = self.seats.follow(schedule);
-        if let Moved::Seats(seats) = &moved
-            && self.largest(seats, schedule)? > self.depth
+        let mut moved = self.slots.sync(schedule);
+        if let Moved::Slots(slots) = &moved
+            && self.largest(slots, schedule)? > self.depth
         {
-            self.seats.forget();
-            moved = self.seats.follow(schedule);
+            self.slots.forget();
+            moved = self.slots.sync(schedule);
         }
-        let seats = match moved {
+        let slots = match moved {
             Moved::All => {
                 patch.is_rebuilt = true;
-                let seats: Vec<u32> = (0..index(self.seats.seat_count())).collect();
-                let largest = self.largest(&seats, schedule)?;
+                let slots: Vec<u32> = (0..index(self.slots.slot_count())).collect();
+                let largest = self.largest(&slots, schedule)?;
                 self.depth = match self.form {
                     ClusterMapping::Threads => largest.max(1),
                     ClusterMapping::Workgroups => tile::room_for(largest),
                 };
                 self.filled.clear();
                 self.places.clear();
-                seats
+                slots
             }
-            Moved::Seats(seats) => self.with_changed(seats, changes, solver, &mut patch),
+            Moved::Slots(slots) => self.with_changed(slots, changes, solver, &mut patch),
         };
-        patch.regrouped = patch.is_rebuilt || !seats.is_empty();
-        self.filled.resize(self.seats.seat_count(), 0);
+        patch.regrouped = patch.is_rebuilt || !slots.is_empty();
+        self.filled.resize(self.slots.slot_count(), 0);
         self.tets.resize(self.place_count(), NONE);
         self.places
             .resize(solver.tet_count().max(self.places.len()), NONE);
-        // All seats are emptied before any is filled: a tet may have changed its seat.
-        for &seat in &seats {
-            self.empty(seat);
+        // All slots are emptied before any is filled: a tet may have changed its slot.
+        for &slot in &slots {
+            self.empty(slot);
         }
-        for &seat in &seats {
-            self.fill(seat, schedule, solver, &mut patch);
+        for &slot in &slots {
+            self.fill(slot, schedule, solver, &mut patch);
         }
         Ok(patch)
     }
 
-    /// The tets of the largest cluster in these seats.
-    fn largest(&mut self, seats: &[u32], schedule: &Schedule) -> Result<usize, GpuError> {
-        let clusters = seats.iter().filter_map(|&seat| self.seats.cluster(seat));
+    /// The tets of the largest cluster in these slots.
+    fn largest(&mut self, slots: &[u32], schedule: &Schedule) -> Result<usize, GpuError> {
+        let clusters = slots.iter().filter_map(|&slot| self.slots.cluster(slot));
         let sized = clusters.map(|cluster| (schedule.constraints(cluster).len(), cluster));
         let (tets, cluster) = sized.max().unwrap_or((0, ClusterId(0)));
         if self.form == ClusterMapping::Workgroups && tets > tile::LARGEST {
-            self.seats.forget();
+            self.slots.forget();
             return Err(GpuError::Block {
                 cluster: cluster.0,
                 tets,
@@ -208,7 +208,7 @@ impl Layout {
     /// Patches changed tets in their places; a tile with one is rebuilt.
     fn with_changed(
         &mut self,
-        mut seats: Vec<u32>,
+        mut slots: Vec<u32>,
         changes: &Changes,
         solver: &Solver<f32>,
         patch: &mut Patch,
@@ -216,35 +216,35 @@ impl Layout {
         let mut changed = changes.tets.clone();
         changed.sort_unstable();
         changed.dedup();
-        let known = seats.len();
+        let known = slots.len();
         for tet in changed {
             let Some(place) = self.place(tet as usize) else {
                 continue;
             };
-            let seat = index(match self.form {
+            let slot = index(match self.form {
                 ClusterMapping::Threads => {
                     place / (self.depth * THREADS) * THREADS + place % THREADS
                 }
                 ClusterMapping::Workgroups => place / self.depth,
             });
-            if seats[..known].binary_search(&seat).is_ok() {
+            if slots[..known].binary_search(&slot).is_ok() {
                 continue;
             }
             match self.form {
-                // One that is gone is in no schedule, so its seat is among those.
+                // One that is gone is in no schedule, so its slot is among those.
                 ClusterMapping::Threads => patch.tets.push(filled_in(place, tet, solver)),
-                ClusterMapping::Workgroups => seats.push(seat),
+                ClusterMapping::Workgroups => slots.push(slot),
             }
         }
-        seats.sort_unstable();
-        seats.dedup();
-        seats
+        slots.sort_unstable();
+        slots.dedup();
+        slots
     }
 
-    /// Forgets where the tets of a seat were.
-    fn empty(&mut self, seat: u32) {
-        for k in 0..self.filled[seat as usize] as usize {
-            let place = self.place_of(seat, k);
+    /// Forgets where the tets of a slot were.
+    fn empty(&mut self, slot: u32) {
+        for k in 0..self.filled[slot as usize] as usize {
+            let place = self.place_of(slot, k);
             let tet = &mut self.places[self.tets[place] as usize];
             if *tet == index(place) {
                 *tet = NONE;
@@ -257,14 +257,14 @@ impl Layout {
         self.tets[place] = tet;
     }
 
-    /// Fills a seat with the tets of its cluster, and clears the places behind them that had one.
-    fn fill(&mut self, seat: u32, schedule: &Schedule, solver: &Solver<f32>, patch: &mut Patch) {
-        let cluster = self.seats.cluster(seat);
+    /// Fills a slot with the tets of its cluster, and clears the places behind them that had one.
+    fn fill(&mut self, slot: u32, schedule: &Schedule, solver: &Solver<f32>, patch: &mut Patch) {
+        let cluster = self.slots.cluster(slot);
         let tets = cluster.map_or(&[][..], |cluster| schedule.constraints(cluster));
         match self.form {
             ClusterMapping::Threads => {
                 for (k, &tet) in tets.iter().enumerate() {
-                    let place = self.place_of(seat, k);
+                    let place = self.place_of(slot, k);
                     self.put(tet, place);
                     patch.tets.push(filled_in(place, tet, solver));
                 }
@@ -273,21 +273,21 @@ impl Layout {
             ClusterMapping::Workgroups => {
                 let tile = Tile::new(tets, |tet| solver.tet_particles(tet as usize));
                 for (k, (tet, corners)) in tile.tets().enumerate() {
-                    let place = self.place_of(seat, k);
+                    let place = self.place_of(slot, k);
                     self.put(tet, place);
                     let filled = filled_in(place, tet, solver);
                     patch.tets.push(TetPatch { corners, ..filled });
                 }
-                patch.tiles.push((seat, tile));
+                patch.tiles.push((slot, tile));
             }
         }
-        for k in tets.len()..self.filled[seat as usize] as usize {
+        for k in tets.len()..self.filled[slot as usize] as usize {
             patch.tets.push(TetPatch {
-                place: index(self.place_of(seat, k)),
+                place: index(self.place_of(slot, k)),
                 ..TetPatch::default()
             });
         }
-        self.filled[seat as usize] = index(tets.len());
+        self.filled[slot as usize] = index(tets.len());
     }
 }
 

@@ -23,10 +23,10 @@ mod layout;
 mod measure;
 mod obstacles;
 mod scalars;
-mod seats;
 #[cfg(test)]
 mod shaders;
 mod shared;
+mod slots;
 mod stages;
 mod tile;
 mod turns;
@@ -292,7 +292,7 @@ impl GpuSolver {
     /// The solver as the host last saw it: topology, masses and materials are those of now, the state is an old one
     /// unless [`GpuSolver::host`] was called since the last step.
     #[must_use]
-    pub fn as_last_seen(&self) -> &Solver<f32> {
+    pub fn cached_host(&self) -> &Solver<f32> {
         &self.host
     }
 

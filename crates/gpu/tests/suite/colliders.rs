@@ -46,7 +46,7 @@ fn throw(test: &str, colliders: &[Collider]) {
         let hit = crate::solver::distance(&twins.host, &alone);
         assert!(hit > 1e-2, "{test}: no collider was touched");
         for p in 0..twins.host.particle_count() {
-            let x = twins.device.as_last_seen().position(p);
+            let x = twins.device.cached_host().position(p);
             for collider in &settings.colliders {
                 // In single precision on a surface.
                 assert!(

@@ -301,7 +301,7 @@ fn a_body_that_moves_on_gets_a_new_origin() {
         assert!(far < 1e-5, "frame {frame}: {far}");
     }
     twins.step(&settings);
-    assert_eq!(twins.device.as_last_seen().origin(), twins.host.origin());
+    assert_eq!(twins.device.cached_host().origin(), twins.host.origin());
     assert!(twins.host.origin().distance(start) > 1.0);
 }
 

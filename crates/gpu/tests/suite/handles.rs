@@ -65,7 +65,7 @@ fn turn(test: &str, settings: &StepSettings) {
         // Ten frames of rounding in another order.
         let far = twins.apart();
         assert!(far < 1e-5, "{test}, {form:?}: {far}");
-        let device = twins.device.as_last_seen();
+        let device = twins.device.cached_host();
         assert!(!held.is_empty() && !fixed.is_empty());
         let mut fastest = 0.0;
         for (&p, place) in held.iter().zip(places) {
@@ -119,7 +119,7 @@ fn held_particles_can_be_fixed_and_let_go() {
         twins.step(&settings());
         // A few frames of rounding in another order.
         assert!(twins.apart() < 1e-5, "frame {frame}");
-        let now = twins.device.as_last_seen().position(held);
+        let now = twins.device.cached_host().position(held);
         assert_eq!(now == last, fixed, "frame {frame}");
         last = now;
     }

@@ -210,7 +210,7 @@ fn the_host_measures_what_the_device_cannot() {
     let before = device.gpu().traffic();
     let measures = device.measure(Some(GRAVITY)).unwrap();
     assert_eq!(device.gpu().traffic().since(before).readbacks, 0);
-    assert_eq!(measures, of_host(device.as_last_seen()));
+    assert_eq!(measures, of_host(device.cached_host()));
     // Of a schedule for the first two tets, the others are in no place.
     let two = Coloring::new(vec![ColorId(0), ColorId(1)]);
     let part = Schedule::new(&Clustering::none(2), &two);

@@ -12,9 +12,9 @@ use incise_mesh::TetMesh;
 
 use crate::attachment::AttachmentHandle;
 use crate::collider::ColliderHandle;
+use crate::compute_device::{ComputeDevice, OpenDevice};
 use crate::distance::DistanceHandle;
 use crate::limits::value;
-use crate::place::{AtHand, Place};
 use crate::scene::{
     AttachmentSpec, BodySpec, ColliderSpec, DistanceSpec, GroundSpec, MaterialSpec, Region,
     ReportSpec, SolverSpec, StrokeSpec,
@@ -155,7 +155,7 @@ pub struct SimulationBuilder {
     /// For each body of the scene its mesh, unless the scene names a file or a shape.
     meshes: Vec<Option<TetMesh>>,
     threads: Option<usize>,
-    device: AtHand,
+    device: OpenDevice,
 }
 
 impl SimulationBuilder {
@@ -255,8 +255,8 @@ impl SimulationBuilder {
             None => scene,
         };
         let pool = self.threads.map(thread_pool).transpose()?;
-        let place = Place::choose(&scene, &self.device)?;
-        Simulation::build(scene, &self.meshes, place, pool)
+        let compute_device = ComputeDevice::choose(&scene, &self.device)?;
+        Simulation::build(scene, &self.meshes, compute_device, pool)
     }
 }
 

@@ -353,7 +353,15 @@ impl Simulation {
             colliders: state.islands[0].settings.colliders.clone(),
             ..settings(&present)?
         };
-        let make = || Island::new(&present, &state.place, state.precision, settings, joined);
+        let make = || {
+            Island::new(
+                &present,
+                &state.compute_device,
+                state.precision,
+                settings,
+                joined,
+            )
+        };
         let island = match &self.pool {
             Some(pool) => pool.install(make),
             None => make(),

@@ -36,10 +36,10 @@ impl Simulation {
             self.state.gravity,
             &self.state.reporting.quantities,
         )?;
-        if self.state.place.is_device() {
+        if self.state.compute_device.is_gpu() {
             let islands = self.state.islands.iter_mut();
             self.state.report.repaired += islands
-                .map(|island| island.solver.backend_mut().news())
+                .map(|island| island.solver.backend_mut().take_repaired())
                 .sum::<usize>();
             ms.readback += milliseconds(start.elapsed());
         }
@@ -99,7 +99,7 @@ impl Simulation {
             .iter()
             .map(|island| island.pieces.count())
             .sum();
-        report.backend = self.state.place.name();
+        report.backend = self.state.compute_device.name();
         report.precision = self.state.precision.name();
     }
 
@@ -110,7 +110,7 @@ impl Simulation {
         for island in &mut self.state.islands {
             repaired += island.solver.backend_mut().read_back()?;
         }
-        if self.state.place.is_device() {
+        if self.state.compute_device.is_gpu() {
             ms.readback += milliseconds(start.elapsed());
         }
         self.collect_positions();
@@ -126,7 +126,7 @@ impl Simulation {
     /// # Errors
     /// If the device is lost.
     pub fn read_back(&mut self) -> Result<(), Error> {
-        if self.state.place.is_device() {
+        if self.state.compute_device.is_gpu() {
             self.state.report.repaired += self.fetch(&mut Milliseconds::default())?;
         }
         Ok(())
@@ -136,7 +136,7 @@ impl Simulation {
     /// the processor.
     #[must_use]
     pub fn backend_note(&self) -> Option<&str> {
-        self.state.place.note.as_deref()
+        self.state.compute_device.note.as_deref()
     }
 
     /// The duration of a frame in s.

@@ -1,12 +1,12 @@
 //! [`Simulation::retune`]: other settings of the solver for a simulation that runs.
 //!
 //! Mesh, cuts, positions, velocities, pieces, handles, obstacles and strokes stay as they are. From the settings follow
-//! substeps, softened tets, partitions, what VBD needs and the place: what differs is rebuilt from the body as it is
+//! substeps, softened tets, partitions, what VBD needs and the device: what differs is rebuilt from the body as it is
 //! now, as a new simulation would make it from such a body, and what does not differ is not touched. Everything that can
 //! fail is made first, beside what is there; only then it takes its place.
 //!
 //! Cost: nothing for iterations, relaxation, form and the methods of XPBD; a pass over the tets for the time of a substep
-//! and the limit of kappa; clustering and coloring for those; a copy of the solvers for VBD and for another place.
+//! and the limit of kappa; clustering and coloring for those; a copy of the solvers for VBD and for another device.
 
 use rayon::prelude::*;
 
@@ -15,12 +15,12 @@ use incise_xpbd::{KappaLimit, StepSettings};
 use super::Simulation;
 use crate::backend::AnySolver;
 use crate::budget;
+use crate::compute_device::ComputeDevice;
 use crate::island::{Island, adopt, kappa_limit};
 use crate::island_builder::substeps;
 use crate::limits::value;
 use crate::method::{leaves_open, resolve, settings};
 use crate::partition::{Partition, PartitionSettings};
-use crate::place::Place;
 use crate::recluster::Recluster;
 use crate::scene::{Method, Precision, ReportSpec, SolverSpec, Substeps};
 use crate::sleep::Rest;
@@ -114,14 +114,22 @@ impl Simulation {
         };
         let settings = settings(&scene)?;
         crate::scene::check(&scene)?;
-        let place = self.place_for(&scene)?;
+        let compute_device = self.compute_device_for(&scene)?;
         if !is_light(&self.state.solver, solver) {
             self.read_back()?;
         }
         let retuned = || {
             let islands = self.state.islands.par_iter();
             islands
-                .map(|island| Retuned::of(island, &self.state.solver, &scene, &settings, &place))
+                .map(|island| {
+                    Retuned::of(
+                        island,
+                        &self.state.solver,
+                        &scene,
+                        &settings,
+                        &compute_device,
+                    )
+                })
                 .collect::<Result<Vec<_>, Error>>()
         };
         let retuned = match &self.pool {
@@ -143,7 +151,7 @@ impl Simulation {
         }
         self.state.clock.set_time_step(settings.time_step);
         self.leave_device();
-        self.state.place = place;
+        self.state.compute_device = compute_device;
         self.state.solver = solver.clone();
         self.state.residuals_kept = false;
         if self.state.clock.next_frame == 0 {
@@ -179,25 +187,27 @@ impl Simulation {
     /// ```
     #[cfg(feature = "gpu")]
     pub fn offer_device(&mut self, gpu: std::sync::Arc<crate::gpu::GpuContext>) {
-        self.at_hand.gpu = Some(gpu);
+        self.open_device.gpu = Some(gpu);
     }
 
     /// Where the scene with other settings is computed.
-    fn place_for(&self, scene: &Scene) -> Result<Place, Error> {
+    fn compute_device_for(&self, scene: &Scene) -> Result<ComputeDevice, Error> {
         let (before, after) = (&self.state.solver, &scene.solver);
         if (before.backend, before.method, &before.clustering)
             == (after.backend, after.method, &after.clustering)
         {
-            return Ok(self.state.place.clone());
+            return Ok(self.state.compute_device.clone());
         }
-        Place::choose(scene, &self.state.place.or(&self.at_hand))
+        ComputeDevice::choose(scene, &self.state.compute_device.or(&self.open_device))
     }
 
     /// Keeps the present device at hand, unless another one is.
     pub(super) fn leave_device(&mut self) {
         #[cfg(feature = "gpu")]
-        if self.at_hand.gpu.is_none() {
-            self.at_hand.gpu.clone_from(&self.state.place.gpu);
+        if self.open_device.gpu.is_none() {
+            self.open_device
+                .gpu
+                .clone_from(&self.state.compute_device.gpu);
         }
     }
 }
@@ -231,7 +241,7 @@ impl Retuned {
         before: &SolverSpec,
         scene: &Scene,
         settings: &StepSettings,
-        place: &Place,
+        compute_device: &ComputeDevice,
     ) -> Result<Self, Error> {
         let after = &scene.solver;
         let mesh = island.cuttable.mesh();
@@ -247,7 +257,7 @@ impl Retuned {
         if chosen_anew {
             (settings.substeps, choice) = substeps(&asked, after, &island.solver, mesh);
         }
-        let is_open = leaves_open(after, &asked, &settings, place.is_device());
+        let is_open = leaves_open(after, &asked, &settings, compute_device.is_gpu());
         let (own, choice) = match after.method {
             Method::Auto if chosen_anew => resolve(after, choice, is_open),
             // What was chosen stays, with everything else that differs.
@@ -290,11 +300,11 @@ impl Retuned {
             .then(|| Partition::of(PartitionSettings::new(after)?, mesh))
             .transpose()?;
         let mut solver = None;
-        if Self::needs_another_solver(island, before, after, limits, place)? {
+        if Self::needs_another_solver(island, before, after, limits, compute_device)? {
             let mut copy = island.solver.clone();
             copy.limit_kappa(limits[0], limits[1], mesh)?;
             copy.backend_mut().end_vbd();
-            copy.prepare(after, place)?;
+            copy.prepare(after, compute_device)?;
             solver = Some(copy);
         }
         Ok(Self {
@@ -309,15 +319,15 @@ impl Retuned {
         })
     }
 
-    /// Whether the solver is in the wrong place or form, or knows not, or wrongly, what VBD has to.
+    /// Whether the solver is on the wrong device or in the wrong form, or does not match what VBD needs.
     fn needs_another_solver(
         island: &Island,
         before: &SolverSpec,
         after: &SolverSpec,
         limits: [Option<KappaLimit>; 2],
-        place: &Place,
+        compute_device: &ComputeDevice,
     ) -> Result<bool, Error> {
-        if !island.solver.is_at(place, after)? {
+        if !island.solver.is_on(compute_device, after)? {
             return Ok(true);
         }
         let prepared = |spec: &SolverSpec| {

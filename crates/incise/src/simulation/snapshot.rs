@@ -14,10 +14,10 @@ use std::sync::Arc;
 
 use super::Simulation;
 use super::state::State;
+use crate::compute_device::{ComputeDevice, OpenDevice};
 use crate::island::Island;
 use crate::limits::value;
 use crate::merged_mesh::MergedMesh;
-use crate::place::{AtHand, Place};
 use crate::recluster::Recluster;
 use crate::report::FrameReport;
 use crate::scene::ReportSpec;
@@ -173,7 +173,7 @@ impl Simulation {
         self.read_back()?;
         let mut state = snapshot.0.clone();
         #[cfg(feature = "gpu")]
-        if let Some(gpu) = state.place.gpu.clone() {
+        if let Some(gpu) = state.compute_device.gpu.clone() {
             let islands = std::mem::take(&mut state.islands);
             state.islands = take_over(&mut self.state.islands, islands, &gpu, &state.solver)?;
         }
@@ -218,21 +218,21 @@ impl Simulation {
     pub fn from_snapshot(snapshot: &Snapshot) -> Result<Self, Error> {
         let mut state = snapshot.0.clone();
         // Every other choice leaves a note.
-        if !state.place.is_device() && state.place.note.is_none() {
+        if !state.compute_device.is_gpu() && state.compute_device.note.is_none() {
             let scene = Scene {
                 solver: state.solver.clone(),
                 ..Scene::clone(&state.scene)
             };
-            state.place = Place::choose(&scene, &AtHand::default())?;
+            state.compute_device = ComputeDevice::choose(&scene, &OpenDevice::default())?;
         }
         #[cfg(feature = "gpu")]
-        if let Some(gpu) = state.place.gpu.clone() {
+        if let Some(gpu) = state.compute_device.gpu.clone() {
             let islands = std::mem::take(&mut state.islands);
             state.islands = take_over(&mut [], islands, &gpu, &state.solver)?;
         }
         let mut simulation = Self {
             state,
-            at_hand: AtHand::default(),
+            open_device: OpenDevice::default(),
             deltas: Vec::new(),
             events: Vec::new(),
             pool: None,

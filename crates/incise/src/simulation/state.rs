@@ -12,11 +12,11 @@ use incise_cutting::{BoundaryTriangle, CutDelta, FaceTag};
 
 use crate::attachment::AttachmentHandle;
 use crate::collider::Colliders;
+use crate::compute_device::ComputeDevice;
 use crate::distance::DistanceHandle;
 use crate::island::Island;
 use crate::merged_mesh::MergedMesh;
 use crate::pieces::PieceNumbers;
-use crate::place::Place;
 use crate::report::{CutReport, DetachedReport, FrameReport, Milliseconds, milliseconds};
 use crate::scene::{Precision, ReportSpec, SolverSpec};
 use crate::strokes::Timeline;
@@ -34,7 +34,7 @@ pub(super) struct State {
     pub(super) solver: SolverSpec,
     pub(super) precision: Precision,
     #[cfg_attr(feature = "save", serde(skip))]
-    pub(super) place: Place,
+    pub(super) compute_device: ComputeDevice,
     pub(super) clock: Clock,
     pub(super) gravity: Option<DVec3>,
     /// The names of the colliders in the settings of all islands.

@@ -18,7 +18,7 @@ fn boxes(more: &str) -> Scene {
 
 fn handles(simulation: &Simulation) -> Vec<usize> {
     let solvers = simulation.device_solvers();
-    let hosts = solvers.map(|solver| solver.as_last_seen().handle_poses(0.0).len());
+    let hosts = solvers.map(|solver| solver.cached_host().handle_poses(0.0).len());
     hosts.collect()
 }
 
@@ -132,6 +132,6 @@ fn a_live_blade_does_the_same_as_a_sweep() {
     let solvers: Vec<_> = live.device_solvers().collect();
     for (p, x) in live.positions().iter().enumerate() {
         let (island, number) = live.place_of(ParticleId::new(p));
-        assert_eq!(solvers[island].as_last_seen().position(number), *x);
+        assert_eq!(solvers[island].cached_host().position(number), *x);
     }
 }

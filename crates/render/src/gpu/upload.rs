@@ -154,7 +154,7 @@ impl Upload {
         let mut particles = 0;
         for solver in solvers {
             first.push(particles);
-            particles += count(solver.as_last_seen().particle_count());
+            particles += count(solver.cached_host().particle_count());
         }
         let vertex = |vertex: &SkinVertex| {
             let outer = vertex.tag == FaceTag::Outer;
@@ -193,12 +193,12 @@ impl Upload {
             self.parts.replace(gpu, &[part(origin)])?;
             return Ok(());
         }
-        let origins = solvers.iter().map(|solver| solver.as_last_seen().origin());
+        let origins = solvers.iter().map(|solver| solver.cached_host().origin());
         let parts: Vec<_> = origins.map(part).collect();
         self.parts.replace(gpu, &parts)?;
         if solvers.len() > 1 {
             let particles = solvers.iter();
-            let particles = particles.map(|solver| solver.as_last_seen().particle_count());
+            let particles = particles.map(|solver| solver.cached_host().particle_count());
             self.positions.resize(gpu, particles.sum())?;
         }
         Ok(())
@@ -241,7 +241,7 @@ pub(super) fn solvers_here<'s>(
 
 /// Bytes of the positions of all its particles.
 fn bytes_of(solver: &GpuSolver) -> u64 {
-    (solver.as_last_seen().particle_count() * size_of::<[f32; 4]>()) as u64
+    (solver.cached_host().particle_count() * size_of::<[f32; 4]>()) as u64
 }
 
 fn view_numbers(view: &View, flags: u32) -> ViewNumbers {

@@ -1,26 +1,25 @@
-//! [`Seats`]: which cluster is where on the device.
+//! [`Slots`]: which cluster is where on the device.
 //!
-//! A group of lanes is what a workgroup solves, and a slot of it a seat: a cluster has one as long as it has tets, and keeps
-//! it while its color stays. Cost: O(changed clusters times groups of their colors / 64) for an update, O(clusters) to
-//! make.
+//! A workgroup solves a group of lanes. A cluster has a slot as long as it has tets, and keeps it while its color stays.
+//! Cost: O(changed clusters times groups of their colors / 64) for an update, O(clusters) to make.
 
 use incise_graph::{ClusterId, Lanes, Rows, Schedule};
 
 /// No cluster.
 const NONE: u32 = u32::MAX;
 
-/// Groups of a color that may be empty beside half of all seats before all clusters are seated again.
+/// Groups of a color that may be empty beside half of all slots before all clusters are assigned again.
 const SPARE: usize = 2;
 
-/// Which cluster is in which seat.
+/// Which cluster is in which slot.
 #[derive(Debug)]
-pub(crate) struct Seats {
+pub(crate) struct Slots {
     lanes: Lanes,
     revision: Option<u64>,
-    /// Seat -> cluster.
+    /// Slot -> cluster.
     clusters: Vec<u32>,
-    /// Clusters that have a seat.
-    seated: usize,
+    /// Clusters that have a slot.
+    assigned: usize,
 }
 
 /// What changed.
@@ -28,22 +27,22 @@ pub(crate) struct Seats {
 pub(crate) enum Moved {
     /// Everything: whatever was known is void.
     All,
-    /// What is in these seats, ascending.
-    Seats(Vec<u32>),
+    /// What is in these slots, ascending.
+    Slots(Vec<u32>),
 }
 
-impl Seats {
-    /// For groups of so many seats, at most 64.
+impl Slots {
+    /// For groups of so many slots, at most 64.
     pub(crate) fn new(width: usize) -> Self {
         Self {
             lanes: Lanes::new(width),
             revision: None,
             clusters: Vec::new(),
-            seated: 0,
+            assigned: 0,
         }
     }
 
-    pub(crate) fn seat_count(&self) -> usize {
+    pub(crate) fn slot_count(&self) -> usize {
         self.clusters.len()
     }
 
@@ -56,14 +55,14 @@ impl Seats {
         self.lanes.groups()
     }
 
-    /// The cluster in a seat.
-    pub(crate) fn cluster(&self, seat: u32) -> Option<ClusterId> {
-        let cluster = self.clusters[seat as usize];
+    /// The cluster in a slot.
+    pub(crate) fn cluster(&self, slot: u32) -> Option<ClusterId> {
+        let cluster = self.clusters[slot as usize];
         (cluster != NONE).then_some(ClusterId(cluster))
     }
 
-    /// The seat of a cluster.
-    fn seat(&self, cluster: ClusterId) -> Option<u32> {
+    /// The slot of a cluster.
+    fn slot(&self, cluster: ClusterId) -> Option<u32> {
         let (group, lane) = self.lanes.slot(cluster)?;
         Some(index(group * self.lanes.width() + lane))
     }
@@ -73,14 +72,14 @@ impl Seats {
         self.revision = None;
     }
 
-    /// Makes this the seats of a schedule.
-    pub(crate) fn follow(&mut self, schedule: &Schedule) -> Moved {
+    /// Makes these the slots of a schedule.
+    pub(crate) fn sync(&mut self, schedule: &Schedule) -> Moved {
         let changes = self.revision.and_then(|r| schedule.changes_since(r));
-        let moved = changes.map(|changes| self.reseat(schedule, changes));
+        let moved = changes.map(|changes| self.update(schedule, changes));
         self.revision = Some(schedule.revision());
         let spare = SPARE * self.color_count().max(1) * self.lanes.width();
         match moved {
-            Some(seats) if self.seat_count() <= 2 * self.seated + spare => Moved::Seats(seats),
+            Some(slots) if self.slot_count() <= 2 * self.assigned + spare => Moved::Slots(slots),
             _ => {
                 self.rebuild(schedule);
                 Moved::All
@@ -92,15 +91,15 @@ impl Seats {
         self.lanes.reset(self.lanes.width());
         self.lanes.set_color_count(schedule.color_count());
         self.clusters.clear();
-        self.seated = 0;
+        self.assigned = 0;
         for color in 0..schedule.color_count() {
             for &cluster in schedule.clusters(color) {
-                self.sit(cluster, color);
+                self.assign(cluster, color);
             }
         }
     }
 
-    fn reseat(&mut self, schedule: &Schedule, changes: &[ClusterId]) -> Vec<u32> {
+    fn update(&mut self, schedule: &Schedule, changes: &[ClusterId]) -> Vec<u32> {
         if self.color_count() < schedule.color_count() {
             self.lanes.set_color_count(schedule.color_count());
         }
@@ -112,25 +111,25 @@ impl Seats {
             let color = schedule.color(cluster).map(|color| color.index());
             color.filter(|_| !schedule.constraints(cluster).is_empty())
         };
-        // All clusters leave before any is seated, so that emptied groups can be used again.
+        // All clusters leave before any is assigned, so that emptied groups can be used again.
         for &cluster in &changed {
-            let Some(seat) = self.seat(cluster) else {
+            let Some(slot) = self.slot(cluster) else {
                 continue;
             };
-            touched.push(seat);
-            let group = self.lanes.group(seat as usize / self.lanes.width());
+            touched.push(slot);
+            let group = self.lanes.group(slot as usize / self.lanes.width());
             if color_of(cluster) != Some(group.color as usize) {
                 self.lanes.release(cluster);
-                self.clusters[seat as usize] = NONE;
-                self.seated -= 1;
+                self.clusters[slot as usize] = NONE;
+                self.assigned -= 1;
             }
         }
         for &cluster in &changed {
             let Some(color) = color_of(cluster) else {
                 continue;
             };
-            if self.seat(cluster).is_none() {
-                touched.push(self.sit(cluster, color));
+            if self.slot(cluster).is_none() {
+                touched.push(self.assign(cluster, color));
             }
         }
         touched.sort_unstable();
@@ -138,24 +137,24 @@ impl Seats {
         touched
     }
 
-    /// Gives a cluster a seat.
-    fn sit(&mut self, cluster: ClusterId, color: usize) -> u32 {
+    /// Gives a cluster a slot.
+    fn assign(&mut self, cluster: ClusterId, color: usize) -> u32 {
         let groups = self.groups().row(color).iter().rev();
         let roomy = groups
             .map(|&group| group as usize)
             .find(|&group| self.lanes.has_room(group));
         let group = roomy.unwrap_or_else(|| self.lanes.open(color, 0).0);
-        let seat = self.lanes.assign(cluster, group);
-        let seats = self.lanes.group_count() * self.lanes.width();
-        self.clusters.resize(seats, NONE);
-        self.clusters[seat] = cluster.0;
-        self.seated += 1;
-        index(seat)
+        let slot = self.lanes.assign(cluster, group);
+        let slots = self.lanes.group_count() * self.lanes.width();
+        self.clusters.resize(slots, NONE);
+        self.clusters[slot] = cluster.0;
+        self.assigned += 1;
+        index(slot)
     }
 }
 
 fn index(value: usize) -> u32 {
-    u32::try_from(value).expect("fewer than 2^32 seats")
+    u32::try_from(value).expect("fewer than 2^32 slots")
 }
 
 #[cfg(test)]
@@ -165,18 +164,18 @@ mod tests {
 
     use super::*;
 
-    fn check(seats: &Seats, schedule: &Schedule) {
+    fn check(slots: &Slots, schedule: &Schedule) {
         let mut seen = 0;
         for color in 0..schedule.color_count() {
             for &cluster in schedule.clusters(color) {
-                let seat = seats.seat(cluster).expect("every cluster has a seat");
-                assert_eq!(seats.cluster(seat), Some(cluster));
-                let group = index(seat as usize / seats.lanes.width());
-                assert!(seats.groups().row(color).contains(&group));
+                let slot = slots.slot(cluster).expect("every cluster has a slot");
+                assert_eq!(slots.cluster(slot), Some(cluster));
+                let group = index(slot as usize / slots.lanes.width());
+                assert!(slots.groups().row(color).contains(&group));
                 seen += 1;
             }
         }
-        let taken = (0..seats.seat_count()).filter(|&s| seats.cluster(index(s)).is_some());
+        let taken = (0..slots.slot_count()).filter(|&s| slots.cluster(index(s)).is_some());
         assert_eq!(taken.count(), seen);
     }
 
@@ -190,40 +189,40 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
 
-        /// Whatever happens to a schedule, every cluster has a seat in a group of its color, and no other one moves.
+        /// Whatever happens to a schedule, every cluster has a slot in a group of its color, and no other one moves.
         #[test]
-        fn seats_follow_a_schedule(
+        fn slots_follow_a_schedule(
             width in prop::sample::select(vec![1usize, 2, 3, 64]),
             steps in prop::collection::vec(
                 (prop::collection::vec((0..200usize, 0..40u8), 0..30),
                  prop::collection::vec((0..40usize, 0..5u8), 0..10)), 1..8),
         ) {
-            let mut seats = Seats::new(width);
+            let mut slots = Slots::new(width);
             let mut labels: Vec<u8> = (0..200).map(|c| c / 5).collect();
             let mut colors = vec![0; 40];
             let (clustering, coloring) = schedule(&labels, &colors);
             let mut now = Schedule::new(&clustering, &coloring);
-            prop_assert_eq!(seats.follow(&now), Moved::All);
-            check(&seats, &now);
+            prop_assert_eq!(slots.sync(&now), Moved::All);
+            check(&slots, &now);
             for (relabeled, recolored) in &steps {
                 relabeled.iter().for_each(|&(c, label)| labels[c] = label);
                 recolored.iter().for_each(|&(k, color)| colors[k] = color);
-                let before: Vec<_> = (0..40).map(|k| seats.seat(ClusterId(k))).collect();
+                let before: Vec<_> = (0..40).map(|k| slots.slot(ClusterId(k))).collect();
                 let (clustering, coloring) = schedule(&labels, &colors);
                 let constraints: Vec<u32> = (0..200).collect();
                 let clusters: Vec<_> = (0..clustering.cluster_count()).map(ClusterId::new).collect();
                 let revision = now.revision();
                 now.update(&clustering, &coloring, &constraints, &clusters);
                 let changed = now.changes_since(revision).map(<[_]>::to_vec);
-                let moved = seats.follow(&now);
-                check(&seats, &now);
-                if let (Moved::Seats(touched), Some(changed)) = (moved, changed) {
+                let moved = slots.sync(&now);
+                check(&slots, &now);
+                if let (Moved::Slots(touched), Some(changed)) = (moved, changed) {
                     for k in (0..40).map(ClusterId) {
-                        let seat = seats.seat(k);
+                        let slot = slots.slot(k);
                         if changed.contains(&k) {
-                            prop_assert!(seat.is_none_or(|seat| touched.contains(&seat)));
+                            prop_assert!(slot.is_none_or(|slot| touched.contains(&slot)));
                         } else {
-                            prop_assert_eq!(seat, before[k.index()]);
+                            prop_assert_eq!(slot, before[k.index()]);
                         }
                     }
                 }

@@ -1,4 +1,4 @@
-//! [`Place`]: where a scene is computed.
+//! [`ComputeDevice`]: where a scene is computed.
 //!
 //! `cpu` is this process, `gpu` a device or an error, `auto` a device if there is a real one that does what the scene
 //! asks for, and else the processor, with the reason. A device that is a processor in disguise is slower than the
@@ -16,23 +16,23 @@ use crate::{Error, Scene};
 
 /// A device that is open, if one is.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct AtHand {
+pub(crate) struct OpenDevice {
     #[cfg(feature = "gpu")]
     pub(crate) gpu: Option<Arc<GpuContext>>,
 }
 
 /// Where a scene is computed.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Place {
+pub(crate) struct ComputeDevice {
     #[cfg(feature = "gpu")]
     pub(crate) gpu: Option<Arc<GpuContext>>,
     /// What is to be said about the choice.
     pub(crate) note: Option<String>,
 }
 
-impl Place {
+impl ComputeDevice {
     /// Where the scene wants to be computed; on which device if one is at hand.
-    pub(crate) fn choose(scene: &Scene, at_hand: &AtHand) -> Result<Self, Error> {
+    pub(crate) fn choose(scene: &Scene, open_device: &OpenDevice) -> Result<Self, Error> {
         let backend = scene.solver.backend;
         if backend.is_cpu() {
             return Ok(Self::default());
@@ -43,20 +43,20 @@ impl Place {
                 _ => Err(refused),
             };
         }
-        Self::open(backend, at_hand)
+        Self::open(backend, open_device)
     }
 
     /// The device that it is, or else the other one.
     #[cfg(feature = "gpu")]
-    pub(crate) fn or(&self, other: &AtHand) -> AtHand {
-        AtHand {
+    pub(crate) fn or(&self, other: &OpenDevice) -> OpenDevice {
+        OpenDevice {
             gpu: self.gpu.clone().or_else(|| other.gpu.clone()),
         }
     }
 
     /// There is none.
     #[cfg(not(feature = "gpu"))]
-    pub(crate) fn or(&self, other: &AtHand) -> AtHand {
+    pub(crate) fn or(&self, other: &OpenDevice) -> OpenDevice {
         other.clone()
     }
 
@@ -69,7 +69,7 @@ impl Place {
     }
 
     #[cfg(not(feature = "gpu"))]
-    fn open(backend: Backend, _: &AtHand) -> Result<Self, Error> {
+    fn open(backend: Backend, _: &OpenDevice) -> Result<Self, Error> {
         match backend {
             Backend::Gpu => Err(Error::NoGpuPath),
             _ => Ok(Self::cpu("this build has no GPU path (feature `gpu`)")),
@@ -77,9 +77,9 @@ impl Place {
     }
 
     #[cfg(feature = "gpu")]
-    fn open(backend: Backend, at_hand: &AtHand) -> Result<Self, Error> {
+    fn open(backend: Backend, open_device: &OpenDevice) -> Result<Self, Error> {
         let open = || GpuContext::new(&GpuOptions::from_env()).map(Arc::new);
-        match at_hand.gpu.clone().map_or_else(open, Ok) {
+        match open_device.gpu.clone().map_or_else(open, Ok) {
             Ok(gpu) if backend == Backend::Auto && gpu.adapter().software => {
                 let name = &gpu.adapter().name;
                 Ok(Self::cpu(&format!("the only GPU is software ({name})")))
@@ -103,11 +103,11 @@ impl Place {
 
     /// Its name in a report.
     pub(crate) fn name(&self) -> &'static str {
-        if self.is_device() { "gpu" } else { "cpu" }
+        if self.is_gpu() { "gpu" } else { "cpu" }
     }
 
     /// Whether the state is elsewhere.
-    pub(crate) fn is_device(&self) -> bool {
+    pub(crate) fn is_gpu(&self) -> bool {
         #[cfg(feature = "gpu")]
         return self.gpu.is_some();
         #[cfg(not(feature = "gpu"))]
