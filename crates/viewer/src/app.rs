@@ -16,12 +16,12 @@ use incise::scene::Backend;
 use incise_render::{ColorBy, Style};
 
 use crate::canvas::Canvas;
+use crate::frame_clock::FrameClock;
 use crate::graphics;
 use crate::help::{self, Action};
 use crate::load::{Loading, Source};
-use crate::pace::Pace;
-use crate::panel::{self, Controls, Wishes};
-use crate::stage::Stage;
+use crate::panel::{self, Controls, UiCommands};
+use crate::session::Session;
 use crate::tool::Tool;
 
 /// The window.
@@ -32,13 +32,13 @@ pub(crate) struct Viewer {
     /// Tets to fill a surface with.
     tets: u32,
     notes: Vec<String>,
-    stage: Option<Stage>,
+    session: Option<Session>,
     loading: Option<Loading>,
     /// A sentence that waits to be read.
     error: Option<String>,
     style: Style,
     tool: Tool,
-    pace: Pace,
+    clock: FrameClock,
     running: bool,
     has_panel: bool,
     has_help: bool,
@@ -76,12 +76,12 @@ impl Viewer {
             backend,
             tets,
             notes,
-            stage: None,
+            session: None,
             loading: None,
             error: None,
             style: Style::default(),
             tool: Tool::default(),
-            pace: Pace::default(),
+            clock: FrameClock::default(),
             running: !paused,
             has_panel: true,
             has_help: false,
@@ -110,7 +110,7 @@ impl Viewer {
     fn fail(&mut self, error: &anyhow::Error) {
         self.error = Some(format!("{error:#}"));
         self.running = false;
-        self.pace.pause();
+        self.clock.pause();
     }
 
     fn take(&mut self, result: anyhow::Result<()>) {
@@ -119,9 +119,9 @@ impl Viewer {
         }
     }
 
-    /// Does something with the stage, if there is one; keeps its error for the dialog.
-    fn with_stage(&mut self, act: impl FnOnce(&mut Stage) -> anyhow::Result<()>) {
-        if let Some(result) = self.stage.as_mut().map(act) {
+    /// Does something with the session, if there is one; keeps its error for the dialog.
+    fn with_session(&mut self, act: impl FnOnce(&mut Session) -> anyhow::Result<()>) {
+        if let Some(result) = self.session.as_mut().map(act) {
             self.take(result);
         }
     }
@@ -135,15 +135,15 @@ impl Viewer {
             return;
         };
         self.loading = None;
-        match result.and_then(Stage::new) {
-            Ok(stage) => {
+        match result.and_then(Session::new) {
+            Ok(session) => {
                 context.send_viewport_cmd(egui::ViewportCommand::Title(format!(
                     "{} - incise",
-                    stage.name
+                    session.name
                 )));
-                self.stage = Some(stage);
+                self.session = Some(session);
                 (self.working, self.line) = (false, Vec::new());
-                self.pace.pause();
+                self.clock.pause();
             }
             // What was loaded before continues.
             Err(error) => self.error = Some(format!("{error:#}")),
@@ -154,20 +154,20 @@ impl Viewer {
         match action {
             Action::Pause => {
                 self.running = !self.running;
-                self.pace.pause();
+                self.clock.pause();
             }
             Action::Step => {
                 self.running = false;
-                self.with_stage(Stage::step);
+                self.with_session(Session::step);
             }
-            Action::Reset => self.with_stage(Stage::reset),
+            Action::Reset => self.with_session(Session::reset),
             Action::Undo => {
-                let undone = self.stage.as_mut().map_or(Ok(None), Stage::undo);
+                let undone = self.session.as_mut().map_or(Ok(None), Session::undo);
                 match undone {
                     // It would cut again at once.
                     Ok(Some(true)) => {
                         self.running = false;
-                        self.pace.pause();
+                        self.clock.pause();
                     }
                     Ok(_) => {}
                     Err(error) => self.fail(&error),
@@ -177,8 +177,8 @@ impl Viewer {
                 self.let_go();
                 self.tool = tool;
             }
-            Action::Fit => self.with_stage(|stage| {
-                stage.fit();
+            Action::Fit => self.with_session(|session| {
+                session.fit();
                 Ok(())
             }),
             Action::Wireframe => self.style.wireframe = !self.style.wireframe,
@@ -196,9 +196,9 @@ impl Viewer {
     fn let_go(&mut self) {
         self.working = false;
         self.line.clear();
-        if let Some(stage) = &mut self.stage {
-            stage.lift_blade();
-            stage.let_go();
+        if let Some(session) = &mut self.session {
+            session.lift_blade();
+            session.let_go();
         }
     }
 
@@ -210,30 +210,30 @@ impl Viewer {
             let at = at - rect.min;
             [f64::from(at.x), f64::from(at.y)]
         };
-        let Some(stage) = &mut self.stage else {
+        let Some(session) = &mut self.session else {
             return;
         };
         let by = |button| response.dragged_by(button);
         let delta = response.drag_delta();
         let part = |points: f32| f64::from(points) / size[1];
-        let turns =
-            by(PointerButton::Secondary) || (self.tool == Tool::Turn && by(PointerButton::Primary));
+        let turns = by(PointerButton::Secondary)
+            || (self.tool == Tool::SettingChange && by(PointerButton::Primary));
         if turns {
-            stage
+            session
                 .camera
                 .orbit(-4.0 * part(delta.x), 4.0 * part(delta.y));
         } else if by(PointerButton::Middle) {
-            stage.camera.pan(part(delta.x), -part(delta.y));
+            session.camera.pan(part(delta.x), -part(delta.y));
         }
         if response.hovered() {
             let (wheel, pinch) =
                 context.input(|input| (input.smooth_scroll_delta().y, input.zoom_delta()));
             let factor = (-0.002 * f64::from(wheel)).exp() / f64::from(pinch);
             if factor != 1.0 {
-                stage.camera.zoom(factor);
+                session.camera.zoom(factor);
             }
         }
-        if self.tool == Tool::Turn {
+        if self.tool == Tool::SettingChange {
             return;
         }
         let primary = PointerButton::Primary;
@@ -245,8 +245,8 @@ impl Viewer {
                 .unwrap_or(rect.min);
             (self.working, self.line) = (true, vec![at]);
             result = match self.tool {
-                Tool::Blade => stage.press_blade(pixel(at), size),
-                _ => stage.take(pixel(at), size).map(|_| ()),
+                Tool::Blade => session.press_blade(pixel(at), size),
+                _ => session.take(pixel(at), size).map(|_| ()),
             };
         }
         if !self.working {
@@ -256,11 +256,11 @@ impl Viewer {
         result = result.and_then(|()| match self.tool {
             Tool::Blade => places.iter().try_for_each(|&at| {
                 self.line.push(at);
-                stage.draw_blade(pixel(at), size)
+                session.draw_blade(pixel(at), size)
             }),
             _ => places
                 .last()
-                .map_or(Ok(()), |&at| stage.pull(pixel(at), size)),
+                .map_or(Ok(()), |&at| session.pull(pixel(at), size)),
         });
         // Not when the drag ends, which any button's release does.
         if !context.input(|input| input.pointer.button_down(primary)) {
@@ -271,16 +271,16 @@ impl Viewer {
 
     /// Lets simulated time catch up.
     fn advance(&mut self) {
-        let Some(stage) = &mut self.stage else {
+        let Some(session) = &mut self.session else {
             return;
         };
         if !self.running {
             return;
         }
-        let time_step = stage.solver().time_step;
+        let time_step = session.solver().time_step;
         let mut result = Ok(());
-        self.pace.run(Instant::now(), time_step, || {
-            result = stage.step();
+        self.clock.run(Instant::now(), time_step, || {
+            result = session.step();
             result.is_ok()
         });
         self.take(result);
@@ -291,18 +291,18 @@ impl Viewer {
         let response = ui.allocate_rect(rect, Sense::click_and_drag());
         self.mouse(&response, rect);
         self.advance();
-        let Some(stage) = &mut self.stage else {
+        let Some(session) = &mut self.session else {
             return;
         };
         // What is to be shown has to be measured.
         let measured = match self.style.color_by {
-            ColorBy::Residual if !stage.measures() => stage.measure(true),
+            ColorBy::Residual if !session.measures() => session.measure(true),
             _ => Ok(()),
         };
         let drawn = measured
-            .and_then(|()| stage.color(self.style.color_by))
-            .and_then(|()| self.canvas.show(ui, rect, stage, &self.style));
-        overlay(ui, rect, stage, &self.line);
+            .and_then(|()| session.color(self.style.color_by))
+            .and_then(|()| self.canvas.show(ui, rect, session, &self.style));
+        overlay(ui, rect, session, &self.line);
         self.take(drawn);
     }
 
@@ -347,21 +347,21 @@ impl Viewer {
         }
     }
 
-    fn fulfil(&mut self, context: &Context, wishes: Wishes) {
-        if let Some(path) = wishes.file {
+    fn fulfil(&mut self, context: &Context, commands: UiCommands) {
+        if let Some(path) = commands.file {
             self.load_file(context, &path);
         }
-        for action in wishes.actions {
+        for action in commands.actions {
             self.act(action);
         }
-        if let Some(on) = wishes.measure {
-            self.with_stage(|stage| stage.measure(on));
+        if let Some(on) = commands.measure {
+            self.with_session(|session| session.measure(on));
         }
-        if let Some(turn) = wishes.turn {
+        if let Some(turn) = commands.turn {
             let turned = self
-                .stage
+                .session
                 .as_mut()
-                .map_or(Ok(()), |stage| stage.turn(&turn));
+                .map_or(Ok(()), |session| session.turn(&turn));
             // A knob that cannot be turned is no reason to stop.
             if let Err(error) = turned {
                 self.error = Some(format!("{error:#}"));
@@ -377,28 +377,28 @@ impl eframe::App for Viewer {
         for action in help::actions(&context) {
             self.act(action);
         }
-        let mut wishes = Wishes::default();
+        let mut commands = UiCommands::default();
         if self.has_panel {
             let mut controls = Controls {
                 running: self.running,
                 tool: self.tool,
                 style: &mut self.style,
-                pace: &mut self.pace,
+                clock: &mut self.clock,
                 has_gpu: self.gpu.is_some(),
                 file: &mut self.file,
                 notes: &self.notes,
             };
-            let stage = self.stage.as_mut();
+            let session = self.session.as_mut();
             Panel::right("panel").exact_size(340.0).show(ui, |ui| {
-                wishes = panel::show(ui, stage, &mut controls);
+                commands = panel::show(ui, session, &mut controls);
             });
         }
-        self.fulfil(&context, wishes);
+        self.fulfil(&context, commands);
         CentralPanel::default()
             .frame(Frame::NONE)
             .show(ui, |ui| self.picture(ui));
         self.windows(&context);
-        let busy = self.loading.is_some() || (self.running && self.stage.is_some());
+        let busy = self.loading.is_some() || (self.running && self.session.is_some());
         if busy {
             context.request_repaint();
         }
@@ -430,15 +430,15 @@ fn places(context: &Context) -> Vec<Pos2> {
 }
 
 /// The drawn line, the hand and what the button would do.
-fn overlay(ui: &Ui, rect: Rect, stage: &Stage, line: &[Pos2]) {
+fn overlay(ui: &Ui, rect: Rect, session: &Session, line: &[Pos2]) {
     let painter = ui.painter_at(rect);
-    if stage.cuts() && line.len() > 1 {
+    if session.cuts() && line.len() > 1 {
         let thin = Stroke::new(1.5, Color32::from_rgb(190, 30, 30));
         painter.line(line.to_vec(), thin);
     }
-    if let Some(to) = stage.hand() {
+    if let Some(to) = session.hand() {
         let size = [f64::from(rect.width()), f64::from(rect.height())];
-        if let Some(at) = stage.camera.project(to, size) {
+        if let Some(at) = session.camera.project(to, size) {
             #[expect(clippy::cast_possible_truncation, reason = "pixels of a window")]
             let at = rect.min + egui::vec2(at.x as f32, at.y as f32);
             painter.circle_stroke(at, 7.0, Stroke::new(2.0, Color32::from_rgb(30, 90, 190)));

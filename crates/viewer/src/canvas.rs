@@ -10,7 +10,7 @@ use eframe::egui_wgpu::RenderState;
 use incise::gpu::{GpuContext, wgpu};
 use incise_render::{GpuRenderer, Style, software_picture};
 
-use crate::stage::Stage;
+use crate::session::Session;
 
 /// Where pictures are drawn: on the window's device or on the processor.
 pub(crate) enum Canvas {
@@ -48,12 +48,12 @@ impl Canvas {
         }
     }
 
-    /// Draws the stage into a part of the window.
+    /// Draws the session into a part of the window.
     pub(crate) fn show(
         &mut self,
         ui: &egui::Ui,
         rect: Rect,
-        stage: &mut Stage,
+        session: &mut Session,
         style: &Style,
     ) -> anyhow::Result<()> {
         let size = pixels(rect, ui.ctx().pixels_per_point());
@@ -64,9 +64,9 @@ impl Canvas {
                 shown,
             } => {
                 let view = renderer.draw(
-                    &stage.painting,
-                    &stage.simulation,
-                    &stage.camera,
+                    &session.painting,
+                    &session.simulation,
+                    &session.camera,
                     style,
                     size,
                 )?;
@@ -89,11 +89,11 @@ impl Canvas {
                 }
             }
             Self::Processor { texture } => {
-                stage.simulation.read_back()?;
+                session.simulation.read_back()?;
                 let picture = software_picture(
-                    &stage.painting,
-                    &stage.simulation,
-                    &stage.camera,
+                    &session.painting,
+                    &session.simulation,
+                    &session.camera,
                     style,
                     size,
                 )?;

@@ -64,7 +64,7 @@ const KEYS: [(Chord, &str, Action, &str); 20] = [
     (
         (PLAIN, Key::T),
         "T",
-        Action::Take(Tool::Turn),
+        Action::Take(Tool::SettingChange),
         "turn the view with the left button, too",
     ),
     ((PLAIN, Key::F), "F", Action::Fit, "see the whole body"),

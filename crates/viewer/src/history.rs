@@ -12,7 +12,7 @@ const BUDGET: usize = 1 << 30;
 
 /// The moment before a stroke.
 #[derive(Debug)]
-pub(crate) struct Moment {
+pub(crate) struct UndoPoint {
     pub(crate) snapshot: Snapshot,
     /// Whether the stroke is the scene's: it will begin again.
     pub(crate) scripted: bool,
@@ -25,14 +25,14 @@ pub(crate) struct Moment {
 /// The moments before the strokes, oldest first.
 #[derive(Debug, Default)]
 pub(crate) struct History {
-    moments: VecDeque<Moment>,
+    moments: VecDeque<UndoPoint>,
 }
 
 impl History {
     /// Keeps a moment, and drops the oldest ones that have no room any more.
-    pub(crate) fn keep(&mut self, moment: Moment) {
+    pub(crate) fn keep(&mut self, moment: UndoPoint) {
         self.moments.push_back(moment);
-        let bytes = |moment: &Moment| moment.snapshot.bytes();
+        let bytes = |moment: &UndoPoint| moment.snapshot.bytes();
         let mut sum: usize = self.moments.iter().map(bytes).sum();
         while sum > BUDGET && self.moments.len() > 1 {
             sum -= self.moments.pop_front().as_ref().map_or(0, bytes);
@@ -40,7 +40,7 @@ impl History {
     }
 
     /// The last moment, which is then forgotten.
-    pub(crate) fn take(&mut self) -> Option<Moment> {
+    pub(crate) fn take(&mut self) -> Option<UndoPoint> {
         self.moments.pop_back()
     }
 

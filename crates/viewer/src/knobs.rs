@@ -8,7 +8,7 @@ use incise::scene::{Backend, Method, SolverSpec, Substeps};
 
 /// A knob that was turned.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Turn {
+pub(crate) struct SettingChange {
     pub(crate) knob: &'static str,
     pub(crate) from: String,
     pub(crate) to: String,
@@ -67,7 +67,12 @@ fn joined(kind: &str, size: u32) -> String {
 
 /// Shows the knobs as `spec` has them; returns the one that was turned. `has_gpu` tells whether a GPU can be chosen,
 /// `on_gpu` whether one computes.
-pub(crate) fn show(ui: &mut Ui, spec: &SolverSpec, has_gpu: bool, on_gpu: bool) -> Option<Turn> {
+pub(crate) fn show(
+    ui: &mut Ui,
+    spec: &SolverSpec,
+    has_gpu: bool,
+    on_gpu: bool,
+) -> Option<SettingChange> {
     let mut turn = None;
     // `Auto` is shown as the backend that was chosen.
     let present = match spec.backend {
@@ -77,7 +82,7 @@ pub(crate) fn show(ui: &mut Ui, spec: &SolverSpec, has_gpu: bool, on_gpu: bool) 
     };
     let mut turned = |knob, from: String, to: String, spec: SolverSpec| {
         if from != to {
-            turn = Some(Turn {
+            turn = Some(SettingChange {
                 knob,
                 from,
                 to,

@@ -6,15 +6,15 @@
 
 mod app;
 mod canvas;
-mod effects;
+mod frame_clock;
 mod graphics;
 mod help;
 mod history;
 mod knobs;
 mod load;
-mod pace;
 mod panel;
-mod stage;
+mod session;
+mod setting_effects;
 mod times;
 mod tool;
 

@@ -7,19 +7,19 @@ use eframe::egui::{
 };
 use incise_render::{ColorBy, Legend, Style};
 
+use crate::frame_clock::FrameClock;
 use crate::help::Action;
-use crate::knobs::{self, Turn};
-use crate::pace::Pace;
-use crate::stage::Stage;
+use crate::knobs::{self, SettingChange};
+use crate::session::Session;
 use crate::tool::Tool;
 
-/// What the panel shows and changes beside the stage.
+/// What the panel shows and changes beside the session.
 #[derive(Debug)]
 pub(crate) struct Controls<'a> {
     pub(crate) running: bool,
     pub(crate) tool: Tool,
     pub(crate) style: &'a mut Style,
-    pub(crate) pace: &'a mut Pace,
+    pub(crate) clock: &'a mut FrameClock,
     /// Whether a GPU can be chosen.
     pub(crate) has_gpu: bool,
     /// The text of the field for a file.
@@ -30,84 +30,93 @@ pub(crate) struct Controls<'a> {
 
 /// What was asked for in the panel.
 #[derive(Debug, Default)]
-pub(crate) struct Wishes {
+pub(crate) struct UiCommands {
     pub(crate) actions: Vec<Action>,
-    pub(crate) turn: Option<Turn>,
+    pub(crate) turn: Option<SettingChange>,
     /// A file to load.
     pub(crate) file: Option<PathBuf>,
     /// Whether residuals are to be measured, if that was changed.
     pub(crate) measure: Option<bool>,
 }
 
-/// Shows the panel; without a stage only what it takes to load one.
-pub(crate) fn show(ui: &mut Ui, stage: Option<&mut Stage>, controls: &mut Controls<'_>) -> Wishes {
-    let mut wishes = Wishes::default();
+/// Shows the panel; without a session only what it takes to load one.
+pub(crate) fn show(
+    ui: &mut Ui,
+    session: Option<&mut Session>,
+    controls: &mut Controls<'_>,
+) -> UiCommands {
+    let mut commands = UiCommands::default();
     ScrollArea::vertical().show(ui, |ui| {
         ui.add_space(4.0);
         let mut note = None;
-        if let Some(stage) = stage {
-            ui.heading(&stage.name);
-            buttons(ui, stage, controls, &mut wishes);
+        if let Some(session) = session {
+            ui.heading(&session.name);
+            buttons(ui, session, controls, &mut commands);
             ui.separator();
-            tools(ui, stage, controls, &mut wishes);
+            tools(ui, session, controls, &mut commands);
             ui.separator();
-            look(ui, stage, controls);
+            look(ui, session, controls);
             ui.separator();
-            counts(ui, stage, controls, &mut wishes);
-            stage.times.show(ui);
+            counts(ui, session, controls, &mut commands);
+            session.times.show(ui);
             ui.separator();
             ui.strong("Speed and accuracy");
-            let on_gpu = stage.simulation.device_solvers().next().is_some();
-            wishes.turn = knobs::show(ui, stage.solver(), controls.has_gpu, on_gpu);
-            effects(ui, stage);
+            let on_gpu = session.simulation.device_solvers().next().is_some();
+            commands.turn = knobs::show(ui, session.solver(), controls.has_gpu, on_gpu);
+            effects(ui, session);
             ui.separator();
-            note = stage.simulation.backend_note();
+            note = session.simulation.backend_note();
         }
-        files(ui, controls, &mut wishes);
+        files(ui, controls, &mut commands);
         for note in controls.notes.iter().map(String::as_str).chain(note) {
             ui.label(RichText::new(note).weak().small());
         }
     });
-    wishes
+    commands
 }
 
-fn buttons(ui: &mut Ui, stage: &Stage, controls: &mut Controls<'_>, wishes: &mut Wishes) {
+fn buttons(ui: &mut Ui, session: &Session, controls: &mut Controls<'_>, commands: &mut UiCommands) {
     ui.horizontal_wrapped(|ui| {
         let pause = if controls.running { "pause" } else { "go on" };
         for (text, action, on) in [
             (pause, Action::Pause, true),
             ("step", Action::Step, !controls.running),
             ("reset", Action::Reset, true),
-            ("undo cut", Action::Undo, stage.strokes() > 0),
+            ("undo cut", Action::Undo, session.strokes() > 0),
             ("fit", Action::Fit, true),
             ("help", Action::Help, true),
         ] {
             if ui.add_enabled(on, Button::new(text)).clicked() {
-                wishes.actions.push(action);
+                commands.actions.push(action);
             }
         }
     });
     ui.add(
-        Slider::new(&mut controls.pace.speed, 0.05..=2.0)
+        Slider::new(&mut controls.clock.speed, 0.05..=2.0)
             .logarithmic(true)
             .text("of real time"),
     );
 }
 
-fn tools(ui: &mut Ui, stage: &mut Stage, controls: &mut Controls<'_>, wishes: &mut Wishes) {
+fn tools(
+    ui: &mut Ui,
+    session: &mut Session,
+    controls: &mut Controls<'_>,
+    commands: &mut UiCommands,
+) {
     ui.horizontal(|ui| {
         for (tool, name) in [
             (Tool::Blade, "blade"),
             (Tool::Hand, "hand"),
-            (Tool::Turn, "turn"),
+            (Tool::SettingChange, "turn"),
         ] {
             let mut chosen = controls.tool;
             if ui.selectable_value(&mut chosen, tool, name).clicked() {
-                wishes.actions.push(Action::Take(tool));
+                commands.actions.push(Action::Take(tool));
             }
         }
     });
-    let grip = &mut stage.grip;
+    let grip = &mut session.grip;
     match controls.tool {
         Tool::Blade => {
             ui.add(
@@ -128,11 +137,11 @@ fn tools(ui: &mut Ui, stage: &mut Stage, controls: &mut Controls<'_>, wishes: &m
                     .text("softness in m/N"),
             );
         }
-        Tool::Turn => {}
+        Tool::SettingChange => {}
     }
 }
 
-fn look(ui: &mut Ui, stage: &Stage, controls: &mut Controls<'_>) {
+fn look(ui: &mut Ui, session: &Session, controls: &mut Controls<'_>) {
     let style = &mut *controls.style;
     ui.horizontal(|ui| {
         ComboBox::from_label("colors")
@@ -145,7 +154,7 @@ fn look(ui: &mut Ui, stage: &Stage, controls: &mut Controls<'_>) {
         ui.checkbox(&mut style.wireframe, "wireframe");
         ui.checkbox(&mut style.smooth, "smooth");
     });
-    if let Some(legend) = &stage.legend {
+    if let Some(legend) = &session.legend {
         bar(ui, legend);
     } else if style.color_by == ColorBy::Residual {
         ui.label(RichText::new("no residuals of tets yet; vbd has none").small());
@@ -193,8 +202,8 @@ fn number(value: f64) -> String {
     }
 }
 
-fn counts(ui: &mut Ui, stage: &mut Stage, controls: &Controls<'_>, wishes: &mut Wishes) {
-    let report = stage.report();
+fn counts(ui: &mut Ui, session: &mut Session, controls: &Controls<'_>, commands: &mut UiCommands) {
+    let report = session.report();
     let mut rows = vec![
         (
             "frame",
@@ -209,13 +218,13 @@ fn counts(ui: &mut Ui, stage: &mut Stage, controls: &Controls<'_>, wishes: &mut 
             "a frame",
             format!(
                 "{:.1} of {:.0} ms, {:.2} of real time",
-                stage.frame_ms,
-                1e3 * stage.solver().time_step,
-                controls.pace.reached(),
+                session.frame_ms,
+                1e3 * session.solver().time_step,
+                controls.clock.reached(),
             ),
         ),
     ];
-    let measured = stage.measured.as_ref();
+    let measured = session.measured.as_ref();
     if let Some(residual) = measured.and_then(|report| report.residual) {
         let force = residual.force_relative.map_or_else(
             || format!("{} N", number(residual.force)),
@@ -246,28 +255,28 @@ fn counts(ui: &mut Ui, stage: &mut Stage, controls: &Controls<'_>, wishes: &mut 
         });
     // What is shown is measured.
     let free = controls.style.color_by != ColorBy::Residual;
-    let mut measures = stage.measures();
+    let mut measures = session.measures();
     let mark = Checkbox::new(&mut measures, "measure the residual (costs time)");
     if ui.add_enabled(free, mark).changed() {
-        wishes.measure = Some(measures);
+        commands.measure = Some(measures);
     }
 }
 
 /// A field for a file, since not every desktop hands over what is dropped onto a window.
-fn files(ui: &mut Ui, controls: &mut Controls<'_>, wishes: &mut Wishes) {
+fn files(ui: &mut Ui, controls: &mut Controls<'_>, commands: &mut UiCommands) {
     ui.horizontal(|ui| {
         let field = TextEdit::singleline(controls.file).hint_text("scene, mesh or surface");
         let typed = ui.add(field.desired_width(230.0));
         let enter = typed.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
         let on = !controls.file.trim().is_empty();
         if ui.add_enabled(on, Button::new("load")).clicked() || (enter && on) {
-            wishes.file = Some(controls.file.trim().into());
+            commands.file = Some(controls.file.trim().into());
         }
     });
 }
 
-fn effects(ui: &mut Ui, stage: &Stage) {
-    for effect in stage.effects.turns() {
+fn effects(ui: &mut Ui, session: &Session) {
+    for effect in session.effects.turns() {
         ui.label(RichText::new(&effect.what).strong());
         let mut text = effect.time();
         let residual = effect.residual();

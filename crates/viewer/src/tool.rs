@@ -15,7 +15,7 @@ pub(crate) enum Tool {
     /// Takes hold of the body and pulls.
     Hand,
     /// Turns the camera, as the right button always does.
-    Turn,
+    SettingChange,
 }
 
 /// How the tools act.

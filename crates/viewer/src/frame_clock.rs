@@ -1,4 +1,4 @@
-//! [`Pace`]: how many frames of the simulation a frame of the window carries.
+//! [`FrameClock`]: how many frames of the simulation a frame of the window carries.
 //!
 //! Simulated time follows real time. A simulation that is too slow falls behind instead of freezing the window: what
 //! does not fit into [`PATIENCE`] is dropped, and the panel tells by how much the body lags.
@@ -13,7 +13,7 @@ const NEWEST: f64 = 0.05;
 
 /// The clock of a simulation.
 #[derive(Debug)]
-pub(crate) struct Pace {
+pub(crate) struct FrameClock {
     /// Wanted simulated time for each second.
     pub(crate) speed: f64,
     last: Option<Instant>,
@@ -23,7 +23,7 @@ pub(crate) struct Pace {
     reached: f64,
 }
 
-impl Default for Pace {
+impl Default for FrameClock {
     fn default() -> Self {
         Self {
             speed: 1.0,
@@ -34,7 +34,7 @@ impl Default for Pace {
     }
 }
 
-impl Pace {
+impl FrameClock {
     /// Resets the clock: time that passes during a pause is not caught up.
     pub(crate) fn pause(&mut self) {
         (self.last, self.due) = (None, 0.0);
@@ -79,12 +79,12 @@ mod tests {
 
     #[test]
     fn frames_follow_the_clock() {
-        let (mut pace, start) = (Pace::default(), Instant::now());
+        let (mut clock, start) = (FrameClock::default(), Instant::now());
         let mut frames = 0;
         for tick in 0..=50 {
             // In the future, so that no patience is lost.
             let now = start + Duration::from_secs(1000) + Duration::from_millis(20 * tick);
-            pace.run(now, 0.005, || {
+            clock.run(now, 0.005, || {
                 frames += 1;
                 true
             });
@@ -95,24 +95,27 @@ mod tests {
 
     #[test]
     fn what_does_not_fit_is_dropped() {
-        let (mut pace, start) = (Pace::default(), Instant::now());
+        let (mut clock, start) = (FrameClock::default(), Instant::now());
         let past = start - Duration::from_millis(500);
-        pace.run(past, 0.01, || true);
+        clock.run(past, 0.01, || true);
         let mut frames = 0;
         // Half a second is due, and the clock says that patience is over.
-        pace.run(past + Duration::from_millis(300), 0.01, || {
+        clock.run(past + Duration::from_millis(300), 0.01, || {
             frames += 1;
             true
         });
-        assert_eq!((frames, pace.due), (0, 0.0));
+        assert_eq!((frames, clock.due), (0, 0.0));
     }
 
     #[test]
     fn a_failed_frame_ends_it() {
-        let (mut pace, start) = (Pace::default(), Instant::now() + Duration::from_secs(1000));
-        pace.run(start, 0.01, || true);
+        let (mut clock, start) = (
+            FrameClock::default(),
+            Instant::now() + Duration::from_secs(1000),
+        );
+        clock.run(start, 0.01, || true);
         let mut frames = 0;
-        pace.run(start + Duration::from_secs(1), 0.01, || {
+        clock.run(start + Duration::from_secs(1), 0.01, || {
             frames += 1;
             frames < 3
         });

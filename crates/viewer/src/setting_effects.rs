@@ -1,4 +1,4 @@
-//! [`Effects`]: what turning a knob did, measured.
+//! [`SettingEffects`]: what turning a knob did, measured.
 //!
 //! The frames before a turn are compared with those after it: time of a frame without its cuts, and what the frame left
 //! unsolved. Both are medians, so that a frame in which something else happened does not count. Frames right after the
@@ -43,7 +43,7 @@ pub(crate) struct Effect {
 
 /// The last turns of knobs.
 #[derive(Debug, Default)]
-pub(crate) struct Effects {
+pub(crate) struct SettingEffects {
     /// Since the last turn, at most [`FRAMES`].
     recent: VecDeque<Sample>,
     /// Frames since the last turn that do not count yet.
@@ -52,7 +52,7 @@ pub(crate) struct Effects {
     turns: VecDeque<Effect>,
 }
 
-impl Effects {
+impl SettingEffects {
     /// Takes a frame in.
     pub(crate) fn note(&mut self, report: &FrameReport, ms: f64) {
         if self.settling > 0 {
@@ -157,7 +157,7 @@ fn compare(before: Option<f64>, after: Option<f64>, unit: &str) -> String {
 mod tests {
     use super::*;
 
-    fn frames(effects: &mut Effects, count: usize, ms: f64) {
+    fn frames(effects: &mut SettingEffects, count: usize, ms: f64) {
         for _ in 0..count {
             effects.note(&FrameReport::default(), ms);
         }
@@ -165,7 +165,7 @@ mod tests {
 
     #[test]
     fn a_turn_is_compared_with_the_frames_before_it() {
-        let mut effects = Effects::default();
+        let mut effects = SettingEffects::default();
         frames(&mut effects, 30, 2.0);
         effects.turned("substeps", "5", "10");
         assert_eq!(effects.turns().next().unwrap().time(), "measuring");
@@ -183,7 +183,7 @@ mod tests {
 
     #[test]
     fn a_drag_of_a_knob_is_one_turn() {
-        let mut effects = Effects::default();
+        let mut effects = SettingEffects::default();
         frames(&mut effects, 30, 2.0);
         for to in 6..=9 {
             let from = (to - 1).to_string();

@@ -1,4 +1,4 @@
-//! What hands do on a [`Stage`]: a blade that cuts along drawn lines, a hand that takes hold and pulls.
+//! Interaction with a [`Session`]: cutting along drawn lines, and pulling with the pointer.
 //!
 //! The body meets one pose of the blade a frame, line after line, so what is drawn faster than frames go, or while time
 //! stands still, is cut when they have come. Poses that wait on a straight line become one, so that it does not take long.
@@ -7,8 +7,8 @@ use std::collections::VecDeque;
 
 use incise::mesh::glam::DVec3;
 
-use super::{Hold, Stage};
-use crate::history::Moment;
+use super::{Hold, Session};
+use crate::history::UndoPoint;
 use crate::tool::blade;
 
 /// Points of the window within which places count as on a straight line.
@@ -37,7 +37,7 @@ pub(super) struct Line {
     /// Its number among the strokes, once the body meets it.
     pub(super) stroke: Option<u32>,
     /// The moment before that, until it has cut something.
-    before: Option<Moment>,
+    before: Option<UndoPoint>,
 }
 
 impl Line {
@@ -82,7 +82,7 @@ fn off(place: [f64; 2], from: [f64; 2], to: [f64; 2]) -> f64 {
     )
 }
 
-impl Stage {
+impl Session {
     /// Puts the blade on a pixel of a picture of some size.
     pub(crate) fn press_blade(&mut self, pixel: [f64; 2], size: [f64; 2]) -> anyhow::Result<()> {
         self.lift_blade();

@@ -1,9 +1,9 @@
-//! [`Stage`]: a simulation that is shown and edited in the window.
+//! [`Session`]: a simulation that is shown and edited in the window.
 //!
 //! It holds what belongs to a loaded scene: the simulation, what is drawn of it, the strokes that can be taken back, the
 //! blade and the hand in use. Input comes as pixels; what it means in space is decided here.
 
-mod hands;
+mod interaction;
 
 use std::collections::VecDeque;
 use std::time::Instant;
@@ -15,11 +15,11 @@ use incise::scene::{Quantity, ReportSpec, SolverSpec};
 use incise::{Grab, Scene, Simulation, Snapshot};
 use incise_render::{Camera, ColorBy, Legend, Painting};
 
-use self::hands::Line;
-use crate::effects::Effects;
-use crate::history::{History, Moment};
-use crate::knobs::Turn;
+use self::interaction::Line;
+use crate::history::{History, UndoPoint};
+use crate::knobs::SettingChange;
 use crate::load::Loaded;
+use crate::setting_effects::SettingEffects;
 use crate::times::Times;
 use crate::tool::Grip;
 
@@ -38,7 +38,7 @@ struct Hold {
 
 /// A simulation at work.
 #[derive(Debug)]
-pub(crate) struct Stage {
+pub(crate) struct Session {
     pub(crate) name: String,
     pub(crate) scene: Scene,
     pub(crate) simulation: Simulation,
@@ -46,7 +46,7 @@ pub(crate) struct Stage {
     pub(crate) camera: Camera,
     pub(crate) grip: Grip,
     pub(crate) times: Times,
-    pub(crate) effects: Effects,
+    pub(crate) effects: SettingEffects,
     /// Time of the last frame until it was done, on a device too, in ms.
     pub(crate) frame_ms: f64,
     /// What the colors mean, if they stand for numbers.
@@ -68,7 +68,7 @@ pub(crate) struct Stage {
     scripted: Vec<u64>,
 }
 
-impl Stage {
+impl Session {
     pub(crate) fn new(loaded: Loaded) -> anyhow::Result<Self> {
         let Loaded {
             name,
@@ -78,7 +78,7 @@ impl Stage {
         let painting = Painting::new(&simulation, &scene);
         let [low, high] = painting.bounds(&simulation);
         let start = simulation.snapshot()?;
-        let mut stage = Self {
+        let mut session = Self {
             name,
             scripted: scene
                 .stroke
@@ -91,7 +91,7 @@ impl Stage {
             camera: Camera::fit(low, high),
             grip: Grip::default(),
             times: Times::default(),
-            effects: Effects::default(),
+            effects: SettingEffects::default(),
             frame_ms: 0.0,
             legend: None,
             shown: ColorBy::Tissue,
@@ -103,8 +103,8 @@ impl Stage {
             hold: None,
             extent: (high - low).length(),
         };
-        stage.measure(true)?;
-        Ok(stage)
+        session.measure(true)?;
+        Ok(session)
     }
 
     /// Whether residuals are measured.
@@ -208,8 +208,8 @@ impl Stage {
     }
 
     /// The present moment, with what hands are doing in it.
-    fn moment(&mut self, scripted: bool) -> anyhow::Result<Moment> {
-        Ok(Moment {
+    fn moment(&mut self, scripted: bool) -> anyhow::Result<UndoPoint> {
+        Ok(UndoPoint {
             snapshot: self.simulation.snapshot()?,
             scripted,
             stroke: self.lines.front().and_then(|line| line.stroke),
@@ -234,7 +234,7 @@ impl Stage {
 
     /// Goes back to the first frame.
     pub(crate) fn reset(&mut self) -> anyhow::Result<()> {
-        let start = Moment {
+        let start = UndoPoint {
             snapshot: self.start.clone(),
             scripted: false,
             stroke: None,
@@ -245,7 +245,7 @@ impl Stage {
     }
 
     /// Goes to another time, with the knobs as they are now and empty hands.
-    fn go_to(&mut self, moment: &Moment) -> anyhow::Result<()> {
+    fn go_to(&mut self, moment: &UndoPoint) -> anyhow::Result<()> {
         self.drop_lines();
         self.let_go();
         let spec = self.simulation.solver_spec().clone();
@@ -274,8 +274,8 @@ impl Stage {
     }
 
     /// Takes a turned knob over.
-    pub(crate) fn turn(&mut self, turn: &Turn) -> anyhow::Result<()> {
-        let Turn {
+    pub(crate) fn turn(&mut self, turn: &SettingChange) -> anyhow::Result<()> {
+        let SettingChange {
             knob,
             from,
             to,

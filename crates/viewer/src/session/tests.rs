@@ -1,0 +1,246 @@
+//! A session without a window: lines are drawn, bodies cut, pulled and brought back.
+
+use incise::scene::{Method, Substeps};
+
+use super::*;
+
+const SIZE: [f64; 2] = [800.0, 600.0];
+
+/// A block that floats, seen in a window.
+fn session(strokes: &str) -> Session {
+    let scene =
+        format!("[[body]]\nshape = {{ kind = \"box\", tets = 600 }}\nscale = 0.2\n{strokes}");
+    let scene = Scene::from_toml(&scene).unwrap();
+    let simulation = Simulation::new(&scene).unwrap();
+    let loaded = Loaded {
+        name: "block".to_owned(),
+        scene,
+        simulation,
+    };
+    Session::new(loaded).unwrap()
+}
+
+/// A stroke of the scene that comes in frame 2.
+const PLANE: &str = r#"
+[[stroke]]
+kind = "plane"
+frame = 2
+point = [0.01, 0, 0]
+normal = [1, 0, 0]
+"#;
+
+fn to_vbd() -> SettingChange {
+    SettingChange {
+        knob: "method",
+        from: String::new(),
+        to: String::new(),
+        spec: SolverSpec::of(Method::Vbd),
+    }
+}
+
+/// Draws from the top of the window to its bottom and waits until the body has met all of it.
+fn cut(session: &mut Session) {
+    session.press_blade([410.0, 20.0], SIZE).unwrap();
+    for step in 1..=20 {
+        session
+            .draw_blade([410.0, 20.0 + 28.0 * f64::from(step)], SIZE)
+            .unwrap();
+    }
+    session.lift_blade();
+    while session.cuts() {
+        session.step().unwrap();
+    }
+}
+
+#[test]
+fn a_drawn_line_cuts_and_is_taken_back() {
+    let mut session = session("");
+    session.step().unwrap();
+    let tets = session.report().tets;
+    cut(&mut session);
+    assert_eq!((session.report().pieces, session.strokes()), (2, 1));
+    session.simulation.check().unwrap();
+    assert_eq!(session.undo().unwrap(), Some(false));
+    assert_eq!((session.report().pieces, session.report().tets), (1, tets));
+    assert_eq!(session.undo().unwrap(), None);
+    // A cut that was taken back can be made again.
+    cut(&mut session);
+    assert_eq!(session.report().pieces, 2);
+    session.reset().unwrap();
+    assert_eq!((session.simulation.next_frame(), session.strokes()), (0, 0));
+}
+
+#[test]
+fn lines_drawn_while_time_stands_still_are_cut_one_after_the_other() {
+    let mut session = session("");
+    for x in [330.0, 470.0] {
+        session.press_blade([x, 20.0], SIZE).unwrap();
+        session.draw_blade([x, 580.0], SIZE).unwrap();
+        session.lift_blade();
+    }
+    // A finished line is not drawn on.
+    session.draw_blade([20.0, 580.0], SIZE).unwrap();
+    assert_eq!((session.report().pieces, session.strokes()), (1, 0));
+    while session.cuts() {
+        session.step().unwrap();
+    }
+    assert_eq!((session.report().pieces, session.strokes()), (3, 2));
+    session.undo().unwrap();
+    assert_eq!(session.report().pieces, 2);
+    session.undo().unwrap();
+    assert_eq!(session.report().pieces, 1);
+}
+
+#[test]
+fn a_line_beside_the_body_is_nothing_to_take_back() {
+    let mut session = session("");
+    session.press_blade([10.0, 20.0], SIZE).unwrap();
+    session.draw_blade([10.0, 580.0], SIZE).unwrap();
+    session.lift_blade();
+    while session.cuts() {
+        session.step().unwrap();
+    }
+    assert_eq!((session.report().pieces, session.strokes()), (1, 0));
+}
+
+#[test]
+fn what_was_held_at_a_moment_is_free_when_it_comes_back() {
+    let mut session = session(PLANE);
+    assert!(session.take([400.0, 300.0], SIZE).unwrap());
+    for step in 1..=4 {
+        let x = 400.0 + 5.0 * f64::from(step);
+        session.pull([x, 300.0], SIZE).unwrap();
+        session.step().unwrap();
+    }
+    session.let_go();
+    session.turn(&to_vbd()).unwrap();
+    // Held softly at that time, which VBD does not know.
+    assert_eq!(session.undo().unwrap(), Some(true));
+    assert_eq!((session.report().pieces, session.hand()), (1, None));
+    session.step().unwrap();
+    assert_eq!(session.solver().method, Method::Vbd);
+    // Nothing hangs on a handle any more: the same place can be taken again.
+    assert!(session.take([400.0, 300.0], SIZE).unwrap());
+}
+
+#[test]
+fn a_shallow_stroke_does_not_go_through() {
+    let mut session = session("");
+    session.grip.depth = 0.15;
+    let tets = session.simulation.mesh().tets.len();
+    cut(&mut session);
+    assert_eq!(session.report().pieces, 1);
+    assert!(session.report().tets > tets, "it cuts, though");
+}
+
+#[test]
+fn a_stroke_of_the_scene_is_taken_back_and_would_begin_again() {
+    let mut session = session(PLANE);
+    for _ in 0..4 {
+        session.step().unwrap();
+    }
+    assert_eq!(session.report().pieces, 2);
+    assert_eq!(session.undo().unwrap(), Some(true));
+    assert_eq!(
+        (session.report().pieces, session.simulation.next_frame()),
+        (1, 2)
+    );
+}
+
+#[test]
+fn the_hand_pulls_what_it_holds() {
+    let mut session = session("");
+    let middle = |session: &Session| {
+        let positions = session.simulation.positions();
+        positions.iter().sum::<DVec3>() / positions.len() as f64
+    };
+    let before = middle(&session);
+    assert!(!session.take([2.0, 2.0], SIZE).unwrap(), "nothing is there");
+    assert!(session.take([400.0, 300.0], SIZE).unwrap());
+    let from = session.hand().unwrap();
+    for step in 1..=30 {
+        session
+            .pull([400.0 + 4.0 * f64::from(step), 300.0], SIZE)
+            .unwrap();
+        session.step().unwrap();
+    }
+    let pulled = session.hand().unwrap() - from;
+    let right = session.camera.right();
+    assert!(pulled.dot(right) > 0.9 * pulled.length(), "to the right");
+    let moved = (middle(&session) - before).dot(right);
+    assert!(
+        moved > 0.2 * pulled.length(),
+        "{moved} of {}",
+        pulled.length()
+    );
+    session.let_go();
+    assert_eq!(session.hand(), None);
+}
+
+#[test]
+fn knobs_are_turned_on_a_body_that_is_cut() {
+    let mut session = session("");
+    cut(&mut session);
+    let turn = |to: &str, spec: SolverSpec| SettingChange {
+        knob: "knob",
+        from: "here".to_owned(),
+        to: to.to_owned(),
+        spec,
+    };
+    let spec = SolverSpec {
+        substeps: Substeps::Fixed(9),
+        iterations: 3,
+        clustering: "serial:4".to_owned(),
+        ..session.solver().clone()
+    };
+    let this = turn("there", spec.clone());
+    session.turn(&this).unwrap();
+    session.step().unwrap();
+    assert_eq!(session.solver(), &spec);
+    assert_eq!(
+        session.effects.turns().next().unwrap().what,
+        "knob here to there"
+    );
+    assert_eq!(session.report().pieces, 2);
+    // A knob that cannot be turned stays where it was.
+    let impossible = SolverSpec {
+        relaxation: -1.0,
+        ..SolverSpec::of(Method::Jacobi)
+    };
+    let this = turn("nowhere", impossible);
+    let refused = format!("{:#}", session.turn(&this).unwrap_err());
+    assert!(refused.starts_with("knob stays at here"), "{refused}");
+    assert_eq!(session.solver(), &spec);
+    // A jump in time leaves knobs as they are.
+    session.reset().unwrap();
+    assert_eq!(session.solver(), &spec);
+    session.step().unwrap();
+}
+
+#[test]
+fn all_colors_can_be_shown_at_any_time() {
+    let mut session = session("");
+    let residual = ColorBy::Residual;
+    // Nothing is known before the first frame, and nothing else is shown in its place.
+    session.color(ColorBy::Stretch).unwrap();
+    assert!(session.legend.is_some());
+    session.color(residual).unwrap();
+    assert!(session.legend.is_none());
+    // Frame 0 is measured, the next ones are not: its colors stay, also on what they cut.
+    session.step().unwrap();
+    session.color(residual).unwrap();
+    assert!(session.legend.is_some());
+    cut(&mut session);
+    session.color(residual).unwrap();
+    assert!(session.legend.is_some());
+    session.measure(false).unwrap();
+    for by in ColorBy::ALL.into_iter().chain(ColorBy::ALL) {
+        session.step().unwrap();
+        session.color(by).unwrap();
+    }
+    session.turn(&to_vbd()).unwrap();
+    session.measure(true).unwrap();
+    session.step().unwrap();
+    session.color(residual).unwrap();
+    assert!(session.legend.is_none(), "vbd has none by tets");
+}
