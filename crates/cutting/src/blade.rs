@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::meet::{Meeting, MovingSegment};
+use crate::ccd::{EdgeHit, MovingSegment};
 use crate::operation::Crossing;
 use crate::surface::Tangent;
 
@@ -16,14 +16,14 @@ pub(crate) const AGAIN: f64 = 1.01;
 /// Something that cuts.
 pub(crate) trait Blade: Sync {
     /// Whether it comes by bit by bit, so that a particle must be decided before all meetings are known.
-    const COMES_BY: bool;
+    const IS_SWEPT: bool;
 
     /// The first meeting with an edge that `keep` does not refuse, and how many there are.
     fn first_meeting(
         &self,
         edge: &MovingSegment,
-        keep: impl Fn(&Meeting) -> bool,
-    ) -> Option<(Meeting, usize)>;
+        keep: impl Fn(&EdgeHit) -> bool,
+    ) -> Option<(EdgeHit, usize)>;
 
     /// How often one edge can be met.
     fn most_meetings(&self) -> usize;

@@ -2,7 +2,7 @@
 //!
 //! The field is evaluated at the particles, where they are now; crossed edges search for the zero along themselves by
 //! regula falsi with the Illinois rule (M. Dowell and P. Jarratt 1971), with bisection in the end. Everything else
-//! follows from the signs (see the module `signs`). Cost: an evaluation a particle and some ten a crossed edge, and a
+//! follows from the signs (see the module `sign_split`). Cost: an evaluation a particle and some ten a crossed edge, and a
 //! pass over the tets, then the cut.
 
 use glam::DVec3;
@@ -10,7 +10,7 @@ use incise_mesh::ParticleId;
 
 use crate::finite::require_positions;
 use crate::parallel;
-use crate::signs::{cut_by_signs, linear};
+use crate::sign_split::{cut_by_signs, linear};
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
 /// Steps of regula falsi before bisection takes over. Smooth fields need about six.

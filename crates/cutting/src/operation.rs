@@ -44,7 +44,7 @@ impl Crossing {
 
 /// Why a split was not made. It has changed nothing then.
 #[derive(Debug)]
-pub(crate) enum Refusal {
+pub(crate) enum SplitError {
     /// There would be too many tets.
     TooMany(CutError),
     /// At these crossings, numbers ascending, tets would become too thin to have a volume: they must move to an end.
@@ -52,7 +52,7 @@ pub(crate) enum Refusal {
 }
 
 /// A tet as it was before the operation.
-struct First {
+struct Original {
     corners: [ParticleId; 4],
     /// What was on the boundary.
     tags: [Option<FaceTag>; 4],
@@ -66,7 +66,7 @@ pub(crate) struct Operation<'a> {
     pub(crate) delta: CutDelta,
     tag: FaceTag,
     max_tets: usize,
-    first: BTreeMap<TetId, First>,
+    first: BTreeMap<TetId, Original>,
     /// For each new slot the slot of the tet it was a part of before the operation.
     ancestors: Vec<TetId>,
 }
@@ -92,7 +92,7 @@ impl<'a> Operation<'a> {
     /// Puts a particle on each crossed edge and splits the tets around. `crossings` ascend by their ends.
     ///
     /// Must not be called after [`Operation::separate`]. Returns the tets touched, ascending.
-    pub(crate) fn split(&mut self, crossings: &[Crossing]) -> Result<Vec<TetId>, Refusal> {
+    pub(crate) fn split(&mut self, crossings: &[Crossing]) -> Result<Vec<TetId>, SplitError> {
         let mesh = &mut self.cuttable.mesh;
         let mut edges: Vec<(f64, SplitEdge)> = Vec::with_capacity(crossings.len());
         for (i, crossing) in crossings.iter().enumerate() {
@@ -145,12 +145,12 @@ impl<'a> Operation<'a> {
         let tets = mesh.tets.len() + children.len() - families.len();
         if tets > self.max_tets {
             let limit = self.max_tets;
-            return Err(Refusal::TooMany(CutError::TooManyTets { tets, limit }));
+            return Err(SplitError::TooMany(CutError::TooManyTets { tets, limit }));
         }
         if !thin.is_empty() {
             thin.sort_unstable();
             thin.dedup();
-            return Err(Refusal::TooThin(thin));
+            return Err(SplitError::TooThin(thin));
         }
 
         for _ in &points {
@@ -201,7 +201,7 @@ impl<'a> Operation<'a> {
             return;
         }
         let faces = &self.cuttable.faces;
-        self.first.entry(tet).or_insert_with(|| First {
+        self.first.entry(tet).or_insert_with(|| Original {
             corners: self.cuttable.mesh.tets[tet.index()],
             tags: faces.links_of(tet).map(|link| faces.tag_of(link)),
             split,
@@ -233,7 +233,7 @@ impl<'a> Operation<'a> {
     }
 
     /// Makes a face whose neighbor is taken away a boundary triangle of this cut.
-    pub(crate) fn lay_bare(&mut self, face: Face) {
+    pub(crate) fn expose(&mut self, face: Face) {
         self.note(face.tet(), false);
         self.cuttable.faces.open(face, self.tag);
     }

@@ -17,8 +17,8 @@
 
 use incise_mesh::{ParticleId, TetId, signed_volume};
 
+use crate::component_search::Parts;
 use crate::index::index;
-use crate::parts::Parts;
 use crate::{CutDelta, CutError, CuttableMesh};
 
 /// A piece of a body.

@@ -1,14 +1,14 @@
 //! [`cut_plane`]: a whole plane cuts at once.
 //!
 //! Each particle gets its signed distance in the space where the blade is; everything else follows from the signs (see
-//! the module `signs`). Source: paper section 4.3. Cost: a pass over particles and tets to find the cut ones, then the
+//! the module `sign_split`). Source: paper section 4.3. Cost: a pass over particles and tets to find the cut ones, then the
 //! cut.
 
 use glam::DVec3;
 
 use crate::finite::{require_finite, require_positions};
 use crate::parallel;
-use crate::signs::cut_by_signs;
+use crate::sign_split::cut_by_signs;
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
 /// A plane through a point.

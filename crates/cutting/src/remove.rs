@@ -132,7 +132,7 @@ impl Operation<'_> {
         for face in Face::of(tet) {
             match self.cuttable.faces.behind(face) {
                 Behind::Nothing(_) => self.cuttable.faces.close(face),
-                Behind::Twin(twin) if !doomed.contains(&twin.tet()) => self.lay_bare(twin),
+                Behind::Twin(twin) if !doomed.contains(&twin.tet()) => self.expose(twin),
                 Behind::Twin(_) => {}
             }
         }

@@ -10,7 +10,7 @@
 //! body moves, a later meeting may come closer to the particle than foreseen; the new particle then keeps the snap
 //! distance, which bends the surface as snapping does, the other way.
 //!
-//! With a [`CutMemory`] the stroke takes over what earlier strokes of the same surface left beside the edges it meets,
+//! With a [`StrokeRegistry`] the stroke takes over what earlier strokes of the same surface left beside the edges it meets,
 //! and continues as if it were one of them.
 //!
 //! Which particles are put on the surface: `snap`. Source: paper section 4.3, with the moving front as described here.
@@ -22,12 +22,12 @@ use glam::{DMat3, DVec3};
 use incise_mesh::{ParticleId, TetId, TetMesh};
 
 use crate::blade::{Blade, Hit, SAME_SHEET};
-use crate::meet::{Meeting, MovingSegment};
-use crate::memory::CutMemory;
-use crate::operation::{Crossing, Operation, Refusal};
+use crate::ccd::{EdgeHit, MovingSegment};
+use crate::operation::{Crossing, Operation, SplitError};
 use crate::parallel;
-use crate::sides::{GivenSides, Sides, standing_side};
-use crate::signs::linear;
+use crate::side_labels::{GivenSides, Sides, standing_side};
+use crate::sign_split::linear;
+use crate::stroke_registry::StrokeRegistry;
 use crate::surface::{CutSurface, Tangent};
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
@@ -64,7 +64,7 @@ pub(crate) struct Stroke {
     given: GivenSides,
     /// Sides of tets split in this call.
     forgotten: Vec<(TetId, bool)>,
-    /// The number that the memory knows it by.
+    /// The number that the registry knows it by.
     number: Option<u32>,
 }
 
@@ -87,7 +87,7 @@ impl Stroke {
         motion: &mut Motion,
         mut near: Vec<TetId>,
         blade: &B,
-        mut memory: Option<&mut CutMemory>,
+        mut registry: Option<&mut StrokeRegistry>,
     ) -> Result<CutDelta, CutError> {
         let particles = motion.now.len();
         let mut fresh: Vec<ParticleId> = Vec::new();
@@ -101,40 +101,40 @@ impl Stroke {
         while round < rounds {
             let edges = edges_of(&operation.cuttable.mesh, &near);
             let mut hits = self.hits(operation.cuttable, &edges, motion, blade);
-            if let Some(memory) = &mut memory {
-                let number = *self.number.get_or_insert_with(|| memory.next_stroke());
+            if let Some(registry) = &mut registry {
+                let number = *self.number.get_or_insert_with(|| registry.next_stroke());
                 self.surface.keep_news();
                 let cuttable = &*operation.cuttable;
-                if memory.join(number, cuttable, &hits, &mut self.surface, &mut fresh) {
+                if registry.join(number, cuttable, &hits, &mut self.surface, &mut fresh) {
                     hits = self.hits(cuttable, &edges, motion, blade);
                 }
             }
             if hits.is_empty() {
                 break;
             }
-            if round == 0 && !B::COMES_BY {
+            if round == 0 && !B::IS_SWEPT {
                 rounds = hits.iter().map(|hit| hit.meetings).max().unwrap_or(0);
             }
             round += 1;
-            let touched = if round == 1 && !B::COMES_BY {
+            let touched = if round == 1 && !B::IS_SWEPT {
                 touched(operation.cuttable, &motion.now, &edges, blade)
             } else {
                 Vec::new()
             };
-            let snapped = self.snap(&mut operation, &hits, touched, B::COMES_BY);
+            let snapped = self.snap(&mut operation, &hits, touched, B::IS_SWEPT);
             near = match self.open(&mut operation, motion, hits, &snapped, &mut fresh) {
                 Ok(touched) => touched,
                 Err(error) => return Err(self.give_up(operation, motion, particles, error)),
             };
         }
 
-        while let (Some(memory), Some(number)) = (&memory, self.number) {
+        while let (Some(registry), Some(number)) = (&registry, self.number) {
             let gaps = self.gaps(operation.cuttable, &fresh);
             if gaps.is_empty() {
                 break;
             }
             let cuttable = &*operation.cuttable;
-            if memory.join(number, cuttable, &gaps, &mut self.surface, &mut fresh) {
+            if registry.join(number, cuttable, &gaps, &mut self.surface, &mut fresh) {
                 continue;
             }
             let snapped = self.snap(&mut operation, &gaps, Vec::new(), false);
@@ -156,9 +156,9 @@ impl Stroke {
             motion.now.push(motion.now[source.index()]);
         }
         self.surface.copy(&delta);
-        if let (Some(memory), Some(number)) = (memory, self.number) {
-            memory.follow_all_but(number, cuttable, &delta, self.options.reach());
-            memory.learn(number, &mut self.surface);
+        if let (Some(registry), Some(number)) = (registry, self.number) {
+            registry.follow_all_but(number, cuttable, &delta, self.options.reach());
+            registry.learn(number, &mut self.surface);
         }
         Ok(delta)
     }
@@ -203,8 +203,8 @@ impl Stroke {
             let crossings: Vec<Crossing> = hits.iter().map(|hit| hit.crossing).collect();
             match operation.split(&crossings) {
                 Ok(near) => break near,
-                Err(Refusal::TooMany(error)) => return Err(error),
-                Err(Refusal::TooThin(refused)) => {
+                Err(SplitError::TooMany(error)) => return Err(error),
+                Err(SplitError::TooThin(refused)) => {
                     let ends = refused.into_iter().map(|i| {
                         let hit = &hits[i];
                         (hit.crossing.nearer_end(), hit.tangent)
@@ -300,7 +300,7 @@ impl Stroke {
             let [a, b] = ends.map(|p| rest[p.index()]);
             let known = ends.iter().find_map(|&p| self.surface.tangent(p));
             let adopted = || ends.iter().any(|&p| self.surface.is_adopted(p));
-            let old = |m: &Meeting| {
+            let old = |m: &EdgeHit| {
                 known.is_some_and(|t| {
                     let distance = t.distance(a.lerp(b, m.parameter)).abs();
                     distance <= SAME_SHEET * a.distance(b)
@@ -347,7 +347,7 @@ fn touched(
         let normal = blade.touches(now[particle.index()], length)?;
         let tangent = Tangent {
             point: cuttable.mesh.positions[particle.index()],
-            normal: carried_back(cuttable, now, cuttable.around(particle), normal)?,
+            normal: pull_back(cuttable, now, cuttable.around(particle), normal)?,
         };
         Some((particle, tangent))
     })
@@ -377,7 +377,7 @@ fn edges_of(mesh: &TetMesh, tets: &[TetId]) -> Vec<[ParticleId; 2]> {
 /// With deformation gradient F, `n · F dX = (Fᵀ n) · dX`: the normal goes back by the transpose, summed over the tets,
 /// which are taken in ascending order: the sum must not depend on the order of a list. `None` in a body crushed flat,
 /// from which there is no way back.
-fn carried_back(
+fn pull_back(
     cuttable: &CuttableMesh,
     now: &[DVec3],
     tets: impl Iterator<Item = TetId>,
@@ -400,7 +400,7 @@ fn carried_back(
 }
 
 /// What a meeting says of the surface, with its tangent plane carried back to the rest shape.
-fn hit(cuttable: &CuttableMesh, now: &[DVec3], ends: [ParticleId; 2], meeting: &Meeting) -> Hit {
+fn hit(cuttable: &CuttableMesh, now: &[DVec3], ends: [ParticleId; 2], meeting: &EdgeHit) -> Hit {
     let rest = &cuttable.mesh.positions;
     let around = cuttable
         .around(ends[0])
@@ -410,7 +410,7 @@ fn hit(cuttable: &CuttableMesh, now: &[DVec3], ends: [ParticleId; 2], meeting: &
     let along = (b - a).normalize_or_zero() * if meeting.upwards { 1.0 } else { -1.0 };
     let tangent = Tangent {
         point: a + (b - a) * meeting.parameter,
-        normal: carried_back(cuttable, now, around, meeting.normal).unwrap_or(along),
+        normal: pull_back(cuttable, now, around, meeting.normal).unwrap_or(along),
     };
     Hit {
         crossing: Crossing {

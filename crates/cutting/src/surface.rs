@@ -70,7 +70,7 @@ enum Seen {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct CutSurface {
     marks: HashMap<ParticleId, Mark, FixedState>,
-    /// Particles whose marks changed since a memory was last told, if it ever was.
+    /// Particles whose marks changed since the registry last learned of them, if it has.
     news: Option<Vec<ParticleId>>,
     /// What was known before each change of this call, in order.
     journal: Vec<(ParticleId, Option<Mark>)>,
@@ -140,13 +140,18 @@ impl CutSurface {
     }
 
     /// Takes over what an earlier stroke of the same surface knew of a particle, if nothing contrary is known;
-    /// `upright` says whether their positive sides are the same. Returns whether the particle came to lie on the
+    /// `same_orientation` says whether their positive sides are the same. Returns whether the particle came to lie on the
     /// surface by it.
-    pub(crate) fn adopt(&mut self, particle: ParticleId, mut mark: Mark, upright: bool) -> bool {
+    pub(crate) fn adopt(
+        &mut self,
+        particle: ParticleId,
+        mut mark: Mark,
+        same_orientation: bool,
+    ) -> bool {
         if self.marks.contains_key(&particle) {
             return false;
         }
-        if !upright {
+        if !same_orientation {
             mark.tangent = mark.tangent.map(|t| Tangent {
                 normal: -t.normal,
                 ..t

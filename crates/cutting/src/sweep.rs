@@ -3,7 +3,7 @@
 //! Each frame, every edge that the blade met since the last frame gets a particle there, and a face opens as soon as
 //! all three of its particles lie on the swept surface (see the module `stroke`). So the cut stays behind the blade by
 //! less than one tet, and a stroke may stop anywhere. The blade is followed in the material's own time (see the module
-//! `meet`), so a body that moves or deforms between frames leaves no gap.
+//! `ccd`), so a body that moves or deforms between frames leaves no gap.
 //!
 //! Source: paper section 4.3, with the moving front as described here. Cost: a pass over particles and tets at the
 //! start; in each frame a copy of the positions, the boxes of the boundary triangles (see the module `near`) and the
@@ -12,11 +12,11 @@
 use glam::DVec3;
 
 use crate::blade::Blade;
+use crate::broad_phase::{Search, SweptSegment};
+use crate::ccd::{EdgeHit, MovingSegment, meetings};
 use crate::finite::{require_finite, require_positions};
-use crate::meet::{Meeting, MovingSegment, meetings};
-use crate::memory::CutMemory;
-use crate::near::{Search, SweptSegment};
 use crate::stroke::{Motion, Stroke};
+use crate::stroke_registry::StrokeRegistry;
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
 /// A blade on its way from one pose to the next.
@@ -24,13 +24,13 @@ use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 struct MovingBlade(Vec<SweptSegment>);
 
 impl Blade for MovingBlade {
-    const COMES_BY: bool = true;
+    const IS_SWEPT: bool = true;
 
     fn first_meeting(
         &self,
         edge: &MovingSegment,
-        keep: impl Fn(&Meeting) -> bool,
-    ) -> Option<(Meeting, usize)> {
+        keep: impl Fn(&EdgeHit) -> bool,
+    ) -> Option<(EdgeHit, usize)> {
         let near = self.0.iter().filter(|swept| !swept.misses(edge));
         let all = near.flat_map(|swept| meetings(edge, &swept.segment));
         let first = all.filter(keep).min_by(|m, n| m.time.total_cmp(&n.time))?;
@@ -55,7 +55,7 @@ impl Blade for MovingBlade {
 /// A stroke in progress.
 ///
 /// Faces open only where all three particles lie on this stroke's surface: a stroke that is to meet an earlier one must
-/// overlap it by a tet, or share a [`CutMemory`] with it.
+/// overlap it by a tet, or share a [`StrokeRegistry`] with it.
 ///
 /// # Example
 /// ```
@@ -151,7 +151,7 @@ impl Sweep {
     /// surface: it may continue where one stopped, or meet one that came from another side, up to a quarter of an edge
     /// beside it.
     ///
-    /// `memory` holds the earlier strokes and learns this one. Use it for every frame of the stroke or for none.
+    /// `registry` holds the earlier strokes and learns this one. Use it for every frame of the stroke or for none.
     ///
     /// # Errors
     /// The errors of [`Sweep::advance`].
@@ -160,9 +160,9 @@ impl Sweep {
         cuttable: &mut CuttableMesh,
         positions: &[DVec3],
         blade: &[DVec3],
-        memory: &mut CutMemory,
+        registry: &mut StrokeRegistry,
     ) -> Result<CutDelta, CutError> {
-        self.advance_by(cuttable, positions, blade, Some(memory))
+        self.advance_by(cuttable, positions, blade, Some(registry))
     }
 
     fn advance_by(
@@ -170,7 +170,7 @@ impl Sweep {
         cuttable: &mut CuttableMesh,
         positions: &[DVec3],
         blade: &[DVec3],
-        memory: Option<&mut CutMemory>,
+        registry: Option<&mut StrokeRegistry>,
     ) -> Result<CutDelta, CutError> {
         let _span = tracing::debug_span!("cutting::sweep").entered();
         blade
@@ -204,7 +204,7 @@ impl Sweep {
         let blade_between = MovingBlade(segments);
         let result = self
             .stroke
-            .cut(cuttable, &mut motion, near, &blade_between, memory);
+            .cut(cuttable, &mut motion, near, &blade_between, registry);
         match result {
             Ok(delta) => {
                 (self.before, self.room) = (motion.now, motion.before);

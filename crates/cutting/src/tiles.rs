@@ -1,4 +1,4 @@
-//! [`Tiles`]: boxes around neighboring boundary triangles that are refit only where it matters.
+//! [`AabbTiles`]: boxes around neighboring boundary triangles that are refit only where it matters.
 //!
 //! No particle moves in a frame by more than the one that moves most. So a box fit to where its triangles were some
 //! frames ago, widened by the sum of these distances, holds them still. Only boxes that the blade may reach are fit
@@ -30,13 +30,13 @@ struct Tile {
 /// The boxes around all boundary triangles.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Tiles {
+pub(crate) struct AabbTiles {
     tiles: Vec<Tile>,
     /// How far the particles moved in this frame, at most.
     moved: f64,
 }
 
-impl Tiles {
+impl AabbTiles {
     /// Forgets all boxes.
     pub(crate) fn clear(&mut self) {
         self.tiles.clear();

@@ -16,13 +16,13 @@ use glam::DVec3;
 use incise_mesh::{Bounds, TetId, TetMesh, orientation};
 
 use crate::blade::{Blade, SAME_SHEET};
+use crate::broad_phase::Slabs;
+use crate::ccd::{EdgeHit, MovingSegment};
 use crate::closest::Closest;
 use crate::finite::{require_finite, require_positions};
-use crate::meet::{Meeting, MovingSegment};
-use crate::memory::CutMemory;
-use crate::near::Slabs;
 use crate::parallel;
 use crate::stroke::{Motion, Stroke};
+use crate::stroke_registry::StrokeRegistry;
 use crate::tree::BoxTree;
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
@@ -112,7 +112,7 @@ impl TriangleSurface {
     }
 
     /// Where a triangle meets the edge from `a` to `b`; ends within `tolerance` of the edge count as on it.
-    fn meeting(&self, triangle: usize, [a, b]: [DVec3; 2], tolerance: f64) -> Option<Meeting> {
+    fn meeting(&self, triangle: usize, [a, b]: [DVec3; 2], tolerance: f64) -> Option<EdgeHit> {
         let [p, q, r] = self.corners(triangle);
         let [at_a, at_b] = [a, b].map(|x| orientation([p, q, r, x]));
         let parameter = if at_a == 0.0 && at_b == 0.0 {
@@ -131,7 +131,7 @@ impl TriangleSurface {
         }
         let sides = [[p, q], [q, r], [r, p]].map(|[x, y]| orientation([a, b, x, y]));
         let inside = sides.iter().all(|&s| s >= 0.0) || sides.iter().all(|&s| s <= 0.0);
-        inside.then_some(Meeting {
+        inside.then_some(EdgeHit {
             time: parameter,
             parameter,
             normal: self.normals[triangle],
@@ -194,15 +194,15 @@ struct StandingBlade<'a> {
 }
 
 impl Blade for StandingBlade<'_> {
-    const COMES_BY: bool = false;
+    const IS_SWEPT: bool = false;
 
     fn first_meeting(
         &self,
         edge: &MovingSegment,
-        keep: impl Fn(&Meeting) -> bool,
-    ) -> Option<(Meeting, usize)> {
+        keep: impl Fn(&EdgeHit) -> bool,
+    ) -> Option<(EdgeHit, usize)> {
         let bounds = with_margin(Bounds::around(edge.now), self.tolerance);
-        let mut all: Vec<Meeting> = self
+        let mut all: Vec<EdgeHit> = self
             .surface
             .tree
             .overlapping(bounds)
@@ -220,7 +220,7 @@ impl Blade for StandingBlade<'_> {
         all.retain(keep);
         without_returns(&mut all, edge.now, self.tolerance);
         let first = *all.first()?;
-        Some((Meeting { sides, ..first }, all.len()))
+        Some((EdgeHit { sides, ..first }, all.len()))
     }
 
     fn most_meetings(&self) -> usize {
@@ -242,8 +242,8 @@ impl StandingBlade<'_> {
     /// Leaves one meeting at each place: ties are those of triangles that share a side or a corner there. Where they
     /// run different ways, the surface may be crossed or only touched, which its sides before and behind the place say.
     /// `meetings` ascend.
-    fn one_a_place(&self, meetings: &[Meeting], [a, b]: [DVec3; 2]) -> Vec<Meeting> {
-        let same = |m: &Meeting, n: &Meeting| n.parameter - m.parameter <= self.tolerance;
+    fn one_a_place(&self, meetings: &[EdgeHit], [a, b]: [DVec3; 2]) -> Vec<EdgeHit> {
+        let same = |m: &EdgeHit, n: &EdgeHit| n.parameter - m.parameter <= self.tolerance;
         let places = meetings.chunk_by(same);
         places
             .filter_map(|place| {
@@ -272,9 +272,9 @@ impl StandingBlade<'_> {
 /// Takes out where an edge goes through the surface and soon comes back: what lies between is thinner than a tet, and
 /// cutting once would put the far end on the wrong side. `meetings` ascend; those next to an end stay, since they move
 /// it onto the surface.
-fn without_returns(meetings: &mut Vec<Meeting>, [a, b]: [DVec3; 2], tolerance: f64) {
-    let inner = |m: &Meeting| m.parameter > tolerance && m.parameter < 1.0 - tolerance;
-    let mut kept: Vec<Meeting> = Vec::with_capacity(meetings.len());
+fn without_returns(meetings: &mut Vec<EdgeHit>, [a, b]: [DVec3; 2], tolerance: f64) {
+    let inner = |m: &EdgeHit| m.parameter > tolerance && m.parameter < 1.0 - tolerance;
+    let mut kept: Vec<EdgeHit> = Vec::with_capacity(meetings.len());
     for &meeting in meetings.iter() {
         let Some(last) = kept.last().filter(|last| inner(last) && inner(&meeting)) else {
             kept.push(meeting);
@@ -337,7 +337,7 @@ pub fn cut_surface(
     cut(cuttable, positions, surface, options, None)
 }
 
-/// Cuts along a surface of triangles that continues where an earlier one stopped: see [`CutMemory`], which holds the
+/// Cuts along a surface of triangles that continues where an earlier one stopped: see [`StrokeRegistry`], which holds the
 /// earlier strokes and learns this one.
 ///
 /// # Errors
@@ -347,9 +347,9 @@ pub fn cut_surface_joining(
     positions: &[DVec3],
     surface: &TriangleSurface,
     options: &CutOptions,
-    memory: &mut CutMemory,
+    registry: &mut StrokeRegistry,
 ) -> Result<CutDelta, CutError> {
-    cut(cuttable, positions, surface, options, Some(memory))
+    cut(cuttable, positions, surface, options, Some(registry))
 }
 
 fn cut(
@@ -357,7 +357,7 @@ fn cut(
     positions: &[DVec3],
     surface: &TriangleSurface,
     options: &CutOptions,
-    memory: Option<&mut CutMemory>,
+    registry: Option<&mut StrokeRegistry>,
 ) -> Result<CutDelta, CutError> {
     let _span = tracing::debug_span!("cutting::surface").entered();
     options.check()?;
@@ -369,7 +369,7 @@ fn cut(
         now: positions.to_vec(),
     };
     let blade = StandingBlade { surface, tolerance };
-    Stroke::new(*options).cut(cuttable, &mut motion, near, &blade, memory)
+    Stroke::new(*options).cut(cuttable, &mut motion, near, &blade, registry)
 }
 
 /// The box and twice the tolerance around it.

@@ -12,7 +12,7 @@ impl CuttableMesh {
     /// Takes the last cut or removal back.
     ///
     /// Strokes in progress cannot follow: continue with clones from before, or start new ones. This holds for a
-    /// [`crate::CutMemory`], too.
+    /// [`crate::StrokeRegistry`], too.
     ///
     /// # Errors
     /// [`CutError::NotLast`] if the mesh has not the size that `delta` left it with; nothing is changed then.

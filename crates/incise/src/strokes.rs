@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 use incise_cutting::{
-    CutDelta, CutMemory, CutOptions, Sweep, carve, cut_level_set, cut_plane, cut_surface_joining,
+    CutDelta, CutOptions, StrokeRegistry, Sweep, carve, cut_level_set, cut_plane,
+    cut_surface_joining,
 };
 
 use crate::island::Island;
@@ -36,7 +37,7 @@ pub(crate) struct Timeline {
     /// Smallest snap distance: rounding of the positions in the solver's precision.
     tolerance: f64,
     /// For each island what its strokes leave for later ones to join; empty before the first stroke.
-    memories: Vec<CutMemory>,
+    registries: Vec<StrokeRegistry>,
     /// Strokes that began or ended to cut since the events were taken.
     events: Vec<Event>,
     /// Strokes of the scene that ended without a cut since they were taken, by their keys in the scene.
@@ -140,7 +141,11 @@ impl Timeline {
             .strokes
             .iter()
             .filter(|stroke| !stroke.sweeps.is_empty());
-        let remembered = if self.memories.is_empty() { 0 } else { on_cut };
+        let remembered = if self.registries.is_empty() {
+            0
+        } else {
+            on_cut
+        };
         UNDER_WAY * particles * under_way.count() + REMEMBERED * remembered
     }
 
@@ -166,8 +171,8 @@ impl Timeline {
                 sweep.follow(&island.cuttable, delta);
             }
         }
-        if let Some(memory) = self.memories.get_mut(number) {
-            memory.follow(&island.cuttable, delta, &CutOptions::default());
+        if let Some(registry) = self.registries.get_mut(number) {
+            registry.follow(&island.cuttable, delta, &CutOptions::default());
         }
     }
 
@@ -182,11 +187,12 @@ impl Timeline {
         if self.strokes.is_empty() {
             return Ok(());
         }
-        self.memories.resize_with(islands.len(), CutMemory::default);
+        self.registries
+            .resize_with(islands.len(), StrokeRegistry::default);
         for i in 0..self.strokes.len() {
             for (g, island) in islands.iter_mut().enumerate() {
                 let stroke = &mut self.strokes[i];
-                let Some(delta) = stroke.advance(frame, g, island, &mut self.memories[g])? else {
+                let Some(delta) = stroke.advance(frame, g, island, &mut self.registries[g])? else {
                     continue;
                 };
                 if delta.is_empty() {
@@ -237,7 +243,7 @@ impl Stroke {
         frame: u64,
         number: usize,
         island: &mut Island,
-        memory: &mut CutMemory,
+        registry: &mut StrokeRegistry,
     ) -> Result<Option<CutDelta>, Error> {
         let [first, last] = self.frames;
         if frame < first {
@@ -247,7 +253,7 @@ impl Stroke {
             (&mut island.cuttable, &island.positions, &self.options);
         let sweeps = &mut self.sweeps;
         let mut sweep = |pose: &[DVec3]| match sweeps.get_mut(number) {
-            Some(sweep) => sweep.advance_joining(cuttable, positions, pose, memory),
+            Some(sweep) => sweep.advance_joining(cuttable, positions, pose, registry),
             None => Sweep::new(cuttable, positions, pose, *options).map(|sweep| {
                 sweeps.push(sweep);
                 CutDelta::default()
@@ -259,7 +265,7 @@ impl Stroke {
             }
             Tool::Live(blade) => sweep(blade.pose()),
             Tool::Surface(surface) => {
-                cut_surface_joining(cuttable, positions, surface, options, memory)
+                cut_surface_joining(cuttable, positions, surface, options, registry)
             }
             Tool::Plane(plane) => cut_plane(cuttable, positions, plane, options),
             Tool::Plug(solid) => cut_level_set(cuttable, positions, |x| solid.distance(x), options),
@@ -274,7 +280,7 @@ impl Stroke {
             Tool::Sweep { .. } | Tool::Live(_) | Tool::Surface(_)
         );
         if !joins && !delta.is_empty() {
-            memory.follow(&island.cuttable, &delta, &self.options);
+            registry.follow(&island.cuttable, &delta, &self.options);
         }
         Ok(Some(delta))
     }

@@ -1,8 +1,8 @@
-//! Strokes that meet earlier ones through a memory.
+//! Strokes that meet earlier ones through a registry.
 
 use glam::DVec3;
 use incise_cutting::{
-    CutDelta, CutMemory, CuttableMesh, Plane, Sweep, TriangleSurface, cut_plane,
+    CutDelta, CuttableMesh, Plane, StrokeRegistry, Sweep, TriangleSurface, cut_plane,
     cut_surface_joining,
 };
 use incise_mesh::kuhn_box;
@@ -13,7 +13,7 @@ use crate::bodies::{body, check_cut, jittered_box, noise, options, volumes};
 /// Moves a blade by `path` times 0 to 1 in `frames` steps; checks everything after each.
 fn sweep(
     body: &mut CuttableMesh,
-    memory: &mut CutMemory,
+    registry: &mut StrokeRegistry,
     blade: [DVec3; 2],
     path: [DVec3; 2],
     frames: usize,
@@ -26,7 +26,7 @@ fn sweep(
     for frame in 1..=frames {
         let before = body.mesh().clone();
         let delta = stroke
-            .advance_joining(body, &before.positions, &pose(frame), memory)
+            .advance_joining(body, &before.positions, &pose(frame), registry)
             .unwrap();
         check_cut(&before, body, &delta);
     }
@@ -34,13 +34,13 @@ fn sweep(
 
 fn stand(
     body: &mut CuttableMesh,
-    memory: &mut CutMemory,
+    registry: &mut StrokeRegistry,
     surface: &TriangleSurface,
     snap: f64,
 ) -> CutDelta {
     let before = body.mesh().clone();
     let delta =
-        cut_surface_joining(body, &before.positions, surface, &options(snap), memory).unwrap();
+        cut_surface_joining(body, &before.positions, surface, &options(snap), registry).unwrap();
     check_cut(&before, body, &delta);
     delta
 }
@@ -74,11 +74,11 @@ fn strokes_that_go_on() {
             for (what, path, beside) in goes_on {
                 for mesh in [kuhn_box([5; 3], DVec3::ONE), jittered_box(5, 0.15, 3)] {
                     let mut body = CuttableMesh::new(mesh).unwrap();
-                    let mut memory = CutMemory::default();
-                    sweep(&mut body, &mut memory, BLADE, z(1.2, depth), 7, snap);
+                    let mut registry = StrokeRegistry::default();
+                    sweep(&mut body, &mut registry, BLADE, z(1.2, depth), 7, snap);
                     assert_eq!(body.mesh().pieces().count, 1);
                     let blade = BLADE.map(|x| x + DVec3::X * beside);
-                    sweep(&mut body, &mut memory, blade, path, 7, snap);
+                    sweep(&mut body, &mut registry, blade, path, 7, snap);
                     let volumes = volumes(&body);
                     assert_eq!(
                         volumes.len(),
@@ -97,11 +97,11 @@ fn strokes_that_cross() {
     for (depth, pieces) in [(0.5, 1), (1.2, 4)] {
         for snap in [0.0, 0.1] {
             let mut body = CuttableMesh::new(jittered_box(5, 0.15, 11)).unwrap();
-            let mut memory = CutMemory::default();
+            let mut registry = StrokeRegistry::default();
             let first = [DVec3::new(0.47, -1.0, 1.1), DVec3::new(0.47, 2.0, 1.1)];
             let second = [DVec3::new(-1.0, 0.53, 1.1), DVec3::new(2.0, 0.53, 1.1)];
             for blade in [first, second] {
-                sweep(&mut body, &mut memory, blade, z(0.0, -depth), 9, snap);
+                sweep(&mut body, &mut registry, blade, z(0.0, -depth), 9, snap);
             }
             assert_eq!(body.mesh().pieces().count, pieces);
         }
@@ -112,12 +112,12 @@ fn strokes_that_cross() {
 #[test]
 fn a_cross_in_four_strokes() {
     let mut body = CuttableMesh::new(jittered_box(5, 0.15, 11)).unwrap();
-    let mut memory = CutMemory::default();
+    let mut registry = StrokeRegistry::default();
     let first = [DVec3::new(0.47, -1.0, 0.0), DVec3::new(0.47, 2.0, 0.0)];
     let second = [DVec3::new(-1.0, 0.53, 0.0), DVec3::new(2.0, 0.53, 0.0)];
     for path in [z(1.1, 0.45), z(-0.1, 0.45)] {
         for blade in [first, second] {
-            sweep(&mut body, &mut memory, blade, path, 6, 0.1);
+            sweep(&mut body, &mut registry, blade, path, 6, 0.1);
         }
     }
     assert_eq!(body.mesh().pieces().count, 4);
@@ -128,13 +128,13 @@ fn a_cross_in_four_strokes() {
 fn a_plane_in_parts() {
     for snap in [0.0, 0.1] {
         let mut body = CuttableMesh::new(jittered_box(5, 0.15, 4)).unwrap();
-        let mut memory = CutMemory::default();
+        let mut registry = StrokeRegistry::default();
         let line = 0.47;
         for (y, z) in [(-1.0, -1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0)] {
             assert_eq!(body.mesh().pieces().count, 1);
             let center = DVec3::new(0.43, line + y, line + z);
             let part = TriangleSurface::rectangle(center, DVec3::Y, DVec3::Z).unwrap();
-            stand(&mut body, &mut memory, &part, snap);
+            stand(&mut body, &mut registry, &part, snap);
         }
         assert_eq!(body.mesh().pieces().count, 2, "snap {snap}");
     }
@@ -145,18 +145,18 @@ fn a_plane_in_parts() {
 fn the_same_again() {
     for snap in [0.0, 0.1, 0.2] {
         let mut body = CuttableMesh::new(jittered_box(5, 0.15, 4)).unwrap();
-        let mut memory = CutMemory::default();
+        let mut registry = StrokeRegistry::default();
         let center = DVec3::new(0.43, 0.5, 0.9);
         let slit = TriangleSurface::rectangle(center, DVec3::Y, DVec3::new(0.1, 0.0, 0.5)).unwrap();
         for time in 0..4 {
-            let delta = stand(&mut body, &mut memory, &slit, snap);
+            let delta = stand(&mut body, &mut registry, &slit, snap);
             assert_eq!(delta.is_empty(), time > 0, "time {time}, snap {snap}");
         }
         let mut body = CuttableMesh::new(jittered_box(5, 0.15, 4)).unwrap();
-        let mut memory = CutMemory::default();
+        let mut registry = StrokeRegistry::default();
         for time in 0..4 {
             let before = body.mesh().clone();
-            sweep(&mut body, &mut memory, BLADE, z(1.2, 0.4), 5, snap);
+            sweep(&mut body, &mut registry, BLADE, z(1.2, 0.4), 5, snap);
             assert_eq!(body.mesh() == &before, time > 0, "time {time}, snap {snap}");
         }
     }
@@ -184,10 +184,10 @@ proptest! {
         let mut whole = CuttableMesh::new(mesh.clone()).unwrap();
         cut_plane(&mut whole, &mesh.positions, &Plane { point: center, normal }, &options(snap)).unwrap();
         let mut cut = CuttableMesh::new(mesh).unwrap();
-        let mut memory = CutMemory::default();
-        sweep(&mut cut, &mut memory, blade, [path * 3.0, path * depth], frames, snap);
+        let mut registry = StrokeRegistry::default();
+        sweep(&mut cut, &mut registry, blade, [path * 3.0, path * depth], frames, snap);
         let second = if from_both { [path * -3.0, path * depth] } else { [path * depth, path * -3.0] };
-        sweep(&mut cut, &mut memory, blade, second, frames, snap);
+        sweep(&mut cut, &mut registry, blade, second, frames, snap);
         let (cut, whole) = (volumes(&cut), volumes(&whole));
         prop_assert_eq!(cut.len(), whole.len(), "{:?} {:?}", &cut, &whole);
     }

@@ -6,7 +6,7 @@
 
 use glam::DVec3;
 use incise_cutting::{
-    CutDelta, CutError, CutMemory, CutOptions, CuttableMesh, Plane, Separation, Skin, Sweep,
+    CutDelta, CutError, CutOptions, CuttableMesh, Plane, Separation, Skin, StrokeRegistry, Sweep,
     TriangleSurface, carve, cut_level_set, cut_plane, cut_surface, cut_surface_joining,
 };
 use incise_mesh::{ParticleId, TetMesh, kuhn_box};
@@ -109,18 +109,18 @@ struct State {
     /// Where the particles are.
     positions: Vec<DVec3>,
     skin: Skin,
-    /// With the positions and the memory before.
-    journal: Vec<(CutDelta, Vec<DVec3>, Option<CutMemory>)>,
+    /// With the positions and the registry before.
+    journal: Vec<(CutDelta, Vec<DVec3>, Option<StrokeRegistry>)>,
     /// If the strokes of this program join.
-    memory: Option<CutMemory>,
+    registry: Option<StrokeRegistry>,
 }
 
 impl State {
-    /// Follows a stroke, before which the memory was `memory`, and checks everything. Errors must have changed nothing.
+    /// Follows a stroke, before which the registry was `registry`, and checks everything. Errors must have changed nothing.
     fn follow_from(
         &mut self,
         before: &TetMesh,
-        memory: Option<CutMemory>,
+        registry: Option<StrokeRegistry>,
         result: Result<CutDelta, CutError>,
     ) {
         let Ok(delta) = result else {
@@ -137,15 +137,15 @@ impl State {
         delta.extend_particles(&mut self.positions);
         self.skin.follow(&delta);
         assert_eq!(self.skin.triangles().len(), self.cuttable.boundary_count());
-        self.journal.push((delta, earlier, memory));
+        self.journal.push((delta, earlier, registry));
     }
 
     fn undo(&mut self) {
-        if let Some((delta, earlier, memory)) = self.journal.pop() {
+        if let Some((delta, earlier, registry)) = self.journal.pop() {
             self.cuttable.undo(&delta).unwrap();
             self.cuttable.check().unwrap();
             self.positions = earlier;
-            self.memory = memory;
+            self.registry = registry;
             self.skin = Skin::new(self.cuttable.boundary());
         }
     }
@@ -162,7 +162,7 @@ pub(crate) fn run(program: &[u8]) {
         skin: Skin::new(cuttable.boundary()),
         cuttable,
         journal: Vec::new(),
-        memory: (kind / 64 == 3).then(CutMemory::default),
+        registry: (kind / 64 == 3).then(StrokeRegistry::default),
     };
     for tag in 0..12 {
         if bytes.is_empty() || state.cuttable.mesh().tets.len() > LARGEST / 2 {
@@ -240,13 +240,13 @@ fn step_more(state: &mut State, bytes: &mut Bytes<'_>, operation: u8, tag: u32) 
             let State {
                 cuttable,
                 positions,
-                memory,
+                registry,
                 ..
             } = state;
-            let earlier = memory.clone();
-            let result = match memory {
-                Some(memory) => {
-                    cut_surface_joining(cuttable, positions, &surface, &options, memory)
+            let earlier = registry.clone();
+            let result = match registry {
+                Some(registry) => {
+                    cut_surface_joining(cuttable, positions, &surface, &options, registry)
                 }
                 None => cut_surface(cuttable, positions, &surface, &options),
             };
@@ -257,16 +257,16 @@ fn step_more(state: &mut State, bytes: &mut Bytes<'_>, operation: u8, tag: u32) 
 }
 
 impl State {
-    /// Follows a cut that the memory did not see.
+    /// Follows a cut that the registry did not see.
     fn followed_by_memory(
         &mut self,
         before: &TetMesh,
         options: &CutOptions,
         result: Result<CutDelta, CutError>,
     ) {
-        let earlier = self.memory.clone();
-        if let (Some(memory), Ok(delta)) = (&mut self.memory, &result) {
-            memory.follow(&self.cuttable, delta, options);
+        let earlier = self.registry.clone();
+        if let (Some(registry), Ok(delta)) = (&mut self.registry, &result) {
+            registry.follow(&self.cuttable, delta, options);
         }
         self.follow_from(before, earlier, result);
     }
@@ -274,10 +274,10 @@ impl State {
     /// One step of a stroke.
     fn advance(&mut self, stroke: &mut Sweep, blade: &[DVec3]) -> Option<CutDelta> {
         let before = self.cuttable.mesh().clone();
-        let earlier = self.memory.clone();
-        let result = match &mut self.memory {
-            Some(memory) => {
-                stroke.advance_joining(&mut self.cuttable, &self.positions, blade, memory)
+        let earlier = self.registry.clone();
+        let result = match &mut self.registry {
+            Some(registry) => {
+                stroke.advance_joining(&mut self.cuttable, &self.positions, blade, registry)
             }
             None => stroke.advance(&mut self.cuttable, &self.positions, blade),
         };

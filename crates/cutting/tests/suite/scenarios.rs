@@ -76,7 +76,7 @@ impl Body {
 }
 
 /// A straight blade along z, far longer than a body, at a place in the plane.
-fn upright(x: f64, y: f64) -> Vec<DVec3> {
+fn same_orientation(x: f64, y: f64) -> Vec<DVec3> {
     vec![dvec3(x, y, -9.0), dvec3(x, y, 9.0)]
 }
 
@@ -227,11 +227,11 @@ fn a_spiral() {
     let mut body = Body::new(mesh, 0.1);
     let pose = |t: f64| {
         let (angle, radius) = (3.0 * TAU * t, 0.06 + 0.38 * t);
-        upright(0.5 + radius * angle.cos(), 0.5 + radius * angle.sin())
+        same_orientation(0.5 + radius * angle.cos(), 0.5 + radius * angle.sin())
     };
     body.sweep(pose, 200);
     assert_eq!(body.topology(), (1, 0));
-    body.sweep(|t| upright(0.503, 0.5 + t * 0.6), 30);
+    body.sweep(|t| same_orientation(0.503, 0.5 + t * 0.6), 30);
     assert_eq!(body.topology(), (3, 6));
 }
 

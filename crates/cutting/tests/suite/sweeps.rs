@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use incise_cutting::{
-    CutDelta, CutError, CutMemory, CutOptions, CuttableMesh, FaceTag, Plane, Sweep,
+    CutDelta, CutError, CutOptions, CuttableMesh, FaceTag, Plane, StrokeRegistry, Sweep,
     TriangleSurface, carve, cut_level_set, cut_plane, cut_surface,
 };
 use incise_mesh::{TetId, TetMesh, kuhn_box};
@@ -400,22 +400,22 @@ fn a_refused_step_is_forgotten() {
         for earlier in [false, true] {
             let mesh = jittered_box(5, 0.2, 3);
             let mut body = CuttableMesh::new(mesh.clone()).unwrap();
-            let mut memory = CutMemory::default();
+            let mut registry = StrokeRegistry::default();
             if earlier {
                 let mut stroke =
                     Sweep::new(&body, &mesh.positions, &pose(-0.2), options(snap)).unwrap();
                 let delta =
-                    stroke.advance_joining(&mut body, &mesh.positions, &pose(0.1), &mut memory);
+                    stroke.advance_joining(&mut body, &mesh.positions, &pose(0.1), &mut registry);
                 assert!(!delta.unwrap().is_empty());
             }
             let rest = |body: &CuttableMesh| body.mesh().positions.clone();
             let whole = {
-                let (mut body, mut memory) = (body.clone(), memory.clone());
+                let (mut body, mut registry) = (body.clone(), registry.clone());
                 let mut stroke =
                     Sweep::new(&body, &rest(&body), &pose(1.2), options(snap)).unwrap();
                 let positions = rest(&body);
                 stroke
-                    .advance_joining(&mut body, &positions, &pose(-0.2), &mut memory)
+                    .advance_joining(&mut body, &positions, &pose(-0.2), &mut registry)
                     .unwrap();
                 body.mesh().tets.len()
             };
@@ -426,20 +426,20 @@ fn a_refused_step_is_forgotten() {
             let mut stroke = Sweep::new(&body, &rest(&body), &pose(1.2), limited).unwrap();
             let positions = rest(&body);
             stroke
-                .advance_joining(&mut body, &positions, &pose(0.7), &mut memory)
+                .advance_joining(&mut body, &positions, &pose(0.7), &mut registry)
                 .unwrap();
             let (mut twin, mut twin_body, mut twin_memory) =
-                (stroke.clone(), body.clone(), memory.clone());
+                (stroke.clone(), body.clone(), registry.clone());
 
             let positions = rest(&body);
-            let refused = stroke.advance_joining(&mut body, &positions, &pose(-0.2), &mut memory);
+            let refused = stroke.advance_joining(&mut body, &positions, &pose(-0.2), &mut registry);
             assert!(
                 matches!(refused, Err(CutError::TooManyTets { .. })),
                 "nothing was refused"
             );
             assert_eq!(body.mesh(), twin_body.mesh());
             let went_on = stroke
-                .advance_joining(&mut body, &positions, &pose(0.5), &mut memory)
+                .advance_joining(&mut body, &positions, &pose(0.5), &mut registry)
                 .unwrap();
             let expected = twin
                 .advance_joining(&mut twin_body, &positions, &pose(0.5), &mut twin_memory)

@@ -34,7 +34,7 @@ impl MovingSegment {
 
 /// Where and how an edge met the blade.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Meeting {
+pub(crate) struct EdgeHit {
     /// When in the frame: 0 at its start, 1 at its end.
     pub(crate) time: f64,
     /// Where on the edge: 0 at the first end, 1 at the second.
@@ -51,7 +51,7 @@ pub(crate) struct Meeting {
 pub(crate) fn meetings(
     edge: &MovingSegment,
     blade: &MovingSegment,
-) -> impl Iterator<Item = Meeting> {
+) -> impl Iterator<Item = EdgeHit> {
     times(edge, blade).into_iter().flatten().filter_map(|time| {
         let [[a, b], [p, q]] = [edge.at(time), blade.at(time)];
         let (along_edge, along_blade) = (b - a, q - p);
@@ -68,7 +68,7 @@ pub(crate) fn meetings(
         let meets =
             within.contains(&parameter) && within.contains(&on_blade) && normal != DVec3::ZERO;
         let upwards = normal.dot(along_edge) > 0.0;
-        meets.then_some(Meeting {
+        meets.then_some(EdgeHit {
             time,
             parameter: parameter.clamp(0.0, 1.0),
             normal,
@@ -268,7 +268,7 @@ mod tests {
             before: [DVec3::new(0.25, -1.0, -1.0), DVec3::new(0.25, -1.0, 1.0)],
             now: [DVec3::new(0.25, 1.0, -1.0), DVec3::new(0.25, 1.0, 1.0)],
         };
-        let found: Vec<Meeting> = meetings(&edge, &blade).collect();
+        let found: Vec<EdgeHit> = meetings(&edge, &blade).collect();
         assert_eq!(found.len(), 1);
         assert!((found[0].time - 0.5).abs() < 1e-12);
         assert!((found[0].parameter - 0.25).abs() < 1e-12);
@@ -293,7 +293,7 @@ mod tests {
             now: [DVec3::new(-1.0, -3.0, 0.0), DVec3::new(1.0, -3.0, 0.0)],
         };
         let blade = still(DVec3::NEG_Z, DVec3::Z);
-        let found: Vec<Meeting> = meetings(&edge, &blade).collect();
+        let found: Vec<EdgeHit> = meetings(&edge, &blade).collect();
         assert_eq!(found.len(), 1);
         assert!((found[0].time - 0.25).abs() < 1e-12);
         assert!((found[0].parameter - 0.5).abs() < 1e-12);
@@ -307,7 +307,7 @@ mod tests {
             before: [DVec3::new(0.0, -1.0, -1.0), DVec3::new(0.0, 0.5, 1.0)],
             now: [DVec3::new(0.0, 0.5, -1.0), DVec3::new(0.0, -1.0, 1.0)],
         };
-        let found: Vec<Meeting> = meetings(&edge, &blade).collect();
+        let found: Vec<EdgeHit> = meetings(&edge, &blade).collect();
         for m in &found {
             assert!(span(&edge, &blade, m.time).abs() < 1e-12);
         }

@@ -22,11 +22,11 @@
 use glam::DVec3;
 use incise_mesh::{Bounds, ParticleId, TetId, TetMesh};
 
+use crate::ccd::MovingSegment;
 use crate::delta::FaceTag;
 use crate::faces::{Face, TILE};
-use crate::meet::MovingSegment;
 use crate::parallel;
-use crate::tiles::Tiles;
+use crate::tiles::AabbTiles;
 use crate::{CutDelta, CuttableMesh};
 
 /// A box along axes of its own.
@@ -156,7 +156,7 @@ pub(crate) struct Search {
     found: Lists,
     /// Particles that came since the last frame, by whatever cut.
     fresh: Vec<ParticleId>,
-    tiles: Tiles,
+    tiles: AabbTiles,
     marks: Marks,
     /// Whether to look at all tets in every frame.
     #[cfg(test)]
@@ -180,7 +180,7 @@ impl Search {
             known,
             found: Lists::default(),
             fresh: Vec::new(),
-            tiles: Tiles::default(),
+            tiles: AabbTiles::default(),
             marks: Marks::default(),
             #[cfg(test)]
             everywhere: false,

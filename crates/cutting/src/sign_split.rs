@@ -8,7 +8,7 @@
 use incise_mesh::ParticleId;
 
 use crate::blade::AGAIN;
-use crate::operation::{Crossing, Operation, Refusal};
+use crate::operation::{Crossing, Operation, SplitError};
 use crate::parallel;
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh, Separation};
 
@@ -46,8 +46,8 @@ pub(crate) fn cut_by_signs(
         flagged.retain(|c| c.ends.iter().all(|p| !on_surface[p.index()]));
         match operation.split(&flagged) {
             Ok(_) => break,
-            Err(Refusal::TooMany(error)) => return Err(error),
-            Err(Refusal::TooThin(refused)) => {
+            Err(SplitError::TooMany(error)) => return Err(error),
+            Err(SplitError::TooThin(refused)) => {
                 for c in refused {
                     let near = flagged[c].nearer_end().index();
                     snapped += usize::from(!std::mem::replace(&mut on_surface[near], true));

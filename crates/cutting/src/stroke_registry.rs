@@ -1,13 +1,13 @@
-//! [`CutMemory`]: what finished strokes leave for later ones to join.
+//! [`StrokeRegistry`]: what finished strokes leave for later ones to join.
 //!
 //! A face opens where all three particles lie on the surface of one stroke, so a stroke that continues where another
-//! stopped would leave the tets between both fronts as threads. The memory keeps, for each particle along earlier
+//! stopped would leave the tets between both fronts as threads. The registry keeps, for each particle along earlier
 //! strokes, what they knew of it. Where a new stroke meets an edge, it looks at the particles around the edge's ends:
 //! those on an earlier surface that runs the same way (within some 25 degrees) and closely (a quarter of an edge) show
 //! that it is the same surface, and what that stroke knew there is taken over. A surface that crosses at an angle is
 //! left alone.
 //!
-//! Cost: a look-up for each particle around the edges met; the memory grows with the particles along all strokes.
+//! Cost: a look-up for each particle around the edges met; the registry grows with the particles along all strokes.
 
 use std::collections::HashMap;
 
@@ -23,30 +23,30 @@ const ALIGNED: f64 = 0.9;
 
 /// What earlier strokes knew of the particles along them. The caller keeps it from stroke to stroke.
 ///
-/// Hand it to [`crate::Sweep::advance_joining`] and [`crate::cut_surface_joining`]; call [`CutMemory::follow`] after
-/// cuts made without it. Without a memory strokes meet only if they overlap by a tet.
+/// Hand it to [`crate::Sweep::advance_joining`] and [`crate::cut_surface_joining`]; call [`StrokeRegistry::follow`] after
+/// cuts made without it. Without a registry strokes meet only if they overlap by a tet.
 ///
 /// # Example
 /// ```
 /// use glam::DVec3;
-/// use incise_cutting::{CutMemory, CutOptions, CuttableMesh, TriangleSurface, cut_surface_joining};
+/// use incise_cutting::{StrokeRegistry, CutOptions, CuttableMesh, TriangleSurface, cut_surface_joining};
 /// use incise_mesh::kuhn_box;
 ///
 /// let mut body = CuttableMesh::new(kuhn_box([4, 4, 4], DVec3::ONE))?;
-/// let mut memory = CutMemory::default();
+/// let mut registry = StrokeRegistry::default();
 /// // The upper and the lower part of one plane, which meet in the middle of tets.
 /// for center in [0.93, -0.07] {
 ///     let center = DVec3::new(0.4, 0.5, center);
 ///     let half = TriangleSurface::rectangle(center, DVec3::Y, DVec3::Z * 0.5)?;
 ///     let positions = body.mesh().positions.clone();
-///     cut_surface_joining(&mut body, &positions, &half, &CutOptions::default(), &mut memory)?;
+///     cut_surface_joining(&mut body, &positions, &half, &CutOptions::default(), &mut registry)?;
 /// }
 /// assert_eq!(body.mesh().pieces().count, 2);
 /// # Ok::<(), incise_cutting::CutError>(())
 /// ```
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct CutMemory {
+pub struct StrokeRegistry {
     /// Strokes so far.
     strokes: u32,
     /// For each particle and 0, 1, .. a stroke it is known to with what that knows of it. Never iterated in a way that
@@ -54,8 +54,8 @@ pub struct CutMemory {
     known: HashMap<(ParticleId, u32), (u32, Mark), FixedState>,
 }
 
-impl CutMemory {
-    /// Follows a cut that was made without this memory. `options` are those of the cut.
+impl StrokeRegistry {
+    /// Follows a cut that was made without this registry. `options` are those of the cut.
     ///
     /// # Panics
     /// If `cuttable` is not the mesh as `delta` left it.
@@ -63,7 +63,7 @@ impl CutMemory {
         self.follow_all_but(u32::MAX, cuttable, delta, options.reach());
     }
 
-    /// Forgets all particles from the given number on, which an undone cut had made. Linear in the memory.
+    /// Forgets all particles from the given number on, which an undone cut had made. Linear in the registry.
     pub fn truncate(&mut self, particles: usize) {
         self.known.retain(|key, _| key.0.index() < particles);
     }
@@ -138,7 +138,7 @@ impl CutMemory {
                 continue;
             }
             for &corner in &corners {
-                for &(of, upright) in &same {
+                for &(of, same_orientation) in &same {
                     let Some(mark) = self.mark(corner, of) else {
                         continue;
                     };
@@ -147,7 +147,7 @@ impl CutMemory {
                         ours.normal.dot(theirs.normal).abs() < ALIGNED
                             || ours.distance(rest[corner.index()]).abs() > close
                     });
-                    if !beside && surface.adopt(corner, mark, upright) {
+                    if !beside && surface.adopt(corner, mark, same_orientation) {
                         adopted.push(corner);
                     }
                 }
