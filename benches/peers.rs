@@ -32,8 +32,8 @@ fn main() {
         measure("greedy-natural", &|| {
             greedy(&case.incidence(), Order::Natural)
         });
-        measure("greedy-crowded", &|| {
-            greedy(&case.incidence(), Order::Crowded)
+        measure("greedy-degree-bound", &|| {
+            greedy(&case.incidence(), Order::DegreeBound)
         });
         measure("greedy-largest-first", &|| {
             greedy(&case.incidence(), Order::LargestFirst)

@@ -169,7 +169,7 @@ pub(crate) struct ColorArguments {
     /// The coloring: auto, scgc, jones-plassmann, ecl-gc, vivace, wlc, mcs, greedy, dsatur, iterated-greedy or tabu.
     ///
     /// Some take a parameter: scgc:13 for shortcuts 1 and 3 only, vivace:4 for the shrinking factor, wlc:64 for the
-    /// chunk, greedy:ORDER with natural, random, largest-first, crowded or smallest-last, iterated-greedy:PASSES,
+    /// chunk, greedy:ORDER with natural, random, largest-first, degree-bound or smallest-last, iterated-greedy:PASSES,
     /// tabu:STEPS.
     #[arg(long, value_name = "NAME", default_value = "auto")]
     pub(crate) algorithm: String,

@@ -24,9 +24,9 @@ use crate::{
 /// | `vivace`, `vivace:4` | [`vivace`](crate::vivace()), with this shrinking factor |
 /// | `wlc`, `wlc:64` | [`wlc`](crate::wlc()), with this chunk; 2048 without |
 /// | `mcs` | [`greedy`](crate::greedy()) in order of maximum cardinality |
-/// | `greedy`, `greedy:natural` | [`greedy`](crate::greedy()), largest first, or in the order `natural`, `random`, `largest-first`, `crowded` or `smallest-last` |
+/// | `greedy`, `greedy:natural` | [`greedy`](crate::greedy()), largest first, or in the order `natural`, `random`, `largest-first`, `degree-bound` or `smallest-last` |
 /// | `dsatur` | [`dsatur`](crate::dsatur()) |
-/// | `iterated-greedy`, `iterated-greedy:500` | [`iterated_greedy`](crate::iterated_greedy()) after `greedy:crowded`, with so many passes; 50 without |
+/// | `iterated-greedy`, `iterated-greedy:500` | [`iterated_greedy`](crate::iterated_greedy()) after `greedy:degree-bound`, with so many passes; 50 without |
 /// | `tabu`, `tabu:1000000` | [`tabu`](crate::tabu()) after `greedy:smallest-last`, with so many steps a color; 100,000 without |
 ///
 /// ```
@@ -88,7 +88,7 @@ const ORDERS: [(&str, Order); 5] = [
     ("natural", Order::Natural),
     ("random", Order::Random(0)),
     ("largest-first", Order::LargestFirst),
-    ("crowded", Order::Crowded),
+    ("degree-bound", Order::DegreeBound),
     ("smallest-last", Order::SmallestLast),
 ];
 
@@ -107,7 +107,7 @@ impl Algorithm {
         Self::Greedy(Order::LargestFirst),
         Self::Greedy(Order::Natural),
         Self::Greedy(Order::Random(0)),
-        Self::Greedy(Order::Crowded),
+        Self::Greedy(Order::DegreeBound),
         Self::Greedy(Order::SmallestLast),
         Self::Dsatur,
         Self::IteratedGreedy(number(50)),
@@ -159,7 +159,7 @@ impl FromStr for Algorithm {
                 let order = parameter.unwrap_or("largest-first");
                 let known = ORDERS.into_iter().find(|(name, _)| *name == order);
                 known.map(|(_, order)| Self::Greedy(order)).ok_or_else(|| {
-                    refuse("natural, random, largest-first, crowded or smallest-last")
+                    refuse("natural, random, largest-first, degree-bound or smallest-last")
                 })
             }
             "dsatur" => plain(Self::Dsatur),
@@ -205,7 +205,7 @@ impl fmt::Display for Algorithm {
             Self::Greedy(Order::LargestFirst) => f.write_str("greedy"),
             Self::Greedy(Order::Natural) => f.write_str("greedy:natural"),
             Self::Greedy(Order::Random(_)) => f.write_str("greedy:random"),
-            Self::Greedy(Order::Crowded) => f.write_str("greedy:crowded"),
+            Self::Greedy(Order::DegreeBound) => f.write_str("greedy:degree-bound"),
             Self::Greedy(Order::SmallestLast) => f.write_str("greedy:smallest-last"),
             Self::Dsatur => f.write_str("dsatur"),
             Self::IteratedGreedy(passes) if passes.get() == 50 => f.write_str("iterated-greedy"),
@@ -267,7 +267,7 @@ pub fn color(
         Algorithm::Greedy(order) => sequential(greedy(conflicts, order)),
         Algorithm::Dsatur => sequential(dsatur(conflicts)),
         Algorithm::IteratedGreedy(passes) => {
-            let mut coloring = greedy(conflicts, Order::Crowded);
+            let mut coloring = greedy(conflicts, Order::DegreeBound);
             iterated_greedy(conflicts, &mut coloring, passes.get(), bound, seed);
             sequential(coloring)
         }

@@ -4,7 +4,7 @@
 //! colors from below, and a coloring that meets the bound is as good as any. On scanned bodies the
 //! first attempt often does. So the attempts go from cheap to costly and stop at the bound:
 //!
-//! 1. first fit, most crowded first ([`Order::Crowded`]);
+//! 1. first fit, largest degree bound first ([`Order::DegreeBound`]);
 //! 2. a few passes of [`iterated_greedy`](crate::iterated_greedy());
 //! 3. first fit in [`Order::SmallestLast`] and in [`Order::MaximumCardinality`];
 //! 4. [`tabu`](crate::tabu()) from the best so far, for as many steps as there are vertices, for each
@@ -43,7 +43,7 @@ const SEED: u64 = 1;
 
 /// Colors with few colors; stops early where it can tell that there are no fewer.
 ///
-/// Proper, deterministic, labels without gaps. Since [`Order::Crowded`] and the bound read a graph
+/// Proper, deterministic, labels without gaps. Since [`Order::DegreeBound`] and the bound read a graph
 /// differently, it may give another coloring than the incidence it came from. From O(entries) when
 /// the first attempt meets the bound to O(vertices * (degree + colors)) for each color lost and the
 /// last one tried.
@@ -61,7 +61,7 @@ const SEED: u64 = 1;
 #[must_use]
 pub fn auto(conflicts: &impl Conflicts) -> Auto {
     let mut result = Auto {
-        coloring: greedy(conflicts, Order::Crowded),
+        coloring: greedy(conflicts, Order::DegreeBound),
         bound: conflicts.clique_bound(),
         passes: 0,
         steps: 0,

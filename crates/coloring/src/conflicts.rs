@@ -28,7 +28,7 @@ use crate::first_fit::FirstFit;
 /// [`Incidence`] (constraints, which conflict when they share a particle).
 ///
 /// Conflicts are symmetric, and no vertex conflicts with itself. Both implementations of one problem
-/// give equal results in every algorithm of this crate, except where [`crowding`](Self::crowding)
+/// give equal results in every algorithm of this crate, except where [`degree_bound`](Self::degree_bound)
 /// takes part.
 ///
 /// ```
@@ -55,10 +55,10 @@ pub trait Conflicts: Sync {
     /// The number of neighbors of every vertex, each counted once.
     fn degrees(&self) -> Vec<u32>;
 
-    /// How crowded it is around every vertex: a number not below its degree that is cheap to have.
+    /// An upper bound of the degree of every vertex that is cheap to compute.
     ///
     /// A graph has its degrees; incidence counts a neighbor once for every particle shared with it.
-    fn crowding(&self) -> Vec<u32>;
+    fn degree_bound(&self) -> Vec<u32>;
 
     /// All edges, in flat arrays: borrowed from a graph, built from incidence.
     fn graph(&self) -> Cow<'_, ConstraintGraph>;
@@ -102,7 +102,7 @@ impl Conflicts for ConstraintGraph {
     }
 
     /// O(vertices).
-    fn crowding(&self) -> Vec<u32> {
+    fn degree_bound(&self) -> Vec<u32> {
         self.degrees()
     }
 
@@ -169,11 +169,11 @@ impl Conflicts for Incidence {
     }
 
     /// O(entries).
-    fn crowding(&self) -> Vec<u32> {
+    fn degree_bound(&self) -> Vec<u32> {
         let others = |&p: &u32| self.constraints_of(p as usize).len() as u64 - 1;
-        let crowding = |v| self.particles_of(v).iter().map(others).sum::<u64>();
+        let degree_bound = |v| self.particles_of(v).iter().map(others).sum::<u64>();
         (0..self.constraint_count())
-            .map(|v| u32::try_from(crowding(v)).unwrap_or(u32::MAX))
+            .map(|v| u32::try_from(degree_bound(v)).unwrap_or(u32::MAX))
             .collect()
     }
 

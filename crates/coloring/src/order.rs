@@ -25,10 +25,10 @@ pub enum Order {
     /// Most neighbors first, ties by hash: [`priority_order`], that of the parallel algorithms
     /// (Welsh and Powell 1967).
     LargestFirst,
-    /// Most neighbors first, counted the cheap way: [`Conflicts::crowding`], ties by number. From
+    /// Most neighbors first, by an upper bound of their number: [`Conflicts::degree_bound`], ties by number. From
     /// incidence this needs no edges, but where neighbors share several particles it differs from
     /// what a graph gives.
-    Crowded,
+    DegreeBound,
     /// Filled from the back: always the vertex with the fewest neighbors among those not placed yet.
     SmallestLast,
     /// Next the vertex with the most neighbors among those already placed (maximum cardinality
@@ -38,8 +38,8 @@ pub enum Order {
 
 /// All vertices of `conflicts`, those that choose first in front.
 ///
-/// Deterministic, and but for `Crowded` the same for a graph and the incidence it came from. O(n)
-/// for `Natural`, O(n + entries) for `Crowded`, O(n) for `Random`, O(n log n + degrees) for
+/// Deterministic, and but for `DegreeBound` the same for a graph and the incidence it came from. O(n)
+/// for `Natural`, O(n + entries) for `DegreeBound`, O(n) for `Random`, O(n log n + degrees) for
 /// `LargestFirst`, O(n + edges) for the other two, from incidence O(sum over particles of valence
 /// squared).
 ///
@@ -65,27 +65,27 @@ pub fn order(conflicts: &impl Conflicts, order: Order) -> Vec<u32> {
             order
         }
         Order::LargestFirst => priority_order(conflicts),
-        Order::Crowded => most_crowded_first(conflicts),
+        Order::DegreeBound => by_degree_bound(conflicts),
         Order::SmallestLast => smallest_last(conflicts),
         Order::MaximumCardinality => maximum_cardinality(conflicts),
     }
 }
 
 /// Counting sort, descending and stable.
-fn most_crowded_first(conflicts: &impl Conflicts) -> Vec<u32> {
-    let crowding = conflicts.crowding();
-    let most = crowding.iter().max().map_or(0, |&most| most as usize);
-    // From the crowding to the place of the next vertex that has it.
+fn by_degree_bound(conflicts: &impl Conflicts) -> Vec<u32> {
+    let degree_bound = conflicts.degree_bound();
+    let most = degree_bound.iter().max().map_or(0, |&most| most as usize);
+    // From the bound to the place of the next vertex that has it.
     let mut place = vec![0u32; most + 2];
-    for &crowding in &crowding {
-        place[most - crowding as usize + 1] += 1;
+    for &degree_bound in &degree_bound {
+        place[most - degree_bound as usize + 1] += 1;
     }
     for i in 0..=most {
         place[i + 1] += place[i];
     }
-    let mut order = vec![0; crowding.len()];
-    for (v, &crowding) in (0..).zip(&crowding) {
-        let place = &mut place[most - crowding as usize];
+    let mut order = vec![0; degree_bound.len()];
+    for (v, &degree_bound) in (0..).zip(&degree_bound) {
+        let place = &mut place[most - degree_bound as usize];
         order[*place as usize] = v;
         *place += 1;
     }

@@ -12,7 +12,7 @@ const ORDERS: [Order; 6] = [
     Order::Natural,
     Order::Random(7),
     Order::LargestFirst,
-    Order::Crowded,
+    Order::DegreeBound,
     Order::SmallestLast,
     Order::MaximumCardinality,
 ];
@@ -90,7 +90,7 @@ fn check(conflicts: &impl Conflicts) -> usize {
     let bound = conflicts.clique_bound();
     assert!(
         conflicts
-            .crowding()
+            .degree_bound()
             .iter()
             .zip(graph.degrees())
             .all(|(&c, d)| c >= d)
@@ -122,7 +122,7 @@ fn check(conflicts: &impl Conflicts) -> usize {
     let colors = result.coloring.color_count();
     assert_eq!(colors, result.coloring.distinct_colors());
     assert!(bound <= result.bound && result.bound <= colors);
-    assert!(colors <= greedy(conflicts, Order::Crowded).color_count());
+    assert!(colors <= greedy(conflicts, Order::DegreeBound).color_count());
     colors
 }
 
@@ -192,9 +192,9 @@ proptest! {
         let keys = priorities(&graph);
         let largest = order(&graph, Order::LargestFirst);
         prop_assert!(largest.is_sorted_by_key(|&v| std::cmp::Reverse(keys[v as usize])));
-        let crowding = graph.crowding();
-        let crowded = order(&graph, Order::Crowded);
-        prop_assert!(crowded.is_sorted_by_key(|&v| (std::cmp::Reverse(crowding[v as usize]), v)));
+        let degree_bound = graph.degree_bound();
+        let crowded = order(&graph, Order::DegreeBound);
+        prop_assert!(crowded.is_sorted_by_key(|&v| (std::cmp::Reverse(degree_bound[v as usize]), v)));
     }
 
     #[test]
@@ -214,7 +214,7 @@ proptest! {
         prop_assert_eq!(incidence.degrees(), graph.degrees());
         let some: Vec<u32> = order(&graph, Order::Random(seed)).into_iter().step_by(2).collect();
         prop_assert_eq!(incidence.first_fit(&some), graph.first_fit(&some));
-        for by in ORDERS.into_iter().filter(|&by| by != Order::Crowded) {
+        for by in ORDERS.into_iter().filter(|&by| by != Order::DegreeBound) {
             prop_assert_eq!(greedy(&incidence, by), greedy(&graph, by));
         }
         prop_assert_eq!(dsatur(&incidence), dsatur(&graph));

@@ -8,7 +8,7 @@ mod builder;
 mod edit;
 mod interaction;
 mod readback;
-mod retune;
+mod set_solver;
 mod snapshot;
 mod state;
 

@@ -177,7 +177,7 @@ fn load(source: &Source, backend: Backend, gpu: Option<Arc<GpuContext>>) -> anyh
         simulation.offer_device(gpu);
         if backend != Backend::Cpu {
             scene.solver.backend = backend;
-            simulation.retune(&scene.solver)?;
+            simulation.set_solver(&scene.solver)?;
         }
     }
     Ok(Loaded {

@@ -191,7 +191,7 @@ fn every_algorithm_and_clustering_can_be_named() {
         "mcs",
         "greedy:natural",
         "greedy:random",
-        "greedy:crowded",
+        "greedy:degree-bound",
         "greedy:smallest-last",
         "dsatur",
         "iterated-greedy:20",

@@ -206,7 +206,7 @@ impl Links {
     }
 
     /// The sum of the valences of a vertex's particles.
-    pub(super) fn crowding(&self, v: u32) -> u64 {
+    pub(super) fn degree_bound(&self, v: u32) -> u64 {
         let valences = self.of(v).map(|p| self.valence[p as usize]);
         valences.map(u64::from).sum()
     }

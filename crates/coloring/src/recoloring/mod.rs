@@ -86,7 +86,7 @@ pub struct Recoloring {
     /// Vertices that an edit leaves without a color, and the color that they had.
     waiting: Vec<(u32, ColorId)>,
     /// Those that cannot keep it, by the valences of their particles.
-    crowded: Vec<(Reverse<u64>, u32)>,
+    by_bound: Vec<(Reverse<u64>, u32)>,
 }
 
 impl Recoloring {
@@ -157,7 +157,7 @@ impl Recoloring {
             reference: 0,
             slack,
             waiting: Vec::new(),
-            crowded: Vec::new(),
+            by_bound: Vec::new(),
         };
         recoloring.count();
         recoloring
@@ -250,16 +250,16 @@ impl Recoloring {
             }
             !keeps
         });
-        // The most crowded first.
-        self.crowded.clear();
-        let crowded = waiting.iter().map(|&(v, _)| {
-            let crowding = self.links.crowding(v);
-            (Reverse(crowding), v)
+        // Those with the largest bound first.
+        self.by_bound.clear();
+        let by_bound = waiting.iter().map(|&(v, _)| {
+            let degree_bound = self.links.degree_bound(v);
+            (Reverse(degree_bound), v)
         });
-        self.crowded.extend(crowded);
-        self.crowded.sort_unstable();
-        for i in 0..self.crowded.len() {
-            self.place(self.crowded[i].1, &mut report);
+        self.by_bound.extend(by_bound);
+        self.by_bound.sort_unstable();
+        for i in 0..self.by_bound.len() {
+            self.place(self.by_bound[i].1, &mut report);
         }
         self.waiting = waiting;
         while self.sizes.last() == Some(&0) {

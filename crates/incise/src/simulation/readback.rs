@@ -205,7 +205,7 @@ impl Simulation {
     /// `C + α̃ λ` over its two, without unit. The root of the sum of squares is the `dual` of the residuals that the frame
     /// reports. 0 for tets that take no part and for bodies asleep.
     ///
-    /// `None` unless the last frame has reported [`Quantity::Residual`], and after [`Simulation::retune`] until the next
+    /// `None` unless the last frame has reported [`Quantity::Residual`], and after [`Simulation::set_solver`] until the next
     /// one does. VBD knows no multipliers and its force is a matter of particles: `None`, too. O(tets).
     ///
     /// ```

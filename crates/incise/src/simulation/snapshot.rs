@@ -159,10 +159,10 @@ impl Simulation {
     /// Goes to the moment of a snapshot: what follows is to the bit what followed then, on a device on the same device
     /// and driver. The snapshot can be used again.
     ///
-    /// Everything goes back: bodies, colliders, the settings of [`Simulation::retune`] and [`Simulation::set_report`], and
+    /// Everything goes back: bodies, colliders, the settings of [`Simulation::set_solver`] and [`Simulation::set_report`], and
     /// the number of the next frame. Strokes added since are gone. Grabs and strokes begun since are void: their numbers
     /// may come to name later ones. To keep the present settings of the solver, hand a copy of
-    /// [`Simulation::solver_spec`] to `retune` afterwards. [`Simulation::deltas`] is empty: renderers and recorders start
+    /// [`Simulation::solver_spec`] to `set_solver` afterwards. [`Simulation::deltas`] is empty: renderers and recorders start
     /// again from [`Simulation::boundary`], and find other buffers in the solvers of a device. A snapshot of another
     /// simulation makes this one continue that one. O(particles + tets).
     ///

@@ -142,7 +142,7 @@ fn the_choice_is_accurate_at_rest() {
     assert!(state(&chosen) == state(&named));
 }
 
-/// A stiff body next to a soft one: each has its own method, and a cut, a retune and a snapshot keep that.
+/// A stiff body next to a soft one: each has its own method, and a cut, a set_solver and a snapshot keep that.
 #[test]
 fn bodies_have_their_own_methods() {
     let stiff =
@@ -173,13 +173,13 @@ fn bodies_have_their_own_methods() {
     assert!(run(&mut simulation) == first);
     let mut spec = simulation.solver_spec().clone();
     spec.method = Method::GaussSeidel;
-    simulation.retune(&spec).unwrap();
+    simulation.set_solver(&spec).unwrap();
     simulation.step().unwrap();
     assert_eq!(methods(&simulation), [ChosenMethod::GaussSeidel; 2]);
     let capped = simulation.report().bodies[1].choice.unwrap();
     assert_eq!(capped.missed, Some(Missed::Cap));
     spec.method = Method::Auto;
-    simulation.retune(&spec).unwrap();
+    simulation.set_solver(&spec).unwrap();
     simulation.step().unwrap();
     assert_eq!(methods(&simulation), both);
 }

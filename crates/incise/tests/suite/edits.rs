@@ -168,7 +168,7 @@ fn gravity_can_be_turned_on_and_comes_back_with_a_snapshot() {
         iterations: 2,
         ..simulation.solver_spec().clone()
     };
-    simulation.retune(&spec).unwrap();
+    simulation.set_solver(&spec).unwrap();
     let last = height(&simulation);
     simulation.step().unwrap();
     assert!(height(&simulation) - last < -0.9 * time * simulation.time_step());

@@ -121,7 +121,7 @@ fn a_device_at_the_start_is_as_if_set_up_so() {
         let mut expected = Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap();
         let then = go_on(&mut expected);
         for simulation in [&mut from_here, &mut from_there] {
-            simulation.retune(&solver).unwrap();
+            simulation.set_solver(&solver).unwrap();
             let mut devices = simulation.device_solvers();
             assert!(devices.all(|device| Arc::ptr_eq(device.gpu(), &gpu)));
             drop(devices);
@@ -152,10 +152,10 @@ fn the_state_goes_there_and_comes_back() {
         (Backend::Gpu, &scene.solver),
     ];
     for (turn, (backend, solver)) in places.into_iter().enumerate() {
-        stays.retune(solver).unwrap();
+        stays.set_solver(solver).unwrap();
         moves.read_back().unwrap();
         let before = moves.positions().to_vec();
-        moves.retune(&on(backend, solver)).unwrap();
+        moves.set_solver(&on(backend, solver)).unwrap();
         assert_eq!(moves.positions(), before);
         for simulation in [&mut stays, &mut moves] {
             if turn % 2 == 1 {
@@ -193,7 +193,9 @@ fn a_snapshot_goes_back_to_its_place() {
     simulation.step().unwrap();
     let here = simulation.snapshot().unwrap();
     let then = go_on(&mut simulation);
-    simulation.retune(&on(Backend::Gpu, &scene.solver)).unwrap();
+    simulation
+        .set_solver(&on(Backend::Gpu, &scene.solver))
+        .unwrap();
     simulation.step().unwrap();
     let there = simulation.snapshot().unwrap();
     simulation.restore(&here).unwrap();
@@ -203,7 +205,9 @@ fn a_snapshot_goes_back_to_its_place() {
     assert_eq!(simulation.step().unwrap().backend, "gpu");
     // It knows the way by itself now.
     simulation.restore(&here).unwrap();
-    simulation.retune(&on(Backend::Gpu, &scene.solver)).unwrap();
+    simulation
+        .set_solver(&on(Backend::Gpu, &scene.solver))
+        .unwrap();
     assert_eq!(simulation.step().unwrap().backend, "gpu");
 }
 
@@ -217,7 +221,7 @@ fn a_device_is_refused_what_it_does_not_do() {
     let vbd = SolverSpec::of(Method::Vbd);
     let mut there = Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap();
     there.step().unwrap();
-    let error = there.retune(&on(Backend::Gpu, &vbd)).unwrap_err();
+    let error = there.set_solver(&on(Backend::Gpu, &vbd)).unwrap_err();
     assert!(
         matches!(&error, Error::Value { field, .. } if field == "solver.method"),
         "{error}"
@@ -225,10 +229,10 @@ fn a_device_is_refused_what_it_does_not_do() {
     assert_eq!(there.step().unwrap().backend, "gpu");
     there.check().unwrap();
     // Automatically it goes where it can.
-    there.retune(&on(Backend::Auto, &vbd)).unwrap();
+    there.set_solver(&on(Backend::Auto, &vbd)).unwrap();
     assert!(there.backend_note().unwrap().contains("solver.method"));
     assert_eq!(there.step().unwrap().backend, "cpu");
-    there.retune(&on(Backend::Auto, plain)).unwrap();
+    there.set_solver(&on(Backend::Auto, plain)).unwrap();
     let name = if gpu.adapter().software { "cpu" } else { "gpu" };
     assert_eq!(there.step().unwrap().backend, name);
 }

@@ -36,10 +36,10 @@ mod regions;
 mod reports;
 mod residuals;
 mod rest_after_cuts;
-mod retune;
 #[cfg(feature = "save")]
 mod save;
 mod scenarios;
+mod set_solver;
 mod sleep;
 mod snapshot;
 mod strokes;

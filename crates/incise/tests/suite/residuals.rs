@@ -103,9 +103,9 @@ fn they_are_gone_with_what_they_belong_to() {
         iterations: 2,
         ..SolverSpec::default()
     };
-    simulation.retune(&iterations).unwrap();
+    simulation.set_solver(&iterations).unwrap();
     assert!(simulation.residuals_of_tets().is_none());
-    simulation.retune(&SolverSpec::of(Method::Vbd)).unwrap();
+    simulation.set_solver(&SolverSpec::of(Method::Vbd)).unwrap();
     let always = ReportSpec {
         every: 1,
         quantities: vec![Quantity::Residual],

@@ -318,7 +318,7 @@ fn hands_go_on_where_they_were() {
             clustering: "serial:5".to_owned(),
             ..simulation.solver_spec().clone()
         };
-        simulation.retune(&spec).unwrap();
+        simulation.set_solver(&spec).unwrap();
         work(&mut simulation, 12..14);
         simulation.end_stroke(stroke).unwrap();
         simulation.release(grab).unwrap();

@@ -257,7 +257,7 @@ impl Session {
         if let Some(grab) = moment.grab {
             self.simulation.release(grab)?;
         }
-        let turned = self.simulation.retune(&spec);
+        let turned = self.simulation.set_solver(&spec);
         let measured = self.measure(self.measures);
         // Whatever the knobs say, the body is another one.
         self.repaint()?;
@@ -282,7 +282,7 @@ impl Session {
             spec,
         } = turn;
         self.simulation
-            .retune(spec)
+            .set_solver(spec)
             .with_context(|| format!("{knob} stays at {from}"))?;
         self.effects.turned(knob, from, to);
         self.repaint()

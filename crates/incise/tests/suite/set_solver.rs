@@ -50,7 +50,7 @@ fn at_the_start_it_is_as_if_set_up_so() {
             // Making its meshes takes longer than all else.
             let snapshot = simulation.snapshot().unwrap();
             for ((name, solver), expected) in all.iter().zip(&expected) {
-                simulation.retune(solver).unwrap();
+                simulation.set_solver(solver).unwrap();
                 assert_eq!(simulation.solver_spec(), solver);
                 simulation.check().unwrap();
                 assert!(three(&mut simulation) == *expected, "{name} {precision:?}");
@@ -72,14 +72,14 @@ fn other_constraints_follow_from_the_start() {
          compliance = 1e-4"
     ));
     for (name, solver) in settings() {
-        let mut retuned = simulation(&base);
-        assert!(retuned.retune(&solver).is_ok(), "{name}");
+        let mut changed = simulation(&base);
+        assert!(changed.set_solver(&solver).is_ok(), "{name}");
         let mut expected = simulation(&with(&base, &solver));
         for _ in 0..2 {
             expected.step().unwrap();
-            retuned.step().unwrap();
+            changed.step().unwrap();
             assert!(
-                everything(&mut retuned) == everything(&mut expected),
+                everything(&mut changed) == everything(&mut expected),
                 "{name}"
             );
         }
@@ -102,7 +102,7 @@ fn a_cut_body_keeps_its_state() {
             simulation.on_cut().to_vec(),
             simulation.mesh().clone(),
         );
-        simulation.retune(&solver).unwrap();
+        simulation.set_solver(&solver).unwrap();
         simulation.check().unwrap();
         let after = (
             simulation.positions().to_vec(),
@@ -142,7 +142,7 @@ fn obstacles_go_on_from_where_they_are() {
             time_step,
             ..five()
         };
-        simulation.retune(&solver).unwrap();
+        simulation.set_solver(&solver).unwrap();
         for _ in 0..20 {
             simulation.step().unwrap();
             floor += time_step;
@@ -182,8 +182,8 @@ fn softened_tets_of_a_cut_body_are_restored() {
         limits(f64::INFINITY, 5),
         limits(0.5, 2),
     ] {
-        here.retune(&solver).unwrap();
-        there.retune(&solver).unwrap();
+        here.set_solver(&solver).unwrap();
+        there.set_solver(&solver).unwrap();
         assert_eq!(here.softened(), there.softened(), "{solver:?}");
         assert_eq!(here.kappa(), there.kappa());
         here.check().unwrap();
@@ -202,7 +202,7 @@ fn detours_leave_no_trace() {
     let mut end = |way: &[&SolverSpec]| {
         simulation.restore(&snapshot).unwrap();
         for solver in way {
-            simulation.retune(solver).unwrap();
+            simulation.set_solver(solver).unwrap();
         }
         let before = simulation.softened();
         simulation.step().unwrap();
@@ -232,7 +232,7 @@ fn auto_chooses_from_the_body_as_it_is() {
         max_substeps,
         ..five()
     };
-    simulation.retune(&auto(200)).unwrap();
+    simulation.set_solver(&auto(200)).unwrap();
     let chosen = |simulation: &mut Simulation| {
         let bodies = simulation.step().unwrap().bodies.clone();
         bodies
@@ -248,19 +248,19 @@ fn auto_chooses_from_the_body_as_it_is() {
     );
     // Iterations have nothing to do with it.
     simulation
-        .retune(&SolverSpec {
+        .set_solver(&SolverSpec {
             iterations: 2,
             ..auto(200)
         })
         .unwrap();
     assert_eq!(chosen(&mut simulation), first);
-    simulation.retune(&auto(2)).unwrap();
+    simulation.set_solver(&auto(2)).unwrap();
     assert!(
         chosen(&mut simulation)
             .iter()
             .all(|(substeps, _)| *substeps == 2)
     );
-    simulation.retune(&five()).unwrap();
+    simulation.set_solver(&five()).unwrap();
     assert!(simulation.step().unwrap().bodies.is_empty());
 }
 
@@ -280,13 +280,13 @@ fn who_sleeps_wakes() {
         [(); 3].map(|()| asleep(&mut simulation)),
         [false, true, true]
     );
-    simulation.retune(&scene.solver.clone()).unwrap();
+    simulation.set_solver(&scene.solver.clone()).unwrap();
     assert!(asleep(&mut simulation), "nothing differs");
     let more = SolverSpec {
         iterations: 2,
         ..scene.solver.clone()
     };
-    simulation.retune(&more).unwrap();
+    simulation.set_solver(&more).unwrap();
     assert_eq!([(); 2].map(|()| asleep(&mut simulation)), [false, true]);
 }
 
@@ -301,7 +301,7 @@ fn worn_clusters_are_renewed_once_that_is_asked_for() {
         }),
         ..five()
     };
-    simulation.retune(&recluster(1.01)).unwrap();
+    simulation.set_solver(&recluster(1.01)).unwrap();
     assert_eq!(simulation.step().unwrap().reclustered, 0);
     assert!(
         simulation.step().unwrap().reclustered > 0,
@@ -407,7 +407,7 @@ fn what_is_refused_changes_nothing() {
         ),
     ];
     for (solver, key) in refused {
-        let error = simulation.retune(&solver).unwrap_err();
+        let error = simulation.set_solver(&solver).unwrap_err();
         assert!(error.to_string().contains(key), "{key}: {error}");
         assert_eq!(simulation.solver_spec(), &plain());
     }
@@ -425,12 +425,12 @@ fn a_device_is_refused_where_there_is_no_path_to_one() {
     use incise::scene::Backend;
     let mut simulation = simulation(&two_bodies());
     let on = |backend| SolverSpec { backend, ..five() };
-    let error = simulation.retune(&on(Backend::Gpu)).unwrap_err();
+    let error = simulation.set_solver(&on(Backend::Gpu)).unwrap_err();
     assert!(matches!(error, Error::NoGpuPath), "{error}");
     assert!(simulation.backend_note().is_none());
-    simulation.retune(&on(Backend::Auto)).unwrap();
+    simulation.set_solver(&on(Backend::Auto)).unwrap();
     assert!(simulation.backend_note().unwrap().contains("no GPU path"));
-    simulation.retune(&on(Backend::Cpu)).unwrap();
+    simulation.set_solver(&on(Backend::Cpu)).unwrap();
     assert!(simulation.backend_note().is_none());
 }
 
@@ -449,13 +449,13 @@ fn a_snapshot_outlives_other_settings() {
     };
     let then = frames(&mut simulation);
     for (name, solver) in settings() {
-        simulation.retune(&solver).unwrap();
+        simulation.set_solver(&solver).unwrap();
         simulation.step().unwrap();
         simulation.restore(&snapshot).unwrap();
         assert_eq!(simulation.solver_spec(), &five());
         assert!(frames(&mut simulation) == then, "{name}");
         simulation.restore(&snapshot).unwrap();
-        simulation.retune(&solver).unwrap();
+        simulation.set_solver(&solver).unwrap();
         simulation.step().unwrap();
         simulation.check().unwrap();
     }
@@ -475,7 +475,7 @@ proptest! {
         for (act, which, at) in acts {
             match act {
                 0 => simulation.cut(halving(at)).unwrap(),
-                1 => simulation.retune(&settings[which.index(settings.len())].1).unwrap(),
+                1 => simulation.set_solver(&settings[which.index(settings.len())].1).unwrap(),
                 2 => snapshots.push(simulation.snapshot().unwrap()),
                 3 if !snapshots.is_empty() => {
                     simulation.restore(&snapshots[which.index(snapshots.len())]).unwrap();

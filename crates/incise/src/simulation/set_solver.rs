@@ -1,4 +1,4 @@
-//! [`Simulation::retune`]: other settings of the solver for a simulation that runs.
+//! [`Simulation::set_solver`]: other settings of the solver for a simulation that runs.
 //!
 //! Mesh, cuts, positions, velocities, pieces, handles, obstacles and strokes stay as they are. From the settings follow
 //! substeps, softened tets, partitions, what VBD needs and the device: what differs is rebuilt from the body as it is
@@ -29,7 +29,7 @@ use crate::{Error, Scene};
 
 /// What other settings make of an island; what is `None` stays.
 #[derive(Debug)]
-struct Retuned {
+struct ChangedSolver {
     settings: StepSettings,
     /// With the method that was chosen.
     spec: SolverSpec,
@@ -46,7 +46,7 @@ struct Retuned {
 }
 
 impl Simulation {
-    /// The settings of the solver as they are now: those of the scene, or of the last [`Simulation::retune`].
+    /// The settings of the solver as they are now: those of the scene, or of the last [`Simulation::set_solver`].
     #[must_use]
     pub fn solver_spec(&self) -> &SolverSpec {
         &self.state.solver
@@ -87,14 +87,14 @@ impl Simulation {
     /// let mut simulation = Simulation::new(&scene)?;
     /// simulation.step()?;
     /// let spec = SolverSpec { iterations: 3, ..simulation.solver_spec().clone() };
-    /// simulation.retune(&spec)?;
+    /// simulation.set_solver(&spec)?;
     /// simulation.step()?;
-    /// simulation.retune(&SolverSpec::of(Method::Vbd))?;
+    /// simulation.set_solver(&SolverSpec::of(Method::Vbd))?;
     /// simulation.step()?;
     /// assert_eq!(simulation.solver_spec().method, Method::Vbd);
     /// # Ok::<(), incise::Error>(())
     /// ```
-    pub fn retune(&mut self, solver: &SolverSpec) -> Result<(), Error> {
+    pub fn set_solver(&mut self, solver: &SolverSpec) -> Result<(), Error> {
         if *solver == self.state.solver {
             return Ok(());
         }
@@ -118,11 +118,11 @@ impl Simulation {
         if !is_light(&self.state.solver, solver) {
             self.read_back()?;
         }
-        let retuned = || {
+        let changed = || {
             let islands = self.state.islands.par_iter();
             islands
                 .map(|island| {
-                    Retuned::of(
+                    ChangedSolver::of(
                         island,
                         &self.state.solver,
                         &scene,
@@ -132,14 +132,14 @@ impl Simulation {
                 })
                 .collect::<Result<Vec<_>, Error>>()
         };
-        let retuned = match &self.pool {
-            Some(pool) => pool.install(retuned),
-            None => retuned(),
+        let changed = match &self.pool {
+            Some(pool) => pool.install(changed),
+            None => changed(),
         }?;
 
         // Nothing fails from here on: what is on a device has been fetched.
-        for (island, retuned) in self.state.islands.iter_mut().zip(retuned) {
-            retuned.take_effect(island)?;
+        for (island, changed) in self.state.islands.iter_mut().zip(changed) {
+            changed.take_effect(island)?;
             island.judge_settings();
         }
         if let Some(budget) = solver.budget_ms {
@@ -160,7 +160,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Hands a device over that is open, a window's above all: it is the one to be used when [`Simulation::retune`] asks
+    /// Hands a device over that is open, a window's above all: it is the one to be used when [`Simulation::set_solver`] asks
     /// for one next and the simulation is not on one. Without an offer the simulation goes back to a device that it has
     /// left, or opens one as [`Simulation::new`] does.
     ///
@@ -181,7 +181,7 @@ impl Simulation {
     /// simulation.offer_device(gpu);
     /// simulation.step()?;
     /// let spec = SolverSpec { backend: Backend::Gpu, ..simulation.solver_spec().clone() };
-    /// simulation.retune(&spec)?;
+    /// simulation.set_solver(&spec)?;
     /// assert_eq!(simulation.step()?.backend, "gpu");
     /// # Ok::<(), incise::Error>(())
     /// ```
@@ -234,7 +234,7 @@ fn is_light(before: &SolverSpec, after: &SolverSpec) -> bool {
     light == *before
 }
 
-impl Retuned {
+impl ChangedSolver {
     /// What becomes of an island under the settings of `scene`.
     fn of(
         island: &Island,
