@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use incise::scene::StrokeSpec;
 use incise::{Scene, Simulation};
 use incise_render::{
-    Camera, ColorBy, Film, Painting, Picture, RenderError, Renderer, Style, contact_sheet,
+    Animation, Camera, ColorBy, Image, RenderError, RenderScene, Renderer, Style, contact_sheet,
 };
 
 use crate::args::RunArguments;
@@ -33,7 +33,7 @@ const DEEPEST: f64 = 3.0;
 pub(crate) struct Pictures {
     renderer: Renderer,
     note: Option<String>,
-    painting: Painting,
+    painting: RenderScene,
     camera: Camera,
     style: Style,
     size: [u32; 2],
@@ -41,13 +41,13 @@ pub(crate) struct Pictures {
     /// Whether each is a file of its own.
     saved: bool,
     film: Option<PathBuf>,
-    writer: Option<Film>,
+    writer: Option<Animation>,
     /// Every how many frames the film has a picture.
     film_every: u64,
     time_step: f64,
     /// The frames on the sheet, ascending.
     on_sheet: Vec<u64>,
-    sheet: Vec<(Picture, String)>,
+    sheet: Vec<(Image, String)>,
     count: u64,
 }
 
@@ -63,7 +63,7 @@ impl Pictures {
             return Ok(None);
         }
         let (renderer, note) = Renderer::for_simulation(simulation);
-        let painting = Painting::new(simulation, scene);
+        let painting = RenderScene::new(simulation, scene);
         let time_step = scene.solver.time_step;
         Ok(Some(Self {
             renderer,
@@ -98,7 +98,7 @@ impl Pictures {
             // Its folder may be the run's, which has just been made.
             require_file(path)?;
             let seconds = self.film_every as f64 * self.time_step;
-            self.writer = Some(Film::create(path, self.size, seconds)?);
+            self.writer = Some(Animation::create(path, self.size, seconds)?);
         }
         Ok(())
     }
@@ -139,7 +139,7 @@ impl Pictures {
         Ok(())
     }
 
-    fn draw(&mut self, simulation: &mut Simulation) -> Result<Picture, RenderError> {
+    fn draw(&mut self, simulation: &mut Simulation) -> Result<Image, RenderError> {
         if self.renderer.needs_read_back(&self.painting, simulation) {
             simulation.read_back()?;
         }

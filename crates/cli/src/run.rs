@@ -7,7 +7,7 @@ use std::path::Path;
 use anyhow::anyhow;
 use incise::scene::{Backend, Method, Precision, Quantity, line_of};
 use incise::{Error, Scene, Simulation, Warning};
-use incise_render::{ColorBy, Film};
+use incise_render::{Animation, ColorBy};
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::ThreadPoolBuilder;
 
@@ -40,7 +40,7 @@ fn simulate(arguments: &RunArguments) -> Result<(), Failure> {
         require_mesh_file(path)?;
     }
     if let Some(path) = &arguments.film {
-        Film::check_path(path).map_err(|error| Failure::Input(error.into()))?;
+        Animation::check_path(path).map_err(|error| Failure::Input(error.into()))?;
     }
     let scene = scene(arguments)?;
     let frames = arguments

@@ -1,4 +1,4 @@
-// A blur along rows, then along columns. Twin: `blurred` in impression.rs.
+// A blur along rows, then along columns. Twin: `blurred` in contact_shadow.rs.
 
 @group(0) @binding(0) var texels: texture_2d<f32>;
 

@@ -1,11 +1,11 @@
 // Half spaces: a patch of each plane with a grid that fades into the background. Twin: `plane` in shading.rs.
 
-@group(0) @binding(1) var impression: texture_2d<f32>;
+@group(0) @binding(1) var contact_shadow: texture_2d<f32>;
 @group(0) @binding(2) var between: sampler;
 
 const TABLE = vec3<f32>(0.62, 0.635, 0.66);
 const TABLE_LINE = vec3<f32>(0.30, 0.32, 0.36);
-// Half the side of the square with the impression, in radii.
+// Half the side of the square with the contact shadow, in radii.
 const SHARE: f32 = 0.6;
 
 struct Patch {
@@ -14,7 +14,7 @@ struct Patch {
     // Along the grid, of length 1; w: where the lines begin.
     @location(1) u: vec4<f32>,
     @location(2) v: vec4<f32>,
-    // Distance of lines, opacity, 1 if it bears the impressions.
+    // Distance of lines, opacity, 1 if it bears contact shadows.
     @location(3) numbers: vec4<f32>,
 }
 
@@ -68,8 +68,8 @@ fn fragment(seen: Seen) -> @location(0) vec4<f32> {
     // All pixels look it up: a lookup by only some in a square of pixels is not defined.
     let from_center = vec2<f32>(dot(place - seen.center.xyz, seen.u.xyz), dot(place - seen.center.xyz, seen.v.xyz));
     let at = from_center / (SHARE * seen.center.w) * 0.5 + 0.5;
-    let dark = textureSampleLevel(impression, between, at, 0.0).x;
-    let edge = 0.5 / vec2<f32>(textureDimensions(impression));
+    let dark = textureSampleLevel(contact_shadow, between, at, 0.0).x;
+    let edge = 0.5 / vec2<f32>(textureDimensions(contact_shadow));
     let within = seen.numbers.z > 0.0 && all(at >= edge) && all(at <= 1.0 - edge);
     let shadow = select(0.0, dark, within);
     let color = mix(TABLE, TABLE_LINE, 0.55 * lines) * (1.0 - 0.62 * shadow);

@@ -1,22 +1,22 @@
 //! Pictures of deformable bodies: on a GPU without a copy, or by a software rasterizer.
 //!
-//! A [`Painting`] follows a [`Simulation`](incise::Simulation) through its cuts. A [`Renderer`] draws it as a [`Camera`] sees
+//! A [`RenderScene`] follows a [`Simulation`](incise::Simulation) through its cuts. A [`Renderer`] draws it as a [`Camera`] sees
 //! it and a [`Style`] wants it: on a device, where the positions of a solver there are drawn from its own buffer, or on the
-//! processor, with the same formulas and nearly the same pixels. [`Film`] and
+//! processor, with the same formulas and nearly the same pixels. [`Animation`] and
 //! [`contact_sheet`] put pictures together.
 
+mod animation;
 mod camera;
+mod contact_shadow;
 mod error;
-mod film;
 #[cfg(feature = "gpu")]
 mod gpu;
-mod impression;
+mod image;
 mod normals;
-mod painting;
 mod palette;
-mod picture;
 mod props;
 mod raster;
+mod render_scene;
 mod renderer;
 mod shading;
 mod sheet;
@@ -26,15 +26,15 @@ mod stretch;
 mod style;
 mod view;
 
+pub use animation::Animation;
 pub use camera::Camera;
 pub use error::RenderError;
-pub use film::Film;
 #[cfg(feature = "gpu")]
 pub use gpu::{GpuRenderer, Shader, shaders};
+pub use image::Image;
 pub use normals::normal_sums;
-pub use painting::Painting;
 pub use palette::Legend;
-pub use picture::Picture;
+pub use render_scene::RenderScene;
 pub use renderer::Renderer;
 pub use sheet::contact_sheet;
 pub use software::software_picture;

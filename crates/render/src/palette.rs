@@ -33,11 +33,11 @@ impl Legend {
     ///
     /// ```
     /// # use incise::{Scene, Simulation, scene::ShapeSpec};
-    /// # use incise_render::{ColorBy, Painting};
+    /// # use incise_render::{ColorBy, RenderScene};
     /// # let mut scene = Scene::built_in();
     /// # scene.body[0].shape = Some(ShapeSpec { kind: "box".into(), tets: 500 });
     /// # let mut simulation = Simulation::new(&scene)?;
-    /// let mut painting = Painting::new(&simulation, &scene);
+    /// let mut painting = RenderScene::new(&simulation, &scene);
     /// let legend = painting.color(&mut simulation, ColorBy::Stretch, None)?.expect("values");
     /// assert_eq!(legend.low, 1.0);
     /// assert!(legend.color(0.0)[2] > legend.color(1.0)[2], "from blue to red");

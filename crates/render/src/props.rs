@@ -7,7 +7,7 @@ use glam::{DQuat, DVec3, Vec3};
 use incise::Simulation;
 use incise::scene::{ColliderSpec, RotationSpec};
 
-use crate::Painting;
+use crate::RenderScene;
 use crate::palette::nice;
 use crate::view::{View, single};
 
@@ -48,7 +48,7 @@ pub(crate) struct Plane {
     pub(crate) offsets: [f32; 2],
     pub(crate) spacing: f32,
     pub(crate) opacity: f32,
-    /// Whether what stands on it leaves an impression.
+    /// Whether what stands on it leaves an contact_shadow.
     pub(crate) ground: bool,
 }
 
@@ -62,7 +62,7 @@ pub(crate) struct Props {
 }
 
 impl Props {
-    pub(crate) fn new(painting: &Painting, simulation: &Simulation, view: &View) -> Self {
+    pub(crate) fn new(painting: &RenderScene, simulation: &Simulation, view: &View) -> Self {
         let mut props = Self::default();
         let [low, high] = painting.start();
         let (middle, size) = ((low + high) * 0.5, (high - low).length().max(1e-6));

@@ -4,7 +4,7 @@ use incise::Simulation;
 
 #[cfg(feature = "gpu")]
 use crate::GpuRenderer;
-use crate::{Camera, Painting, Picture, RenderError, Style, software_picture};
+use crate::{Camera, Image, RenderError, RenderScene, Style, software_picture};
 
 /// Draws on a device or on the processor.
 #[derive(Debug)]
@@ -69,7 +69,7 @@ impl Renderer {
     /// Whether a simulation has to be [read back](Simulation::read_back) for a picture of the present: it is on a device,
     /// and not drawn from there. Until a step after the painting was made or reset, no simulation is drawn from a device.
     #[must_use]
-    pub fn needs_read_back(&self, painting: &Painting, simulation: &Simulation) -> bool {
+    pub fn needs_read_back(&self, painting: &RenderScene, simulation: &Simulation) -> bool {
         match self {
             #[cfg(feature = "gpu")]
             Self::Gpu(renderer) => renderer.needs_read_back(painting, simulation),
@@ -105,12 +105,12 @@ impl Renderer {
     /// If the painting does not follow the simulation.
     pub fn picture(
         &mut self,
-        painting: &Painting,
+        painting: &RenderScene,
         simulation: &Simulation,
         camera: &Camera,
         style: &Style,
         size: [u32; 2],
-    ) -> Result<Picture, RenderError> {
+    ) -> Result<Image, RenderError> {
         match self {
             #[cfg(feature = "gpu")]
             Self::Gpu(renderer) => renderer.picture(painting, simulation, camera, style, size),

@@ -123,7 +123,7 @@ pub(crate) fn background(y: f32) -> Vec3 {
 }
 
 /// A plane where the ray through a pixel meets it: its color in linear light and how much of what is behind it covers;
-/// and the depth. `shade_of` is the impression of what stands on it, from 0 to 1, at a place relative to the eye.
+/// and the depth. `shade_of` is the contact shadow of what stands on it, from 0 to 1, at a place relative to the eye.
 pub(crate) fn plane(
     view: &View,
     plane: &Plane,

@@ -2,7 +2,7 @@
 
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 
-use crate::Picture;
+use crate::Image;
 
 /// Pixels around each picture.
 const MARGIN: usize = 10;
@@ -20,17 +20,17 @@ const HEIGHT: RasterHeight = RasterHeight::Size16;
 ///
 /// # Example
 /// ```
-/// use incise_render::{Picture, contact_sheet};
+/// use incise_render::{Image, contact_sheet};
 ///
-/// let picture = Picture::filled(80, 60, [120, 60, 50]);
+/// let picture = Image::filled(80, 60, [120, 60, 50]);
 /// let four = vec![(picture, "frame 0".to_owned()); 4];
 /// let sheet = contact_sheet(&four, 3);
 /// assert_eq!((sheet.width, sheet.height), (3 * 90 + 10, 2 * 90 + 10));
 /// ```
 #[must_use]
-pub fn contact_sheet(pictures: &[(Picture, String)], columns: usize) -> Picture {
+pub fn contact_sheet(pictures: &[(Image, String)], columns: usize) -> Image {
     let columns = columns.min(pictures.len()).max(1);
-    let largest = |side: fn(&Picture) -> u32| {
+    let largest = |side: fn(&Image) -> u32| {
         let sides = pictures.iter().map(|(picture, _)| side(picture) as usize);
         sides.max().unwrap_or(0)
     };
@@ -39,7 +39,7 @@ pub fn contact_sheet(pictures: &[(Picture, String)], columns: usize) -> Picture 
     let cell = [width + MARGIN, height + LINE + MARGIN];
     let rows = pictures.len().div_ceil(columns);
     let side = |pixels: usize| u32::try_from(pixels).unwrap_or(u32::MAX);
-    let mut sheet = Picture::filled(
+    let mut sheet = Image::filled(
         side(MARGIN + columns * cell[0]),
         side(MARGIN + rows * cell[1]),
         PAPER,
@@ -58,7 +58,7 @@ pub fn contact_sheet(pictures: &[(Picture, String)], columns: usize) -> Picture 
 }
 
 /// Writes a line of text from a place on, as much of it as fits.
-fn write(sheet: &mut Picture, text: &str, [left, top]: [usize; 2], width: usize) {
+fn write(sheet: &mut Image, text: &str, [left, top]: [usize; 2], width: usize) {
     let advance = get_raster_width(WEIGHT, HEIGHT);
     for (i, letter) in text.chars().take(width / advance).enumerate() {
         let drawn = get_raster(letter, WEIGHT, HEIGHT).or_else(|| get_raster('?', WEIGHT, HEIGHT));

@@ -13,14 +13,14 @@ use incise::Simulation;
 use incise::cutting::FaceTag;
 use rayon::prelude::*;
 
-use crate::impression::Impression;
+use crate::contact_shadow::ContactShadow;
 use crate::normals::normal_sums;
 use crate::props::{Plane, PropCorner, Props};
 use crate::raster::{clip, fill};
 use crate::shading::{self, Surface, direction};
 use crate::srgb::{decode, encode};
 use crate::view::{LARGEST_SIDE, View};
-use crate::{Camera, Painting, Picture, RenderError, Style};
+use crate::{Camera, Image, RenderError, RenderScene, Style};
 
 /// Where the samples of a pixel are: the standard places of Vulkan, Metal and Direct3D.
 const SAMPLES: [Vec2; 4] = [
@@ -47,14 +47,14 @@ const NOTHING: u32 = u32::MAX;
 /// If the painting does not follow the simulation.
 ///
 /// # Example
-/// See [`Painting`].
+/// See [`RenderScene`].
 pub fn software_picture(
-    painting: &Painting,
+    painting: &RenderScene,
     simulation: &Simulation,
     camera: &Camera,
     style: &Style,
     size: [u32; 2],
-) -> Result<Picture, RenderError> {
+) -> Result<Image, RenderError> {
     let view = View::new(camera, size, LARGEST_SIDE)?;
     let frame = Frame::new(view, painting, simulation, *style);
     let placed = frame.place();
@@ -65,7 +65,7 @@ pub fn software_picture(
         .for_each_init(Band::default, |band, (number, rows)| {
             band.draw(&frame, &placed, number * BAND, rows);
         });
-    Ok(Picture {
+    Ok(Image {
         width: size[0],
         height: size[1],
         rgba,
@@ -76,13 +76,13 @@ pub fn software_picture(
 struct Frame<'a> {
     view: View,
     style: Style,
-    painting: &'a Painting,
+    painting: &'a RenderScene,
     colors: &'a [u32],
     /// Of the skin's vertices, relative to the eye.
     places: Vec<Vec3>,
     normals: Vec<Vec3>,
     props: Props,
-    impression: Option<Impression>,
+    contact_shadow: Option<ContactShadow>,
 }
 
 /// A triangle on the screen: pixels from the upper left and one over the depth.
@@ -105,7 +105,7 @@ enum Kind<'a> {
 }
 
 impl<'a> Frame<'a> {
-    fn new(view: View, painting: &'a Painting, simulation: &Simulation, style: Style) -> Self {
+    fn new(view: View, painting: &'a RenderScene, simulation: &Simulation, style: Style) -> Self {
         let skin = painting.skin();
         let positions = simulation.positions();
         let origin = positions.first().copied().unwrap_or_default();
@@ -124,7 +124,8 @@ impl<'a> Frame<'a> {
         let places: Vec<Vec3> = local.into_iter().map(|place| place + from_eye).collect();
         let props = Props::new(painting, simulation, &view);
         let ground = props.planes.iter().find(|plane| plane.ground);
-        let impression = ground.map(|plane| Impression::new(*plane, skin.triangles(), &places));
+        let contact_shadow =
+            ground.map(|plane| ContactShadow::new(*plane, skin.triangles(), &places));
         Self {
             style,
             colors: painting.colors_for(style.color_by),
@@ -132,7 +133,7 @@ impl<'a> Frame<'a> {
             places,
             normals,
             props,
-            impression,
+            contact_shadow,
             view,
         }
     }
@@ -293,9 +294,9 @@ impl<'a> Frame<'a> {
         samples: [(u32, f32); 4],
         colors: &mut [Vec3],
     ) -> bool {
-        let impression = self.impression.as_ref().filter(|_| plane.ground);
+        let contact_shadow = self.contact_shadow.as_ref().filter(|_| plane.ground);
         let seen = shading::plane(&self.view, plane, ray, |place| {
-            impression.map_or(0.0, |impression| impression.at(place))
+            contact_shadow.map_or(0.0, |contact_shadow| contact_shadow.at(place))
         });
         let Some((color, cover, depth)) = seen else {
             return false;

@@ -80,7 +80,7 @@ impl FromStr for ColorBy {
 /// How bodies are drawn.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Style {
-    /// What colors show. Colors other than of tissue are those that [`Painting::color`](crate::Painting::color) made last
+    /// What colors show. Colors other than of tissue are those that [`RenderScene::color`](crate::RenderScene::color) made last
     /// for the same; triangles without one are drawn as tissue.
     pub color_by: ColorBy,
     /// Whether the edges of triangles are drawn.

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail, ensure};
 use clap::Args;
-use incise_render::Picture;
+use incise_render::Image;
 
 use screen::{Button, Running, Screen};
 
@@ -140,7 +140,7 @@ fn portrait(viewer: &Path, backend: &str, screen: &Screen, out: &Path) -> anyhow
 /// Uses the viewer as a person would.
 fn use_it(screen: &Screen, out: &Path) -> anyhow::Result<()> {
     screen.window("block.toml", Duration::from_secs(60))?;
-    let look = |name: &str| -> anyhow::Result<Picture> {
+    let look = |name: &str| -> anyhow::Result<Image> {
         let picture = screen.picture()?;
         picture.write_png(out.join(name))?;
         Ok(picture)
@@ -222,11 +222,11 @@ fn until(what: &str, is_so: impl Fn() -> anyhow::Result<bool>) -> anyhow::Result
 }
 
 /// A column of the screen.
-fn columns(picture: &Picture, from: u32, to: u32) -> Picture {
+fn columns(picture: &Image, from: u32, to: u32) -> Image {
     let row = 4 * picture.width as usize;
     let (left, right) = (4 * from as usize, 4 * to as usize);
     let rows = picture.rgba.chunks_exact(row);
-    Picture {
+    Image {
         width: to - from,
         height: picture.height,
         rgba: rows
@@ -235,15 +235,15 @@ fn columns(picture: &Picture, from: u32, to: u32) -> Picture {
     }
 }
 
-fn body(picture: &Picture) -> Picture {
+fn body(picture: &Image) -> Image {
     columns(picture, 0, PANEL - 10)
 }
 
-fn panel(picture: &Picture) -> Picture {
+fn panel(picture: &Image) -> Image {
     columns(picture, PANEL, picture.width)
 }
 
-fn pixels(picture: &Picture) -> impl Iterator<Item = [u8; 3]> + '_ {
+fn pixels(picture: &Image) -> impl Iterator<Item = [u8; 3]> + '_ {
     picture
         .rgba
         .chunks_exact(4)
@@ -251,7 +251,7 @@ fn pixels(picture: &Picture) -> impl Iterator<Item = [u8; 3]> + '_ {
 }
 
 /// How many different colors there are.
-fn colors_of(picture: &Picture) -> usize {
+fn colors_of(picture: &Image) -> usize {
     let mut colors: Vec<[u8; 3]> = pixels(picture).collect();
     colors.sort_unstable();
     colors.dedup();
@@ -259,14 +259,14 @@ fn colors_of(picture: &Picture) -> usize {
 }
 
 /// The part of the pixels that differ visibly.
-fn differ(a: &Picture, b: &Picture) -> f64 {
+fn differ(a: &Image, b: &Image) -> f64 {
     let far = |(a, b): &([u8; 3], [u8; 3])| (0..3).any(|k| a[k].abs_diff(b[k]) > 12);
     let count = pixels(a).zip(pixels(b)).filter(far).count();
     count as f64 / f64::from(a.width * a.height)
 }
 
 /// How many hues strong colors have: the pieces' colors lie far apart, shading only darkens them.
-fn hues(picture: &Picture) -> usize {
+fn hues(picture: &Image) -> usize {
     const BINS: usize = 36;
     let mut count = [0_usize; BINS];
     for [red, green, blue] in pixels(picture) {
@@ -302,11 +302,11 @@ fn hues(picture: &Picture) -> usize {
 mod tests {
     use super::*;
 
-    fn stripes(colors: &[[u8; 3]]) -> Picture {
+    fn stripes(colors: &[[u8; 3]]) -> Image {
         let row = colors
             .iter()
             .flat_map(|&[r, g, b]| [r, g, b, 255].repeat(20));
-        Picture {
+        Image {
             width: 20 * u32::try_from(colors.len()).unwrap(),
             height: 10,
             rgba: row.collect::<Vec<u8>>().repeat(10),

@@ -8,7 +8,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, anyhow, bail};
-use incise_render::Picture;
+use incise_render::Image;
 use x11rb::CURRENT_TIME;
 use x11rb::connection::Connection;
 use x11rb::protocol::xproto::{
@@ -195,7 +195,7 @@ impl Screen {
     }
 
     /// What the screen shows.
-    pub(super) fn picture(&self) -> anyhow::Result<Picture> {
+    pub(super) fn picture(&self) -> anyhow::Result<Image> {
         let [width, height] = self.size;
         let image = self.connection.get_image(
             ImageFormat::Z_PIXMAP,
@@ -211,7 +211,7 @@ impl Screen {
         let rgba = data
             .chunks_exact(4)
             .flat_map(|bgrx| [bgrx[2], bgrx[1], bgrx[0], 255]);
-        Ok(Picture {
+        Ok(Image {
             width: u32::from(width),
             height: u32::from(height),
             rgba: rgba.collect(),

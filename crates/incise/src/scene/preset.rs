@@ -10,6 +10,6 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Preset {
-    /// That of the paper: see [`SolverSpec::paper`].
+    /// That of the paper: see [`SolverSpec::paper`](super::SolverSpec::paper).
     Paper,
 }

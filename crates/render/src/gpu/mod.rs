@@ -3,7 +3,7 @@
 //! The bodies' vertices are not sent: the vertex shader reads positions from the solver's own buffer, looks up the triangle
 //! and its corners, and normals are computed on the device too. What is sent is all of the skin's triangles and colors when
 //! any changed, and for each picture the view and the obstacles. Several solvers' positions are put together by copies on the device. A
-//! simulation that runs on the processor sends its positions. All is one submit; nothing is read back unless a [`Picture`]
+//! simulation that runs on the processor sends its positions. All is one submit; nothing is read back unless a [`Image`]
 //! is asked for.
 //!
 //! Cost: a thread a triangle for the normals, four samples a pixel.
@@ -23,7 +23,7 @@ use incise::gpu::{GpuContext, GpuSolver};
 pub use shaders::{Shader, shaders};
 
 use crate::view::View;
-use crate::{Camera, Painting, Picture, RenderError, Style};
+use crate::{Camera, Image, RenderError, RenderScene, Style};
 use pipelines::{Pipelines, bind};
 use target::{Dark, Target};
 use upload::{Upload, solvers_here};
@@ -42,7 +42,7 @@ const WIDEST: u32 = 65_535;
 ///
 /// use incise::gpu::{GpuContext, GpuError, GpuOptions};
 /// use incise::{Scene, Simulation, scene::ShapeSpec};
-/// use incise_render::{Camera, GpuRenderer, Painting, Style};
+/// use incise_render::{Camera, GpuRenderer, RenderScene, Style};
 ///
 /// let gpu = match GpuContext::new(&GpuOptions::from_env()) {
 ///     Err(GpuError::NoAdapter { .. }) => return Ok(()), // take the software renderer
@@ -51,7 +51,7 @@ const WIDEST: u32 = 65_535;
 /// let mut scene = Scene::built_in();
 /// scene.body[0].shape = Some(ShapeSpec { kind: "liver".into(), tets: 500 });
 /// let simulation = Simulation::new(&scene)?;
-/// let painting = Painting::new(&simulation, &scene);
+/// let painting = RenderScene::new(&simulation, &scene);
 /// let [low, high] = painting.bounds(&simulation);
 /// let mut renderer = GpuRenderer::new(gpu)?;
 /// let camera = Camera::fit(low, high);
@@ -99,7 +99,7 @@ impl GpuRenderer {
         self.upload.sent()
     }
 
-    /// How often it has read something from the device since it was made, each a wait: once a [`Picture`].
+    /// How often it has read something from the device since it was made, each a wait: once a [`Image`].
     #[must_use]
     pub fn readbacks(&self) -> u64 {
         self.readbacks
@@ -108,7 +108,7 @@ impl GpuRenderer {
     /// Whether a simulation has to be [read back](Simulation::read_back) for a picture of the present: it is on another
     /// device than this, or on any and has made no step since the painting was made or reset.
     #[must_use]
-    pub fn needs_read_back(&self, painting: &Painting, simulation: &Simulation) -> bool {
+    pub fn needs_read_back(&self, painting: &RenderScene, simulation: &Simulation) -> bool {
         let mut solvers = simulation.device_solvers();
         let current = painting.device_is_current();
         solvers.any(|solver| !current || !Arc::ptr_eq(solver.gpu(), &self.gpu))
@@ -128,7 +128,7 @@ impl GpuRenderer {
     /// If the painting does not follow the simulation.
     pub fn draw(
         &mut self,
-        painting: &Painting,
+        painting: &RenderScene,
         simulation: &Simulation,
         camera: &Camera,
         style: &Style,
@@ -160,7 +160,7 @@ impl GpuRenderer {
         let positions = upload.gather(&mut encoder, solvers);
         self.compute_normals(&mut encoder, positions);
         if upload.has_ground {
-            self.draw_impression(&mut encoder, positions);
+            self.draw_contact_shadow(&mut encoder, positions);
         }
         let mut pass = begin(&mut encoder, target);
         let view = || upload.view.raw().as_entire_binding();
@@ -248,14 +248,14 @@ impl GpuRenderer {
     }
 
     /// Draws what bodies leave on the ground and blurs it.
-    fn draw_impression(&self, encoder: &mut wgpu::CommandEncoder, positions: &wgpu::Buffer) {
+    fn draw_contact_shadow(&self, encoder: &mut wgpu::CommandEncoder, positions: &wgpu::Buffer) {
         let [first, second] = &self.dark.views;
         {
             let mut pass = begin_dark(encoder, first);
             if self.upload.triangles.len() > 0 {
                 let bound = bind(
                     &self.gpu,
-                    &self.pipelines.impression.get_bind_group_layout(0),
+                    &self.pipelines.contact_shadow.get_bind_group_layout(0),
                     &[
                         self.upload.ground.raw().as_entire_binding(),
                         positions.as_entire_binding(),
@@ -264,7 +264,7 @@ impl GpuRenderer {
                         self.upload.parts.raw().as_entire_binding(),
                     ],
                 );
-                pass.set_pipeline(&self.pipelines.impression);
+                pass.set_pipeline(&self.pipelines.contact_shadow);
                 pass.set_bind_group(0, &bound, &[]);
                 pass.draw(0..count(3 * self.upload.triangles.len()), 0..1);
             }
@@ -293,12 +293,12 @@ impl GpuRenderer {
     /// Panics where [`GpuRenderer::draw`] does.
     pub fn picture(
         &mut self,
-        painting: &Painting,
+        painting: &RenderScene,
         simulation: &Simulation,
         camera: &Camera,
         style: &Style,
         size: [u32; 2],
-    ) -> Result<Picture, RenderError> {
+    ) -> Result<Image, RenderError> {
         self.draw(painting, simulation, camera, style, size)?;
         match &self.target {
             Some(target) => target.read(&self.gpu, &mut self.readbacks),
@@ -342,7 +342,7 @@ fn begin_dark<'e>(
     view: &wgpu::TextureView,
 ) -> wgpu::RenderPass<'e> {
     encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-        label: Some("impression"),
+        label: Some("contact_shadow"),
         color_attachments: &[Some(wgpu::RenderPassColorAttachment {
             view,
             depth_slice: None,

@@ -11,7 +11,7 @@ use crate::RenderError;
 #[derive(Debug)]
 pub(super) struct Pipelines {
     pub(super) normals: wgpu::ComputePipeline,
-    pub(super) impression: wgpu::RenderPipeline,
+    pub(super) contact_shadow: wgpu::RenderPipeline,
     pub(super) across: wgpu::RenderPipeline,
     pub(super) down: wgpu::RenderPipeline,
     pub(super) background: wgpu::RenderPipeline,
@@ -26,7 +26,7 @@ struct How<'a> {
     fragment: &'a str,
     /// Once for each vertex or each instance, and its rows of numbers, if vertices come from a buffer.
     vertices: Option<(VertexStepMode, &'a [VertexFormat])>,
-    /// Into the picture with its samples and depths, or else into the impression.
+    /// Into the picture with its samples and depths, or else into the contact_shadow.
     depth: Option<Depth>,
     blend: Option<wgpu::BlendState>,
 }
@@ -73,10 +73,10 @@ impl Pipelines {
         };
         let pipelines = Self {
             normals: computed(gpu, "normals"),
-            impression: drawn(
+            contact_shadow: drawn(
                 gpu,
                 &How {
-                    shader: "impression",
+                    shader: "contact_shadow",
                     blend: Some(LARGEST),
                     ..how
                 },

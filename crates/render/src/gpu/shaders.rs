@@ -22,7 +22,10 @@ const DRAWN: [(&str, &str); 4] = [
 ];
 const ALONE: [(&str, &str); 3] = [
     ("normals", include_str!("../../shader/normals.wgsl")),
-    ("impression", include_str!("../../shader/impression.wgsl")),
+    (
+        "contact_shadow",
+        include_str!("../../shader/contact_shadow.wgsl"),
+    ),
     ("blur", include_str!("../../shader/blur.wgsl")),
 ];
 

@@ -6,14 +6,14 @@ use incise::gpu::wgpu::{self, TextureFormat, TextureUsages};
 use incise::gpu::{GpuContext, GpuError};
 
 use super::buffer;
-use crate::impression::SIDE;
-use crate::{Picture, RenderError};
+use crate::contact_shadow::SIDE;
+use crate::{Image, RenderError};
 
 pub(super) const COLOR: TextureFormat = TextureFormat::Rgba8UnormSrgb;
 /// The format of colors without their meaning: eight bits each, as they are stored.
 const STORED: TextureFormat = TextureFormat::Rgba8Unorm;
 pub(super) const DEPTH: TextureFormat = TextureFormat::Depth32Float;
-/// Of the impression on the ground.
+/// Of the contact shadow on the ground.
 pub(super) const DARK: TextureFormat = TextureFormat::R8Unorm;
 /// Samples of a pixel.
 pub(super) const SAMPLES: u32 = 4;
@@ -73,11 +73,7 @@ impl Target {
     }
 
     /// Waits for the picture and reads it; counts that.
-    pub(super) fn read(
-        &self,
-        gpu: &GpuContext,
-        readbacks: &mut u64,
-    ) -> Result<Picture, RenderError> {
+    pub(super) fn read(&self, gpu: &GpuContext, readbacks: &mut u64) -> Result<Image, RenderError> {
         let [width, height] = self.size;
         let row = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let bytes = u64::from(row) * u64::from(height);
@@ -102,7 +98,7 @@ impl Target {
         for line in bytes.chunks_exact(row as usize) {
             rgba.extend_from_slice(&line[..4 * width as usize]);
         }
-        Ok(Picture {
+        Ok(Image {
             width,
             height,
             rgba,
@@ -151,7 +147,7 @@ fn collect(
     Ok(range.to_vec())
 }
 
-/// Two textures for the impression on the ground, which is blurred from one into the other and back.
+/// Two textures for the contact shadow on the ground, which is blurred from one into the other and back.
 #[derive(Debug)]
 pub(super) struct Dark {
     pub(super) views: [wgpu::TextureView; 2],
@@ -176,7 +172,7 @@ impl Dark {
             texture.create_view(&wgpu::TextureViewDescriptor::default())
         };
         Self {
-            views: [texture("impression"), texture("blurred impression")],
+            views: [texture("contact_shadow"), texture("blurred contact_shadow")],
             sampler: device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some("between texels"),
                 mag_filter: wgpu::FilterMode::Linear,

@@ -17,7 +17,7 @@ use super::buffer::Buffer;
 use super::count;
 use crate::props::{Plane, PropCorner, Props};
 use crate::view::View;
-use crate::{Painting, RenderError, Style};
+use crate::{RenderError, RenderScene, Style};
 
 /// Set in a vertex that a cut laid bare.
 const CUT: u32 = 0x8000_0000;
@@ -39,7 +39,7 @@ pub(super) struct ViewNumbers {
     unused: u32,
 }
 
-/// `Patch` in `plane.wgsl`, `Ground` in `impression.wgsl`.
+/// `Patch` in `plane.wgsl`, `Ground` in `contact_shadow.wgsl`.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct PlaneNumbers {
@@ -103,7 +103,7 @@ impl Upload {
     pub(super) fn send(
         &mut self,
         gpu: &GpuContext,
-        painting: &Painting,
+        painting: &RenderScene,
         simulation: &Simulation,
         solvers: &[&GpuSolver],
         style: &Style,
@@ -144,7 +144,7 @@ impl Upload {
     fn send_skin(
         &mut self,
         gpu: &GpuContext,
-        painting: &Painting,
+        painting: &RenderScene,
         simulation: &Simulation,
         solvers: &[&GpuSolver],
     ) -> Result<(), RenderError> {

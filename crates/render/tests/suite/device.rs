@@ -7,7 +7,7 @@ use std::sync::Arc;
 use glam::Vec3;
 use incise::{Scene, Simulation};
 use incise_render::{
-    Camera, ColorBy, GpuRenderer, Painting, Picture, RenderError, Style, normal_sums,
+    Camera, ColorBy, GpuRenderer, Image, RenderError, RenderScene, Style, normal_sums,
     software_picture,
 };
 
@@ -61,8 +61,8 @@ fn both_draw_the_same() {
 
 /// Reads the simulation back, draws it by software and compares. As in `assert_alike`.
 fn assert_present(
-    there: &Picture,
-    painting: &Painting,
+    there: &Image,
+    painting: &RenderScene,
     simulation: &mut Simulation,
     camera: &Camera,
     what: &str,
@@ -79,7 +79,7 @@ fn assert_present(
 /// Draws twice; the second time sends no positions and no skin, and neither reads.
 fn assert_little_is_sent(
     renderer: &mut GpuRenderer,
-    painting: &Painting,
+    painting: &RenderScene,
     simulation: &Simulation,
     camera: &Camera,
 ) {
@@ -104,7 +104,7 @@ fn positions_do_not_leave_the_device() {
     };
     let scene = Scene::from_toml(&LIVER.replace("substeps = 8", "substeps = 1")).unwrap();
     let mut simulation = Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap();
-    let mut painting = Painting::new(&simulation, &scene);
+    let mut painting = RenderScene::new(&simulation, &scene);
     let mut renderer = GpuRenderer::new(gpu).unwrap();
     let camera = Camera::fit(Vec3::splat(-0.22).into(), Vec3::splat(0.2).into());
     let style = Style::default();
@@ -142,7 +142,7 @@ fn a_painting_made_late_needs_positions_of_the_host() {
     for _ in 0..10 {
         simulation.step().unwrap();
     }
-    let mut painting = Painting::new(&simulation, &scene);
+    let mut painting = RenderScene::new(&simulation, &scene);
     for what in ["made", "reset"] {
         assert!(renderer.needs_read_back(&painting, &simulation), "{what}");
         simulation.read_back().unwrap();
@@ -166,7 +166,7 @@ fn bodies_of_several_solvers_are_put_together_on_the_device() {
     let scene = Scene::from_toml(&format!("{TWO_BODIES}{cuts}")).unwrap();
     let mut simulation = Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap();
     assert_eq!(simulation.device_solvers().count(), 2);
-    let mut painting = Painting::new(&simulation, &scene);
+    let mut painting = RenderScene::new(&simulation, &scene);
     let mut renderer = GpuRenderer::new(gpu).unwrap();
     let [low, high] = painting.bounds(&simulation);
     let (camera, style) = (Camera::fit(low, high), Style::default());

@@ -6,12 +6,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 
+mod animation;
 mod camera;
 mod device;
-mod film;
-mod painting;
 mod pictures;
 mod references;
+mod render_scene;
 mod shaders;
 mod sheet;
 mod support;

@@ -1,16 +1,16 @@
 //! Pictures: sizes, threads, cameras in odd places, and that two pieces look like two.
 
 use glam::DVec3;
-use incise_render::{Camera, ColorBy, Picture, RenderError, Style, software_picture};
+use incise_render::{Camera, ColorBy, Image, RenderError, Style, software_picture};
 
 use crate::support::{LIVER, Shown, TWO_BODIES};
 
-fn draw(shown: &Shown, camera: &Camera, style: &Style, size: [u32; 2]) -> Picture {
+fn draw(shown: &Shown, camera: &Camera, style: &Style, size: [u32; 2]) -> Image {
     software_picture(&shown.painting, &shown.simulation, camera, style, size).unwrap()
 }
 
 /// Numbers of pixels of what is red, by connected regions, the largest first; below ten pixels nothing counts.
-fn regions(picture: &Picture) -> Vec<usize> {
+fn regions(picture: &Image) -> Vec<usize> {
     let (width, height) = (picture.width as usize, picture.height as usize);
     let red = |i: usize| i32::from(picture.rgba[4 * i]) - i32::from(picture.rgba[4 * i + 2]) > 25;
     let mut open: Vec<bool> = (0..width * height).map(red).collect();
@@ -225,20 +225,20 @@ fn pictures_shrink_and_survive_files() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.png");
     picture.write_png(&path).unwrap();
-    assert_eq!(Picture::read_png(&path).unwrap(), picture);
+    assert_eq!(Image::read_png(&path).unwrap(), picture);
     let small = picture.shrunk(4);
     assert_eq!((small.width, small.height), (12, 7));
     assert_eq!(picture.shrunk(0), picture);
     assert_eq!(picture.shrunk(32), picture);
     assert_eq!(
-        Picture::filled(9, 9, [10, 200, 90]).shrunk(3),
-        Picture::filled(3, 3, [10, 200, 90])
+        Image::filled(9, 9, [10, 200, 90]).shrunk(3),
+        Image::filled(3, 3, [10, 200, 90])
     );
-    let missing = Picture::read_png(folder.path().join("none.png")).unwrap_err();
+    let missing = Image::read_png(folder.path().join("none.png")).unwrap_err();
     assert!(missing.to_string().contains("none.png"), "{missing}");
     std::fs::write(&path, b"no picture").unwrap();
     assert!(matches!(
-        Picture::read_png(&path),
+        Image::read_png(&path),
         Err(RenderError::Io { .. })
     ));
     assert!(picture.write_png(folder.path().join("none/a.png")).is_err());

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use incise_render::{Camera, ColorBy, Picture, Style, software_picture};
+use incise_render::{Camera, ColorBy, Image, Style, software_picture};
 
 use crate::support::{Difference, LIVER, Shown, TWO_BODIES};
 
@@ -56,8 +56,8 @@ fn references() -> [Reference; 3] {
     ]
 }
 
-fn stored(name: &str) -> Picture {
-    Picture::read_png(path(name)).unwrap_or_else(|error| panic!("{error}: see main.rs"))
+fn stored(name: &str) -> Image {
+    Image::read_png(path(name)).unwrap_or_else(|error| panic!("{error}: see main.rs"))
 }
 
 fn path(name: &str) -> std::path::PathBuf {

@@ -1,16 +1,12 @@
 //! Contact sheets: cells, captions.
 
-use incise_render::{Picture, contact_sheet};
+use incise_render::{Image, contact_sheet};
 
 #[test]
 fn cells_are_as_large_as_the_largest_picture() {
     let caption = "frame 12  0.20 s  2 pieces".to_owned();
-    let pictures = [[30, 20], [50, 10], [20, 40], [5, 5], [50, 40]].map(|[width, height]| {
-        (
-            Picture::filled(width, height, [200, 30, 30]),
-            caption.clone(),
-        )
-    });
+    let pictures = [[30, 20], [50, 10], [20, 40], [5, 5], [50, 40]]
+        .map(|[width, height]| (Image::filled(width, height, [200, 30, 30]), caption.clone()));
     let sheet = contact_sheet(&pictures, 3);
     // 10 pixels between, 20 for a caption.
     assert_eq!((sheet.width, sheet.height), (10 + 3 * 60, 10 + 2 * 70));
@@ -44,13 +40,13 @@ fn cells_are_as_large_as_the_largest_picture() {
 #[test]
 fn captions_differ_and_nothing_is_no_trouble() {
     let sheet =
-        |caption: &str| contact_sheet(&[(Picture::filled(60, 10, [9; 3]), caption.to_owned())], 4);
+        |caption: &str| contact_sheet(&[(Image::filled(60, 10, [9; 3]), caption.to_owned())], 4);
     assert_eq!(sheet("a").width, 80, "as many columns as pictures");
     assert_ne!(sheet("frame 1"), sheet("frame 2"));
     assert_eq!(sheet("ü"), sheet("?"));
     assert_eq!(sheet(""), sheet("   "));
     let none = contact_sheet(&[], 0);
     assert!(none.width > 0 && none.height > 0);
-    let empty = contact_sheet(&[(Picture::filled(0, 0, [0; 3]), "x".to_owned())], 1);
+    let empty = contact_sheet(&[(Image::filled(0, 0, [0; 3]), "x".to_owned())], 1);
     assert_eq!(empty.width, 20);
 }

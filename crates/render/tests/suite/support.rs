@@ -1,20 +1,20 @@
 //! Scenes, comparison of pictures, and the device that all tests of this process share.
 
 use incise::{Scene, Simulation};
-use incise_render::{Camera, Painting, Picture};
+use incise_render::{Camera, Image, RenderScene};
 
 /// A simulation after some frames, and what is drawn of it.
 pub(crate) struct Shown {
     pub(crate) scene: Scene,
     pub(crate) simulation: Simulation,
-    pub(crate) painting: Painting,
+    pub(crate) painting: RenderScene,
 }
 
 impl Shown {
     pub(crate) fn new(toml: &str, frames: usize) -> Self {
         let scene = Scene::from_toml(toml).unwrap();
         let simulation = Simulation::new(&scene).unwrap();
-        let painting = Painting::new(&simulation, &scene);
+        let painting = RenderScene::new(&simulation, &scene);
         let mut shown = Self {
             scene,
             simulation,
@@ -111,7 +111,7 @@ pub(crate) struct Difference {
 }
 
 impl Difference {
-    pub(crate) fn of(a: &Picture, b: &Picture, more_than: u8) -> Self {
+    pub(crate) fn of(a: &Image, b: &Image, more_than: u8) -> Self {
         assert_eq!((a.width, a.height), (b.width, b.height));
         let pixels = a.rgba.len() / 4;
         let (mut sum, mut count) = (0_u64, 0_usize);

@@ -13,7 +13,7 @@ use incise::mesh::glam::DVec3;
 use incise::report::FrameReport;
 use incise::scene::{Quantity, ReportSpec, SolverSpec};
 use incise::{Grab, Scene, Simulation, Snapshot};
-use incise_render::{Camera, ColorBy, Legend, Painting};
+use incise_render::{Camera, ColorBy, Legend, RenderScene};
 
 use self::interaction::Line;
 use crate::history::{History, UndoPoint};
@@ -42,7 +42,7 @@ pub(crate) struct Session {
     pub(crate) name: String,
     pub(crate) scene: Scene,
     pub(crate) simulation: Simulation,
-    pub(crate) painting: Painting,
+    pub(crate) painting: RenderScene,
     pub(crate) camera: Camera,
     pub(crate) grip: Grip,
     pub(crate) times: Times,
@@ -75,7 +75,7 @@ impl Session {
             scene,
             mut simulation,
         } = loaded;
-        let painting = Painting::new(&simulation, &scene);
+        let painting = RenderScene::new(&simulation, &scene);
         let [low, high] = painting.bounds(&simulation);
         let start = simulation.snapshot()?;
         let mut session = Self {

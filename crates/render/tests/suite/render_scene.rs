@@ -4,7 +4,7 @@
 use glam::{DMat3, DQuat, DVec3};
 use incise::cutting::FaceTag;
 use incise::mesh::{ParticleId, TetId};
-use incise_render::{ColorBy, Painting, RenderError, normal_sums, stretch};
+use incise_render::{ColorBy, RenderError, RenderScene, normal_sums, stretch};
 use proptest::prelude::*;
 
 use crate::support::{LIVER, Shown, TWO_BODIES};
@@ -41,7 +41,7 @@ region = { box = { low = [-1.0, -1.0, -1.0], high = [-0.2, 1.0, 0.0] } }
 type Triangle = (TetId, [ParticleId; 3], FaceTag, Option<[u8; 3]>);
 
 /// All triangles with their colors, in an order that does not depend on how they came about.
-fn triangles(painting: &Painting) -> Vec<Triangle> {
+fn triangles(painting: &RenderScene) -> Vec<Triangle> {
     let skin = painting.skin();
     let triangle = |t: usize| {
         let mut corners = skin.triangles()[t].map(|v| skin.vertices()[v as usize].particle);
@@ -73,7 +73,7 @@ fn following_is_starting_anew() {
                 .color(&mut shown.simulation, by, None)
                 .unwrap();
             assert_eq!(legend.is_some(), by == ColorBy::Stretch);
-            let mut rebuilt = Painting::new(&shown.simulation, &shown.scene);
+            let mut rebuilt = RenderScene::new(&shown.simulation, &shown.scene);
             rebuilt.color(&mut shown.simulation, by, None).unwrap();
             let all = triangles(&shown.painting);
             assert_eq!(all, triangles(&rebuilt), "{by}");

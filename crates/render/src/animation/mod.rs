@@ -1,4 +1,4 @@
-//! [`Film`]: pictures one after the other in an animated GIF or PNG.
+//! [`Animation`]: pictures one after the other in an animated GIF or PNG.
 //!
 //! Each picture is stored as what differs from the one before, so that a film of a still background stays small: as the
 //! rectangle around it in a PNG, which keeps every pixel, and pixel by pixel in a GIF, which has 255 colors a picture.
@@ -14,7 +14,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use crate::{Picture, RenderError};
+use crate::{Image, RenderError};
 use apng::Apng;
 use gif::Gif;
 
@@ -27,12 +27,12 @@ const LARGEST_GIF: u32 = 65_535;
 ///
 /// # Example
 /// ```
-/// use incise_render::{Film, Picture};
+/// use incise_render::{Animation, Image};
 ///
 /// let path = std::env::temp_dir().join(format!("incise-render-doc-{}.gif", std::process::id()));
-/// let mut film = Film::create(&path, [8, 6], 0.1)?;
+/// let mut film = Animation::create(&path, [8, 6], 0.1)?;
 /// for step in 0..4 {
-///     film.push(&Picture::filled(8, 6, [40 * step, 90, 120]))?;
+///     film.push(&Image::filled(8, 6, [40 * step, 90, 120]))?;
 /// }
 /// film.finish()?;
 /// assert!(path.exists());
@@ -40,7 +40,7 @@ const LARGEST_GIF: u32 = 65_535;
 /// # Ok::<(), incise_render::RenderError>(())
 /// ```
 #[derive(Debug)]
-pub struct Film {
+pub struct Animation {
     path: PathBuf,
     temporary: PathBuf,
     size: [u32; 2],
@@ -68,7 +68,7 @@ struct Rectangle {
     height: u32,
 }
 
-impl Film {
+impl Animation {
     /// Begins a film of pictures of `size` pixels, each shown for as many seconds, in a file whose ending says the format:
     /// `.gif`, or `.png` or `.apng` for an animated PNG. It plays forever. Most viewers show a picture of a GIF for at
     /// least 0.02 s.
@@ -139,8 +139,8 @@ impl Film {
     ///
     /// # Errors
     /// If it has another size than the film; if it or an earlier one cannot be written: then the film is lost.
-    pub fn push(&mut self, picture: &Picture) -> Result<(), RenderError> {
-        let Picture { width, height, .. } = *picture;
+    pub fn push(&mut self, picture: &Image) -> Result<(), RenderError> {
+        let Image { width, height, .. } = *picture;
         if [width, height] != self.size {
             return Err(RenderError::OtherSize {
                 width,
@@ -198,7 +198,7 @@ impl Film {
     }
 }
 
-impl Drop for Film {
+impl Drop for Animation {
     fn drop(&mut self) {
         // Closed before it is removed: not every system removes an open file.
         self.writer = None;
@@ -301,8 +301,8 @@ mod tests {
         for ending in ["gif", "png"] {
             let name = format!("incise-broken-{}.{ending}", std::process::id());
             let path = std::env::temp_dir().join(name);
-            let picture = Picture::filled(3, 2, [1, 2, 3]);
-            let mut film = Film::create(&path, [3, 2], 0.1).unwrap();
+            let picture = Image::filled(3, 2, [1, 2, 3]);
+            let mut film = Animation::create(&path, [3, 2], 0.1).unwrap();
             film.push(&picture).unwrap();
             // What a push does that fails.
             film.writer = None;
@@ -320,13 +320,13 @@ mod tests {
         let size = [200, 200];
         let name = format!("incise-full-{}.gif", std::process::id());
         let path = std::env::temp_dir().join(name);
-        let mut picture = Picture::filled(size[0], size[1], [0; 3]);
+        let mut picture = Image::filled(size[0], size[1], [0; 3]);
         // More than a buffer of eight thousand bytes holds, however it is compressed.
         let noise = (0..).map(|i: u32| i.wrapping_mul(2_654_435_761).to_be_bytes()[0]);
         for (byte, noise) in picture.rgba.iter_mut().zip(noise) {
             *byte = noise;
         }
-        let mut film = Film::create(&path, size, 0.1).unwrap();
+        let mut film = Animation::create(&path, size, 0.1).unwrap();
         let full = File::options().write(true).open("/dev/full").unwrap();
         film.writer = Some(Writer::Gif(Box::new(Gif::new(full, size).unwrap())));
         assert!(matches!(film.push(&picture), Err(RenderError::Io { .. })));

@@ -1,4 +1,4 @@
-//! [`Painting`]: what is drawn of a simulation, kept current.
+//! [`RenderScene`]: what is drawn of a simulation, kept current.
 //!
 //! It holds the skin, which follows cuts, and the colors of its triangles; obstacles and ground as the scene has them; a
 //! blade where its owner says. It holds no positions: those are the simulation's, on the processor or on a device. What
@@ -23,7 +23,7 @@ const NONE: u32 = 0;
 /// # Example
 /// ```
 /// use incise::{Scene, Simulation};
-/// use incise_render::{Camera, Painting, Style, software_picture};
+/// use incise_render::{Camera, RenderScene, Style, software_picture};
 ///
 /// let scene = Scene::from_toml(
 ///     r#"
@@ -37,7 +37,7 @@ const NONE: u32 = 0;
 ///     "#,
 /// )?;
 /// let mut simulation = Simulation::new(&scene)?;
-/// let mut painting = Painting::new(&simulation, &scene);
+/// let mut painting = RenderScene::new(&simulation, &scene);
 /// let [low, high] = painting.bounds(&simulation);
 /// let camera = Camera::fit(low, high);
 /// for _ in 0..3 {
@@ -50,7 +50,7 @@ const NONE: u32 = 0;
 /// # Ok::<(), incise_render::RenderError>(())
 /// ```
 #[derive(Debug)]
-pub struct Painting {
+pub struct RenderScene {
     skin: Skin,
     /// Of each triangle, or nothing where colors show tissue.
     colors: Vec<u32>,
@@ -76,7 +76,7 @@ pub struct Painting {
     start: [DVec3; 2],
 }
 
-impl Painting {
+impl RenderScene {
     /// All of a simulation as it is now; of `scene`, which it was made from, ground and obstacles. O(tets).
     #[must_use]
     pub fn new(simulation: &Simulation, scene: &Scene) -> Self {
@@ -104,7 +104,7 @@ impl Painting {
     /// Follows a step of the simulation. To be called after each; a second call after the same one does nothing.
     ///
     /// # Panics
-    /// If a step with a cut was left out: [`Painting::reset`] starts over.
+    /// If a step with a cut was left out: [`RenderScene::reset`] starts over.
     pub fn follow(&mut self, simulation: &Simulation) {
         let now = simulation.report().time_s;
         if now == self.followed {
@@ -243,7 +243,7 @@ impl Painting {
         self.add_blade(blade.unwrap_or_default());
     }
 
-    /// Adds another blade to those that are drawn, until the next [`Painting::set_blade`].
+    /// Adds another blade to those that are drawn, until the next [`RenderScene::set_blade`].
     pub fn add_blade(&mut self, blade: &[DVec3]) {
         self.blade_points.extend_from_slice(blade);
         self.blade_ends.push(self.blade_points.len());
@@ -271,7 +271,7 @@ impl Painting {
         &self.skin
     }
 
-    /// The color of each triangle in sRGB, as [`Painting::color`] made them; `None` for one that is drawn as tissue.
+    /// The color of each triangle in sRGB, as [`RenderScene::color`] made them; `None` for one that is drawn as tissue.
     #[must_use]
     pub fn color_of(&self, triangle: usize) -> Option<[u8; 3]> {
         let word = self.colors.get(triangle).copied().unwrap_or(NONE);

@@ -9,7 +9,7 @@ use gif::{DisposalMethod, Encoder, EncodingError, Frame, Repeat};
 
 use super::reduce::{Reduced, reduce};
 use super::{Rectangle, around};
-use crate::Picture;
+use crate::Image;
 
 /// Colors of a picture, and the number of the one that is none.
 const COLORS: usize = 255;
@@ -40,7 +40,7 @@ impl Gif {
 
     pub(super) fn push(
         &mut self,
-        picture: &Picture,
+        picture: &Image,
         shown: &mut Vec<u8>,
         delay: u16,
     ) -> io::Result<()> {

@@ -7,7 +7,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 
 use super::{Rectangle, around};
-use crate::Picture;
+use crate::Image;
 
 /// Parts of a second that delays are counted in.
 const PER_SECOND: u16 = 1000;
@@ -45,7 +45,7 @@ impl Apng {
 
     pub(super) fn push(
         &mut self,
-        picture: &Picture,
+        picture: &Image,
         shown: &mut Vec<u8>,
         delay: u16,
     ) -> io::Result<()> {
@@ -95,7 +95,7 @@ impl Apng {
 }
 
 /// The compressed data of a part of a picture, as the `png` crate divides it.
-fn compressed(picture: &Picture, part: Rectangle) -> io::Result<Vec<Vec<u8>>> {
+fn compressed(picture: &Image, part: Rectangle) -> io::Result<Vec<Vec<u8>>> {
     let mut file = Vec::new();
     let mut encoder = png::Encoder::new(&mut file, part.width, part.height);
     encoder.set_color(png::ColorType::Rgb);

@@ -1,8 +1,8 @@
-//! [`Impression`]: the soft dark spot that bodies leave on the ground, from right above.
+//! [`ContactShadow`]: the soft dark spot that bodies leave on the ground, from right above.
 //!
 //! The ground around the bodies is a square of texels. Each knows how near to the ground the lowest triangle above it is; this
 //! is blurred in both directions. It is no shadow of the key light, which would move with the camera: it shows whether and
-//! where something touches. Twin: `impression.wgsl` and `blur.wgsl`, with all steps rounded to a byte as a texture has
+//! where something touches. Twin: `contact_shadow.wgsl` and `blur.wgsl`, with all steps rounded to a byte as a texture has
 //! them. Cost: a pass over the triangles, most of which are smaller than a texel, and 13 operations a texel twice.
 
 use glam::Vec3;
@@ -14,21 +14,21 @@ use crate::raster::fill;
 pub(crate) const SIDE: usize = 128;
 /// Half the square's side, in radii of the ground's patch.
 pub(crate) const SHARE: f32 = 0.6;
-/// The height at which the impression is a third, in radii.
+/// The height at which the contact shadow is a third, in radii.
 pub(crate) const FALLOFF: f32 = 0.05;
 /// Weights of the blur: the middle and then to both sides, as of a bell of 2.5 texels.
 const WEIGHTS: [f32; 7] = [0.1624, 0.1499, 0.1179, 0.0790, 0.0451, 0.0219, 0.0050];
 
 /// How dark the ground is, texel by texel.
 #[derive(Clone, Debug)]
-pub(crate) struct Impression {
+pub(crate) struct ContactShadow {
     plane: Plane,
     texels: Vec<f32>,
     /// The rows and columns between which it is dark, in texels.
     bounds: [[f32; 2]; 2],
 }
 
-impl Impression {
+impl ContactShadow {
     /// What triangles leave on a plane, with corners at places relative to the eye.
     pub(crate) fn new(plane: Plane, triangles: &[[u32; 3]], places: &[Vec3]) -> Self {
         let mut texels = vec![0.0; SIDE * SIDE];

@@ -1,5 +1,5 @@
 // What bodies leave on the ground, seen from right above: how near the lowest triangle is, the largest value of all that
-// are drawn to a texel. Twin: impression.rs.
+// are drawn to a texel. Twin: contact_shadow.rs.
 
 @group(0) @binding(1) var<storage, read> positions: array<vec4<f32>>;
 // The particle; its part, and in the highest bit whether a cut laid it bare.

@@ -1,4 +1,4 @@
-//! [`Picture`]: pixels, and PNG files of them.
+//! [`Image`]: pixels, and PNG files of them.
 
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Write};
@@ -13,17 +13,17 @@ use crate::srgb::{decode, encode};
 ///
 /// # Example
 /// ```
-/// use incise_render::Picture;
+/// use incise_render::Image;
 ///
 /// let path = std::env::temp_dir().join(format!("incise-render-doc-{}.png", std::process::id()));
-/// let picture = Picture::filled(4, 3, [200, 180, 160]);
+/// let picture = Image::filled(4, 3, [200, 180, 160]);
 /// picture.write_png(&path)?;
-/// assert_eq!(Picture::read_png(&path)?, picture);
+/// assert_eq!(Image::read_png(&path)?, picture);
 /// # std::fs::remove_file(path).ok();
 /// # Ok::<(), incise_render::RenderError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Picture {
+pub struct Image {
     /// Pixels across.
     pub width: u32,
     /// Pixels down.
@@ -32,7 +32,7 @@ pub struct Picture {
     pub rgba: Vec<u8>,
 }
 
-impl Picture {
+impl Image {
     /// One color everywhere.
     #[must_use]
     pub fn filled(width: u32, height: u32, [r, g, b]: [u8; 3]) -> Self {

@@ -4,13 +4,13 @@ use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::Path;
 
-use incise_render::{Film, Picture, RenderError};
+use incise_render::{Animation, Image, RenderError};
 
 /// A square that wanders over a gradient, with a still picture between; many more than 256 colors.
-fn pictures() -> Vec<Picture> {
+fn pictures() -> Vec<Image> {
     let byte = |value: u32| u8::try_from(value % 256).unwrap();
     let picture = |step: u32| {
-        let mut picture = Picture::filled(40, 30, [0; 3]);
+        let mut picture = Image::filled(40, 30, [0; 3]);
         for (x, y) in (0..40_u32).flat_map(|x| (0..30_u32).map(move |y| (x, y))) {
             let inside = x.wrapping_sub(3 * step) < 8 && y.wrapping_sub(2 * step) < 8;
             let color = if inside {
@@ -27,7 +27,7 @@ fn pictures() -> Vec<Picture> {
 }
 
 fn write(path: &Path, seconds: f64) {
-    let mut film = Film::create(path, [40, 30], seconds).unwrap();
+    let mut film = Animation::create(path, [40, 30], seconds).unwrap();
     pictures()
         .iter()
         .for_each(|picture| film.push(picture).unwrap());
@@ -35,13 +35,13 @@ fn write(path: &Path, seconds: f64) {
 }
 
 /// The pictures of an animated PNG, put together as viewers do, and their delays in s.
-fn decode_png(path: &Path) -> (Vec<Picture>, Vec<f64>) {
+fn decode_png(path: &Path) -> (Vec<Image>, Vec<f64>) {
     let decoder = png::Decoder::new(BufReader::new(File::open(path).unwrap()));
     let mut reader = decoder.read_info().unwrap();
     let control = *reader.info().animation_control().unwrap();
     assert_eq!(control.num_plays, 0, "forever");
     let (mut pictures, mut delays) = (Vec::new(), Vec::new());
-    let mut canvas = Picture::filled(40, 30, [0; 3]);
+    let mut canvas = Image::filled(40, 30, [0; 3]);
     for _ in 0..control.num_frames {
         let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
         let info = reader.next_frame(&mut bytes).unwrap();
@@ -70,13 +70,13 @@ fn decode_png(path: &Path) -> (Vec<Picture>, Vec<f64>) {
     (pictures, delays)
 }
 
-fn decode_gif(path: &Path) -> (Vec<Picture>, Vec<f64>) {
+fn decode_gif(path: &Path) -> (Vec<Image>, Vec<f64>) {
     let mut options = gif::DecodeOptions::new();
     options.set_color_output(gif::ColorOutput::RGBA);
     let mut reader = options.read_info(File::open(path).unwrap()).unwrap();
     assert_eq!((reader.width(), reader.height()), (40, 30));
     let (mut pictures, mut delays) = (Vec::new(), Vec::new());
-    let mut canvas = Picture::filled(40, 30, [0; 3]);
+    let mut canvas = Image::filled(40, 30, [0; 3]);
     while let Some(frame) = reader.read_next_frame().unwrap() {
         delays.push(f64::from(frame.delay) / 100.0);
         let pixels = frame.buffer.chunks_exact(4).enumerate();
@@ -105,7 +105,7 @@ fn an_animated_png_keeps_every_pixel() {
         assert_eq!(decoded, pictures());
         assert_eq!(delays, [0.04; 5]);
         // For viewers that know no animation it is the first picture.
-        assert_eq!(Picture::read_png(&path).unwrap(), pictures()[0]);
+        assert_eq!(Image::read_png(&path).unwrap(), pictures()[0]);
     }
 }
 
@@ -137,7 +137,7 @@ fn films_are_small_where_little_changes() {
     for name in ["still.gif", "still.png"] {
         let path = folder.path().join(name);
         let size = |count: usize| {
-            let mut film = Film::create(&path, [40, 30], 0.1).unwrap();
+            let mut film = Animation::create(&path, [40, 30], 0.1).unwrap();
             (0..count).for_each(|_| film.push(&pictures()[0]).unwrap());
             film.finish().unwrap();
             fs::metadata(&path).unwrap().len()
@@ -153,37 +153,37 @@ fn what_is_no_film_is_refused_and_leaves_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     for name in ["film.mp4", "film", "film.gif.txt"] {
-        let error = Film::create(path(name), [4, 4], 0.1).unwrap_err();
+        let error = Animation::create(path(name), [4, 4], 0.1).unwrap_err();
         assert!(error.to_string().contains(".gif, .png, .apng"), "{error}");
-        assert!(Film::check_path(path(name)).is_err());
+        assert!(Animation::check_path(path(name)).is_err());
     }
-    assert!(Film::check_path("a.gif").is_ok());
+    assert!(Animation::check_path("a.gif").is_ok());
     for size in [[0, 4], [4, 0], [65_536, 4]] {
-        let error = Film::create(path("a.gif"), size, 0.1).unwrap_err();
+        let error = Animation::create(path("a.gif"), size, 0.1).unwrap_err();
         assert!(matches!(error, RenderError::Size { .. }), "{error}");
     }
     for seconds in [0.0, -1.0, 11.0, f64::NAN] {
-        let error = Film::create(path("a.gif"), [4, 4], seconds).unwrap_err();
+        let error = Animation::create(path("a.gif"), [4, 4], seconds).unwrap_err();
         assert!(matches!(error, RenderError::FrameTime { .. }), "{error}");
     }
     assert!(matches!(
-        Film::create(path("none/a.gif"), [4, 4], 0.1),
+        Animation::create(path("none/a.gif"), [4, 4], 0.1),
         Err(RenderError::Io { .. })
     ));
     fs::create_dir(path("folder.gif")).unwrap();
     assert!(matches!(
-        Film::create(path("folder.gif"), [4, 4], 0.1),
+        Animation::create(path("folder.gif"), [4, 4], 0.1),
         Err(RenderError::Io { .. })
     ));
     fs::remove_dir(path("folder.gif")).unwrap();
 
     for name in ["a.gif", "a.png"] {
-        let mut film = Film::create(path(name), [40, 30], 0.1).unwrap();
+        let mut film = Animation::create(path(name), [40, 30], 0.1).unwrap();
         film.push(&pictures()[0]).unwrap();
-        let other = film.push(&Picture::filled(30, 40, [0; 3])).unwrap_err();
+        let other = film.push(&Image::filled(30, 40, [0; 3])).unwrap_err();
         assert!(matches!(other, RenderError::OtherSize { .. }), "{other}");
         drop(film);
-        let empty = Film::create(path(name), [40, 30], 0.1).unwrap();
+        let empty = Animation::create(path(name), [40, 30], 0.1).unwrap();
         assert!(matches!(empty.finish(), Err(RenderError::EmptyFilm { .. })));
     }
     assert_eq!(
@@ -198,10 +198,10 @@ fn a_film_replaces_another_when_it_is_finished() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("film.png");
     fs::write(&path, b"before").unwrap();
-    let mut film = Film::create(&path, [40, 30], 0.1).unwrap();
+    let mut film = Animation::create(&path, [40, 30], 0.1).unwrap();
     film.push(&pictures()[0]).unwrap();
     assert_eq!(fs::read(&path).unwrap(), b"before");
     film.finish().unwrap();
-    assert_eq!(Picture::read_png(&path).unwrap(), pictures()[0]);
+    assert_eq!(Image::read_png(&path).unwrap(), pictures()[0]);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
