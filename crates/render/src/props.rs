@@ -48,7 +48,7 @@ pub(crate) struct Plane {
     pub(crate) offsets: [f32; 2],
     pub(crate) spacing: f32,
     pub(crate) opacity: f32,
-    /// Whether what stands on it leaves an contact_shadow.
+    /// Whether what stands on it leaves a contact shadow.
     pub(crate) ground: bool,
 }
 

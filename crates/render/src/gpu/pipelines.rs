@@ -26,7 +26,7 @@ struct How<'a> {
     fragment: &'a str,
     /// Once for each vertex or each instance, and its rows of numbers, if vertices come from a buffer.
     vertices: Option<(VertexStepMode, &'a [VertexFormat])>,
-    /// Into the picture with its samples and depths, or else into the contact_shadow.
+    /// Into the picture with its samples and depths, or else into the contact shadow.
     depth: Option<Depth>,
     blend: Option<wgpu::BlendState>,
 }
