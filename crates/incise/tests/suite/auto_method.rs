@@ -142,7 +142,7 @@ fn the_choice_is_accurate_at_rest() {
     assert!(state(&chosen) == state(&named));
 }
 
-/// A stiff body next to a soft one: each has its own method, and a cut, a set_solver and a snapshot keep that.
+/// A stiff body next to a soft one: each has its own method, and a cut, a `set_solver` and a snapshot keep that.
 #[test]
 fn bodies_have_their_own_methods() {
     let stiff =
