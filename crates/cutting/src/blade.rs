@@ -1,4 +1,4 @@
-//! [`Blade`]: what strokes ask of something that cuts, and [`Hit`]: what they know of an edge that it met.
+//! [`Blade`]: something that cuts, as strokes use it, and [`CrossedEdge`]: where it crosses an edge at rest.
 
 use glam::DVec3;
 
@@ -15,10 +15,10 @@ pub(crate) const AGAIN: f64 = 1.01;
 
 /// Something that cuts.
 pub(crate) trait Blade: Sync {
-    /// Whether it comes by bit by bit, so that a particle must be decided before all meetings are known.
+    /// Whether it moves through the body, so that particles are put on a side before all edge hits are known.
     const IS_SWEPT: bool;
 
-    /// The first meeting with an edge that `keep` does not refuse, and how many there are.
+    /// The first hit on an edge that `keep` does not refuse, and how many there are.
     fn first_meeting(
         &self,
         edge: &MovingSegment,
@@ -36,12 +36,12 @@ pub(crate) trait Blade: Sync {
     fn touches(&self, x: DVec3, length: f64) -> Option<DVec3>;
 }
 
-/// An edge met by the blade, with the surface there.
-pub(crate) struct Hit {
+/// An edge that the blade crosses, with the surface there.
+pub(crate) struct CrossedEdge {
     pub(crate) crossing: Crossing,
     pub(crate) tangent: Tangent,
     /// On which side the ends were seen.
     pub(crate) sides: [Option<bool>; 2],
-    /// How often it is met.
+    /// Number of hits.
     pub(crate) meetings: usize,
 }

@@ -21,7 +21,7 @@ mod snap;
 use glam::{DMat3, DVec3};
 use incise_mesh::{ParticleId, TetId, TetMesh};
 
-use crate::blade::{Blade, Hit, SAME_SHEET};
+use crate::blade::{Blade, CrossedEdge, SAME_SHEET};
 use crate::ccd::{EdgeHit, MovingSegment};
 use crate::operation::{Crossing, Operation, SplitError};
 use crate::parallel;
@@ -186,7 +186,7 @@ impl Stroke {
         &mut self,
         operation: &mut Operation<'_>,
         motion: &mut Motion,
-        mut hits: Vec<Hit>,
+        mut hits: Vec<CrossedEdge>,
         snapped: &[ParticleId],
         fresh: &mut Vec<ParticleId>,
     ) -> Result<Vec<TetId>, CutError> {
@@ -235,9 +235,9 @@ impl Stroke {
     /// Where the two run beside each other, an edge may slip through between the end of one and the start of the other.
     /// So in tets that have particles of both, an edge that no blade met is taken to cross the mean of their tangent
     /// planes, if its ends lie on different sides.
-    fn gaps(&self, cuttable: &CuttableMesh, fresh: &[ParticleId]) -> Vec<Hit> {
+    fn gaps(&self, cuttable: &CuttableMesh, fresh: &[ParticleId]) -> Vec<CrossedEdge> {
         let rest = &cuttable.mesh.positions;
-        let mut gaps: Vec<Hit> = Vec::new();
+        let mut gaps: Vec<CrossedEdge> = Vec::new();
         for tet in cuttable.tets_around(fresh) {
             let corners = cuttable.mesh.tets[tet.index()];
             let on = || corners.into_iter().filter(|&p| self.surface.contains(p));
@@ -259,7 +259,7 @@ impl Stroke {
             let parameter = linear(distances);
             let crossing = Crossing { ends, parameter };
             let upwards = distances[0] < 0.0;
-            gaps.push(Hit {
+            gaps.push(CrossedEdge {
                 crossing,
                 tangent: Tangent {
                     point: rest[ends[0].index()].lerp(rest[ends[1].index()], parameter),
@@ -291,7 +291,7 @@ impl Stroke {
         edges: &[[ParticleId; 2]],
         motion: &Motion,
         blade: &impl Blade,
-    ) -> Vec<Hit> {
+    ) -> Vec<CrossedEdge> {
         let rest = &cuttable.mesh.positions;
         parallel::filter_map(edges, |&ends| {
             if ends.iter().all(|&p| self.surface.contains(p)) {
@@ -309,7 +309,7 @@ impl Stroke {
                 })
             };
             let (meeting, meetings) = blade.first_meeting(&motion.edge(ends), |m| !old(m))?;
-            Some(Hit {
+            Some(CrossedEdge {
                 meetings,
                 ..hit(cuttable, &motion.now, ends, &meeting)
             })
@@ -400,7 +400,12 @@ fn pull_back(
 }
 
 /// What a meeting says of the surface, with its tangent plane carried back to the rest shape.
-fn hit(cuttable: &CuttableMesh, now: &[DVec3], ends: [ParticleId; 2], meeting: &EdgeHit) -> Hit {
+fn hit(
+    cuttable: &CuttableMesh,
+    now: &[DVec3],
+    ends: [ParticleId; 2],
+    meeting: &EdgeHit,
+) -> CrossedEdge {
     let rest = &cuttable.mesh.positions;
     let around = cuttable
         .around(ends[0])
@@ -412,7 +417,7 @@ fn hit(cuttable: &CuttableMesh, now: &[DVec3], ends: [ParticleId; 2], meeting: &
         point: a + (b - a) * meeting.parameter,
         normal: pull_back(cuttable, now, around, meeting.normal).unwrap_or(along),
     };
-    Hit {
+    CrossedEdge {
         crossing: Crossing {
             ends,
             parameter: meeting.parameter,

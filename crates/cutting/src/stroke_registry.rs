@@ -14,7 +14,7 @@ use std::collections::HashMap;
 use foldhash::fast::FixedState;
 use incise_mesh::ParticleId;
 
-use crate::blade::{Hit, SAME_SHEET};
+use crate::blade::{CrossedEdge, SAME_SHEET};
 use crate::surface::{CutSurface, Mark};
 use crate::{CutDelta, CutOptions, CuttableMesh};
 
@@ -97,7 +97,7 @@ impl StrokeRegistry {
         &self,
         stroke: u32,
         cuttable: &CuttableMesh,
-        hits: &[Hit],
+        hits: &[CrossedEdge],
         surface: &mut CutSurface,
         adopted: &mut Vec<ParticleId>,
     ) -> bool {

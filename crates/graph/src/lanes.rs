@@ -223,13 +223,6 @@ impl Lanes {
         self.colors.tidy();
         self.free.tidy();
     }
-
-    /// Bytes of all lists.
-    #[must_use]
-    pub fn bytes(&self) -> usize {
-        let rows = self.colors.value_count() + self.free.value_count();
-        size_of_val(&*self.list) + size_of_val(&*self.slots) + size_of::<u32>() * rows
-    }
 }
 
 fn check_width(width: usize) {

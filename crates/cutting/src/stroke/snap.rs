@@ -8,7 +8,7 @@ use incise_mesh::ParticleId;
 
 use super::Stroke;
 use crate::CuttableMesh;
-use crate::blade::{AGAIN, Hit};
+use crate::blade::{AGAIN, CrossedEdge};
 use crate::operation::Operation;
 use crate::surface::Tangent;
 
@@ -21,7 +21,7 @@ impl Stroke {
     pub(super) fn snap(
         &mut self,
         operation: &mut Operation<'_>,
-        hits: &[Hit],
+        hits: &[CrossedEdge],
         touched: Vec<(ParticleId, Tangent)>,
         foresee: bool,
     ) -> Vec<ParticleId> {

@@ -1,4 +1,4 @@
-//! [`Method`]: how a substep is solved, and the defaults that go with it.
+//! [`Method`]: how a substep is solved, and [`TetSolve`]: the constraints of a tet.
 
 use serde::{Deserialize, Serialize};
 

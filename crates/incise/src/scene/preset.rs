@@ -1,7 +1,4 @@
-//! [`Preset`]: a setting of the solver under one name, whose single keys can still be overridden.
-//!
-//! The keys that a scene names are laid over those of the preset, so a preset is a set of other defaults. The defaults
-//! of a method that is not the default one are treated the same way.
+//! [`Preset`]: the name of a set of defaults for `[solver]`. [`SolverSpec`](super::SolverSpec) has the values.
 
 use serde::{Deserialize, Serialize};
 

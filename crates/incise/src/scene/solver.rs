@@ -1,4 +1,6 @@
 //! [`SolverSpec`]: how a scene is computed.
+//!
+//! Keys that a scene names replace those of its preset or method, which are sets of other defaults.
 
 use std::num::NonZeroU32;
 

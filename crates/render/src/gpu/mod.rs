@@ -3,7 +3,7 @@
 //! The bodies' vertices are not sent: the vertex shader reads positions from the solver's own buffer, looks up the triangle
 //! and its corners, and normals are computed on the device too. What is sent is all of the skin's triangles and colors when
 //! any changed, and for each picture the view and the obstacles. Several solvers' positions are put together by copies on the device. A
-//! simulation that runs on the processor sends its positions. All is one submit; nothing is read back unless a [`Image`]
+//! simulation that runs on the processor sends its positions. All is one submit; nothing is read back unless an [`Image`]
 //! is asked for.
 //!
 //! Cost: a thread a triangle for the normals, four samples a pixel.
@@ -99,7 +99,7 @@ impl GpuRenderer {
         self.upload.sent()
     }
 
-    /// How often it has read something from the device since it was made, each a wait: once a [`Image`].
+    /// How often it has read something from the device since it was made, each a wait: once an [`Image`].
     #[must_use]
     pub fn readbacks(&self) -> u64 {
         self.readbacks

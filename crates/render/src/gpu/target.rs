@@ -172,7 +172,7 @@ impl Dark {
             texture.create_view(&wgpu::TextureViewDescriptor::default())
         };
         Self {
-            views: [texture("contact_shadow"), texture("blurred contact_shadow")],
+            views: [texture("contact shadow"), texture("blurred contact shadow")],
             sampler: device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some("between texels"),
                 mag_filter: wgpu::FilterMode::Linear,

@@ -80,21 +80,10 @@ pub(super) fn add_symmetric<R: Float>(h: &mut [R; 6], block: &Block<R>) {
     }
 }
 
-/// A direction that differs from particle to particle: each coordinate in -1 .. 1, by the mixing step of `SplitMix64`.
-#[cold]
-pub(super) fn push_of<R: Float>(particle: usize) -> R::Vector {
-    let coordinate = |k: u64| {
-        let mut z = (particle as u64 * 3 + k + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        R::from_f64(((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0)
-    };
-    R::vector(coordinate(0), coordinate(1), coordinate(2))
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{push_of, solve};
+    use super::solve;
+    use crate::vbd::sweep::push_of;
 
     /// In single precision, beside slivers of any flatness, no step leads above where it started. Without the bound on
     /// the solution three of ten do.

@@ -378,6 +378,7 @@ impl<R: Float> ImplicitStep<'_, R> {
                     if finite::<R>(moved) { moved } else { x },
                 );
             }
+            // The base is outside, and exact.
             if part > R::ZERO {
                 constraints.colliders.project(particles);
             }

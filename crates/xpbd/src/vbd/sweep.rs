@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::block::{push_of, solve};
+use super::block::solve;
 use super::constraints::Local;
 use super::{ImplicitStep, VertexStars};
 use crate::constraints::outside;
@@ -130,4 +130,16 @@ impl<R: Float> Sweep<R> {
             store::<R>(particle, moved);
         }
     }
+}
+
+/// A direction that differs from particle to particle: each coordinate in -1 .. 1, by the mixing step of `SplitMix64`.
+#[cold]
+pub(super) fn push_of<R: Float>(particle: usize) -> R::Vector {
+    let coordinate = |k: u64| {
+        let mut z = (particle as u64 * 3 + k + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        R::from_f64(((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0)
+    };
+    R::vector(coordinate(0), coordinate(1), coordinate(2))
 }
