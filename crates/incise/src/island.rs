@@ -265,6 +265,12 @@ impl Island {
         self.choice.is_some_and(|choice| choice.by_vbd)
     }
 
+    /// Whether two-level VBD has an accuracy to reach. Single precision may not resolve it: the strains of a stiff body in
+    /// free fall are rounding.
+    pub(crate) fn must_converge(&self) -> bool {
+        self.spec.method == Method::Vbd && self.spec.two_level && self.spec.accuracy.is_some()
+    }
+
     /// Judges the accuracy of the present settings and notes warnings. O(tets log tets).
     pub(crate) fn judge_settings(&mut self) {
         self.warnings.clear();

@@ -164,7 +164,7 @@ impl Simulation {
         let mut islands = make_islands(precision, joined)?;
         let short = || {
             let mut islands = islands.iter();
-            islands.any(|island| island.is_too_short_for_f32() || island.chose_vbd())
+            islands.any(|island| island.is_too_short_for_f32() || island.must_converge())
         };
         if scene.solver.precision == Precision::Auto && !compute_device.is_gpu() && short() {
             precision = Precision::F64;
