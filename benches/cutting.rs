@@ -86,7 +86,7 @@ fn followers(
     bench.measure_per(&format!("{cut}-pieces"), count, |b| {
         b.iter_batched_ref(
             || pieces.clone(),
-            |pieces| pieces.follow(after, delta),
+            |pieces| pieces.apply_delta(after, delta),
             BatchSize::PerIteration,
         );
     });
@@ -94,7 +94,7 @@ fn followers(
     bench.measure_per(&format!("{cut}-skin"), count, |b| {
         b.iter_batched_ref(
             || skin.clone(),
-            |skin| skin.follow(delta),
+            |skin| skin.apply_delta(delta),
             BatchSize::PerIteration,
         );
     });

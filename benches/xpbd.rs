@@ -8,12 +8,11 @@
 // The same reason as in the library.
 #![expect(clippy::unwrap_used, reason = "benches stop at the first surprise")]
 
-mod follow;
 mod plain;
+mod update;
 
 use std::num::NonZeroUsize;
 
-use follow::{Following, Stage};
 use incise::clustering::serial_neighbor;
 use incise::coloring::scgc;
 use incise::graph::{Clustering, Schedule};
@@ -23,6 +22,7 @@ use incise::xpbd::{Material, Real, Solver, StepSettings, TetSolve};
 use incise_benches::{Bench, Case};
 use plain::Plain;
 use rayon::{ThreadPool, ThreadPoolBuilder};
+use update::{Stage, Updated};
 
 fn main() {
     let pools = [1, 2].map(|threads| {
@@ -36,8 +36,7 @@ fn main() {
             ("cut-layout", Stage::Layout, false),
             ("cut-layout-rebuilt", Stage::Layout, true),
         ] {
-            let mut following =
-                Following::new(bench.case, solver::<f32>(bench.case, 0.0), rebuilds);
+            let mut following = Updated::new(bench.case, solver::<f32>(bench.case, 0.0), rebuilds);
             bench.measure(name, |b| {
                 b.iter_custom(|count| (0..count).map(|_| following.time(stage)).sum());
             });

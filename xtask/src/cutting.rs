@@ -261,10 +261,10 @@ fn alone(models: &[Model]) -> anyhow::Result<Table> {
             seconds[0] += start.elapsed().as_secs_f64();
             delta.extend_particles(&mut positions);
             let start = Instant::now();
-            pieces.follow(&body, &delta);
+            pieces.apply_delta(&body, &delta);
             seconds[1] += start.elapsed().as_secs_f64();
             let start = Instant::now();
-            skin.follow(&delta);
+            skin.apply_delta(&delta);
             seconds[2] += start.elapsed().as_secs_f64();
             cut_tets += delta.removed.len();
             deltas.push(delta);

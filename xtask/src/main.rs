@@ -2,27 +2,27 @@
 //!
 //! One module per command; no algorithms of its own, except the slow ones that results are compared with.
 
+mod accuracy;
 mod coloring;
+mod comparison;
 mod cutting;
 mod defaults;
+mod degradation;
 mod experiment;
 mod gpu;
-mod lean;
 mod models;
+mod overhead;
 mod paper;
-mod peers;
 #[cfg(test)]
 mod prose;
 mod random;
-mod soak;
 mod solver;
 mod stability;
+mod stress;
 mod sweep;
 #[cfg(test)]
 mod tidy;
-mod trade;
 mod viewer;
-mod wear;
 
 use anyhow::Context;
 use clap::{Parser, Subcommand};
@@ -77,11 +77,11 @@ const EXPERIMENTS: &[(&str, Run)] = &[
     ("paper-claims", |arguments| {
         paper::run(paper::What::Claims, arguments)
     }),
-    ("trade", trade::trade),
+    ("accuracy", accuracy::accuracy),
     ("stability", stability::stability),
     ("defaults", defaults::all),
-    ("lean", lean::run),
-    ("peers", peers::usual),
+    ("overhead", overhead::run),
+    ("comparison", comparison::usual),
 ];
 
 #[derive(Debug, Subcommand)]
@@ -101,27 +101,27 @@ enum Command {
     /// Gather what runs with --shard have measured, and write the pages.
     Merge(MergeArguments),
     /// What a scene pays for what it does not use: instructions, bytes, dispatches.
-    Lean(lean::LeanArguments),
-    /// What `lean` runs under valgrind.
+    Overhead(overhead::OverheadArguments),
+    /// What `overhead` runs under valgrind.
     #[command(hide = true)]
-    LeanProbe(lean::ProbeArguments),
+    OverheadProbe(overhead::ProbeArguments),
     /// Our solver next to other systems on the same mesh, each in turns with ours.
-    Peers(peers::PeersArguments),
+    Comparison(comparison::ComparisonArguments),
     /// Compare the methods of the solver: what they cost and what they are worth.
     Solver(solver::SolverArguments),
     /// Make random strokes by the thousand and check everything after each.
-    SoakCut(soak::SoakArguments),
+    StressCut(stress::StressArguments),
     /// What becomes of bodies in extreme states, materials, steps and cuts: a matrix, and why what does not recover
     /// does not.
     Stability(ExperimentArguments),
     /// Cut meshes, check everything and write a table.
     Sweep(sweep::SweepArguments),
     /// What accuracy costs: errors against Newton's method beside times, for every knob of the solver.
-    Trade(ExperimentArguments),
+    Accuracy(ExperimentArguments),
     /// Use the viewer with a synthetic hand on a screen without a monitor, and check what it shows (needs Xvfb).
     ViewerSmoke(viewer::SmokeArguments),
     /// Cut a mesh many times in small strokes, and see what becomes of clusters, colors and the time to solve.
-    Wear(wear::WearArguments),
+    Degradation(degradation::DegradationArguments),
 }
 
 fn main() -> anyhow::Result<()> {
@@ -135,16 +135,16 @@ fn main() -> anyhow::Result<()> {
         Command::Merge(arguments) => experiment::merge(&arguments)?
             .iter()
             .try_for_each(|(name, of_this)| named(name)?(of_this)),
-        Command::Lean(arguments) => lean::lean(&arguments),
-        Command::LeanProbe(arguments) => lean::probe(&arguments),
-        Command::Peers(arguments) => peers::peers(&arguments),
+        Command::Overhead(arguments) => overhead::overhead(&arguments),
+        Command::OverheadProbe(arguments) => overhead::probe(&arguments),
+        Command::Comparison(arguments) => comparison::comparison(&arguments),
         Command::Solver(arguments) => solver::solver(&arguments),
-        Command::SoakCut(arguments) => soak::soak(&arguments),
+        Command::StressCut(arguments) => stress::stress(&arguments),
         Command::Stability(arguments) => stability::stability(&arguments),
         Command::Sweep(arguments) => sweep::sweep(&arguments),
-        Command::Trade(arguments) => trade::trade(&arguments),
+        Command::Accuracy(arguments) => accuracy::accuracy(&arguments),
         Command::ViewerSmoke(arguments) => viewer::smoke(&arguments),
-        Command::Wear(arguments) => wear::wear(&arguments),
+        Command::Degradation(arguments) => degradation::degradation(&arguments),
     }
 }
 

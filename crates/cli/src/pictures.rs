@@ -111,7 +111,7 @@ impl Pictures {
         saved: bool,
         folder: &Path,
     ) -> anyhow::Result<()> {
-        self.painting.follow(simulation);
+        self.painting.sync(simulation);
         let frame = simulation.report().frame;
         let saved = saved && self.saved;
         let filmed = self.writer.is_some() && frame.is_multiple_of(self.film_every);

@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for frame in 1..=13 {
         let positions = body.mesh().positions.clone(); // those of a simulation, where the body moves
         let delta = stroke.advance(&mut body, &positions, &blade(1.1 - 0.1 * f64::from(frame)))?;
-        let came_off = pieces.follow(&body, &delta).len();
+        let came_off = pieces.apply_delta(&body, &delta).len();
         println!(
             "frame {frame:2}: {:3} tets split, {:3} new ones, {:3} new triangles, {came_off} piece(s) came off",
             delta.removed.len(),

@@ -241,7 +241,7 @@ impl Search {
     pub(crate) fn keep(&mut self, delta: &CutDelta) {
         std::mem::swap(&mut self.known, &mut self.found);
         self.fresh.clear();
-        self.follow(delta);
+        self.apply_delta(delta);
     }
 
     /// Forgets a frame that did not come to be.
@@ -250,7 +250,7 @@ impl Search {
     }
 
     /// Follows a cut made by whomever.
-    pub(crate) fn follow(&mut self, delta: &CutDelta) {
+    pub(crate) fn apply_delta(&mut self, delta: &CutDelta) {
         let new = delta.particles_before..delta.particles_after();
         self.fresh.extend(new.map(ParticleId::new));
     }

@@ -71,7 +71,7 @@ pub enum PieceEvent {
 ///     let positions = body.mesh().positions.clone();
 ///     let plane = Plane { point: DVec3::splat(x), normal: DVec3::X };
 ///     let delta = cut_plane(&mut body, &positions, &plane, &CutOptions::default())?;
-///     for event in pieces.follow(&body, &delta) {
+///     for event in pieces.apply_delta(&body, &delta) {
 ///         let PieceEvent::Detached { piece, from, volume, .. } = event else { continue };
 ///         println!("piece {piece} of {volume} m³ came off piece {from}");
 ///     }
@@ -169,7 +169,7 @@ impl PieceTracker {
     ///
     /// # Panics
     /// If the tracker does not follow the deltas of this mesh one by one, or from 2³² pieces on.
-    pub fn follow(&mut self, cuttable: &CuttableMesh, delta: &CutDelta) -> Vec<PieceEvent> {
+    pub fn apply_delta(&mut self, cuttable: &CuttableMesh, delta: &CutDelta) -> Vec<PieceEvent> {
         assert_eq!(
             self.piece_of.len(),
             delta.tets_before,

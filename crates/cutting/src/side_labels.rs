@@ -34,7 +34,7 @@ impl GivenSides {
     }
 
     /// Updates the tets after a cut or a removal made outside of the stroke.
-    pub(crate) fn follow(&mut self, delta: &CutDelta) {
+    pub(crate) fn apply_delta(&mut self, delta: &CutDelta) {
         if self.0.is_empty() {
             return;
         }

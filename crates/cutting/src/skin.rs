@@ -47,7 +47,7 @@ pub struct SkinChange {
 /// let positions = body.mesh().positions.clone();
 /// let plane = Plane { point: DVec3::splat(0.4), normal: DVec3::X };
 /// let delta = cut_plane(&mut body, &positions, &plane, &CutOptions::default())?;
-/// let changed = skin.follow(&delta);
+/// let changed = skin.apply_delta(&delta);
 /// println!("{} triangles to upload", changed.triangles.len());
 /// let normals = skin.normals(&body.mesh().positions);
 /// for (vertex, normal) in skin.vertices().iter().zip(&normals) {
@@ -134,7 +134,7 @@ impl Skin {
     ///
     /// # Panics
     /// If the delta does not follow the last one.
-    pub fn follow(&mut self, delta: &CutDelta) -> SkinChange {
+    pub fn apply_delta(&mut self, delta: &CutDelta) -> SkinChange {
         let mut change = SkinChange::default();
         for triangle in &delta.surface_removed {
             self.remove(triangle, &mut change);

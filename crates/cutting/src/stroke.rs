@@ -157,7 +157,7 @@ impl Stroke {
         }
         self.surface.copy(&delta);
         if let (Some(registry), Some(number)) = (registry, self.number) {
-            registry.follow_all_but(number, cuttable, &delta, self.options.reach());
+            registry.apply_delta_to_others(number, cuttable, &delta, self.options.reach());
             registry.learn(number, &mut self.surface);
         }
         Ok(delta)
@@ -278,10 +278,10 @@ impl Stroke {
     }
 
     /// Follows a cut that another stroke made.
-    pub(crate) fn follow(&mut self, cuttable: &CuttableMesh, delta: &CutDelta) {
-        self.given.follow(delta);
+    pub(crate) fn apply_delta(&mut self, cuttable: &CuttableMesh, delta: &CutDelta) {
+        self.given.apply_delta(delta);
         self.surface
-            .follow(delta, &cuttable.mesh.positions, self.options.reach());
+            .apply_delta(delta, &cuttable.mesh.positions, self.options.reach());
     }
 
     /// The edges met, each with its first meeting that is not with the sheet one of its ends lies on.

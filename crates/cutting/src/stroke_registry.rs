@@ -59,8 +59,8 @@ impl StrokeRegistry {
     ///
     /// # Panics
     /// If `cuttable` is not the mesh as `delta` left it.
-    pub fn follow(&mut self, cuttable: &CuttableMesh, delta: &CutDelta, options: &CutOptions) {
-        self.follow_all_but(u32::MAX, cuttable, delta, options.reach());
+    pub fn apply_delta(&mut self, cuttable: &CuttableMesh, delta: &CutDelta, options: &CutOptions) {
+        self.apply_delta_to_others(u32::MAX, cuttable, delta, options.reach());
     }
 
     /// Forgets all particles from the given number on, which an undone cut had made. Linear in the registry.
@@ -164,7 +164,7 @@ impl StrokeRegistry {
     }
 
     /// Follows a cut with what all strokes but one know, as [`CutSurface::follow`] does.
-    pub(crate) fn follow_all_but(
+    pub(crate) fn apply_delta_to_others(
         &mut self,
         stroke: u32,
         cuttable: &CuttableMesh,

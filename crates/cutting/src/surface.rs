@@ -210,7 +210,7 @@ impl CutSurface {
 
     /// Follows a cut made by another stroke. A new particle between two on the surface is on it as well, and so is one
     /// beside it that is closer than `reach` times the edge: it may lie behind the front, where no blade will come by.
-    pub(crate) fn follow(&mut self, delta: &CutDelta, rest: &[DVec3], reach: f64) {
+    pub(crate) fn apply_delta(&mut self, delta: &CutDelta, rest: &[DVec3], reach: f64) {
         for (i, point) in delta.points.iter().enumerate() {
             let particle = ParticleId::new(delta.particles_before + i);
             let tangents = point.ends.map(|p| self.tangent(p));

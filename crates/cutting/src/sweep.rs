@@ -236,11 +236,11 @@ impl Sweep {
     ///
     /// # Panics
     /// If `cuttable` is not the mesh as `delta` left it.
-    pub fn follow(&mut self, cuttable: &CuttableMesh, delta: &CutDelta) {
+    pub fn apply_delta(&mut self, cuttable: &CuttableMesh, delta: &CutDelta) {
         delta.extend_particles(&mut self.before);
-        self.search.follow(delta);
+        self.search.apply_delta(delta);
         self.tets = delta.tets_after();
-        self.stroke.follow(cuttable, delta);
+        self.stroke.apply_delta(cuttable, delta);
     }
 }
 

@@ -26,9 +26,9 @@ fn main(
     var x = particle.xyz + corrections[p].xyz;
     corrections[p] = vec4(0.0);
     if KEEPS {
-        if turn.weight > 0.0 {
+        if current.weight > 0.0 {
             let start = before[p].xyz;
-            x = start + (x - start) * turn.weight;
+            x = start + (x - start) * current.weight;
         }
         before[p] = particle;
     }

@@ -17,11 +17,11 @@ fn main(
     var multiplier = multipliers[place];
     // A substep begins without multipliers.
     var start = vec4(0.0);
-    if turn.iteration > 0u {
+    if current.iteration > 0u {
         start = history[place];
     }
-    if turn.weight > 0.0 {
-        multiplier = start.zw + (multiplier - start.zw) * turn.weight;
+    if current.weight > 0.0 {
+        multiplier = start.zw + (multiplier - start.zw) * current.weight;
         multipliers[place] = multiplier;
     }
     // Nothing but the tets changes them: the next iteration begins with these.

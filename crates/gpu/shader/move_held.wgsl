@@ -19,7 +19,7 @@ fn main(
         return;
     }
     let attachment = attachments[index];
-    let row = (turn.substep + 1u) * settings.handles;
+    let row = (current.substep + 1u) * settings.handles;
     let x = at_pose(poses[row + attachment.handle], attachment.place);
     if are_finite(x) {
         particles[attachment.particle] = vec4(x, particles[attachment.particle].w);

@@ -120,7 +120,7 @@ fn main(
     }
     let before = previous[p].xyz;
     let number = settings.obstacles;
-    let first = turn.substep * number;
+    let first = current.substep * number;
     var x = particle.xyz;
     var moved = false;
     // Obstacles in a row that the particle is not inside of.

@@ -27,11 +27,11 @@ fn main(
     if !(inverse_mass > 0.0) {
         return;
     }
-    let row = turn.substep * settings.handles + attachment.handle;
+    let row = current.substep * settings.handles + attachment.handle;
     let start = at_pose(poses[row], attachment.place);
     let target_ = at_pose(poses[row + settings.handles], attachment.place);
     var multiplier = vec3(0.0);
-    if KEEPS && turn.iteration > 0u {
+    if KEEPS && current.iteration > 0u {
         multiplier = multipliers[index].xyz;
     }
     let x = particles[p].xyz;

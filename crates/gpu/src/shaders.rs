@@ -4,8 +4,8 @@ use std::mem::offset_of;
 
 use crate::coloring::{Round, SEARCH_WORDS, VivaceSettings, WAIT_WORDS, WlcWork, Work};
 use crate::solver::{
-    Attachment, DispatchRange, ParticlePatch, ParticleSums, Settings, TetPatch, TetSums, Turn,
-    Units,
+    Attachment, DispatchRange, IterationUniform, ParticlePatch, ParticleSums, Settings, TetPatch,
+    TetSums, Units,
 };
 use crate::{coloring, solver};
 
@@ -119,7 +119,7 @@ pub fn shared_structs() -> Vec<SharedStruct> {
             material
         }),
         shared!(DispatchRange { first, count }),
-        shared!(Turn {
+        shared!(IterationUniform {
             substep,
             iteration,
             weight,

@@ -58,7 +58,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         // Output: triangles and vertices that changed, then positions and normals of all vertices.
         let (mut triangles, mut vertices) = (0, 0);
         for delta in simulation.deltas() {
-            let changed = skin.follow(delta);
+            let changed = skin.apply_delta(delta);
             triangles += changed.triangles.len(); // upload skin.triangles()[i] for each
             vertices += changed.vertices.len();
             delta.extend_with(&mut uv, |a, b, t| a.lerp(*b, t));

@@ -11,9 +11,9 @@ use incise_xpbd::Pose;
 use crate::Error;
 use crate::backend::{AnySolver, each_mut};
 use crate::collider::rotation;
-use crate::limits::{coordinates, value, within};
 use crate::region::particles;
 use crate::scene::{AttachmentSpec, along};
+use crate::validate::{coordinates, value, within};
 
 /// Names an attachment of a simulation from when it is added until it is removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -130,7 +130,7 @@ impl AnySolver {
     }
 
     /// Applies a cut to particles, tets and masses. Costs what the cut touched.
-    pub(crate) fn follow(
+    pub(crate) fn apply_delta(
         &mut self,
         delta: &CutDelta,
         cuttable: &CuttableMesh,
@@ -389,7 +389,7 @@ impl<R: Real> SolverBackend for Backend<R> {
 
     fn update_vbd(&mut self, ms: &mut Milliseconds) -> Result<(), Error> {
         let Self { solver, vbd } = self;
-        vbd.as_mut().map_or(Ok(()), |vbd| vbd.follow(solver, ms))
+        vbd.as_mut().map_or(Ok(()), |vbd| vbd.sync(solver, ms))
     }
 
     fn vbd_error(&self) -> Option<f64> {

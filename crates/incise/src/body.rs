@@ -4,9 +4,9 @@ use incise_mesh::TetMesh;
 use incise_meshing::{Shape, generate};
 use incise_xpbd::Material;
 
-use crate::limits::{LARGEST_COORDINATE, coordinates, value, within};
 use crate::region::{particles, tets};
 use crate::scene::{BodySpec, MaterialSpec, Substeps};
+use crate::validate::{LARGEST_COORDINATE, coordinates, value, within};
 use crate::{Error, Scene};
 
 /// A body in the world.

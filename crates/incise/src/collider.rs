@@ -3,8 +3,8 @@
 use glam::{DQuat, DVec3};
 use incise_xpbd::{Collider, ColliderShape, StepSettings};
 
-use crate::limits::{LARGEST_COORDINATE, coordinates, direction, within};
 use crate::scene::{ColliderSpec, GroundSpec};
+use crate::validate::{LARGEST_COORDINATE, coordinates, direction, within};
 use crate::{Error, Scene};
 
 /// The rotation about an axis by an angle.

@@ -10,8 +10,8 @@ use std::sync::Arc;
 #[cfg(feature = "gpu")]
 use incise_gpu::{GpuContext, GpuOptions};
 
-use crate::limits::value;
 use crate::scene::{Backend, Method, Precision};
+use crate::validate::value;
 use crate::{Error, Scene};
 
 /// A device that is open, if one is.

@@ -8,8 +8,8 @@ use incise_graph::{Clustering, Incidence, Schedule};
 use incise_xpbd::DistanceConstraint;
 
 use crate::backend::{AnySolver, each_mut};
-use crate::limits::{LARGEST_COORDINATE, coordinates, existing, value, within};
 use crate::scene::{DistanceSpec, EndSpec};
+use crate::validate::{LARGEST_COORDINATE, coordinates, existing, value, within};
 use crate::{Error, Scene};
 
 /// Names a distance constraint of a simulation from when it is added until it is removed.

@@ -708,7 +708,7 @@ impl Island {
 
     /// Lets solver, pieces, clusters, colors, schedule and volume constraints follow a cut of the mesh, and wakes it.
     /// Returns what happened to its pieces.
-    pub(crate) fn follow(
+    pub(crate) fn apply_delta(
         &mut self,
         delta: &CutDelta,
         ms: &mut Milliseconds,
@@ -724,7 +724,7 @@ impl Island {
                 each!(&self.solver, solver => accuracy_data(solver, tet.tet.index(), settings));
             self.outside.remove(data);
         }
-        self.solver.follow(delta, &self.cuttable)?;
+        self.solver.apply_delta(delta, &self.cuttable)?;
         let mut stiffest = 0.0_f64;
         for tet in &delta.added {
             let data =
@@ -735,13 +735,13 @@ impl Island {
         if let Some(noted) = &mut self.cut_kappa {
             noted.new_tets = noted.new_tets.max(stiffest);
         }
-        let events = self.pieces.follow(&self.cuttable, delta);
-        self.partition.follow(delta, &self.cuttable, ms)?;
+        let events = self.pieces.apply_delta(&self.cuttable, delta);
+        self.partition.apply_delta(delta, &self.cuttable, ms)?;
         if let Some(recluster) = &mut self.recluster {
             recluster.note(delta);
         }
         if let Some(volumes) = &self.volumes {
-            volumes.follow(
+            volumes.apply_delta(
                 &mut self.solver,
                 delta,
                 &self.cuttable,
@@ -780,7 +780,7 @@ impl Island {
             return Ok(());
         };
         let (nothing, schedule) = (CutDelta::default(), &self.partition.schedule);
-        volumes.follow(&mut self.solver, &nothing, &self.cuttable, schedule)
+        volumes.apply_delta(&mut self.solver, &nothing, &self.cuttable, schedule)
     }
 
     /// Has [`Island::follow`] note the largest kappa of the tets that the cuts of a frame make, and that of all tets before the

@@ -14,10 +14,10 @@ use crate::attachment::{Attachment, AttachmentHandle};
 use crate::backend::{AnySolver, each, each_mut, mass};
 use crate::body::Body;
 use crate::distance::{DistanceHandle, Distances};
-use crate::limits::{existing, value};
 use crate::method::tet_solve;
 use crate::scene::{Precision, SolverSpec, Substeps};
 use crate::substeps::{Choice, TetDemand, choose};
+use crate::validate::{existing, value};
 use crate::volume::Volumes;
 use crate::{Error, Scene, distance};
 

@@ -7,7 +7,7 @@ use glam::DVec3;
 use incise_cutting::CutError;
 
 use crate::Error;
-use crate::limits::coordinates;
+use crate::validate::coordinates;
 
 /// How far a blade is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

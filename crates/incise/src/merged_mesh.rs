@@ -118,7 +118,7 @@ impl MergedMesh {
     }
 
     /// Follows a cut in one island; returns what it changed in the numbers of the merged mesh.
-    pub(crate) fn follow(&mut self, island: usize, delta: &CutDelta) -> CutDelta {
+    pub(crate) fn apply_delta(&mut self, island: usize, delta: &CutDelta) -> CutDelta {
         let numbers = &mut self.numbers[island];
         let (particles_before, tets_before) = (self.mesh.positions.len(), self.mesh.tets.len());
         let new = delta.particles_after() - delta.particles_before;

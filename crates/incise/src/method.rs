@@ -9,9 +9,9 @@
 use incise_xpbd::{StepSettings, VbdSettings};
 
 use crate::accuracy::DEFAULT_ACCURACY;
-use crate::limits::{coordinates, value, within};
 use crate::scene::{Integrator, Method, SolverSpec, Substeps, TetSolve};
 use crate::substeps::{Choice, Missed};
+use crate::validate::{coordinates, value, within};
 use crate::{Error, Scene, collider};
 
 /// Rounds of two-level VBD in a frame, at most: what has not converged then is reported.

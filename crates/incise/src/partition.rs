@@ -29,7 +29,7 @@ pub(crate) struct Partition {
     pub(crate) schedule: Schedule,
     settings: PartitionSettings,
     /// Number of colors and mean cluster size after the last complete rebuild.
-    fresh: [f64; 2],
+    rebuilt: [f64; 2],
     #[cfg_attr(feature = "save", serde(skip))]
     lists: Lists,
 }
@@ -103,10 +103,10 @@ impl Partition {
             recoloring,
             schedule,
             settings,
-            fresh: [1.0; 2],
+            rebuilt: [1.0; 2],
             lists: Lists::default(),
         };
-        partition.fresh = partition.measures();
+        partition.rebuilt = partition.measures();
         Ok(partition)
     }
 
@@ -114,10 +114,10 @@ impl Partition {
         self.settings
     }
 
-    /// How far cuts have worn it: its number of colors over that when it was fresh, or the mean size of its clusters then
+    /// Degradation by cuts: its number of colors over that when it was rebuilt, or the mean size of its clusters then
     /// over that now, whichever is larger. O(1).
-    pub(crate) fn wear(&self) -> f64 {
-        let ([colors, size], now) = (self.fresh, self.measures());
+    pub(crate) fn degradation(&self) -> f64 {
+        let ([colors, size], now) = (self.rebuilt, self.measures());
         (now[0] / colors).max(size / now[1])
     }
 
@@ -138,7 +138,7 @@ impl Partition {
     /// small clusters around or become new ones, clusters that stay small are merged, and clusters with new particles
     /// get a color; everything else stays. Without merging the children on each side of a cut tet become clusters of
     /// their own. `cuttable` is the mesh after the cut.
-    pub(crate) fn follow(
+    pub(crate) fn apply_delta(
         &mut self,
         delta: &CutDelta,
         cuttable: &CuttableMesh,
@@ -217,7 +217,7 @@ impl Partition {
         }
         self.schedule
             .rebuild(&self.clustering, self.recoloring.coloring());
-        self.fresh = self.measures();
+        self.rebuilt = self.measures();
         Ok(())
     }
 
@@ -468,7 +468,7 @@ mod tests {
                 delta.apply(&mut mesh);
                 let cuttable = CuttableMesh::new(mesh.clone()).unwrap();
                 let mut ms = Milliseconds::default();
-                partition.follow(&delta, &cuttable, &mut ms).unwrap();
+                partition.apply_delta(&delta, &cuttable, &mut ms).unwrap();
                 partition.check(&mesh).unwrap();
                 assert_eq!(partition.clustering.constraint_count(), mesh.tets.len());
             }

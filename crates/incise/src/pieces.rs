@@ -79,7 +79,7 @@ impl PieceNumbers {
     }
 
     /// Notes what came off in an island of a number; adds it to `detached`.
-    pub(crate) fn follow(
+    pub(crate) fn apply_delta(
         &mut self,
         number: usize,
         island: &Island,

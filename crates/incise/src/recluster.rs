@@ -1,7 +1,7 @@
-//! [`Recluster`]: fresh clusters and colors for a worn partition, made in the background.
+//! [`Recluster`]: fresh clusters and colors for a degraded partition, made in the background.
 //!
-//! Cuts change clusters where they are, so a partition wears: after many cuts it has more colors and smaller clusters than one
-//! made from the mesh as it is now. When it has worn enough, a copy of the mesh goes to a thread of its own, which
+//! Cuts change clusters where they are, so a partition degrades: after many cuts it has more colors and smaller clusters than one
+//! made from the mesh as it is now. When it has degraded enough, a copy of the mesh goes to a thread of its own, which
 //! clusters and colors it as at the start. A fixed number of frames later, after the strokes of that frame, the new partition
 //! takes the place of the old one, and follows the cuts made meanwhile: first each by itself, then small clusters around
 //! all of them are merged. If the thread is not done by then the frame waits. So it depends on the scene alone in which
@@ -22,7 +22,7 @@ use crate::Error;
 use crate::partition::{Partition, PartitionSettings};
 use crate::scene::ReclusterSpec;
 
-/// What watches over the wear of a partition.
+/// What watches over the degradation of a partition.
 #[derive(Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Recluster {
@@ -81,14 +81,14 @@ impl Recluster {
         }
     }
 
-    /// Takes the new partition if this is its frame, else starts one if the present one has worn; tells whether it was taken.
+    /// Takes the new partition if this is its frame, else starts one if the present one has degraded; tells whether it was taken.
     pub(crate) fn advance(
         &mut self,
         frame: u64,
         partition: &mut Partition,
         cuttable: &CuttableMesh,
     ) -> Result<bool, Error> {
-        if self.pending.is_none() && partition.wear() >= self.spec.wear {
+        if self.pending.is_none() && partition.degradation() >= self.spec.threshold {
             let due = frame + u64::from(self.spec.frames.get());
             self.pending = Some(Pending::start(due, partition.settings(), cuttable)?);
         }

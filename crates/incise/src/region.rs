@@ -4,8 +4,8 @@ use glam::DVec3;
 use incise_mesh::{TetId, TetMesh};
 
 use crate::Error;
-use crate::limits::{coordinates, direction, value};
 use crate::scene::Region;
+use crate::validate::{coordinates, direction, value};
 
 /// A part of space.
 #[derive(Clone, Copy, Debug)]

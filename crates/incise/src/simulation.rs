@@ -30,7 +30,6 @@ use crate::compute_device::{ComputeDevice, OpenDevice};
 use crate::island::Island;
 use crate::island_builder::IslandBuilder;
 use crate::islands::island_of_bodies;
-use crate::limits::value;
 use crate::measure::{kappa, softened};
 use crate::merged_mesh::MergedMesh;
 use crate::method::settings;
@@ -40,6 +39,7 @@ use crate::report::{
 };
 use crate::scene::{Precision, Quantity, StrokeSpec};
 use crate::strokes::Timeline;
+use crate::validate::value;
 use crate::warning::{Warning, WarningCode};
 use crate::{Error, Event, Scene, collider, distance};
 

@@ -7,10 +7,10 @@ use incise_cutting::{
 };
 
 use crate::island::Island;
-use crate::limits::value;
 use crate::live_blade::LiveBlade;
 use crate::scene::{StrokeSpec, pose};
 use crate::tool::{Tool, tool};
+use crate::validate::value;
 use crate::{Error, Event};
 
 /// A stroke and how far it is.
@@ -168,21 +168,21 @@ impl Timeline {
     pub(crate) fn apply_delta(&mut self, number: usize, island: &Island, delta: &CutDelta) {
         for stroke in &mut self.strokes {
             if let Some(sweep) = stroke.sweeps.get_mut(number) {
-                sweep.follow(&island.cuttable, delta);
+                sweep.apply_delta(&island.cuttable, delta);
             }
         }
         if let Some(registry) = self.registries.get_mut(number) {
-            registry.follow(&island.cuttable, delta, &CutOptions::default());
+            registry.apply_delta(&island.cuttable, delta, &CutOptions::default());
         }
     }
 
-    /// Carries out what is due in `frame` on every island; hands each delta to `follow` before the next stroke moves. The
+    /// Carries out what is due in `frame` on every island; hands each delta to `apply_delta` before the next stroke moves. The
     /// islands' positions are kept current.
     pub(crate) fn advance(
         &mut self,
         frame: u64,
         islands: &mut [Island],
-        mut follow: impl FnMut(usize, &mut Island, &CutDelta) -> Result<(), Error>,
+        mut apply_delta: impl FnMut(usize, &mut Island, &CutDelta) -> Result<(), Error>,
     ) -> Result<(), Error> {
         if self.strokes.is_empty() {
             return Ok(());
@@ -205,10 +205,10 @@ impl Timeline {
                 delta.extend_particles(&mut island.positions);
                 for other in self.strokes.iter_mut().enumerate().filter(|(j, _)| *j != i) {
                     if let Some(sweep) = other.1.sweeps.get_mut(g) {
-                        sweep.follow(&island.cuttable, &delta);
+                        sweep.apply_delta(&island.cuttable, &delta);
                     }
                 }
-                follow(g, island, &delta)?;
+                apply_delta(g, island, &delta)?;
             }
         }
         let (events, missed) = (&mut self.events, &mut self.missed);
@@ -280,7 +280,7 @@ impl Stroke {
             Tool::Sweep { .. } | Tool::Live(_) | Tool::Surface(_)
         );
         if !joins && !delta.is_empty() {
-            registry.follow(&island.cuttable, &delta, &self.options);
+            registry.apply_delta(&island.cuttable, &delta, &self.options);
         }
         Ok(Some(delta))
     }

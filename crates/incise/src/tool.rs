@@ -4,10 +4,10 @@ use glam::DVec3;
 use incise_cutting::{CutError, Plane, TriangleSurface};
 
 use crate::Error;
-use crate::limits::{coordinates, direction, value};
 use crate::live_blade::{LiveBlade, long_enough};
 use crate::region::Solid;
 use crate::scene::{Region, StrokeSpec};
+use crate::validate::{coordinates, direction, value};
 
 /// What a stroke cuts with.
 #[derive(Clone, Debug)]

@@ -76,11 +76,7 @@ impl<R: Real> Vbd<R> {
     }
 
     /// Follows a cut, after the solver has.
-    pub(crate) fn follow(
-        &mut self,
-        solver: &Solver<R>,
-        ms: &mut Milliseconds,
-    ) -> Result<(), Error> {
+    pub(crate) fn sync(&mut self, solver: &Solver<R>, ms: &mut Milliseconds) -> Result<(), Error> {
         let start = Instant::now();
         let incidence = solver.star_incidence();
         let mut coloring = recolor(&mut self.colors, &incidence);
@@ -94,7 +90,7 @@ impl<R: Real> Vbd<R> {
         let start = Instant::now();
         self.stars.rebuild(solver, &incidence, &schedule)?;
         if let Some(correction) = &mut self.correction {
-            correction.follow(&self.stars);
+            correction.sync(&self.stars);
         }
         ms.schedule += milliseconds(start.elapsed());
         Ok(())

@@ -47,7 +47,7 @@ impl Volumes {
     }
 
     /// Follows a cut, after the solver and the schedule have.
-    pub(crate) fn follow(
+    pub(crate) fn apply_delta(
         &self,
         solver: &mut AnySolver,
         delta: &CutDelta,

@@ -42,7 +42,7 @@ const NONE: u32 = 0;
 /// let camera = Camera::fit(low, high);
 /// for _ in 0..3 {
 ///     simulation.step()?;
-///     painting.follow(&simulation);
+///     painting.sync(&simulation);
 ///     let size = [64, 48];
 ///     let picture = software_picture(&painting, &simulation, &camera, &Style::default(), size)?;
 ///     assert_eq!(picture.rgba.len(), 64 * 48 * 4);
@@ -105,7 +105,7 @@ impl RenderScene {
     ///
     /// # Panics
     /// If a step with a cut was left out: [`RenderScene::reset`] starts over.
-    pub fn follow(&mut self, simulation: &Simulation) {
+    pub fn sync(&mut self, simulation: &Simulation) {
         let now = simulation.report().time_s;
         if now == self.followed {
             return;
@@ -121,7 +121,7 @@ impl RenderScene {
         }
         let colored = !self.colors.is_empty();
         for delta in deltas {
-            let change = self.skin.follow(delta);
+            let change = self.skin.apply_delta(delta);
             if colored {
                 self.colors.resize(self.skin.triangles().len(), NONE);
                 for triangle in change.triangles {

@@ -35,7 +35,7 @@ pub(crate) struct SolverArguments {
 enum Part {
     /// Iterations and milliseconds to a residual, by method.
     Convergence,
-    /// The error of a beam at rest by kappa. For errors in motion: `cargo xtask trade`.
+    /// The error of a beam at rest by kappa. For errors in motion: `cargo xtask accuracy`.
     Rest,
     /// Nanoseconds a tet, on one thread and on two.
     Speed,

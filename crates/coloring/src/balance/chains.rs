@@ -148,7 +148,7 @@ impl Chains {
             }
             if let Some(target) = self.search(source, partition, members, around) {
                 chains += 1;
-                self.follow(source, target, partition, members, around);
+                self.shift_along_path(source, target, partition, members, around);
             } else {
                 self.dead.copy_from_slice(&self.closed);
             }
@@ -280,7 +280,7 @@ impl Chains {
     }
 
     /// Makes the moves that lead to `target`, the last one first.
-    fn follow(
+    fn shift_along_path(
         &self,
         source: u32,
         target: u32,

@@ -61,10 +61,10 @@ struct Run {
 }
 
 impl Run {
-    fn follow(&mut self, delta: CutDelta, but: Option<usize>) {
+    fn apply_delta(&mut self, delta: CutDelta, but: Option<usize>) {
         for (i, stroke) in self.strokes.iter_mut().enumerate() {
             if Some(i) != but {
-                stroke.follow(&self.cuttable, &delta);
+                stroke.apply_delta(&self.cuttable, &delta);
             }
         }
         delta.extend_particles(&mut self.positions);
@@ -127,7 +127,7 @@ fn run(kind: usize, seed: u64, shake: f64, everywhere: bool) -> Run {
             let stroke = &mut run.strokes[i];
             let cut = stroke.advance(&mut run.cuttable, &run.positions, blade);
             if let Ok(delta) = cut {
-                run.follow(delta, Some(i));
+                run.apply_delta(delta, Some(i));
             }
         }
         let count = run.cuttable.mesh().tets.len();
@@ -153,7 +153,7 @@ fn run(kind: usize, seed: u64, shake: f64, everywhere: bool) -> Run {
             _ => continue,
         };
         if let Ok(delta) = delta {
-            run.follow(delta, None);
+            run.apply_delta(delta, None);
         }
         if run.cuttable.mesh().tets.is_empty() {
             break;

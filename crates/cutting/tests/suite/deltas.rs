@@ -188,7 +188,7 @@ proptest! {
                 let options = CutOptions { tag: round, ..CutOptions::default() };
                 cut_plane(&mut cuttable, &rest, &plane, &options).unwrap()
             };
-            let change = skin.follow(&delta);
+            let change = skin.apply_delta(&delta);
             upload(&mut copy, &skin, &change);
             prop_assert_eq!(listed(&skin), listed(&Skin::new(cuttable.boundary())));
             prop_assert!(skin.outer_triangles().all(|t| skin.tag(t) == FaceTag::Outer));

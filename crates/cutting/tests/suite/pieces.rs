@@ -35,9 +35,9 @@ impl Tracked {
     }
 
     /// Lets the pieces follow and compares everything with what the whole mesh says.
-    fn follow(&mut self, delta: &CutDelta) -> Vec<PieceEvent> {
+    fn apply_delta(&mut self, delta: &CutDelta) -> Vec<PieceEvent> {
         let before = self.pieces.clone();
-        let events = self.pieces.follow(&self.body, delta);
+        let events = self.pieces.apply_delta(&self.body, delta);
         self.pieces.check(&self.body).unwrap();
 
         // The events say what is new, and nothing else is.
@@ -95,7 +95,7 @@ impl Tracked {
         };
         let plane = Plane { point, normal };
         let delta = cut_plane(&mut self.body, &positions, &plane, &options).unwrap();
-        self.follow(&delta)
+        self.apply_delta(&delta)
     }
 
     /// Moves a blade by `way` in `frames` steps; returns how many pieces came off and the most looks of a frame.
@@ -107,7 +107,7 @@ impl Tracked {
             let pose = blade.map(|x| x + way * (f64::from(frame) / f64::from(frames)));
             let rest = self.body.mesh().positions.clone();
             let delta = stroke.advance(&mut self.body, &rest, &pose).unwrap();
-            came_off += self.follow(&delta).len();
+            came_off += self.apply_delta(&delta).len();
             looks = looks.max(self.pieces.looks());
         }
         (came_off, looks)
@@ -146,7 +146,7 @@ impl Tracked {
         assert_eq!(after.tets.len(), kept);
         self.volume = after.total_volume();
         self.body = CuttableMesh::new(after).unwrap();
-        self.follow(&delta)
+        self.apply_delta(&delta)
     }
 }
 

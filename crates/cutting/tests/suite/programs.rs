@@ -117,7 +117,7 @@ struct State {
 
 impl State {
     /// Follows a stroke, before which the registry was `registry`, and checks everything. Errors must have changed nothing.
-    fn follow_from(
+    fn apply_delta_from(
         &mut self,
         before: &TetMesh,
         registry: Option<StrokeRegistry>,
@@ -135,7 +135,7 @@ impl State {
         crate::bodies::check_cut(before, &self.cuttable, &delta);
         let earlier = self.positions.clone();
         delta.extend_particles(&mut self.positions);
-        self.skin.follow(&delta);
+        self.skin.apply_delta(&delta);
         assert_eq!(self.skin.triangles().len(), self.cuttable.boundary_count());
         self.journal.push((delta, earlier, registry));
     }
@@ -250,7 +250,7 @@ fn step_more(state: &mut State, bytes: &mut Bytes<'_>, operation: u8, tag: u32) 
                 }
                 None => cut_surface(cuttable, positions, &surface, &options),
             };
-            state.follow_from(&before, earlier, result);
+            state.apply_delta_from(&before, earlier, result);
         }
         _ => two_sweeps(state, bytes, tag),
     }
@@ -266,9 +266,9 @@ impl State {
     ) {
         let earlier = self.registry.clone();
         if let (Some(registry), Ok(delta)) = (&mut self.registry, &result) {
-            registry.follow(&self.cuttable, delta, options);
+            registry.apply_delta(&self.cuttable, delta, options);
         }
-        self.follow_from(before, earlier, result);
+        self.apply_delta_from(before, earlier, result);
     }
 
     /// One step of a stroke.
@@ -282,7 +282,7 @@ impl State {
             None => stroke.advance(&mut self.cuttable, &self.positions, blade),
         };
         let delta = result.as_ref().ok().cloned();
-        self.follow_from(&before, earlier, result);
+        self.apply_delta_from(&before, earlier, result);
         delta
     }
 }
@@ -335,7 +335,7 @@ fn two_sweeps(state: &mut State, bytes: &mut Bytes<'_>, tag: u32) {
             let result = carve(&mut state.cuttable, &state.positions, near, tag);
             if let Ok(delta) = &result {
                 for (stroke, _) in &mut strokes {
-                    stroke.follow(&state.cuttable, delta);
+                    stroke.apply_delta(&state.cuttable, delta);
                 }
             }
             state.followed_by_memory(&before, &options, result);
@@ -348,7 +348,7 @@ fn two_sweeps(state: &mut State, bytes: &mut Bytes<'_>, tag: u32) {
         let Some(delta) = state.advance(stroke, blade) else {
             return;
         };
-        strokes[1 - step % 2].0.follow(&state.cuttable, &delta);
+        strokes[1 - step % 2].0.apply_delta(&state.cuttable, &delta);
     }
 }
 

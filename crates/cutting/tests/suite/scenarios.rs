@@ -41,7 +41,7 @@ impl Body {
         let plane = Plane { point, normal };
         let delta = cut_plane(&mut self.cuttable, &before.positions, &plane, &options).unwrap();
         check_cut(&before, &self.cuttable, &delta);
-        self.pieces.follow(&self.cuttable, &delta);
+        self.pieces.apply_delta(&self.cuttable, &delta);
         self.pieces.check(&self.cuttable).unwrap();
     }
 
@@ -58,7 +58,7 @@ impl Body {
             if !delta.is_empty() {
                 check_cut(&before, &self.cuttable, &delta);
             }
-            self.pieces.follow(&self.cuttable, &delta);
+            self.pieces.apply_delta(&self.cuttable, &delta);
         }
         self.pieces.check(&self.cuttable).unwrap();
     }

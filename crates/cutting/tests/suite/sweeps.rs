@@ -256,7 +256,7 @@ fn strokes_at_the_same_time() {
                     .advance(&mut body, &before.positions, &pose)
                     .unwrap();
                 check_cut(&before, &body, &delta);
-                strokes[1 - i].follow(&body, &delta);
+                strokes[1 - i].apply_delta(&body, &delta);
             }
         }
         assert_eq!(body.mesh().pieces().count, 4, "snap {snap}, lead {lead}");
@@ -516,7 +516,7 @@ fn removals_and_undo_on_the_way() {
             assert!(!removal.moved.is_empty());
             let refused = advance(&mut stroke, &mut body, 0.3);
             assert!(matches!(refused, Err(CutError::NotFollowed { .. })));
-            stroke.follow(&body, &removal);
+            stroke.apply_delta(&body, &removal);
             advance(&mut stroke, &mut body, 0.3).unwrap();
             let last = advance(&mut stroke, &mut body, 0.1).unwrap();
             body.undo(&last).unwrap();
@@ -527,7 +527,7 @@ fn removals_and_undo_on_the_way() {
             let mut stroke = early;
             let mut body = CuttableMesh::new(early_body).unwrap();
             let removal = carve(&mut body, &before.positions, drill, 1).unwrap();
-            stroke.follow(&body, &removal);
+            stroke.apply_delta(&body, &removal);
             for z in [0.3, 0.1, -0.2] {
                 advance(&mut stroke, &mut body, z).unwrap();
             }

@@ -12,7 +12,7 @@ use super::gpu_types::{DispatchRange, NUMBERS, ParticlePatch, TetPatch};
 use super::handles::Handles;
 use super::kernels::{Kernels, Kind, PATCH_PARTICLES, PATCH_TETS, Variant};
 use super::layout::{ClusterMapping, Layout, THREADS};
-use super::scalars::Scalars;
+use super::scalar_constraints::ScalarConstraints;
 use super::tile::number_count;
 use crate::array::Array;
 use crate::kernel::Recorder;
@@ -42,8 +42,8 @@ pub(crate) struct Body {
     /// If something hangs on handles.
     pub(crate) handles: Option<Handles>,
     /// If there are such constraints.
-    pub(crate) distances: Option<Scalars>,
-    pub(crate) volumes: Option<Scalars>,
+    pub(crate) distances: Option<ScalarConstraints>,
+    pub(crate) volumes: Option<ScalarConstraints>,
     tet_patches: Array<TetPatch>,
     particle_patches: Array<ParticlePatch>,
     range: Array<DispatchRange>,
@@ -73,7 +73,7 @@ impl Body {
     }
 
     /// Sends what has changed.
-    pub(crate) fn follow(
+    pub(crate) fn sync(
         &mut self,
         gpu: &GpuContext,
         kernels: &mut Kernels,
@@ -81,17 +81,17 @@ impl Body {
         schedule: &Schedule,
         changes: &Changes,
     ) -> Result<(), GpuError> {
-        self.follow_particles(gpu, kernels, solver, changes)?;
-        Handles::follow(&mut self.handles, gpu, solver, changes)?;
+        self.sync_particles(gpu, kernels, solver, changes)?;
+        Handles::sync(&mut self.handles, gpu, solver, changes)?;
         if changes.distances {
-            Scalars::follow(&mut self.distances, gpu, solver, Kind::Distance)?;
+            ScalarConstraints::sync(&mut self.distances, gpu, solver, Kind::Distance)?;
         }
         if changes.volumes {
-            Scalars::follow(&mut self.volumes, gpu, solver, Kind::Volume)?;
+            ScalarConstraints::sync(&mut self.volumes, gpu, solver, Kind::Volume)?;
         }
-        let patch = self.layout.follow(schedule, solver, changes)?;
+        let patch = self.layout.sync(schedule, solver, changes)?;
         if patch.regrouped {
-            self.colors.follow(gpu, self.layout.slots.groups())?;
+            self.colors.sync(gpu, self.layout.slots.groups())?;
         }
         let various = !solver.is_uniform();
         let places = self.layout.place_count();
@@ -138,7 +138,7 @@ impl Body {
         Ok(())
     }
 
-    fn follow_particles(
+    fn sync_particles(
         &mut self,
         gpu: &GpuContext,
         kernels: &mut Kernels,
@@ -216,7 +216,7 @@ impl Body {
         .sum();
         let scalars = self.distances.iter().chain(&self.volumes);
         let handles = self.handles.as_ref().map_or(0, Handles::bytes);
-        arrays + handles + scalars.map(Scalars::bytes).sum::<u64>()
+        arrays + handles + scalars.map(ScalarConstraints::bytes).sum::<u64>()
     }
 }
 

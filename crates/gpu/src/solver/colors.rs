@@ -34,9 +34,9 @@ pub(crate) struct Run {
 pub(crate) struct Colors {
     pub(crate) runs: Vec<Run>,
     /// The groups, color by color, then those of tails.
-    pub(crate) lists: Followed,
+    pub(crate) lists: SyncedArray,
     /// What each run works on, [`STRIDE`] bytes each.
-    pub(crate) ranges: Followed,
+    pub(crate) ranges: SyncedArray,
     /// Color -> room in the lists.
     rooms: Vec<usize>,
 }
@@ -46,18 +46,14 @@ impl Colors {
         let (storage, uniform) = (wgpu::BufferUsages::STORAGE, wgpu::BufferUsages::UNIFORM);
         Ok(Self {
             runs: Vec::new(),
-            lists: Followed::new(gpu, "lists of groups", storage)?,
-            ranges: Followed::new(gpu, "ranges of dispatches", uniform)?,
+            lists: SyncedArray::new(gpu, "lists of groups", storage)?,
+            ranges: SyncedArray::new(gpu, "ranges of dispatches", uniform)?,
             rooms: Vec::new(),
         })
     }
 
     /// Takes over the groups of all colors.
-    pub(crate) fn follow(
-        &mut self,
-        gpu: &GpuContext,
-        groups_of: &Rows<u32>,
-    ) -> Result<(), GpuError> {
+    pub(crate) fn sync(&mut self, gpu: &GpuContext, groups_of: &Rows<u32>) -> Result<(), GpuError> {
         let colors = groups_of.row_count();
         self.rooms.resize(colors, 0);
         let (mut lists, mut ranges) = (Vec::new(), Vec::new());
@@ -138,12 +134,12 @@ fn index(value: usize) -> u32 {
 
 /// Numbers on the device of which the host has a copy, so that only what differs is sent.
 #[derive(Debug)]
-pub(crate) struct Followed {
+pub(crate) struct SyncedArray {
     pub(crate) array: Array<u32>,
     host: Vec<u32>,
 }
 
-impl Followed {
+impl SyncedArray {
     fn new(
         gpu: &GpuContext,
         what: &'static str,

@@ -8,17 +8,17 @@ use wgpu::{Buffer, BufferUsages, SubmissionIndex};
 
 use super::body::Body;
 use super::gpu_types::Settings;
-use super::handles::{self, Handles};
-use super::jacobi::{self, Jacobi};
+use super::handles::{AttachmentKernels, Handles};
+use super::iterations::{self, IterationUniforms};
+use super::jacobi::{Jacobi, JacobiKernels};
 use super::kernels::{
     BoundKernel, CLEAR, Kernels, PREDICT, UPDATE_VELOCITIES, Variant, damp_tets, solve_tets,
 };
 use super::layout::{ClusterMapping, THREADS};
 use super::obstacles::Obstacles;
-use super::scalars;
+use super::scalar_constraints::ScalarKernels;
 use super::shared::Shared;
 use super::stages::{Clock, Stage::*, Track};
-use super::turns::{self, Turns};
 use crate::array::{Array, Copy};
 use crate::{GpuContext, GpuError};
 
@@ -27,8 +27,8 @@ use crate::{GpuContext, GpuError};
 pub(crate) struct Frame {
     settings: Array<Settings>,
     sent: Option<Settings>,
-    /// If something asks for its turn.
-    turns: Option<Turns>,
+    /// If something asks for its uniform.
+    uniforms: Option<IterationUniforms>,
     /// If there are colliders.
     obstacles: Option<Obstacles>,
     /// If iterations are Jacobi's.
@@ -56,7 +56,7 @@ impl Frame {
         Ok(Self {
             settings: Array::with_usage(gpu, "settings", 1, BufferUsages::UNIFORM)?,
             sent: None,
-            turns: None,
+            uniforms: None,
             obstacles: None,
             jacobi: None,
             predicted: Array::zeros(gpu, "predicted positions", 0)?,
@@ -92,7 +92,7 @@ impl Frame {
         let mut track = Track::new(gpu, self.clock.as_mut());
         let particles = host.particle_count().div_ceil(THREADS);
         for substep in 0..settings.substeps {
-            let start = turns::offset(settings, substep, 0);
+            let start = iterations::offset(settings, substep, 0);
             passes.predict.run(track.at(Predict), &[], particles);
             if let Some(handles) = &passes.handles {
                 handles.move_held(track.at(Other), start);
@@ -111,20 +111,20 @@ impl Frame {
                 encoder.copy_buffer_to_buffer(from, 0, to, 0, bytes);
             }
             for iteration in 0..settings.iterations {
-                let turn = turns::offset(settings, substep, iteration);
+                let uniform = iterations::offset(settings, substep, iteration);
                 let [one, several] = &passes.solve;
                 body.colors.run(track.at(Solve), one, several);
                 if let Some(jacobi) = &passes.jacobi {
-                    jacobi.run(track.at(Solve), turn, particles);
+                    jacobi.run(track.at(Solve), uniform, particles);
                 }
                 if let Some(handles) = &passes.handles {
-                    handles.solve(track.at(Other), turn);
+                    handles.solve(track.at(Other), uniform);
                 }
                 for scalars in &passes.scalars {
                     scalars.solve(track.at(Other));
                 }
                 if let Some(project) = &passes.project {
-                    project.run(track.at(Other), &[turn], particles);
+                    project.run(track.at(Other), &[uniform], particles);
                 }
             }
             passes.update.run(track.at(Update), &[], particles);
@@ -152,7 +152,7 @@ impl Frame {
             body.multipliers.resize(gpu, body.layout.place_count())?;
         }
         Jacobi::prepare(&mut self.jacobi, gpu, body, host.particle_count(), settings)?;
-        Obstacles::follow(&mut self.obstacles, gpu, host, settings)?;
+        Obstacles::sync(&mut self.obstacles, gpu, host, settings)?;
         if let Some(handles) = &mut body.handles {
             handles.prepare(gpu, host, settings)?;
         }
@@ -162,7 +162,7 @@ impl Frame {
             }
         }
         let asks = self.obstacles.is_some() || body.handles.is_some() || self.jacobi.is_some();
-        Turns::follow(&mut self.turns, gpu, settings, asks)
+        IterationUniforms::sync(&mut self.uniforms, gpu, settings, asks)
     }
 
     /// Sends the settings if they are others.
@@ -222,12 +222,15 @@ impl Frame {
 
     /// Bytes of what the step needs.
     pub(crate) fn bytes(&self) -> u64 {
-        let turns = self.turns.as_ref().map_or(0, |turns| turns.buffer().size());
+        let uniforms = self
+            .uniforms
+            .as_ref()
+            .map_or(0, |uniforms| uniforms.buffer().size());
         let obstacles = self.obstacles.as_ref().map_or(0, Obstacles::bytes);
         let jacobi = self.jacobi.as_ref().map_or(0, Jacobi::bytes);
         let always = self.settings.buffer().size() + self.predicted.buffer().size();
         let clock = self.clock.as_ref().map_or(0, Clock::bytes);
-        always + turns + obstacles + jacobi + clock
+        always + uniforms + obstacles + jacobi + clock
     }
 
     /// Records copies of what residuals need, if the last step kept it.
@@ -260,7 +263,7 @@ pub(crate) struct LastSubstep {
 
 /// The kernels of a step, in the order of a substep; those that it does not need are not there.
 #[derive(Debug)]
-struct Passes<'a> {
+struct StepContext<'a> {
     predict: BoundKernel,
     /// Where multipliers are kept.
     clear: Option<BoundKernel>,
@@ -270,10 +273,10 @@ struct Passes<'a> {
     update: BoundKernel,
     /// If a material is damped.
     damp: Option<[BoundKernel; 2]>,
-    jacobi: Option<jacobi::Passes>,
-    handles: Option<handles::Passes>,
+    jacobi: Option<JacobiKernels>,
+    handles: Option<AttachmentKernels>,
     /// Distances before volumes.
-    scalars: Vec<scalars::Passes<'a>>,
+    scalars: Vec<ScalarKernels<'a>>,
 }
 
 impl Frame {
@@ -290,7 +293,7 @@ impl Frame {
         repaired: &Array<u32>,
         settings: &StepSettings,
         keeps: bool,
-    ) -> Result<Passes<'a>, GpuError> {
+    ) -> Result<StepContext<'a>, GpuError> {
         let constants = self.settings.buffer();
         let (particles, previous) = (body.particles.buffer(), body.previous.buffer());
         let velocities = body.velocities.buffer();
@@ -331,10 +334,10 @@ impl Frame {
             velocities,
             repaired.buffer(),
         ];
-        let turns = self.turns.as_ref().map(Turns::buffer);
-        let shared = turns.map(|turns| Shared {
+        let uniforms = self.uniforms.as_ref().map(IterationUniforms::buffer);
+        let shared = uniforms.map(|uniforms| Shared {
             settings: constants,
-            turns,
+            uniforms,
             particles,
             previous,
             velocities,
@@ -347,7 +350,7 @@ impl Frame {
         }
         let mut bind =
             |source, variant, buffers: &[&Buffer]| kernels.bind(gpu, source, variant, buffers);
-        Ok(Passes {
+        Ok(StepContext {
             predict: bind(
                 &PREDICT,
                 plain,

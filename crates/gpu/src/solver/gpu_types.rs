@@ -34,10 +34,10 @@ pub(crate) struct DispatchRange {
     pub(crate) count: u32,
 }
 
-/// `Turn` in `turn.wgsl`.
+/// `IterationUniform` in `iteration.wgsl`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub(crate) struct Turn {
+pub(crate) struct IterationUniform {
     pub(crate) substep: u32,
     pub(crate) iteration: u32,
     pub(crate) weight: f32,

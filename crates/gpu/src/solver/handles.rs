@@ -80,7 +80,7 @@ impl Handles {
     }
 
     /// Takes over what hangs on handles if it may have changed; nothing is kept for nothing.
-    pub(crate) fn follow(
+    pub(crate) fn sync(
         this: &mut Option<Self>,
         gpu: &GpuContext,
         solver: &Solver<f32>,
@@ -162,15 +162,15 @@ impl Handles {
         kernels: &mut Kernels,
         shared: &Shared<'_>,
         keeps: bool,
-    ) -> Result<Passes, GpuError> {
+    ) -> Result<AttachmentKernels, GpuError> {
         let (held, hanging) = (self.held.array.buffer(), self.hanging.array.buffer());
         let poses = self.poses.buffer();
-        let mut passes = Passes::default();
+        let mut passes = AttachmentKernels::default();
         if self.held_count() > 0 {
             let (plain, groups) = (Variant::default(), self.held.groups());
             let buffers = [
                 shared.settings,
-                shared.turns,
+                shared.uniforms,
                 shared.particles,
                 held,
                 poses,
@@ -194,7 +194,7 @@ impl Handles {
             };
             let buffers = [
                 shared.settings,
-                shared.turns,
+                shared.uniforms,
                 shared.particles,
                 shared.previous,
                 hanging,
@@ -221,23 +221,23 @@ impl Handles {
 
 /// The kernels for what hangs on handles, with their workgroups.
 #[derive(Debug, Default)]
-pub(crate) struct Passes {
+pub(crate) struct AttachmentKernels {
     held: Option<(BoundKernel, BoundKernel, usize)>,
     hanging: Option<(BoundKernel, usize)>,
 }
 
-impl Passes {
-    /// At the start of a substep; `turn` is where its turn is.
-    pub(crate) fn move_held(&self, pass: &mut Recorder<'_>, turn: u32) {
+impl AttachmentKernels {
+    /// At the start of a substep; `uniform` is where its uniform is.
+    pub(crate) fn move_held(&self, pass: &mut Recorder<'_>, uniform: u32) {
         if let Some((moving, _, groups)) = &self.held {
-            moving.run(pass, &[turn], *groups);
+            moving.run(pass, &[uniform], *groups);
         }
     }
 
     /// In an iteration, after the tets.
-    pub(crate) fn solve(&self, pass: &mut Recorder<'_>, turn: u32) {
+    pub(crate) fn solve(&self, pass: &mut Recorder<'_>, uniform: u32) {
         if let Some((solve, groups)) = &self.hanging {
-            solve.run(pass, &[turn], *groups);
+            solve.run(pass, &[uniform], *groups);
         }
     }
 

@@ -2,7 +2,7 @@
 //!
 //! The kernels of the tets gather corrections color by color, so that every sum has one order and no two threads add to
 //! one particle at once; a pass over the particles then adds them. Chebyshev keeps where the previous iteration began,
-//! of positions and of multipliers, and its weights are in the turns. Only threads gather: a tile has its particles in
+//! of positions and of multipliers, and its weights are in the uniforms. Only threads gather: a tile has its particles in
 //! workgroup memory, where a correction would be seen at once. Twin: `jacobi.rs` of incise-xpbd.
 //!
 //! Cost: a dispatch an iteration, with Chebyshev two; 16 bytes a particle, with Chebyshev 16 more and 16 a place.
@@ -70,14 +70,14 @@ impl Jacobi {
         body: &Body,
         shared: &Shared<'_>,
         keeps: bool,
-    ) -> Result<Passes, GpuError> {
+    ) -> Result<JacobiKernels, GpuError> {
         let variant = Variant {
             keeps: self.extrapolating,
             ..Variant::default()
         };
         let buffers = [
             shared.settings,
-            shared.turns,
+            shared.uniforms,
             shared.particles,
             body.corrections.buffer(),
             self.before.buffer(),
@@ -87,14 +87,14 @@ impl Jacobi {
         if self.extrapolating && keeps {
             let buffers = [
                 body.multipliers.buffer(),
-                shared.turns,
+                shared.uniforms,
                 self.history.buffer(),
             ];
             let plain = Variant::default();
             let leap = kernels.bind(gpu, &EXTRAPOLATE_MULTIPLIERS, plain, &buffers)?;
             extrapolate = Some((leap, self.history.len().div_ceil(THREADS)));
         }
-        Ok(Passes { apply, extrapolate })
+        Ok(JacobiKernels { apply, extrapolate })
     }
 
     /// Bytes on the device.
@@ -106,18 +106,18 @@ impl Jacobi {
 
 /// The kernels that end an iteration over the tets.
 #[derive(Debug)]
-pub(crate) struct Passes {
+pub(crate) struct JacobiKernels {
     apply: BoundKernel,
     /// Where multipliers are kept and extrapolated.
     extrapolate: Option<(BoundKernel, usize)>,
 }
 
-impl Passes {
-    /// After the tets of the iteration whose turn is at `turn`; `particles` is how many workgroups these are.
-    pub(crate) fn run(&self, pass: &mut Recorder<'_>, turn: u32, particles: usize) {
-        self.apply.run(pass, &[turn], particles);
+impl JacobiKernels {
+    /// After the tets of the iteration whose uniform is at `uniform`; `particles` is how many workgroups these are.
+    pub(crate) fn run(&self, pass: &mut Recorder<'_>, uniform: u32, particles: usize) {
+        self.apply.run(pass, &[uniform], particles);
         if let Some((leap, groups)) = &self.extrapolate {
-            leap.run(pass, &[turn], *groups);
+            leap.run(pass, &[uniform], *groups);
         }
     }
 }

@@ -307,7 +307,7 @@ pub(crate) const PROJECT_TO_COLLIDERS: Source = Source {
     parts: text!(
         "common",
         "settings",
-        "turn",
+        "iteration",
         "direction",
         "project_to_colliders"
     ),
@@ -323,7 +323,13 @@ pub(crate) const PROJECT_TO_COLLIDERS: Source = Source {
 
 pub(crate) const MOVE_HELD: Source = Source {
     name: "move_held",
-    parts: text!("common", "settings", "turn", "attachments", "move_held"),
+    parts: text!(
+        "common",
+        "settings",
+        "iteration",
+        "attachments",
+        "move_held"
+    ),
     uses: &[
         BindingKind::Uniform,
         BindingKind::DynamicUniform(TURN),
@@ -340,7 +346,7 @@ pub(crate) const SOLVE_ATTACHMENTS: Source = Source {
     parts: text!(
         "common",
         "settings",
-        "turn",
+        "iteration",
         "attachments",
         "solve_attachments"
     ),
@@ -371,7 +377,7 @@ pub(crate) const UPDATE_HELD: Source = Source {
 
 pub(crate) const APPLY_CORRECTIONS: Source = Source {
     name: "apply_corrections",
-    parts: text!("common", "settings", "turn", "apply_corrections"),
+    parts: text!("common", "settings", "iteration", "apply_corrections"),
     uses: &[
         BindingKind::Uniform,
         BindingKind::DynamicUniform(TURN),
@@ -384,7 +390,7 @@ pub(crate) const APPLY_CORRECTIONS: Source = Source {
 
 pub(crate) const EXTRAPOLATE_MULTIPLIERS: Source = Source {
     name: "extrapolate_multipliers",
-    parts: text!("common", "turn", "extrapolate_multipliers"),
+    parts: text!("common", "iteration", "extrapolate_multipliers"),
     uses: &[
         BindingKind::Write,
         BindingKind::DynamicUniform(TURN),

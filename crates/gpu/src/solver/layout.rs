@@ -142,7 +142,7 @@ impl Layout {
     ///
     /// # Errors
     /// If a cluster is larger than a tile.
-    pub(crate) fn follow(
+    pub(crate) fn sync(
         &mut self,
         schedule: &Schedule,
         solver: &Solver<f32>,

@@ -131,7 +131,7 @@ impl Measuring {
         clippy::cast_possible_truncation,
         reason = "the device computes in single precision"
     )]
-    fn follow(
+    fn sync(
         &mut self,
         gpu: &GpuContext,
         solver: &Solver<f32>,
@@ -269,7 +269,7 @@ impl GpuSolver {
             none => none.insert(Measuring::new(gpu)?),
         };
         let places = body.layout.place_count();
-        measuring.follow(gpu, host, places)?;
+        measuring.sync(gpu, host, places)?;
         let variant = Variant {
             various: !host.is_uniform(),
             tile: body.layout.tile(),

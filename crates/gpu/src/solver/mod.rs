@@ -17,19 +17,19 @@ mod colors;
 mod frame;
 mod gpu_types;
 mod handles;
+mod iterations;
 mod jacobi;
 mod kernels;
 mod layout;
 mod measure;
 mod obstacles;
-mod scalars;
+mod scalar_constraints;
 #[cfg(test)]
 mod shaders;
 mod shared;
 mod slots;
 mod stages;
 mod tile;
-mod turns;
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -44,8 +44,8 @@ pub use measure::Measures;
 pub use stages::StageTimes;
 
 pub(crate) use gpu_types::{
-    Attachment, DispatchRange, ParticlePatch, ParticleSums, Settings, TetPatch, TetSums, Turn,
-    Units,
+    Attachment, DispatchRange, IterationUniform, ParticlePatch, ParticleSums, Settings, TetPatch,
+    TetSums, Units,
 };
 
 use crate::array::Array;
@@ -245,12 +245,12 @@ impl GpuSolver {
         if let Some(measuring) = &mut self.measuring {
             measuring.stale |= changes != Changes::default();
         }
-        let followed = body.follow(gpu, kernels, host, schedule, &changes);
-        // What was not followed is not known any more. Edits wait for the device: it is not ahead of them.
-        if followed.is_err() && !self.ahead {
+        let synced = body.sync(gpu, kernels, host, schedule, &changes);
+        // After a failed update the state of the device is unknown. Edits wait for the device: it is not ahead of them.
+        if synced.is_err() && !self.ahead {
             self.host.track_changes();
         }
-        followed
+        synced
     }
 
     /// The solver with the state of the device, which is waited for if it has advanced.

@@ -22,7 +22,7 @@ pub(crate) struct Obstacles {
 
 impl Obstacles {
     /// Sends the colliders of a frame unless they are there; nothing is kept for none.
-    pub(crate) fn follow(
+    pub(crate) fn sync(
         this: &mut Option<Self>,
         gpu: &GpuContext,
         host: &Solver<f32>,
@@ -62,7 +62,7 @@ impl Obstacles {
     ) -> Result<BoundKernel, GpuError> {
         let buffers = [
             shared.settings,
-            shared.turns,
+            shared.uniforms,
             shared.particles,
             shared.previous,
             self.array.buffer(),

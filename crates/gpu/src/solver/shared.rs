@@ -6,7 +6,7 @@ use wgpu::Buffer;
 #[derive(Debug)]
 pub(crate) struct Shared<'a> {
     pub(crate) settings: &'a Buffer,
-    pub(crate) turns: &'a Buffer,
+    pub(crate) uniforms: &'a Buffer,
     pub(crate) particles: &'a Buffer,
     pub(crate) previous: &'a Buffer,
     pub(crate) velocities: &'a Buffer,

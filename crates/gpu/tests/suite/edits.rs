@@ -194,7 +194,7 @@ impl Edited {
     }
 
     /// Makes the host solve in the order of the device.
-    fn follow(&mut self) {
+    fn sync(&mut self) {
         let host = &self.twins.host;
         let corners = (0..host.tet_count()).map(|t| host.tet_particles(t));
         let incidence = Incidence::from_constraints(host.particle_count(), corners).unwrap();
@@ -251,7 +251,7 @@ fn run(gpu: &'static GpuContext, form: (&str, ClusterMapping), rounds: &[Vec<Edi
         for edit in edits {
             edited.apply(edit);
         }
-        edited.follow();
+        edited.sync();
         let pose = Pose::at(DVec3::ONE + dvec3(0.002, -0.003, 0.004) * f64::from(frame));
         for _ in 0..2 {
             edited.twins.device.move_handle(1, pose);

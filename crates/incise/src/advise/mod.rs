@@ -166,14 +166,14 @@ pub fn advise(scene: &Scene, question: &Question) -> Result<Advice, Error> {
         threads,
     } = *question;
     if !(budget_ms > 0.0 && budget_ms.is_finite()) {
-        return Err(crate::limits::value(
+        return Err(crate::validate::value(
             "budget-ms",
             budget_ms,
             "positive and finite",
         ));
     }
     if frames == 0 {
-        return Err(crate::limits::value("frames", frames, "at least 1"));
+        return Err(crate::validate::value("frames", frames, "at least 1"));
     }
     let tets = Simulation::new(scene)?.mesh().tets.len();
     let substeps = accurate_substeps(scene)?;

@@ -2,7 +2,7 @@
 
 use super::Scene;
 use crate::Error;
-use crate::limits::value;
+use crate::validate::value;
 
 /// Refuses settings of the solver that are out of their ranges, whatever the bodies are.
 pub(crate) fn check(scene: &Scene) -> Result<(), Error> {
@@ -24,10 +24,14 @@ pub(crate) fn check(scene: &Scene) -> Result<(), Error> {
         return Err(value("solver.max_substeps", 0, "at least 1"));
     }
     if let Some(recluster) = scene.solver.recluster {
-        let wear = recluster.wear;
-        // The first cut would exceed a wear of 1.
-        if !(wear.is_finite() && wear > 1.0) {
-            return Err(value("solver.recluster.wear", wear, "above 1 and finite"));
+        let threshold = recluster.threshold;
+        // The first cut would exceed a threshold of 1.
+        if !(threshold.is_finite() && threshold > 1.0) {
+            return Err(value(
+                "solver.recluster.threshold",
+                threshold,
+                "above 1 and finite",
+            ));
         }
     }
     if let Some(sleep) = scene.solver.sleep {

@@ -60,7 +60,7 @@ pub struct SolverSpec {
     /// paper.
     #[serde(skip_serializing_if = "is_true")]
     pub merge_clusters: bool,
-    /// When clusters and colors that many cuts have worn are rebuilt, in the background; absent: never.
+    /// When clusters and colors that many cuts have degraded are rebuilt, in the background; absent: never.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub recluster: Option<ReclusterSpec>,
     /// How clusters are colored, by the name of an [`Algorithm`](incise_coloring::Algorithm). Clusters that cuts make are
@@ -158,10 +158,10 @@ impl Backend {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ReclusterSpec {
-    /// How far they may wear first, above 1: the number of colors over that of the last full coloring, or the mean cluster
+    /// Degradation at which they are rebuilt, above 1: the number of colors over that of the last full coloring, or the mean cluster
     /// size of that over the present one, whichever is larger.
     #[serde(default = "five_quarters")]
-    pub wear: f64,
+    pub threshold: f64,
     /// After how many frames the new ones are taken, at least 1. A frame that comes too early waits for them.
     #[serde(default = "ten")]
     pub frames: NonZeroU32,

@@ -14,11 +14,11 @@ use crate::attachment::AttachmentHandle;
 use crate::collider::ColliderHandle;
 use crate::compute_device::{ComputeDevice, OpenDevice};
 use crate::distance::DistanceHandle;
-use crate::limits::value;
 use crate::scene::{
     AttachmentSpec, BodySpec, ColliderSpec, DistanceSpec, GroundSpec, MaterialSpec, Region,
     ReportSpec, SolverSpec, StrokeSpec,
 };
+use crate::validate::value;
 use crate::{Error, Scene, Simulation};
 
 /// A body that is added to a [`SimulationBuilder`]: a mesh in memory, its material and its pinned particles.

@@ -17,11 +17,11 @@ use crate::collider::{self, ColliderHandle};
 use crate::distance::DistanceHandle;
 use crate::island::Island;
 use crate::island_builder::IslandBuilder;
-use crate::limits::{LARGEST_COORDINATE, coordinates, value, within};
 use crate::merged_mesh::MergedMesh;
 use crate::method::settings;
 use crate::ray::{RayHit, first_hit};
 use crate::scene::{AttachmentSpec, ColliderSpec, DistanceSpec};
+use crate::validate::{LARGEST_COORDINATE, coordinates, value, within};
 use crate::{Error, Scene, body, budget};
 
 impl Simulation {

@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use super::Simulation;
 use crate::backend::{each, each_mut};
-use crate::limits::{coordinates, value, within};
+use crate::validate::{coordinates, value, within};
 use crate::{Error, Grab};
 
 impl Simulation {

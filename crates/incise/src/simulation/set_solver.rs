@@ -18,13 +18,13 @@ use crate::budget;
 use crate::compute_device::ComputeDevice;
 use crate::island::{Island, adopt, kappa_limit};
 use crate::island_builder::substeps;
-use crate::limits::value;
 use crate::method::{leaves_open, resolve, settings};
 use crate::partition::{Partition, PartitionSettings};
 use crate::recluster::Recluster;
 use crate::scene::{Method, Precision, ReportSpec, SolverSpec, Substeps};
 use crate::sleep::Rest;
 use crate::substeps::Choice;
+use crate::validate::value;
 use crate::{Error, Scene};
 
 /// What other settings make of an island; what is `None` stays.
@@ -62,7 +62,7 @@ impl Simulation {
     /// * `kappa_limit`, or another time of a substep: tets are softened to the new limit, and those that need not be any
     ///   more are what their material says.
     /// * `clustering`, `coloring`, `merge_clusters`: clusters and colors of all tets are rebuilt.
-    /// * `recluster`: counts the wear since clusters and colors were last rebuilt. Those in the making are still taken,
+    /// * `recluster`: counts the degradation since clusters and colors were last rebuilt. Those in the making are still taken,
     ///   unless they are those of other settings.
     /// * `backend`, and with `auto` also `method` and `clustering`: the state goes over to a device or comes back. The
     ///   device is the present one, or that of `offer_device`, or one that the simulation has left, or else it is opened.

@@ -16,11 +16,11 @@ use super::Simulation;
 use super::state::State;
 use crate::compute_device::{ComputeDevice, OpenDevice};
 use crate::island::Island;
-use crate::limits::value;
 use crate::merged_mesh::MergedMesh;
 use crate::recluster::Recluster;
 use crate::report::FrameReport;
 use crate::scene::ReportSpec;
+use crate::validate::value;
 use crate::{Error, Scene};
 
 /// A simulation at one moment: see [`Simulation::snapshot`].

@@ -102,13 +102,14 @@ impl Dependents<'_> {
             island.note_kappa(before);
             cut.measuring += milliseconds(start.elapsed());
         }
-        let events = island.follow(delta, ms)?;
-        self.pieces.follow(number, island, &events, cut.detached);
+        let events = island.apply_delta(delta, ms)?;
+        self.pieces
+            .apply_delta(number, island, &events, cut.detached);
         cut.report.get_or_insert_default().add(delta);
         let of_merged = self
             .merged
             .as_mut()
-            .map(|merged| merged.follow(number, delta));
+            .map(|merged| merged.apply_delta(number, delta));
         let delta = of_merged.as_ref().unwrap_or(delta);
         self.on_cut.resize(delta.particles_after(), false);
         let bare = |triangle: &&BoundaryTriangle| triangle.tag != FaceTag::Outer;

@@ -85,7 +85,7 @@ impl Body {
     }
 
     /// The edits that a simulation makes when it follows a cut, without a step.
-    fn follow(&mut self, delta: &CutDelta) {
+    fn apply_delta(&mut self, delta: &CutDelta) {
         let (solver, mesh) = (&mut self.solver, self.cuttable.mesh());
         for point in &delta.points {
             let [a, b] = point.ends.map(ParticleId::index);
@@ -205,7 +205,7 @@ fn cut(mut body: Body, snap: f64) -> Lost {
         };
         let (before, positions) = (body.moment(), body.positions());
         let delta = cut_plane(&mut body.cuttable, &positions, &plane, &options).unwrap();
-        body.follow(&delta);
+        body.apply_delta(&delta);
         note(&before, &body, &delta);
     }
     let center = body.moment().center;
@@ -218,7 +218,7 @@ fn cut(mut body: Body, snap: f64) -> Lost {
         let delta = stroke
             .advance(&mut body.cuttable, &positions, &blade)
             .unwrap();
-        body.follow(&delta);
+        body.apply_delta(&delta);
         note(&before, &body, &delta);
     }
     // The blade passes through the hole of the torus in some frames.

@@ -348,7 +348,7 @@ fn other_methods_and_constraints_are_cut_on_a_gpu_too() {
         ("tet_solve = \"sequential\"", "damping = 0.01"),
         ("iterations = 3", "volume_compliance = 1e-7"),
         (
-            "recluster = { wear = 1.01, frames = 2 }\nsleep = { speed = 0.5, time = 0.1 }",
+            "recluster = { threshold = 1.01, frames = 2 }\nsleep = { speed = 0.5, time = 0.1 }",
             "",
         ),
         (

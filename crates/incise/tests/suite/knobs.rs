@@ -109,11 +109,11 @@ pub(crate) fn settings() -> Vec<(&'static str, SolverSpec)> {
             },
         ),
         (
-            "wear",
+            "degradation",
             SolverSpec {
                 merge_clusters: false,
                 recluster: Some(ReclusterSpec {
-                    wear: 1.01,
+                    threshold: 1.01,
                     frames: std::num::NonZeroU32::MIN.saturating_add(1),
                 }),
                 ..plain()

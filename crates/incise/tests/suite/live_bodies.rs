@@ -111,7 +111,7 @@ fn bodies_come_and_go_among_cuts() {
         simulation.step().unwrap();
         simulation.check().unwrap();
         for delta in simulation.deltas() {
-            skin.follow(delta);
+            skin.apply_delta(delta);
         }
         let particle = |v: u32| skin.vertices()[v as usize].particle.0;
         let rotated = |[a, b, c]: [u32; 3]| [[a, b, c], [b, c, a], [c, a, b]].into_iter().min();

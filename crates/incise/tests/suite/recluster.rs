@@ -36,7 +36,7 @@ fn renewals(simulation: &mut Simulation, frames: u64) -> Vec<u64> {
 #[test]
 fn a_worn_plan_is_renewed_and_follows_what_was_cut_meanwhile() {
     // Without merging the plan wears fast.
-    let solver = "merge_clusters = false\nrecluster = { wear = 1.1, frames = 3 }";
+    let solver = "merge_clusters = false\nrecluster = { threshold = 1.1, frames = 3 }";
     let renewed = strokes_into_a_box(solver, "");
     let mut worn = renewed.clone();
     worn.solver.recluster = None;
@@ -63,7 +63,7 @@ fn a_worn_plan_is_renewed_and_follows_what_was_cut_meanwhile() {
 
 #[test]
 fn threads_and_time_decide_nothing() {
-    let solver = "recluster = { wear = 1.02, frames = 2 }";
+    let solver = "recluster = { threshold = 1.02, frames = 2 }";
     let scene = strokes_into_a_box(solver, "[world]\ngravity = [0.0, 0.0, -9.81]");
     let mut one = Simulation::with_threads(&scene, 1).unwrap();
     let mut others = [2, 3].map(|threads| Simulation::with_threads(&scene, threads).unwrap());
@@ -84,7 +84,7 @@ fn threads_and_time_decide_nothing() {
 
 #[test]
 fn volume_constraints_take_the_new_order() {
-    let mut scene = strokes_into_a_box("recluster = { wear = 1.02, frames = 1 }", "");
+    let mut scene = strokes_into_a_box("recluster = { threshold = 1.02, frames = 1 }", "");
     scene.body[0].volume_compliance = Some(0.0);
     let mut simulation = Simulation::with_threads(&scene, 1).unwrap();
     assert!(!renewals(&mut simulation, 20).is_empty());
@@ -92,13 +92,16 @@ fn volume_constraints_take_the_new_order() {
 
 #[test]
 fn a_limit_that_is_none_is_refused() {
-    for wear in ["1.0", "0.5", "-2.0", "inf", "nan"] {
+    for threshold in ["1.0", "0.5", "-2.0", "inf", "nan"] {
         let scene = scene(&format!(
-            "[solver]\nrecluster = {{ wear = {wear} }}\n{}",
+            "[solver]\nrecluster = {{ threshold = {threshold} }}\n{}",
             body("box", 100, [0.0; 3])
         ));
         let message = Simulation::new(&scene).unwrap_err().to_string();
-        assert!(message.starts_with("solver.recluster.wear is"), "{message}");
+        assert!(
+            message.starts_with("solver.recluster.threshold is"),
+            "{message}"
+        );
     }
     let refused = Scene::from_toml("[solver]\nrecluster = { frames = 0 }");
     assert!(refused.is_err());
@@ -111,6 +114,6 @@ fn absent_it_leaves_no_trace_in_a_scene() {
     assert!(!text.contains("recluster") && !text.contains("merge_clusters"));
     let with = Scene::from_toml("[solver]\nrecluster = {}").unwrap();
     let recluster = with.solver.recluster.unwrap();
-    assert_eq!((recluster.wear, recluster.frames.get()), (1.25, 10));
+    assert_eq!((recluster.threshold, recluster.frames.get()), (1.25, 10));
     assert_eq!(Scene::from_toml(&with.to_toml().unwrap()).unwrap(), with);
 }

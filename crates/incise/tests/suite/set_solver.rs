@@ -198,7 +198,7 @@ fn detours_leave_no_trace() {
     let snapshot = simulation.snapshot().unwrap();
     // Except for clusters and colors, which are rebuilt only by settings that ask for others.
     let mut settings = settings();
-    settings.retain(|(name, _)| !["clusters", "wear"].contains(name));
+    settings.retain(|(name, _)| !["clusters", "degradation"].contains(name));
     let mut end = |way: &[&SolverSpec]| {
         simulation.restore(&snapshot).unwrap();
         for solver in way {
@@ -294,9 +294,9 @@ fn who_sleeps_wakes() {
 fn worn_clusters_are_renewed_once_that_is_asked_for() {
     let mut simulation = simulation(&two_bodies());
     (0..5).for_each(|_| assert!(simulation.step().is_ok()));
-    let recluster = |wear| SolverSpec {
+    let recluster = |threshold| SolverSpec {
         recluster: Some(ReclusterSpec {
-            wear,
+            threshold,
             frames: std::num::NonZeroU32::MIN,
         }),
         ..five()

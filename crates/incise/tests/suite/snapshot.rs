@@ -137,7 +137,7 @@ fn every_method_goes_on_as_it_did() {
 
 #[test]
 fn clusters_under_way_are_taken_in_their_frame() {
-    let scene = two_bodies("recluster = { wear = 1.01, frames = 3 }");
+    let scene = two_bodies("recluster = { threshold = 1.01, frames = 3 }");
     let mut simulation = simulation(&scene);
     let frames = |simulation: &mut Simulation| -> Vec<usize> {
         let frames = (0..6).map(|_| simulation.step().unwrap().reclustered);
@@ -258,7 +258,10 @@ fn the_bytes_are_about_those_that_are_asked_for() {
             two_bodies("method = \"vbd\"\nsubsteps = 1\ntwo_level = true\nprecision = \"f64\""),
             2,
         ),
-        (two_bodies("recluster = { wear = 1.01, frames = 9 }"), 6),
+        (
+            two_bodies("recluster = { threshold = 1.01, frames = 9 }"),
+            6,
+        ),
     ] {
         let mut simulation = simulation(&scene);
         (0..frames).for_each(|_| assert!(simulation.step().is_ok()));

@@ -68,7 +68,7 @@ fn run(scene: &Scene) -> usize {
         simulation.check().unwrap();
         for delta in simulation.deltas() {
             delta.apply(&mut mesh);
-            skin.follow(delta);
+            skin.apply_delta(delta);
         }
         assert_eq!(&mesh, simulation.mesh(), "the deltas say everything");
         let mut followed: Vec<_> = (0..skin.triangles().len())

@@ -115,7 +115,7 @@ fn positions_do_not_leave_the_device() {
     assert_present(&there, &painting, &mut simulation, &camera, "at the start");
     for _ in 0..20 {
         simulation.step().unwrap();
-        painting.follow(&simulation);
+        painting.sync(&simulation);
     }
     assert!(!renderer.needs_read_back(&painting, &simulation));
     assert_little_is_sent(&mut renderer, &painting, &simulation, &camera);
@@ -151,7 +151,7 @@ fn a_painting_made_late_needs_positions_of_the_host() {
             .unwrap();
         assert_present(&there, &painting, &mut simulation, &camera, what);
         simulation.step().unwrap();
-        painting.follow(&simulation);
+        painting.sync(&simulation);
         assert!(!renderer.needs_read_back(&painting, &simulation), "{what}");
         painting.reset(&simulation);
     }
@@ -172,7 +172,7 @@ fn bodies_of_several_solvers_are_put_together_on_the_device() {
     let (camera, style) = (Camera::fit(low, high), Style::default());
     for frame in 0..3 {
         simulation.step().unwrap();
-        painting.follow(&simulation);
+        painting.sync(&simulation);
         assert!(!renderer.needs_read_back(&painting, &simulation));
         let there = renderer
             .picture(&painting, &simulation, &camera, &style, SIZE)

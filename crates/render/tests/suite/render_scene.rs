@@ -67,7 +67,7 @@ fn following_is_starting_anew() {
         for _ in 0..9 {
             shown.advance(1);
             // A second time changes nothing.
-            shown.painting.follow(&shown.simulation);
+            shown.painting.sync(&shown.simulation);
             let legend = shown
                 .painting
                 .color(&mut shown.simulation, by, None)

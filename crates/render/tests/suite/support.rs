@@ -27,7 +27,7 @@ impl Shown {
     pub(crate) fn advance(&mut self, frames: usize) {
         for _ in 0..frames {
             self.simulation.step().unwrap();
-            self.painting.follow(&self.simulation);
+            self.painting.sync(&self.simulation);
         }
     }
 

@@ -147,7 +147,7 @@ impl Session {
         let report = self.simulation.step()?.clone();
         self.wait()?;
         self.frame_ms = start.elapsed().as_secs_f64() * 1e3;
-        self.painting.follow(&self.simulation);
+        self.painting.sync(&self.simulation);
         self.show_scripted_blade(frame);
         self.times.note(report.frame, report.ms);
         self.effects.note(&report, self.frame_ms);

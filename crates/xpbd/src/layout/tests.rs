@@ -74,7 +74,7 @@ impl Plan {
     }
 
     /// Follows and checks; returns the tets filled in.
-    fn follow(&mut self) -> usize {
+    fn update(&mut self) -> usize {
         self.schedule.update(
             &self.clustering,
             &self.coloring,
@@ -99,7 +99,7 @@ fn following_a_cut_costs_what_was_cut() {
             for i in 0..20 {
                 plan.replace((cut * 20 + i) * 11, (7 * i + cut) % 32);
             }
-            filled += plan.follow();
+            filled += plan.update();
         }
         assert!(
             filled <= 2 * 40 * 20 * (5 + 2),
@@ -121,7 +121,7 @@ fn blocks_stay_well_used() {
             // Most crowd into few colors, then into others.
             plan.recolor(ClusterId(k), (i * i + round / 10) % 40);
         }
-        filled += plan.follow();
+        filled += plan.update();
         let used: usize = plan
             .layout
             .groups
@@ -154,7 +154,7 @@ fn a_touched_tet_is_filled_in_once() {
     // Also if its cluster moves at the same time.
     plan.layout.touch(7);
     plan.recolor(ClusterId(1), 31);
-    assert_eq!(plan.follow(), 5);
+    assert_eq!(plan.update(), 5);
 }
 
 /// Another schedule, even an equal one, is not followed but laid out.

@@ -88,7 +88,7 @@ impl Coarse {
 
     /// Follows another order of the particles, of which some are new: these join aggregates of their neighbors, with
     /// the mean of their motions. O(blocks).
-    pub(super) fn follow<R: Float>(&mut self, old: &[u32], new: &[u32], matrix: &Blocks<R>) {
+    pub(super) fn sync<R: Float>(&mut self, old: &[u32], new: &[u32], matrix: &Blocks<R>) {
         self.worn = true;
         let mut before = vec![(NONE, [0.0; VECTORS]); new.len()];
         for ((&p, &a), &weight) in old.iter().zip(&self.of).zip(&self.weights) {

@@ -175,10 +175,10 @@ impl<R: Float> CoarseCorrection<R> {
     /// Follows stars that were rebuilt, after a cut for example. Particles keep their aggregates, new ones join those
     /// around them, and the factor stays in use. When it has aged, aggregates are grown again, as many in all: larger
     /// ones where cuts have made more particles. O(pairs).
-    pub fn follow(&mut self, stars: &VertexStars<R>) {
+    pub fn sync(&mut self, stars: &VertexStars<R>) {
         let old = std::mem::replace(&mut self.order, stars.order.clone());
-        self.matrix.follow(stars);
-        self.coarse.follow(&old, &self.order, &self.matrix);
+        self.matrix.sync(stars);
+        self.coarse.sync(&old, &self.order, &self.matrix);
         self.filled = None;
     }
 

@@ -60,12 +60,12 @@ impl<R: Float> Blocks<R> {
             places: Vec::new(),
             excess: Vec::new(),
         };
-        blocks.follow(stars);
+        blocks.sync(stars);
         blocks
     }
 
     /// Takes the pattern of other stars; memory is used again. O(pairs + blocks log valence).
-    pub(super) fn follow(&mut self, stars: &VertexStars<R>) {
+    pub(super) fn sync(&mut self, stars: &VertexStars<R>) {
         let Self {
             offsets,
             upper,

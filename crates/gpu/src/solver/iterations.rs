@@ -1,5 +1,5 @@
-//! [`Turns`]: what an iteration of a frame is told beside the settings: which it is, in which substep, and how far
-//! Chebyshev's leap goes.
+//! [`IterationUniforms`]: the uniforms of an iteration beside the settings: its number, its substep and the weight of
+//! Chebyshev extrapolation.
 //!
 //! They are all in one buffer before the frame begins, and a dispatch sees its own by a dynamic offset. Only scenes with
 //! colliders, handles or Jacobi iterations need them. Cost: 256 bytes an iteration of a frame, sent when settings change.
@@ -7,28 +7,28 @@
 use incise_xpbd::{Method, StepSettings};
 use wgpu::{Buffer, BufferUsages};
 
-use super::gpu_types::Turn;
+use super::gpu_types::IterationUniform;
 use crate::array::Array;
 use crate::kernel::STRIDE;
 use crate::{GpuContext, GpuError};
 
-/// The turns of a frame.
+/// The uniforms of a frame.
 #[derive(Debug)]
-pub(crate) struct Turns {
-    array: Array<[Turn; PER_STRIDE]>,
+pub(crate) struct IterationUniforms {
+    array: Array<[IterationUniform; PER_STRIDE]>,
     sent: Option<(u32, u32, Method)>,
 }
 
-/// Turns that would fit where one is.
-const PER_STRIDE: usize = STRIDE as usize / size_of::<Turn>();
+/// Uniforms that would fit where one is.
+const PER_STRIDE: usize = STRIDE as usize / size_of::<IterationUniform>();
 
-impl Turns {
+impl IterationUniforms {
     pub(crate) fn buffer(&self) -> &Buffer {
         self.array.buffer()
     }
 
-    /// Sends the turns of a frame unless they are there; keeps none unless the frame `asks` for them.
-    pub(crate) fn follow(
+    /// Sends the uniforms of a frame unless they are there; keeps none unless the frame `asks` for them.
+    pub(crate) fn sync(
         this: &mut Option<Self>,
         gpu: &GpuContext,
         settings: &StepSettings,
@@ -39,9 +39,9 @@ impl Turns {
             return Ok(());
         }
         let all = match this {
-            Some(turns) => turns,
+            Some(uniforms) => uniforms,
             None => this.insert(Self {
-                array: Array::with_usage(gpu, "turns", 0, BufferUsages::UNIFORM)?,
+                array: Array::with_usage(gpu, "uniforms", 0, BufferUsages::UNIFORM)?,
                 sent: None,
             }),
         };
@@ -55,29 +55,29 @@ impl Turns {
             return Ok(());
         }
         let weights = weights(method, iterations);
-        let turn = |substep, (iteration, &weight)| {
-            let mut turns = [Turn::default(); PER_STRIDE];
-            turns[0] = Turn {
+        let uniform = |substep, (iteration, &weight)| {
+            let mut uniforms = [IterationUniform::default(); PER_STRIDE];
+            uniforms[0] = IterationUniform {
                 substep,
                 iteration,
                 weight,
                 unused: 0,
             };
-            turns
+            uniforms
         };
-        let turns: Vec<_> = (0..substeps)
-            .flat_map(|substep| (0..).zip(&weights).map(move |at| turn(substep, at)))
+        let uniforms: Vec<_> = (0..substeps)
+            .flat_map(|substep| (0..).zip(&weights).map(move |at| uniform(substep, at)))
             .collect();
-        all.array.replace(gpu, &turns)?;
+        all.array.replace(gpu, &uniforms)?;
         all.sent = Some((substeps, iterations, method));
         Ok(())
     }
 }
 
-/// Where the turn of an iteration is, in bytes.
+/// Where the uniform of an iteration is, in bytes.
 pub(crate) fn offset(settings: &StepSettings, substep: u32, iteration: u32) -> u32 {
     let number = u64::from(substep) * u64::from(settings.iterations) + u64::from(iteration);
-    // More than a buffer holds are refused when they are sent; without turns the offset is not used.
+    // More than a buffer holds are refused when they are sent; without uniforms the offset is not used.
     u32::try_from(number * u64::from(STRIDE)).unwrap_or(u32::MAX)
 }
 

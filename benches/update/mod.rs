@@ -23,7 +23,7 @@ pub(crate) enum Stage {
 
 /// A body that is cut, with its schedule and the solver's layout.
 #[derive(Debug)]
-pub(crate) struct Following {
+pub(crate) struct Updated {
     /// Whether everything is rebuilt instead of updated.
     rebuilds: bool,
     solver: Solver<f32>,
@@ -39,7 +39,7 @@ pub(crate) struct Following {
     limit: NonZeroUsize,
 }
 
-impl Following {
+impl Updated {
     pub(crate) fn new(case: &Case, solver: Solver<f32>, rebuilds: bool) -> Self {
         let tets = (0..solver.tet_count()).map(|t| solver.tet_particles(t));
         let count = solver.particle_count();

@@ -1,4 +1,4 @@
-//! [`Scalars`]: distance or volume constraints on the device.
+//! [`ScalarConstraints`]: distance or volume constraints on the device.
 //!
 //! They lie in the order in which they are solved. Sixty-four clusters of a color are a group, as with tets, so the
 //! dispatches are made the same way: one for each color, small colors together. Whatever changes, all of them are sent
@@ -17,7 +17,7 @@ use crate::{GpuContext, GpuError};
 
 /// All constraints of a kind.
 #[derive(Debug)]
-pub(crate) struct Scalars {
+pub(crate) struct ScalarConstraints {
     kind: Kind,
     damped: bool,
     corners: Array<[u32; 4]>,
@@ -29,7 +29,7 @@ pub(crate) struct Scalars {
     multipliers: Array<f32>,
 }
 
-impl Scalars {
+impl ScalarConstraints {
     fn new(gpu: &GpuContext, kind: Kind) -> Result<Self, GpuError> {
         Ok(Self {
             kind,
@@ -43,7 +43,7 @@ impl Scalars {
     }
 
     /// Takes over the constraints of a kind; nothing is kept for none.
-    pub(crate) fn follow(
+    pub(crate) fn sync(
         this: &mut Option<Self>,
         gpu: &GpuContext,
         solver: &Solver<f32>,
@@ -95,7 +95,7 @@ impl Scalars {
         self.ranges.replace(gpu, &ranges)?;
         let mut rows = Rows::default();
         rows.refill(schedule.color_count(), groups.into_iter());
-        self.colors.follow(gpu, &rows)
+        self.colors.sync(gpu, &rows)
     }
 
     /// Makes room for multipliers.
@@ -109,7 +109,7 @@ impl Scalars {
         kernels: &mut Kernels,
         [settings, particles, previous]: [&Buffer; 3],
         keeps: bool,
-    ) -> Result<Passes<'a>, GpuError> {
+    ) -> Result<ScalarKernels<'a>, GpuError> {
         let variant = Variant {
             damped: self.damped,
             keeps,
@@ -127,7 +127,7 @@ impl Scalars {
             self.colors.lists.array.buffer(),
         ];
         let [one, several] = solve_scalars(self.kind);
-        Ok(Passes {
+        Ok(ScalarKernels {
             colors: &self.colors,
             one: kernels.bind(gpu, one, variant, &buffers)?,
             several: kernels.bind(gpu, several, variant, &buffers)?,
@@ -177,7 +177,7 @@ impl Kind {
 
 /// The kernels of a kind.
 #[derive(Debug)]
-pub(crate) struct Passes<'a> {
+pub(crate) struct ScalarKernels<'a> {
     colors: &'a Colors,
     one: BoundKernel,
     several: BoundKernel,
@@ -185,7 +185,7 @@ pub(crate) struct Passes<'a> {
     clear: Option<(BoundKernel, usize)>,
 }
 
-impl Passes<'_> {
+impl ScalarKernels<'_> {
     /// At the start of a substep.
     pub(crate) fn begin(&self, pass: &mut Recorder<'_>) {
         if let Some((clear, groups)) = &self.clear {

@@ -1,4 +1,4 @@
-//! `cargo xtask trade`: what accuracy costs, scene by scene and knob by knob.
+//! `cargo xtask accuracy`: what accuracy costs, scene by scene and knob by knob.
 //!
 //! Errors are distances from a converged solution of the same tets, by Newton's method in double precision, whose own
 //! error is stated; times are those of whole frames on one thread. The machinery is that of `incise advise`
@@ -74,12 +74,12 @@ struct LargeRow {
     vbd: Option<Deviation>,
 }
 
-pub(crate) fn trade(arguments: &ExperimentArguments) -> anyhow::Result<()> {
+pub(crate) fn accuracy(arguments: &ExperimentArguments) -> anyhow::Result<()> {
     experiment(arguments)?.run(arguments)
 }
 
 fn experiment(arguments: &ExperimentArguments) -> anyhow::Result<Experiment<SceneRow>> {
-    let folder = arguments.out.join("trade-scenes");
+    let folder = arguments.out.join("accuracy-scenes");
     fs::create_dir_all(&folder)?;
     let (quick, gpu) = (arguments.quick, arguments.backend == Backend::Gpu);
     let cells = Kind::ALL.map(|kind| {
@@ -87,7 +87,7 @@ fn experiment(arguments: &ExperimentArguments) -> anyhow::Result<Experiment<Scen
         Cell::new(kind.id(), move || measure(kind, &folder, quick, gpu))
     });
     Ok(Experiment {
-        name: "trade",
+        name: "accuracy",
         cells: cells.into(),
         page: page::page,
     })

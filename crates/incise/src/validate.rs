@@ -1,4 +1,4 @@
-//! What no number of a scene may exceed, and the errors that name those that do.
+//! Validation: ranges that numbers of a scene must stay in, and the errors that name those that do not.
 
 use incise_mesh::glam::DVec3;
 

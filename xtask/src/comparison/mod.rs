@@ -1,4 +1,4 @@
-//! `cargo xtask peers`: our solver next to other systems on the same mesh, each in turns with ours within one run.
+//! `cargo xtask comparison`: our solver next to other systems on the same mesh, each in turns with ours within one run.
 //!
 //! The other systems are run by the scripts of a folder, which is given; they are copied into the output folder and run
 //! there, since they write beside themselves. What is not installed is a row that says so. One thread each.
@@ -27,7 +27,7 @@ const FOLDER: &str = "../shared/peers";
 const PYTHON: &str = "python3";
 
 #[derive(Debug, Args)]
-pub(crate) struct PeersArguments {
+pub(crate) struct ComparisonArguments {
     #[command(flatten)]
     experiment: ExperimentArguments,
     /// The folder of the scripts that run other systems.
@@ -85,17 +85,17 @@ const QUICK: Extent = Extent {
 pub(crate) fn usual(arguments: &ExperimentArguments) -> anyhow::Result<()> {
     let peers = PathBuf::from(FOLDER);
     if !peers.join("scene.py").is_file() {
-        eprintln!("peers: left out, {FOLDER} has no scripts that run other systems");
+        eprintln!("comparison: left out, {FOLDER} has no scripts that run other systems");
         return Ok(());
     }
-    self::peers(&PeersArguments {
+    comparison(&ComparisonArguments {
         experiment: arguments.clone(),
         peers,
         python: PathBuf::from(PYTHON),
     })
 }
 
-pub(crate) fn peers(arguments: &PeersArguments) -> anyhow::Result<()> {
+pub(crate) fn comparison(arguments: &ComparisonArguments) -> anyhow::Result<()> {
     let from = &arguments.peers;
     ensure!(
         from.join("scene.py").is_file(),
@@ -103,7 +103,7 @@ pub(crate) fn peers(arguments: &PeersArguments) -> anyhow::Result<()> {
          packages, see the README there, and --python FILE for the Python that has them)",
         from.display()
     );
-    let folder = arguments.experiment.out.join("peers-run");
+    let folder = arguments.experiment.out.join("comparison-run");
     let folder = copy(from, &folder)?;
     let extent = if arguments.experiment.quick {
         QUICK
@@ -115,7 +115,7 @@ pub(crate) fn peers(arguments: &PeersArguments) -> anyhow::Result<()> {
         Cell::new(peer.id, move || row(peer, extent, &folder, &python))
     });
     let experiment = Experiment {
-        name: "peers",
+        name: "comparison",
         cells: cells.collect(),
         page: page::page,
     };

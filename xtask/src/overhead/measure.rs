@@ -108,7 +108,7 @@ fn instructions(scene: &Scene, way: Way, folder: &Path) -> anyhow::Result<Counts
     std::fs::write(&path, scene.to_toml()?)?;
     let path = path.to_str().context("the temporary folder has a name")?;
     let frames = FRAMES.to_string();
-    let arguments = ["lean-probe", "--scene", path, "--way", way.name()];
+    let arguments = ["overhead-probe", "--scene", path, "--way", way.name()];
     callgrind::count(&[&arguments[..], &["--frames", &frames]].concat(), folder)
 }
 

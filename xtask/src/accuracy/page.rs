@@ -1,4 +1,4 @@
-//! The page of `cargo xtask trade`, made of the rows alone: sentences by knob, and for each scene a plot, the settings
+//! The page of `cargo xtask accuracy`, made of the rows alone: sentences by knob, and for each scene a plot, the settings
 //! that no other one dominates, and all of them.
 
 use incise::advise::non_dominated;

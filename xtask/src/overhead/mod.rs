@@ -1,4 +1,4 @@
-//! `cargo xtask lean`: what a scene pays for what it does not use.
+//! `cargo xtask overhead`: what a scene pays for what it does not use.
 //!
 //! Each feature is declared in an otherwise bare scene, once with nothing to do and once at work, in two sizes, and the
 //! differences to the bare scene are listed: instructions, branches, bytes, and what a GPU is told. The bare scene
@@ -20,7 +20,7 @@ use probe::Way;
 pub(crate) use probe::{ProbeArguments, probe};
 
 #[derive(Debug, Args)]
-pub(crate) struct LeanArguments {
+pub(crate) struct OverheadArguments {
     #[command(flatten)]
     experiment: ExperimentArguments,
     /// Leave out what valgrind counts.
@@ -52,7 +52,7 @@ const BY_HAND: [(Way, &str); 2] = [
     clippy::print_stderr,
     reason = "a user who waits for a page wants to know at once what will be missing from it"
 )]
-pub(crate) fn lean(arguments: &LeanArguments) -> anyhow::Result<()> {
+pub(crate) fn overhead(arguments: &OverheadArguments) -> anyhow::Result<()> {
     let valgrind = match arguments.no_valgrind {
         true => None,
         false => callgrind::version(),
@@ -68,7 +68,7 @@ pub(crate) fn lean(arguments: &LeanArguments) -> anyhow::Result<()> {
 
 /// Runs this experiment as one of all experiments.
 pub(crate) fn run(arguments: &ExperimentArguments) -> anyhow::Result<()> {
-    lean(&LeanArguments {
+    overhead(&OverheadArguments {
         experiment: arguments.clone(),
         no_valgrind: false,
     })
@@ -113,7 +113,7 @@ fn experiment(quick: bool, valgrind: &Option<String>) -> Experiment<Row> {
         }));
     }
     Experiment {
-        name: "lean",
+        name: "overhead",
         cells,
         page: page::page,
     }

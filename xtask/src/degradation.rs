@@ -1,4 +1,4 @@
-//! `cargo xtask wear`: many small strokes into one mesh, and what becomes of clusters, colors and the time to solve.
+//! `cargo xtask degradation`: many small strokes into one mesh, and what becomes of clusters, colors and the time to solve.
 //!
 //! One scene runs without merging, with it, and with re-clustering in the background, frame by frame in turn, so that
 //! other load of the machine affects all of them. Nothing moves: the strokes fall on the mesh at rest, and the solver
@@ -24,7 +24,7 @@ use crate::models::{Model, models};
 use crate::table;
 
 #[derive(Debug, Args)]
-pub(crate) struct WearArguments {
+pub(crate) struct DegradationArguments {
     /// Take the .vtk meshes of this folder instead of generated ones.
     #[arg(long, value_name = "DIR")]
     models: Option<PathBuf>,
@@ -63,7 +63,7 @@ struct Run {
     clippy::print_stdout,
     reason = "the tables are the result of the command"
 )]
-pub(crate) fn wear(arguments: &WearArguments) -> anyhow::Result<()> {
+pub(crate) fn degradation(arguments: &DegradationArguments) -> anyhow::Result<()> {
     let models = models(arguments.models.as_deref(), usize::MAX, false)?;
     let named = models.iter().find(|model| model.name == arguments.model);
     let generated = models.iter().find(|model| model.name.starts_with("liver"));
@@ -83,7 +83,7 @@ pub(crate) fn wear(arguments: &WearArguments) -> anyhow::Result<()> {
             }
         }
     }
-    let WearArguments {
+    let DegradationArguments {
         strokes, threads, ..
     } = arguments;
     let mut text = format!(
@@ -112,7 +112,7 @@ fn runs(model: &Model, strokes: u64, threads: usize) -> anyhow::Result<Vec<Run>>
     scene.stroke = small_strokes(&model.mesh, scale, strokes);
     let mut runs = Vec::new();
     let renewing = Some(ReclusterSpec {
-        wear: 1.25,
+        threshold: 1.25,
         frames: NonZeroU32::MIN.saturating_add(9),
     });
     for (name, merges, recluster) in [

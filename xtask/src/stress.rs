@@ -1,4 +1,4 @@
-//! `cargo xtask soak-cut`: random strokes by the thousand, everything checked after each.
+//! `cargo xtask stress-cut`: random strokes by the thousand, everything checked after each.
 //!
 //! The body sags under its weight, held on one side, with a ground for what comes off. Each stroke is of a random kind
 //! and place, a few edges large: rectangles, bent strips, plugs, blades swept over several frames, the stroke before
@@ -22,7 +22,7 @@ use crate::random::Random;
 use crate::table;
 
 #[derive(Debug, Args)]
-pub(crate) struct SoakArguments {
+pub(crate) struct StressArguments {
     /// How many strokes on each mesh.
     #[arg(long, default_value_t = 10_000)]
     strokes: u64,
@@ -40,7 +40,7 @@ pub(crate) struct SoakArguments {
     mesh: Option<PathBuf>,
 }
 
-/// What a soak saw.
+/// What a stress saw.
 #[derive(Debug, Default)]
 struct Tally {
     strokes: u64,
@@ -59,7 +59,7 @@ struct Tally {
     clippy::print_stdout,
     reason = "the table is the result of the command"
 )]
-pub(crate) fn soak(arguments: &SoakArguments) -> anyhow::Result<()> {
+pub(crate) fn stress(arguments: &StressArguments) -> anyhow::Result<()> {
     let mut bodies = models(None, 12_000, arguments.quick)?;
     bodies.retain(|model| model.name.contains("liver") && model.mesh.tets.len() <= 12_000);
     if let Some(path) = &arguments.mesh {
@@ -85,7 +85,7 @@ pub(crate) fn soak(arguments: &SoakArguments) -> anyhow::Result<()> {
         let share = (i + 1) as f64 / bodies.len() as f64;
         let end = arguments.seconds.map(|seconds| seconds * share);
         let late = || end.is_some_and(|end| start.elapsed().as_secs_f64() > end);
-        let tally = soak_one(model, arguments, late)?;
+        let tally = stress_one(model, arguments, late)?;
         table.add_row([
             model.name.clone(),
             tally.strokes.to_string(),
@@ -109,9 +109,9 @@ pub(crate) fn soak(arguments: &SoakArguments) -> anyhow::Result<()> {
 }
 
 /// Runs until all strokes are made or it is `late`; fails at the first violation.
-fn soak_one(
+fn stress_one(
     model: &Model,
-    arguments: &SoakArguments,
+    arguments: &StressArguments,
     late: impl Fn() -> bool,
 ) -> anyhow::Result<Tally> {
     let mut random = Random(arguments.seed);
@@ -137,7 +137,7 @@ fn soak_one(
             simulation.cut(stroke.clone())?;
             tally.strokes += 1;
             for _ in 0..frames {
-                follow(&mut simulation, &mut skin, &mut tally).with_context(|| {
+                checked_step(&mut simulation, &mut skin, &mut tally).with_context(|| {
                     let (seed, strokes) = (arguments.seed, tally.strokes);
                     format!("{}, seed {seed}, stroke {strokes}: {stroke:?}", model.name)
                 })?;
@@ -149,11 +149,15 @@ fn soak_one(
 }
 
 /// Makes a frame and checks everything.
-fn follow(simulation: &mut Simulation, skin: &mut Skin, tally: &mut Tally) -> anyhow::Result<()> {
+fn checked_step(
+    simulation: &mut Simulation,
+    skin: &mut Skin,
+    tally: &mut Tally,
+) -> anyhow::Result<()> {
     let report = simulation.step()?.clone();
     simulation.check()?;
     for delta in simulation.deltas() {
-        skin.follow(delta);
+        skin.apply_delta(delta);
     }
     ensure!(
         skin.triangles().len() == simulation.boundary().count(),

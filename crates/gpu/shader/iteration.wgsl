@@ -1,6 +1,6 @@
 // Where in a frame an iteration is, for kernels that need to know.
 
-struct Turn {
+struct IterationUniform {
     // Both from 0 on.
     substep: u32,
     iteration: u32,
@@ -9,4 +9,4 @@ struct Turn {
     unused: u32,
 }
 
-@group(0) @binding(1) var<uniform> turn: Turn;
+@group(0) @binding(1) var<uniform> current: IterationUniform;

@@ -341,7 +341,7 @@ pub(crate) fn cases() -> Vec<Case> {
         }),
         case("recluster", Idle, "nothing is worn", |s| {
             s.solver.recluster = Some(ReclusterSpec {
-                wear: 1.25,
+                threshold: 1.25,
                 frames: std::num::NonZeroU32::MIN,
             });
         }),

@@ -7,7 +7,8 @@ use super::page::{front, page, sentence};
 use super::*;
 
 fn folder(name: &str) -> PathBuf {
-    let folder = std::env::temp_dir().join(format!("incise-trade-{name}-{}", std::process::id()));
+    let folder =
+        std::env::temp_dir().join(format!("incise-accuracy-{name}-{}", std::process::id()));
     fs::create_dir_all(&folder).unwrap();
     folder
 }
