@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap_complete::Shell;
 use incise_render::{ColorBy, LARGEST_SIDE};
 
 /// Cuts soft bodies in real time.
@@ -28,12 +29,47 @@ pub(crate) enum Command {
     Advise(AdviseArguments),
     /// Cluster and color the constraints of a mesh or the vertices of a graph.
     Color(ColorArguments),
-    /// Look at, convert and generate meshes.
+    /// Print the keys of scene files, or validate a scene.
+    Scene(SceneArguments),
+    /// Inspect, convert and generate meshes.
     #[command(after_help = "Example: incise mesh generate liver --tets 5000 liver.vtk")]
     Mesh {
         #[command(subcommand)]
         command: MeshCommand,
     },
+    /// Print completions for a shell.
+    #[command(after_help = "Example: incise completions bash > /etc/bash_completion.d/incise")]
+    Completions {
+        /// The shell.
+        #[arg(value_enum)]
+        shell: Shell,
+    },
+    /// Write manual pages, one for each command.
+    #[command(after_help = "Example: incise man /usr/local/share/man/man1")]
+    Man {
+        /// Folder of the pages.
+        folder: PathBuf,
+    },
+}
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example: incise scene --check scene.toml\nExample: incise scene --defaults > scene.toml"
+)]
+#[group(required = true, multiple = false)]
+pub(crate) struct SceneArguments {
+    /// Print a commented scene with every default.
+    #[arg(long)]
+    pub(crate) defaults: bool,
+    /// Print the JSON Schema of scene files.
+    #[arg(long)]
+    pub(crate) schema: bool,
+    /// Print the reference of all keys in Markdown.
+    #[arg(long)]
+    pub(crate) reference: bool,
+    /// Validate a scene without running it.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) check: Option<PathBuf>,
 }
 
 #[derive(Debug, Default, Args)]

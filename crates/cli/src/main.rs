@@ -13,13 +13,18 @@ mod output;
 mod pictures;
 mod print;
 mod run;
+mod scene;
 mod summary;
 
+use std::path::Path;
 use std::process::ExitCode;
 
+use anyhow::Context;
 use args::{Arguments, Command};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, Parser};
+use failure::Failure;
+use print::print;
 
 fn main() -> ExitCode {
     let arguments = Arguments::try_parse().unwrap_or_else(|error| with_tip(error).exit());
@@ -28,12 +33,26 @@ fn main() -> ExitCode {
         Some(Command::Run(arguments)) => run::run(&arguments),
         Some(Command::Advise(arguments)) => advise::advise(&arguments),
         Some(Command::Color(arguments)) => color::color(&arguments),
+        Some(Command::Scene(arguments)) => scene::scene(&arguments),
         Some(Command::Mesh { command }) => mesh::mesh(&command),
+        Some(Command::Completions { shell }) => {
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Arguments::command(), "incise", &mut script);
+            print(String::from_utf8_lossy(&script).trim_end())
+        }
+        Some(Command::Man { folder }) => manual(&folder),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(),
     }
+}
+
+/// Writes the manual pages.
+fn manual(folder: &Path) -> Result<(), Failure> {
+    let written = clap_mangen::generate_to(Arguments::command(), folder);
+    let named = written.with_context(|| format!("{}: cannot write manual pages", folder.display()));
+    named.map_err(Failure::Input)
 }
 
 /// Says where an option belongs that was given without its command.

@@ -16,3 +16,8 @@ pub(crate) fn print(line: impl std::fmt::Display) -> Result<(), Failure> {
         _ => Ok(()),
     }
 }
+
+/// A count with its noun, in singular or plural.
+pub(crate) fn count(count: usize, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
+}

@@ -48,7 +48,7 @@ pub(crate) fn settings(scene: &Scene) -> Result<StepSettings, Error> {
         method: match solver.method {
             Method::Chebyshev => incise_xpbd::Method::Chebyshev {
                 spectral_radius: solver.spectral_radius,
-                delay: solver.delay,
+                chebyshev_start: solver.chebyshev_start,
             },
             Method::Jacobi => incise_xpbd::Method::Jacobi,
             // VBD does not ask.

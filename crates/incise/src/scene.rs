@@ -1,10 +1,12 @@
-//! [`Scene`]: what is simulated, as written in a scene file.
+//! [`Scene`]: the contents of a scene file.
 //!
-//! A scene names what it needs; what it does not name is not computed. Every key has a documented default, unknown
-//! keys are errors that name the nearest known one. The format is TOML; the structs are the documentation of its keys.
+//! A scene names what it needs; features that it does not name cost nothing. Every key has a documented default, and an
+//! unknown key is an error that names the nearest known one. The format is TOML. The structs are the only place that
+//! documents keys, with units and ranges: `docs/scene.md` and the JSON Schema are generated from them.
 
 use std::path::{Path, PathBuf};
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
@@ -17,6 +19,7 @@ mod lines;
 mod method;
 mod preset;
 mod region;
+mod schema;
 mod solver;
 mod stroke;
 mod substeps;
@@ -29,6 +32,7 @@ pub use lines::line_of;
 pub use method::{Integrator, Method, TetSolve};
 pub use preset::Preset;
 pub use region::Region;
+pub use schema::schema;
 pub use solver::{Backend, Precision, ReclusterSpec, SleepSpec, SolverSpec};
 pub use stroke::StrokeSpec;
 pub(crate) use stroke::{along, pose};
@@ -51,16 +55,16 @@ pub use substeps::Substeps;
 /// assert_eq!(scene.solver.substeps, incise::scene::Substeps::Auto);
 /// # Ok::<(), incise::Error>(())
 /// ```
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
-    /// What is reported beside times and counts.
+    /// Reported quantities beside times and counts.
     #[serde(default, skip_serializing_if = "ReportSpec::is_default")]
     pub report: ReportSpec,
-    /// What acts on all bodies.
+    /// Forces and obstacles that act on all bodies.
     #[serde(default)]
     pub world: WorldSpec,
-    /// How it is computed.
+    /// Settings of the solver.
     #[serde(default)]
     pub solver: SolverSpec,
     /// The bodies.
@@ -69,10 +73,10 @@ pub struct Scene {
     /// Obstacles.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub collider: Vec<ColliderSpec>,
-    /// What holds parts of bodies and moves them.
+    /// Parts of bodies that are held or moved.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub attachment: Vec<AttachmentSpec>,
-    /// Sutures and springs.
+    /// Sutures, springs and rods.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub distance: Vec<DistanceSpec>,
     /// The cuts.
@@ -80,14 +84,15 @@ pub struct Scene {
     pub stroke: Vec<StrokeSpec>,
 }
 
-/// What is reported, and how often.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Reported quantities and how often they are computed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ReportSpec {
-    /// Every how many frames, at least 1.
+    /// Frames from one report to the next.
     #[serde(default = "one")]
+    #[schemars(range(min = 1))]
     pub every: u64,
-    /// Which quantities; they cost time only in the frames that report them.
+    /// Quantities, which cost time only in the frames that report them.
     #[serde(default)]
     pub quantities: Vec<Quantity>,
 }
@@ -107,8 +112,8 @@ impl Default for ReportSpec {
     }
 }
 
-/// Something to report that has to be computed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// A quantity that is computed for reports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Quantity {
     /// Primal and dual residual of the last substep.
@@ -119,34 +124,37 @@ pub enum Quantity {
     Volume,
     /// The largest speed.
     Speed,
-    /// The control number of the substep (see `incise_xpbd::Solver::kappa`) and what was softened to keep its limit, for
-    /// all and by body, and in a frame with a cut also as it was before.
+    /// Squared Courant number of the substep (see `incise_xpbd::Solver::kappa`) and the tets softened to keep its limit,
+    /// in all and by body; in a frame with a cut also the values before it.
     Kappa,
 }
 
-/// What acts on all bodies.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// Forces and obstacles that act on all bodies.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WorldSpec {
-    /// Acceleration in m/s²; absent: none.
+    /// Acceleration of gravity; absent: none.
+    #[schemars(extend("unit" = "m/s²"))]
     pub gravity: Option<[f64; 3]>,
     /// A floor; absent: none.
     pub ground: Option<GroundSpec>,
 }
 
 /// A horizontal floor; up is z.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GroundSpec {
-    /// Its height in m.
+    /// Height of the floor.
+    #[schemars(extend("unit" = "m"), range(min = -1e9, max = 1e9))]
     pub height: f64,
     /// Coefficient of friction.
     #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1e3))]
     pub friction: f64,
 }
 
-/// A body: its mesh, where it is and what it is made of.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// A body: mesh, position and material.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BodySpec {
     /// A mesh file, relative to the scene file. Either this or `shape`.
@@ -157,55 +165,64 @@ pub struct BodySpec {
     pub shape: Option<ShapeSpec>,
     /// Factor on the mesh's coordinates.
     #[serde(default = "unit")]
+    #[schemars(range(min = 1e-9, max = 1e9))]
     pub scale: f64,
-    /// Where the mesh's origin goes, in m.
+    /// Position of the mesh's origin.
     #[serde(default)]
+    #[schemars(extend("unit" = "m"))]
     pub position: [f64; 3],
-    /// Young's modulus in Pa.
+    /// Young's modulus.
     #[serde(default = "soft")]
+    #[schemars(extend("unit" = "Pa"), range(min = 1e-6, max = 1e15))]
     pub young_modulus: f64,
-    /// Poisson's ratio, at least 0 and below 0.5.
+    /// Poisson's ratio.
     #[serde(default = "nearly_incompressible")]
+    #[schemars(extend("exclusiveMaximum" = 0.5), range(min = 0.0))]
     pub poisson_ratio: f64,
-    /// Mass density in kg/m³.
+    /// Mass density.
     #[serde(default = "water")]
+    #[schemars(extend("unit" = "kg/m³"), range(min = 1e-6, max = 1e9))]
     pub density: f64,
-    /// Damping time in s: see `incise_xpbd::Material::damping`.
+    /// Damping time τ: a vibration of angular frequency ω is damped by the fraction τω/2 of critical. Moves no equilibrium.
     #[serde(default)]
+    #[schemars(extend("unit" = "s"), range(min = 0.0, max = 1e6))]
     pub damping: f64,
-    /// Keeps the volume of each tet beyond what the material does: one over a bulk modulus, in 1/Pa; 0 is
-    /// incompressible. Absent: not at all.
+    /// Additional volume constraint of each tet: one over a bulk modulus; 0 is incompressible, absent: none.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "1/Pa"), range(min = 0.0, max = 1e9))]
     pub volume_compliance: Option<f64>,
-    /// Substeps of this body in place of the solver's. Bodies that are solved together take the largest number.
+    /// Substeps of this body in place of the solver's. Bodies that are solved together take the largest number of them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub substeps: Option<Substeps>,
-    /// Particles that do not move, in m in the world.
+    /// Particles that do not move.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fixed: Vec<Region>,
-    /// Parts of another material.
+    /// Parts with another material.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub material: Vec<MaterialSpec>,
 }
 
-/// The material of a part of a body. What it does not name is that of the body.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// The material of a part of a body. Absent keys have the body's values.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MaterialSpec {
-    /// The part: the tets at rest whose centers lie in any of these regions, in m in the world. Where parts overlap, the
-    /// last one counts.
+    /// The part: tets whose centers at rest lie in any of these regions. Where parts overlap, the last one counts.
     pub regions: Vec<Region>,
-    /// Young's modulus in Pa.
+    /// Young's modulus.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "Pa"), range(min = 1e-6, max = 1e15))]
     pub young_modulus: Option<f64>,
-    /// Poisson's ratio, at least 0 and below 0.5.
+    /// Poisson's ratio.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMaximum" = 0.5), range(min = 0.0))]
     pub poisson_ratio: Option<f64>,
-    /// Mass density in kg/m³.
+    /// Mass density.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "kg/m³"), range(min = 1e-6, max = 1e9))]
     pub density: Option<f64>,
-    /// Damping time in s.
+    /// Damping time.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "s"), range(min = 0.0, max = 1e6))]
     pub damping: Option<f64>,
 }
 
@@ -230,12 +247,14 @@ impl Default for BodySpec {
 }
 
 /// A generated shape.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ShapeSpec {
-    /// `box`, `beam`, `sphere`, `torus`, `plate`, `liver`, `bunny`, `armadillo`, `gear`, `shell` or `pair`.
+    /// Name of the shape.
+    #[schemars(extend("enum" = incise_meshing::Shape::NAMES))]
     pub kind: String,
     /// Wanted number of tets; the result is within 2%.
+    #[schemars(range(min = 1))]
     pub tets: usize,
 }
 

@@ -77,18 +77,18 @@ impl<R: Float> Jacobi<R> {
         }
     }
 
-    /// Leaps ahead, once `delay` iterations have been made.
+    /// Leaps ahead, once `chebyshev_start` iterations have been made.
     pub(crate) fn extrapolate(
         &mut self,
         particles: &[R::Particle],
         multipliers: &[R::Atomic],
         spectral_radius: f64,
-        delay: u32,
+        chebyshev_start: u32,
     ) {
         self.made += 1;
-        if self.made > delay {
+        if self.made > chebyshev_start {
             let square = spectral_radius * spectral_radius;
-            self.weight = if self.made == delay + 1 {
+            self.weight = if self.made == chebyshev_start + 1 {
                 2.0 / (2.0 - square)
             } else {
                 4.0 / (4.0 - square * self.weight)

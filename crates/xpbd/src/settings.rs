@@ -62,7 +62,7 @@ pub enum Method {
         /// The spectral radius ρ of the Jacobi iteration, from 0 to below 1: the larger, the bolder.
         spectral_radius: f64,
         /// Plain iterations before the first extrapolation, at least 1.
-        delay: u32,
+        chebyshev_start: u32,
     },
 }
 
@@ -126,15 +126,15 @@ impl StepSettings {
         }
         if let Method::Chebyshev {
             spectral_radius,
-            delay,
+            chebyshev_start,
         } = self.method
         {
             if !(0.0..1.0).contains(&spectral_radius) {
                 let range = "at least 0 and below 1";
                 return refuse("spectral_radius", spectral_radius, range);
             }
-            if delay == 0 {
-                return refuse("delay", 0.0, "at least 1");
+            if chebyshev_start == 0 {
+                return refuse("chebyshev_start", 0.0, "at least 1");
             }
         }
         if let Some(value) = self

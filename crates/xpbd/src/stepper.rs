@@ -200,10 +200,15 @@ impl<R: Float> Stepper<R> {
         jacobi.apply(&particles.cells);
         if let Method::Chebyshev {
             spectral_radius,
-            delay,
+            chebyshev_start,
         } = settings.method
         {
-            jacobi.extrapolate(&particles.cells, multipliers, spectral_radius, delay);
+            jacobi.extrapolate(
+                &particles.cells,
+                multipliers,
+                spectral_radius,
+                chebyshev_start,
+            );
         }
     }
 }

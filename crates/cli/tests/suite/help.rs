@@ -14,6 +14,9 @@ fn every_help_has_an_example() {
         &["mesh", "info"],
         &["mesh", "convert"],
         &["mesh", "generate"],
+        &["scene"],
+        &["completions"],
+        &["man"],
     ] {
         for flag in ["--help", "-h"] {
             let help = place.good(&[command, &[flag]].concat());
@@ -42,5 +45,42 @@ fn the_version_is_that_of_the_package() {
     assert_eq!(
         version.trim(),
         concat!("incise ", env!("CARGO_PKG_VERSION"))
+    );
+}
+
+#[test]
+fn shells_complete_commands_and_options() {
+    let place = Place::new();
+    for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
+        let script = place.good(&["completions", shell]);
+        for word in ["advise", "tetrahedralize", "wireframe"] {
+            assert!(script.contains(word), "{shell} does not complete {word}");
+        }
+    }
+}
+
+#[test]
+fn every_command_has_a_manual_page() {
+    let place = Place::new();
+    std::fs::create_dir(place.path("man1")).unwrap();
+    place.good(&["man", "man1"]);
+    for name in [
+        "incise",
+        "incise-run",
+        "incise-scene",
+        "incise-mesh-convert",
+    ] {
+        let page = std::fs::read_to_string(place.path(&format!("man1/{name}.1"))).unwrap();
+        assert!(
+            page.contains(".TH") && page.contains(".SH SYNOPSIS"),
+            "{name}"
+        );
+    }
+    let refused = place.incise(&["man", "absent"]);
+    assert_eq!(refused.code, 2);
+    assert!(
+        refused.stderr.contains("absent: cannot write manual pages"),
+        "{}",
+        refused.stderr
     );
 }

@@ -14,4 +14,5 @@ mod mesh;
 mod pictures;
 mod run;
 mod run_files;
+mod scene;
 mod support;

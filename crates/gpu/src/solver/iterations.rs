@@ -89,7 +89,7 @@ pub(crate) fn offset(settings: &StepSettings, substep: u32, iteration: u32) -> u
 fn weights(method: Method, iterations: u32) -> Vec<f32> {
     let Method::Chebyshev {
         spectral_radius,
-        delay,
+        chebyshev_start,
     } = method
     else {
         return vec![0.0; iterations as usize];
@@ -98,10 +98,10 @@ fn weights(method: Method, iterations: u32) -> Vec<f32> {
     let mut weight = 1.0;
     (1..=iterations)
         .map(|made| {
-            if made <= delay {
+            if made <= chebyshev_start {
                 return 0.0;
             }
-            weight = match made == delay + 1 {
+            weight = match made == chebyshev_start + 1 {
                 true => 2.0 / (2.0 - square),
                 false => 4.0 / (4.0 - square * weight),
             };

@@ -11,7 +11,7 @@ use crate::twin::{FORMS, Twins, bar};
 
 const CHEBYSHEV: Method = Method::Chebyshev {
     spectral_radius: 0.9,
-    delay: 4,
+    chebyshev_start: 4,
 };
 
 fn iterated(method: Method) -> StepSettings {

@@ -81,7 +81,7 @@ fn several_iterations_accumulate_multipliers() {
 fn jacobi_and_chebyshev() {
     let chebyshev = Method::Chebyshev {
         spectral_radius: 0.9,
-        delay: 4,
+        chebyshev_start: 4,
     };
     for method in [Method::Jacobi, chebyshev] {
         for iterations in [1, 12] {

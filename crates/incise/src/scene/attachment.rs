@@ -1,28 +1,31 @@
-//! [`AttachmentSpec`]: what holds a part of a body and moves it.
+//! [`AttachmentSpec`]: a part of a body that is held or moved.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Region;
 
-/// Holds some particles of a body and moves them. Cuts through what it holds leave both sides held.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// A part of a body that is held or moved along a path. A cut through the part leaves both sides attached.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AttachmentSpec {
-    /// The number of the body.
+    /// Number of the body, counted from 0.
     #[serde(default)]
     pub body: usize,
-    /// What is held: the particles that lie at rest in any of these regions. Fixed ones stay where they are.
+    /// Attached particles: those that lie at rest in any of these regions, except fixed ones.
     pub regions: Vec<Region>,
-    /// The frames at whose start the attachment is at the path's start and end.
+    /// Frames at whose start the attachment is at the start and at the end of the path.
     #[serde(default = "at_once")]
     pub frames: [u64; 2],
-    /// Offsets of the attachment in m, passed through at equal times. What is held is at rest at the first one.
+    /// Offsets of the attachment, at least two, at equal intervals of time. At the first one the particles are at rest.
     #[serde(default = "nowhere")]
+    #[schemars(extend("unit" = "m"), length(min = 2))]
     pub path: Vec<[f64; 3]>,
-    /// How it turns meanwhile; absent: not at all.
+    /// Rotation along the path; absent: none.
     pub rotation: Option<PathRotationSpec>,
-    /// One over the stiffness by which each particle is held, in m/N; 0 holds rigidly.
+    /// Compliance of each attached particle; 0 is rigid.
     #[serde(default)]
+    #[schemars(extend("unit" = "m/N"), range(min = 0.0, max = 1e9))]
     pub compliance: f64,
 }
 
@@ -35,7 +38,7 @@ fn nowhere() -> Vec<[f64; 3]> {
 }
 
 impl AttachmentSpec {
-    /// Holds the parts of a body in some regions rigidly where they are, until a program moves them.
+    /// A rigid attachment of the particles in some regions, at rest until a program moves it.
     #[must_use]
     pub fn new(body: usize, regions: Vec<Region>) -> Self {
         Self {
@@ -49,15 +52,17 @@ impl AttachmentSpec {
     }
 }
 
-/// A turn about an axis through a point, at an even rate.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// A rotation about an axis at a constant rate.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PathRotationSpec {
-    /// The axis.
+    /// Direction of the axis.
     pub axis: [f64; 3],
-    /// The angle from start to end in degrees, against the clock as seen against the axis; below 180 a frame.
+    /// Angle from start to end, counterclockwise when the axis points to the viewer; below 180 degrees a frame.
+    #[schemars(extend("unit" = "degrees"), range(min = -1e6, max = 1e6))]
     pub angle_degrees: f64,
-    /// A point on the axis in m, which moves along the path.
+    /// Point on the axis, which moves along the path.
     #[serde(default)]
+    #[schemars(extend("unit" = "m"))]
     pub center: [f64; 3],
 }

@@ -1,73 +1,90 @@
 //! [`ColliderSpec`]: an obstacle.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A solid obstacle that particles do not enter.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// A solid obstacle for particles.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
 pub enum ColliderSpec {
-    /// A half space, free on the side that the normal points to.
+    /// A half space below a plane; the normal points to the free side.
     Plane {
-        /// A point on its surface in m.
+        /// Point on the plane.
+        #[schemars(extend("unit" = "m"))]
         point: [f64; 3],
-        /// Its normal.
+        /// Normal of the plane, of any length.
         normal: [f64; 3],
         /// Coefficient of friction.
         #[serde(default)]
+        #[schemars(range(min = 0.0, max = 1e3))]
         friction: f64,
-        /// Velocity in m/s, from the first frame on.
+        /// Velocity, from the first frame on.
         #[serde(default)]
+        #[schemars(extend("unit" = "m/s"))]
         velocity: [f64; 3],
     },
-    /// A ball.
+    /// A sphere.
     Sphere {
-        /// Its center in m.
+        /// Center.
+        #[schemars(extend("unit" = "m"))]
         center: [f64; 3],
-        /// Its radius in m.
+        /// Radius.
+        #[schemars(extend("unit" = "m"), range(min = 1e-9, max = 1e9))]
         radius: f64,
         /// Coefficient of friction.
         #[serde(default)]
+        #[schemars(range(min = 0.0, max = 1e3))]
         friction: f64,
-        /// Velocity in m/s, from the first frame on.
+        /// Velocity, from the first frame on.
         #[serde(default)]
+        #[schemars(extend("unit" = "m/s"))]
         velocity: [f64; 3],
     },
-    /// All points within the radius of a segment.
+    /// A capsule: all points within a radius of a segment.
     Capsule {
-        /// The ends of the segment in m.
+        /// Ends of the segment.
+        #[schemars(extend("unit" = "m"))]
         ends: [[f64; 3]; 2],
-        /// Its radius in m.
+        /// Radius.
+        #[schemars(extend("unit" = "m"), range(min = 1e-9, max = 1e9))]
         radius: f64,
         /// Coefficient of friction.
         #[serde(default)]
+        #[schemars(range(min = 0.0, max = 1e3))]
         friction: f64,
-        /// Velocity in m/s, from the first frame on.
+        /// Velocity, from the first frame on.
         #[serde(default)]
+        #[schemars(extend("unit" = "m/s"))]
         velocity: [f64; 3],
     },
     /// A box.
     Box {
-        /// Its center in m.
+        /// Center.
+        #[schemars(extend("unit" = "m"))]
         center: [f64; 3],
-        /// Half its edges in m.
+        /// Half lengths of the edges.
+        #[schemars(extend("unit" = "m"))]
         half_extents: [f64; 3],
-        /// How it is turned; absent: its edges are along the axes.
+        /// Rotation; absent: the edges are parallel to the axes.
         rotation: Option<RotationSpec>,
         /// Coefficient of friction.
         #[serde(default)]
+        #[schemars(range(min = 0.0, max = 1e3))]
         friction: f64,
-        /// Velocity in m/s, from the first frame on.
+        /// Velocity, from the first frame on.
         #[serde(default)]
+        #[schemars(extend("unit" = "m/s"))]
         velocity: [f64; 3],
     },
 }
 
-/// A rotation.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// A rotation of a collider.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RotationSpec {
-    /// The axis.
+    /// Direction of the axis.
     pub axis: [f64; 3],
-    /// The angle in degrees, against the clock as seen against the axis.
+    /// Angle, counterclockwise when the axis points to the viewer.
+    #[schemars(extend("unit" = "degrees"), range(min = -1e6, max = 1e6))]
     pub angle_degrees: f64,
 }

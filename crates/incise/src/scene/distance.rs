@@ -1,31 +1,35 @@
 //! [`DistanceSpec`]: a suture or a spring between two points of bodies.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Keeps two particles at a distance. A cut leaves it on its particles.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// A distance constraint between two particles: a suture, a spring or a rod. Cuts leave it in place.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DistanceSpec {
-    /// One end.
+    /// First end.
     pub from: EndSpec,
-    /// The other end.
+    /// Second end.
     pub to: EndSpec,
-    /// The length at rest in m; absent: the distance of both particles at rest.
+    /// Length at rest; absent: the distance of both particles at rest.
+    #[schemars(extend("unit" = "m"), range(min = 0.0, max = 2e9))]
     pub length: Option<f64>,
-    /// One over the stiffness in m/N; 0 is a rod, or a thread that does not stretch.
+    /// Compliance; 0 is a rod, or with `tension_only` a thread that does not stretch.
     #[serde(default)]
+    #[schemars(extend("unit" = "m/N"), range(min = 0.0, max = 1e9))]
     pub compliance: f64,
-    /// Whether it acts only while it is longer than at rest, as a thread does.
+    /// Whether it acts only while it is longer than at rest, like a thread.
     #[serde(default)]
     pub tension_only: bool,
 }
 
-/// The particle of a body that is nearest to a point at rest.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// An end of a distance constraint: the particle of a body that is nearest to a point at rest.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EndSpec {
-    /// The number of the body.
+    /// Number of the body, counted from 0.
     pub body: usize,
-    /// The point in m in the world.
+    /// Point in the world.
+    #[schemars(extend("unit" = "m"))]
     pub point: [f64; 3],
 }

@@ -1,37 +1,37 @@
-//! [`Method`]: how a substep is solved, and [`TetSolve`]: the constraints of a tet.
+//! [`Method`]: the solver of a substep, [`Integrator`]: its time integration, and [`TetSolve`]: the constraints of a tet.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How a substep is solved.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// The solver of a substep.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Method {
-    /// Gauss-Seidel, and two-level VBD for each body of which the accuracy needs more than `max_substeps`. VBD is taken
-    /// only where `substeps`, `iterations`, `relaxation`, `tet_solve` and `kappa_limit` have their defaults, not on a GPU, and
-    /// not in scenes with colliders: an impact of a stiff body does not converge in a frame.
+    /// Gauss-Seidel, or two-level VBD for a body whose accuracy needs more than `max_substeps`. VBD is chosen only where
+    /// `substeps`, `iterations`, `relaxation`, `tet_solve` and `kappa_limit` have their defaults, not on a GPU, and not in
+    /// scenes with colliders, where an impact of a stiff body does not converge within a frame.
     #[default]
     Auto,
-    /// Color after color, each constraint seeing the corrections before it.
+    /// XPBD by colored Gauss-Seidel: each constraint uses the corrections of those before it.
     GaussSeidel,
-    /// All constraints at once, corrections added up: see `incise_xpbd::Method::Jacobi`.
+    /// XPBD by Jacobi: all constraints are solved from one state and their corrections are added up.
     Jacobi,
-    /// Jacobi, extrapolated: see `incise_xpbd::Method::Chebyshev`.
+    /// XPBD by Jacobi with Chebyshev extrapolation.
     Chebyshev,
-    /// No XPBD: particle by particle into the minimum of the implicit step's potential, see
-    /// `incise_xpbd::Solver::step_vbd`. Stable at any stiffness.
+    /// Vertex block descent: minimizes the potential of an implicit step, particle by particle. Stable at any stiffness.
     Vbd,
 }
 
-/// The rule by which VBD advances in time: see `incise_xpbd::Integrator`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// The time integration of VBD.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Integrator {
     /// The backward differentiation formula of two steps, second order.
     #[default]
     Bdf2,
-    /// Implicit Euler, first order: it damps vibrations much more.
+    /// Implicit Euler, first order: damps vibrations much more.
     ImplicitEuler,
 }
 
@@ -41,16 +41,16 @@ impl Integrator {
     }
 }
 
-/// How the elastic energy of a tet is solved.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// The constraints that stand for the elastic energy of a tet.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum TetSolve {
-    /// A shear part and a volume part that vanish at rest: bounded at any stiffness.
+    /// A shear part and a volume part that both vanish at rest: bounded at any stiffness.
     #[default]
     Split,
     /// `|F|` and `det F` as one system of two unknowns: unstable from a kappa of about 2 on unless `kappa_limit` softens.
     Block,
-    /// One after the other, as in the paper.
+    /// `|F|` and `det F` in sequence, the paper's form.
     Sequential,
 }

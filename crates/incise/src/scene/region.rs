@@ -1,34 +1,40 @@
-//! [`Region`]: some of a body's particles or tets, or a part of space.
+//! [`Region`]: a part of space, or a list of particles or tets of a body.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Some of a body's particles, or of its tets by their centers.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// A part of space that selects particles, or tets by their centers; or a list of them. Coordinates are in the world.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Region {
-    /// Those on the side of a plane that its normal points to.
+    /// The side of a plane that its normal points to.
     HalfSpace {
-        /// A point on the plane.
+        /// Point on the plane.
+        #[schemars(extend("unit" = "m"))]
         point: [f64; 3],
-        /// Its normal.
+        /// Normal of the plane, of any length.
         normal: [f64; 3],
     },
-    /// Those in an axis-aligned box.
+    /// An axis-aligned box.
     Box {
-        /// The corner with the smallest coordinates.
+        /// Corner with the smallest coordinates.
+        #[schemars(extend("unit" = "m"))]
         low: [f64; 3],
-        /// The corner with the largest coordinates.
+        /// Corner with the largest coordinates.
+        #[schemars(extend("unit" = "m"))]
         high: [f64; 3],
     },
-    /// Those in a sphere.
+    /// A sphere.
     Sphere {
-        /// Its center.
+        /// Center of the sphere.
+        #[schemars(extend("unit" = "m"))]
         center: [f64; 3],
-        /// Its radius.
+        /// Radius of the sphere.
+        #[schemars(extend("unit" = "m"), range(min = 0.0))]
         radius: f64,
     },
-    /// Those with these numbers in the body's mesh; tets if they have all four corners.
+    /// Particles by their numbers in the body's mesh; of tets, those with all four corners in the list.
     Particles(Vec<u32>),
-    /// The tets with these numbers in the body's mesh, as part of another material only.
+    /// Tets by their numbers in the body's mesh; only in the `material` of a body.
     Tets(Vec<u32>),
 }

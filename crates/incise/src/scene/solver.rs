@@ -4,78 +4,91 @@
 
 use std::num::NonZeroU32;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Integrator, Method, Preset, Substeps, TetSolve};
 use crate::Error;
 
-/// How it is computed.
+/// Settings of the solver.
 ///
 /// Some defaults depend on the method: see [`SolverSpec::of`]. Those and a preset's are applied when a scene is read.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SolverSpec {
-    /// Other defaults for the keys below: `paper`.
+    /// Other defaults for the keys of this table: `paper`, the settings of the paper's experiments.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub preset: Option<Preset>,
-    /// Time of a frame in s.
+    /// Time of a frame.
+    #[schemars(extend("unit" = "s"), range(min = 1e-9, max = 1e3))]
     pub time_step: f64,
-    /// The largest error wanted, as a fraction of the motion, above 0 and at most 1; absent: 0.1. Decides what
-    /// `substeps = "auto"` and `method = "auto"` take, and, if given, ends the rounds of two-level VBD.
+    /// Largest error wanted, as a fraction of the motion; absent: 0.1. Decides what `substeps = "auto"` and
+    /// `method = "auto"` take, and, if given, ends the rounds of two-level VBD.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0), range(max = 1.0))]
     pub accuracy: Option<f64>,
-    /// The time in ms that a frame may take on this machine, positive; absent: no limit. Substeps that are chosen, and the
-    /// method, are fitted to it: with `accuracy` no more than that needs, without it as many as fit. Runs then differ from
+    /// Computing time that a frame may take on this machine; absent: no limit. `substeps = "auto"` and `method = "auto"` are
+    /// fitted to it: with `accuracy` no more substeps than that needs, without it as many as fit. Runs then differ from
     /// each other. Not on a GPU.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("unit" = "ms", "exclusiveMinimum" = 0))]
     pub budget_ms: Option<f64>,
-    /// Equal parts of a frame: a number, or `auto`, which chooses for each body by the accuracy.
+    /// Equal parts of a frame: a number, or `auto`, which chooses for each body by `accuracy`.
     pub substeps: Substeps,
-    /// The most substeps that `auto` takes.
+    /// Largest number of substeps that `auto` takes.
+    #[schemars(range(min = 1))]
     pub max_substeps: u32,
-    /// Passes over the constraints in a substep, or sweeps of VBD. With Gauss-Seidel 1 is what converges.
+    /// Passes over the constraints in a substep, or sweeps of VBD. Gauss-Seidel converges with 1 and more substeps. The
+    /// default is 20 for Jacobi, Chebyshev and VBD.
+    #[schemars(range(min = 1))]
     pub iterations: u32,
-    /// How a substep is solved: `auto`, `gauss-seidel`, `jacobi`, `chebyshev` or `vbd`.
+    /// Solver of a substep.
     pub method: Method,
-    /// How the elastic energy of a tet is solved. VBD has no constraints.
+    /// Constraints that stand for the elastic energy of a tet. Not used by VBD.
     pub tet_solve: TetSolve,
-    /// Factor on each correction.
+    /// Factor on each correction; 0.1 by default for Jacobi and Chebyshev.
+    #[schemars(extend("exclusiveMinimum" = 0), range(max = 2.0))]
     pub relaxation: f64,
-    /// For Chebyshev: the spectral radius of the Jacobi iteration, from 0 to below 1: the larger, the bolder. At 0.99
-    /// the weights tend to 1.75, which they reach in some ten iterations; more pays only with hundreds of them.
+    /// For Chebyshev: estimated spectral radius of the Jacobi iteration. Larger values extrapolate further: with 0.99 the
+    /// weights reach 1.75 after some ten iterations.
+    #[schemars(extend("exclusiveMaximum" = 1), range(min = 0.0))]
     pub spectral_radius: f64,
-    /// For Chebyshev: plain iterations before the first extrapolation, at least 1. They damp what extrapolation would
-    /// blow up.
-    pub delay: u32,
-    /// For VBD: whether each sweep is followed by a correction of the whole body, which costs some 100 sweeps.
+    /// For Chebyshev: plain iterations before the first extrapolation. They damp the high frequencies that
+    /// extrapolation would amplify.
+    #[schemars(range(min = 1))]
+    pub chebyshev_start: u32,
+    /// For VBD: whether each sweep is followed by a coarse correction of the whole body, which costs some 100 sweeps.
     #[serde(skip_serializing_if = "is_false")]
+    #[schemars(extend("default" = false))]
     pub two_level: bool,
-    /// For VBD: how a substep advances in time, `bdf2` or `implicit-euler`.
+    /// For VBD: time integration of a substep.
     #[serde(skip_serializing_if = "Integrator::is_default")]
+    #[schemars(extend("default" = Integrator::default()))]
     pub integrator: Integrator,
-    /// How constraints are put together: `none` or `serial:K`.
+    /// Clustering of the tets: `none`, `serial:K` or `pressure:K`, with K tets a cluster.
     pub clustering: String,
-    /// Whether clusters that a cut leaves small are merged with neighbors. This makes a cut a little more expensive
-    /// and all frames after many cuts cheaper; without it clusters shrink and colors grow with every cut, as in the
-    /// paper.
+    /// Whether clusters that a cut leaves small are merged with neighbors. A cut then costs a little more and frames after
+    /// many cuts cost less; without it clusters shrink and colors grow with every cut, as in the paper.
     #[serde(skip_serializing_if = "is_true")]
+    #[schemars(extend("default" = true))]
     pub merge_clusters: bool,
-    /// When clusters and colors that many cuts have degraded are rebuilt, in the background; absent: never.
+    /// Rebuilding of clusters and colors in the background after many cuts; absent: never.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub recluster: Option<ReclusterSpec>,
-    /// How clusters are colored, by the name of an [`Algorithm`](incise_coloring::Algorithm). Clusters that cuts make are
-    /// colored one by one, until they need more colors than they should; then all are recolored, with `auto`.
+    /// Coloring algorithm for clusters, by the name of an [`Algorithm`](incise_coloring::Algorithm) or `auto`. New
+    /// clusters of cuts are colored one by one; if that needs too many colors, all are recolored with `auto`.
     pub coloring: String,
-    /// Width of the numbers.
+    /// Floating-point precision.
     pub precision: Precision,
-    /// Where it is computed: `cpu`, `gpu` or `auto`. On a GPU clusters of up to 32 tets are a thread's work each, larger
-    /// ones, up to 256, that of a workgroup.
+    /// Compute device. On a GPU a thread solves a cluster of up to 32 tets, a workgroup a larger one of up to 256.
     #[serde(skip_serializing_if = "Backend::is_cpu")]
+    #[schemars(extend("default" = Backend::default()))]
     pub backend: Backend,
-    /// Largest kappa of a tet, positive: stiffer ones, as cuts leave them, are softened to it. `inf`, the default,
-    /// softens none.
+    /// Largest kappa of a tet (squared Courant number of the substep): stiffer tets are softened to it. `inf`, the
+    /// default, softens none.
+    #[schemars(extend("exclusiveMinimum" = 0, "default" = "inf"))]
     pub kappa_limit: f64,
-    /// Bodies at rest are not solved until they are cut or something moves them; absent: all are always solved.
+    /// Sleep: bodies at rest are not solved until they are cut or moved; absent: all bodies are always solved.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sleep: Option<SleepSpec>,
 }
@@ -94,7 +107,7 @@ impl Default for SolverSpec {
             tet_solve: TetSolve::Split,
             relaxation: 1.0,
             spectral_radius: 0.99,
-            delay: 10,
+            chebyshev_start: 10,
             two_level: false,
             integrator: Integrator::Bdf2,
             clustering: "serial:10".to_owned(),
@@ -109,12 +122,12 @@ impl Default for SolverSpec {
     }
 }
 
-/// Width of the numbers the solver computes with.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Floating-point precision of the solver.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Precision {
-    /// Single on a GPU and wherever the substep is long enough for it, else double; double also where `method = "auto"`
-    /// takes VBD.
+    /// Single on a GPU and wherever the substep is long enough for it, else double. Double for two-level VBD with an
+    /// accuracy.
     #[default]
     Auto,
     /// Single: 32 bits.
@@ -135,16 +148,16 @@ impl Precision {
     }
 }
 
-/// Where a scene is to be computed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Compute device of a scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Backend {
-    /// On the processor.
+    /// The processor.
     #[default]
     Cpu,
-    /// On a GPU; an error if there is none or it cannot do what the scene asks for. Needs the feature `gpu`.
+    /// A GPU; an error if there is none or it does not support the scene's settings. Needs the feature `gpu`.
     Gpu,
-    /// On a GPU if there is a real one that can, else on the processor.
+    /// A hardware GPU if there is one that supports the scene's settings, else the processor.
     Auto,
 }
 
@@ -154,15 +167,16 @@ impl Backend {
     }
 }
 
-/// When clusters and colors are rebuilt in the background, and how long that may take.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// Rebuilding of clusters and colors in the background.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ReclusterSpec {
-    /// Degradation at which they are rebuilt, above 1: the number of colors over that of the last full coloring, or the mean cluster
-    /// size of that over the present one, whichever is larger.
+    /// Degradation at which clusters and colors are rebuilt: the number of colors over that after the last rebuild, or
+    /// the mean cluster size after the last rebuild over the present one, whichever is larger.
     #[serde(default = "five_quarters")]
+    #[schemars(extend("exclusiveMinimum" = 1))]
     pub threshold: f64,
-    /// After how many frames the new ones are taken, at least 1. A frame that comes too early waits for them.
+    /// Frames after which the rebuilt ones are taken. A frame that comes before they are ready waits for them.
     #[serde(default = "ten")]
     pub frames: NonZeroU32,
 }
@@ -174,16 +188,18 @@ fn ten() -> NonZeroU32 {
     NonZeroU32::MIN.saturating_add(9)
 }
 
-/// When a body falls asleep.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// Conditions under which a body falls asleep.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SleepSpec {
-    /// The largest speed in m/s of a particle that still counts as rest, positive. Choose it below the speed after one
-    /// frame of free fall (0.16 m/s at 0.016 s), or a body falls asleep before it falls.
+    /// Largest speed of a particle that counts as rest. Choose it below the speed after one frame of free fall (0.16 m/s
+    /// at 0.016 s), or a body falls asleep before it falls.
     #[serde(default = "millimeter_per_second")]
+    #[schemars(extend("unit" = "m/s", "exclusiveMinimum" = 0))]
     pub speed: f64,
-    /// For how long in s a body must rest before it sleeps, positive.
+    /// Time at rest before a body sleeps.
     #[serde(default = "half_a_second")]
+    #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0))]
     pub time: f64,
 }
 

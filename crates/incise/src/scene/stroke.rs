@@ -4,79 +4,92 @@
 //! `tool.rs` checks and prepares, `strokes.rs` cuts.
 
 use glam::DVec3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Region;
 
 /// A cut.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
 pub enum StrokeSpec {
-    /// A whole plane, at once.
+    /// A whole plane, cut at once.
     Plane {
-        /// The frame at whose start it cuts.
+        /// Frame at whose start the cut is made.
         frame: u64,
-        /// A point on the plane in m.
+        /// Point on the plane.
+        #[schemars(extend("unit" = "m"))]
         point: [f64; 3],
-        /// Its normal.
+        /// Normal of the plane, of any length.
         normal: [f64; 3],
-        /// Snap distance as a fraction of an edge.
+        /// Snap distance as a fraction of an edge; 0 turns snapping off.
         #[serde(default = "tenth")]
+        #[schemars(range(min = 0.0, max = 0.25))]
         snap: f64,
     },
     /// A blade moved along a path, cutting as it goes.
     Sweep {
-        /// The frames at whose start the blade is at the path's start and end.
+        /// Frames at whose start the blade is at the start and at the end of the path.
         frames: [u64; 2],
-        /// The blade: a polyline in m.
+        /// Blade: a polyline.
+        #[schemars(extend("unit" = "m"), length(min = 2))]
         blade: Vec<[f64; 3]>,
-        /// Offsets of the blade in m, passed through at equal times.
+        /// Offsets of the blade, at least two, at equal intervals of time.
+        #[schemars(extend("unit" = "m"), length(min = 2))]
         path: Vec<[f64; 3]>,
-        /// Snap distance as a fraction of an edge.
+        /// Snap distance as a fraction of an edge; 0 turns snapping off.
         #[serde(default = "tenth")]
+        #[schemars(range(min = 0.0, max = 0.25))]
         snap: f64,
     },
-    /// A bounded plane, at once.
+    /// A rectangle, cut at once.
     Rectangle {
-        /// The frame at whose start it cuts.
+        /// Frame at whose start the cut is made.
         frame: u64,
-        /// Its middle in m.
+        /// Center of the rectangle.
+        #[schemars(extend("unit" = "m"))]
         center: [f64; 3],
-        /// From the middle to the middle of one side in m.
+        /// Vector from the center to the middle of one side.
+        #[schemars(extend("unit" = "m"))]
         half_u: [f64; 3],
-        /// From the middle to the middle of the next side in m.
+        /// Vector from the center to the middle of the adjacent side.
+        #[schemars(extend("unit" = "m"))]
         half_v: [f64; 3],
-        /// Snap distance as a fraction of an edge.
+        /// Snap distance as a fraction of an edge; 0 turns snapping off.
         #[serde(default = "tenth")]
+        #[schemars(range(min = 0.0, max = 0.25))]
         snap: f64,
     },
-    /// A surface of triangles, open or closed, at once.
+    /// A triangle surface, open or closed, cut at once.
     Surface {
-        /// The frame at whose start it cuts.
+        /// Frame at whose start the cut is made.
         frame: u64,
-        /// The corners in m.
+        /// Vertices of the surface.
+        #[schemars(extend("unit" = "m"))]
         points: Vec<[f64; 3]>,
-        /// Three numbers of corners each.
+        /// Triangles: three numbers of vertices each.
         triangles: Vec<[u32; 3]>,
-        /// Snap distance as a fraction of an edge.
+        /// Snap distance as a fraction of an edge; 0 turns snapping off.
         #[serde(default = "tenth")]
+        #[schemars(range(min = 0.0, max = 0.25))]
         snap: f64,
     },
-    /// A cut around a region, at once: what is inside comes off as a plug.
+    /// A cut around a region, made at once: the inside comes off as a plug.
     Plug {
-        /// The frame at whose start it cuts.
+        /// Frame at whose start the cut is made.
         frame: u64,
-        /// What comes off, in the space where the body is then; not `particles`.
+        /// Region that is cut out, in the world at that frame; not `particles` or `tets`.
         region: Region,
-        /// Snap distance as a fraction of an edge.
+        /// Snap distance as a fraction of an edge; 0 turns snapping off.
         #[serde(default = "tenth")]
+        #[schemars(range(min = 0.0, max = 0.25))]
         snap: f64,
     },
-    /// Tets taken away, at once: those with their middle in a region.
+    /// Tets that are removed at once: those whose centers lie in a region.
     Remove {
-        /// The frame at whose start they go.
+        /// Frame at whose start the tets are removed.
         frame: u64,
-        /// Where, in the space where the body is then; not `particles`.
+        /// Region of the removed tets, in the world at that frame; not `particles` or `tets`.
         region: Region,
     },
 }

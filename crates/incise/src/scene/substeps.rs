@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{Unexpected, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -23,6 +24,25 @@ pub enum Substeps {
     /// `max_substeps`. The number rises, at most to twice itself, when cuts leave more than 1% of the
     /// volume outside that accuracy.
     Auto,
+}
+
+impl JsonSchema for Substeps {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Substeps".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "anyOf": [
+                { "type": "integer", "minimum": 1, "maximum": u32::MAX },
+                { "const": "auto" },
+            ],
+        })
+    }
 }
 
 impl From<u32> for Substeps {

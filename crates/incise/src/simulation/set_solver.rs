@@ -226,7 +226,7 @@ fn is_light(before: &SolverSpec, after: &SolverSpec) -> bool {
         tet_solve: before.tet_solve,
         relaxation: before.relaxation,
         spectral_radius: before.spectral_radius,
-        delay: before.delay,
+        chebyshev_start: before.chebyshev_start,
         recluster: before.recluster,
         sleep: before.sleep,
         ..after.clone()

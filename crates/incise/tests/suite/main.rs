@@ -39,6 +39,7 @@ mod rest_after_cuts;
 #[cfg(feature = "save")]
 mod save;
 mod scenarios;
+mod schema;
 mod set_solver;
 mod sleep;
 mod snapshot;

@@ -44,7 +44,7 @@ fn each_method_has_its_defaults_and_named_keys_override_them() {
             (
                 given.tet_solve,
                 given.spectral_radius,
-                given.delay,
+                given.chebyshev_start,
                 given.two_level
             ),
             (TetSolve::Split, 0.99, 10, false)
@@ -101,7 +101,7 @@ fn each_method_runs_through_a_cut_and_does_not_depend_on_threads() {
     }
 }
 
-/// Chebyshev's own keys arrive: a delay as long as the iterations, or a radius of 0, is Jacobi.
+/// Chebyshev's own keys arrive: a chebyshev_start as long as the iterations, or a radius of 0, is Jacobi.
 #[test]
 fn chebyshev_without_extrapolation_is_jacobi() {
     let run = |keys: &str| {
@@ -283,8 +283,8 @@ const MISTAKES: [Mistake; 6] = [
     ("solver.spectral_radius is 1", |s| {
         (s.solver.method, s.solver.spectral_radius) = (Method::Chebyshev, 1.0);
     }),
-    ("solver.delay is 0", |s| {
-        (s.solver.method, s.solver.delay) = (Method::Chebyshev, 0);
+    ("solver.chebyshev_start is 0", |s| {
+        (s.solver.method, s.solver.chebyshev_start) = (Method::Chebyshev, 0);
     }),
     ("solver.iterations is 0", |s| s.solver.iterations = 0),
 ];

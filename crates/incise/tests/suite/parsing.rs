@@ -23,7 +23,11 @@ fn defaults_are_the_documented_ones() {
     );
     assert_eq!((solver.method, solver.relaxation), (Method::Auto, 1.0));
     assert_eq!(
-        (solver.tet_solve, solver.spectral_radius, solver.delay),
+        (
+            solver.tet_solve,
+            solver.spectral_radius,
+            solver.chebyshev_start
+        ),
         (TetSolve::Split, 0.99, 10)
     );
     assert_eq!(
@@ -75,7 +79,7 @@ method = "chebyshev"
 tet_solve = "sequential"
 relaxation = 0.9
 spectral_radius = 0.9
-delay = 3
+chebyshev_start = 3
 clustering = "serial:5"
 coloring = "greedy"
 precision = "f64"
@@ -153,7 +157,7 @@ fn an_unknown_key_at_any_level_names_the_nearest() {
         ("tet_solve", "tet_slove"),
         ("sequential", "seqential"),
         ("spectral_radius", "spectral_radios"),
-        ("delay", "dealy"),
+        ("chebyshev_start", "chebyshev_strat"),
         ("relaxation", "relaxtion"),
         ("clustering", "clusterng"),
         ("precision", "precison"),

@@ -38,7 +38,7 @@ fn a_frame_asks_for_no_memory() {
     let chebyshev = StepSettings {
         method: Method::Chebyshev {
             spectral_radius: 0.9,
-            delay: 2,
+            chebyshev_start: 2,
         },
         ..jacobi.clone()
     };

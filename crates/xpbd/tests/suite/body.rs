@@ -111,7 +111,7 @@ impl Method {
             Self::Chebyshev => {
                 settings.method = incise_xpbd::Method::Chebyshev {
                     spectral_radius: 0.99,
-                    delay: 3,
+                    chebyshev_start: 3,
                 };
                 settings.relaxation = 0.1;
             }

@@ -88,7 +88,7 @@ fn goes_on<R: Real>(method: Method, iterations: u32) {
 fn a_copy_goes_on_as_the_original() {
     let chebyshev = Method::Chebyshev {
         spectral_radius: 0.9,
-        delay: 2,
+        chebyshev_start: 2,
     };
     for (method, iterations) in [
         (Method::GaussSeidel, 1),
