@@ -115,6 +115,23 @@ impl Algorithm {
     ];
 }
 
+impl Algorithm {
+    /// The names that [`from_str`](Self::from_str) knows, without parameters.
+    pub const NAMES: [&str; 11] = [
+        "auto",
+        "scgc",
+        "jones-plassmann",
+        "ecl-gc",
+        "vivace",
+        "wlc",
+        "mcs",
+        "greedy",
+        "dsatur",
+        "iterated-greedy",
+        "tabu",
+    ];
+}
+
 impl FromStr for Algorithm {
     type Err = ColoringError;
 

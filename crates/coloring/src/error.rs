@@ -1,13 +1,13 @@
-//! What can be wrong with a request to color.
+//! [`ColoringError`]: invalid requests and improper colorings.
 
-/// A request that names something that does not exist.
+use crate::Algorithm;
+
+/// An invalid request, or a coloring that failed its check.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ColoringError {
     /// No algorithm has this name.
-    #[error(
-        "there is no coloring algorithm '{name}'; known are: auto, scgc, jones-plassmann, ecl-gc, vivace, wlc, mcs, greedy, dsatur, iterated-greedy, tabu"
-    )]
+    #[error("unknown coloring algorithm '{name}'; known are: {}", Algorithm::NAMES.join(", "))]
     UnknownAlgorithm {
         /// The name asked for.
         name: String,

@@ -75,19 +75,19 @@ pub fn order(conflicts: &impl Conflicts, order: Order) -> Vec<u32> {
 fn by_degree_bound(conflicts: &impl Conflicts) -> Vec<u32> {
     let degree_bound = conflicts.degree_bound();
     let most = degree_bound.iter().max().map_or(0, |&most| most as usize);
-    // From the bound to the place of the next vertex that has it.
-    let mut place = vec![0u32; most + 2];
+    // From the bound to the next of the next vertex that has it.
+    let mut next = vec![0u32; most + 2];
     for &degree_bound in &degree_bound {
-        place[most - degree_bound as usize + 1] += 1;
+        next[most - degree_bound as usize + 1] += 1;
     }
     for i in 0..=most {
-        place[i + 1] += place[i];
+        next[i + 1] += next[i];
     }
     let mut order = vec![0; degree_bound.len()];
     for (v, &degree_bound) in (0..).zip(&degree_bound) {
-        let place = &mut place[most - degree_bound as usize];
-        order[*place as usize] = v;
-        *place += 1;
+        let next = &mut next[most - degree_bound as usize];
+        order[*next as usize] = v;
+        *next += 1;
     }
     order
 }

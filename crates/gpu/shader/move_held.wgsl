@@ -20,7 +20,7 @@ fn main(
     }
     let attachment = attachments[index];
     let row = (current.substep + 1u) * settings.handles;
-    let x = at_pose(poses[row + attachment.handle], attachment.place);
+    let x = at_pose(poses[row + attachment.handle], attachment.anchor);
     if are_finite(x) {
         particles[attachment.particle] = vec4(x, particles[attachment.particle].w);
     } else {

@@ -126,7 +126,7 @@ pub fn shared_structs() -> Vec<SharedStruct> {
             unused
         }),
         shared!(Attachment {
-            place,
+            tet_slot,
             particle,
             handle,
             compliance,
@@ -134,7 +134,7 @@ pub fn shared_structs() -> Vec<SharedStruct> {
             unused
         }),
         shared!(TetPatch {
-            place,
+            tet_slot,
             unused,
             corners,
             rest,
@@ -146,7 +146,7 @@ pub fn shared_structs() -> Vec<SharedStruct> {
             index
         }),
         shared!(Units {
-            places,
+            tet_slots,
             length,
             slope,
             unused

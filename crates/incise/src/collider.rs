@@ -28,9 +28,9 @@ pub(crate) fn colliders(scene: &Scene) -> Result<Vec<Collider>, Error> {
 pub struct ColliderHandle(u32);
 
 impl ColliderHandle {
-    /// The handle of the collider of a scene with this place in its list.
-    pub(crate) fn of_scene(place: usize) -> Self {
-        Self(u32::try_from(place).expect("colliders are numbered in 32 bits"))
+    /// The handle of the collider of a scene with this index in its list.
+    pub(crate) fn of_scene(index: usize) -> Self {
+        Self(u32::try_from(index).expect("colliders are numbered in 32 bits"))
     }
 }
 
@@ -58,8 +58,8 @@ impl Colliders {
         }
     }
 
-    /// The place of a collider in the settings, unless it was removed.
-    pub(crate) fn place(&self, handle: ColliderHandle) -> Option<usize> {
+    /// The index of a collider in the settings, unless it was removed.
+    pub(crate) fn index(&self, handle: ColliderHandle) -> Option<usize> {
         self.handles.iter().position(|h| *h == Some(handle))
     }
 
@@ -72,8 +72,8 @@ impl Colliders {
     }
 
     /// Follows the removal of a collider from the settings.
-    pub(crate) fn remove(&mut self, place: usize) {
-        self.handles.remove(place);
+    pub(crate) fn remove(&mut self, index: usize) {
+        self.handles.remove(index);
     }
 
     /// Notes where a collider goes in the next frame.
@@ -91,7 +91,7 @@ impl Colliders {
     pub(crate) fn take_moves(&mut self) -> Vec<(usize, DVec3)> {
         let moves = std::mem::take(&mut self.moves).into_iter();
         moves
-            .filter_map(|(h, to)| Some((self.place(h)?, to)))
+            .filter_map(|(h, to)| Some((self.index(h)?, to)))
             .collect()
     }
 
@@ -110,7 +110,7 @@ pub(crate) fn position(shape: &ColliderShape) -> DVec3 {
     }
 }
 
-/// Has a collider go to a place within `time` s.
+/// Has a collider go to a index within `time` s.
 pub(crate) fn send(collider: &mut Collider, to: DVec3, time: f64) {
     collider.velocity = (to - position(&collider.shape)) / time;
 }

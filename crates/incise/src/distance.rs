@@ -87,7 +87,7 @@ pub(crate) fn constraint(
         )?,
         compliance: within(&format!("{field}.compliance"), spec.compliance, 0.0, 1e9)?,
         damping: 0.0,
-        only_when_longer: spec.tension_only,
+        tension_only: spec.tension_only,
     })
 }
 

@@ -2,14 +2,16 @@
 
 use std::path::PathBuf;
 
-use incise_clustering::ClusteringError;
-use incise_coloring::ColoringError;
+use incise_clustering::{ClusteringError, Method};
+use incise_coloring::{Algorithm, ColoringError};
 use incise_cutting::CutError;
 use incise_graph::GraphError;
 use incise_mesh::MeshError;
 use incise_mesh_io::MeshIoError;
-use incise_meshing::MeshingError;
+use incise_meshing::{MeshingError, Shape};
 use incise_xpbd::XpbdError;
+
+use crate::scene::suggestion;
 
 /// Why a scene could not be read or run.
 #[derive(Debug, thiserror::Error)]
@@ -58,7 +60,7 @@ pub enum Error {
         source: MeshIoError,
     },
     /// A body's shape.
-    #[error("{field}: {source}")]
+    #[error("{field}: {source}{}", shape_suggestion(source))]
     Shape {
         /// The body.
         field: String,
@@ -82,10 +84,10 @@ pub enum Error {
         source: CutError,
     },
     /// The name of a coloring.
-    #[error("solver.coloring: {0}")]
+    #[error("solver.coloring: {0}{}", coloring_suggestion(.0))]
     Coloring(#[from] ColoringError),
     /// The name of a clustering.
-    #[error("solver.clustering: {0}")]
+    #[error("solver.clustering: {0}{}", clustering_suggestion(.0))]
     Clustering(#[from] ClusteringError),
     /// A derived structure no longer agrees with what it is derived from: a defect of this library.
     #[error("internal check failed: {0}")]
@@ -132,6 +134,33 @@ impl Error {
             Self::NoGpuPath => Some("solver.backend".to_owned()),
             _ => None,
         }
+    }
+}
+
+/// The nearest known shape, as the end of a message; empty for other errors.
+#[must_use]
+pub fn shape_suggestion(error: &MeshingError) -> String {
+    match error {
+        MeshingError::UnknownShape { name, .. } => suggestion(name, Shape::NAMES),
+        _ => String::new(),
+    }
+}
+
+/// The nearest known coloring algorithm, as the end of a message; empty for other errors.
+#[must_use]
+pub fn coloring_suggestion(error: &ColoringError) -> String {
+    match error {
+        ColoringError::UnknownAlgorithm { name } => suggestion(name, Algorithm::NAMES),
+        _ => String::new(),
+    }
+}
+
+/// The nearest known clustering, as the end of a message; empty for other errors.
+#[must_use]
+pub fn clustering_suggestion(error: &ClusteringError) -> String {
+    match error {
+        ClusteringError::UnknownMethod { text } => suggestion(text, Method::NAMES),
+        _ => String::new(),
     }
 }
 

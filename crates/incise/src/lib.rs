@@ -66,7 +66,7 @@ mod warning;
 pub use attachment::AttachmentHandle;
 pub use collider::ColliderHandle;
 pub use distance::DistanceHandle;
-pub use error::Error;
+pub use error::{Error, clustering_suggestion, coloring_suggestion, shape_suggestion};
 pub use event::Event;
 pub use grab::Grab;
 pub use incise_clustering as clustering;

@@ -27,16 +27,16 @@ struct Numbers {
 }
 
 impl Numbers {
-    /// Appends particles of the island; their numbers in the merged mesh are the next ones, so `places` gets theirs at its end.
+    /// Appends particles of the island; their numbers in the merged mesh are the next ones, so `locations` gets theirs at its end.
     fn add_particles(
         &mut self,
         island: usize,
         new: impl Iterator<Item = ParticleId>,
-        places: &mut Vec<(u32, ParticleId)>,
+        locations: &mut Vec<(u32, ParticleId)>,
     ) {
         let island = u32::try_from(island).expect("each island has particles, numbered by 32 bits");
         for particle in new {
-            places.push((island, ParticleId::new(self.particles.len())));
+            locations.push((island, ParticleId::new(self.particles.len())));
             self.particles.push(particle);
         }
     }
@@ -50,7 +50,7 @@ pub(crate) struct MergedMesh {
     pub(crate) positions: Vec<DVec3>,
     numbers: Vec<Numbers>,
     /// For each particle its island and its number there.
-    places: Vec<(u32, ParticleId)>,
+    locations: Vec<(u32, ParticleId)>,
 }
 
 impl MergedMesh {
@@ -59,7 +59,7 @@ impl MergedMesh {
         let mut mesh = TetMesh::default();
         let islands = island_of.iter().max().map_or(0, |last| last + 1);
         let mut numbers: Vec<Numbers> = (0..islands).map(|_| Numbers::default()).collect();
-        let mut places = Vec::new();
+        let mut locations = Vec::new();
         for (body, &island) in bodies.iter().zip(island_of) {
             let first = mesh.positions.len();
             let shifted = |p: ParticleId| ParticleId::new(first + p.index());
@@ -69,7 +69,7 @@ impl MergedMesh {
             mesh.tets.extend(tets);
             let numbers = &mut numbers[island];
             let particles = (first..mesh.positions.len()).map(ParticleId::new);
-            numbers.add_particles(island, particles, &mut places);
+            numbers.add_particles(island, particles, &mut locations);
             let tets = (first_tet..mesh.tets.len()).map(TetId::new);
             numbers.tets.extend(tets);
         }
@@ -77,7 +77,7 @@ impl MergedMesh {
             positions: mesh.positions.clone(),
             mesh,
             numbers,
-            places,
+            locations,
         }
     }
 
@@ -87,7 +87,7 @@ impl MergedMesh {
             mesh: TetMesh::default(),
             positions: Vec::new(),
             numbers: Vec::new(),
-            places: Vec::new(),
+            locations: Vec::new(),
         };
         merged.add_island(island);
         merged
@@ -104,7 +104,7 @@ impl MergedMesh {
         self.mesh.tets.extend(tets);
         let mut numbers = Numbers::default();
         let particles = (first..self.mesh.positions.len()).map(ParticleId::new);
-        numbers.add_particles(self.numbers.len(), particles, &mut self.places);
+        numbers.add_particles(self.numbers.len(), particles, &mut self.locations);
         numbers
             .tets
             .extend((first_tet..self.mesh.tets.len()).map(TetId::new));
@@ -112,8 +112,8 @@ impl MergedMesh {
     }
 
     /// The island of a particle and its number there. O(1).
-    pub(crate) fn place(&self, particle: ParticleId) -> (usize, usize) {
-        let (island, number) = self.places[particle.index()];
+    pub(crate) fn location(&self, particle: ParticleId) -> (usize, usize) {
+        let (island, number) = self.locations[particle.index()];
         (island as usize, number.index())
     }
 
@@ -123,7 +123,7 @@ impl MergedMesh {
         let (particles_before, tets_before) = (self.mesh.positions.len(), self.mesh.tets.len());
         let new = delta.particles_after() - delta.particles_before;
         let particles = (particles_before..particles_before + new).map(ParticleId::new);
-        numbers.add_particles(island, particles, &mut self.places);
+        numbers.add_particles(island, particles, &mut self.locations);
         let new = delta.added.len() - delta.removed.len();
         let new = (tets_before..tets_before + new).map(TetId::new);
         numbers.tets.extend(new);
@@ -306,7 +306,7 @@ impl MergedMesh {
                 particles[number.index()] += 1;
                 if self.mesh.positions[number.index()] != mesh.positions[p]
                     || self.positions[number.index()] != island.positions[p]
-                    || self.place(*number) != (g, p)
+                    || self.location(*number) != (g, p)
                 {
                     return differs("a particle");
                 }

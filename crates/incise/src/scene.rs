@@ -358,14 +358,38 @@ fn with_suggestion(message: &str) -> String {
     }
 }
 
-/// The known name most like `unknown`.
+/// The known name most similar to `unknown`, by Jaro-Winkler similarity; `None` without any known name.
 #[must_use]
 pub fn nearest<'a>(unknown: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let likeness = |name: &&str| strsim::jaro_winkler(unknown, name);
+    let similarity = |name: &&str| strsim::jaro_winkler(unknown, name);
     known
         .into_iter()
-        .max_by(|a, b| likeness(a).total_cmp(&likeness(b)))
+        .max_by(|a, b| similarity(a).total_cmp(&similarity(b)))
 }
+
+/// The end of a message about an unknown name: `; did you mean 'liver'?`, or nothing if no known name is similar.
+///
+/// A parameter after a colon, as in `serial:10`, does not count.
+///
+/// ```
+/// use incise::scene::suggestion;
+///
+/// assert_eq!(suggestion("livr", ["box", "liver"]), "; did you mean 'liver'?");
+/// assert_eq!(suggestion("17", ["box", "liver"]), "");
+/// ```
+#[must_use]
+pub fn suggestion<'a>(unknown: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    let name = unknown.split(':').next().unwrap_or(unknown).to_lowercase();
+    match nearest(&name, known) {
+        Some(nearest) if strsim::jaro_winkler(&name, nearest) >= SIMILAR => {
+            format!("; did you mean '{nearest}'?")
+        }
+        _ => String::new(),
+    }
+}
+
+/// Jaro-Winkler similarity from which a name is suggested.
+const SIMILAR: f64 = 0.7;
 
 fn one() -> u64 {
     1

@@ -268,7 +268,9 @@ impl Stroke {
                 cut_surface_joining(cuttable, positions, surface, options, registry)
             }
             Tool::Plane(plane) => cut_plane(cuttable, positions, plane, options),
-            Tool::Plug(solid) => cut_level_set(cuttable, positions, |x| solid.distance(x), options),
+            Tool::Punch(solid) => {
+                cut_level_set(cuttable, positions, |x| solid.distance(x), options)
+            }
             Tool::Remove(solid) => carve(cuttable, positions, |x| solid.contains(x), options.tag),
         };
         let delta = cut.map_err(|source| Error::Cut {

@@ -16,7 +16,7 @@ pub(crate) enum Tool {
     Plane(Plane),
     Surface(TriangleSurface),
     /// What is inside comes off.
-    Plug(Solid),
+    Punch(Solid),
     /// What is inside goes.
     Remove(Solid),
     /// A polyline and the offsets it passes through.
@@ -75,7 +75,7 @@ pub(crate) fn tool(field: &str, spec: &StrokeSpec) -> Result<(Tool, f64), Error>
             let triangles = TriangleSurface::new(&corners, triangles);
             (surface("triangles", triangles)?, *snap)
         }
-        StrokeSpec::Plug { region, snap, .. } => (Tool::Plug(solid(field, region)?), *snap),
+        StrokeSpec::Punch { region, snap, .. } => (Tool::Punch(solid(field, region)?), *snap),
         StrokeSpec::Remove { region, .. } => (Tool::Remove(solid(field, region)?), 0.0),
         StrokeSpec::Sweep {
             frames,

@@ -1,7 +1,7 @@
-//! [`Source`]: what is to be loaded, and [`Loading`]: the thread that does it.
+//! [`Source`]: a file or scene to open, and [`Loading`]: the thread that opens it.
 //!
-//! A scene is taken as it is. A mesh alone is put on a table, z up, glued to it by its lowest part, at the size of an organ; a
-//! closed surface is filled with tets first. Setting up a million tets takes seconds, so the window does not wait for it.
+//! A mesh without a scene is scaled to the size of an organ and placed on a table, z up, with its lowest part pinned; a
+//! closed surface is filled with tets first. Setting up a million tets takes seconds, so a thread does it.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -22,10 +22,10 @@ pub(crate) const TETS: u32 = 11_000;
 /// The longest side of a mesh that comes without a scene, in m.
 const SIZE: f64 = 0.25;
 
-/// Its stiffness in Pa: so that a body of that size stands and still yields to a hand.
+/// Young's modulus of such a mesh in Pa: it carries its weight and deforms when pulled.
 const STIFFNESS: f64 = 4e4;
 
-/// What is to be loaded.
+/// A simulation to load.
 #[derive(Clone, Debug)]
 pub(crate) enum Source {
     /// A scene and its name.
@@ -35,7 +35,7 @@ pub(crate) enum Source {
 }
 
 impl Source {
-    /// What a file holds, or the built-in scene.
+    /// The source in a file, or the built-in scene.
     ///
     /// A scene is read here, so that its errors are known at once; a mesh only has to exist.
     pub(crate) fn new(path: Option<&Path>, tets: u32) -> anyhow::Result<Self> {
@@ -51,7 +51,7 @@ impl Source {
             return Ok(Self::Scene(Box::new(scene), name_of(path)));
         }
         if !path.is_file() {
-            return Err(anyhow!("{}: there is no such file", path.display()));
+            return Err(anyhow!("{}: file not found", path.display()));
         }
         Ok(Self::Mesh(path.to_owned(), tets))
     }
@@ -69,11 +69,11 @@ impl Source {
         match self {
             Self::Scene(scene, _) => {
                 let mut scene = (**scene).clone();
-                // The window's device or none: one of its own could not be drawn from.
+                // The renderer can only draw from the window's device.
                 scene.solver.backend = Backend::Cpu;
                 Ok((scene.clone(), SimulationBuilder::from_scene(scene)))
             }
-            Self::Mesh(path, tets) => around(path, *tets),
+            Self::Mesh(path, tets) => scene_around(path, *tets),
         }
     }
 }
@@ -83,8 +83,8 @@ fn name_of(path: &Path) -> String {
     name.to_string_lossy().into_owned()
 }
 
-/// A scene around a mesh, which fills the surface if the file has one.
-fn around(path: &Path, tets: u32) -> anyhow::Result<(Scene, SimulationBuilder)> {
+/// A scene with a mesh on a table; a surface is filled with tets.
+fn scene_around(path: &Path, tets: u32) -> anyhow::Result<(Scene, SimulationBuilder)> {
     let mesh = if mesh_io::is_surface(path) {
         let surface = mesh_io::read_surface(path)?;
         let solid = Solid::new(&surface).with_context(|| path.display().to_string())?;
@@ -110,19 +110,19 @@ fn around(path: &Path, tets: u32) -> anyhow::Result<(Scene, SimulationBuilder)> 
         friction: 0.5,
     };
     scene.world.ground = Some(table);
-    let glued = low.z + 0.1 * (high.z - low.z);
+    let pinned_below = low.z + 0.1 * (high.z - low.z);
     let middle = (low + high) / 2.0;
     let body = Body::new(mesh)
         .scale(scale)
         .position(DVec3::new(-middle.x, -middle.y, -low.z) * scale)
         .young_modulus(STIFFNESS)
-        .pinned(|x| x.z <= glued);
+        .pinned(|x| x.z <= pinned_below);
     let mut builder = SimulationBuilder::from_scene(scene.clone());
     builder.add_body(body);
     Ok((scene, builder))
 }
 
-/// What was loaded.
+/// A loaded simulation.
 #[derive(Debug)]
 pub(crate) struct Loaded {
     pub(crate) name: String,
@@ -130,7 +130,7 @@ pub(crate) struct Loaded {
     pub(crate) simulation: Simulation,
 }
 
-/// Something on its way.
+/// A simulation that is being loaded.
 #[derive(Debug)]
 pub(crate) struct Loading {
     pub(crate) name: String,
@@ -160,7 +160,7 @@ impl Loading {
         }
     }
 
-    /// What was loaded, once it is.
+    /// The loaded simulation or the error, once the thread has ended.
     pub(crate) fn poll(&self) -> Option<anyhow::Result<Loaded>> {
         match self.receiver.try_recv() {
             Ok(result) => Some(result),
@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_read_is_said() {
+    fn errors_name_the_file() {
         let missing = Source::new(Some(Path::new("missing.vtk")), TETS).unwrap_err();
         assert!(missing.to_string().contains("missing.vtk"));
         let folder = tempfile::tempdir().unwrap();

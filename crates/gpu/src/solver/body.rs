@@ -1,7 +1,7 @@
 //! [`Body`]: the arrays of a body on the device, and how they follow a solver on the host.
 //!
-//! What a cut changes arrives as patches, which a kernel puts where they belong: the tets of a place lie number by number
-//! in 16 parts of an array. Nothing else is sent. Memory: 96 bytes a place and 48 a particle; 16 a place more with
+//! What a cut changes arrives as patches, which a kernel puts where they belong: the tets of a slot lie number by number
+//! in 16 parts of an array. Nothing else is sent. Memory: 96 bytes a slot and 48 a particle; 16 a slot more with
 //! several materials, 8 where multipliers are kept, 16 a particle for Jacobi. Cost: O(what changed).
 
 use incise_graph::Schedule;
@@ -94,15 +94,15 @@ impl Body {
             self.colors.sync(gpu, self.layout.slots.groups())?;
         }
         let various = !solver.is_uniform();
-        let places = self.layout.place_count();
+        let tet_slots = self.layout.tet_slot_count();
         if patch.is_rebuilt {
-            self.corners = Array::zeros(gpu, "corners of tets", places)?;
+            self.corners = Array::zeros(gpu, "corners of tets", tet_slots)?;
         }
-        self.corners.resize(gpu, places)?;
+        self.corners.resize(gpu, tet_slots)?;
         self.rest
-            .resize(gpu, places.next_multiple_of(THREADS) * NUMBERS)?;
+            .resize(gpu, tet_slots.next_multiple_of(THREADS) * NUMBERS)?;
         if various {
-            self.constants.resize(gpu, places)?;
+            self.constants.resize(gpu, tet_slots)?;
         }
         if self.layout.form == ClusterMapping::Workgroups {
             let tiles = self.layout.slots.slot_count();

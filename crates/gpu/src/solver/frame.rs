@@ -98,7 +98,7 @@ impl Frame {
                 handles.move_held(track.at(Other), start);
             }
             if let Some(clear) = &passes.clear {
-                let words = 2 * body.layout.place_count();
+                let words = 2 * body.layout.tet_slot_count();
                 clear.run(track.at(Other), &[], words.div_ceil(THREADS));
             }
             for scalars in &passes.scalars {
@@ -149,7 +149,7 @@ impl Frame {
     ) -> Result<(), GpuError> {
         self.send_settings(gpu, body, host, settings);
         if keeps {
-            body.multipliers.resize(gpu, body.layout.place_count())?;
+            body.multipliers.resize(gpu, body.layout.tet_slot_count())?;
         }
         Jacobi::prepare(&mut self.jacobi, gpu, body, host.particle_count(), settings)?;
         Obstacles::sync(&mut self.obstacles, gpu, host, settings)?;
@@ -398,5 +398,5 @@ impl Frame {
 }
 
 fn index(value: usize) -> u32 {
-    u32::try_from(value).expect("particles and places are numbered by 32 bits")
+    u32::try_from(value).expect("particles and slots are numbered by 32 bits")
 }

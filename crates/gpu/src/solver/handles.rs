@@ -2,10 +2,10 @@
 //!
 //! What is held rigidly and what hangs by a compliance are two lists, since they are moved at different times; a list
 //! that is empty costs no dispatch. The host says where the handles are at the end of each substep and the device moves
-//! their places: rotations and sums in single precision, so places are taken relative to the middle of all places on a
+//! their anchors: rotations and sums in single precision, so anchors are taken relative to the middle of all anchors on a
 //! handle, which the host moves in double precision.
 //!
-//! Twin: `constraints/attachments.rs` of incise-xpbd, to a few roundings. The place at the start of a frame is that of the handle
+//! Twin: `constraints/attachments.rs` of incise-xpbd, to a few roundings. The anchor at the start of a frame is that of the handle
 //! there. Cost: 32 bytes an attachment, sent when some have changed; 48 bytes a handle and substep, sent when they
 //! differ from those before.
 
@@ -30,7 +30,7 @@ pub(crate) struct Handles {
     held: List,
     /// What is pulled there.
     hanging: List,
-    /// Handle -> the middle of the places on it.
+    /// Handle -> the middle of the anchors on it.
     middles: Vec<DVec3>,
     /// All at the start of a frame, then all at the end of each substep.
     poses: Array<Rows>,
@@ -249,12 +249,12 @@ impl AttachmentKernels {
     }
 }
 
-/// The middle of the places on each handle; 0 without any.
+/// The middle of the anchors on each handle; 0 without any.
 fn middles(solver: &Solver<f32>) -> Vec<DVec3> {
     let mut sums = vec![(DVec3::ZERO, 0.0); solver.handle_poses(0.0).len()];
     for data in solver.attachments() {
         let (sum, number) = &mut sums[data.handle as usize];
-        *sum += data.place;
+        *sum += data.anchor;
         *number += 1.0;
     }
     let middle = |(sum, number): (DVec3, f64)| sum / number.max(1.0);
@@ -267,7 +267,7 @@ fn middles(solver: &Solver<f32>) -> Vec<DVec3> {
 )]
 fn attachment(data: &AttachmentData, middle: DVec3) -> Attachment {
     Attachment {
-        place: (data.place - middle).as_vec3().to_array(),
+        anchor: (data.anchor - middle).as_vec3().to_array(),
         particle: data.particle,
         handle: data.handle,
         compliance: data.compliance as f32,

@@ -5,7 +5,7 @@
 //! of positions and of multipliers, and its weights are in the uniforms. Only threads gather: a tile has its particles in
 //! workgroup memory, where a correction would be seen at once. Twin: `jacobi.rs` of incise-xpbd.
 //!
-//! Cost: a dispatch an iteration, with Chebyshev two; 16 bytes a particle, with Chebyshev 16 more and 16 a place.
+//! Cost: a dispatch an iteration, with Chebyshev two; 16 bytes a particle, with Chebyshev 16 more and 16 a tet_slot.
 
 use incise_xpbd::{Method, StepSettings};
 use wgpu::Buffer;

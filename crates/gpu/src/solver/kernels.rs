@@ -608,10 +608,10 @@ impl Kernels {
     ) -> Result<Arc<Kernel>, GpuError> {
         let kernel = match self.compiled.entry((source.name, variant)) {
             Entry::Occupied(kernel) => kernel.into_mut(),
-            Entry::Vacant(place) => {
+            Entry::Vacant(tet_slot) => {
                 let constants: Vec<_> = source.flags.iter().map(|f| variant.value(*f)).collect();
                 let (name, parts, uses) = (source.name, source.parts, source.uses);
-                place.insert(Arc::new(Kernel::new(gpu, name, parts, uses, &constants)?))
+                tet_slot.insert(Arc::new(Kernel::new(gpu, name, parts, uses, &constants)?))
             }
         };
         Ok(Arc::clone(kernel))

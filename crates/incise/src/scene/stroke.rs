@@ -74,8 +74,8 @@ pub enum StrokeSpec {
         #[schemars(range(min = 0.0, max = 0.25))]
         snap: f64,
     },
-    /// A cut around a region, made at once: the inside comes off as a plug.
-    Plug {
+    /// A cut around a region, made at once: the inside comes off as a piece.
+    Punch {
         /// Frame at whose start the cut is made.
         frame: u64,
         /// Region that is cut out, in the world at that frame; not `particles` or `tets`.
@@ -111,7 +111,7 @@ impl StrokeSpec {
             Self::Plane { frame, .. }
             | Self::Rectangle { frame, .. }
             | Self::Surface { frame, .. }
-            | Self::Plug { frame, .. }
+            | Self::Punch { frame, .. }
             | Self::Remove { frame, .. } => *frame,
             Self::Sweep { frames, .. } => frames[1],
         }

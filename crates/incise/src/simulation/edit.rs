@@ -83,20 +83,20 @@ impl Simulation {
         Ok(handle)
     }
 
-    /// Has a collider go to a place in a straight line during the next frame and stay there; of several calls before a
-    /// frame the last one holds. Bodies that it touches feel its velocity. The place is that of the point of a plane,
+    /// Has a collider go to a index in a straight line during the next frame and stay there; of several calls before a
+    /// frame the last one holds. Bodies that it touches feel its velocity. The index is that of the point of a plane,
     /// the center of a sphere or a box, the middle of a capsule, in m.
     ///
     /// # Errors
     /// If the collider was removed, or a coordinate is not finite or beyond 1e9 m; nothing has changed then.
     pub fn move_collider(&mut self, handle: ColliderHandle, to: DVec3) -> Result<(), Error> {
         coordinates("collider.to", to.to_array())?;
-        self.collider_place(handle)?;
+        self.collider_index(handle)?;
         self.state.colliders.go_to(handle, to);
         Ok(())
     }
 
-    /// Makes a collider another one: shape, place, friction and velocity, from the start of the next frame on.
+    /// Makes a collider another one: shape, index, friction and velocity, from the start of the next frame on.
     ///
     /// # Errors
     /// If the collider was removed, or a value lies outside its range; nothing has changed then.
@@ -105,11 +105,11 @@ impl Simulation {
         handle: ColliderHandle,
         collider: &ColliderSpec,
     ) -> Result<(), Error> {
-        let place = self.collider_place(handle)?;
+        let index = self.collider_index(handle)?;
         let new = collider::collider("collider", collider)?;
         self.state.colliders.stay(handle);
         for island in &mut self.state.islands {
-            island.settings.colliders[place] = new;
+            island.settings.colliders[index] = new;
             island.wake();
         }
         Ok(())
@@ -120,9 +120,9 @@ impl Simulation {
     /// # Errors
     /// If the collider was removed.
     pub fn collider_position(&self, handle: ColliderHandle) -> Result<DVec3, Error> {
-        let place = self.collider_place(handle)?;
+        let index = self.collider_index(handle)?;
         Ok(collider::position(
-            &self.state.islands[0].settings.colliders[place].shape,
+            &self.state.islands[0].settings.colliders[index].shape,
         ))
     }
 
@@ -131,18 +131,18 @@ impl Simulation {
     /// # Errors
     /// If it was removed before.
     pub fn remove_collider(&mut self, handle: ColliderHandle) -> Result<(), Error> {
-        let place = self.collider_place(handle)?;
-        self.state.colliders.remove(place);
+        let index = self.collider_index(handle)?;
+        self.state.colliders.remove(index);
         for island in &mut self.state.islands {
-            island.settings.colliders.remove(place);
+            island.settings.colliders.remove(index);
             island.wake();
         }
         Ok(())
     }
 
-    fn collider_place(&self, handle: ColliderHandle) -> Result<usize, Error> {
-        let place = self.state.colliders.place(handle);
-        place.ok_or_else(|| removed("collider", handle))
+    fn collider_index(&self, handle: ColliderHandle) -> Result<usize, Error> {
+        let index = self.state.colliders.index(handle);
+        index.ok_or_else(|| removed("collider", handle))
     }
 
     /// Holds part of a body from the next frame on: its particles that lie at rest in the regions of the attachment. They

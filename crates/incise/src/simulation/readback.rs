@@ -177,22 +177,22 @@ impl Simulation {
     /// )?;
     /// let simulation = Simulation::new(&scene)?;
     /// let last = ParticleId::new(simulation.mesh().positions.len() - 1);
-    /// assert_eq!(simulation.place_of(ParticleId(0)), (0, 0));
-    /// assert_eq!(simulation.place_of(last).0, 1);
+    /// assert_eq!(simulation.location_of(ParticleId(0)), (0, 0));
+    /// assert_eq!(simulation.location_of(last).0, 1);
     /// # Ok::<(), incise::Error>(())
     /// ```
     #[must_use]
-    pub fn place_of(&self, particle: ParticleId) -> (usize, usize) {
+    pub fn location_of(&self, particle: ParticleId) -> (usize, usize) {
         let count = self.mesh().positions.len();
         assert!(particle.index() < count, "the mesh has {count} particles");
         match &self.state.merged {
-            Some(merged) => merged.place(particle),
+            Some(merged) => merged.location(particle),
             None => (0, particle.index()),
         }
     }
 
     /// The device solvers of the scene's islands of bodies, for renderers; none on the processor. Which of them has a
-    /// particle: [`Simulation::place_of`].
+    /// particle: [`Simulation::location_of`].
     #[cfg(feature = "gpu")]
     pub fn device_solvers(&self) -> impl Iterator<Item = &crate::gpu::GpuSolver> + '_ {
         self.state

@@ -162,8 +162,8 @@ impl Upload {
             if solvers.is_empty() {
                 return [vertex.particle.0, cut];
             }
-            let (part, place) = simulation.place_of(vertex.particle);
-            [first[part] + count(place), count(part) | cut]
+            let (part, offset) = simulation.location_of(vertex.particle);
+            [first[part] + count(offset), count(part) | cut]
         };
         let vertices: Vec<[u32; 2]> = skin.vertices().iter().map(vertex).collect();
         self.vertices.replace(gpu, &vertices)?;
@@ -188,8 +188,8 @@ impl Upload {
             // Near the bodies: far from the origin of the world single precision would not do.
             let origin = positions.first().copied().unwrap_or_default();
             let local = |x: &DVec3| (*x - origin).as_vec3().extend(0.0).to_array();
-            let places: Vec<[f32; 4]> = positions.iter().map(local).collect();
-            self.positions.replace(gpu, &places)?;
+            let offsets: Vec<[f32; 4]> = positions.iter().map(local).collect();
+            self.positions.replace(gpu, &offsets)?;
             self.parts.replace(gpu, &[part(origin)])?;
             return Ok(());
         }
@@ -213,11 +213,11 @@ impl Upload {
         if let [only] = solvers {
             return only.positions();
         }
-        let mut place = 0;
+        let mut offset = 0;
         for solver in solvers {
             let (from, bytes) = (solver.positions(), bytes_of(solver));
-            encoder.copy_buffer_to_buffer(from, 0, self.positions.raw(), place, bytes);
-            place += bytes;
+            encoder.copy_buffer_to_buffer(from, 0, self.positions.raw(), offset, bytes);
+            offset += bytes;
         }
         self.positions.raw()
     }

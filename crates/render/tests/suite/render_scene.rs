@@ -9,7 +9,7 @@ use proptest::prelude::*;
 
 use crate::support::{LIVER, Shown, TWO_BODIES};
 
-/// Two bodies, cut by a plane, a moving blade, a plug, and with a part taken away.
+/// Two bodies, cut by a plane, a moving blade, a punch, and with a part taken away.
 const STROKES: &str = r#"
 [solver]
 substeps = 2
@@ -29,7 +29,7 @@ frames = [2, 6]
 blade = [[-1.0, 0.05, 1.0], [3.0, 0.1, 1.0]]
 path = [[0.0, 0.0, 0.0], [0.0, 0.0, -2.0]]
 [[stroke]]
-kind = "plug"
+kind = "punch"
 frame = 4
 region = { sphere = { center = [1.2, 0.2, 0.3], radius = 0.2 } }
 [[stroke]]

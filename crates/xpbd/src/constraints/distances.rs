@@ -22,7 +22,7 @@ pub struct DistanceConstraint {
     /// already held at 0, so there it does nothing.
     pub damping: f64,
     /// Whether it acts only while the particles are farther apart than `length`, as a thread does.
-    pub only_when_longer: bool,
+    pub tension_only: bool,
 }
 
 impl DistanceConstraint {
@@ -58,7 +58,7 @@ pub struct DistanceData<R> {
     /// Damping time in s.
     pub damping: R,
     /// Whether it acts only while the particles are farther apart.
-    pub only_when_longer: bool,
+    pub tension_only: bool,
 }
 
 /// All distance constraints.
@@ -72,7 +72,7 @@ pub(crate) struct Distance<R> {
     length: R,
     compliance: R,
     damping: R,
-    only_when_longer: bool,
+    tension_only: bool,
 }
 
 impl<R: Float> Distance<R> {
@@ -82,7 +82,7 @@ impl<R: Float> Distance<R> {
             length: R::from_f64(constraint.length),
             compliance: R::from_f64(constraint.compliance),
             damping: R::from_f64(constraint.damping),
-            only_when_longer: constraint.only_when_longer,
+            tension_only: constraint.tension_only,
         }
     }
 
@@ -93,7 +93,7 @@ impl<R: Float> Distance<R> {
             length: self.length,
             compliance: self.compliance,
             damping: self.damping,
-            only_when_longer: self.only_when_longer,
+            tension_only: self.tension_only,
         }
     }
 
@@ -110,7 +110,7 @@ impl<R: Float> Distance<R> {
             length: self.length.to_f64(),
             compliance: self.compliance.to_f64(),
             damping: self.damping.to_f64(),
-            only_when_longer: self.only_when_longer,
+            tension_only: self.tension_only,
         }
     }
 }
@@ -140,6 +140,6 @@ impl<R: Float> ScalarConstraint<R, 2> for Distance<R> {
 
     #[inline]
     fn one_sided(&self) -> bool {
-        self.only_when_longer
+        self.tension_only
     }
 }

@@ -166,7 +166,7 @@ impl<R: Float> Solver<R> {
     ///     length: 1.0,
     ///     compliance: 0.1,
     ///     damping: 0.2,
-    ///     only_when_longer: false,
+    ///     tension_only: false,
     /// };
     /// let order = Schedule::new(&Clustering::none(1), &Coloring::new(vec![ColorId(0)]));
     /// solver.set_distances(&[spring], order)?;

@@ -263,12 +263,12 @@ mod tests {
             let colors = (0u32..).take(constraints).map(ColorId).collect();
             Schedule::new(&Clustering::none(constraints), &Coloring::new(colors))
         };
-        let distance = |particles, compliance, damping, only_when_longer| DistanceConstraint {
+        let distance = |particles, compliance, damping, tension_only| DistanceConstraint {
             particles,
             length: 0.5,
             compliance,
             damping,
-            only_when_longer,
+            tension_only,
         };
         let distances = [
             distance([0, 4], 1e-3, 0.1, false),
