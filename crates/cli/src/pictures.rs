@@ -33,7 +33,7 @@ const DEEPEST: f64 = 3.0;
 pub(crate) struct Pictures {
     renderer: Renderer,
     note: Option<String>,
-    drawn: RenderScene,
+    render_scene: RenderScene,
     camera: Camera,
     style: Style,
     size: [u32; 2],
@@ -63,13 +63,13 @@ impl Pictures {
             return Ok(None);
         }
         let (renderer, note) = Renderer::for_simulation(simulation);
-        let drawn = RenderScene::new(simulation, scene);
+        let render_scene = RenderScene::new(simulation, scene);
         let time_step = scene.solver.time_step;
         Ok(Some(Self {
             renderer,
             note,
-            camera: camera(arguments, scene, drawn.bounds(simulation)),
-            drawn,
+            camera: camera(arguments, scene, render_scene.bounds(simulation)),
+            render_scene,
             style: Style {
                 color_by: arguments.color_by,
                 wireframe: arguments.wireframe,
@@ -111,7 +111,7 @@ impl Pictures {
         saved: bool,
         folder: &Path,
     ) -> anyhow::Result<()> {
-        self.drawn.sync(simulation);
+        self.render_scene.sync(simulation);
         let frame = simulation.report().frame;
         let saved = saved && self.saved;
         let animated = self.writer.is_some() && frame.is_multiple_of(self.animation_every);
@@ -140,25 +140,29 @@ impl Pictures {
     }
 
     fn draw(&mut self, simulation: &mut Simulation) -> Result<Image, RenderError> {
-        if self.renderer.needs_read_back(&self.drawn, simulation) {
+        if self
+            .renderer
+            .needs_read_back(&self.render_scene, simulation)
+        {
             simulation.read_back()?;
         }
         let frame = simulation.report().frame;
-        self.drawn.set_blade(None);
+        self.render_scene.set_blade(None);
         for blade in self
             .strokes
             .iter()
             .filter_map(|stroke| stroke.blade_at(frame))
         {
-            self.drawn.add_blade(&blade);
+            self.render_scene.add_blade(&blade);
         }
         let by = self.style.color_by;
         let wanted = by == ColorBy::Residual;
         let residuals = wanted.then(|| simulation.residuals_of_tets()).flatten();
-        self.drawn.color(simulation, by, residuals.as_deref())?;
-        let (drawn, camera) = (&self.drawn, &self.camera);
+        self.render_scene
+            .color(simulation, by, residuals.as_deref())?;
+        let (render_scene, camera) = (&self.render_scene, &self.camera);
         self.renderer
-            .picture(drawn, simulation, camera, &self.style, self.size)
+            .picture(render_scene, simulation, camera, &self.style, self.size)
     }
 
     /// Completes the contact sheet and the animation; returns a line about them.

@@ -75,7 +75,7 @@ pub fn order(conflicts: &impl Conflicts, order: Order) -> Vec<u32> {
 fn by_degree_bound(conflicts: &impl Conflicts) -> Vec<u32> {
     let degree_bound = conflicts.degree_bound();
     let most = degree_bound.iter().max().map_or(0, |&most| most as usize);
-    // From the bound to the next of the next vertex that has it.
+    // Bound -> position of the next vertex with that bound.
     let mut next = vec![0u32; most + 2];
     for &degree_bound in &degree_bound {
         next[most - degree_bound as usize + 1] += 1;

@@ -1,7 +1,7 @@
-// Particles that hang on handles, and where their anchors are.
+// Attached particles and their anchors on handles.
 
 struct Attachment {
-    // The anchor in the handle's frame, relative to the middle of all anchors there.
+    // The anchor in the handle's frame, relative to the center of all anchors there.
     anchor: vec3<f32>,
     particle: u32,
     handle: u32,
@@ -19,7 +19,7 @@ struct Pose {
     z: vec4<f32>,
 }
 
-// Where a anchor is.
+// Position of an anchor in the world.
 fn at_pose(pose: Pose, anchor: vec3<f32>) -> vec3<f32> {
     return vec3(
         dot(pose.x.xyz, anchor) + pose.x.w,

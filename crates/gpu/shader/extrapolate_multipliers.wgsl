@@ -1,7 +1,7 @@
 // Chebyshev's leap of the multipliers. Twin: `Jacobi::extrapolate` of incise-xpbd.
 
 @group(0) @binding(0) var<storage, read_write> multipliers: array<vec2<f32>>;
-// Place -> the multipliers when this iteration began, and those when the previous one did.
+// Slot -> the multipliers when this iteration began, and those when the previous one did.
 @group(0) @binding(2) var<storage, read_write> history: array<vec4<f32>>;
 
 @compute @workgroup_size(64)

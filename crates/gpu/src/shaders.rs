@@ -126,7 +126,7 @@ pub fn shared_structs() -> Vec<SharedStruct> {
             unused
         }),
         shared!(Attachment {
-            tet_slot,
+            anchor,
             particle,
             handle,
             compliance,

@@ -27,7 +27,7 @@ pub(crate) fn fits(what: &'static str, count: usize) -> Result<(), GraphError> {
     }
 }
 
-/// Turns counts, stored one position to the right (`counts[i + 1]` for row `i`), into offsets.
+/// Turns counts, shifted by one (`counts[i + 1]` for row `i`), into offsets.
 pub(crate) fn accumulate(counts: &mut [u32]) {
     let mut sum = 0;
     for count in counts {

@@ -110,7 +110,7 @@ pub(crate) fn position(shape: &ColliderShape) -> DVec3 {
     }
 }
 
-/// Has a collider go to a index within `time` s.
+/// Moves a collider to a position within `time` s.
 pub(crate) fn send(collider: &mut Collider, to: DVec3, time: f64) {
     collider.velocity = (to - position(&collider.shape)) / time;
 }

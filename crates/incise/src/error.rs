@@ -84,10 +84,10 @@ pub enum Error {
         source: CutError,
     },
     /// The name of a coloring.
-    #[error("solver.coloring: {0}{}", coloring_suggestion(.0))]
+    #[error("solver.coloring: {}{}", .0, coloring_suggestion(.0))]
     Coloring(#[from] ColoringError),
     /// The name of a clustering.
-    #[error("solver.clustering: {0}{}", clustering_suggestion(.0))]
+    #[error("solver.clustering: {}{}", .0, clustering_suggestion(.0))]
     Clustering(#[from] ClusteringError),
     /// A derived structure no longer agrees with what it is derived from: a defect of this library.
     #[error("internal check failed: {0}")]

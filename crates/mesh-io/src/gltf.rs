@@ -103,7 +103,7 @@ impl Numbers {
         floats.chain(indices).flatten().collect()
     }
 
-    /// The text, with more about the index of the numbers.
+    /// Writes the text; `index` writes the object of the index array.
     fn describe(
         &self,
         out: &mut dyn Write,

@@ -103,7 +103,7 @@ pub fn stuff_graded(
 pub(super) enum Slope {
     /// Nothing: it is sampled everywhere.
     Any,
-    /// It differs between two near_indices by no more than their distance: far from the surface few samples do.
+    /// It differs between two points by no more than their distance: far from the surface few samples do.
     AtMostOne,
 }
 
@@ -117,7 +117,7 @@ pub(super) struct Grid {
     steps: [[isize; 14]; 2],
     /// Per vertex.
     sides: Vec<Side>,
-    /// Per vertex: its near_index in `near`, if it has an edge with a cut.
+    /// Vertex -> its index in `near`, if it has an edge with a cut.
     near_indices: Vec<u32>,
     /// The vertices that have an edge with a cut, in ascending order.
     near: Vec<Near>,
@@ -326,7 +326,7 @@ impl Grid {
         }
     }
 
-    /// The cut on the edge in a direction from the inside vertex with this near_index in `near`.
+    /// The cut on the edge in a direction from the inside vertex with this index in `near`.
     fn cut_at(&self, near_index: usize, direction: usize) -> usize {
         let Near {
             opposite, first, ..

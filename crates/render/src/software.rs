@@ -3,7 +3,7 @@
 //! Triangles are clipped and cut into rows of pixels (`raster.rs`).
 //!
 //! What the rasterizer is asked for is only which triangle is in front at each of four samples of a pixel, placed as devices
-//! position them. A pixel is then shaded once for each triangle that it shows, at the middle of the samples that show it: what
+//! place them. A pixel is then shaded once for each triangle that it shows, at the middle of the samples that show it: what
 //! a device does with four samples. Bands of rows are done in parallel; each pixel is computed by one thread in one order,
 //! so a picture is the same for any number of threads. Cost: each band looks at each triangle, O(bands x triangles); four
 //! passes over the rows of those in it, and a shading or two a pixel.
@@ -44,19 +44,19 @@ const NOTHING: u32 = u32::MAX;
 /// If a side of the picture is 0 or more than [`LARGEST_SIDE`].
 ///
 /// # Panics
-/// If the painting does not follow the simulation.
+/// If the render scene does not follow the simulation.
 ///
 /// # Example
 /// See [`RenderScene`].
 pub fn software_picture(
-    painting: &RenderScene,
+    render_scene: &RenderScene,
     simulation: &Simulation,
     camera: &Camera,
     style: &Style,
     size: [u32; 2],
 ) -> Result<Image, RenderError> {
     let view = View::new(camera, size, LARGEST_SIDE)?;
-    let frame = Frame::new(view, painting, simulation, *style);
+    let frame = Frame::new(view, render_scene, simulation, *style);
     let placed = frame.place();
     let [width, height] = size.map(|side| side as usize);
     let mut rgba = vec![0; 4 * width * height];
@@ -76,7 +76,7 @@ pub fn software_picture(
 struct Frame<'a> {
     view: View,
     style: Style,
-    painting: &'a RenderScene,
+    render_scene: &'a RenderScene,
     colors: &'a [u32],
     /// Of the skin's vertices, relative to the eye.
     positions: Vec<Vec3>,
@@ -105,8 +105,13 @@ enum Kind<'a> {
 }
 
 impl<'a> Frame<'a> {
-    fn new(view: View, painting: &'a RenderScene, simulation: &Simulation, style: Style) -> Self {
-        let skin = painting.skin();
+    fn new(
+        view: View,
+        render_scene: &'a RenderScene,
+        simulation: &Simulation,
+        style: Style,
+    ) -> Self {
+        let skin = render_scene.skin();
         let positions = simulation.positions();
         let origin = positions.first().copied().unwrap_or_default();
         let vertices = skin.vertices().par_iter().with_min_len(CHUNK);
@@ -125,14 +130,14 @@ impl<'a> Frame<'a> {
             .into_iter()
             .map(|position| position + from_eye)
             .collect();
-        let props = Props::new(painting, simulation, &view);
+        let props = Props::new(render_scene, simulation, &view);
         let ground = props.planes.iter().find(|plane| plane.ground);
         let contact_shadow =
             ground.map(|plane| ContactShadow::new(*plane, skin.triangles(), &positions));
         Self {
             style,
-            colors: painting.colors_for(style.color_by),
-            painting,
+            colors: render_scene.colors_for(style.color_by),
+            render_scene,
             positions,
             normals,
             props,
@@ -142,11 +147,11 @@ impl<'a> Frame<'a> {
     }
 
     fn triangles(&self) -> usize {
-        self.painting.skin().triangles().len() + self.props.corners.len() / 3
+        self.render_scene.skin().triangles().len() + self.props.corners.len() / 3
     }
 
     fn corners(&self, triangle: usize) -> Corners<'_> {
-        let skin = self.painting.skin().triangles();
+        let skin = self.render_scene.skin().triangles();
         match skin.get(triangle) {
             Some(corners) => Corners {
                 positions: corners.map(|v| self.positions[v as usize]),
@@ -209,7 +214,7 @@ impl<'a> Frame<'a> {
         let position = mix(positions);
         match kind {
             Kind::Skin(triangle) => {
-                let skin = self.painting.skin();
+                let skin = self.render_scene.skin();
                 let corners = skin.triangles()[triangle];
                 let cut = skin.tag(triangle) != FaceTag::Outer;
                 let word = self.colors.get(triangle).copied().unwrap_or(0);

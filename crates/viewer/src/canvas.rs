@@ -64,7 +64,7 @@ impl Canvas {
                 shown,
             } => {
                 let view = renderer.draw(
-                    &session.drawn,
+                    &session.render_scene,
                     &session.simulation,
                     &session.camera,
                     style,
@@ -91,7 +91,7 @@ impl Canvas {
             Self::Processor { texture } => {
                 session.simulation.read_back()?;
                 let picture = software_picture(
-                    &session.drawn,
+                    &session.render_scene,
                     &session.simulation,
                     &session.camera,
                     style,

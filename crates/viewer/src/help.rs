@@ -12,7 +12,7 @@ pub(crate) enum Action {
     Step,
     Reset,
     Undo,
-    Take(Tool),
+    Use(Tool),
     Fit,
     Wireframe,
     Smooth,

@@ -13,9 +13,9 @@ pub(crate) enum Tool {
     #[default]
     Blade,
     /// Grabs the body and pulls.
-    Hand,
+    Grab,
     /// Orbits the camera, as the right button always does.
-    SettingChange,
+    Orbit,
 }
 
 /// Settings of the tools.

@@ -7,7 +7,11 @@ use crate::support::{SCENE, Sandbox};
 /// All but the times: those are of no two runs the same.
 fn same_files(sandbox: &Sandbox, a: &str, b: &str) {
     assert_eq!(sandbox.names(a), sandbox.names(b));
-    for name in place.names(a).iter().filter(|name| *name != "frames.jsonl") {
+    for name in sandbox
+        .names(a)
+        .iter()
+        .filter(|name| *name != "frames.jsonl")
+    {
         let [a, b] = [a, b].map(|folder| fs::read(sandbox.path(folder).join(name)).unwrap());
         assert!(a == b, "{name} differs");
     }

@@ -16,7 +16,7 @@ use super::surroundings::Surroundings;
 struct Component {
     /// By how much its part in the heavy class outweighs that in the light one.
     surplus: i128,
-    /// The local of its first vertex; [`NONE`] stands for no component at all.
+    /// Index of its first vertex; [`NONE`] stands for no component at all.
     root: u32,
 }
 
@@ -25,13 +25,13 @@ struct Component {
 pub(super) struct Flips {
     /// The members of the heavy class, then those of the light one.
     vertices: Vec<u32>,
-    /// Vertex -> its local in `vertices`, for members of the two classes at hand.
+    /// Vertex -> its local index in `vertices`, for members of the two classes at hand.
     local: Vec<u32>,
-    /// Place -> an earlier local in the same component, or itself.
+    /// Local index -> an earlier one in the same component, or itself.
     parent: Vec<u32>,
-    /// Place of a root -> surplus of the component.
+    /// Local index of a root -> surplus of the component.
     surplus: Vec<i128>,
-    /// Place of a root -> is the component to be flipped?
+    /// Local index of a root -> whether the component to be flipped?
     chosen: Vec<bool>,
     /// By surplus.
     components: Vec<Component>,
@@ -186,7 +186,7 @@ impl Flips {
     }
 }
 
-/// The first local of the component, by path halving.
+/// The first local index of the component, by path halving.
 fn root(parent: &mut [u32], mut at: u32) -> u32 {
     while parent[at as usize] != at {
         let above = parent[parent[at as usize] as usize];

@@ -121,7 +121,7 @@ impl GpuSolver {
         }
     }
 
-    /// The slots of a group that have a tet.
+    /// The tet slots of a group that have a tet.
     fn tet_slots(&self, group: u32, copy: &Copy) -> Vec<usize> {
         let group = group as usize;
         match self.form() {

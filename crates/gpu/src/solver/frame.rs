@@ -256,7 +256,7 @@ impl Frame {
 #[derive(Debug)]
 pub(crate) struct LastSubstep {
     pub(crate) predicted: Copy<[f32; 4]>,
-    /// Place -> multipliers.
+    /// Tet slot -> multipliers.
     pub(crate) multipliers: Copy<[f32; 2]>,
     pub(crate) tet_solve: TetSolve,
 }

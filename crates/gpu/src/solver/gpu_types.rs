@@ -48,7 +48,7 @@ pub(crate) struct IterationUniform {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Attachment {
-    pub(crate) tet_slot: [f32; 3],
+    pub(crate) anchor: [f32; 3],
     pub(crate) particle: u32,
     pub(crate) handle: u32,
     pub(crate) compliance: f32,

@@ -1,9 +1,9 @@
-//! [`Layout`]: which tet is in which slot on the device, and what has to be sent there after a change.
+//! [`Layout`]: the slot of each tet on the device, and the patches to send after a change.
 //!
 //! Two forms of the same schedule. [`ClusterMapping::Threads`] is the paper's: a thread solves a cluster, tet after tet, 64
 //! clusters of a color a workgroup. [`ClusterMapping::Workgroups`] takes clusters of up to 128 tets: a workgroup solves one, with
 //! its particles in workgroup memory and its tets in steps that share no particle, so that a small body needs few colors
-//! and thus few dispatches. Either way a cluster has a slot (`slots.rs`) and its tets the slots of that slot.
+//! and thus few dispatches. Either way a cluster has a slot (`slots.rs`), and its tets have the tet slots within it.
 //!
 //! Cost: O(tets of changed clusters and changed tets), O(tets) for another schedule or other masses.
 
@@ -51,14 +51,14 @@ impl ClusterMapping {
 #[derive(Debug)]
 pub(crate) struct Layout {
     pub(crate) form: ClusterMapping,
-    /// Tets that a slot has slots for.
+    /// Tet slots of a cluster slot.
     depth: usize,
     pub(crate) slots: Slots,
     /// Slot -> tets in it.
     filled: Vec<u32>,
-    /// Tet -> slot.
+    /// Tet -> tet slot.
     tet_slots: Vec<u32>,
-    /// Place -> tet, in slots that have one.
+    /// Tet slot -> tet, in slots that have one.
     tets: Vec<u32>,
 }
 
@@ -67,7 +67,7 @@ pub(crate) struct Layout {
 pub(crate) struct Patch {
     /// Whether nothing on the device is of use any more.
     pub(crate) is_rebuilt: bool,
-    /// No two of one slot.
+    /// Patches of different tet slots.
     pub(crate) tets: Vec<TetPatch>,
     /// Tiles by number.
     pub(crate) tiles: Vec<(u32, Tile)>,
@@ -101,7 +101,7 @@ impl Layout {
         self.filled.iter().map(|&tets| tets as usize).sum()
     }
 
-    /// Rows of 64 slots that a group has.
+    /// Rows of 64 tet slots that a group has.
     pub(crate) fn depth(&self) -> usize {
         self.depth
     }
@@ -114,7 +114,7 @@ impl Layout {
         }
     }
 
-    /// The slot of a tet, if the schedule solves it.
+    /// The tet slot of a tet, if the schedule solves it.
     pub(crate) fn tet_slot(&self, tet: usize) -> Option<usize> {
         let tet_slot = self.tet_slots.get(tet).copied();
         tet_slot
@@ -122,7 +122,7 @@ impl Layout {
             .map(|tet_slot| tet_slot as usize)
     }
 
-    /// The tet in a slot that has one.
+    /// The tet in a tet slot that has one.
     pub(crate) fn tet(&self, tet_slot: usize) -> u32 {
         self.tets[tet_slot]
     }
@@ -257,7 +257,7 @@ impl Layout {
         self.tets[tet_slot] = tet;
     }
 
-    /// Fills a slot with the tets of its cluster, and clears the slots behind them that had one.
+    /// Fills a cluster slot with the tets of its cluster, and clears the tet slots behind them.
     fn fill(&mut self, slot: u32, schedule: &Schedule, solver: &Solver<f32>, patch: &mut Patch) {
         let cluster = self.slots.cluster(slot);
         let tets = cluster.map_or(&[][..], |cluster| schedule.constraints(cluster));

@@ -271,7 +271,7 @@ impl GpuSolver {
         Ok(&mut self.host)
     }
 
-    /// Puts another solver in the tet_slot of the host's; the device takes over all of it, with its state, in the next step.
+    /// Puts another solver in place of the host's; the device takes over all of it, with its state, in the next step.
     /// Kernels and memory stay. The state of the device is lost: to keep it, or the count of repairs up to now, call
     /// [`GpuSolver::host`] before. O(particles + tets) in the next step.
     pub fn replace(&mut self, mut solver: Solver<f32>) {
@@ -327,7 +327,7 @@ impl GpuSolver {
         if let Some((predicted, multipliers, tet_solve)) = last {
             let (predicted, multipliers) = (predicted.collect(gpu)?, multipliers.collect(gpu)?);
             let slot = |tet| self.body.layout.tet_slot(tet);
-            let of_tet = |tet| tet_slot(tet).map_or([0.0; 2], |tet_slot| multipliers[tet_slot]);
+            let of_tet = |tet| slot(tet).map_or([0.0; 2], |tet_slot| multipliers[tet_slot]);
             let multipliers: Vec<_> = (0..self.host.tet_count()).map(of_tet).collect();
             self.host
                 .load_last_substep(&predicted, &multipliers, tet_solve);

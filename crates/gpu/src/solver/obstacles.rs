@@ -15,7 +15,7 @@ use crate::{GpuContext, GpuError};
 #[derive(Debug)]
 pub(crate) struct Obstacles {
     array: Array<[f32; 20]>,
-    /// What the device has, and a tet_slot to put together what it should have.
+    /// The values on the device, and scratch memory for new ones.
     sent: Vec<[f32; 20]>,
     next: Vec<[f32; 20]>,
 }

@@ -83,8 +83,8 @@ impl Simulation {
         Ok(handle)
     }
 
-    /// Has a collider go to a index in a straight line during the next frame and stay there; of several calls before a
-    /// frame the last one holds. Bodies that it touches feel its velocity. The index is that of the point of a plane,
+    /// Moves a collider to a position in a straight line during the next frame; of several calls before a frame the last
+    /// one counts. Bodies that it touches feel its velocity. The position is that of the point of a plane,
     /// the center of a sphere or a box, the middle of a capsule, in m.
     ///
     /// # Errors
@@ -96,7 +96,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Makes a collider another one: shape, index, friction and velocity, from the start of the next frame on.
+    /// Replaces a collider: shape, position, friction and velocity, from the start of the next frame on.
     ///
     /// # Errors
     /// If the collider was removed, or a value lies outside its range; nothing has changed then.

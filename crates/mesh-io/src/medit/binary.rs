@@ -24,7 +24,7 @@ const VERTICES: i32 = 4;
 const TETRAHEDRA: i32 = 8;
 const END: i32 = 54;
 
-/// The bytes of a offset and of a whole number.
+/// Bytes of an offset and of a whole number.
 fn widths(version: i32) -> (u64, u64) {
     (
         if version < 3 { 4 } else { 8 },

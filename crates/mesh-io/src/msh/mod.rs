@@ -6,7 +6,7 @@
 //!
 //! Regions are the physical groups of the tets (0 for a tet in none; the first one of several), or, where no tet is in
 //! one, the elementary entities. A single entity 1 without a group, which Gmsh writes for want of anything else, is no
-//! region at all. The names of groups (`$PhysicalNames`) are not kept: no other format has a offset for them.
+//! region at all. The names of groups (`$PhysicalNames`) are not kept: no other format stores them.
 //!
 //! `$NodeData` and `$ElementData` with 1 or 3 components are fields; each time step is one; elements without a value
 //! have NaN, and a file is refused that needs more than eight times its size for them. Orientation is kept as it is.

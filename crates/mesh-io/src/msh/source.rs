@@ -20,7 +20,7 @@ pub(super) enum Encoding {
     Big,
 }
 
-/// A file in memory and the offset reached in it.
+/// A file in memory and the read position in it.
 pub(super) struct Source<'a> {
     path: &'a Path,
     bytes: &'a [u8],

@@ -84,9 +84,9 @@ fn fault<T>(message: String) -> Result<T, MeshingError> {
     Err(MeshingError::Surface(message))
 }
 
-/// For each point the first one at the same location.
+/// The first point with the same coordinates, for each point.
 fn weld(positions: &[DVec3]) -> Vec<u32> {
-    // Zeros of either sign are one location.
+    // Zeros of either sign are equal.
     let location = |p: u32| {
         positions[p as usize]
             .to_array()

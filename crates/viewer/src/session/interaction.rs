@@ -96,7 +96,7 @@ impl Session {
             stroke: None,
             before: None,
         });
-        self.drawn.set_blade(Some(&ends));
+        self.render_scene.set_blade(Some(&ends));
         Ok(())
     }
 
@@ -118,7 +118,7 @@ impl Session {
             line.surface = surface;
             line.push(BladePose { pixel, ends });
         }
-        self.drawn.set_blade(Some(&ends));
+        self.render_scene.set_blade(Some(&ends));
         Ok(())
     }
 
@@ -127,7 +127,7 @@ impl Session {
         if let Some(line) = self.lines.back_mut() {
             line.lifted = true;
         }
-        self.drawn.set_blade(None);
+        self.render_scene.set_blade(None);
     }
 
     /// Whether a line is being drawn or cut.
@@ -143,7 +143,7 @@ impl Session {
                 let _ = self.simulation.end_stroke(stroke);
             }
         }
-        self.drawn.set_blade(None);
+        self.render_scene.set_blade(None);
     }
 
     /// Moves the blade to its pose of the next frame.
@@ -183,7 +183,7 @@ impl Session {
     }
 
     fn blade_under(&self, pixel: [f64; 2], size: [f64; 2], surface: Option<f64>) -> [DVec3; 2] {
-        let bounds = self.drawn.bounds(&self.simulation);
+        let bounds = self.render_scene.bounds(&self.simulation);
         let through = self.tool_settings.depth >= 1.0;
         let depth = (!through).then_some(self.tool_settings.depth * self.extent);
         blade(&self.camera, pixel, size, bounds, surface, depth)

@@ -42,7 +42,7 @@ pub(crate) struct Session {
     pub(crate) name: String,
     pub(crate) scene: Scene,
     pub(crate) simulation: Simulation,
-    pub(crate) drawn: RenderScene,
+    pub(crate) render_scene: RenderScene,
     pub(crate) camera: Camera,
     pub(crate) tool_settings: ToolSettings,
     pub(crate) times: Times,
@@ -75,8 +75,8 @@ impl Session {
             scene,
             mut simulation,
         } = loaded;
-        let drawn = RenderScene::new(&simulation, &scene);
-        let [low, high] = drawn.bounds(&simulation);
+        let render_scene = RenderScene::new(&simulation, &scene);
+        let [low, high] = render_scene.bounds(&simulation);
         let start = simulation.snapshot()?;
         let mut session = Self {
             name,
@@ -87,7 +87,7 @@ impl Session {
                 .collect(),
             scene,
             simulation,
-            drawn,
+            render_scene,
             camera: Camera::fit(low, high),
             tool_settings: ToolSettings::default(),
             times: Times::default(),
@@ -131,7 +131,7 @@ impl Session {
         let result = self.frame();
         if result.is_err() {
             self.drop_lines();
-            self.drawn.reset(&self.simulation);
+            self.render_scene.reset(&self.simulation);
         }
         result
     }
@@ -147,7 +147,7 @@ impl Session {
         let report = self.simulation.step()?.clone();
         self.wait()?;
         self.frame_ms = start.elapsed().as_secs_f64() * 1e3;
-        self.drawn.sync(&self.simulation);
+        self.render_scene.sync(&self.simulation);
         self.show_scripted_blade(frame);
         self.times.note(report.frame, report.ms);
         self.effects.note(&report, self.frame_ms);
@@ -165,7 +165,7 @@ impl Session {
         if self.lines.is_empty() && !self.scripted.is_empty() {
             let strokes = self.scene.stroke.iter();
             let blade = strokes.filter_map(|stroke| stroke.blade_at(frame)).next();
-            self.drawn.set_blade(blade.as_deref());
+            self.render_scene.set_blade(blade.as_deref());
         }
     }
 
@@ -194,7 +194,7 @@ impl Session {
             _ => by,
         };
         let painted = self
-            .drawn
+            .render_scene
             .color(&mut self.simulation, by, residuals.as_deref());
         (self.legend, self.shown) = (painted?, by);
         Ok(())
@@ -202,7 +202,7 @@ impl Session {
 
     /// Fits the view to the body.
     pub(crate) fn fit(&mut self) {
-        let [low, high] = self.drawn.bounds(&self.simulation);
+        let [low, high] = self.render_scene.bounds(&self.simulation);
         let fitted = Camera::fit(low, high);
         (self.camera.target, self.camera.distance) = (fitted.target, fitted.distance);
     }
@@ -267,7 +267,7 @@ impl Session {
     /// Redraws from the host's state; the device's state is drawn again after the next step.
     fn repaint(&mut self) -> anyhow::Result<()> {
         self.simulation.read_back()?;
-        self.drawn.reset(&self.simulation);
+        self.render_scene.reset(&self.simulation);
         (self.legend, self.shown) = (None, ColorBy::Tissue);
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! [`Attachments`]: particles that are attached to moving handles, such as an instrument's jaws or a bone.
 //!
 //! A handle goes from pose to pose, one a frame; in between, its position is interpolated linearly and its rotation
-//! along the shortest arc. An attached particle has a anchor in the handle's frame. With a compliance of 0 it is there
+//! along the shortest arc. An attached particle has an anchor in the handle's frame. With a compliance of 0 it is there
 //! at the end of every substep, to the bit, whatever pulls on it: it moves as a fixed particle does, by itself only.
 //! With a compliance it is pulled there by a spring of rest length 0, `C = x - target` in all three directions at once.
 //!
@@ -64,7 +64,7 @@ pub(crate) struct Attachment<R: Float> {
     /// In m/N; 0 is rigid.
     pub(crate) compliance: f64,
     pub(crate) damping: f64,
-    /// Where the anchor is in the world at the end of the substep, and at its start.
+    /// The anchor in the world at the end of the substep and at its start.
     pub(crate) target: R::Vector,
     pub(crate) before: R::Vector,
     /// 0 at the start of every substep.

@@ -53,7 +53,7 @@ pub(super) struct ConstraintTerms<R: Float> {
     /// Where the terms of each particle of the order end, a 0 before the first.
     offsets: Vec<usize>,
     terms: Vec<Term>,
-    /// The row of each particle in the order.
+    /// Particle -> its position in the order.
     pub(super) row_of: Vec<u32>,
     /// The stiffness in N/m of the tets around each particle.
     elastic: Vec<f64>,
@@ -292,7 +292,7 @@ impl<R: Float> ConstraintTerms<R> {
         self.springs.is_empty() && self.anchors.is_empty()
     }
 
-    /// The particles that share a distance or volume with the particle at a row of the order, with repetitions.
+    /// The particles that share a distance or volume with the particle at a position of the order, with repetitions.
     pub(super) fn neighbors(&self, row: usize) -> impl Iterator<Item = u32> + '_ {
         self.terms(row).iter().flat_map(|term| term.others)
     }
@@ -499,7 +499,7 @@ impl<R: Float> ConstraintTerms<R> {
         }
     }
 
-    /// The step of the particle at a row of the order, now at `x`, that lowers the energy of its star. `tets` is what
+    /// The step of the particle at a position of the order, now at `x`, that lowers the energy of its star. `tets` is what
     /// inertia and tets say at `x`. Also force and matrix at `x`.
     pub(super) fn minimize(
         &self,
@@ -545,7 +545,7 @@ impl<R: Float> ConstraintTerms<R> {
         (step * relaxation, start)
     }
 
-    /// The tension of those distances of the particle at a row of the order, now at `x`, whose particles coincide. It
+    /// The tension of those distances of the particle at a position of the order, now at `x`, whose particles coincide. It
     /// resists a step in any direction.
     fn tension_at_zero_length(&self, solver: &Solver<R>, row: usize, x: R::Vector) -> R {
         let mut sum = R::ZERO;
@@ -683,7 +683,7 @@ impl<R: Float> ConstraintTerms<R> {
         sum
     }
 
-    /// The force of the constraints on the particle at a row of the order.
+    /// The force of the constraints on the particle at a position of the order.
     pub(super) fn force(&self, solver: &Solver<R>, order: &[u32], row: usize) -> R::Vector {
         let p = order[row] as usize;
         let x = load::<R>(&solver.particles.cells[p]);
@@ -696,7 +696,7 @@ impl<R: Float> ConstraintTerms<R> {
         local.force
     }
 
-    /// Adds force and blocks of the constraints of the particle at a row of the order; `columns` are those of its
+    /// Adds force and blocks of the constraints of the particle at a position of the order; `columns` are those of its
     /// row, the diagonal first.
     pub(super) fn add_row(
         &self,

@@ -31,7 +31,7 @@ pub(super) struct Blocks<R: Float> {
     /// The column of each block; the diagonal comes first in its row, the others ascend.
     pub(super) columns: Vec<u32>,
     pub(super) blocks: Vec<Block<R>>,
-    /// For each term, the block of its three blocks within its row.
+    /// For each term, the indices of its three blocks within their row.
     pub(super) block_indices: Vec<[u32; 3]>,
     /// The held excess of each tet.
     excess: Vec<R>,
