@@ -1,11 +1,10 @@
 //! `incise run`: simulates a scene.
 
 use std::collections::HashSet;
-use std::fs;
 use std::path::Path;
 
 use anyhow::anyhow;
-use incise::scene::{Backend, Method, Precision, Quantity, line_of};
+use incise::scene::{Backend, Method, Precision, Quantity, location};
 use incise::{Error, Scene, Simulation, Warning};
 use incise_render::{Animation, ColorBy};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -141,15 +140,10 @@ pub(crate) fn load(path: Option<&Path>) -> Result<Scene, Failure> {
 
 /// An error about a scene, with the file and the line of the key that it is about.
 pub(crate) fn located(error: Error, path: Option<&Path>) -> Failure {
-    let line = || {
-        let text = fs::read_to_string(path?).ok()?;
-        line_of(&text, &error.key()?)
-    };
-    let (Some(path), Some(line)) = (path, line()) else {
-        return error.into();
-    };
-    let place = format!("{}: line {line}", path.display());
-    Failure::Input(anyhow::Error::from(error).context(place))
+    match path.and_then(|path| location(path, &error)) {
+        Some(location) => Failure::Input(anyhow::Error::from(error).context(location)),
+        None => error.into(),
+    }
 }
 
 /// The scene as asked for, with what the command line changes.

@@ -28,7 +28,7 @@ pub use attachment::{AttachmentSpec, PathRotationSpec};
 pub(crate) use check::check;
 pub use collider::{ColliderSpec, RotationSpec};
 pub use distance::{DistanceSpec, EndSpec};
-pub use lines::line_of;
+pub use lines::{line_of, location};
 pub use method::{Integrator, Method, TetSolve};
 pub use preset::Preset;
 pub use region::Region;

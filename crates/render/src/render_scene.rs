@@ -44,7 +44,7 @@ const NONE: u32 = 0;
 ///     simulation.step()?;
 ///     render_scene.sync(&simulation);
 ///     let size = [64, 48];
-///     let picture = software_picture(&render scene, &simulation, &camera, &Style::default(), size)?;
+///     let picture = software_picture(&render_scene, &simulation, &camera, &Style::default(), size)?;
 ///     assert_eq!(picture.rgba.len(), 64 * 48 * 4);
 /// }
 /// # Ok::<(), incise_render::RenderError>(())

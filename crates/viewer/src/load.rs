@@ -12,7 +12,7 @@ use anyhow::{Context, anyhow};
 use incise::gpu::GpuContext;
 use incise::mesh::glam::DVec3;
 use incise::meshing::Solid;
-use incise::scene::{Backend, GroundSpec};
+use incise::scene::{Backend, GroundSpec, location};
 use incise::{Body, Scene, Simulation, SimulationBuilder};
 use incise::{mesh_io, meshing};
 
@@ -28,8 +28,8 @@ const STIFFNESS: f64 = 4e4;
 /// A simulation to load.
 #[derive(Clone, Debug)]
 pub(crate) enum Source {
-    /// A scene and its name.
-    Scene(Box<Scene>, String),
+    /// A scene, its file and its name.
+    Scene(Box<Scene>, Option<PathBuf>, String),
     /// A mesh or a surface without a scene, and tets to fill a surface with.
     Mesh(PathBuf, u32),
 }
@@ -41,14 +41,15 @@ impl Source {
     pub(crate) fn new(path: Option<&Path>, tets: u32) -> anyhow::Result<Self> {
         let Some(path) = path else {
             let name = "built-in liver".to_owned();
-            return Ok(Self::Scene(Box::new(Scene::built_in()), name));
+            return Ok(Self::Scene(Box::new(Scene::built_in()), None, name));
         };
         if path
             .extension()
             .is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
         {
             let scene = Scene::load(path).with_context(|| path.display().to_string())?;
-            return Ok(Self::Scene(Box::new(scene), name_of(path)));
+            let file = Some(path.to_owned());
+            return Ok(Self::Scene(Box::new(scene), file, name_of(path)));
         }
         if !path.is_file() {
             return Err(anyhow!("{}: file not found", path.display()));
@@ -59,15 +60,27 @@ impl Source {
     /// For the title.
     pub(crate) fn name(&self) -> String {
         match self {
-            Self::Scene(_, name) => name.clone(),
+            Self::Scene(_, _, name) => name.clone(),
             Self::Mesh(path, _) => name_of(path),
+        }
+    }
+
+    /// Adds the line of the scene file to an error about a key.
+    fn locate(&self, error: incise::Error) -> anyhow::Error {
+        let location = match self {
+            Self::Scene(_, Some(path), _) => location(path, &error),
+            _ => None,
+        };
+        match location {
+            Some(location) => anyhow::Error::new(error).context(location),
+            None => error.into(),
         }
     }
 
     /// The scene, and a builder of its simulation on the processor.
     fn open(&self) -> anyhow::Result<(Scene, SimulationBuilder)> {
         match self {
-            Self::Scene(scene, _) => {
+            Self::Scene(scene, ..) => {
                 let mut scene = (**scene).clone();
                 // The renderer can only draw from the window's device.
                 scene.solver.backend = Backend::Cpu;
@@ -172,12 +185,13 @@ impl Loading {
 
 fn load(source: &Source, backend: Backend, gpu: Option<Arc<GpuContext>>) -> anyhow::Result<Loaded> {
     let (mut scene, builder) = source.open()?;
-    let mut simulation = builder.build()?;
+    let mut simulation = builder.build().map_err(|error| source.locate(error))?;
     if let Some(gpu) = gpu {
         simulation.offer_device(gpu);
         if backend != Backend::Cpu {
             scene.solver.backend = backend;
-            simulation.set_solver(&scene.solver)?;
+            let set = simulation.set_solver(&scene.solver);
+            set.map_err(|error| source.locate(error))?;
         }
     }
     Ok(Loaded {
@@ -218,6 +232,20 @@ mod tests {
         let loaded = load(&Source::new(Some(&path), 2000).unwrap(), Backend::Cpu, None).unwrap();
         let tets = loaded.simulation.mesh().tets.len();
         assert!((1000..4000).contains(&tets), "{tets}");
+    }
+
+    #[test]
+    fn errors_of_a_scene_name_file_line_and_key() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.toml");
+        let text = "[[body]]\nshape = { kind = \"box\", tets = 10 }\n\nyoung_modulus = -1.0\n";
+        std::fs::write(&path, text).unwrap();
+        let source = Source::new(Some(&path), TETS).unwrap();
+        let error = format!("{:#}", load(&source, Backend::Cpu, None).unwrap_err());
+        assert!(
+            error.contains("scene.toml: line 4: body[0].young_modulus"),
+            "{error}"
+        );
     }
 
     #[test]

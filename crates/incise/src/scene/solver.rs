@@ -57,7 +57,7 @@ pub struct SolverSpec {
     /// extrapolation would amplify.
     #[schemars(range(min = 1))]
     pub chebyshev_start: u32,
-    /// For VBD: whether each sweep is followed by a coarse correction of the whole body, which costs some 100 sweeps.
+    /// For VBD: follow each sweep by a coarse correction of the whole body, which costs as much as about 100 sweeps.
     #[serde(skip_serializing_if = "is_false")]
     #[schemars(extend("default" = false))]
     pub two_level: bool,
@@ -67,7 +67,7 @@ pub struct SolverSpec {
     pub integrator: Integrator,
     /// Clustering of the tets: `none`, `serial:K` or `pressure:K`, with K tets a cluster.
     pub clustering: String,
-    /// Whether clusters that a cut leaves small are merged with neighbors. A cut then costs a little more and frames after
+    /// Merge clusters that a cut leaves small with their neighbors. A cut then costs a little more and frames after
     /// many cuts cost less; without it clusters shrink and colors grow with every cut, as in the paper.
     #[serde(skip_serializing_if = "is_true")]
     #[schemars(extend("default" = true))]

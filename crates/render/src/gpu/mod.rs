@@ -52,10 +52,10 @@ const WIDEST: u32 = 65_535;
 /// scene.body[0].shape = Some(ShapeSpec { kind: "liver".into(), tets: 500 });
 /// let simulation = Simulation::new(&scene)?;
 /// let render scene = RenderScene::new(&simulation, &scene);
-/// let [low, high] = render scene.bounds(&simulation);
+/// let [low, high] = render_scene.bounds(&simulation);
 /// let mut renderer = GpuRenderer::new(gpu)?;
 /// let camera = Camera::fit(low, high);
-/// let picture = renderer.picture(&render scene, &simulation, &camera, &Style::default(), [64, 48])?;
+/// let picture = renderer.picture(&render_scene, &simulation, &camera, &Style::default(), [64, 48])?;
 /// assert_ne!(picture.pixel(32, 24), picture.pixel(0, 0));
 /// # Ok::<(), incise_render::RenderError>(())
 /// ```
