@@ -64,7 +64,7 @@ impl StrokeRegistry {
         self.apply_delta_to_others(u32::MAX, cuttable, delta, options.reach());
     }
 
-    /// Removes all particles from a number on, which an undone cut had added. Linear in the registry.
+    /// Removes the particles from number `particles` on, which an undone cut had added. Linear in the registry.
     pub fn truncate(&mut self, particles: usize) {
         self.known.retain(|key, _| key.0.index() < particles);
     }

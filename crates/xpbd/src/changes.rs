@@ -1,4 +1,4 @@
-//! [`Changes`]: what edits of a solver have changed, for a device that solves on its own. Cost: a number an edit.
+//! [`Changes`]: changes by edits of a solver, for a device that solves on its own. Cost: a number an edit.
 
 /// Changes by edits of a solver, for a device that solves on its own.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

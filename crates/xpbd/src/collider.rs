@@ -1,6 +1,6 @@
 //! [`Collider`]: the shape and motion of a solid obstacle, with its signed distance in closed form.
 //!
-//! How particles are kept outside: `constraints/colliders.rs`.
+//! `constraints/colliders.rs` keeps particles outside.
 
 mod solid;
 

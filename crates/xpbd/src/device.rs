@@ -1,5 +1,5 @@
-//! What a device that solves on its own needs of a [`Solver`]: tets and particles as plain numbers, what edits have
-//! changed since it last asked, and the way back of a state.
+//! Interface of a [`Solver`] for a device that solves on its own: tets and particles as plain numbers, changes since
+//! the last query, and loading of a state.
 //!
 //! Tets, masses and materials are edited in the solver here; a GPU applies the same changes that the layout of this
 //! crate applies. Changes are tracked on request only. Cost: a number an edit.

@@ -1,7 +1,7 @@
 //! Measurements of a state: energies, volume, kappa. Computed on request, in double precision.
 //!
-//! Everything is summed one after the other in the order of particles and tets, so the numbers do not depend on the
-//! number of threads. Cost: a pass over particles or tets.
+//! Sums are sequential in the order of particles and tets, so the numbers do not depend on the number of threads. Cost:
+//! a pass over particles or tets.
 
 use glam::{DMat3, DVec3};
 

@@ -1,4 +1,4 @@
-//! [`Real`]: the precisions that a solver steps in, and the functions that advance it.
+//! [`Real`]: the precisions of solvers, and the functions that advance them.
 //!
 //! The large algorithms are called through this trait, so they are compiled once for each precision, with this crate;
 //! called directly they would be compiled again in every crate that steps a solver.

@@ -1,9 +1,10 @@
 //! [`Residuals`]: residuals of the last substep, in stated norms and units.
 //!
-//! Backward Euler asks for `M (x - x̃) = ∇Cᵀ λ` and `C + α̃ λ = 0` at once; XPBD iterates on the second alone, so a
-//! small dual residual proves nothing. Without multipliers both are one equation, `M (x - x̃) / Δt² + ∇U(x) = 0`, the
-//! slope of the incremental potential `‖x - x̃‖²_M / (2 Δt²) + U(x)`: the force residual is taken from positions alone,
-//! and no state that fails to move as it should, collapsed or stalled, can make it small.
+//! Backward Euler requires `M (x - x̃) = ∇Cᵀ λ` and `C + α̃ λ = 0` at once. XPBD iterates on the second alone, so a
+//! small dual residual does not show convergence. Without multipliers both are one equation,
+//! `M (x - x̃) / Δt² + ∇U(x) = 0`, the gradient of the incremental potential `‖x - x̃‖²_M / (2 Δt²) + U(x)`. The force
+//! residual is computed from positions alone, so it is large for any state that does not solve the step, also for a
+//! collapsed or stalled one.
 //!
 //! Sources: Macklin, Müller, Chentanez 2016 (primal and dual); Gast et al. 2015 (incremental potential). Everything is
 //! in double precision and summed in the order of particles and tets. Cost: one pass over the tets, on request only.

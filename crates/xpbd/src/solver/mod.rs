@@ -1,12 +1,12 @@
 //! [`Solver`]: owns the particles, tets and other constraints of a simulation, and applies the edits of a cut.
 //!
-//! Constraints keep the numbers of the mesh's tets; the order of solving is that of a [`Schedule`], which each step is
-//! given. Topology changes arrive as single edits (a new particle between two others, a copy, a tet replaced), each in
-//! constant time, and mark what the next step has to look at, so that a cut costs what it touches.
+//! Constraints keep the numbers of the mesh's tets; each step gets the order of solving as a [`Schedule`]. Topology
+//! changes are single edits (a new particle on an edge, a copy, a replaced tet), each in constant time. They mark the
+//! data that the next step must update, so the cost of a cut follows the cut.
 //!
-//! A clone has all that decides what the next steps compute, to the bit: particles, tets, materials, constraints, what
-//! was kept for residuals. It leaves out what a step makes by itself: the layout, which is the largest part and follows
-//! from tets and schedule, and working memory. The first step of a clone lays the tets out, O(tets).
+//! A clone has all data that decides the results of the next steps: particles, tets, materials, constraints, data for
+//! residuals. It leaves out data that a step derives: the layout, which is the largest part, and working memory. The
+//! first step of a clone rebuilds the layout, O(tets).
 
 mod constraints;
 

@@ -1,15 +1,16 @@
 //! [`CoarseCorrection`]: a truncated Newton step for the whole body, preconditioned by aggregates.
 //!
-//! What sweeps leave over varies slowly over the body. A correction solves `A d = f` with the semidefinite second
-//! derivatives A (`hessian`) and the forces f left over, by conjugate gradients, and goes along d as far as the
+//! The error that sweeps leave varies slowly over the body. A correction solves `A d = f` with the semidefinite second
+//! derivatives A (`hessian`) and the residual forces f by conjugate gradients, and moves along d as far as the
 //! potential falls. The preconditioner is a symmetric Gauss-Seidel sweep over the blocks in the colors of the stars,
-//! with the affine motions of aggregates in between (`coarse`): a two-level cycle. Nothing of the mesh is
-//! factored, only the aggregates, so after a cut a new pattern is all that has to be made.
+//! with the affine motions of aggregates in between (`coarse`): a two-level cycle. Only the aggregates are factored,
+//! not the mesh, so a cut only needs a new pattern.
 //!
-//! Where an accuracy is asked for, the matrix is kept as long as steps with it gain what it predicts: a body that moves
-//! smoothly needs a new one only now and then.
+//! With an accuracy the matrix is kept as long as steps gain the predicted energy: a body that moves smoothly needs a
+//! new one only from time to time.
 //!
-//! From a violent start, with many solutions at hand, it may settle in a worse one than sweeps would: sweep first.
+//! From a start far from rest, with many solutions, it may converge to one of higher energy than sweeps would: sweep
+//! first.
 //!
 //! Source: truncated Newton after Nash 2000; aggregates after Vaněk, Mandel, Brezina 1996, without smoothing.
 //! Cost: filling is 3 sweeps, factoring 2 to 5, an iteration of conjugate gradients half of one.

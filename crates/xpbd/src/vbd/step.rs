@@ -1,4 +1,4 @@
-//! [`Solver::step_vbd`] and [`ImplicitStep`]: a frame, and one substep of it opened up.
+//! [`Solver::step_vbd`] and [`ImplicitStep`]: a frame of VBD, and a single substep in parts.
 
 use super::constraints::SWEEP_PENALTY;
 use super::{Guess, Integrator, VbdSettings, VertexStars};

@@ -1,4 +1,4 @@
-//! [`ImplicitStep::sweep`]: every particle once into the minimum of the potential over its position.
+//! [`ImplicitStep::sweep`]: moves every particle once to the minimum of the potential over its position.
 
 use rayon::prelude::*;
 
