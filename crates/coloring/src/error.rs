@@ -2,7 +2,7 @@
 
 use crate::Algorithm;
 
-/// An invalid request, or a coloring that failed its check.
+/// Errors of coloring: unknown names, invalid parameters, and failed checks.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ColoringError {
@@ -12,7 +12,7 @@ pub enum ColoringError {
         /// The name asked for.
         name: String,
     },
-    /// An algorithm with a parameter that it has not.
+    /// The parameter of an algorithm is invalid.
     #[error("coloring algorithm '{text}': {expected} expected behind the name")]
     BadParameter {
         /// What was written.
@@ -28,7 +28,7 @@ pub enum ColoringError {
         /// Vertices without a color.
         uncolored: usize,
     },
-    /// An edit removes a vertex from a particle where it is not.
+    /// An edit removes a vertex from a particle that it does not have.
     #[error("vertex {vertex} cannot be removed from particle {particle}: it is not there")]
     NotThere {
         /// The vertex.
@@ -36,10 +36,10 @@ pub enum ColoringError {
         /// The particle.
         particle: u32,
     },
-    /// A coloring that is not proper, or not about the same vertices.
+    /// The coloring is not proper or has another number of vertices.
     #[error(transparent)]
     Graph(#[from] incise_graph::GraphError),
-    /// A count that is kept up to date differs from what it counts.
+    /// An incrementally updated count differs from its recomputed value: a defect of this crate.
     #[error("the counts kept beside the coloring are wrong: this is a defect, please report it")]
     Books,
 }

@@ -13,14 +13,14 @@ use crate::buckets::{Buckets, Extreme};
 use crate::random::Random;
 use crate::{Conflicts, priority_order};
 
-/// Which vertices choose first.
+/// Order in which greedy coloring visits vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Order {
-    /// By number.
+    /// Ascending by number.
     Natural,
-    /// In an order drawn with this seed; the same on every machine.
+    /// Random with this seed; equal on every machine.
     Random(u64),
     /// Most neighbors first, ties by hash: [`priority_order`], that of the parallel algorithms
     /// (Welsh and Powell 1967).
@@ -29,14 +29,15 @@ pub enum Order {
     /// incidence this needs no edges, but where neighbors share several particles it differs from
     /// what a graph gives.
     DegreeBound,
-    /// Filled from the back: always the vertex with the fewest neighbors among those not placed yet.
+    /// Smallest last: filled from the back with the vertex that has the fewest neighbors among
+    /// those not placed yet.
     SmallestLast,
-    /// Next the vertex with the most neighbors among those already placed (maximum cardinality
-    /// search, MCS).
+    /// Maximum cardinality search (MCS): next is the vertex with the most neighbors among those
+    /// already placed.
     MaximumCardinality,
 }
 
-/// All vertices of `conflicts`, those that choose first in front.
+/// Returns all vertices of `conflicts` in an order, the first to choose in front.
 ///
 /// Deterministic, and but for `DegreeBound` the same for a graph and the incidence it came from. O(n)
 /// for `Natural`, O(n + entries) for `DegreeBound`, O(n) for `Random`, O(n log n + degrees) for

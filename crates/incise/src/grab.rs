@@ -14,11 +14,11 @@ use crate::Error;
 use crate::attachment::detach_all;
 use crate::backend::{AnySolver, each, each_mut};
 
-/// Something that is held, in the simulation that gave it: see [`Simulation::grab`](crate::Simulation::grab).
+/// Handle of an interactive grab in the simulation that returned it: see [`Simulation::grab`](crate::Simulation::grab).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Grab {
     pub(crate) island: usize,
-    /// Its grip in the island, and which user of the grip it is.
+    /// Index of the grip in the island, and the user number of the grip.
     slot: usize,
     user: u64,
 }
@@ -35,9 +35,9 @@ struct Grip {
     /// The point that was grabbed, and where it is to be at the end of the next frame.
     point: DVec3,
     to: DVec3,
-    /// Where the handle was when it took hold.
+    /// Position of the handle when the grab began.
     start: DVec3,
-    /// Whether `to` is news for the next frame.
+    /// Whether `to` has changed since the last frame.
     moved: bool,
 }
 
@@ -49,7 +49,7 @@ pub(crate) struct Hand {
 }
 
 impl Hand {
-    /// Whether something that is held is to move in the next frame.
+    /// Whether a grab moves in the next frame.
     pub(crate) fn moves(&self) -> bool {
         self.grips.iter().any(|grip| grip.held && grip.moved)
     }
@@ -61,7 +61,7 @@ impl Hand {
         }
     }
 
-    /// Says where the point of a grab is to be at the end of the next frame; tells whether there is such a grab.
+    /// Sets the target of a grab for the end of the next frame; returns whether the grab exists.
     pub(crate) fn move_to(&mut self, solver: &mut AnySolver, grab: Grab, to: DVec3) -> bool {
         let Some(grip) = self.find(grab) else {
             return false;
@@ -74,7 +74,7 @@ impl Hand {
         true
     }
 
-    /// Releases all particles attached to a grab's handle; tells whether there is such a grab.
+    /// Releases all particles of a grab; returns whether the grab exists.
     pub(crate) fn release(&mut self, solver: &mut AnySolver, grab: Grab) -> Result<bool, Error> {
         let Some(grip) = self.find(grab) else {
             return Ok(false);
@@ -90,7 +90,7 @@ impl Hand {
         (grip.held && grip.user == grab.user).then_some(grip)
     }
 
-    /// Hangs particles on a handle that is free. `island` is the number of the island.
+    /// Attaches particles to a free handle. `island` is the number of the island.
     pub(crate) fn take(
         &mut self,
         island: usize,

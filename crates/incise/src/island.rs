@@ -1,8 +1,7 @@
-//! [`Island`]: bodies that are solved together, with all that moves and cuts them.
+//! [`Island`]: bodies that are solved together, with their solver, partition, attachments and cuts.
 //!
-//! Mostly a single body. An island has its own mesh, solver, partition and substeps, so a stiff body makes no other one wait,
-//! each is precise around its own origin, and a body moves to the bit as it would alone in the scene. Cost: that of its
-//! parts.
+//! Mostly a single body. Each island has its own mesh, solver, partition, substeps and origin. A stiff body therefore
+//! does not slow down others, and a body moves bit-identically to a scene of its own. Cost: that of its parts.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -70,30 +69,30 @@ pub(crate) struct Island {
     pub(crate) initial_volume: f64,
     /// Volume at rest in m³ that strokes have taken away.
     pub(crate) removed_volume: f64,
-    /// What was chosen, if the scene left it open.
+    /// Choice of substeps, if the scene leaves it open.
     #[cfg_attr(feature = "save", serde(with = "crate::substeps::saved"))]
     pub(crate) choice: Option<Choice>,
     /// The substeps before all cuts.
     first_substeps: u32,
-    /// What it costs and may cost, where there is a budget.
+    /// Cost and time limit, in a scene with a budget.
     pub(crate) budget: Option<Budget>,
     /// The longest side of the box around its bodies at rest in m.
     size: f64,
-    /// What is solved less accurately than asked for.
+    /// Volume that is solved less accurately than the accuracy wanted.
     pub(crate) outside: OutsideVolume,
     /// Whether the last frame of VBD missed the accuracy wanted.
     misses_accuracy: bool,
     /// Warnings for the next report.
     pub(crate) warnings: Vec<Warning>,
-    /// What the last cut did to kappa, if that is to be reported.
+    /// Change of kappa by the last cut, if it is reported.
     pub(crate) cut_kappa: Option<CutKappa>,
     /// Whether it sleeps, in a scene where bodies may.
     pub(crate) rest: Option<Rest>,
-    /// What renews the partition, in a scene where partitions are renewed.
+    /// Background rebuild of the partition, in a scene with `recluster`.
     pub(crate) recluster: Option<Recluster>,
 }
 
-/// What an island costs and may cost.
+/// Cost of an island and its share of a time budget.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Budget {
@@ -121,7 +120,7 @@ fn whole(number: f64) -> u32 {
     whole.max(1)
 }
 
-/// What cuts did to kappa.
+/// Change of kappa by cuts.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct CutKappa {
@@ -155,7 +154,7 @@ const OUTSIDE_FRACTION: f64 = 0.01;
 /// slower without end.
 const MOST_GROWTH: u32 = 2;
 
-/// How much weaker than on earth gravity may be and still count for the precision.
+/// Factor by which gravity may be weaker than on earth and still decide the precision.
 const WEAKEST: f64 = 1e4;
 
 /// The longest side of the box around points, 0 without points.
@@ -600,7 +599,7 @@ impl Island {
         Ok(())
     }
 
-    /// Detaches what an attachment holds, and wakes it; tells whether there is such an attachment.
+    /// Releases the particles of an attachment and wakes the island; returns whether the attachment exists.
     pub(crate) fn remove_attachment(&mut self, name: AttachmentHandle) -> Result<bool, Error> {
         let Some(index) = self.attachments.iter().position(|a| a.name == name) else {
             return Ok(false);
@@ -673,8 +672,8 @@ impl Island {
         around.next().map(|tet| self.pieces.piece_of(tet))
     }
 
-    /// Takes hold of what can be held within a radius around a point, of the piece of the particle `nearest`. `number` is
-    /// that of the island. Wakes it.
+    /// Grabs the free particles within a radius around a point that belong to the piece of the particle `nearest`.
+    /// `number` is that of the island. Wakes the island.
     pub(crate) fn grab(
         &mut self,
         number: usize,
@@ -692,12 +691,12 @@ impl Island {
         Ok(grab)
     }
 
-    /// Says where the point of a grab is to be at the end of the next frame; tells whether there is such a grab.
+    /// Sets the target of a grab for the end of the next frame; returns whether the grab exists.
     pub(crate) fn move_grab(&mut self, grab: Grab, to: DVec3) -> bool {
         self.hand.move_to(&mut self.solver, grab, to)
     }
 
-    /// Lets go of all that hangs on a grab's handle, and wakes the island; tells whether there is such a grab.
+    /// Releases the particles of a grab and wakes the island; returns whether the grab exists.
     pub(crate) fn release(&mut self, grab: Grab) -> Result<bool, Error> {
         let is_held = self.hand.release(&mut self.solver, grab)?;
         if is_held {
@@ -706,8 +705,8 @@ impl Island {
         Ok(is_held)
     }
 
-    /// Lets solver, pieces, clusters, colors, schedule and volume constraints follow a cut of the mesh, and wakes it.
-    /// Returns what happened to its pieces.
+    /// Applies a delta to solver, pieces, clusters, colors, schedule and volume constraints, and wakes the island.
+    /// Returns the events of its pieces.
     pub(crate) fn apply_delta(
         &mut self,
         delta: &CutDelta,
@@ -774,7 +773,7 @@ impl Island {
         Ok(renewed)
     }
 
-    /// Lets volume constraints follow another partition.
+    /// Updates volume constraints for another partition.
     pub(crate) fn reschedule_volumes(&mut self) -> Result<(), Error> {
         let Some(volumes) = &self.volumes else {
             return Ok(());
@@ -783,8 +782,8 @@ impl Island {
         volumes.apply_delta(&mut self.solver, &nothing, &self.cuttable, schedule)
     }
 
-    /// Has [`Island::follow`] note the largest kappa of the tets that the cuts of a frame make, and that of all tets before the
-    /// first of them if it is wanted, which is O(tets).
+    /// Makes [`Island::apply_delta`] note the largest kappa of the tets that the cuts of a frame create, and if wanted
+    /// that of all tets before the first cut, which is O(tets).
     pub(crate) fn note_kappa(&mut self, before: bool) {
         if self.cut_kappa.is_none() {
             self.cut_kappa = Some(CutKappa {

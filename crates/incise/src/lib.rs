@@ -1,9 +1,8 @@
 //! Cuts soft bodies in real time.
 //!
-//! This is the facade: a [`Scene`] or a [`SimulationBuilder`] says what is simulated, a [`Simulation`] moves it frame by
-//! frame, cuts included.
-//! The crates behind it are useful alone and re-exported here: [`mesh`], [`mesh_io`], [`meshing`], [`graph`],
-//! [`coloring`], [`clustering`], [`cutting`], [`xpbd`].
+//! This is the facade: a [`Scene`] or a [`SimulationBuilder`] describes bodies, cuts and settings, and a [`Simulation`]
+//! advances them frame by frame. The other crates of the workspace are usable alone and re-exported here: [`mesh`],
+//! [`mesh_io`], [`meshing`], [`graph`], [`coloring`], [`clustering`], [`cutting`], [`xpbd`].
 //!
 //! ```
 //! use incise::{Scene, Simulation};

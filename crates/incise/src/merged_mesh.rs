@@ -1,11 +1,11 @@
-//! [`MergedMesh`]: several islands of bodies seen as one mesh.
+//! [`MergedMesh`]: all islands of bodies as one mesh.
 //!
 //! At the start particles and tets are numbered body by body in the order of the scene. A cut keeps all numbers: new
-//! particles and tets get the next ones, stroke by stroke and within a stroke island by island, each island's in the order
-//! of its own delta. Each island numbers its own from 0; the lists here translate, and one delta of an island becomes one
-//! of the merged mesh. Only scenes with more than one island have one; a single island is its own.
+//! particles and tets get the next ones, stroke by stroke and within a stroke island by island, each island's in the
+//! order of its own delta. Each island numbers its own from 0; the lists here translate the numbers and the deltas.
+//! Scenes with a single island use its mesh directly.
 //!
-//! Cost: following a cut costs what the cut touched; clusters and colors of the merged mesh are put together on request.
+//! Cost: a delta costs as much as it changes; clusters and colors are merged on request.
 
 use glam::DVec3;
 use incise_cutting::{
@@ -117,7 +117,7 @@ impl MergedMesh {
         (island as usize, number.index())
     }
 
-    /// Follows a cut in one island; returns what it changed in the numbers of the merged mesh.
+    /// Applies a delta of one island; returns the delta in the numbers of the merged mesh.
     pub(crate) fn apply_delta(&mut self, island: usize, delta: &CutDelta) -> CutDelta {
         let numbers = &mut self.numbers[island];
         let (particles_before, tets_before) = (self.mesh.positions.len(), self.mesh.tets.len());
@@ -238,7 +238,7 @@ impl MergedMesh {
         self.numbers[island].particles[particle].index()
     }
 
-    /// Puts what each island says of its tets in the order of the merged mesh.
+    /// Merges per-tet values of all islands in the order of the merged mesh.
     pub(crate) fn of_tets<T: Copy + Default>(&self, of_islands: &[Vec<T>]) -> Vec<T> {
         let mut of_tets = vec![T::default(); self.mesh.tets.len()];
         for (numbers, of_island) in self.numbers.iter().zip(of_islands) {
@@ -249,7 +249,7 @@ impl MergedMesh {
         of_tets
     }
 
-    /// Takes over the islands' positions.
+    /// Copies the positions of the islands.
     pub(crate) fn collect_positions(&mut self, islands: &[Island]) {
         for (numbers, island) in self.numbers.iter().zip(islands) {
             for (p, x) in numbers.particles.iter().zip(&island.positions) {

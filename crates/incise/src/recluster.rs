@@ -1,18 +1,18 @@
-//! [`Recluster`]: fresh clusters and colors for a degraded partition, made in the background.
+//! [`Recluster`]: rebuilds clusters and colors of a degraded partition in the background.
 //!
-//! Cuts change clusters where they are, so a partition degrades: after many cuts it has more colors and smaller clusters than one
-//! made from the mesh as it is now. When it has degraded enough, a copy of the mesh goes to a thread of its own, which
-//! clusters and colors it as at the start. A fixed number of frames later, after the strokes of that frame, the new partition
-//! takes the place of the old one, and follows the cuts made meanwhile: first each by itself, then small clusters around
-//! all of them are merged. If the thread is not done by then the frame waits. So it depends on the scene alone in which
-//! frame which partition comes, never on time or on the number of threads.
+//! Cuts change clusters locally, so a partition degrades: after many cuts it has more colors and smaller clusters than
+//! a rebuilt one. Once it has degraded enough, a thread clusters and colors a copy of the mesh. A fixed number of
+//! frames later, after the strokes of that frame, the new partition replaces the old one. The cuts made meanwhile are
+//! applied to it first, one by one, and then small clusters around all of them are merged. If the thread has not
+//! finished by then, the frame waits. The frame of the replacement thus depends on the scene alone, never on time or on
+//! the number of threads.
 //!
-//! The trade: the thread needs a core; the frame that starts it copies the mesh, the one that swaps costs what following
-//! the cuts of the frames between took, and a schedule and layout, as any frame with a cut. More frames between wait less
-//! and follow more. Clusters and colors far from all cuts change, too, and with them the order of solving: the result
-//! differs as much as between two numberings of the mesh.
+//! Trade-off: the thread needs a core. The frame that starts it copies the mesh; the frame of the replacement applies
+//! the pending cuts and rebuilds schedule and layout. More frames between mean less waiting and more cuts to apply.
+//! Clusters and colors far from all cuts change as well, and with them the order of solving: results differ as much as
+//! between two numberings of the mesh.
 //!
-//! The paper leaves this open. Cost: clustering and coloring in the background; beside it two divisions a frame.
+//! The paper leaves this open. Cost: clustering and coloring in the background, and two divisions a frame.
 
 use std::thread::JoinHandle;
 
@@ -22,7 +22,7 @@ use crate::Error;
 use crate::partition::{Partition, PartitionSettings};
 use crate::scene::ReclusterSpec;
 
-/// What watches over the degradation of a partition.
+/// Monitors the degradation of a partition and rebuilds it in the background.
 #[derive(Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Recluster {
@@ -40,7 +40,7 @@ impl Clone for Recluster {
     }
 }
 
-/// A partition in the making.
+/// A partition that is being rebuilt.
 #[derive(Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 struct Pending {
@@ -153,7 +153,7 @@ impl Pending {
         }
     }
 
-    /// Waits for the partition and lets it follow what has been cut meanwhile.
+    /// Waits for the partition and applies the cuts made meanwhile.
     fn finish(self, cuttable: &CuttableMesh) -> Result<Partition, Error> {
         let mut partition = self.making.partition()?;
         partition.catch_up(&self.deltas, cuttable)?;

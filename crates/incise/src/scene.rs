@@ -315,7 +315,7 @@ impl Scene {
         })
     }
 
-    /// The first frame after all strokes and handles.
+    /// Returns the first frame after all strokes and attachments.
     #[must_use]
     pub fn frames_needed(&self) -> u64 {
         let strokes = self.stroke.iter().map(StrokeSpec::last_frame);
@@ -358,7 +358,7 @@ fn with_suggestion(message: &str) -> String {
     }
 }
 
-/// The known name most similar to `unknown`, by Jaro-Winkler similarity; `None` without any known name.
+/// Returns the known name that is most similar to `unknown` by Jaro-Winkler similarity; `None` without any known name.
 #[must_use]
 pub fn nearest<'a>(unknown: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let similarity = |name: &&str| strsim::jaro_winkler(unknown, name);

@@ -1,10 +1,10 @@
-//! [`Choice`]: how many substeps `auto` chooses for a body.
+//! [`Choice`]: the number of substeps that `auto` chooses for a body.
 //!
 //! The error of a substep grows with kappa, `E Δt² / (ρ h²)` with h the smallest altitude of a tet, and with Poisson's
-//! ratio (`accuracy.rs`). Kappa falls with the square of the number of substeps, so one pass over the tets at rest tells
-//! the number that every tet needs for the accuracy wanted, and the largest decides, with two exceptions, which are
-//! reported. No more than a cap is taken. And a few slivers do not decide for the whole body: tets that need more than
-//! twice the substeps of all others, together less than a thousandth of the volume, are solved less accurately.
+//! ratio (`accuracy.rs`). Kappa falls with the square of the number of substeps. One pass over the tets at rest gives
+//! the number that every tet needs for the accuracy wanted; the largest decides, with two exceptions, which are
+//! reported. The number is capped. And a few slivers do not decide for the whole body: tets that need more than twice
+//! the substeps of all others, together less than a thousandth of the volume, are solved less accurately.
 //!
 //! Source: kappa is the square of a Courant number; that substeps and not iterations make XPBD accurate, Macklin et al.
 //! 2019. Cost: O(n log n) for each choice.
@@ -20,25 +20,25 @@ const SLIVER_VOLUME: f64 = 1e-3;
 /// ... and more than this much stiffer than all other tets: they want more than twice as many substeps.
 const SLIVER_KAPPA: f64 = 4.0;
 
-/// Why not all tets have the substeps they want.
+/// Reason for fewer substeps than all tets need.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 #[cfg_attr(feature = "save", derive(serde::Deserialize))]
 pub enum Missed {
-    /// They want more than `max_substeps`.
+    /// More than `max_substeps` are needed.
     Cap,
-    /// They want more than `budget_ms` allows.
+    /// More are needed than `budget_ms` allows.
     Budget,
-    /// Those that want more are few slivers.
+    /// Only a few slivers need more.
     Sliver,
 }
 
-/// What `auto` chose for a body, and what it left undone.
+/// Choice of substeps by `auto` for a body, and its expected error.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Choice {
-    /// The substeps that would solve every tet with the accuracy wanted.
+    /// Number of substeps that would solve every tet with the accuracy wanted.
     pub substeps_wanted: u32,
     /// The substeps that would solve all tets but slivers with it.
     #[serde(skip)]
@@ -46,11 +46,11 @@ pub struct Choice {
     /// The number that was chosen; that of the body is larger if it is joined to one with more.
     #[serde(skip)]
     pub substeps: u32,
-    /// Why it was not all that is wanted, if it was not; the cap if both reasons hold.
+    /// Reason for a smaller number than `substeps_wanted`, if it is smaller; the cap takes precedence.
     pub missed: Option<Missed>,
-    /// Tets that were left aside as slivers.
+    /// Number of tets that were ignored as slivers.
     pub sliver_tets: usize,
-    /// Their share of the volume at rest.
+    /// Share of the slivers in the volume at rest.
     pub sliver_volume_fraction: f64,
     /// The expected error of all other tets with the chosen number, as a fraction of the motion; 1 stands for 1 or more.
     pub expected_error: f64,
@@ -102,7 +102,7 @@ pub(crate) mod saved {
 }
 
 impl Choice {
-    /// What becomes of it where two-level VBD with this expected error takes the place of too many substeps.
+    /// Returns the choice with two-level VBD of this expected error in place of too many substeps.
     pub(crate) fn solved_by_vbd(self, expected_error: f64) -> Self {
         Self {
             substeps: 1,
@@ -140,7 +140,7 @@ pub(crate) fn choose(tets: Vec<TetDemand>, max_substeps: u32, form: TetSolve) ->
     evaluate(tets, |needed| needed.min(max_substeps), form)
 }
 
-/// What a number of substeps, taken from the needed one, means for tets.
+/// Evaluates the number of substeps that `take` returns for the needed one.
 pub(crate) fn evaluate(
     mut tets: Vec<TetDemand>,
     take: impl FnOnce(u32) -> u32,

@@ -1,4 +1,4 @@
-//! [`Warning`]: what a user of a result must know about it.
+//! [`Warning`]: a problem of a result, with its cause and a fix.
 //!
 //! Warnings of the settings come with the first frame and whenever settings change, those of a cut or of the motion with
 //! the frame in which they begin. Cost: a pass over the particles a frame for the largest speed; the others cost what
@@ -47,14 +47,14 @@ pub enum WarningCode {
     Diverged,
 }
 
-/// What a user of a result must know about it.
+/// A problem of a result: its kind, its place in the scene, and a sentence with cause and fix.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 #[cfg_attr(feature = "save", derive(serde::Deserialize))]
 pub struct Warning {
-    /// Its kind.
+    /// Kind of the warning.
     pub code: WarningCode,
-    /// One sentence: what is wrong and what helps.
+    /// One sentence: the problem and a fix.
     pub message: String,
     /// The part of the scene, as in `body 0`.
     #[serde(rename = "where")]

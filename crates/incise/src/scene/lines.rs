@@ -1,4 +1,4 @@
-//! [`line_of`]: the line of a key in the text of a scene, so that an error about a value can name its line.
+//! [`line_of`]: the line of a key in the text of a scene, for errors about its value.
 
 use std::path::Path;
 

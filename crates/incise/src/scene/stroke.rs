@@ -1,7 +1,7 @@
-//! [`StrokeSpec`]: a cut, as a scene file describes it.
+//! [`StrokeSpec`]: a cut in a scene file.
 //!
-//! Every kind names the frame at whose start it acts, in the space where the body is then. What is carried out:
-//! `tool.rs` checks and prepares, `strokes.rs` cuts.
+//! Every kind states the frame at whose start it acts, in the world coordinates of that frame. `tool.rs` checks and
+//! prepares the geometry; `strokes.rs` cuts.
 
 use glam::DVec3;
 use schemars::JsonSchema;
@@ -117,8 +117,8 @@ impl StrokeSpec {
         }
     }
 
-    /// Where the blade is at the start of a frame, a polyline in m; `None` before it begins, after it has ended, for strokes
-    /// that cut at once, and for a path that no simulation takes. The same arithmetic as that of the cut.
+    /// Returns the blade at the start of a frame, a polyline in m; `None` before the stroke begins, after it has ended,
+    /// for strokes that cut at once, and for an invalid path. Bit-identical to the blade of the simulation.
     ///
     /// ```
     /// use incise::Scene;

@@ -16,16 +16,16 @@ use crate::particles::{PARALLEL_PARTICLES, Particles};
 use crate::substep::{Factors, Substep};
 use crate::{Float, Pose, XpbdError};
 
-/// The attachment of a particle to a handle.
+/// Attachment of a particle to a handle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AttachmentData {
     /// The particle.
     pub particle: u32,
     /// The number of the handle.
     pub handle: u32,
-    /// The anchor in the handle's frame in m.
+    /// Position in the handle's frame in m.
     pub anchor: DVec3,
-    /// In m/N; 0 is rigid.
+    /// Compliance in m/N; 0 is rigid.
     pub compliance: f64,
     /// Damping time in s.
     pub damping: f64,
@@ -61,7 +61,7 @@ pub(crate) struct Attachment<R: Float> {
     pub(crate) handle: u32,
     /// The anchor in the handle's frame.
     anchor: DVec3,
-    /// In m/N; 0 is rigid.
+    /// Compliance in m/N; 0 is rigid.
     pub(crate) compliance: f64,
     pub(crate) damping: f64,
     /// The anchor in the world at the end of the substep and at its start.

@@ -8,18 +8,18 @@ use super::scalar::{ScalarConstraint, ScalarConstraints};
 use crate::direction::direction;
 use crate::{Float, XpbdError};
 
-/// Keeps two particles at a distance. See [`crate::Solver::set_distances`].
+/// Distance constraint between two particles: a spring, a rod or a thread. See [`crate::Solver::set_distances`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DistanceConstraint {
     /// The two particles.
     pub particles: [u32; 2],
-    /// Their distance at rest in m, at least 0.
+    /// Distance at rest in m, at least 0.
     pub length: f64,
     /// One over the stiffness in m/N, at least 0; 0 is a rod.
     pub compliance: f64,
-    /// Damping time in s, at least 0: the rate of change is resisted by this times the stiffness. A rod's own rate is
-    /// already held at 0, so there it does nothing.
+    /// Damping time in s, at least 0: the rate of change is resisted by this times the stiffness. No effect on a rod,
+    /// whose rate of change is 0.
     pub damping: f64,
     /// Whether it acts only while the particles are farther apart than `length`, as a thread does.
     pub tension_only: bool,
@@ -46,14 +46,14 @@ impl DistanceConstraint {
     }
 }
 
-/// A distance constraint as a kernel wants it.
+/// A distance constraint as plain numbers for a kernel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DistanceData<R> {
     /// Its particles.
     pub particles: [u32; 2],
-    /// Their distance at rest in m.
+    /// Distance at rest in m.
     pub length: R,
-    /// In m/N.
+    /// Compliance in m/N.
     pub compliance: R,
     /// Damping time in s.
     pub damping: R,

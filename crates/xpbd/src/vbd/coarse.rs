@@ -5,11 +5,10 @@
 //! of the body are made. A block of A between two particles contributes itself times the products of their r: no more
 //! than 16 scaled copies. The matrix of a connected piece is dense, because its aggregates are few.
 //!
-//! The factor is kept from one correction to the next until conjugate gradients converge at less than [`AGED`] of the
-//! rate that they had when it was new: a preconditioner need not be that of the present matrix, only symmetric and
-//! positive. Affine motions also stay what they are when the body turns. A cut changes neither aggregates nor factor:
-//! new particles join the aggregates of their neighbors, and all aggregates are grown again once the factor has aged.
-//! Cost: 36 operations a block, then a factorization of 12 unknowns an aggregate, only where the factor has aged.
+//! The factor is kept from one correction to the next until conjugate gradients converge at less than [`AGED`] of their
+//! rate with the new factor: a preconditioner need not be that of the present matrix, only symmetric and positive.
+//! Affine motions also remain valid when the body rotates. A cut changes neither aggregates nor factor: new particles
+//! join the aggregates of their neighbors, and all aggregates are grown again once the factor has aged.
 
 use super::cholesky::Cholesky;
 use super::matrix::Blocks;

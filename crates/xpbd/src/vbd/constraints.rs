@@ -709,8 +709,8 @@ impl<R: Float> ConstraintTerms<R> {
     ) {
         let p = order[row] as usize;
         let x = load::<R>(&solver.particles.cells[p]);
-        let place_of = |q: u32| match columns[1..].binary_search(&self.row_of[q as usize]) {
-            Ok(row) => row + 1,
+        let block_of = |q: u32| match columns[1..].binary_search(&self.row_of[q as usize]) {
+            Ok(block) => block + 1,
             // Not beside the diagonal, so on it.
             Err(_) => 0,
         };
@@ -732,7 +732,7 @@ impl<R: Float> ConstraintTerms<R> {
                     if excess == R::ZERO && spring.one_sided {
                         continue;
                     }
-                    let other = place_of(distance(solver, index).particles()[1 - own]);
+                    let other = block_of(distance(solver, index).particles()[1 - own]);
                     let outer = along * (spring.stiffness * (R::ONE - part));
                     let isotropic = spring.stiffness * part;
                     add_outer::<R>(&mut blocks[0], outer, along);
@@ -749,8 +749,8 @@ impl<R: Float> ConstraintTerms<R> {
                     let scaled = gradients[own] * spring.stiffness;
                     *force += scaled * -spring.excess(value);
                     for (q, gradient) in volume.particles().into_iter().zip(gradients) {
-                        let row = if q as usize == p { 0 } else { place_of(q) };
-                        add_outer::<R>(&mut blocks[row], scaled, gradient);
+                        let block = if q as usize == p { 0 } else { block_of(q) };
+                        add_outer::<R>(&mut blocks[block], scaled, gradient);
                     }
                 }
             }

@@ -1,4 +1,4 @@
-//! [`ImplicitStep::sweep`]: every particle once into the minimum of the potential over its position.
+//! [`ImplicitStep::sweep`]: moves every particle once to the minimum of the potential over its position.
 
 use rayon::prelude::*;
 
@@ -25,7 +25,7 @@ struct Sweep<R> {
 }
 
 impl<R: Float> ImplicitStep<'_, R> {
-    /// Moves every free particle once, color after color, and out of colliders.
+    /// Moves every free particle once, color by color, and out of colliders.
     ///
     /// Without colliders the potential does not rise, up to rounding. Cost: about 60 operations a pair of particle and
     /// tet, and three divisions a particle; [`VertexStars::pair_count`].
