@@ -2,7 +2,9 @@
 
 use comfy_table::Table;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
-use incise::advise::{Advice, Against, Measured, Question, ReferenceKind, default_frames};
+use incise::advise::{
+    Advice, AdviseSettings, Measured, ReferenceKind, ReferenceSummary, default_frames,
+};
 
 use crate::args::AdviseArguments;
 use crate::failure::Failure;
@@ -11,7 +13,7 @@ use crate::run::{load, located};
 
 pub(crate) fn advise(arguments: &AdviseArguments) -> Result<(), Failure> {
     let scene = load(arguments.scene.as_deref())?;
-    let question = Question {
+    let question = AdviseSettings {
         budget_ms: arguments.budget_ms,
         frames: arguments.frames.unwrap_or_else(|| default_frames(&scene)),
         threads: arguments.threads.map(usize::from),
@@ -41,7 +43,7 @@ pub(crate) fn advise(arguments: &AdviseArguments) -> Result<(), Failure> {
 
 /// The reference solution in words.
 fn reference(advice: &Advice) -> String {
-    let Against {
+    let ReferenceSummary {
         kind,
         why_not_newton,
         steps: [a, b, c],
@@ -89,7 +91,7 @@ fn table(advice: &Advice) -> Table {
     ]);
     for (i, row) in advice.measured.iter().enumerate() {
         let mut notes = Vec::new();
-        if row.of_the_scene {
+        if row.is_scene_setting {
             notes.push("the scene");
         }
         if advice.best == Some(i) {

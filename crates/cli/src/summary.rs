@@ -3,7 +3,7 @@
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table};
 use incise::FrameReport;
-use incise::report::{BodyReport, Milliseconds, Missed, SoftenedReport};
+use incise::report::{BodyReport, Milliseconds, Shortfall, SoftenedReport};
 
 /// Name and time of each stage that has one.
 type Stage = (&'static str, fn(&Milliseconds) -> f64);
@@ -133,11 +133,11 @@ fn substeps_of(bodies: &[usize]) -> String {
 fn substeps(body: &BodyReport) -> String {
     let substeps = body.substeps;
     match body.choice {
-        Some(choice) => match choice.missed {
-            Some(Missed::Cap) => {
+        Some(choice) => match choice.shortfall {
+            Some(Shortfall::Cap) => {
                 format!("{substeps} (limited; {} needed)", choice.substeps_wanted)
             }
-            Some(Missed::Sliver) => format!(
+            Some(Shortfall::Sliver) => format!(
                 "{substeps} ({} needed by {} slivers)",
                 choice.substeps_wanted, choice.sliver_tets
             ),

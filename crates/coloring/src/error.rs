@@ -30,7 +30,7 @@ pub enum ColoringError {
     },
     /// An edit removes a vertex from a particle that it does not have.
     #[error("vertex {vertex} cannot be removed from particle {particle}: it is not there")]
-    NotThere {
+    NoSuchPair {
         /// The vertex.
         vertex: u32,
         /// The particle.
@@ -41,5 +41,5 @@ pub enum ColoringError {
     Graph(#[from] incise_graph::GraphError),
     /// An incrementally updated count differs from its recomputed value: a defect of this crate.
     #[error("the counts kept beside the coloring are wrong: this is a defect, please report it")]
-    Books,
+    InconsistentCounts,
 }

@@ -77,7 +77,7 @@ pub struct VivaceStats {
     /// The largest label plus one before gaps were closed. The paper seems to count these.
     pub labels: usize,
     /// Number of times that a vertex ran out of colors.
-    pub fed: usize,
+    pub refills: usize,
     /// The neighbors of the uncolored vertices, summed over the rounds. A round looks at each of them
     /// up to three times.
     pub edge_visits: u64,
@@ -139,7 +139,7 @@ pub fn vivace(conflicts: &impl Conflicts, options: VivaceOptions) -> Result<Viva
             state.colors[v as usize] = state.picked[v as usize];
         }
         uncolored.retain(|&v| state.colors[v as usize] == NONE);
-        stats.fed += state.renew(&uncolored);
+        stats.refills += state.renew(&uncolored);
     }
     let mut coloring = Coloring::new(state.colors.into_iter().map(ColorId).collect());
     stats.labels = coloring.color_count();

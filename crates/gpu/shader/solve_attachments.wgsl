@@ -18,7 +18,7 @@ fn main(
     @builtin(num_workgroups) count: vec3<u32>,
 ) {
     let index = workgroup_index(id, count) * THREADS + lane;
-    if index >= settings.hanging {
+    if index >= settings.soft {
         return;
     }
     let attachment = attachments[index];

@@ -112,10 +112,10 @@ pub fn shared_structs() -> Vec<SharedStruct> {
             max_cofactor_norm,
             particles,
             depth,
-            obstacles,
+            colliders,
             handles,
-            held,
-            hanging,
+            rigid,
+            soft,
             material
         }),
         shared!(DispatchRange { first, count }),

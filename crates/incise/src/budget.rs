@@ -17,7 +17,7 @@ use crate::island_builder::demands;
 use crate::method::{tet_solve, with_vbd};
 use crate::report::{Milliseconds, milliseconds};
 use crate::scene::SolverSpec;
-use crate::substeps::{Missed, choose};
+use crate::substeps::{Shortfall, choose};
 
 /// The part of the budget that solving may take; the rest is for cuts, positions and reports.
 const SHARE: f64 = 0.75;
@@ -91,7 +91,7 @@ pub(crate) fn fit(islands: &mut [Island], spec: &SolverSpec, budget: f64) -> Res
         island.take_substeps(substeps);
         let missed = island
             .choice
-            .is_some_and(|choice| choice.missed == Some(Missed::Budget));
+            .is_some_and(|choice| choice.shortfall == Some(Shortfall::Budget));
         if missed && island.leaves_method_open {
             try_vbd(island, spec, limits.share)?;
         }

@@ -18,7 +18,7 @@ use crate::attachment::{Attachment, AttachmentHandle};
 use crate::backend::{AnySolver, each, each_mut};
 use crate::compute_device::ComputeDevice;
 use crate::distance::Distances;
-use crate::grab::{Grab, Hand};
+use crate::grab::{Grab, Grabs};
 use crate::island_builder::{IslandBuilder, demands, substeps};
 use crate::method::{leaves_open, resolve, tet_solve};
 use crate::partition::Partition;
@@ -27,8 +27,8 @@ use crate::report::{Milliseconds, milliseconds};
 use crate::scene::{
     AttachmentSpec, DistanceSpec, Method, Precision, Quantity, SolverSpec, Substeps,
 };
-use crate::sleep::Rest;
-use crate::substeps::{Choice, Missed, evaluate};
+use crate::sleep::SleepState;
+use crate::substeps::{Choice, Shortfall, evaluate};
 use crate::volume::Volumes;
 use crate::warning::{self, Warning, WarningCode};
 use crate::{Error, Scene, collider, distance};
@@ -59,7 +59,7 @@ pub(crate) struct Island {
     spare_frames: Vec<u32>,
     pub(crate) distances: Distances,
     /// The interactive grabs.
-    pub(crate) hand: Hand,
+    pub(crate) grabs: Grabs,
     volumes: Option<Volumes>,
     /// The present positions.
     pub(crate) positions: Vec<DVec3>,
@@ -87,7 +87,7 @@ pub(crate) struct Island {
     /// Change of kappa by the last cut, if it is reported.
     pub(crate) cut_kappa: Option<CutKappa>,
     /// Whether it sleeps, in a scene where bodies may.
-    pub(crate) rest: Option<Rest>,
+    pub(crate) sleep: Option<SleepState>,
     /// Background rebuild of the partition, in a scene with `recluster`.
     pub(crate) recluster: Option<Recluster>,
 }
@@ -230,7 +230,7 @@ impl Island {
             attachments: joined.attachments,
             spare_frames: Vec::new(),
             distances: joined.distances,
-            hand: Hand::default(),
+            grabs: Grabs::default(),
             volumes,
             positions: Vec::new(),
             pieces: PieceTracker::new(&cuttable),
@@ -250,7 +250,7 @@ impl Island {
             misses_accuracy: false,
             warnings: Vec::new(),
             cut_kappa: None,
-            rest: scene.solver.sleep.map(Rest::new),
+            sleep: scene.solver.sleep.map(SleepState::new),
         };
         island.solver.positions(&mut island.positions);
         island.judge_settings();
@@ -302,9 +302,9 @@ impl Island {
         );
         if self
             .choice
-            .is_some_and(|c| c.missed == Some(Missed::Budget))
+            .is_some_and(|c| c.shortfall == Some(Shortfall::Budget))
         {
-            judged.missed = Some(Missed::Budget);
+            judged.shortfall = Some(Shortfall::Budget);
         }
         let chosen = self.choice.is_some();
         self.warnings.extend(warning::of_substeps(
@@ -362,8 +362,8 @@ impl Island {
         let form = tet_solve(self.spec.tet_solve);
         let tets = demands(&self.spec, &self.solver, self.cuttable.mesh(), |_| true);
         let mut choice = evaluate(tets, |_| substeps, form);
-        if choice.missed == Some(Missed::Cap) {
-            choice.missed = Some(Missed::Budget);
+        if choice.shortfall == Some(Shortfall::Cap) {
+            choice.shortfall = Some(Shortfall::Budget);
         }
         self.choice = Some(choice);
         self.set_substeps(substeps);
@@ -441,12 +441,12 @@ impl Island {
 
     /// Whether it is not solved until it is woken.
     pub(crate) fn asleep(&self) -> bool {
-        self.rest.is_some_and(|rest| rest.asleep())
+        self.sleep.is_some_and(|sleep| sleep.asleep())
     }
 
     /// Wakes it, in a scene where bodies may sleep.
     pub(crate) fn wake(&mut self) {
-        if let Some(rest) = &mut self.rest {
+        if let Some(rest) = &mut self.sleep {
             rest.wake();
         }
     }
@@ -457,7 +457,7 @@ impl Island {
         frame: u64,
         keeping_residuals: bool,
     ) -> Result<StepReport, Error> {
-        let moved = self.rest.is_some() && self.is_moved(frame);
+        let moved = self.sleep.is_some() && self.is_moved(frame);
         if moved {
             self.wake();
         }
@@ -479,12 +479,12 @@ impl Island {
             .step(schedule, settings, keeping_residuals)?;
         self.judge_step();
         collider::advance(&mut self.settings);
-        self.hand.arrive();
+        self.grabs.arrive();
         for attachment in &mut self.attachments {
             attachment.arrive();
         }
         let time = self.settings.time_step;
-        if let Some(rest) = self.rest.as_mut().filter(|_| !moved) {
+        if let Some(rest) = self.sleep.as_mut().filter(|_| !moved) {
             let state = self.solver.backend_mut().state(None, &[Quantity::Speed])?;
             let falls_asleep = |speed| rest.count(speed, time);
             if state.max_speed.is_some_and(falls_asleep) {
@@ -638,7 +638,7 @@ impl Island {
                 .attachments
                 .iter()
                 .any(|attachment| attachment.moves(frame))
-            || self.hand.moves()
+            || self.grabs.moves()
     }
 
     /// The nearest particle to a point within a radius that can be held, and its squared distance.
@@ -685,20 +685,20 @@ impl Island {
         let piece = self.piece_of(nearest);
         let near = self.holdable(point, radius).map(|(_, p)| p);
         let particles: Vec<usize> = near.filter(|&p| self.piece_of(p) == piece).collect();
-        let Self { hand, solver, .. } = self;
-        let grab = hand.take(number, solver, &particles, point, compliance)?;
+        let Self { grabs, solver, .. } = self;
+        let grab = grabs.take(number, solver, &particles, point, compliance)?;
         self.wake();
         Ok(grab)
     }
 
     /// Sets the target of a grab for the end of the next frame; returns whether the grab exists.
     pub(crate) fn move_grab(&mut self, grab: Grab, to: DVec3) -> bool {
-        self.hand.move_to(&mut self.solver, grab, to)
+        self.grabs.move_to(&mut self.solver, grab, to)
     }
 
     /// Releases the particles of a grab and wakes the island; returns whether the grab exists.
     pub(crate) fn release(&mut self, grab: Grab) -> Result<bool, Error> {
-        let is_held = self.hand.release(&mut self.solver, grab)?;
+        let is_held = self.grabs.release(&mut self.solver, grab)?;
         if is_held {
             self.wake();
         }
@@ -817,7 +817,7 @@ impl Island {
         }
         self.solver
             .check(&self.cuttable, &self.partition.schedule)?;
-        self.hand.check(&self.solver)?;
+        self.grabs.check(&self.solver)?;
         self.partition.check(mesh)?;
         self.pieces
             .check(&self.cuttable)

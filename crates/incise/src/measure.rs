@@ -168,7 +168,7 @@ pub(crate) fn by_body(islands: &mut [Island], with_kappa: bool) -> Vec<BodyRepor
             substeps: island.settings.substeps,
             method: island.choice.map(|_| ChosenMethod::of(&island.spec)),
             iterations: island.choice.map(|_| island.settings.iterations),
-            asleep: island.rest.map(|rest| rest.asleep()),
+            asleep: island.sleep.map(|sleep| sleep.asleep()),
             choice: island.choice,
             kappa: with_kappa.then(|| island.kappa()),
             kappa_before_cut: cut.and_then(|cut| cut.before),

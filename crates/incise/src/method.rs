@@ -10,7 +10,7 @@ use incise_xpbd::{StepSettings, VbdSettings};
 
 use crate::accuracy::DEFAULT_ACCURACY;
 use crate::scene::{Integrator, Method, SolverSpec, Substeps, TetSolve};
-use crate::substeps::{Choice, Missed};
+use crate::substeps::{Choice, Shortfall};
 use crate::validate::{coordinates, value, within};
 use crate::{Error, Scene, collider};
 
@@ -93,7 +93,7 @@ pub(crate) fn resolve(
     match choice {
         Some(capped)
             if is_open
-                && capped.missed == Some(Missed::Cap)
+                && capped.shortfall == Some(Shortfall::Cap)
                 && capped.expected_error > DEFAULT_ACCURACY =>
         {
             let (own, choice) = with_vbd(spec, capped);

@@ -30,7 +30,7 @@ pub(crate) struct Recluster {
     pending: Option<Pending>,
 }
 
-/// A copy has no thread: a partition in the making is left out, unless [`Recluster::settle`] was called.
+/// A copy has no thread: a partition in the rebuild is left out, unless [`Recluster::settle`] was called.
 impl Clone for Recluster {
     fn clone(&self) -> Self {
         Self {
@@ -46,7 +46,7 @@ impl Clone for Recluster {
 struct Pending {
     /// The frame that takes it.
     due: u64,
-    making: Making,
+    rebuild: Rebuild,
     /// The cuts since.
     deltas: Vec<CutDelta>,
 }
@@ -54,11 +54,11 @@ struct Pending {
 /// A partition, or the thread that makes it.
 #[derive(Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
-enum Making {
-    Made(Box<Partition>),
+enum Rebuild {
+    Done(Box<Partition>),
     // Last, since a variant that is skipped must not shift the numbers of others. A snapshot has none.
     #[cfg_attr(feature = "save", serde(skip))]
-    Thread(JoinHandle<Result<Partition, Error>>),
+    Running(JoinHandle<Result<Partition, Error>>),
 }
 
 impl Recluster {
@@ -69,12 +69,12 @@ impl Recluster {
         }
     }
 
-    /// Replaces the spec. A partition in the making is still taken in the frame that was set before.
+    /// Replaces the spec. A partition that is being rebuilt is still taken in the frame that was set before.
     pub(crate) fn with(self, spec: ReclusterSpec) -> Self {
         Self { spec, ..self }
     }
 
-    /// Notes a cut for the partition in the making.
+    /// Notes a cut for the partition in the rebuild.
     pub(crate) fn note(&mut self, delta: &CutDelta) {
         if let Some(pending) = &mut self.pending {
             pending.deltas.push(delta.clone());
@@ -99,19 +99,19 @@ impl Recluster {
         Ok(true)
     }
 
-    /// Waits for a partition in the making, so that a copy has it, too. It is taken in the same frame as it would be.
+    /// Waits for a partition in the rebuild, so that a copy has it, too. It is taken in the same frame as it would be.
     pub(crate) fn settle(&mut self) -> Result<(), Error> {
         let Some(pending) = self.pending.take() else {
             return Ok(());
         };
         self.pending = Some(Pending {
-            making: Making::Made(Box::new(pending.making.partition()?)),
+            rebuild: Rebuild::Done(Box::new(pending.rebuild.partition()?)),
             ..pending
         });
         Ok(())
     }
 
-    /// Whether a partition is in the making.
+    /// Whether a partition is in the rebuild.
     pub(crate) fn is_pending(&self) -> bool {
         self.pending.is_some()
     }
@@ -137,17 +137,17 @@ impl Pending {
             .map_err(|error| refused(error.to_string()))?;
         Ok(Self {
             due,
-            making: Making::Thread(thread),
+            rebuild: Rebuild::Running(thread),
             deltas: Vec::new(),
         })
     }
 
     fn copy(&self) -> Option<Self> {
-        match &self.making {
-            Making::Thread(_) => None,
-            Making::Made(partition) => Some(Self {
+        match &self.rebuild {
+            Rebuild::Running(_) => None,
+            Rebuild::Done(partition) => Some(Self {
                 due: self.due,
-                making: Making::Made(partition.clone()),
+                rebuild: Rebuild::Done(partition.clone()),
                 deltas: self.deltas.clone(),
             }),
         }
@@ -155,19 +155,19 @@ impl Pending {
 
     /// Waits for the partition and applies the cuts made meanwhile.
     fn finish(self, cuttable: &CuttableMesh) -> Result<Partition, Error> {
-        let mut partition = self.making.partition()?;
+        let mut partition = self.rebuild.partition()?;
         partition.catch_up(&self.deltas, cuttable)?;
         Ok(partition)
     }
 }
 
-impl Making {
+impl Rebuild {
     /// The partition; waits for it.
     fn partition(self) -> Result<Partition, Error> {
         let failed = |_| Error::Inconsistent("clustering in the background failed".into());
         match self {
-            Self::Thread(thread) => thread.join().map_err(failed)?,
-            Self::Made(partition) => Ok(*partition),
+            Self::Running(thread) => thread.join().map_err(failed)?,
+            Self::Done(partition) => Ok(*partition),
         }
     }
 }

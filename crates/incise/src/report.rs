@@ -9,7 +9,7 @@ use incise_xpbd::Softened;
 use serde::Serialize;
 
 use crate::scene::{Method, SolverSpec};
-pub use crate::substeps::{Choice, Missed};
+pub use crate::substeps::{Choice, Shortfall};
 use crate::warning::Warning;
 
 /// Report on a frame: counts, times, and the quantities that the scene requests.

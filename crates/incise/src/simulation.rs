@@ -411,7 +411,7 @@ impl Simulation {
         self.state
             .islands
             .iter()
-            .any(|island| island.rest.is_some())
+            .any(|island| island.sleep.is_some())
     }
 
     /// Removes bodies and cuts what is due, with all that depends on the meshes; adds what comes off to `detached`.

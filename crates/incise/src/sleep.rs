@@ -1,4 +1,4 @@
-//! [`Rest`]: the sleep timer of an island of bodies.
+//! [`SleepState`]: the sleep timer of an island of bodies.
 //!
 //! A body whose fastest particle has stayed below a speed for a time is not solved any more: it keeps its positions bit
 //! for bit, its velocities become zero, and it costs nothing until it is cut or one of its attachments moves. A
@@ -15,14 +15,14 @@ use crate::scene::SleepSpec;
 /// Sleep timer of an island.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Rest {
+pub(crate) struct SleepState {
     spec: SleepSpec,
     /// Time at rest so far in s.
     still: f64,
     asleep: bool,
 }
 
-impl Rest {
+impl SleepState {
     pub(crate) fn new(spec: SleepSpec) -> Self {
         Self {
             spec,
@@ -61,7 +61,7 @@ mod tests {
             speed: 1.0,
             time: 0.5,
         };
-        let mut rest = Rest::new(spec);
+        let mut rest = SleepState::new(spec);
         assert!(!rest.count(1.0, 0.25));
         assert!(!rest.count(1.1, 0.25));
         assert!(!rest.count(0.0, 0.25));

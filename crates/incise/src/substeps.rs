@@ -25,7 +25,7 @@ const SLIVER_KAPPA: f64 = 4.0;
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 #[cfg_attr(feature = "save", derive(serde::Deserialize))]
-pub enum Missed {
+pub enum Shortfall {
     /// More than `max_substeps` are needed.
     Cap,
     /// More are needed than `budget_ms` allows.
@@ -47,7 +47,7 @@ pub struct Choice {
     #[serde(skip)]
     pub substeps: u32,
     /// Reason for a smaller number than `substeps_wanted`, if it is smaller; the cap takes precedence.
-    pub missed: Option<Missed>,
+    pub shortfall: Option<Shortfall>,
     /// Number of tets that were ignored as slivers.
     pub sliver_tets: usize,
     /// Share of the slivers in the volume at rest.
@@ -67,7 +67,7 @@ pub struct Choice {
 pub(crate) mod saved {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-    use super::{Choice, Missed};
+    use super::{Choice, Shortfall};
 
     #[derive(Serialize, Deserialize)]
     #[serde(remote = "Choice")]
@@ -75,7 +75,7 @@ pub(crate) mod saved {
         substeps_wanted: u32,
         substeps_needed: u32,
         substeps: u32,
-        missed: Option<Missed>,
+        shortfall: Option<Shortfall>,
         sliver_tets: usize,
         sliver_volume_fraction: f64,
         expected_error: f64,
@@ -106,7 +106,7 @@ impl Choice {
     pub(crate) fn solved_by_vbd(self, expected_error: f64) -> Self {
         Self {
             substeps: 1,
-            missed: None,
+            shortfall: None,
             sliver_tets: 0,
             sliver_volume_fraction: 0.0,
             expected_error,
@@ -174,10 +174,10 @@ pub(crate) fn evaluate(
         substeps_wanted: wanted,
         substeps_needed: chosen,
         substeps,
-        missed: if chosen > substeps {
-            Some(Missed::Cap)
+        shortfall: if chosen > substeps {
+            Some(Shortfall::Cap)
         } else if wanted > chosen {
-            Some(Missed::Sliver)
+            Some(Shortfall::Sliver)
         } else {
             None
         },
@@ -251,16 +251,22 @@ mod tests {
         // 90 slivers are 0.09 % of the volume, 200 are 0.2 %.
         let few = choice(&body(90), 200);
         assert_eq!((few.substeps, few.substeps_wanted), (4, 40));
-        assert_eq!((few.missed, few.sliver_tets), (Some(Missed::Sliver), 90));
+        assert_eq!(
+            (few.shortfall, few.sliver_tets),
+            (Some(Shortfall::Sliver), 90)
+        );
         assert!((few.sliver_volume_fraction - 0.9 / 1000.9).abs() < 1e-12);
         let many = choice(&body(200), 200);
-        assert_eq!((many.substeps, many.missed), (40, None));
+        assert_eq!((many.substeps, many.shortfall), (40, None));
         // Tets just smaller than the others are no slivers.
         let graded = choice(&[(8.0, 1000.0), (30.0, 0.1)], 200);
-        assert_eq!((graded.substeps, graded.missed), (8, None));
+        assert_eq!((graded.substeps, graded.shortfall), (8, None));
         // The cap is reported before the slivers.
         let capped = choice(&body(90), 3);
-        assert_eq!((capped.substeps, capped.missed), (3, Some(Missed::Cap)));
+        assert_eq!(
+            (capped.substeps, capped.shortfall),
+            (3, Some(Shortfall::Cap))
+        );
         assert!(capped.expected_error > few.expected_error);
         assert_eq!(choice(&[], 200).substeps, 1);
     }
@@ -277,21 +283,21 @@ mod tests {
             let choice = choice(&tets, cap);
             let total: f64 = tets.iter().map(|t| t.1).sum();
             let served = |n: u32| tets.iter().filter(move |t| t.0 / 0.5 <= f64::from(n).powi(2));
-            let missed = |n: u32| total - served(n).map(|t| t.1).sum::<f64>();
+            let shortfall = |n: u32| total - served(n).map(|t| t.1).sum::<f64>();
             prop_assert!(choice.substeps <= cap);
-            if choice.missed == Some(Missed::Cap) {
+            if choice.shortfall == Some(Shortfall::Cap) {
                 prop_assert_eq!(choice.substeps, cap);
                 prop_assert!(served(cap).count() < tets.len());
             } else {
-                prop_assert!(missed(choice.substeps) <= 1.001e-3 * total);
+                prop_assert!(shortfall(choice.substeps) <= 1.001e-3 * total);
                 prop_assert!(tets.len() - served(choice.substeps).count() <= choice.sliver_tets);
                 prop_assert_eq!(
-                    choice.missed.is_none(),
+                    choice.shortfall.is_none(),
                     served(choice.substeps).count() == tets.len()
                 );
             }
             // One fewer would leave a tet behind that is no sliver.
-            if choice.substeps > 1 && choice.missed.is_none() {
+            if choice.substeps > 1 && choice.shortfall.is_none() {
                 prop_assert!(served(choice.substeps - 1).count() < tets.len());
             }
             prop_assert!(choice.substeps_wanted == 1 || served(choice.substeps_wanted - 1).count() < tets.len());

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::accuracy::DEFAULT_ACCURACY;
 use crate::scene::SolverSpec;
-use crate::substeps::{Choice, Missed};
+use crate::substeps::{Choice, Shortfall};
 
 /// The kind of a [`Warning`], written in JSON as `substeps_capped` and so on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
@@ -125,12 +125,12 @@ pub(crate) fn of_substeps(
         choice.substeps,
         100.0 * accuracy
     );
-    let capped = chosen && choice.missed == Some(Missed::Cap);
+    let capped = chosen && choice.shortfall == Some(Shortfall::Cap);
     let (code, fix) = if choice.nearly_incompressible {
         let fix =
             "Poisson's ratio is near 0.5: lower it, or set method = \"vbd\" and two_level = true";
         (WarningCode::NearlyIncompressible, fix)
-    } else if choice.missed == Some(Missed::Budget) {
+    } else if choice.shortfall == Some(Shortfall::Budget) {
         let fix = "raise budget_ms, use fewer tets or a softer material";
         (WarningCode::BudgetTooSmall, fix)
     } else if capped {

@@ -49,7 +49,7 @@ fn the_best_setting_is_measured_and_can_be_pasted_in() {
     assert_eq!(advice["next"], Value::Null);
     assert_eq!(
         rows.iter()
-            .filter(|row| row["of_the_scene"] == true)
+            .filter(|row| row["is_scene_setting"] == true)
             .count(),
         1
     );

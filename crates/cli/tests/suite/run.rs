@@ -148,7 +148,7 @@ fn chosen_substeps_are_in_the_table_and_in_every_line() {
     assert!(table.contains("2 (limited; "), "{table}");
     for frame in frames(&sandbox, "out/frames.jsonl") {
         assert_eq!(frame["bodies"][0]["substeps"], 2);
-        assert_eq!(frame["bodies"][0]["missed"], "cap");
+        assert_eq!(frame["bodies"][0]["shortfall"], "cap");
     }
 }
 

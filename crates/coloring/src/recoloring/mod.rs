@@ -324,7 +324,7 @@ impl Recoloring {
         if sizes == self.sizes && at_particles && self.links.counts_agree(&incidence) {
             Ok(())
         } else {
-            Err(ColoringError::Books)
+            Err(ColoringError::InconsistentCounts)
         }
     }
 
@@ -343,7 +343,7 @@ impl Recoloring {
                         let color = self.coloring.color(vertex as usize);
                         self.taken.take(std::iter::once(particle), color);
                     }
-                    return Err(ColoringError::NotThere { vertex, particle });
+                    return Err(ColoringError::NoSuchPair { vertex, particle });
                 }
             }
         }

@@ -7,9 +7,9 @@
 use incise_graph::Schedule;
 use incise_xpbd::{Changes, Solver};
 
+use super::attachments::Attachments;
 use super::colors::Colors;
 use super::gpu_types::{DispatchRange, NUMBERS, ParticlePatch, TetPatch};
-use super::handles::Handles;
 use super::kernels::{Kernels, Kind, PATCH_PARTICLES, PATCH_TETS, Variant};
 use super::layout::{ClusterMapping, Layout, THREADS};
 use super::scalar_constraints::ScalarConstraints;
@@ -40,7 +40,7 @@ pub(crate) struct Body {
     /// Empty until a step is Jacobi's; all 0 between its iterations.
     pub(crate) corrections: Array<[f32; 4]>,
     /// If something hangs on handles.
-    pub(crate) handles: Option<Handles>,
+    pub(crate) attachments: Option<Attachments>,
     /// If there are such constraints.
     pub(crate) distances: Option<ScalarConstraints>,
     pub(crate) volumes: Option<ScalarConstraints>,
@@ -50,9 +50,9 @@ pub(crate) struct Body {
 }
 
 impl Body {
-    pub(crate) fn new(gpu: &GpuContext, form: ClusterMapping) -> Result<Self, GpuError> {
+    pub(crate) fn new(gpu: &GpuContext, mapping: ClusterMapping) -> Result<Self, GpuError> {
         Ok(Self {
-            layout: Layout::new(form),
+            layout: Layout::new(mapping),
             colors: Colors::new(gpu)?,
             particles: Array::zeros(gpu, "positions", 0)?,
             previous: Array::zeros(gpu, "previous positions", 0)?,
@@ -63,7 +63,7 @@ impl Body {
             tiles: Array::zeros(gpu, "tiles", 0)?,
             multipliers: Array::zeros(gpu, "multipliers", 0)?,
             corrections: Array::zeros(gpu, "corrections", 0)?,
-            handles: None,
+            attachments: None,
             distances: None,
             volumes: None,
             tet_patches: Array::zeros(gpu, "patches of tets", 0)?,
@@ -82,7 +82,7 @@ impl Body {
         changes: &Changes,
     ) -> Result<(), GpuError> {
         self.sync_particles(gpu, kernels, solver, changes)?;
-        Handles::sync(&mut self.handles, gpu, solver, changes)?;
+        Attachments::sync(&mut self.attachments, gpu, solver, changes)?;
         if changes.distances {
             ScalarConstraints::sync(&mut self.distances, gpu, solver, Kind::Distance)?;
         }
@@ -104,7 +104,7 @@ impl Body {
         if various {
             self.constants.resize(gpu, tet_slots)?;
         }
-        if self.layout.form == ClusterMapping::Workgroups {
+        if self.layout.mapping == ClusterMapping::Workgroups {
             let tiles = self.layout.slots.slot_count();
             let room = self.layout.depth();
             let numbers_of_tile = number_count(room);
@@ -215,7 +215,7 @@ impl Body {
         .map(wgpu::Buffer::size)
         .sum();
         let scalars = self.distances.iter().chain(&self.volumes);
-        let handles = self.handles.as_ref().map_or(0, Handles::bytes);
+        let handles = self.attachments.as_ref().map_or(0, Attachments::bytes);
         arrays + handles + scalars.map(ScalarConstraints::bytes).sum::<u64>()
     }
 }

@@ -70,7 +70,7 @@ impl GpuSolver {
         };
         let data = self.host.tet_data(tet);
         let mut corners = copy.corners[tet_slot];
-        if self.form() == ClusterMapping::Workgroups {
+        if self.cluster_mapping() == ClusterMapping::Workgroups {
             let room = self.body.layout.depth();
             let list = tet_slot / room * number_count(room) + 2 + room;
             corners = corners.map(|p| copy.tiles[list + p as usize]);
@@ -124,7 +124,7 @@ impl GpuSolver {
     /// The tet slots of a group that have a tet.
     fn tet_slots(&self, group: u32, copy: &Copy) -> Vec<usize> {
         let group = group as usize;
-        match self.form() {
+        match self.cluster_mapping() {
             ClusterMapping::Threads => {
                 let tet_slots = self.body.layout.depth() * THREADS;
                 let all = group * tet_slots..(group + 1) * tet_slots;
@@ -146,7 +146,7 @@ impl GpuSolver {
 
     /// Looks whether the tets of a step share a particle.
     fn check_steps(&self, copy: &Copy) -> Result<(), GpuError> {
-        if self.form() == ClusterMapping::Threads {
+        if self.cluster_mapping() == ClusterMapping::Threads {
             return Ok(());
         }
         let slots = &self.body.layout.slots;

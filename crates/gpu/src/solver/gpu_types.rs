@@ -19,10 +19,10 @@ pub(crate) struct Settings {
     pub(crate) max_cofactor_norm: f32,
     pub(crate) particles: u32,
     pub(crate) depth: u32,
-    pub(crate) obstacles: u32,
+    pub(crate) colliders: u32,
     pub(crate) handles: u32,
-    pub(crate) held: u32,
-    pub(crate) hanging: u32,
+    pub(crate) rigid: u32,
+    pub(crate) soft: u32,
     pub(crate) material: [f32; 4],
 }
 

@@ -41,7 +41,7 @@ impl Jacobi {
             *this = None;
             return Ok(());
         }
-        if body.layout.form == ClusterMapping::Workgroups {
+        if body.layout.mapping == ClusterMapping::Workgroups {
             return Err(GpuError::Unsupported {
                 what: "Jacobi iterations in workgroups (threads do them)",
             });

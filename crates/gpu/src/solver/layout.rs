@@ -50,7 +50,7 @@ impl ClusterMapping {
 /// The slots of clusters and tets on the device.
 #[derive(Debug)]
 pub(crate) struct Layout {
-    pub(crate) form: ClusterMapping,
+    pub(crate) mapping: ClusterMapping,
     /// Tet slots of a cluster slot.
     depth: usize,
     pub(crate) slots: Slots,
@@ -76,13 +76,13 @@ pub(crate) struct Patch {
 }
 
 impl Layout {
-    pub(crate) fn new(form: ClusterMapping) -> Self {
-        let width = match form {
+    pub(crate) fn new(mapping: ClusterMapping) -> Self {
+        let width = match mapping {
             ClusterMapping::Threads => THREADS,
             ClusterMapping::Workgroups => 1,
         };
         Self {
-            form,
+            mapping,
             depth: 1,
             slots: Slots::new(width),
             filled: Vec::new(),
@@ -108,7 +108,7 @@ impl Layout {
 
     /// Tets that a tile has room for; 0 without tiles.
     pub(crate) fn tile(&self) -> u32 {
-        match self.form {
+        match self.mapping {
             ClusterMapping::Threads => 0,
             ClusterMapping::Workgroups => index(self.depth),
         }
@@ -130,7 +130,7 @@ impl Layout {
     /// Where the `k`-th tet of a slot is.
     fn tet_slot_of(&self, slot: u32, k: usize) -> usize {
         let slot = slot as usize;
-        match self.form {
+        match self.mapping {
             ClusterMapping::Threads => {
                 ((slot / THREADS) * self.depth + k) * THREADS + slot % THREADS
             }
@@ -164,7 +164,7 @@ impl Layout {
                 patch.is_rebuilt = true;
                 let slots: Vec<u32> = (0..index(self.slots.slot_count())).collect();
                 let largest = self.largest(&slots, schedule)?;
-                self.depth = match self.form {
+                self.depth = match self.mapping {
                     ClusterMapping::Threads => largest.max(1),
                     ClusterMapping::Workgroups => tile::room_for(largest),
                 };
@@ -194,7 +194,7 @@ impl Layout {
         let clusters = slots.iter().filter_map(|&slot| self.slots.cluster(slot));
         let sized = clusters.map(|cluster| (schedule.constraints(cluster).len(), cluster));
         let (tets, cluster) = sized.max().unwrap_or((0, ClusterId(0)));
-        if self.form == ClusterMapping::Workgroups && tets > tile::LARGEST {
+        if self.mapping == ClusterMapping::Workgroups && tets > tile::LARGEST {
             self.slots.forget();
             return Err(GpuError::Block {
                 cluster: cluster.0,
@@ -221,7 +221,7 @@ impl Layout {
             let Some(tet_slot) = self.tet_slot(tet as usize) else {
                 continue;
             };
-            let slot = index(match self.form {
+            let slot = index(match self.mapping {
                 ClusterMapping::Threads => {
                     tet_slot / (self.depth * THREADS) * THREADS + tet_slot % THREADS
                 }
@@ -230,7 +230,7 @@ impl Layout {
             if slots[..known].binary_search(&slot).is_ok() {
                 continue;
             }
-            match self.form {
+            match self.mapping {
                 // One that is gone is in no schedule, so its slot is among those.
                 ClusterMapping::Threads => patch.tets.push(filled_in(tet_slot, tet, solver)),
                 ClusterMapping::Workgroups => slots.push(slot),
@@ -261,7 +261,7 @@ impl Layout {
     fn fill(&mut self, slot: u32, schedule: &Schedule, solver: &Solver<f32>, patch: &mut Patch) {
         let cluster = self.slots.cluster(slot);
         let tets = cluster.map_or(&[][..], |cluster| schedule.constraints(cluster));
-        match self.form {
+        match self.mapping {
             ClusterMapping::Threads => {
                 for (k, &tet) in tets.iter().enumerate() {
                     let tet_slot = self.tet_slot_of(slot, k);

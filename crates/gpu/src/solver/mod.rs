@@ -11,18 +11,18 @@
 //! Cost: a dispatch a color and two or three a substep, with damping another one a color, one more for each other thing
 //! in the scene; uploads only of what edits changed and of handles and colliders that move.
 
+mod attachments;
 mod body;
 mod check;
+mod colliders;
 mod colors;
 mod frame;
 mod gpu_types;
-mod handles;
 mod iterations;
 mod jacobi;
 mod kernels;
 mod layout;
 mod measure;
-mod obstacles;
 mod scalar_constraints;
 #[cfg(test)]
 mod shaders;
@@ -121,11 +121,11 @@ impl GpuSolver {
     pub fn new(
         gpu: Arc<GpuContext>,
         mut solver: Solver<f32>,
-        form: ClusterMapping,
+        mapping: ClusterMapping,
     ) -> Result<Self, GpuError> {
         solver.track_changes();
         Ok(Self {
-            body: Body::new(&gpu, form)?,
+            body: Body::new(&gpu, mapping)?,
             frame: Frame::new(&gpu)?,
             repaired: Array::zeros(&gpu, "count of repairs", 1)?,
             known_repaired: 0,
@@ -146,8 +146,8 @@ impl GpuSolver {
 
     /// The unit of the device that solves a cluster.
     #[must_use]
-    pub fn form(&self) -> ClusterMapping {
-        self.body.layout.form
+    pub fn cluster_mapping(&self) -> ClusterMapping {
+        self.body.layout.mapping
     }
 
     /// Advances by one frame of `settings.time_step`; returns when the commands are with the driver, not when they are

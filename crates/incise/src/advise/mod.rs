@@ -41,7 +41,7 @@ const ROUNDS: u32 = 2;
 
 /// Conditions of a search for settings by [`advise`].
 #[derive(Clone, Copy, Debug)]
-pub struct Question {
+pub struct AdviseSettings {
     /// Time budget of a frame in ms, positive.
     pub budget_ms: f64,
     /// Number of measured frames from the scene's start, at least 1.
@@ -64,14 +64,14 @@ pub struct Measured {
     /// Error against the reference.
     pub error: Deviation,
     /// Whether these are the settings of the scene.
-    pub of_the_scene: bool,
+    pub is_scene_setting: bool,
     /// Whether no other settings are both as fast and as accurate.
     pub non_dominated: bool,
 }
 
 /// The reference of an [`Advice`].
 #[derive(Clone, Debug, Serialize)]
-pub struct Against {
+pub struct ReferenceSummary {
     /// Method that computed the reference.
     pub kind: ReferenceKind,
     /// Reason for not using Newton's method.
@@ -87,16 +87,16 @@ pub struct Against {
 /// Result of [`advise`]: measured settings and the recommended ones.
 #[derive(Clone, Debug, Serialize)]
 pub struct Advice {
-    /// Time budget of a frame in ms, from [`Question::budget_ms`].
+    /// Time budget of a frame in ms, from [`AdviseSettings::budget_ms`].
     pub budget_ms: f64,
-    /// Number of measured frames, from [`Question::frames`].
+    /// Number of measured frames, from [`AdviseSettings::frames`].
     pub frames: u32,
     /// Tets of the scene before all cuts.
     pub tets: usize,
     /// Substeps of a frame that bring kappa to 0.5.
     pub accurate_substeps: u32,
     /// The reference that errors are measured against.
-    pub reference: Against,
+    pub reference: ReferenceSummary,
     /// Measured settings by rising time.
     pub measured: Vec<Measured>,
     /// Names of settings that are far too slow for the budget or not possible for the scene.
@@ -138,7 +138,7 @@ pub fn default_frames(scene: &Scene) -> u32 {
 ///
 /// ```
 /// use incise::Scene;
-/// use incise::advise::{Question, advise};
+/// use incise::advise::{AdviseSettings, advise};
 ///
 /// let scene = Scene::from_toml(
 ///     r#"
@@ -149,7 +149,7 @@ pub fn default_frames(scene: &Scene) -> u32 {
 ///     fixed = [{ half_space = { point = [-0.45, 0.0, 0.0], normal = [-1.0, 0.0, 0.0] } }]
 ///     "#,
 /// )?;
-/// let question = Question { budget_ms: 1e3, frames: 2, threads: Some(1) };
+/// let question = AdviseSettings { budget_ms: 1e3, frames: 2, threads: Some(1) };
 /// let advice = advise(&scene, &question)?;
 /// let best = &advice.measured[advice.best.expect("a second is enough")];
 /// println!("{}: {:.2} ms, {:.3} % off\n{}", best.name, best.ms, best.error.largest, best.solver);
@@ -159,8 +159,8 @@ pub fn default_frames(scene: &Scene) -> u32 {
 ///
 /// # Errors
 /// [`Error::Value`] if a value of the question lies outside its range; the errors of [`Simulation::new`] for the scene.
-pub fn advise(scene: &Scene, question: &Question) -> Result<Advice, Error> {
-    let Question {
+pub fn advise(scene: &Scene, question: &AdviseSettings) -> Result<Advice, Error> {
+    let AdviseSettings {
         budget_ms,
         frames,
         threads,
@@ -225,7 +225,7 @@ pub fn advise(scene: &Scene, question: &Question) -> Result<Advice, Error> {
             ms: motion.ms_per_frame(),
             slowest_ms: motion.slowest_ms(),
             error: motion.deviation(&reference.motion),
-            of_the_scene: *i == 0,
+            is_scene_setting: *i == 0,
             non_dominated: false,
         });
     }
@@ -245,7 +245,7 @@ pub fn advise(scene: &Scene, question: &Question) -> Result<Advice, Error> {
         frames,
         tets,
         accurate_substeps: substeps,
-        reference: Against {
+        reference: ReferenceSummary {
             kind: reference.kind,
             why_not_newton: reference.why_not_newton,
             steps: reference.steps,

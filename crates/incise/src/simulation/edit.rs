@@ -163,17 +163,17 @@ impl Simulation {
     /// let scene = Scene::from_toml("[[body]]\nshape = { kind = \"beam\", tets = 300 }")?;
     /// let mut simulation = Simulation::new(&scene)?;
     /// let end = Region::HalfSpace { point: [0.45, 0.0, 0.0], normal: [1.0, 0.0, 0.0] };
-    /// let grip = simulation.add_attachment(&AttachmentSpec::new(0, vec![end]))?;
+    /// let attachment = simulation.add_attachment(&AttachmentSpec::new(0, vec![end]))?;
     /// for frame in 1..=10 {
     ///     let offset = DVec3::Z * 0.01 * f64::from(frame);
-    ///     simulation.move_attachment(grip, offset, DQuat::IDENTITY)?;
+    ///     simulation.move_attachment(attachment, offset, DQuat::IDENTITY)?;
     ///     simulation.step()?;
     /// }
     /// let mesh = simulation.mesh().positions.iter();
     /// let lifted = mesh.zip(simulation.positions()).filter(|(rest, _)| rest.x >= 0.45);
     /// assert!(lifted.clone().count() > 3);
     /// assert!(lifted.clone().all(|(rest, x)| (x.z - rest.z - 0.1).abs() < 1e-6));
-    /// simulation.remove_attachment(grip)?;
+    /// simulation.remove_attachment(attachment)?;
     /// # Ok::<(), incise::Error>(())
     /// ```
     pub fn add_attachment(&mut self, spec: &AttachmentSpec) -> Result<AttachmentHandle, Error> {

@@ -23,7 +23,7 @@ use crate::method::{leaves_open, resolve, settings};
 use crate::partition::{Partition, PartitionSettings};
 use crate::recluster::Recluster;
 use crate::scene::{Method, Precision, ReportSpec, SolverSpec, Substeps};
-use crate::sleep::Rest;
+use crate::sleep::SleepState;
 use crate::substeps::Choice;
 use crate::validate::value;
 use crate::{Error, Scene};
@@ -360,7 +360,7 @@ impl ChangedSolver {
             (Some(spec), Some(old)) if !planned => Some(old.with(spec)),
             (spec, _) => spec.map(Recluster::new),
         };
-        island.rest = spec.sleep.map(Rest::new);
+        island.sleep = spec.sleep.map(SleepState::new);
         island.set_first_substeps(self.settings.substeps);
         island.settings = self.settings;
         island.choice = self.choice;

@@ -32,7 +32,7 @@ const CUTTING: usize = 16 + 32 + 16;
 /// Bytes of a particle there: its position at rest, the head of its list.
 const CUTTING_PARTICLE: usize = 24 + 4;
 /// About the bytes of a tet in clusters, colors and schedule; with clusters of 10 it is 54, with smaller ones more.
-const PLAN: usize = 58;
+const PARTITION: usize = 58;
 /// Bytes of a tet in the lists of pieces.
 const PIECES: usize = 4;
 /// Bytes of a particle's present position.
@@ -111,7 +111,7 @@ impl Island {
         let pending = self.recluster.as_ref().is_some_and(Recluster::is_pending);
         let partitions = 1 + usize::from(pending);
         self.solver.backend().bytes()
-            + tets * (CUTTING + PIECES + partitions * PLAN)
+            + tets * (CUTTING + PIECES + partitions * PARTITION)
             + particles * (CUTTING_PARTICLE + POSITION)
     }
 }

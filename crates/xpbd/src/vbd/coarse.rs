@@ -43,7 +43,7 @@ pub(super) struct Coarse {
     values: Vec<f64>,
     age: Age,
     /// Whether the mesh has changed since the aggregates were grown.
-    worn: bool,
+    outdated: bool,
 }
 
 /// How well the factor still does.
@@ -76,19 +76,19 @@ impl Coarse {
             cholesky: Cholesky::default(),
             values: Vec::new(),
             age: Age::default(),
-            worn: false,
+            outdated: false,
         }
     }
 
     /// Whether the mesh has changed since the aggregates were grown.
-    pub(super) fn is_worn(&self) -> bool {
-        self.worn
+    pub(super) fn is_outdated(&self) -> bool {
+        self.outdated
     }
 
     /// Follows another order of the particles, of which some are new: these join aggregates of their neighbors, with
     /// the mean of their motions. O(blocks).
     pub(super) fn sync<R: Float>(&mut self, old: &[u32], new: &[u32], matrix: &Blocks<R>) {
-        self.worn = true;
+        self.outdated = true;
         let mut before = vec![(NONE, [0.0; VECTORS]); new.len()];
         for ((&p, &a), &weight) in old.iter().zip(&self.of).zip(&self.weights) {
             before[p as usize] = (a, weight);

@@ -255,7 +255,7 @@ impl<R: Float> ImplicitStep<'_, R> {
             *filled = Some((self.time, held.clone()));
         }
         if coarse.is_stale() {
-            if coarse.is_worn() {
+            if coarse.is_outdated() {
                 // The factor grows with the cube of their number, so aggregates grow with the body.
                 let size = settings.aggregate * rows / (*first_rows).max(1);
                 let size = size.max(settings.aggregate);
