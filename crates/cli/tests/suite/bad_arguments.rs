@@ -55,7 +55,11 @@ fn places_that_cannot_be_written() {
         "--animation",
         "animation.gif",
     ];
-    refused_in_a_sentence(&sandbox, &animation, &["20 s a picture", "0.01 s to 10 s"]);
+    refused_in_a_sentence(
+        &sandbox,
+        &animation,
+        &["20 s for each image", "0.01 s to 10 s"],
+    );
     for command in [
         &["color", "tet.vtk", "--csv", "tet.vtk/colors.csv"][..],
         &["color", "tet.vtk", "--csv", "none/colors.csv"],

@@ -126,7 +126,11 @@ fn scenes_with_a_mistake() {
         ("normal = [1.0, 0.1, 0.0]", "", &["scene.toml", "normal"]),
         ("tets = 300", "tets = 0", &["body[0].shape", "0 tets"]),
         ("tets = 300", "tets = -5", &["scene.toml: line 5"]),
-        ("\"box\"", "\"bx\"", &["body[0].shape", "\"bx\"", "box"]),
+        (
+            "\"box\"",
+            "\"bx\"",
+            &["body[0].shape", "did you mean 'box'?"],
+        ),
         (
             "shape = { kind = \"box\", tets = 300 }",
             "mesh = \"none.vtk\"",
