@@ -103,6 +103,8 @@ pub struct CoarseCorrection<R: Float> {
     base: Vec<R::Vector>,
     /// The substep time and held rows that the matrix was filled for, while it may be kept.
     filled: Option<(R, Vec<bool>)>,
+    /// Whether the stars have changed since the last frame.
+    is_cut: bool,
 }
 
 /// The part of the accuracy wanted that conjugate gradients may use up.
@@ -170,6 +172,7 @@ impl<R: Float> CoarseCorrection<R> {
             force: Vec::new(),
             base: Vec::new(),
             filled: None,
+            is_cut: false,
         })
     }
 
@@ -181,6 +184,7 @@ impl<R: Float> CoarseCorrection<R> {
         self.matrix.sync(stars);
         self.coarse.sync(&old, &self.order, &self.matrix);
         self.filled = None;
+        self.is_cut = true;
     }
 
     /// Returns the number of aggregates.
@@ -199,13 +203,15 @@ impl<R: Float> Solver<R> {
         settings: &VbdSettings,
     ) -> Result<VbdReport, XpbdError> {
         let mut idle = 0;
-        self.frame_of_vbd(stars, settings, CORRECTION_PENALTY, |step| {
+        let report = self.frame_of_vbd(stars, settings, CORRECTION_PENALTY, |step| {
             step.sweep();
             let report = step.correct(correction);
             idle = if report.taken > 0.0 { 0 } else { idle + 1 };
             step.error = Some(report.error);
             idle < IDLE_ROUNDS && step.accuracy.is_none_or(|accuracy| report.error > accuracy)
-        })
+        });
+        correction.is_cut = false;
+        report
     }
 }
 
@@ -227,6 +233,7 @@ impl<R: Float> ImplicitStep<'_, R> {
             force,
             base,
             filled,
+            is_cut,
             ..
         } = correction;
         let rows = self.stars.order.len();
@@ -254,7 +261,7 @@ impl<R: Float> ImplicitStep<'_, R> {
             conjugate.prepare(matrix, held);
             *filled = Some((self.time, held.clone()));
         }
-        if coarse.is_stale() {
+        if coarse.is_stale(*is_cut) {
             if coarse.is_outdated() {
                 // The factor grows with the cube of their number, so aggregates grow with the body.
                 let size = settings.aggregate * rows / (*first_rows).max(1);

@@ -8,14 +8,11 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::VertexStars;
 use super::block::{Block, add_cross, add_isotropic, add_outer, apply};
 use super::hessian::held_excess;
+use super::{PARALLEL_ROWS, VertexStars};
 use crate::float::{load, weight};
 use crate::{Float, Solver};
-
-/// Rows a thread takes at a time.
-pub(super) const PARALLEL_ROWS: usize = 512;
 
 /// A symmetric matrix of blocks with the pattern of a mesh.
 #[derive(Clone, Debug)]
@@ -35,6 +32,61 @@ pub(super) struct Blocks<R: Float> {
     pub(super) block_indices: Vec<[u32; 3]>,
     /// The held excess of each tet.
     excess: Vec<R>,
+}
+
+/// The pattern of consecutive rows.
+struct Pattern {
+    columns: Vec<u32>,
+    block_indices: Vec<[u32; 3]>,
+    /// For each row the end of its blocks up to the diagonal, and the end of all its blocks.
+    rows: Vec<[usize; 2]>,
+}
+
+impl Pattern {
+    fn new<R: Float>(stars: &VertexStars<R>, row_of: &[u32], rows: Range<usize>) -> Self {
+        let mut columns = Vec::new();
+        let mut block_indices = Vec::new();
+        let mut ends = Vec::with_capacity(rows.len());
+        // For each column the last row that has a block there, and the index of the block in that row.
+        let mut seen = vec![(u32::MAX, 0u32); row_of.len()];
+        for row in rows {
+            let diagonal = u32::try_from(row).expect("particles are numbered in 32 bits");
+            let first = columns.len();
+            columns.push(diagonal);
+            seen[row].0 = diagonal;
+            let of_tets = stars.of(row).iter().flat_map(|term| term.others);
+            for p in of_tets.chain(stars.constraints.neighbors(row)) {
+                let column = row_of[p as usize];
+                let mark = &mut seen[column as usize].0;
+                if *mark != diagonal {
+                    *mark = diagonal;
+                    columns.push(column);
+                }
+            }
+            let beside = &mut columns[first + 1..];
+            beside.sort_unstable();
+            let below = first + 1 + beside.partition_point(|&column| column < diagonal);
+            for (block, &column) in (1u32..).zip(&*beside) {
+                seen[column as usize].1 = block;
+            }
+            let terms = stars.of(row).iter();
+            block_indices
+                .extend(terms.map(|term| term.others.map(|p| seen[row_of[p as usize] as usize].1)));
+            ends.push([below, columns.len()]);
+        }
+        Self {
+            columns,
+            block_indices,
+            rows: ends,
+        }
+    }
+}
+
+/// Threads that are worth their start for a number of rows, at least 1.
+fn threads_for(rows: usize) -> usize {
+    rayon::current_num_threads()
+        .min(rows.div_ceil(PARALLEL_ROWS))
+        .max(1)
 }
 
 impl<R: Float> Blocks<R> {
@@ -85,31 +137,20 @@ impl<R: Float> Blocks<R> {
         upper.clear();
         columns.clear();
         block_indices.clear();
-        // Which row has seen a column last, and where the column's block is in that row.
-        let mut seen = vec![(u32::MAX, 0u32); rows];
-        for (row, diagonal) in (0..rows).zip(0u32..) {
+        let parts = threads_for(rows);
+        let range = |part| rows * part / parts..rows * (part + 1) / parts;
+        let patterns = (0..parts).into_par_iter();
+        let patterns: Vec<Pattern> = patterns
+            .map(|part| Pattern::new(stars, &row_of, range(part)))
+            .collect();
+        for pattern in patterns {
             let first = columns.len();
-            columns.push(diagonal);
-            seen[row].0 = diagonal;
-            let of_tets = stars.of(row).iter().flat_map(|term| term.others);
-            for p in of_tets.chain(stars.constraints.neighbors(row)) {
-                let column = row_of[p as usize];
-                let mark = &mut seen[column as usize].0;
-                if *mark != diagonal {
-                    *mark = diagonal;
-                    columns.push(column);
-                }
+            columns.extend_from_slice(&pattern.columns);
+            block_indices.extend_from_slice(&pattern.block_indices);
+            for [below, end] in pattern.rows {
+                upper.push(first + below);
+                offsets.push(first + end);
             }
-            let beside = &mut columns[first + 1..];
-            beside.sort_unstable();
-            upper.push(first + 1 + beside.partition_point(|&column| column < diagonal));
-            for (block, &column) in (1u32..).zip(&*beside) {
-                seen[column as usize].1 = block;
-            }
-            let terms = stars.of(row).iter();
-            block_indices
-                .extend(terms.map(|term| term.others.map(|p| seen[row_of[p as usize] as usize].1)));
-            offsets.push(columns.len());
         }
         blocks.clear();
         blocks.resize(columns.len(), [R::Vector::default(); 3]);
@@ -339,9 +380,7 @@ pub(super) fn row_slices<'a, B>(
     mut blocks: &'a mut [B],
 ) -> Vec<(Range<usize>, &'a mut [B])> {
     let rows = offsets.len() - 1;
-    let parts = rayon::current_num_threads()
-        .min(rows.div_ceil(PARALLEL_ROWS))
-        .max(1);
+    let parts = threads_for(rows);
     let mut slices = Vec::with_capacity(parts);
     for part in 0..parts {
         let (start, end) = (rows * part / parts, rows * (part + 1) / parts);

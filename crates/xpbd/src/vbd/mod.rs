@@ -37,6 +37,9 @@ mod step;
 mod sweep;
 mod viscosity;
 
+/// Rows a thread takes at a time.
+const PARALLEL_ROWS: usize = 512;
+
 pub use correction::{CoarseCorrection, CoarseCorrectionReport, CoarseCorrectionSettings};
 pub use settings::{Guess, Integrator, VbdSettings};
 pub use stars::VertexStars;

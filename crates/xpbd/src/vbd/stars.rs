@@ -7,9 +7,11 @@
 //! a sweep from front to back.
 
 use incise_graph::{DisjointSets, GraphError, Incidence, Schedule};
+use rayon::prelude::*;
 
+use super::PARALLEL_ROWS;
 use super::constraints::ConstraintTerms;
-use super::corner_term::CornerTerm;
+use super::corner_term::{CornerTerm, takes_part};
 use super::history::History;
 use super::viscosity::Viscosity;
 use crate::constraints::ScalarConstraint;
@@ -101,21 +103,25 @@ impl<R: Float> VertexStars<R> {
         self.offsets.push(0);
         self.terms.clear();
         self.tets.clear();
-        for p in schedule.order() {
-            for &t in incidence.particles_of(p as usize) {
-                // What comes after the tets are distances and volumes.
-                let Some(tet) = solver.tets.list.get(t as usize) else {
-                    break;
-                };
-                let tet = tet.to_f64();
-                let corner = tet.particles.iter().position(|&corner| corner == p);
-                if let Some(term) = corner.and_then(|corner| CornerTerm::new(&tet, corner)) {
-                    self.terms.push(term);
-                    self.tets.push(t);
-                }
-            }
-            self.offsets.push(self.terms.len());
+        let list = &solver.tets.list;
+        // What comes after the tets are distances and volumes.
+        let tets_of = |p: u32| {
+            let elements = incidence.particles_of(p as usize).iter();
+            elements.map_while(|&t| Some((t, list.get(t as usize)?)))
+        };
+        let mut end = 0;
+        for &p in &self.order {
+            end += tets_of(p).filter(|(_, tet)| takes_part(tet)).count();
+            self.offsets.push(end);
         }
+        let terms = self.order.par_iter().with_min_len(PARALLEL_ROWS);
+        let terms = terms.flat_map_iter(|&p| {
+            tets_of(p).filter_map(move |(t, tet)| {
+                let corner = tet.particles.iter().position(|&corner| corner == p)?;
+                Some((CornerTerm::new(&tet.to_f64(), corner)?, t))
+            })
+        });
+        (&mut self.terms, &mut self.tets).par_extend(terms);
         self.tet_count = solver.tet_count();
         let volume = solver.tets.rest_volumes.iter().sum::<f64>();
         self.size = (6.0 * volume / self.tet_count.max(1) as f64)

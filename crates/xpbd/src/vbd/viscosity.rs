@@ -18,10 +18,11 @@
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
+use super::PARALLEL_ROWS;
 use super::VertexStars;
 use super::block::{add_outer, add_symmetric, apply};
 use super::corner_term::{OTHERS, rows};
-use super::matrix::{Blocks, PARALLEL_ROWS, row_slices};
+use super::matrix::{Blocks, row_slices};
 use crate::float::finite;
 use crate::neo_hookean::TetConstraint;
 use crate::{Float, Solver};
