@@ -46,6 +46,14 @@ pub enum XpbdError {
         /// Its number.
         number: usize,
     },
+    /// Contacts were set and the method does not solve them.
+    #[error(
+        "method {method} does not solve contacts: use colored Gauss-Seidel, or clear the contacts"
+    )]
+    ContactMethod {
+        /// The name of the method.
+        method: &'static str,
+    },
     /// Constraints on particles that do not exist, or a schedule that is not theirs.
     #[error("{what} constraints: {source}")]
     Schedule {

@@ -524,6 +524,9 @@ impl<R: Float> Solver<R> {
     ) -> Result<StepReport, XpbdError> {
         let _span = tracing::debug_span!("xpbd::step").entered();
         settings.check()?;
+        if self.constraints.contacts.is_declared() {
+            settings.method.check_contacts()?;
+        }
         self.update_layout(schedule);
         let unfolded = self.prepare();
         let Self {
@@ -538,6 +541,6 @@ impl<R: Float> Solver<R> {
     }
 }
 
-fn number(index: usize) -> u32 {
+pub(crate) fn number(index: usize) -> u32 {
     u32::try_from(index).expect("particles and tets are numbered by 32 bits")
 }
