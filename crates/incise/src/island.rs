@@ -198,7 +198,7 @@ impl Island {
         let (substeps, choice) = joined.substeps(scene, &solver, &cuttable);
         settings.substeps = substeps;
         let is_open = leaves_open(
-            &scene.solver,
+            scene,
             &joined.substeps,
             &settings,
             compute_device.is_gpu(),

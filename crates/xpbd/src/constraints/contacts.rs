@@ -81,9 +81,10 @@ pub struct ContactState {
     pub against: u32,
     /// How far the vertex is on the wrong side in m; negative if the two are apart.
     pub depth: f64,
-    /// The normal force in N, the mean of the last frame; 0 if the contact did not press.
+    /// The normal force in N, summed up over the substeps since the contacts were set and divided by those of the frame:
+    /// the mean of a frame, or in a frame of several parts the share of the last part. 0 if the contact did not press.
     pub pressure: f64,
-    /// The force in N on the vertex with friction, the mean of the last frame. The other side has its opposite.
+    /// The force in N on the vertex with friction, as `pressure`. The other side has its opposite.
     pub force: DVec3,
 }
 
@@ -632,7 +633,8 @@ impl<R: Float> ConstraintKind<R> for Contacts<R> {
         }
         let count = self.pairs.len() + self.faces.len();
         let nothing = || R::particle([R::ZERO; 4]);
-        if substep.number == 0 {
+        // Those of a part of a frame are forgotten when contacts are set.
+        if substep.number == 0 || self.impulses.len() != count {
             self.impulses.clear();
             self.impulses.resize_with(count, nothing);
             let time = substep.settings.substep_time();

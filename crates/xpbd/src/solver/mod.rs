@@ -10,6 +10,8 @@
 
 mod constraints;
 
+use std::ops::Range;
+
 use glam::DVec3;
 use incise_graph::Schedule;
 
@@ -515,20 +517,32 @@ impl<R: Float> Solver<R> {
         jitter(&self.particles, &self.tets)
     }
 
-    /// One frame of XPBD.
+    /// Some substeps of a frame of XPBD.
     pub(crate) fn frame(
         &mut self,
         schedule: &Schedule,
         settings: &StepSettings,
+        part: Range<u32>,
         keep: bool,
     ) -> Result<StepReport, XpbdError> {
         let _span = tracing::debug_span!("xpbd::step").entered();
         settings.check()?;
+        if part.start > part.end || part.end > settings.substeps {
+            return Err(XpbdError::Setting {
+                what: "end of the part",
+                value: f64::from(part.end),
+                range: "at least its start and at most the substeps",
+            });
+        }
         if self.constraints.contacts.is_declared() {
             settings.method.check_contacts()?;
         }
         self.update_layout(schedule);
-        let unfolded = self.prepare();
+        let unfolded = if part.start == 0 {
+            self.prepare()
+        } else {
+            0
+        };
         let Self {
             particles,
             tets,
@@ -536,7 +550,7 @@ impl<R: Float> Solver<R> {
             stepper,
             ..
         } = self;
-        let repaired = stepper.frame(particles, tets, constraints, settings, keep);
+        let repaired = stepper.frame(particles, tets, constraints, settings, part, keep);
         Ok(StepReport { repaired, unfolded })
     }
 }

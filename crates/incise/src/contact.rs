@@ -1,0 +1,411 @@
+//! [`Contact`]: what of an island touches, found between its substeps and handed to its solver.
+//!
+//! A detector (`incise-contact`) follows the cuts of the island's mesh and lists what may touch in the frame to come:
+//! pairs of particles across fresh cuts, and vertices near triangles. The lists are colored when their particles
+//! change and handed to the solver before the substeps, in which it decides which of them press. In a frame in which
+//! surfaces approach each other by more than the search looks ahead, the frame is divided and contacts are found again.
+//! What pressed is summed up by pairs of pieces after the frame, for forces and for the events of contacts that begin
+//! and end.
+//!
+//! Bodies that may touch are one island, since what touches is solved together.
+//!
+//! Source: `incise-contact` and `incise-xpbd`. Cost: that of a detector, about 40 ns a contact to color when the list
+//! changes, and a pass over the contacts after the frame.
+
+use std::time::Instant;
+
+use glam::DVec3;
+use incise_coloring::{Order, greedy};
+use incise_contact::{BodyPairs, ContactDetector, ContactSettings, ContactState};
+use incise_cutting::{CutDelta, CuttableMesh, PieceTracker};
+use incise_graph::{Coloring, Incidence};
+use incise_mesh::ParticleId;
+use incise_xpbd::{ContactLaw, FaceContact, PairContact};
+
+use crate::backend::{AnySolver, each, each_mut};
+use crate::report::milliseconds;
+use crate::scene::{ContactPairs, ContactSpec};
+use crate::validate::{existing, value, within};
+use crate::{Error, Scene};
+
+/// Pieces that have touched do so until their gap is this part of a mean edge.
+const TOUCHING: f64 = 0.02;
+
+/// The pairs of bodies that contact joins into islands, if all that the scene says about it is in its range.
+pub(crate) fn pairs(scene: &Scene, bodies: usize) -> Result<Vec<[usize; 2]>, Error> {
+    let Some(contact) = &scene.contact else {
+        return Ok(Vec::new());
+    };
+    check(contact)?;
+    match &contact.pairs {
+        ContactPairs::All => Ok((1..bodies).map(|body| [0, body]).collect()),
+        ContactPairs::Only(pairs) => {
+            for (i, pair) in pairs.iter().enumerate() {
+                let field = format!("contact.pairs[{i}]");
+                existing(&field, pair[0], bodies)?;
+                existing(&field, pair[1], bodies)?;
+                if pair[0] == pair[1] {
+                    let range = "a pair of different bodies: self_contact is about one body";
+                    return Err(value(field, format!("{pair:?}"), range));
+                }
+            }
+            Ok(pairs.clone())
+        }
+    }
+}
+
+/// Refuses numbers outside their ranges.
+pub(crate) fn check(contact: &ContactSpec) -> Result<(), Error> {
+    within("contact.friction", contact.friction, 0.0, 1e3)?;
+    within("contact.recovery_time", contact.recovery_time, 0.0, 1e3)?;
+    within("contact.thickness", contact.thickness, 0.0, 1e9)?;
+    Ok(())
+}
+
+/// Two pieces that touched in the last frame, by their numbers in an island or in a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct Touch {
+    /// Ascending.
+    pub(crate) pieces: [u32; 2],
+    /// On the second piece in N, the mean of the frame.
+    pub(crate) force: DVec3,
+    /// The torque of the force about the origin in N·m.
+    pub(crate) torque: DVec3,
+}
+
+/// Counts and depths of the contacts of an island after a frame.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ContactCounts {
+    pub(crate) candidates: usize,
+    pub(crate) active: usize,
+    pub(crate) colors: usize,
+    pub(crate) buried: usize,
+}
+
+/// What of an island touches.
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct Contact {
+    detector: ContactDetector,
+    law: ContactLaw,
+    thickness: f64,
+    pair_colors: Coloring,
+    face_colors: Coloring,
+    /// Ascending by pieces.
+    touches: Vec<Touch>,
+    /// Those of the frame before.
+    #[cfg_attr(feature = "save", serde(skip))]
+    before: Vec<Touch>,
+    /// What the search and the coloring of the last frame took.
+    #[cfg_attr(feature = "save", serde(skip))]
+    pub(crate) milliseconds: f64,
+    #[cfg_attr(feature = "save", serde(skip))]
+    room: Room,
+}
+
+/// Memory that each frame uses again. Nothing in it outlives a frame.
+#[derive(Clone, Debug, Default)]
+struct Room {
+    positions: Vec<DVec3>,
+    velocities: Vec<DVec3>,
+    pairs: Vec<PairContact>,
+    faces: Vec<FaceContact>,
+    /// The touches of the present frame, one a contact.
+    touches: Vec<Touch>,
+}
+
+/// An error of the detector: it comes with wrong input from this crate only, since the scene was checked.
+fn inconsistent(error: incise_contact::ContactError) -> Error {
+    Error::Inconsistent(error.to_string())
+}
+
+fn detector_settings(spec: &ContactSpec) -> ContactSettings {
+    ContactSettings {
+        bodies: match &spec.pairs {
+            ContactPairs::All => BodyPairs::All,
+            ContactPairs::Only(pairs) => {
+                let number = |body: usize| u32::try_from(body).unwrap_or(u32::MAX);
+                BodyPairs::Only(pairs.iter().map(|pair| pair.map(number)).collect())
+            }
+        },
+        self_contact: spec.self_contact,
+        thickness: spec.thickness,
+        ..ContactSettings::default()
+    }
+}
+
+fn law(spec: &ContactSpec) -> ContactLaw {
+    ContactLaw {
+        friction: spec.friction,
+        recovery_time: spec.recovery_time,
+    }
+}
+
+impl Contact {
+    /// Contact of an island that has not moved; `body_of` has the number in the scene of the body of each particle.
+    pub(crate) fn new(
+        spec: &ContactSpec,
+        mesh: &CuttableMesh,
+        body_of: Vec<u32>,
+    ) -> Result<Self, Error> {
+        let detector = ContactDetector::new(mesh, body_of, detector_settings(spec));
+        Ok(Self {
+            detector: detector.map_err(inconsistent)?,
+            law: law(spec),
+            thickness: spec.thickness,
+            pair_colors: Coloring::default(),
+            face_colors: Coloring::default(),
+            touches: Vec::new(),
+            before: Vec::new(),
+            milliseconds: 0.0,
+            room: Room::default(),
+        })
+    }
+
+    /// Takes over other settings from the next frame on.
+    pub(crate) fn set(&mut self, spec: &ContactSpec) -> Result<(), Error> {
+        let settings = detector_settings(spec);
+        self.detector.set_settings(settings).map_err(inconsistent)?;
+        (self.law, self.thickness) = (law(spec), spec.thickness);
+        Ok(())
+    }
+
+    /// Follows a cut or a removal of tets; `mesh` is the one after it.
+    pub(crate) fn apply_delta(&mut self, mesh: &CuttableMesh, delta: &CutDelta) {
+        self.detector.apply_delta(mesh, delta);
+    }
+
+    /// Into how many parts the frame to come is divided.
+    pub(crate) fn begin_frame(&mut self, solver: &AnySolver, time: f64, substeps: u32) -> u32 {
+        let start = Instant::now();
+        self.read(solver);
+        let parts = self.detector.intervals(&self.room.velocities, time);
+        self.room.touches.clear();
+        self.milliseconds = milliseconds(start.elapsed());
+        parts.min(substeps)
+    }
+
+    fn read(&mut self, solver: &AnySolver) {
+        let Room {
+            positions,
+            velocities,
+            ..
+        } = &mut self.room;
+        each!(solver, solver => {
+            solver.positions(positions);
+            velocities.clear();
+            velocities.extend((0..solver.particle_count()).map(|p| solver.velocity(p)));
+        });
+    }
+
+    /// Finds what may touch in the next `time` s, and hands it to the solver.
+    pub(crate) fn update(
+        &mut self,
+        solver: &mut AnySolver,
+        mesh: &CuttableMesh,
+        pieces: &PieceTracker,
+        time: f64,
+    ) -> Result<(), Error> {
+        let start = Instant::now();
+        self.read(solver);
+        let update = self.detector.update(&ContactState {
+            mesh,
+            pieces,
+            positions: &self.room.positions,
+            velocities: &self.room.velocities,
+            frame_time: time,
+        });
+        let particles = self.room.positions.len();
+        let (pairs, faces) = (self.detector.pairs(), self.detector.faces());
+        if update.pairs_changed || pairs.len() != self.pair_colors.vertex_count() {
+            let all = pairs.iter().map(|contact| contact.particles);
+            self.pair_colors = colors(particles, all)?;
+        }
+        if update.faces_changed || faces.len() != self.face_colors.vertex_count() {
+            let all = faces.iter().map(|contact| contact.particles);
+            self.face_colors = colors(particles, all)?;
+        }
+        let (bodies, rest) = (self.detector.body_of(), &mesh.mesh().positions);
+        let thickness = |particles: [u32; 4]| {
+            let [vertex, corner, ..] = particles.map(|p| bodies[p as usize]);
+            if self.thickness > 0.0 && vertex == corner {
+                let [x, a, b, c] = particles.map(|p| rest[p as usize]);
+                self.thickness.min(distance(x, [a, b, c]))
+            } else {
+                self.thickness
+            }
+        };
+        let room = &mut self.room;
+        room.pairs.clear();
+        room.pairs.extend(pairs.iter().map(|contact| PairContact {
+            particles: contact.particles,
+            normal: contact.normal,
+        }));
+        room.faces.clear();
+        room.faces.extend(faces.iter().map(|contact| FaceContact {
+            particles: contact.particles,
+            normal: contact.normal,
+            thickness: thickness(contact.particles),
+        }));
+        each_mut!(solver, solver => {
+            let pairs = (&room.pairs[..], &self.pair_colors);
+            let faces = (&room.faces[..], &self.face_colors);
+            let set = solver.set_contacts(&self.law, pairs, faces);
+            set.map_err(|source| Error::Xpbd { field: "contact".into(), source })?;
+        });
+        self.milliseconds += milliseconds(start.elapsed());
+        Ok(())
+    }
+
+    /// Notes what pressed in the part of the frame that has ended.
+    pub(crate) fn note(&mut self, solver: &AnySolver, mesh: &CuttableMesh, pieces: &PieceTracker) {
+        let piece_of = |particle: u32| {
+            let mut around = mesh.around(ParticleId(particle));
+            around.next().map(|tet| pieces.piece_of(tet))
+        };
+        let (near, touches) = (TOUCHING * self.detector.mean_edge(), &self.touches);
+        let touched = |pieces: &[u32; 2]| touches.binary_search_by_key(pieces, |t| t.pieces).is_ok();
+        let out = &mut self.room.touches;
+        each!(solver, solver => {
+            for contact in solver.contacts() {
+                let presses = contact.pressure > 0.0;
+                if !presses && contact.depth < -near {
+                    continue;
+                }
+                let of = [contact.against, contact.vertex].map(piece_of);
+                let [Some(against), Some(vertex)] = of else { continue };
+                let key = [against.min(vertex), against.max(vertex)];
+                // A piece that touches itself is not an event, and its forces add up to nothing.
+                if against == vertex || !(presses || touched(&key)) {
+                    continue;
+                }
+                let force = if vertex > against { contact.force } else { -contact.force };
+                let point = solver.position(contact.vertex as usize);
+                out.push(Touch { pieces: key, force, torque: point.cross(force) });
+            }
+        });
+    }
+
+    /// Sums up what was noted, by pieces.
+    pub(crate) fn end_frame(&mut self) {
+        std::mem::swap(&mut self.before, &mut self.touches);
+        self.touches.clear();
+        // Stable, so that sums are taken in the order of solving.
+        self.room.touches.sort_by_key(|touch| touch.pieces);
+        for touch in &self.room.touches {
+            match self.touches.last_mut() {
+                Some(last) if last.pieces == touch.pieces => {
+                    last.force += touch.force;
+                    last.torque += touch.torque;
+                }
+                _ => self.touches.push(*touch),
+            }
+        }
+    }
+
+    /// Pieces that touched in the last frame, ascending.
+    pub(crate) fn touches(&self) -> &[Touch] {
+        &self.touches
+    }
+
+    /// The pieces that began to touch in the last frame, and those that ended.
+    pub(crate) fn changes(&self) -> [Vec<[u32; 2]>; 2] {
+        let only = |one: &[Touch], other: &[Touch]| {
+            let of = one.iter().map(|touch| touch.pieces);
+            of.filter(|pieces| other.binary_search_by_key(pieces, |t| t.pieces).is_err())
+                .collect()
+        };
+        [
+            only(&self.touches, &self.before),
+            only(&self.before, &self.touches),
+        ]
+    }
+
+    /// Counts, and appends to `depths` how deep each contact is that pressed or overlaps, in mean edges.
+    pub(crate) fn count(&self, solver: &AnySolver, depths: &mut Vec<f64>) -> ContactCounts {
+        let edge = self.detector.mean_edge();
+        let mut counts = ContactCounts {
+            buried: self.detector.buried(),
+            ..ContactCounts::default()
+        };
+        each!(solver, solver => {
+            counts.colors = solver.contact_color_count();
+            counts.candidates = solver.contact_counts().iter().sum();
+            for contact in solver.contacts() {
+                let presses = contact.pressure > 0.0;
+                counts.active += usize::from(presses);
+                if presses || contact.depth > 0.0 {
+                    depths.push(contact.depth.max(0.0) / edge);
+                }
+            }
+        });
+        counts
+    }
+
+    /// Recomputes what follows from the mesh and compares.
+    pub(crate) fn check(&self, mesh: &CuttableMesh) -> Result<(), Error> {
+        self.detector.check(mesh).map_err(inconsistent)
+    }
+}
+
+/// Colors by first fit in the order of the list, which is that of its keys.
+fn colors<const K: usize>(
+    particles: usize,
+    contacts: impl Iterator<Item = [u32; K]>,
+) -> Result<Coloring, Error> {
+    let incidence = Incidence::from_constraints(particles, contacts)?;
+    Ok(greedy(&incidence, Order::Natural))
+}
+
+/// The distance of a point from a triangle: the point nearest to it is on the face, or else on an edge.
+fn distance(x: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
+    let normal = (b - a).cross(c - a);
+    let ways = [(a, b), (b, c), (c, a)];
+    let is_above = ways
+        .iter()
+        .all(|(a, b)| (*b - *a).cross(x - *a).dot(normal) >= 0.0);
+    if is_above && normal != DVec3::ZERO {
+        return (x - a).dot(normal.normalize()).abs();
+    }
+    let of_edge = |(a, b): (DVec3, DVec3)| {
+        let way = b - a;
+        let square = way.length_squared();
+        let part = if square > 0.0 {
+            ((x - a).dot(way) / square).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        x.distance(a + way * part)
+    };
+    ways.into_iter().map(of_edge).fold(f64::INFINITY, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::dvec3;
+
+    use super::*;
+
+    /// Against the nearest of many points of the triangle, which are at most a hundredth apart.
+    #[test]
+    fn distances_of_points_and_triangles() {
+        let triangle = [dvec3(0.0, 0.0, 0.0), dvec3(1.0, 0.1, 0.0), dvec3(0.2, 0.9, 0.3)];
+        for number in 0..200 {
+            let x = [0, 1, 2].map(|k| ((number * 37 + k * 101) % 83) as f64 / 30.0 - 1.0);
+            let x = DVec3::from_array(x);
+            let mut nearest = f64::INFINITY;
+            for i in 0..=100 {
+                for k in 0..=100 - i {
+                    let [u, v] = [i, k].map(|n| f64::from(n) / 100.0);
+                    let [a, b, c] = triangle;
+                    nearest = nearest.min(x.distance(a + (b - a) * u + (c - a) * v));
+                }
+            }
+            let found = distance(x, triangle);
+            assert!(found <= nearest + 1e-12 && found > nearest - 0.01, "{x}: {found} {nearest}");
+        }
+        assert_eq!(distance(DVec3::Z, [DVec3::ZERO; 3]), 1.0);
+        assert_eq!(distance(DVec3::Z, [DVec3::ZERO, DVec3::X, DVec3::X * 2.0]), 1.0);
+    }
+}
