@@ -1,0 +1,3 @@
+//! Contacts found on generated bodies against slow searches, while they are cut.
+
+#![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
