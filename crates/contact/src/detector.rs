@@ -313,6 +313,10 @@ impl ContactDetector {
         );
         assert_eq!(self.body_of.len(), particles, "all deltas were followed");
 
+        if self.search_is_due {
+            self.vertices.clear();
+            self.vertices.extend(self.surface.vertices().map(|p| p.0));
+        }
         let approach = self.approach(state);
         let margin = approach.min(self.settings.reach * self.mean_edge);
         let skin = self.settings.skin * self.mean_edge;
@@ -398,10 +402,6 @@ impl ContactDetector {
 
     /// Finds all candidates.
     fn search(&mut self, state: &ContactState<'_>) {
-        if self.search_is_due {
-            self.vertices.clear();
-            self.vertices.extend(self.surface.vertices().map(|p| p.0));
-        }
         self.prepare_slots(state);
         self.sync_trees(state);
         self.prepare_bodies(state.positions);

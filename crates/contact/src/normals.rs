@@ -105,7 +105,6 @@ impl<'a> Shape<'a> {
 }
 
 #[cfg(test)]
-#[expect(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 mod tests {
     use incise_cutting::CuttableMesh;
     use incise_mesh::{ParticleId, kuhn_box};

@@ -10,7 +10,8 @@
 //! corner. Only these: the outer skin would tilt the normal at the rim, and where cuts cross, other sides would. The
 //! normal is no difference of positions, so it is well defined at a gap of exactly 0, which each cut starts with.
 //!
-//! Where cuts cross, a particle has several copies; only those that share twins are paired, never all with all. A pair
+//! Where cuts cross, a particle has several copies; only those that share twins are paired, never all with all. A cut
+//! that splits both sides of an earlier one at the same places leaves parts that are twins again. A pair
 //! ends when the sides have slid apart by more than a quarter of an edge, when they fold, or when a later cut took its
 //! faces. It does not come back: from then on the search takes care of both particles. A pair whose sides are further
 //! apart than the search reaches sleeps: it is left out of the list, and is there again when they come close.
@@ -29,6 +30,9 @@ use crate::surface::{ContactSurface, SurfaceChange, is_cut};
 const LARGEST_SLIDE: f64 = 0.25;
 /// A pair ends where `|N_a − N_b|` falls below this fraction of `|N_a| + |N_b|`.
 const FOLDED: f64 = 0.5;
+
+/// Points on the same edge of both sides of a cut are one if their parameters differ by at most this.
+const SAME_PARAMETER: f64 = 0.05;
 
 /// A contact of two particles that were one before a cut: `normal · (x₁ − x₀) ≥ 0`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -145,6 +149,7 @@ impl FreshPairs {
         change: &SurfaceChange,
     ) {
         self.resize(surface);
+        self.split_twins(mesh, surface, delta, change);
         let relinked = |tet: TetId| delta.relinked.binary_search_by_key(&tet, |r| r.tet).is_ok();
         for &(slot, tet, opposite) in &change.removed {
             // A whole tet that hangs on copies keeps its faces, with other corners.
@@ -152,17 +157,10 @@ impl FreshPairs {
             self.replace(mesh, surface, slot, again.flatten(), change.first_added);
         }
         // Faces that were one before the delta have the same corners then.
-        let first_copy = delta.particles_before + delta.points.len();
-        let original = |mut particle: ParticleId| {
-            while let Some(copy) = particle.index().checked_sub(first_copy) {
-                particle = delta.copies[copy];
-            }
-            particle
-        };
         let added = change.first_added..index(surface.slot_count());
         let cut = added.filter(|&slot| is_cut(surface.triangle(slot)));
         let faces = cut.map(|slot| {
-            let mut originals = surface.triangle(slot).particles.map(original);
+            let mut originals = surface.triangle(slot).particles.map(|p| original(delta, p));
             originals.sort_unstable();
             (originals, slot)
         });
@@ -172,19 +170,60 @@ impl FreshPairs {
             let [(_, one), (_, other)] = *same else {
                 continue;
             };
-            let [first, second] =
-                [one, other].map(|slot| surface.triangle(slot).particles.map(original));
+            let [first, second] = [one, other]
+                .map(|slot| surface.triangle(slot).particles.map(|p| original(delta, p)));
             let is_new = [one, other].map(|slot| self.twin_of_slot[slot as usize] == NONE);
-            // Opposite orientation: what comes after a corner in one comes before it in the other.
             let place = |p: ParticleId| second.iter().position(|q| *q == p);
-            let partner = first.map(place);
-            let [Some(a), Some(b), Some(c)] = partner else {
-                continue;
-            };
-            if is_new == [true; 2] && (a + 2) % 3 == b && (b + 2) % 3 == c {
-                let partner = [a, b, c].map(|k| [0, 1, 2][k]);
+            if let Some(partner) = opposite(first.map(place)).filter(|_| is_new == [true; 2]) {
                 self.add_twin(mesh, surface, [one, other], partner);
             }
+        }
+    }
+
+    /// Makes twins of the parts of twins of which a delta split a side or both, where the parts are at the same places.
+    fn split_twins(
+        &mut self,
+        mesh: &CuttableMesh,
+        surface: &ContactSurface,
+        delta: &CutDelta,
+        change: &SurfaceChange,
+    ) {
+        let is_split = |tet: TetId| delta.removed.binary_search_by_key(&tet, |r| r.tet).is_ok();
+        let mut split: Vec<u32> = Vec::new();
+        for &(slot, tet, _) in &change.removed {
+            let twin = self.twin_of_slot[slot as usize];
+            if twin != NONE && is_split(tet) {
+                split.push(twin);
+            }
+        }
+        if split.is_empty() {
+            return;
+        }
+        // From the last on, so that the others keep their places while these are removed.
+        split.sort_unstable_by(|one, other| other.cmp(one));
+        split.dedup();
+        let parts = Parts::new(surface, delta, change);
+        for twin in split {
+            let old = self.twins[twin as usize];
+            let [first, second] = old.slots.map(|slot| *surface.triangle(slot));
+            // The corners of the second in the order of their partners.
+            let partners = old.partner.map(|k| second.particles[usize::from(k)]);
+            let [firsts, seconds] = old.slots.map(|slot| parts.of(surface, delta, slot));
+            for &one in &firsts {
+                let Some(places) = places(surface, delta, one, first.particles) else {
+                    continue;
+                };
+                let found = seconds.iter().find_map(|&other| {
+                    let others = self::places(surface, delta, other, partners)?;
+                    let place = |at: FacePlace| others.iter().position(|o| o.is_same(&at));
+                    opposite(places.map(place)).map(|partner| (other, partner))
+                });
+                if let Some((other, partner)) = found {
+                    self.add_twin(mesh, surface, [one, other], partner);
+                }
+            }
+            // Only now, so that pairs at its corners keep what is known of them.
+            self.remove_twin(twin);
         }
     }
 
@@ -284,16 +323,22 @@ impl FreshPairs {
     }
 
     fn remove_twin(&mut self, twin: u32) {
+        let last = index(self.twins.len() - 1);
         let Twin { slots, pairs, .. } = self.twins.swap_remove(twin as usize);
+        // A slot may belong to a newer twin already.
         for slot in slots {
-            self.twin_of_slot[slot as usize] = NONE;
+            if self.twin_of_slot[slot as usize] == twin {
+                self.twin_of_slot[slot as usize] = NONE;
+            }
         }
         for pair in pairs.into_iter().filter(|&pair| pair != NONE) {
             self.release(pair);
         }
         if let Some(moved) = self.twins.get(twin as usize) {
             for slot in moved.slots {
-                self.twin_of_slot[slot as usize] = twin;
+                if self.twin_of_slot[slot as usize] == last {
+                    self.twin_of_slot[slot as usize] = twin;
+                }
             }
         }
     }
@@ -474,6 +519,125 @@ impl Pair {
     fn is_live(&self) -> bool {
         self.twins > 0 && !self.is_retired
     }
+}
+
+/// What has become of triangles of cuts in a delta.
+struct Parts {
+    /// The new ones by the tet that theirs is a part of, ascending.
+    by_parent: Vec<(TetId, u32)>,
+    first_added: u32,
+}
+
+impl Parts {
+    fn new(surface: &ContactSurface, delta: &CutDelta, change: &SurfaceChange) -> Self {
+        let mut parents: Vec<(TetId, TetId)> =
+            delta.added.iter().map(|a| (a.tet, a.parent)).collect();
+        parents.sort_unstable();
+        let mut by_parent: Vec<(TetId, u32)> = Vec::new();
+        for slot in change.first_added..index(surface.slot_count()) {
+            let triangle = surface.triangle(slot);
+            let parent = parents.binary_search_by_key(&triangle.tet, |p| p.0);
+            if let Some(parent) = parent.ok().filter(|_| is_cut(triangle)) {
+                by_parent.push((parents[parent].1, slot));
+            }
+        }
+        by_parent.sort_unstable();
+        Self {
+            by_parent,
+            first_added: change.first_added,
+        }
+    }
+
+    /// The new slots that may be parts of the triangle that a slot held before the delta: itself if nothing happened to
+    /// it, its tet's face again if that only hangs on copies, else the faces of the tets its own was split into.
+    fn of(&self, surface: &ContactSurface, delta: &CutDelta, slot: u32) -> Vec<u32> {
+        if surface.is_alive(slot) {
+            return vec![slot];
+        }
+        let triangle = surface.triangle(slot);
+        let is_split = delta.removed.binary_search_by_key(&triangle.tet, |r| r.tet);
+        if is_split.is_err() {
+            let again = surface.slot_of(delta.slot_after(triangle.tet), triangle.opposite);
+            return again
+                .filter(|&again| again >= self.first_added)
+                .into_iter()
+                .collect();
+        }
+        let from = self.by_parent.partition_point(|part| part.0 < triangle.tet);
+        let end = self
+            .by_parent
+            .partition_point(|part| part.0 <= triangle.tet);
+        self.by_parent[from..end]
+            .iter()
+            .map(|part| part.1)
+            .collect()
+    }
+}
+
+/// A place on a triangle: a corner, or a point on one of its edges.
+#[derive(Clone, Copy)]
+struct FacePlace {
+    /// The ends of the edge as numbers of corners, the lower one first; twice the same for a corner.
+    ends: [usize; 2],
+    /// Where on the edge.
+    parameter: f64,
+}
+
+impl FacePlace {
+    fn is_same(&self, other: &Self) -> bool {
+        self.ends == other.ends && (self.parameter - other.parameter).abs() <= SAME_PARAMETER
+    }
+}
+
+/// Where the corners of a new triangle lie on one that was split, if it is a part of that.
+fn places(
+    surface: &ContactSurface,
+    delta: &CutDelta,
+    slot: u32,
+    corners: [ParticleId; 3],
+) -> Option<[FacePlace; 3]> {
+    let corner = |p: ParticleId| corners.iter().position(|q| *q == p);
+    let place = |p: ParticleId| {
+        let p = original(delta, p);
+        let Some(point) = p.index().checked_sub(delta.particles_before) else {
+            let corner = corner(p)?;
+            let (ends, parameter) = ([corner; 2], 0.0);
+            return Some(FacePlace { ends, parameter });
+        };
+        let point = &delta.points[point];
+        let [from, to] = point.ends.map(corner);
+        let (from, to) = (from?, to?);
+        Some(if from < to {
+            FacePlace {
+                ends: [from, to],
+                parameter: point.parameter,
+            }
+        } else {
+            FacePlace {
+                ends: [to, from],
+                parameter: 1.0 - point.parameter,
+            }
+        })
+    };
+    let [a, b, c] = surface.triangle(slot).particles.map(place);
+    Some([a?, b?, c?])
+}
+
+/// The particle that a copy made by the delta was made of, or the particle itself.
+fn original(delta: &CutDelta, mut particle: ParticleId) -> ParticleId {
+    let first_copy = delta.particles_before + delta.points.len();
+    while let Some(copy) = particle.index().checked_sub(first_copy) {
+        particle = delta.copies[copy];
+    }
+    particle
+}
+
+/// Which corner of a triangle each corner of another one is, if there is one for each and the two look in opposite
+/// directions: what comes after a corner in one comes before it in the other.
+fn opposite(corners: [Option<usize>; 3]) -> Option<[u8; 3]> {
+    let [a, b, c] = corners;
+    let (a, b, c) = (a?, b?, c?);
+    ((a + 2) % 3 == b && (b + 2) % 3 == c).then(|| [a, b, c].map(|k| [0, 1, 2][k]))
 }
 
 /// The mean edge of a triangle at rest.

@@ -79,7 +79,6 @@ pub(crate) fn walk(
 }
 
 #[cfg(test)]
-#[expect(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 mod tests {
     use incise_mesh::{TetMesh, kuhn_box};
 
