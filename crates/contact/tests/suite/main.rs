@@ -1,0 +1,6 @@
+//! Contacts found on generated bodies against slow searches, while they are cut.
+
+#![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
+
+mod fresh_pairs;
+mod scene;
