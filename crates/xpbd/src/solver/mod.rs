@@ -538,11 +538,7 @@ impl<R: Float> Solver<R> {
             settings.method.check_contacts()?;
         }
         self.update_layout(schedule);
-        let unfolded = if part.start == 0 {
-            self.prepare()
-        } else {
-            0
-        };
+        let unfolded = if part.start == 0 { self.prepare() } else { 0 };
         let Self {
             particles,
             tets,

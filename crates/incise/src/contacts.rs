@@ -1,4 +1,4 @@
-//! [`Contact`]: what of an island touches, found between its substeps and handed to its solver.
+//! [`Contacts`]: what of an island touches, found between its substeps and handed to its solver.
 //!
 //! A detector (`incise-contact`) follows the cuts of the island's mesh and lists what may touch in the frame to come:
 //! pairs of particles across fresh cuts, and vertices near triangles. The lists are colored when their particles
@@ -74,6 +74,14 @@ pub(crate) struct Touch {
     pub(crate) torque: DVec3,
 }
 
+/// Two pieces that began to touch, or ended it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct TouchChange {
+    /// Ascending.
+    pub(crate) pieces: [u32; 2],
+    pub(crate) begins: bool,
+}
+
 /// Counts and depths of the contacts of an island after a frame.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ContactCounts {
@@ -86,7 +94,7 @@ pub(crate) struct ContactCounts {
 /// What of an island touches.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Contact {
+pub(crate) struct Contacts {
     detector: ContactDetector,
     law: ContactLaw,
     thickness: f64,
@@ -97,9 +105,12 @@ pub(crate) struct Contact {
     /// Those of the frame before.
     #[cfg_attr(feature = "save", serde(skip))]
     before: Vec<Touch>,
-    /// What the search and the coloring of the last frame took.
+    /// Pieces that began to touch or ended it in the last frame, until they are asked for.
     #[cfg_attr(feature = "save", serde(skip))]
-    pub(crate) milliseconds: f64,
+    changes: Vec<TouchChange>,
+    /// What the search and the coloring of the last frame took, until it is asked for.
+    #[cfg_attr(feature = "save", serde(skip))]
+    milliseconds: f64,
     #[cfg_attr(feature = "save", serde(skip))]
     room: Room,
 }
@@ -142,7 +153,7 @@ fn law(spec: &ContactSpec) -> ContactLaw {
     }
 }
 
-impl Contact {
+impl Contacts {
     /// Contact of an island that has not moved; `body_of` has the number in the scene of the body of each particle.
     pub(crate) fn new(
         spec: &ContactSpec,
@@ -158,6 +169,7 @@ impl Contact {
             face_colors: Coloring::default(),
             touches: Vec::new(),
             before: Vec::new(),
+            changes: Vec::new(),
             milliseconds: 0.0,
             room: Room::default(),
         })
@@ -265,7 +277,8 @@ impl Contact {
             around.next().map(|tet| pieces.piece_of(tet))
         };
         let (near, touches) = (TOUCHING * self.detector.mean_edge(), &self.touches);
-        let touched = |pieces: &[u32; 2]| touches.binary_search_by_key(pieces, |t| t.pieces).is_ok();
+        let touched =
+            |pieces: &[u32; 2]| touches.binary_search_by_key(pieces, |t| t.pieces).is_ok();
         let out = &mut self.room.touches;
         each!(solver, solver => {
             for contact in solver.contacts() {
@@ -302,6 +315,27 @@ impl Contact {
                 _ => self.touches.push(*touch),
             }
         }
+        let (before, now) = (&self.before, &self.touches);
+        for (these, others, begins) in [(now, before, true), (before, now, false)] {
+            let all = these.iter().map(|touch| touch.pieces);
+            let is_new =
+                |pieces: &[u32; 2]| others.binary_search_by_key(pieces, |t| t.pieces).is_err();
+            let new = all.filter(is_new);
+            self.changes
+                .extend(new.map(|pieces| TouchChange { pieces, begins }));
+        }
+    }
+
+    /// Lets go of all contacts, where there is nothing left that could touch.
+    pub(crate) fn end(&mut self, solver: &mut AnySolver) -> Result<(), Error> {
+        self.room.touches.clear();
+        self.end_frame();
+        (self.pair_colors, self.face_colors) = (Coloring::default(), Coloring::default());
+        let none = Coloring::default();
+        each_mut!(solver, solver => {
+            let set = solver.set_contacts(&self.law, (&[], &none), (&[], &none));
+            set.map_err(|source| Error::Xpbd { field: "contact".into(), source })
+        })
     }
 
     /// Pieces that touched in the last frame, ascending.
@@ -309,17 +343,14 @@ impl Contact {
         &self.touches
     }
 
-    /// The pieces that began to touch in the last frame, and those that ended.
-    pub(crate) fn changes(&self) -> [Vec<[u32; 2]>; 2] {
-        let only = |one: &[Touch], other: &[Touch]| {
-            let of = one.iter().map(|touch| touch.pieces);
-            of.filter(|pieces| other.binary_search_by_key(pieces, |t| t.pieces).is_err())
-                .collect()
-        };
-        [
-            only(&self.touches, &self.before),
-            only(&self.before, &self.touches),
-        ]
+    /// Takes the pieces that began to touch in the last frame, then those that ended it, each ascending.
+    pub(crate) fn take_changes(&mut self) -> Vec<TouchChange> {
+        std::mem::take(&mut self.changes)
+    }
+
+    /// Takes the milliseconds that finding and coloring took in the last frame.
+    pub(crate) fn take_milliseconds(&mut self) -> f64 {
+        std::mem::take(&mut self.milliseconds)
     }
 
     /// Counts, and appends to `depths` how deep each contact is that pressed or overlaps, in mean edges.
@@ -390,7 +421,11 @@ mod tests {
     /// Against the nearest of many points of the triangle, which are at most a hundredth apart.
     #[test]
     fn distances_of_points_and_triangles() {
-        let triangle = [dvec3(0.0, 0.0, 0.0), dvec3(1.0, 0.1, 0.0), dvec3(0.2, 0.9, 0.3)];
+        let triangle = [
+            dvec3(0.0, 0.0, 0.0),
+            dvec3(1.0, 0.1, 0.0),
+            dvec3(0.2, 0.9, 0.3),
+        ];
         for number in 0..200 {
             let x = [0, 1, 2].map(|k| ((number * 37 + k * 101) % 83) as f64 / 30.0 - 1.0);
             let x = DVec3::from_array(x);
@@ -403,9 +438,15 @@ mod tests {
                 }
             }
             let found = distance(x, triangle);
-            assert!(found <= nearest + 1e-12 && found > nearest - 0.01, "{x}: {found} {nearest}");
+            assert!(
+                found <= nearest + 1e-12 && found > nearest - 0.01,
+                "{x}: {found} {nearest}"
+            );
         }
         assert_eq!(distance(DVec3::Z, [DVec3::ZERO; 3]), 1.0);
-        assert_eq!(distance(DVec3::Z, [DVec3::ZERO, DVec3::X, DVec3::X * 2.0]), 1.0);
+        assert_eq!(
+            distance(DVec3::Z, [DVec3::ZERO, DVec3::X, DVec3::X * 2.0]),
+            1.0
+        );
     }
 }
