@@ -11,7 +11,8 @@
 //!
 //! Cost: an update without a search is a pass over the surface vertices, the candidates and the twins; a search is a
 //! refit of the tree and a query for each surface vertex, on all threads; a delta costs what the boundary lost and
-//! gained. The search after a cut builds a tree over the new triangles, and over all of them once these are more than a
+//! gained. The first search also looks for vertices that start inside of other parts, among all tets. The search after a
+//! cut builds a tree over the new triangles, and over all of them once these are more than a
 //! quarter.
 
 use glam::DVec3;
@@ -33,8 +34,6 @@ use crate::walk::Barycentric;
 const FRESH: usize = 4;
 /// Triangles or vertices that are not worth another thread.
 const PARALLEL: usize = 512;
-/// Up to this distance in mean edges a vertex counts as touching an edge or a vertex.
-const TOUCHING: f64 = 0.01;
 /// A candidate whose vertex has moved along its triangle by this in barycentric coordinates is searched for again.
 const SLID: f64 = 0.5;
 /// A candidate whose vertex lies beneath a point this far beyond its triangle is searched for again.
@@ -140,6 +139,9 @@ pub struct ContactDetector {
     reach: f64,
     /// Whether the next update has to search.
     search_is_due: bool,
+    /// Whether the next search has to look for vertices inside of other parts everywhere. Later ones know which they
+    /// are: a vertex gets inside through the outer tets, which the search looks at.
+    location_is_due: bool,
     #[cfg_attr(feature = "serde", serde(skip))]
     room: Room,
 }
@@ -191,6 +193,7 @@ impl ContactDetector {
             searched_at: Vec::new(),
             reach: 0.0,
             search_is_due: true,
+            location_is_due: true,
             room: Room::default(),
         };
         detector.rebuild(mesh, body_of)?;
@@ -222,6 +225,7 @@ impl ContactDetector {
         self.main_slots = 0;
         self.fresh_is_due = true;
         self.search_is_due = true;
+        self.location_is_due = true;
         self.deep.clear();
         self.faces.clear();
         self.sightings.clear();
@@ -435,6 +439,7 @@ impl ContactDetector {
         if slots - self.main_slots > self.main_slots / FRESH {
             let numbers = self.surface.compact(state.mesh);
             self.fresh_pairs.renumber(&self.surface, &numbers);
+            self.mean_edge = self.surface.mean_edge(&state.mesh.mesh().positions);
             self.prepare_slots(state);
             self.main_slots = self.surface.slot_count();
             self.main.build(0..index(self.main_slots), &self.room.boxes);
@@ -488,6 +493,7 @@ impl ContactDetector {
             is_near,
             ..
         } = &mut self.room;
+        let normals = &*normals;
         let query = Query {
             state,
             settings: &self.settings,
@@ -500,14 +506,28 @@ impl ContactDetector {
             pairs: &self.fresh_pairs,
             body_of: &self.body_of,
             reach: self.reach,
-            touching: TOUCHING * self.mean_edge,
+            mean_edge: self.mean_edge,
         };
         // A body touches itself, or its pieces each other, whichever bodies are near.
         let touches_itself = self.settings.self_contact || state.pieces.count() > is_near.len();
-        let (deep, body_of) = (&self.deep, &self.body_of);
+        let is_asked = |vertex: u32| {
+            let body = self.body_of[vertex as usize] as usize;
+            touches_itself || is_near[body]
+        };
+        if self.location_is_due {
+            self.deep.clear();
+            let asked = self.vertices.iter().filter(|&&vertex| is_asked(vertex));
+            let mut asked = asked.map(|&vertex| ParticleId(vertex)).peekable();
+            if asked.peek().is_some() {
+                let tets = tree_of_tets(state);
+                let located = asked.filter_map(|p| Some((p, query.locate(p, &tets)?)));
+                self.deep.extend(located);
+            }
+            self.location_is_due = false;
+        }
+        let deep = &self.deep;
         let ask = |(&vertex, found): (&u32, &mut Found)| {
-            let is_near = is_near[body_of[vertex as usize] as usize];
-            *found = if is_near || touches_itself {
+            *found = if is_asked(vertex) {
                 let vertex = ParticleId(vertex);
                 let was_deep = deep.binary_search_by_key(&vertex, |d| d.0);
                 query.vertex(vertex, was_deep.ok().map(|i| deep[i].1))
@@ -581,7 +601,7 @@ impl ContactDetector {
         self.buried
     }
 
-    /// The mean edge of the surface at rest in m, as it was when the detector was made or rebuilt.
+    /// The mean edge of the surface at rest in m, as it was when the search tree was built over all triangles.
     #[must_use]
     pub fn mean_edge(&self) -> f64 {
         self.mean_edge
@@ -658,6 +678,22 @@ fn prepared(surface: &ContactSurface, state: &ContactState<'_>, slot: u32) -> (B
     }
     let bounds = Bounds::around(corners);
     (Box32::around(&bounds), area / squared.sqrt())
+}
+
+/// A tree over all tets that are not flat or inverted, by their numbers. O(n log n).
+fn tree_of_tets(state: &ContactState<'_>) -> TriangleTree {
+    let tets = state.mesh.mesh().tets.iter();
+    let boxes = tets.map(|corners| {
+        let corners = corners.map(|p| state.positions[p.index()]);
+        match Barycentric::new(corners) {
+            Some(_) => Box32::around(&Bounds::around(corners)),
+            None => Box32::EMPTY,
+        }
+    });
+    let boxes: Vec<Box32> = boxes.collect();
+    let mut tree = TriangleTree::default();
+    tree.build(0..index(boxes.len()), &boxes);
+    tree
 }
 
 /// The barycentric coordinates of the point beneath a vertex in the plane of its triangle; of the first corner where

@@ -31,8 +31,10 @@ use crate::walk::{Barycentric, walk};
 
 /// Sides face each other where the dot product of their unit normals is below this.
 const FACING: f64 = 0.2;
-/// Squared distances that differ by this fraction are the same.
-const SAME: f64 = 1e-12;
+/// Distances that differ by this, in mean edges, are the same.
+const SAME: f64 = 1e-9;
+/// Up to this distance in mean edges a vertex counts as touching an edge or a vertex.
+const TOUCHING: f64 = 0.01;
 /// A vertex counts as inside a tet if all barycentric coordinates are above this: what merely touches is not deep.
 const STRICTLY_INSIDE: f64 = 1e-6;
 /// Outer triangles kept for a vertex: as many as there are directions that can hold it.
@@ -123,6 +125,7 @@ struct Near {
     key: u32,
     slot: u32,
     point: DVec3,
+    part: TrianglePart,
     normal: DVec3,
 }
 
@@ -199,6 +202,12 @@ impl VertexNormals {
     }
 }
 
+/// A dot product of unit vectors rounded to a millionth, so that triangles of one plane face a vertex alike.
+#[expect(clippy::cast_possible_truncation, reason = "within a few millions")]
+fn rounded(facing: f64) -> i64 {
+    (facing * 1e6).round() as i64
+}
+
 /// All that a search needs. Nothing in it changes while vertices are searched for, by as many threads as there are.
 pub(crate) struct Query<'a> {
     pub(crate) state: &'a ContactState<'a>,
@@ -209,8 +218,8 @@ pub(crate) struct Query<'a> {
     pub(crate) body_of: &'a [u32],
     /// How far away a triangle may be in m.
     pub(crate) reach: f64,
-    /// Up to which distance in m a vertex counts as touching an edge or a vertex.
-    pub(crate) touching: f64,
+    /// The mean edge of the surface.
+    pub(crate) mean_edge: f64,
 }
 
 /// A vertex with what is asked often.
@@ -223,21 +232,41 @@ struct Vertex<'q> {
 }
 
 impl Query<'_> {
+    /// The tet of another part that contains a vertex, searched for among all tets of a tree over their numbers.
+    pub(crate) fn locate(&self, id: ParticleId, tets: &TriangleTree) -> Option<TetId> {
+        let normals = VertexNormals::new(&self.shape, id);
+        let vertex = self.vertex_of(id, &normals)?;
+        let wanted = Box32::around(&Bounds::around([vertex.x]));
+        let mut containing: Option<TetId> = None;
+        tets.search(&wanted, |tet, _| {
+            let tet = TetId(tet);
+            if self.may_touch_part(&vertex, tet) && self.is_strictly_inside(tet, &vertex) {
+                containing = Some(containing.map_or(tet, |other| other.min(tet)));
+            }
+        });
+        containing
+    }
+
+    /// `None` for a particle that is no vertex of the surface.
+    fn vertex_of<'q>(&self, id: ParticleId, normals: &'q VertexNormals) -> Option<Vertex<'q>> {
+        let (first, _) = self.shape.surface.corners(id).next()?;
+        Some(Vertex {
+            id,
+            x: self.state.positions[id.index()],
+            body: self.body_of[id.index()],
+            piece: self.state.pieces.piece_of(self.shape.triangle(first).tet),
+            normals,
+        })
+    }
+
     /// What `id` may touch. `was_deep` is the tet that contained it at the last search, if it was deep then.
     pub(crate) fn vertex(&self, id: ParticleId, was_deep: Option<TetId>) -> Found {
         let mut found = Found::NOTHING;
-        let x = self.state.positions[id.index()];
-        let Some((first, _)) = self.shape.surface.corners(id).next() else {
+        let normals = VertexNormals::new(&self.shape, id);
+        let Some(vertex) = self.vertex_of(id, &normals) else {
             return found;
         };
-        let normals = VertexNormals::new(&self.shape, id);
-        let vertex = Vertex {
-            id,
-            x,
-            body: self.body_of[id.index()],
-            piece: self.state.pieces.piece_of(self.shape.triangle(first).tet),
-            normals: &normals,
-        };
+        let x = vertex.x;
         let mut outside = Nearest::<OUTSIDE>::EMPTY;
         let mut inside = Nearest::<TRIES>::EMPTY;
         let mut containing = NONE;
@@ -279,7 +308,14 @@ impl Query<'_> {
         if containing != NONE && !self.is_held_by_pair(&vertex, TetId(containing)) {
             found.deep = containing;
             match self.way_out(TetId(containing), &vertex) {
-                Some(near) => found.push(self.contact(&vertex, &near)),
+                Some(near) => {
+                    let contact = self.contact(&vertex, &near);
+                    // A folded surface may have been found from outside, too.
+                    let same = |known: &FaceContact| known.particles == contact.particles;
+                    if !found.contacts().iter().any(same) {
+                        found.push(contact);
+                    }
+                }
                 None => found.is_buried = true,
             }
         }
@@ -316,20 +352,19 @@ impl Query<'_> {
             return None;
         }
         let key = self.shape.surface.key(slot);
+        let distance = squared.sqrt();
         if part != TrianglePart::Face {
-            for (other, _) in self
-                .shape
-                .around(slot, part)
-                .filter(|(other, _)| *other != slot)
-            {
+            let closer = (distance - SAME * self.mean_edge).max(0.0);
+            let rank = (rounded(facing), key);
+            let around = self.shape.around(slot, part);
+            for (other, _) in around.filter(|(other, _)| *other != slot) {
                 let closest = closest_on_triangle(self.shape.corners(other), x).point;
-                if closest.distance_squared(x) < squared * (1.0 - SAME) {
+                if closest.distance_squared(x) < closer * closer {
                     return None;
                 }
-                let faces = vertex.normals.facing(self.shape.normal(other));
-                if (faces, self.shape.surface.key(other)) < (facing, key)
-                    && self.may_touch(vertex, other)
-                {
+                let facing = vertex.normals.facing(self.shape.normal(other));
+                let other_rank = (rounded(facing), self.shape.surface.key(other));
+                if other_rank < rank && self.may_touch(vertex, other) {
                     return None;
                 }
             }
@@ -340,10 +375,9 @@ impl Query<'_> {
         }
         let side = self.shape.side_normal(slot, part).dot(x - point);
         let is_inside = side < 0.0;
-        let distance = squared.sqrt();
         // Along the way to the closest point. It has no direction where the two touch, and there the triangle's own
         // normal serves: at the rim of a box, a sum over all faces would push aside what stands on it.
-        let normal = if part == TrianglePart::Face || distance <= self.touching {
+        let normal = if part == TrianglePart::Face || distance <= TOUCHING * self.mean_edge {
             face
         } else if is_inside {
             (point - x) / distance
@@ -355,6 +389,7 @@ impl Query<'_> {
             key,
             slot,
             point,
+            part,
             normal,
         };
         Some((near, is_inside))
@@ -376,15 +411,21 @@ impl Query<'_> {
     fn is_shallow(&self, near: &Near, x: DVec3) -> bool {
         let depth = near.normal.dot(near.point - x);
         let twice = near.point - near.normal * (2.0 * depth);
-        self.walk(self.shape.triangle(near.slot).tet, [near.point, twice])
-            .is_some()
+        self.ways(near, twice).next().is_some()
     }
 
     /// Whether a way leads through tets from a triangle to the vertex, and not to its own tets.
     fn is_way(&self, near: &Near, vertex: &Vertex<'_>) -> bool {
-        let tet = self.shape.triangle(near.slot).tet;
-        let end = self.walk(tet, [near.point, vertex.x]);
-        end.is_some_and(|tet| !self.is_own(tet, vertex))
+        let mut ends = self.ways(near, vertex.x);
+        ends.any(|tet| !self.is_own(tet, vertex))
+    }
+
+    /// The ends of the ways from the closest point of a triangle, which start in the tets behind all triangles there:
+    /// from a concave edge, the way may lie on the outer side of one of them.
+    fn ways(&self, near: &Near, to: DVec3) -> impl Iterator<Item = TetId> {
+        let starts = self.shape.around(near.slot, near.part);
+        let segment = [near.point, to];
+        starts.filter_map(move |(slot, _)| self.walk(self.shape.triangle(slot).tet, segment))
     }
 
     fn walk(&self, tet: TetId, segment: [DVec3; 2]) -> Option<TetId> {
@@ -470,12 +511,14 @@ impl Query<'_> {
     /// A triangle that a deep vertex might leave by, and whether it faces it.
     fn deep(&self, vertex: &Vertex<'_>, slot: u32) -> (Near, bool) {
         let normal = self.shape.normal(slot);
-        let point = closest_on_triangle(self.shape.corners(slot), vertex.x).point;
+        let ClosestPoint { point, part, .. } =
+            closest_on_triangle(self.shape.corners(slot), vertex.x);
         let near = Near {
             distance: point.distance(vertex.x),
             key: self.shape.surface.key(slot),
             slot,
             point,
+            part,
             normal,
         };
         let facing = vertex.normals.facing(normal);

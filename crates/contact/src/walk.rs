@@ -1,7 +1,8 @@
 //! The way through a body: from tet to tet along a segment.
 //!
-//! A step leaves a tet by the face that the segment crosses first and goes on in the tet behind that face. Where there
-//! is none, the segment leaves the body. Two sides of a cut are no neighbors, so no way leads across it: this is what
+//! A step leaves a tet by the face that the segment crosses first and goes on in the tet behind that face; where it
+//! passes through an edge or a corner, all faces there are tried. Where there is no tet behind, the segment leaves the
+//! body. Two sides of a cut are no neighbors, so no way leads across it: this is what
 //! tells a true contact from one through a body's own wall.
 //! Source: H. Chen, E. Diaz, C. Yuksel 2023, Shortest Path to Boundary for Self-Intersecting Meshes (the test that a
 //! straight path is valid). Cost: four volumes a step.
@@ -10,8 +11,10 @@ use glam::DVec3;
 use incise_cutting::CuttableMesh;
 use incise_mesh::TetId;
 
-/// Steps after which a walk gives up. Walks are as long as a depth, a few tets.
-const MAX_STEPS: usize = 64;
+/// Tets after which a walk gives up. Walks are as long as a depth, a few tets.
+const MAX_TETS: usize = 64;
+/// Crossings of a segment that differ by this fraction of its length are one.
+const SAME: f64 = 1e-9;
 /// A point counts as inside a tet if no barycentric coordinate is below minus this.
 const INSIDE: f64 = 1e-9;
 
@@ -48,32 +51,51 @@ impl Barycentric {
 pub(crate) fn walk(
     mesh: &CuttableMesh,
     positions: &[DVec3],
-    mut tet: TetId,
+    tet: TetId,
     [from, to]: [DVec3; 2],
 ) -> Option<TetId> {
-    let mut came_from = None;
-    for _ in 0..MAX_STEPS {
+    let mut seen = [tet; MAX_TETS];
+    // The place of a tet in `seen` and where on the segment it is entered.
+    let mut due = [(0, 0.0); MAX_TETS];
+    let (mut known, mut waiting) = (1, 1);
+    while waiting > 0 {
+        waiting -= 1;
+        let (place, entered) = due[waiting];
+        let tet = seen[place];
         let corners = mesh.mesh().tets[tet.index()].map(|p| positions[p.index()]);
-        let barycentric = Barycentric::new(corners)?;
+        let Some(barycentric) = Barycentric::new(corners) else {
+            continue;
+        };
         let (start, end) = (barycentric.of(from), barycentric.of(to));
-        let neighbors = mesh.neighbors(tet);
-        let mut exit: Option<(f64, f64, usize)> = None;
-        for k in 0..4 {
-            let is_entry = neighbors[k].is_some() && neighbors[k] == came_from;
-            if end[k] < -INSIDE && !is_entry {
-                let inside = start[k].max(0.0);
-                let crossing = (inside / (inside - end[k]), end[k], k);
-                if exit.is_none_or(|first| (crossing.0, crossing.1) < (first.0, first.1)) {
-                    exit = Some(crossing);
-                }
+        let crossing = [0, 1, 2, 3].map(|k| {
+            let inside = start[k].max(0.0);
+            let is_crossed = end[k] < -INSIDE;
+            if is_crossed {
+                inside / (inside - end[k])
+            } else {
+                f64::INFINITY
+            }
+        });
+        let left = crossing.into_iter().fold(f64::INFINITY, f64::min);
+        if left == f64::INFINITY {
+            return Some(tet);
+        }
+        if left < entered - SAME {
+            // The segment touches this tet only where it was entered.
+            continue;
+        }
+        // Through an edge or a corner, the segment leaves by any of several faces.
+        for (k, neighbor) in mesh.neighbors(tet).into_iter().enumerate() {
+            let Some(neighbor) = neighbor.filter(|_| crossing[k] <= left + SAME) else {
+                continue;
+            };
+            if known < MAX_TETS && !seen[..known].contains(&neighbor) {
+                seen[known] = neighbor;
+                due[waiting] = (known, left);
+                known += 1;
+                waiting += 1;
             }
         }
-        let Some((_, _, face)) = exit else {
-            // Behind the face it came in by only if the way bends, which straight ones do by rounding.
-            return Some(tet);
-        };
-        came_from = Some(tet);
-        tet = neighbors[face]?;
     }
     None
 }

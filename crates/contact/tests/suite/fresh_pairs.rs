@@ -10,7 +10,7 @@ use incise_cutting::{
 use incise_mesh::{ParticleId, TetId, kuhn_box};
 use proptest::prelude::*;
 
-use crate::scene::{Scene, direction, jittered_box, noise};
+use crate::scene::{Scene, below, direction, jittered_box};
 
 /// Particles of cut faces that coincide at rest, corner by corner, and look in opposite directions.
 fn by_rest_position(mesh: &CuttableMesh) -> BTreeSet<[ParticleId; 2]> {
@@ -188,9 +188,7 @@ fn of_tets_taken_away() {
     assert!(compare(&scene) < before);
     for step in 0..10_u64 {
         let count = scene.body.mesh().tets.len();
-        let tets: Vec<TetId> = (0..8)
-            .map(|i| TetId::new((noise(step, i).abs() * count as f64) as usize % count))
-            .collect();
+        let tets: Vec<TetId> = (0..8).map(|i| TetId::new(below(count, step, i))).collect();
         let delta = remove_tets(&mut scene.body, &tets, 2).unwrap();
         scene.apply(&delta);
         compare(&scene);

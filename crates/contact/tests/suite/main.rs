@@ -2,5 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 
+mod candidates;
 mod fresh_pairs;
+mod oracle;
 mod scene;

@@ -8,13 +8,22 @@ use incise_mesh::{ParticleId, TetId, TetMesh, kuhn_box};
 /// The length of a frame in s.
 pub(crate) const FRAME: f64 = 1.0 / 60.0;
 
-/// A hash of a seed and a number, in -1..1.
-pub(crate) fn noise(seed: u64, number: usize) -> f64 {
+fn hash(seed: u64, number: usize) -> u64 {
     let mut x = seed ^ (number as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     for _ in 0..2 {
         x = (x ^ (x >> 31)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     }
-    (x >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    x >> 11
+}
+
+/// A hash of a seed and a number, in -1..1.
+pub(crate) fn noise(seed: u64, number: usize) -> f64 {
+    hash(seed, number) as f64 / (1_u64 << 52) as f64 - 1.0
+}
+
+/// A hash of a seed and a number below a limit.
+pub(crate) fn below(limit: usize, seed: u64, number: usize) -> usize {
+    usize::try_from(hash(seed, number) % limit as u64).unwrap()
 }
 
 /// A direction from a seed.
