@@ -16,7 +16,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 use incise_coloring::{Order, greedy};
-use incise_contact::{BodyPairs, ContactDetector, ContactSettings, ContactState};
+use incise_contact::{BodyPairs, ContactDetector, ContactSettings, ContactState, ContactSurface};
 use incise_cutting::{CutDelta, CuttableMesh, PieceTracker};
 use incise_graph::{Coloring, Incidence};
 use incise_mesh::ParticleId;
@@ -30,6 +30,8 @@ use crate::{Error, Scene};
 
 /// Pieces that have touched do so until their gap is this part of a mean edge.
 const TOUCHING: f64 = 0.02;
+/// The sine of the angle between two triangles from which the edge between them counts as convex.
+const FLAT: f64 = 1e-3;
 
 /// The pairs of bodies that contact joins into islands, if all that the scene says about it is in its range.
 pub(crate) fn pairs(scene: &Scene, bodies: usize) -> Result<Vec<[usize; 2]>, Error> {
@@ -100,6 +102,8 @@ pub(crate) struct Contacts {
     thickness: f64,
     pair_colors: Coloring,
     face_colors: Coloring,
+    /// The contacts of vertices as the solver takes them, from the last search.
+    faces: Vec<FaceContact>,
     /// Ascending by pieces.
     touches: Vec<Touch>,
     /// Those of the frame before.
@@ -121,7 +125,6 @@ struct Room {
     positions: Vec<DVec3>,
     velocities: Vec<DVec3>,
     pairs: Vec<PairContact>,
-    faces: Vec<FaceContact>,
     /// The touches of the present frame, one a contact.
     touches: Vec<Touch>,
 }
@@ -167,6 +170,7 @@ impl Contacts {
             thickness: spec.thickness,
             pair_colors: Coloring::default(),
             face_colors: Coloring::default(),
+            faces: Vec::new(),
             touches: Vec::new(),
             before: Vec::new(),
             changes: Vec::new(),
@@ -238,31 +242,37 @@ impl Contacts {
             let all = faces.iter().map(|contact| contact.particles);
             self.face_colors = colors(particles, all)?;
         }
-        let (bodies, rest) = (self.detector.body_of(), &mesh.mesh().positions);
-        let thickness = |particles: [u32; 4]| {
-            let [vertex, corner, ..] = particles.map(|p| bodies[p as usize]);
-            if self.thickness > 0.0 && vertex == corner {
-                let [x, a, b, c] = particles.map(|p| rest[p as usize]);
-                self.thickness.min(distance(x, [a, b, c]))
-            } else {
-                self.thickness
-            }
-        };
+        if update.searched || faces.len() != self.faces.len() {
+            let (bodies, rest) = (self.detector.body_of(), &mesh.mesh().positions);
+            let thickness = |particles: [u32; 4]| {
+                let [vertex, corner, ..] = particles.map(|p| bodies[p as usize]);
+                if self.thickness > 0.0 && vertex == corner {
+                    let [x, a, b, c] = particles.map(|p| rest[p as usize]);
+                    self.thickness.min(distance(x, [a, b, c]))
+                } else {
+                    self.thickness
+                }
+            };
+            let (surface, positions) = (self.detector.surface(), &self.room.positions);
+            self.faces.clear();
+            self.faces.extend(faces.iter().map(|contact| {
+                let (particles, beyond) = beyond_edge(surface, positions, contact.particles);
+                FaceContact {
+                    particles,
+                    beyond,
+                    thickness: thickness(particles),
+                }
+            }));
+        }
         let room = &mut self.room;
         room.pairs.clear();
         room.pairs.extend(pairs.iter().map(|contact| PairContact {
             particles: contact.particles,
             normal: contact.normal,
         }));
-        room.faces.clear();
-        room.faces.extend(faces.iter().map(|contact| FaceContact {
-            particles: contact.particles,
-            normal: contact.normal,
-            thickness: thickness(contact.particles),
-        }));
         each_mut!(solver, solver => {
             let pairs = (&room.pairs[..], &self.pair_colors);
-            let faces = (&room.faces[..], &self.face_colors);
+            let faces = (&self.faces[..], &self.face_colors);
             let set = solver.set_contacts(&self.law, pairs, faces);
             set.map_err(|source| Error::Xpbd { field: "contact".into(), source })?;
         });
@@ -331,6 +341,7 @@ impl Contacts {
         self.room.touches.clear();
         self.end_frame();
         (self.pair_colors, self.face_colors) = (Coloring::default(), Coloring::default());
+        self.faces.clear();
         let none = Coloring::default();
         each_mut!(solver, solver => {
             let set = solver.set_contacts(&self.law, (&[], &none), (&[], &none));
@@ -387,6 +398,59 @@ fn colors<const K: usize>(
 ) -> Result<Coloring, Error> {
     let incidence = Incidence::from_constraints(particles, contacts)?;
     Ok(greedy(&incidence, Order::Natural))
+}
+
+/// A vertex and a triangle, turned so that the edge nearest to the vertex runs from the first corner to the second, and,
+/// if that edge is convex, the normal of the surface beyond it in the basis of the triangle.
+fn beyond_edge(
+    surface: &ContactSurface,
+    positions: &[DVec3],
+    contact: [u32; 4],
+) -> ([u32; 4], Option<[f64; 3]>) {
+    let at = |p: u32| positions[p as usize];
+    let [vertex, corners @ ..] = contact;
+    let [a, b, c] = corners.map(at);
+    let area = (b - a).cross(c - a);
+    // Of the edge opposite to each corner: the area of the triangle that it makes with the foot of the vertex.
+    let weight = |k: usize| {
+        let [from, to] = [1, 2].map(|step| at(corners[(k + step) % 3]));
+        (to - from).cross(at(vertex) - from).dot(area)
+    };
+    let weights = [0, 1, 2].map(weight);
+    let opposite = (0..3).fold(0, |least, k| {
+        if weights[k] < weights[least] {
+            k
+        } else {
+            least
+        }
+    });
+    let [p, q, r] = [1, 2, 3].map(|step| corners[(opposite + step) % 3]);
+    let turned = [vertex, p, q, r];
+    let others = surface.fan(ParticleId(p)).filter_map(|triangle| {
+        let numbers = triangle.particles.map(|p| p.0);
+        // Neighbors run along a common edge in opposite directions.
+        let k = (0..3).find(|&k| numbers[k] == q && numbers[(k + 1) % 3] == p)?;
+        Some(at(numbers[(k + 2) % 3]))
+    });
+    let mut others = others;
+    let Some(other) = others.next() else {
+        return (turned, None);
+    };
+    let (x, e1, e2) = (at(p), at(q) - at(p), at(r) - at(p));
+    // Convex: the other triangle bends away from the plane of this one.
+    let height = area.dot(other - x);
+    if !(height < -FLAT * area.length() * (other - x).length()) {
+        return (turned, None);
+    }
+    let normal = (other - x).cross(e1);
+    let Some(normal) = normal.try_normalize() else {
+        return (turned, None);
+    };
+    // In the basis: the part along the area, and the rest by the normal equations of both edges.
+    let square = area.length_squared();
+    let second = e1.cross(normal).dot(area) / square;
+    let first = normal.cross(e2).dot(area) / square;
+    (turned, Some([first, second, normal.dot(area) / square]))
 }
 
 /// The distance of a point from a triangle: the point nearest to it is on the face, or else on an edge.

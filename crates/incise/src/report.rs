@@ -354,7 +354,7 @@ impl ContactReport {
 }
 
 /// The force between two pieces that touch: [`Simulation::contacts`](crate::Simulation::contacts).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ContactForce {
     /// The numbers of the pieces.

@@ -3,7 +3,12 @@
 //! A contact is a linear combination of particles along a normal, `C = n · Σ sₖ xₖ - h ≥ 0` with `Σ sₖ = 0`: a vertex
 //! against the point below it on a triangle, or a particle against its partner on the other side of a fresh cut. The
 //! point on the triangle is found in each solve: the foot of the vertex, kept inside of the triangle with its sides
-//! moved outward by a quarter. The normal of a triangle is given in its own basis, so it turns with the triangle.
+//! moved outward by a quarter.
+//!
+//! Near a convex edge a vertex is outside if it is outside of one of both surfaces that meet there. So a contact may
+//! have a second plane, that of the surface beyond an edge of its triangle, and of both it acts along the one that takes
+//! less to satisfy. With one plane only, or with a normal in between, a vertex of a floor catches the front of a block
+//! that slides over it. The normal of the second plane is given in the basis of the triangle, so it turns with it.
 //!
 //! What the substep adds to the overlap is stopped in full; the overlap that was there at its start is taken back over
 //! a recovery time τ: `C̃ = C - α min(C₀, 0)` with `1 - α = min(1, Δt/τ)`. So an overlap parts at its depth over τ, and
@@ -65,9 +70,10 @@ pub struct PairContact {
 pub struct FaceContact {
     /// The vertex, then the corners of the triangle, counterclockwise seen from outside.
     pub particles: [u32; 4],
-    /// The normal in the triangle's basis: coefficients of the edges `e₁ = x₂ - x₁` and `e₂ = x₃ - x₁` and of
-    /// `e₁ × e₂`. `[0, 0, 1]` is the normal of the triangle.
-    pub normal: [f64; 3],
+    /// Where the edge from the first corner to the second is convex, the outward normal of the surface beyond it: of any
+    /// length but 0, as coefficients of the edges `e₁ = x₂ - x₁` and `e₂ = x₃ - x₁` and of `e₁ × e₂`. A vertex on the
+    /// outer side of that plane through the edge touches nothing.
+    pub beyond: Option<[f64; 3]>,
     /// The distance that is kept in m, at least 0.
     pub thickness: f64,
 }
@@ -121,9 +127,8 @@ fn unit<R: Float>(index: usize, normal: DVec3) -> Result<R::Vector, XpbdError> {
 /// A contact of `K` particles at the present positions.
 struct Gap<R: Float, const K: usize> {
     normal: R::Vector,
-    /// `C` now and at the start of the substep.
-    value: R,
-    before: R,
+    /// `C` without the part of an old overlap that the substep leaves.
+    residual: R,
     /// The gradient at each particle is the normal times this; their sum is 0.
     shares: [R; K],
 }
@@ -131,8 +136,9 @@ struct Gap<R: Float, const K: usize> {
 /// A contact in the solver's precision.
 trait Contact<R: Float, const K: usize>: Copy + Sync {
     fn particles(&self) -> [u32; K];
-    /// From positions now and at the start of the substep; `None` where a triangle has no normal.
-    fn gap(&self, x: [R::Vector; K], previous: [R::Vector; K]) -> Option<Gap<R, K>>;
+    /// From positions now and at the start of the substep and the part of an old overlap that is left; `None` where a
+    /// triangle has no normal.
+    fn gap(&self, x: [R::Vector; K], previous: [R::Vector; K], kept: R) -> Option<Gap<R, K>>;
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -148,7 +154,8 @@ struct Pair<R: Float> {
 #[cfg_attr(feature = "serde", serde(bound = ""))]
 struct Face<R: Float> {
     particles: [u32; 4],
-    normal: [R; 3],
+    /// Zeros where there is none.
+    beyond: [R; 3],
     thickness: R,
 }
 
@@ -163,7 +170,6 @@ impl<R: Float> Pair<R> {
 
 impl<R: Float> Face<R> {
     fn new(index: usize, contact: &FaceContact) -> Result<Self, XpbdError> {
-        let [a, b, c] = contact.normal;
         let refuse = |what, value, range| {
             Err(XpbdError::Constraint {
                 index,
@@ -175,13 +181,17 @@ impl<R: Float> Face<R> {
         if !(contact.thickness.is_finite() && contact.thickness >= 0.0) {
             return refuse("thickness", contact.thickness, "at least 0 and finite");
         }
-        let normal = [a, b, c].map(R::from_f64);
-        if !normal.iter().all(|n| n.is_finite()) || normal == [R::ZERO; 3] {
-            return refuse("normal", DVec3::new(a, b, c).length(), "a direction");
+        let beyond = contact.beyond.map_or([R::ZERO; 3], |n| n.map(R::from_f64));
+        let is_none = beyond == [R::ZERO; 3];
+        if !beyond.iter().all(|n| n.is_finite()) || (contact.beyond.is_some() && is_none) {
+            let length = contact
+                .beyond
+                .map_or(0.0, |n| DVec3::from_array(n).length());
+            return refuse("normal", length, "a direction");
         }
         Ok(Self {
             particles: contact.particles,
-            normal,
+            beyond,
             thickness: R::from_f64(contact.thickness),
         })
     }
@@ -193,11 +203,12 @@ impl<R: Float> Contact<R, 2> for Pair<R> {
     }
 
     #[inline]
-    fn gap(&self, x: [R::Vector; 2], previous: [R::Vector; 2]) -> Option<Gap<R, 2>> {
+    fn gap(&self, x: [R::Vector; 2], previous: [R::Vector; 2], kept: R) -> Option<Gap<R, 2>> {
+        let value = R::dot(self.normal, x[1] - x[0]);
+        let before = R::dot(self.normal, previous[1] - previous[0]);
         Some(Gap {
             normal: self.normal,
-            value: R::dot(self.normal, x[1] - x[0]),
-            before: R::dot(self.normal, previous[1] - previous[0]),
+            residual: new_part(value, before, kept),
             shares: [-R::ONE, R::ONE],
         })
     }
@@ -209,33 +220,60 @@ impl<R: Float> Contact<R, 4> for Face<R> {
     }
 
     #[inline]
-    fn gap(&self, x: [R::Vector; 4], previous: [R::Vector; 4]) -> Option<Gap<R, 4>> {
-        let (e1, e2, r) = (x[2] - x[1], x[3] - x[1], x[0] - x[1]);
+    fn gap(&self, x: [R::Vector; 4], previous: [R::Vector; 4], kept: R) -> Option<Gap<R, 4>> {
+        let basis = |x: [R::Vector; 4]| (x[2] - x[1], x[3] - x[1], x[0] - x[1]);
+        let ((e1, e2, r), old) = (basis(x), basis(previous));
         let area = R::cross(e1, e2);
-        let [a, b, c] = self.normal;
-        let normal = if a == R::ZERO && b == R::ZERO {
-            area * c
-        } else {
-            e1 * a + e2 * b + area * c
-        };
-        let (_, normal) = direction::<R>(normal)?;
-        // The triangle scaled to a size of one, since squares of areas leave the range of single precision.
-        let (size, _) = direction::<R>(area)?;
-        let scaled = area * (R::ONE / size);
+        // The normal, scaled by hand: squares of areas leave the range of single precision.
+        let (size, normal) = direction::<R>(area)?;
         let [second, third] = inside(
-            R::dot(R::cross(r, e2), scaled) / size,
-            R::dot(R::cross(e1, r), scaled) / size,
+            R::dot(R::cross(r, e2), normal) / size,
+            R::dot(R::cross(e1, r), normal) / size,
         )?;
-        let above = |r: R::Vector, e1: R::Vector, e2: R::Vector| {
-            R::dot(normal, r - e1 * second - e2 * third) - self.thickness
+        let residual = |normal: R::Vector, [second, third]: [R; 2]| {
+            let above = |(e1, e2, r): (R::Vector, R::Vector, R::Vector)| {
+                R::dot(normal, r - e1 * second - e2 * third) - self.thickness
+            };
+            new_part(above((e1, e2, r)), above(old), kept)
         };
-        let p = previous;
-        Some(Gap {
+        let mut gap = Gap {
             normal,
-            value: above(r, e1, e2),
-            before: above(p[0] - p[1], p[2] - p[1], p[3] - p[1]),
+            residual: residual(normal, [second, third]),
             shares: [R::ONE, second + third - R::ONE, -second, -third],
-        })
+        };
+        let [a, b, c] = self.beyond;
+        if gap.residual >= R::ZERO || self.beyond == [R::ZERO; 3] {
+            return Some(gap);
+        }
+        let Some((_, normal)) = direction::<R>(e1 * a + e2 * b + area * c) else {
+            return Some(gap);
+        };
+        let Some((length, along)) = direction::<R>(e1) else {
+            return Some(gap);
+        };
+        let (low, high) = (R::from_f64(-MARGIN), R::from_f64(1.0 + MARGIN));
+        let part = R::dot(r, along) / length;
+        let part = if part < low { low } else { part };
+        let part = if part > high { high } else { part };
+        let beyond = residual(normal, [part, R::ZERO]);
+        if beyond > gap.residual {
+            gap = Gap {
+                normal,
+                residual: beyond,
+                shares: [R::ONE, part - R::ONE, -part, R::ZERO],
+            };
+        }
+        Some(gap)
+    }
+}
+
+/// What is left of `C` without the part of an old overlap that the substep leaves.
+#[inline]
+fn new_part<R: Float>(value: R, before: R, kept: R) -> R {
+    if before < R::ZERO {
+        value - kept * before
+    } else {
+        value
     }
 }
 
@@ -477,7 +515,8 @@ impl<R: Float> Contacts<R> {
         [vertex, against]: [u32; 2],
     ) -> ContactState {
         let x = contact.particles().map(|p| particles.vector(p as usize));
-        let depth = contact.gap(x, x).map_or(0.0, |gap| -gap.value.to_f64());
+        let gap = contact.gap(x, x, R::ZERO);
+        let depth = gap.map_or(0.0, |gap| -gap.residual.to_f64());
         let [x, y, z, normal] = self
             .impulses
             .get(index)
@@ -504,15 +543,10 @@ impl<R: Float> Contacts<R> {
         let cells = numbers.map(|p| &particles.cells[p as usize]);
         let x = cells.map(|cell| load::<R>(cell));
         let previous = numbers.map(|p| particles.previous[p as usize]);
-        let Some(gap) = contact.gap(x, previous) else {
+        let Some(gap) = contact.gap(x, previous, factors.kept) else {
             return;
         };
-        let old = if gap.before < R::ZERO {
-            factors.kept * gap.before
-        } else {
-            R::ZERO
-        };
-        let residual = gap.value - old;
+        let residual = gap.residual;
         let multiplier = self.multipliers.get(index);
         let [hx, hy, hz, before] = multiplier.map_or([R::ZERO; 4], R::read);
         // Apart, and not to be let go of either.
