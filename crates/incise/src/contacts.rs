@@ -28,10 +28,23 @@ use crate::scene::{ContactPairs, ContactSpec};
 use crate::validate::{existing, value, within};
 use crate::{Error, Scene};
 
+/// Bytes of a particle in a detector: its body, the head of its list of triangles, where it was when contacts were searched.
+const PARTICLE: usize = 4 + 4 + 24;
+/// Bytes of a triangle there: corners and tet, its places in the lists of its corners, and its part of the search tree.
+const TRIANGLE: usize = 24 + 24 + 32;
 /// Pieces that have touched do so until their gap is this part of a mean edge.
 const TOUCHING: f64 = 0.02;
 /// The sine of the angle between two triangles from which the edge between them counts as convex.
 const FLAT: f64 = 1e-3;
+/// The cosine between the normals of two triangles below which they face each other, and that above which they do not.
+const FACES: f64 = -0.3;
+const FACES_NOT: f64 = -0.1;
+/// A place in the list of contacts.
+const NO_CONTACT: FaceContact = FaceContact {
+    particles: [0; 4],
+    beyond: None,
+    thickness: 0.0,
+};
 
 /// The pairs of bodies that contact joins into islands, if all that the scene says about it is in its range.
 pub(crate) fn pairs(scene: &Scene, bodies: usize) -> Result<Vec<[usize; 2]>, Error> {
@@ -238,10 +251,6 @@ impl Contacts {
             let all = pairs.iter().map(|contact| contact.particles);
             self.pair_colors = colors(particles, all)?;
         }
-        if update.faces_changed || faces.len() != self.face_colors.vertex_count() {
-            let all = faces.iter().map(|contact| contact.particles);
-            self.face_colors = colors(particles, all)?;
-        }
         if update.searched || faces.len() != self.faces.len() {
             let (bodies, rest) = (self.detector.body_of(), &mesh.mesh().positions);
             let thickness = |particles: [u32; 4]| {
@@ -254,15 +263,21 @@ impl Contacts {
                 }
             };
             let (surface, positions) = (self.detector.surface(), &self.room.positions);
-            self.faces.clear();
-            self.faces.extend(faces.iter().map(|contact| {
-                let (particles, beyond) = beyond_edge(surface, positions, contact.particles);
-                FaceContact {
+            let mut changed = faces.len() != self.face_colors.vertex_count();
+            self.faces.resize(faces.len(), NO_CONTACT);
+            for (contact, out) in faces.iter().zip(&mut self.faces) {
+                let (particles, beyond) = planes(surface, positions, contact.particles);
+                changed |= particles != out.particles;
+                *out = FaceContact {
                     particles,
                     beyond,
                     thickness: thickness(particles),
-                }
-            }));
+                };
+            }
+            if changed {
+                let all = self.faces.iter().map(|contact| contact.particles);
+                self.face_colors = colors(particles, all)?;
+            }
         }
         let room = &mut self.room;
         room.pairs.clear();
@@ -385,6 +400,17 @@ impl Contacts {
         counts
     }
 
+    /// About the bytes of a copy.
+    pub(crate) fn bytes(&self) -> usize {
+        let particles = self.detector.body_of().len();
+        let triangles = self.detector.surface().triangle_count();
+        particles * PARTICLE
+            + triangles * TRIANGLE
+            + size_of_val(&*self.faces)
+            + size_of_val(self.detector.faces())
+            + size_of_val(self.detector.pairs())
+    }
+
     /// Recomputes what follows from the mesh and compares.
     pub(crate) fn check(&self, mesh: &CuttableMesh) -> Result<(), Error> {
         self.detector.check(mesh).map_err(inconsistent)
@@ -402,7 +428,11 @@ fn colors<const K: usize>(
 
 /// A vertex and a triangle, turned so that the edge nearest to the vertex runs from the first corner to the second, and,
 /// if that edge is convex, the normal of the surface beyond it in the basis of the triangle.
-fn beyond_edge(
+///
+/// Of the two surfaces, one that no triangle around the vertex faces cannot be what it meets, if the other one is faced:
+/// at the rim of a cut the vertices of one side meet the cut face of the other side and not its outer surface. Then the
+/// contact is with the other surface alone.
+fn planes(
     surface: &ContactSurface,
     positions: &[DVec3],
     contact: [u32; 4],
@@ -417,35 +447,51 @@ fn beyond_edge(
         (to - from).cross(at(vertex) - from).dot(area)
     };
     let weights = [0, 1, 2].map(weight);
-    let opposite = (0..3).fold(0, |least, k| {
+    let least = |least: usize, k: usize| {
         if weights[k] < weights[least] {
             k
         } else {
             least
         }
-    });
+    };
+    let opposite = (1..3).fold(0, least);
     let [p, q, r] = [1, 2, 3].map(|step| corners[(opposite + step) % 3]);
     let turned = [vertex, p, q, r];
-    let others = surface.fan(ParticleId(p)).filter_map(|triangle| {
+    let mut others = surface.fan(ParticleId(p)).filter_map(|triangle| {
         let numbers = triangle.particles.map(|p| p.0);
         // Neighbors run along a common edge in opposite directions.
         let k = (0..3).find(|&k| numbers[k] == q && numbers[(k + 1) % 3] == p)?;
-        Some(at(numbers[(k + 2) % 3]))
+        Some(numbers[(k + 2) % 3])
     });
-    let mut others = others;
     let Some(other) = others.next() else {
         return (turned, None);
     };
     let (x, e1, e2) = (at(p), at(q) - at(p), at(r) - at(p));
+    let way = at(other) - x;
     // Convex: the other triangle bends away from the plane of this one.
-    let height = area.dot(other - x);
-    if !(height < -FLAT * area.length() * (other - x).length()) {
-        return (turned, None);
-    }
-    let normal = (other - x).cross(e1);
-    let Some(normal) = normal.try_normalize() else {
+    let is_convex = area.dot(way) < -FLAT * area.length() * way.length();
+    let normals = [area.try_normalize(), way.cross(e1).try_normalize()];
+    let [Some(own), Some(normal)] = normals else {
         return (turned, None);
     };
+    if !is_convex {
+        return (turned, None);
+    }
+    let around = surface.fan(ParticleId(vertex)).filter_map(|triangle| {
+        let [a, b, c] = triangle.particles.map(|p| positions[p.index()]);
+        (b - a).cross(c - a).try_normalize()
+    });
+    let (mut to_own, mut to_other) = (1.0_f64, 1.0_f64);
+    for around in around {
+        to_own = to_own.min(around.dot(own));
+        to_other = to_other.min(around.dot(normal));
+    }
+    if to_own < FACES && to_other > FACES_NOT {
+        return (turned, None);
+    }
+    if to_other < FACES && to_own > FACES_NOT && other != vertex {
+        return ([vertex, q, p, other], None);
+    }
     // In the basis: the part along the area, and the rest by the normal equations of both edges.
     let square = area.length_squared();
     let second = e1.cross(normal).dot(area) / square;

@@ -74,6 +74,7 @@ pub struct Scene {
     pub body: Vec<BodySpec>,
     /// Contact of what is made of tets; absent: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("optional" = true))]
     pub contact: Option<ContactSpec>,
     /// Obstacles.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
