@@ -5,4 +5,5 @@
 mod candidates;
 mod fresh_pairs;
 mod oracle;
+mod scenarios;
 mod scene;
