@@ -16,7 +16,7 @@
 //! quarter.
 
 use glam::DVec3;
-use incise_cutting::{CutDelta, CuttableMesh, PieceTracker};
+use incise_cutting::{CutDelta, CuttableMesh};
 use incise_mesh::{Bounds, ParticleId, TetId};
 use rayon::prelude::*;
 
@@ -26,6 +26,7 @@ use crate::normals::Shape;
 use crate::pairs::{FreshPairs, PairContact};
 use crate::query::{FaceContact, Found, Query};
 use crate::settings::ContactSettings;
+use crate::state::ContactState;
 use crate::surface::{ContactSurface, SurfaceChange};
 use crate::tree::{Box32, TriangleTree};
 use crate::walk::Barycentric;
@@ -40,21 +41,6 @@ const SLID: f64 = 0.5;
 const DEEPER: f64 = 0.25;
 /// A candidate whose vertex lies beneath a point this far beyond its triangle is searched for again.
 const BEYOND: f64 = 0.25;
-
-/// What the detector looks at.
-#[derive(Clone, Copy, Debug)]
-pub struct ContactState<'a> {
-    /// The bodies that are solved together as one mesh, with all cuts made so far.
-    pub mesh: &'a CuttableMesh,
-    /// The pieces of that mesh.
-    pub pieces: &'a PieceTracker,
-    /// The present positions of the particles in m, finite.
-    pub positions: &'a [DVec3],
-    /// Their velocities in m/s.
-    pub velocities: &'a [DVec3],
-    /// How long the list will be used: the time of a frame in s, or of a part of it.
-    pub frame_time: f64,
-}
 
 /// What an update changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

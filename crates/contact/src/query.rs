@@ -21,11 +21,11 @@ use glam::DVec3;
 use incise_cutting::FaceTag;
 use incise_mesh::{Bounds, ClosestPoint, ParticleId, TetId, TrianglePart, closest_on_triangle};
 
-use crate::detector::ContactState;
 use crate::index::NONE;
 use crate::normals::Shape;
 use crate::pairs::FreshPairs;
 use crate::settings::ContactSettings;
+use crate::state::ContactState;
 use crate::tree::{Box32, TriangleTree};
 use crate::walk::{Barycentric, walk};
 
