@@ -16,7 +16,7 @@
 //! quarter.
 
 use glam::DVec3;
-use incise_cutting::{CutDelta, CuttableMesh, PieceTracker};
+use incise_cutting::{CutDelta, CuttableMesh};
 use incise_mesh::{Bounds, ParticleId, TetId};
 use rayon::prelude::*;
 
@@ -26,6 +26,7 @@ use crate::normals::Shape;
 use crate::pairs::{FreshPairs, PairContact};
 use crate::query::{FaceContact, Found, Query};
 use crate::settings::ContactSettings;
+use crate::state::ContactState;
 use crate::surface::{ContactSurface, SurfaceChange};
 use crate::tree::{Box32, TriangleTree};
 use crate::walk::Barycentric;
@@ -36,23 +37,10 @@ const FRESH: usize = 4;
 const PARALLEL: usize = 512;
 /// A candidate whose vertex has moved along its triangle by this in barycentric coordinates is searched for again.
 const SLID: f64 = 0.5;
+/// A vertex inside that has gone deeper by this fraction of the reach is searched for again, before it gets out of reach.
+const DEEPER: f64 = 0.25;
 /// A candidate whose vertex lies beneath a point this far beyond its triangle is searched for again.
 const BEYOND: f64 = 0.25;
-
-/// What the detector looks at.
-#[derive(Clone, Copy, Debug)]
-pub struct ContactState<'a> {
-    /// The bodies that are solved together as one mesh, with all cuts made so far.
-    pub mesh: &'a CuttableMesh,
-    /// The pieces of that mesh.
-    pub pieces: &'a PieceTracker,
-    /// The present positions of the particles in m, finite.
-    pub positions: &'a [DVec3],
-    /// Their velocities in m/s.
-    pub velocities: &'a [DVec3],
-    /// How long the list will be used: the time of a frame in s, or of a part of it.
-    pub frame_time: f64,
-}
 
 /// What an update changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -71,6 +59,8 @@ pub struct ContactUpdate {
 struct Sighting {
     /// The barycentric coordinates of the vertex in the plane of the triangle, the second and the third.
     weights: [f64; 2],
+    /// How far apart they were.
+    gap: f64,
 }
 
 /// Finds contacts between bodies, pieces and the sides of cuts.
@@ -129,7 +119,8 @@ pub struct ContactDetector {
     faces: Vec<FaceContact>,
     sightings: Vec<Sighting>,
     /// The vertices inside another part, ascending, each with the tet that contains it.
-    deep: Vec<(ParticleId, TetId)>,
+    inside: Vec<(ParticleId, TetId)>,
+    deep: usize,
     buried: usize,
     /// The surface vertices, ascending.
     vertices: Vec<u32>,
@@ -154,7 +145,7 @@ struct Room {
     found: Vec<Found>,
     last_faces: Vec<FaceContact>,
     last_pairs: Vec<PairContact>,
-    last_deep: Vec<(ParticleId, TetId)>,
+    last_inside: Vec<(ParticleId, TetId)>,
     /// By body the box around it.
     bodies: Vec<Bounds>,
     /// By body whether the box of another one that it may touch is near.
@@ -187,7 +178,8 @@ impl ContactDetector {
             pairs: Vec::new(),
             faces: Vec::new(),
             sightings: Vec::new(),
-            deep: Vec::new(),
+            inside: Vec::new(),
+            deep: 0,
             buried: 0,
             vertices: Vec::new(),
             searched_at: Vec::new(),
@@ -226,7 +218,7 @@ impl ContactDetector {
         self.fresh_is_due = true;
         self.search_is_due = true;
         self.location_is_due = true;
-        self.deep.clear();
+        self.inside.clear();
         self.faces.clear();
         self.sightings.clear();
         self.pairs.clear();
@@ -265,8 +257,8 @@ impl ContactDetector {
             self.body_of.push(self.body_of[source.index()]);
         }
         let is_deleted = |tet: TetId| delta.deleted.binary_search_by_key(&tet, |d| d.tet).is_ok();
-        self.deep.retain(|(_, tet)| !is_deleted(*tet));
-        for (_, tet) in &mut self.deep {
+        self.inside.retain(|(_, tet)| !is_deleted(*tet));
+        for (_, tet) in &mut self.inside {
             *tet = delta.slot_after(*tet);
         }
         self.fresh_is_due = true;
@@ -288,7 +280,7 @@ impl ContactDetector {
             let moved = delta.moved.binary_search_by_key(&tet, |moved| moved.to);
             moved.map_or(tet, |i| delta.moved[i].from)
         };
-        self.deep.retain_mut(|(particle, tet)| {
+        self.inside.retain_mut(|(particle, tet)| {
             *tet = before(*tet);
             particle.index() < delta.particles_before && tet.index() < delta.tets_before
         });
@@ -381,7 +373,7 @@ impl ContactDetector {
         needed > self.reach || needed.is_nan()
     }
 
-    /// Whether a vertex in contact is about to leave its triangle.
+    /// Whether a vertex in contact is about to leave its triangle or has gone deeper.
     fn has_slid(&self, state: &ContactState<'_>) -> bool {
         let close = 0.5 * self.settings.skin * self.mean_edge + self.settings.thickness;
         let mut candidates = self.faces.iter().zip(&self.sightings);
@@ -400,7 +392,9 @@ impl ContactDetector {
             let is_beyond = beyond(first, 1.0 - before2 - before3)
                 || beyond(second, before2)
                 || beyond(third, before3);
-            (has_slid || is_beyond) && contact.gap(state.positions) < close
+            let gap = contact.gap(state.positions);
+            let is_deeper = gap < 0.0 && gap < sighting.gap - DEEPER * self.reach;
+            is_deeper || (has_slid || is_beyond) && gap < close
         })
     }
 
@@ -515,22 +509,22 @@ impl ContactDetector {
             touches_itself || is_near[body]
         };
         if self.location_is_due {
-            self.deep.clear();
+            self.inside.clear();
             let asked = self.vertices.iter().filter(|&&vertex| is_asked(vertex));
             let mut asked = asked.map(|&vertex| ParticleId(vertex)).peekable();
             if asked.peek().is_some() {
                 let tets = tree_of_tets(state);
                 let located = asked.filter_map(|p| Some((p, query.locate(p, &tets)?)));
-                self.deep.extend(located);
+                self.inside.extend(located);
             }
             self.location_is_due = false;
         }
-        let deep = &self.deep;
+        let inside = &self.inside;
         let ask = |(&vertex, found): (&u32, &mut Found)| {
             *found = if is_asked(vertex) {
                 let vertex = ParticleId(vertex);
-                let was_deep = deep.binary_search_by_key(&vertex, |d| d.0);
-                query.vertex(vertex, was_deep.ok().map(|i| deep[i].1))
+                let was_inside = inside.binary_search_by_key(&vertex, |known| known.0);
+                query.vertex(vertex, was_inside.ok().map(|i| inside[i].1))
             } else {
                 Found::NOTHING
             };
@@ -549,28 +543,30 @@ impl ContactDetector {
         let Room {
             found,
             last_faces,
-            last_deep,
+            last_inside,
             ..
         } = &mut self.room;
         std::mem::swap(&mut self.faces, last_faces);
-        std::mem::swap(&mut self.deep, last_deep);
+        std::mem::swap(&mut self.inside, last_inside);
         self.faces.clear();
-        self.deep.clear();
+        self.inside.clear();
         self.sightings.clear();
         self.searched_at.clear();
-        self.buried = 0;
+        (self.deep, self.buried) = (0, 0);
         for (&vertex, found) in self.vertices.iter().zip(found) {
             self.searched_at.push(state.positions[vertex as usize]);
             self.faces.extend_from_slice(found.contacts());
-            if found.deep != NONE {
-                self.deep.push((ParticleId(vertex), TetId(found.deep)));
+            if found.inside != NONE {
+                self.inside.push((ParticleId(vertex), TetId(found.inside)));
             }
+            self.deep += usize::from(found.is_deep);
             self.buried += usize::from(found.is_buried);
         }
         for contact in &self.faces {
             let [_, second, third] = beneath(contact, state.positions);
             self.sightings.push(Sighting {
                 weights: [second, third],
+                gap: contact.gap(state.positions),
             });
         }
     }
@@ -591,7 +587,7 @@ impl ContactDetector {
     /// them, at the last search.
     #[must_use]
     pub fn deep(&self) -> usize {
-        self.deep.len()
+        self.deep
     }
 
     /// How many of the deep vertices have no way out within reach of the search, so that nothing pushes them out: a

@@ -61,15 +61,17 @@ mod normals;
 mod pairs;
 mod query;
 mod settings;
+mod state;
 mod surface;
 mod tree;
 mod walk;
 
-pub use detector::{ContactDetector, ContactState, ContactUpdate};
+pub use detector::{ContactDetector, ContactUpdate};
 pub use error::ContactError;
 pub use pairs::{FreshPairs, PairContact};
 pub use query::FaceContact;
 pub use settings::{BodyPairs, ContactSettings};
+pub use state::ContactState;
 pub use surface::ContactSurface;
 
 /// The example of the README, run as a test.

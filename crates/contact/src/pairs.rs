@@ -12,7 +12,7 @@
 //!
 //! Where cuts cross, a particle has several copies; only those that share twins are paired, never all with all. A cut
 //! that splits both sides of an earlier one at the same places leaves parts that are twins again. A pair
-//! ends when the sides have slid apart by more than a quarter of an edge, when they fold, or when a later cut took its
+//! ends when the sides have slid apart by a quarter of an edge (or half the way out of the triangles around it), when they fold, or when a later cut took its
 //! faces. It does not come back: from then on the search takes care of both particles. A pair whose sides are further
 //! apart than the search reaches sleeps: it is left out of the list, and is there again when they come close.
 //!
@@ -27,7 +27,9 @@ use crate::index::{NONE, index};
 use crate::surface::{ContactSurface, SurfaceChange, is_cut};
 
 /// Sides that have slid by this fraction of an edge are no pair any more.
-const LARGEST_SLIDE: f64 = 0.25;
+const OF_EDGE: f64 = 0.25;
+/// Nor are those that have slid by this fraction of the way out of the triangles around the pair.
+const OF_HEIGHT: f64 = 0.5;
 /// A pair ends where `|N_a − N_b|` falls below this fraction of `|N_a| + |N_b|`.
 const FOLDED: f64 = 0.5;
 
@@ -75,8 +77,8 @@ struct Pair {
     particles: [u32; 2],
     /// The number of twins with it as a corner; 0 if this place is free.
     twins: u32,
-    /// The mean edge at rest of the twins that made it.
-    edge: f64,
+    /// How far its sides may slide in m, the least that one of its twins allowed.
+    largest_slide: f64,
     is_retired: bool,
     /// For each of the particles the next end of its list.
     next: [u32; 2],
@@ -280,8 +282,9 @@ impl FreshPairs {
             let before = pairs[corner];
             let known = (before != NONE).then(|| self.pairs[before as usize].particles);
             if known != now {
-                let edge = mean_edge(mesh, surface, again);
-                let pair = now.map_or(NONE, |particles| self.add_pair(particles, edge));
+                let slot = self.twins[twin as usize].slots[0];
+                let slide = largest_slide(mesh, surface, slot, corner);
+                let pair = now.map_or(NONE, |particles| self.add_pair(particles, slide));
                 self.twins[twin as usize].pairs[corner] = pair;
                 if before != NONE {
                     self.release(before);
@@ -311,10 +314,10 @@ impl FreshPairs {
             partner,
             pairs: [NONE; 3],
         });
-        let edge = mean_edge(mesh, surface, slots[0]);
         for corner in 0..3 {
             if let Some(particles) = self.corner(surface, twin, corner) {
-                self.twins[twin as usize].pairs[corner] = self.add_pair(particles, edge);
+                let slide = largest_slide(mesh, surface, slots[0], corner);
+                self.twins[twin as usize].pairs[corner] = self.add_pair(particles, slide);
             }
         }
         for slot in slots {
@@ -344,12 +347,14 @@ impl FreshPairs {
     }
 
     /// The pair of two particles, smaller number first, with one more twin.
-    fn add_pair(&mut self, particles: [u32; 2], edge: f64) -> u32 {
+    fn add_pair(&mut self, particles: [u32; 2], largest_slide: f64) -> u32 {
         let known = self
             .ends(particles[0])
             .find(|(pair, _)| self.pairs[*pair as usize].particles == particles);
         if let Some((pair, _)) = known {
-            self.pairs[pair as usize].twins += 1;
+            let pair_of = &mut self.pairs[pair as usize];
+            pair_of.twins += 1;
+            pair_of.largest_slide = pair_of.largest_slide.min(largest_slide);
             return pair;
         }
         let largest = particles[1] as usize;
@@ -359,7 +364,7 @@ impl FreshPairs {
         let pair = Pair {
             particles,
             twins: 1,
-            edge,
+            largest_slide,
             is_retired: false,
             next: particles.map(|p| self.head[p as usize]),
         };
@@ -453,7 +458,7 @@ impl FreshPairs {
             let slide = (to - from - normal * gap).length();
             let is_folded = length < FOLDED * (a.length() + b.length());
             // Not a number where all areas are 0.
-            let holds = slide < LARGEST_SLIDE * pair.edge && !is_folded;
+            let holds = slide < pair.largest_slide && !is_folded;
             if !holds {
                 pair.is_retired = true;
                 retired = true;
@@ -640,9 +645,13 @@ fn opposite(corners: [Option<usize>; 3]) -> Option<[u8; 3]> {
     ((a + 2) % 3 == b && (b + 2) % 3 == c).then(|| [a, b, c].map(|k| [0, 1, 2][k]))
 }
 
-/// The mean edge of a triangle at rest.
-fn mean_edge(mesh: &CuttableMesh, surface: &ContactSurface, slot: u32) -> f64 {
+/// How far a particle may slide along a triangle from one of its corners, at rest: a quarter of an edge, and not out of
+/// the triangles around the corner, where the search would see others.
+fn largest_slide(mesh: &CuttableMesh, surface: &ContactSurface, slot: u32, corner: usize) -> f64 {
     let corners = surface.triangle(slot).particles;
-    let [a, b, c] = corners.map(|p| mesh.mesh().positions[p.index()]);
-    (a.distance(b) + b.distance(c) + c.distance(a)) / 3.0
+    let at = |k: usize| mesh.mesh().positions[corners[(corner + k) % 3].index()];
+    let (a, b, c) = (at(0), at(1), at(2));
+    let mean_edge = (a.distance(b) + b.distance(c) + c.distance(a)) / 3.0;
+    let height = (b - a).cross(c - a).length() / b.distance(c);
+    (OF_EDGE * mean_edge).min(OF_HEIGHT * height)
 }

@@ -21,11 +21,11 @@ use glam::DVec3;
 use incise_cutting::FaceTag;
 use incise_mesh::{Bounds, ClosestPoint, ParticleId, TetId, TrianglePart, closest_on_triangle};
 
-use crate::detector::ContactState;
 use crate::index::NONE;
 use crate::normals::Shape;
 use crate::pairs::FreshPairs;
 use crate::settings::ContactSettings;
+use crate::state::ContactState;
 use crate::tree::{Box32, TriangleTree};
 use crate::walk::{Barycentric, walk};
 
@@ -35,8 +35,9 @@ const FACING: f64 = 0.2;
 const SAME: f64 = 1e-9;
 /// Up to this distance in mean edges a vertex counts as touching an edge or a vertex.
 const TOUCHING: f64 = 0.01;
-/// A vertex counts as inside a tet if all barycentric coordinates are above this: what merely touches is not deep.
-const STRICTLY_INSIDE: f64 = 1e-6;
+/// A vertex counts as inside another part if the point this far behind it, in mean edges, is: what merely touches is
+/// not.
+const BEHIND: f64 = 1e-4;
 /// Outer triangles kept for a vertex: as many as there are directions that can hold it.
 const OUTSIDE: usize = 3;
 /// Inner triangles that are tried for a valid way, nearest first; the vertex counts as deep after that.
@@ -90,8 +91,10 @@ impl FaceContact {
 pub(crate) struct Found {
     contacts: [FaceContact; OUTSIDE + 1],
     count: usize,
-    /// A tet of another part that contains it although no triangle near it says so; [`NONE`] if there is none.
-    pub(crate) deep: u32,
+    /// A tet of another part that contains it; [`NONE`] if there is none.
+    pub(crate) inside: u32,
+    /// Whether no triangle near it says how it got there.
+    pub(crate) is_deep: bool,
     /// Whether it is deep and no way out was found.
     pub(crate) is_buried: bool,
 }
@@ -103,7 +106,8 @@ impl Found {
             normal: [0.0; 3],
         }; OUTSIDE + 1],
         count: 0,
-        deep: NONE,
+        inside: NONE,
+        is_deep: false,
         is_buried: false,
     };
 
@@ -192,6 +196,15 @@ impl VertexNormals {
         this
     }
 
+    /// The direction out of the body over all tags; zero without one.
+    fn mean(&self) -> DVec3 {
+        let normals = self.normals[..self.count].iter();
+        normals
+            .map(|(_, normal)| *normal)
+            .sum::<DVec3>()
+            .normalize_or_zero()
+    }
+
     /// The least dot product with a normal: how little a triangle faces the vertex. A vertex without a normal, whose
     /// triangles have collapsed, is faced by all.
     fn facing(&self, normal: DVec3) -> f64 {
@@ -226,6 +239,8 @@ pub(crate) struct Query<'a> {
 struct Vertex<'q> {
     id: ParticleId,
     x: DVec3,
+    /// A point a little behind it, inside its own body.
+    behind: DVec3,
     body: u32,
     piece: u32,
     normals: &'q VertexNormals,
@@ -236,11 +251,11 @@ impl Query<'_> {
     pub(crate) fn locate(&self, id: ParticleId, tets: &TriangleTree) -> Option<TetId> {
         let normals = VertexNormals::new(&self.shape, id);
         let vertex = self.vertex_of(id, &normals)?;
-        let wanted = Box32::around(&Bounds::around([vertex.x]));
+        let wanted = Box32::around(&Bounds::around([vertex.behind]));
         let mut containing: Option<TetId> = None;
         tets.search(&wanted, |tet, _| {
             let tet = TetId(tet);
-            if self.may_touch_part(&vertex, tet) && self.is_strictly_inside(tet, &vertex) {
+            if self.may_touch_part(&vertex, tet) && self.is_inside(tet, &vertex) {
                 containing = Some(containing.map_or(tet, |other| other.min(tet)));
             }
         });
@@ -250,17 +265,19 @@ impl Query<'_> {
     /// `None` for a particle that is no vertex of the surface.
     fn vertex_of<'q>(&self, id: ParticleId, normals: &'q VertexNormals) -> Option<Vertex<'q>> {
         let (first, _) = self.shape.surface.corners(id).next()?;
+        let x = self.state.positions[id.index()];
         Some(Vertex {
             id,
-            x: self.state.positions[id.index()],
+            x,
+            behind: x - normals.mean() * (BEHIND * self.mean_edge),
             body: self.body_of[id.index()],
             piece: self.state.pieces.piece_of(self.shape.triangle(first).tet),
             normals,
         })
     }
 
-    /// What `id` may touch. `was_deep` is the tet that contained it at the last search, if it was deep then.
-    pub(crate) fn vertex(&self, id: ParticleId, was_deep: Option<TetId>) -> Found {
+    /// What `id` may touch. `was_inside` is the tet of another part that contained it at the last search.
+    pub(crate) fn vertex(&self, id: ParticleId, was_inside: Option<TetId>) -> Found {
         let mut found = Found::NOTHING;
         let normals = VertexNormals::new(&self.shape, id);
         let Some(vertex) = self.vertex_of(id, &normals) else {
@@ -277,9 +294,9 @@ impl Query<'_> {
                 if !self.shape.is_sound(slot) || !self.may_touch(&vertex, slot) {
                     return;
                 }
-                if bounds.contains(x) {
+                if bounds.contains(vertex.behind) {
                     let tet = self.shape.triangle(slot).tet;
-                    if self.is_strictly_inside(tet, &vertex) {
+                    if self.is_inside(tet, &vertex) {
                         containing = containing.min(tet.0);
                     }
                 }
@@ -295,18 +312,21 @@ impl Query<'_> {
         for near in outside.iter() {
             found.push(self.contact(&vertex, near));
         }
-        let valid = inside
-            .iter()
-            .find(|near| self.is_shallow(near, x) && self.is_way(near, &vertex));
-        if let Some(near) = valid {
+        let valid = inside.iter().find_map(|near| {
+            let way = self.way(near, &vertex)?;
+            self.is_shallow(near, x).then_some((near, way))
+        });
+        if let Some((near, tet)) = valid {
             found.push(self.contact(&vertex, near));
+            found.inside = tet.0;
             return found;
         }
-        if let Some(tet) = was_deep.and_then(|tet| self.followed(tet, &vertex)) {
+        if let Some(tet) = was_inside.and_then(|tet| self.followed(tet, &vertex)) {
             containing = tet.0;
         }
         if containing != NONE && !self.is_held_by_pair(&vertex, TetId(containing)) {
-            found.deep = containing;
+            found.inside = containing;
+            found.is_deep = true;
             match self.way_out(TetId(containing), &vertex) {
                 Some(near) => {
                     let contact = self.contact(&vertex, &near);
@@ -414,10 +434,10 @@ impl Query<'_> {
         self.ways(near, twice).next().is_some()
     }
 
-    /// Whether a way leads through tets from a triangle to the vertex, and not to its own tets.
-    fn is_way(&self, near: &Near, vertex: &Vertex<'_>) -> bool {
+    /// The tet at the end of a way through tets from a triangle to the vertex, which is none of its own.
+    fn way(&self, near: &Near, vertex: &Vertex<'_>) -> Option<TetId> {
         let mut ends = self.ways(near, vertex.x);
-        ends.any(|tet| !self.is_own(tet, vertex))
+        ends.find(|&tet| !self.is_own(tet, vertex))
     }
 
     /// The ends of the ways from the closest point of a triangle, which start in the tets behind all triangles there:
@@ -441,11 +461,11 @@ impl Query<'_> {
         corners.map(|p| self.state.positions[p.index()])
     }
 
-    fn is_strictly_inside(&self, tet: TetId, vertex: &Vertex<'_>) -> bool {
+    fn is_inside(&self, tet: TetId, vertex: &Vertex<'_>) -> bool {
         let barycentric = Barycentric::new(self.tet_corners(tet));
         let inside = barycentric.is_some_and(|coordinates| {
-            let coordinates = coordinates.of(vertex.x);
-            coordinates.iter().all(|&b| b > STRICTLY_INSIDE)
+            let coordinates = coordinates.of(vertex.behind);
+            coordinates.iter().all(|&b| b >= 0.0)
         });
         inside && !self.is_own(tet, vertex)
     }
@@ -453,9 +473,9 @@ impl Query<'_> {
     /// The tet that contains a vertex that was in `tet` at the last search.
     fn followed(&self, tet: TetId, vertex: &Vertex<'_>) -> Option<TetId> {
         let center = self.tet_corners(tet).iter().sum::<DVec3>() / 4.0;
-        let end = self.walk(tet, [center, vertex.x])?;
-        let inside = self.is_strictly_inside(end, vertex) && self.may_touch_part(vertex, end);
-        inside.then_some(end)
+        let end = self.walk(tet, [center, vertex.behind])?;
+        let is_other = !self.is_own(end, vertex) && self.may_touch_part(vertex, end);
+        is_other.then_some(end)
     }
 
     /// Whether the vertex has a live pair with the piece that it is inside of, which holds it.
@@ -505,7 +525,7 @@ impl Query<'_> {
             }
         }
         let mut ways = facing.iter().chain(others.iter());
-        ways.find(|near| self.is_way(near, vertex)).copied()
+        ways.find(|near| self.way(near, vertex).is_some()).copied()
     }
 
     /// A triangle that a deep vertex might leave by, and whether it faces it.

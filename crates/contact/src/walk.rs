@@ -12,9 +12,9 @@ use incise_cutting::CuttableMesh;
 use incise_mesh::TetId;
 
 /// Tets after which a walk gives up. Walks are as long as a depth, a few tets.
-const MAX_TETS: usize = 64;
+const MAX_TETS: usize = 128;
 /// Crossings of a segment that differ by this fraction of its length are one.
-const SAME: f64 = 1e-9;
+const SAME: f64 = 1e-6;
 /// A point counts as inside a tet if no barycentric coordinate is below minus this.
 const INSIDE: f64 = 1e-9;
 

@@ -5,4 +5,7 @@
 mod candidates;
 mod fresh_pairs;
 mod oracle;
+#[cfg(feature = "serde")]
+mod saved;
+mod scenarios;
 mod scene;

@@ -94,6 +94,13 @@ impl Scene {
         self.contacts.update(&state)
     }
 
+    /// An update that searches.
+    pub(crate) fn search(&mut self) {
+        let settings = self.contacts.settings().clone();
+        self.contacts.set_settings(settings).unwrap();
+        assert!(self.update().searched);
+    }
+
     pub(crate) fn apply(&mut self, delta: &CutDelta) {
         delta.extend_particles(&mut self.positions);
         delta.extend_particles(&mut self.velocities);
