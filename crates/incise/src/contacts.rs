@@ -19,7 +19,7 @@ use incise_coloring::{Order, greedy};
 use incise_contact::{BodyPairs, ContactDetector, ContactSettings, ContactState, ContactSurface};
 use incise_cutting::{CutDelta, CuttableMesh, PieceTracker};
 use incise_graph::{Coloring, Incidence};
-use incise_mesh::ParticleId;
+use incise_mesh::{ParticleId, closest_on_triangle};
 use incise_xpbd::{ContactLaw, FaceContact, PairContact};
 
 use crate::backend::{AnySolver, each, each_mut};
@@ -257,7 +257,8 @@ impl Contacts {
                 let [vertex, corner, ..] = particles.map(|p| bodies[p as usize]);
                 if self.thickness > 0.0 && vertex == corner {
                     let [x, a, b, c] = particles.map(|p| rest[p as usize]);
-                    self.thickness.min(distance(x, [a, b, c]))
+                    self.thickness
+                        .min(x.distance(closest_on_triangle([a, b, c], x).point))
                 } else {
                     self.thickness
                 }
@@ -497,66 +498,4 @@ fn planes(
     let second = e1.cross(normal).dot(area) / square;
     let first = normal.cross(e2).dot(area) / square;
     (turned, Some([first, second, normal.dot(area) / square]))
-}
-
-/// The distance of a point from a triangle: the point nearest to it is on the face, or else on an edge.
-fn distance(x: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
-    let normal = (b - a).cross(c - a);
-    let ways = [(a, b), (b, c), (c, a)];
-    let is_above = ways
-        .iter()
-        .all(|(a, b)| (*b - *a).cross(x - *a).dot(normal) >= 0.0);
-    if is_above && normal != DVec3::ZERO {
-        return (x - a).dot(normal.normalize()).abs();
-    }
-    let of_edge = |(a, b): (DVec3, DVec3)| {
-        let way = b - a;
-        let square = way.length_squared();
-        let part = if square > 0.0 {
-            ((x - a).dot(way) / square).clamp(0.0, 1.0)
-        } else {
-            0.0
-        };
-        x.distance(a + way * part)
-    };
-    ways.into_iter().map(of_edge).fold(f64::INFINITY, f64::min)
-}
-
-#[cfg(test)]
-mod tests {
-    use glam::dvec3;
-
-    use super::*;
-
-    /// Against the nearest of many points of the triangle, which are at most a hundredth apart.
-    #[test]
-    fn distances_of_points_and_triangles() {
-        let triangle = [
-            dvec3(0.0, 0.0, 0.0),
-            dvec3(1.0, 0.1, 0.0),
-            dvec3(0.2, 0.9, 0.3),
-        ];
-        for number in 0..200 {
-            let x = [0, 1, 2].map(|k| ((number * 37 + k * 101) % 83) as f64 / 30.0 - 1.0);
-            let x = DVec3::from_array(x);
-            let mut nearest = f64::INFINITY;
-            for i in 0..=100 {
-                for k in 0..=100 - i {
-                    let [u, v] = [i, k].map(|n| f64::from(n) / 100.0);
-                    let [a, b, c] = triangle;
-                    nearest = nearest.min(x.distance(a + (b - a) * u + (c - a) * v));
-                }
-            }
-            let found = distance(x, triangle);
-            assert!(
-                found <= nearest + 1e-12 && found > nearest - 0.01,
-                "{x}: {found} {nearest}"
-            );
-        }
-        assert_eq!(distance(DVec3::Z, [DVec3::ZERO; 3]), 1.0);
-        assert_eq!(
-            distance(DVec3::Z, [DVec3::ZERO, DVec3::X, DVec3::X * 2.0]),
-            1.0
-        );
-    }
 }
