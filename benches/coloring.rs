@@ -20,7 +20,9 @@ fn main() {
             };
             let chunk = NonZeroUsize::MIN.saturating_add(2047);
             measure("auto", &|| drop(auto(incidence)));
-            measure("crowded", &|| drop(greedy(incidence, Order::DegreeBound)));
+            measure("degree-bound", &|| {
+                drop(greedy(incidence, Order::DegreeBound));
+            });
             measure("particles-greedy", &|| {
                 drop(greedy(incidence, Order::LargestFirst));
             });

@@ -1,7 +1,7 @@
 //! `cargo xtask stress-cut`: random strokes by the thousand, everything checked after each.
 //!
 //! The body sags under its weight, held on one side, with a ground for what comes off. Each stroke is of a random kind
-//! and place, a few edges large: rectangles, bent strips, plugs, blades swept over several frames, the stroke before
+//! and place, a few edges large: rectangles, bent strips, punches, blades swept over several frames, the stroke before
 //! once more, now and then a bite taken out. After every frame with a stroke everything derived is recomputed and
 //! compared (`Simulation::check`), positions must be finite and what the deltas say must be what the mesh is. Cutting
 //! only ever adds tets, so a body that has grown threefold is replaced by a fresh one. All is determined by the seed.
@@ -240,7 +240,7 @@ fn random_stroke(simulation: &Simulation, random: &mut Random) -> StrokeSpec {
                 snap,
             }
         }
-        6 => StrokeSpec::Plug {
+        6 => StrokeSpec::Punch {
             frame,
             region: Region::Sphere {
                 center: array(&center),
@@ -274,7 +274,7 @@ fn due(mut stroke: StrokeSpec, now: u64) -> StrokeSpec {
         StrokeSpec::Plane { frame, .. }
         | StrokeSpec::Rectangle { frame, .. }
         | StrokeSpec::Surface { frame, .. }
-        | StrokeSpec::Plug { frame, .. }
+        | StrokeSpec::Punch { frame, .. }
         | StrokeSpec::Remove { frame, .. } => *frame = now,
         StrokeSpec::Sweep { frames, .. } => *frames = [now, now + frames[1] - frames[0]],
     }

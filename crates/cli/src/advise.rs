@@ -2,7 +2,9 @@
 
 use comfy_table::Table;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
-use incise::advise::{Advice, Against, Measured, Question, ReferenceKind, default_frames};
+use incise::advise::{
+    Advice, AdviseSettings, Measured, ReferenceKind, ReferenceSummary, default_frames,
+};
 
 use crate::args::AdviseArguments;
 use crate::failure::Failure;
@@ -11,7 +13,7 @@ use crate::run::{load, located};
 
 pub(crate) fn advise(arguments: &AdviseArguments) -> Result<(), Failure> {
     let scene = load(arguments.scene.as_deref())?;
-    let question = Question {
+    let question = AdviseSettings {
         budget_ms: arguments.budget_ms,
         frames: arguments.frames.unwrap_or_else(|| default_frames(&scene)),
         threads: arguments.threads.map(usize::from),
@@ -28,20 +30,20 @@ pub(crate) fn advise(arguments: &AdviseArguments) -> Result<(), Failure> {
         print(format_args!("not measured: {left_out}"))?;
     }
     if scene.body.iter().any(|body| body.substeps.is_some()) {
-        print("the settings are for all bodies: remove `substeps` from each [[body]]")?;
+        print("these settings apply to all bodies; remove `substeps` from each [[body]]")?;
     }
     let last = scene.frames_needed();
     if last > u64::from(advice.frames) {
         print(format_args!(
-            "strokes and handles act until frame {last}: --frames {last} measures all of them"
+            "strokes and attachments end in frame {last}; --frames {last} measures all of them"
         ))?;
     }
     print(words(&advice))
 }
 
-/// What errors are measured against.
+/// The reference solution in words.
 fn reference(advice: &Advice) -> String {
-    let Against {
+    let ReferenceSummary {
         kind,
         why_not_newton,
         steps: [a, b, c],
@@ -57,19 +59,19 @@ fn reference(advice: &Advice) -> String {
             format!("Newton's method with {a}, {b} and {c} steps a frame, extrapolated")
         }
         ReferenceKind::Xpbd => format!(
-            "the solver itself in double precision with {c} substeps a frame, after {a} and {b}"
+            "the solver itself in double precision with {c} substeps a frame ({a} and {b} for its error)"
         ),
     };
     if let Some(order) = order {
         text += &format!(" (order {order:.1})");
     }
     text += &format!(
-        ", whose own error is about {}% of the motion and {}% of the volume",
+        "; its own error is about {}% of the motion and {}% of the volume",
         digits(left.motion),
         digits(left.volume)
     );
     if let Some(why) = why_not_newton {
-        text += &format!("\nnot Newton's method: {why}");
+        text += &format!("\nNewton's method was not used: {why}");
     }
     text
 }
@@ -79,23 +81,23 @@ fn table(advice: &Advice) -> Table {
     table.load_style(UTF8_FULL_CONDENSED);
     table.set_header([
         "setting",
-        "ms a frame",
-        "slowest frame",
-        "error in % of the motion",
-        "of the size, at most",
-        "at the end",
-        "of the volume",
+        "ms/frame",
+        "worst frame (ms)",
+        "error (% of motion)",
+        "largest (% of size)",
+        "at the end (%)",
+        "volume (%)",
         "",
     ]);
     for (i, row) in advice.measured.iter().enumerate() {
         let mut notes = Vec::new();
-        if row.of_the_scene {
-            notes.push("the scene's");
+        if row.is_scene_setting {
+            notes.push("the scene");
         }
         if advice.best == Some(i) {
-            notes.push("best in budget");
+            notes.push("best within budget");
         } else if row.non_dominated {
-            notes.push("not dominated");
+            notes.push("Pareto optimal");
         }
         let error = row.error;
         let numbers = [
@@ -114,13 +116,13 @@ fn table(advice: &Advice) -> Table {
     table
 }
 
-/// The answer in words, with lines to paste in.
+/// The result in words, with the `[solver]` table for the scene file.
 fn words(advice: &Advice) -> String {
     let budget = advice.budget_ms;
     let row = |i: Option<usize>| i.and_then(|i| advice.measured.get(i));
     let what = |m: &Measured| {
         format!(
-            "{}: {} ms a frame, error {}% of the motion, {}% of the size, {}% of the volume",
+            "{}: {} ms/frame, error {}% of the motion, {}% of the size, {}% of the volume",
             m.name,
             digits(m.ms),
             digits(m.error.motion),
@@ -133,16 +135,16 @@ fn words(advice: &Advice) -> String {
             let mut text = format!("\nwithin {budget} ms: {}\n\n{}", what(best), best.solver);
             text += &match next {
                 Some(next) => format!("\nmore accurate: {}", what(next)),
-                None => "\nnothing that was measured is more accurate".to_owned(),
+                None => "\nno measured setting is more accurate".to_owned(),
             };
             text
         }
         (None, Some(fastest)) => format!(
-            "\nno setting that was measured meets {budget} ms; the fastest is {}\n\n{}\na smaller mesh or a GPU would be faster",
+            "\nno measured setting meets {budget} ms; the fastest is {}\n\n{}\nuse a smaller mesh or a GPU",
             what(fastest),
             fastest.solver
         ),
-        (None, None) => format!("\nno setting that was measured meets {budget} ms"),
+        (None, None) => format!("\nno measured setting meets {budget} ms"),
     }
 }
 

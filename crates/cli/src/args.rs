@@ -23,9 +23,9 @@ pub(crate) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Simulate a scene and write what happens.
+    /// Simulate a scene and write reports, surfaces and images.
     Run(RunArguments),
-    /// Measure which settings of the solver are the most accurate within a time budget, on this machine.
+    /// Find the most accurate solver settings for a time budget on this machine.
     Advise(AdviseArguments),
     /// Cluster and color the constraints of a mesh or the vertices of a graph.
     Color(ColorArguments),
@@ -85,59 +85,58 @@ pub(crate) struct RunArguments {
     /// Number of frames [default: 200, or more if a stroke ends later].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) frames: Option<u64>,
-    /// Where to compute: auto takes a GPU if there is a real one that can do the scene [default: as the scene says].
+    /// Compute device; auto takes a hardware GPU if one supports the scene [default: that of the scene].
     #[arg(long, value_enum)]
     pub(crate) backend: Option<BackendName>,
-    /// Width of the numbers [default: as the scene says].
+    /// Floating-point precision [default: that of the scene].
     #[arg(long, value_enum)]
     pub(crate) precision: Option<PrecisionName>,
-    /// Number of threads that simulate and draw, at most 1024 [default: one for each core]. The result is the same for any number.
+    /// Number of threads, at most 1024 [default: one for each core]. It does not change the result.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) threads: Option<u16>,
-    /// Folder for scene, frames, surfaces, pictures and last mesh.
+    /// Folder for the scene, frame reports, surfaces, images and the last mesh.
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub(crate) out: Option<PathBuf>,
-    /// Write one JSON object per frame to this file as well.
+    /// Also write one JSON object per frame to this file.
     #[arg(long, value_name = "FILE")]
     pub(crate) jsonl: Option<PathBuf>,
-    /// Write the last mesh at rest to this file; as .vtu with its deformed positions.
+    /// Write the last rest mesh to this file; a .vtu file also has the deformed positions.
     #[arg(long, value_name = "FILE")]
     pub(crate) save_mesh: Option<PathBuf>,
-    /// Write no pictures and no contact sheet.
+    /// Write no images and no contact sheet.
     #[arg(long)]
     pub(crate) no_pictures: bool,
-    /// Write a film as well: .gif, or .png for an animated PNG.
-    #[arg(long, value_name = "FILE")]
-    pub(crate) film: Option<PathBuf>,
-    /// Pixels of pictures, across and down [default: 640x480].
+    /// Write an animation: .gif, or .png for an animated PNG.
+    #[arg(long, value_name = "FILE", alias = "film")]
+    pub(crate) animation: Option<PathBuf>,
+    /// Width and height of images in pixels [default: 640x480].
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub(crate) size: Option<[u32; 2]>,
-    /// From where pictures are taken: degrees around, degrees above the floor and how many times as large as what fits
-    /// [default: -60,22,1].
+    /// Camera: azimuth and elevation in degrees, and zoom; at zoom 1 the bodies fit the image [default: -60,22,1].
     #[arg(long, value_name = "AZIMUTH,ELEVATION[,ZOOM]", value_parser = view, allow_hyphen_values = true)]
     pub(crate) view: Option<[f64; 3]>,
-    /// What the colors in pictures show: tissue, color, cluster, piece, stretch or residual. Where there are pictures by
-    /// residual, every frame reports it.
+    /// Quantity that colors show in images: tissue, color, cluster, piece, stretch or residual. With residual every frame
+    /// reports it.
     #[arg(long, value_name = "NAME", default_value_t)]
     pub(crate) color_by: ColorBy,
     /// Draw the edges of triangles.
     #[arg(long)]
     pub(crate) wireframe: bool,
-    /// Recompute and compare everything after every cut; slow.
+    /// Validate all derived data after every cut (slow).
     #[arg(long)]
     pub(crate) check: bool,
-    /// Simulate all frames even if the solution diverges; without this the run ends there with exit code 1.
+    /// Continue if the solution diverges; without this the run ends there with exit code 1.
     #[arg(long)]
     pub(crate) keep_going: bool,
-    /// Print nothing but errors.
+    /// Print only errors; warnings are in frames.jsonl.
     #[arg(long)]
     pub(crate) quiet: bool,
 }
 
 impl RunArguments {
-    /// Whether there is to be any picture.
+    /// Tests whether any image is requested.
     pub(crate) fn draws(&self) -> bool {
-        !self.no_pictures || self.film.is_some()
+        !self.no_pictures || self.animation.is_some()
     }
 }
 
@@ -153,7 +152,7 @@ fn size(text: &str) -> Result<[u32; 2], String> {
         .ok_or_else(|| format!("two numbers from 1 to {LARGEST_SIDE}, as in 960x720, are needed"))
 }
 
-/// Where a camera is, as in `-60,22` or `-60,22,1.5`.
+/// A camera as in `-60,22` or `-60,22,1.5`.
 fn view(text: &str) -> Result<[f64; 3], String> {
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
     let view = match numbers.unwrap_or_default()[..] {
@@ -173,23 +172,23 @@ fn view(text: &str) -> Result<[f64; 3], String> {
 
 #[derive(Debug, Args)]
 #[command(after_help = "Example: incise advise scene.toml --budget-ms 8\n\n\
-    Errors are distances from a converged motion of the same scene: by Newton's method where the scene has nothing that \
-    the reference does not know (contacts, damping, springs, cuts after frame 0), otherwise by the solver itself at a \
-    fine substep. The output says which, how much of its own error is left, and gives the [solver] table to paste in.")]
+    Errors are measured against a converged solution of the same scene: by Newton's method, or by the solver itself with \
+    a fine substep if the scene has contacts, damping, springs or cuts after frame 0. The output names the reference and \
+    its own error, and gives the [solver] table for the scene file.")]
 pub(crate) struct AdviseArguments {
     /// The scene file; without one, the built-in liver.
     pub(crate) scene: Option<PathBuf>,
-    /// Time of a frame in ms that may be spent.
+    /// Largest computing time of a frame in ms.
     #[arg(long, value_name = "X")]
     pub(crate) budget_ms: f64,
-    /// Number of frames that are measured, from the first on [default: those of half a second and of all strokes and handles,
-    /// at most 100]. More take longer and see more of the scene.
+    /// Number of frames that are measured, from the first on [default: half a second and all strokes and attachments, at
+    /// most 100].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub(crate) frames: Option<u32>,
     /// Number of threads, at most 1024 [default: one for each core].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) threads: Option<u16>,
-    /// Print one JSON object instead of words.
+    /// Print one JSON object instead of text.
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -212,16 +211,16 @@ pub(crate) struct ColorArguments {
     /// The clustering: none, serial:K, serial-loose:K, greedy-k:K or pressure:K.
     #[arg(long, value_name = "NAME", default_value = "none")]
     pub(crate) clustering: String,
-    /// Where to compute: on a GPU jones-plassmann, ecl-gc, scgc, vivace and wlc.
+    /// Compute device; gpu supports jones-plassmann, ecl-gc, scgc, vivace and wlc.
     #[arg(long, value_enum, default_value_t)]
-    pub(crate) backend: PlaceName,
+    pub(crate) backend: ColorBackendName,
     /// Seed of vivace, greedy:random, iterated-greedy and tabu; the others use none.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) seed: u64,
-    /// Make the colors even, in clusters or in constraints, without adding any.
+    /// Balance the colors by clusters or by constraints without adding any.
     #[arg(long, value_enum, value_name = "BY", num_args = 0..=1, require_equals = true, default_missing_value = "clusters")]
     pub(crate) balance: Option<BalanceName>,
-    /// Write cluster and color of each constraint (of a graph: each vertex) to this file.
+    /// Write the cluster and color of each constraint (of a graph: of each vertex) to this CSV file.
     #[arg(long, value_name = "FILE")]
     pub(crate) csv: Option<PathBuf>,
     /// Print one JSON object instead of a table.
@@ -231,7 +230,7 @@ pub(crate) struct ColorArguments {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum MeshCommand {
-    /// Check a mesh and say what it is like.
+    /// Check a mesh and print its statistics.
     #[command(after_help = "Example: incise mesh info liver.vtk --json")]
     Info {
         /// The mesh.
@@ -239,33 +238,33 @@ pub(crate) enum MeshCommand {
         /// Print one JSON object instead of tables.
         #[arg(long)]
         json: bool,
-        /// Young's modulus in Pa of the material whose substeps are told.
+        /// Young's modulus in Pa, for the number of substeps.
         #[arg(long, value_name = "E", default_value_t = 1e5)]
         young_modulus: f64,
-        /// Its mass density in kg/m³.
+        /// Mass density in kg/m³, for the number of substeps.
         #[arg(long, value_name = "RHO", default_value_t = 1000.0)]
         density: f64,
-        /// Time of a frame in s.
+        /// Time of a frame in s, for the number of substeps.
         #[arg(long, value_name = "DT", default_value_t = 0.016)]
         time_step: f64,
     },
-    /// Read a mesh in one format and write it in another; formats go by file ending. Endings of surfaces (.obj, .stl, .ply,
-    /// .off, .glb, .gltf) get its boundary.
+    /// Convert a mesh between formats, which the file endings determine. Surface formats (.obj, .stl, .ply, .off, .glb,
+    /// .gltf) get the boundary of the mesh.
     #[command(after_help = "Example: incise mesh convert liver.node liver.vtu")]
     Convert {
         /// The mesh to read.
         input: PathBuf,
         /// The file to write.
         output: PathBuf,
-        /// Merge particles at one place, remove degenerate and double tets, turn inverted ones, keep the largest piece
-        /// and the particles it uses; says what was done.
+        /// Merge coincident particles, remove degenerate and duplicate tets, reorient inverted ones, keep the largest piece
+        /// and its particles; prints the changes.
         #[arg(long)]
         repair: bool,
     },
     /// Fill a closed triangle surface with tets.
     #[command(
         after_help = "Example: incise mesh tetrahedralize heart.stl heart.vtk --tets 20000\n\n\
-        Edges and corners are rounded to the size of a tet, and thinner parts are lost: the output says by how much."
+        Edges and corners are rounded to the size of a tet, and thinner parts are lost; the output gives the distances."
     )]
     Tetrahedralize {
         /// The surface: .obj, .stl, .ply or .off.
@@ -275,7 +274,7 @@ pub(crate) enum MeshCommand {
         /// Wanted number of tets; the result is within 2%.
         #[arg(long, value_name = "N")]
         tets: usize,
-        /// How often tets far inside may be doubled in size: more are left for the surface.
+        /// Number of times that tets deep inside may be doubled in size, which leaves more for the surface.
         #[arg(long, value_name = "N", default_value_t = 0)]
         levels: u32,
     },
@@ -292,12 +291,12 @@ pub(crate) enum MeshCommand {
     },
 }
 
-/// What is counted when colors are made even.
+/// Measure of the size of a color when colors are balanced.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum BalanceName {
-    /// Clusters: what runs side by side on a wide machine.
+    /// Number of clusters: the parallelism of a color.
     Clusters,
-    /// Constraints: the work of a color.
+    /// Number of constraints: the work of a color.
     Constraints,
 }
 
@@ -310,28 +309,28 @@ impl BalanceName {
     }
 }
 
-/// Where to simulate.
+/// Compute device of a simulation.
 #[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 pub(crate) enum BackendName {
-    /// The processor.
+    /// The CPU.
     Cpu,
-    /// A GPU, or an error.
+    /// A GPU; an error if there is none.
     Gpu,
-    /// A GPU if there is a real one that can, else the processor.
+    /// A hardware GPU if one supports the scene, else the CPU.
     Auto,
 }
 
-/// Where to color.
+/// Compute device of a coloring.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ValueEnum)]
-pub(crate) enum PlaceName {
-    /// The processor.
+pub(crate) enum ColorBackendName {
+    /// The CPU.
     #[default]
     Cpu,
-    /// A GPU, or an error.
+    /// A GPU; an error if there is none.
     Gpu,
 }
 
-/// Width of the numbers.
+/// Floating-point precision.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum PrecisionName {
     /// Single: 32 bits.

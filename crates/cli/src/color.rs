@@ -9,8 +9,9 @@ use anyhow::anyhow;
 use incise::clustering::Method;
 use incise::coloring::{Algorithm, Conflicts, balance, color as color_by};
 use incise::graph::{Clustering, Coloring, ColoringMetrics};
+use incise::{clustering_suggestion, coloring_suggestion};
 
-use crate::args::{BalanceName, ColorArguments, PlaceName};
+use crate::args::{BalanceName, ColorArguments, ColorBackendName};
 use crate::failure::Failure;
 use crate::print::print;
 use input::{Format, Problem};
@@ -21,11 +22,11 @@ pub(crate) fn color(arguments: &ColorArguments) -> Result<(), Failure> {
     let algorithm: Algorithm = arguments
         .algorithm
         .parse()
-        .map_err(|error| input(anyhow::Error::from_boxed(Box::new(error))))?;
+        .map_err(|error| input(anyhow!("{error}{}", coloring_suggestion(&error))))?;
     let method: Method = arguments
         .clustering
         .parse()
-        .map_err(|error| input(anyhow::Error::from_boxed(Box::new(error))))?;
+        .map_err(|error| input(anyhow!("{error}{}", clustering_suggestion(&error))))?;
 
     let format = Format::of(&arguments.input);
     format.require(method).map_err(input)?;
@@ -68,8 +69,8 @@ pub(crate) fn color(arguments: &ColorArguments) -> Result<(), Failure> {
         algorithm: algorithm.to_string(),
         clustering: method.to_string(),
         backend: match arguments.backend {
-            PlaceName::Cpu => "cpu",
-            PlaceName::Gpu => "gpu",
+            ColorBackendName::Cpu => "cpu",
+            ColorBackendName::Gpu => "gpu",
         },
         seed: arguments.seed,
         balanced: arguments.balance.map(BalanceName::name),
@@ -120,7 +121,7 @@ fn colored(
     arguments: &ColorArguments,
 ) -> Result<Found, Failure> {
     let mut result = match arguments.backend {
-        PlaceName::Cpu => {
+        ColorBackendName::Cpu => {
             let result = color_by(algorithm, clusters, arguments.seed);
             let result = result.map_err(|error| Failure::Run(error.into()))?;
             Found {
@@ -129,7 +130,7 @@ fn colored(
                 edge_visits: result.edge_visits,
             }
         }
-        PlaceName::Gpu => on_gpu(algorithm, clusters, arguments.seed)?,
+        ColorBackendName::Gpu => on_gpu(algorithm, clusters, arguments.seed)?,
     };
     match arguments.balance {
         None => {}

@@ -1,12 +1,13 @@
-//! [`Failure`]: why a command ended, and the exit code that says whose fault it was.
+//! [`Failure`]: an error of a command with its exit code.
 
 use std::process::ExitCode;
 
-use incise::Error;
+use anyhow::anyhow;
 use incise::mesh_io::MeshIoError;
 use incise::meshing::MeshingError;
+use incise::{Error, shape_suggestion};
 
-/// Why a command ended early.
+/// An error that ends a command.
 #[derive(Debug)]
 pub(crate) enum Failure {
     /// The input cannot be used: exit code 2.
@@ -16,10 +17,10 @@ pub(crate) enum Failure {
 }
 
 impl Failure {
-    /// Says it in one sentence and returns the exit code.
+    /// Prints the error in one line and returns the exit code.
     #[expect(
         clippy::print_stderr,
-        reason = "this is where the command line speaks of errors"
+        reason = "errors of the command line go to stderr"
     )]
     pub(crate) fn report(&self) -> ExitCode {
         let (error, code) = match self {
@@ -31,7 +32,7 @@ impl Failure {
     }
 }
 
-/// The error and its causes in one line. Many errors name their cause themselves; it is not said twice.
+/// The error and its causes in one line. A cause that the error itself already names is left out.
 fn sentence(error: &anyhow::Error) -> String {
     let mut sentence = error.to_string();
     for cause in error.chain().skip(1).map(ToString::to_string) {
@@ -42,7 +43,7 @@ fn sentence(error: &anyhow::Error) -> String {
     sentence.replace('\n', " ")
 }
 
-/// What cannot be read, understood or written is the input's fault; what goes wrong later is ours.
+/// Errors of input and files give exit code 2, errors of the simulation 1.
 impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         match error {
@@ -60,6 +61,6 @@ impl From<MeshIoError> for Failure {
 
 impl From<MeshingError> for Failure {
     fn from(error: MeshingError) -> Self {
-        Self::Input(error.into())
+        Self::Input(anyhow!("{error}{}", shape_suggestion(&error)))
     }
 }

@@ -1,4 +1,4 @@
-//! `incise mesh`: looks at, converts and generates meshes.
+//! `incise mesh`: inspects, converts and generates meshes.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use crate::args::MeshCommand;
 use crate::failure::Failure;
-use crate::print::print;
+use crate::print::{count, print};
 
 /// The object that `incise mesh info --json` prints.
 #[derive(Debug, Serialize)]
@@ -29,10 +29,10 @@ struct MeshReport {
     max_dihedral_degrees: f64,
     worst_radius_ratio: f64,
     max_tets_per_particle: usize,
-    /// Handles of all boundary surfaces; absent if they are no manifolds.
+    /// Genus of all boundary surfaces; absent if they are no manifolds.
     #[serde(skip_serializing_if = "Option::is_none")]
     genus: Option<usize>,
-    /// That bring the kappa of every tet to 0.5.
+    /// Substeps that bring the kappa of every tet to 0.5.
     substeps: f64,
     /// Angles in classes of 10 degrees from 0 to 180.
     dihedral_histogram: [usize; 18],
@@ -40,7 +40,7 @@ struct MeshReport {
     radius_ratio_histogram: [usize; 10],
 }
 
-/// The material and the frame whose substeps are told.
+/// Material and frame time for the number of substeps.
 struct Stiffness {
     young_modulus: f64,
     density: f64,
@@ -122,7 +122,7 @@ pub(crate) fn mesh(command: &MeshCommand) -> Result<(), Failure> {
     }
 }
 
-/// Fills a surface, and says how well the body fits it.
+/// Fills a surface and prints how well the body fits it.
 fn fill(file: &Path, output: &Path, tets: usize, levels: u32) -> Result<(), Failure> {
     let surface = mesh_io::read_surface(file)?;
     let named = |error| {
@@ -135,44 +135,49 @@ fn fill(file: &Path, output: &Path, tets: usize, levels: u32) -> Result<(), Fail
     let boundary = TriangleSurface::boundary_of(&mesh);
     let back = Solid::new(&boundary).map_err(named)?;
     let prepared = solid.prepared();
-    for (count, what) in [
-        (
-            prepared.welded,
-            "points at the place of another were merged",
-        ),
-        (
-            prepared.degenerate,
-            "triangles with equal corners were left out",
-        ),
+    for (number, what, done) in [
+        (prepared.welded, "coincident point", "merged"),
+        (prepared.degenerate, "degenerate triangle", "removed"),
         (
             prepared.turned,
-            "triangles were turned to face as their neighbors",
+            "triangle",
+            "reoriented to match the neighbors",
         ),
     ] {
-        if count > 0 {
-            print(format!("{count} {what}"))?;
+        if number > 0 {
+            print(format!(
+                "{} {done}",
+                count(number, what, &format!("{what}s"))
+            ))?;
         }
     }
     if prepared.inside_out {
-        print("the surface was inside out and was turned")?;
+        print("the surface was inside out; all triangles were reversed")?;
     }
     print(format!(
-        "tets {}, particles {}, pieces {}",
-        mesh.tets.len(),
-        mesh.positions.len(),
-        mesh.pieces().count
+        "{}, {}, {}",
+        count(mesh.tets.len(), "tet", "tets"),
+        count(mesh.positions.len(), "particle", "particles"),
+        count(mesh.pieces().count, "piece", "pieces"),
     ))?;
     print(format!(
-        "volume {:.6} m³, that of the surface is {:.6} m³",
+        "volume {:.6} m³ (surface: {:.6} m³)",
         mesh.total_volume(),
         solid.volume()
     ))?;
+    let size = (12.0 * mesh.total_volume() / mesh.tets.len() as f64).cbrt();
+    let missed = back.farthest(&surface);
     print(format!(
-        "the body reaches {:.3e} m beyond or short of the surface, the surface {:.3e} m from the body; a tet is {:.3e} m wide",
+        "distance of the body from the surface: at most {:.2e} m (size of a tet: {size:.2e} m)",
         solid.farthest(&boundary),
-        back.farthest(&surface),
-        (12.0 * mesh.total_volume() / mesh.tets.len() as f64).cbrt()
-    ))
+    ))?;
+    if missed > size {
+        print(format!(
+            "warning: parts of the surface up to {missed:.2e} m away are not covered (thinner than a tet, {size:.2e} m); \
+             increase --tets"
+        ))?;
+    }
+    Ok(())
 }
 
 fn info(file: &Path, json: bool, stiffness: &Stiffness) -> Result<(), Failure> {
@@ -211,9 +216,9 @@ fn bars(title: &str, classes: impl Iterator<Item = (String, usize)>) -> Table {
     let most = classes.iter().map(|(_, n)| *n).max().unwrap_or(0).max(1);
     let mut table = Table::new();
     table.load_style(UTF8_FULL_CONDENSED);
-    table.set_header([title, "number", ""]);
+    table.set_header([title, "count", ""]);
     for (name, number) in &classes[first..=last] {
-        // Few are seen, too.
+        // Small counts get a visible bar, too.
         let length = (number * BAR).div_ceil(most);
         table.add_row([name.clone(), number.to_string(), "█".repeat(length)]);
     }
@@ -246,29 +251,25 @@ fn report(file: &Path, mesh: &TetMesh, stiffness: &Stiffness) -> MeshReport {
 fn table(report: &MeshReport) -> Table {
     let mut table = Table::new();
     table.load_style(UTF8_FULL_CONDENSED);
-    table.set_header([report.input.as_str(), "sound"]);
+    table.set_header([report.input.as_str(), "valid"]);
     let mut row = |name: &str, value: String| {
         table.add_row([name.to_owned(), value]);
     };
-    row(
-        "tets, particles",
-        format!("{}, {}", report.tets, report.particles),
-    );
+    row("tets", report.tets.to_string());
+    row("particles", report.particles.to_string());
     row("pieces", report.pieces.to_string());
+    row("boundary triangles", report.boundary_triangles.to_string());
     row(
-        "boundary triangles, Euler characteristic",
-        format!(
-            "{}, {}",
-            report.boundary_triangles, report.euler_characteristic
-        ),
+        "Euler characteristic",
+        report.euler_characteristic.to_string(),
     );
     if let Some(genus) = report.genus {
         row("genus", genus.to_string());
     }
-    row("volume in m³", format!("{:.6}", report.volume));
+    row("volume", format!("{:.6} m³", report.volume));
     row(
-        "smallest altitude in m",
-        format!("{:.3e}", report.min_altitude),
+        "smallest altitude",
+        format!("{:.3e} m", report.min_altitude),
     );
     row(
         "dihedral angles",
@@ -282,9 +283,9 @@ fn table(report: &MeshReport) -> Table {
         format!("{:.3}", report.worst_radius_ratio),
     );
     row(
-        "most tets at a particle",
+        "largest number of tets at a particle",
         report.max_tets_per_particle.to_string(),
     );
-    row("substeps for the material", report.substeps.to_string());
+    row("substeps for kappa 0.5", report.substeps.to_string());
     table
 }

@@ -135,7 +135,7 @@ impl Output {
                 lines.push(Lines::create(path)?);
             }
             if let Some(pictures) = &mut pictures {
-                pictures.begin_film()?;
+                pictures.begin_animation()?;
             }
             let toml = movable(scene)?.to_toml()?;
             write_atomically(folder.join("scene.toml"), |file| {

@@ -1,6 +1,6 @@
-//! [`Pictures`]: what a run looks like: a picture of each frame that is saved, a sheet of some of them, a film.
+//! [`Pictures`]: images of a run: one for each saved frame, a contact sheet and an animation.
 //!
-//! A film has its own pace, some 25 pictures a second of simulated time, and may take other frames than those saved.
+//! An animation has about 25 images for each second of simulated time, independent of the frames that are saved.
 
 use std::path::{Path, PathBuf};
 
@@ -14,36 +14,36 @@ use crate::args::RunArguments;
 use crate::failure::Failure;
 use crate::files::{require_file, save_every};
 
-/// Pixels of a picture, across and down.
+/// Width and height of an image in pixels.
 const SIZE: [u32; 2] = [640, 480];
-/// Degrees around, degrees above the floor and magnification.
+/// Azimuth and elevation in degrees, and zoom.
 const VIEW: [f64; 3] = [-60.0, 22.0, 1.0];
-/// Least pictures of a film in a second.
+/// Smallest number of images of an animation for each second.
 const PER_SECOND: f64 = 25.0;
-/// Pictures on the sheet, and of a row.
+/// Images on the contact sheet and in its rows.
 const ON_SHEET: u64 = 12;
 const COLUMNS: usize = 4;
-/// Most pixels across of a picture on the sheet.
+/// Largest width of an image on the contact sheet in pixels.
 const SHEET_WIDTH: u32 = 360;
-/// A floor deeper than this many diagonals under the bodies is not kept in sight.
+/// A ground deeper below the bodies than this many of their diagonals is not included in the view.
 const DEEPEST: f64 = 3.0;
 
-/// What draws a run.
+/// Draws the images of a run.
 #[derive(Debug)]
 pub(crate) struct Pictures {
     renderer: Renderer,
     note: Option<String>,
-    painting: RenderScene,
+    render_scene: RenderScene,
     camera: Camera,
     style: Style,
     size: [u32; 2],
     strokes: Vec<StrokeSpec>,
-    /// Whether each is a file of its own.
+    /// Whether saved frames get an image file.
     saved: bool,
-    film: Option<PathBuf>,
+    animation: Option<PathBuf>,
     writer: Option<Animation>,
-    /// Every how many frames the film has a picture.
-    film_every: u64,
+    /// Frames from one image of the animation to the next.
+    animation_every: u64,
     time_step: f64,
     /// The frames on the sheet, ascending.
     on_sheet: Vec<u64>,
@@ -52,7 +52,7 @@ pub(crate) struct Pictures {
 }
 
 impl Pictures {
-    /// What the command line asks for; `None` if it wants no pictures.
+    /// Images as requested by the arguments; `None` without any.
     pub(crate) fn of(
         arguments: &RunArguments,
         scene: &Scene,
@@ -63,13 +63,13 @@ impl Pictures {
             return Ok(None);
         }
         let (renderer, note) = Renderer::for_simulation(simulation);
-        let painting = RenderScene::new(simulation, scene);
+        let render_scene = RenderScene::new(simulation, scene);
         let time_step = scene.solver.time_step;
         Ok(Some(Self {
             renderer,
             note,
-            camera: camera(arguments, scene, painting.bounds(simulation)),
-            painting,
+            camera: camera(arguments, scene, render_scene.bounds(simulation)),
+            render_scene,
             style: Style {
                 color_by: arguments.color_by,
                 wireframe: arguments.wireframe,
@@ -78,9 +78,9 @@ impl Pictures {
             size: arguments.size.unwrap_or(SIZE),
             strokes: scene.stroke.clone(),
             saved: !arguments.no_pictures,
-            film: arguments.film.clone(),
+            animation: arguments.animation.clone(),
             writer: None,
-            film_every: film_every(time_step),
+            animation_every: animation_every(time_step),
             time_step,
             on_sheet: if arguments.no_pictures {
                 Vec::new()
@@ -92,30 +92,30 @@ impl Pictures {
         }))
     }
 
-    /// Opens the film, if there is to be one, so that what cannot be written is known before the run.
-    pub(crate) fn begin_film(&mut self) -> anyhow::Result<()> {
-        if let Some(path) = &self.film {
-            // Its folder may be the run's, which has just been made.
+    /// Creates the file of the animation, if one is requested, so that a path that cannot be written fails before the run.
+    pub(crate) fn begin_animation(&mut self) -> anyhow::Result<()> {
+        if let Some(path) = &self.animation {
+            // The folder of the run exists by now.
             require_file(path)?;
-            let seconds = self.film_every as f64 * self.time_step;
+            let seconds = self.animation_every as f64 * self.time_step;
             self.writer = Some(Animation::create(path, self.size, seconds)?);
         }
         Ok(())
     }
 
-    /// Updates the painting after a frame and draws the frame if it is saved or filmed. `saved` says whether the files
-    /// of this frame are kept.
+    /// Updates the render scene after a frame and draws the frame if it is saved or part of the animation. `saved` tells
+    /// whether files of this frame are written.
     pub(crate) fn frame(
         &mut self,
         simulation: &mut Simulation,
         saved: bool,
         folder: &Path,
     ) -> anyhow::Result<()> {
-        self.painting.sync(simulation);
+        self.render_scene.sync(simulation);
         let frame = simulation.report().frame;
         let saved = saved && self.saved;
-        let filmed = self.writer.is_some() && frame.is_multiple_of(self.film_every);
-        if !(saved || filmed) {
+        let animated = self.writer.is_some() && frame.is_multiple_of(self.animation_every);
+        if !(saved || animated) {
             return Ok(());
         }
         let picture = self.draw(simulation)?;
@@ -123,8 +123,8 @@ impl Pictures {
             picture.write_png(folder.join(format!("frame_{frame:05}.png")))?;
             self.count += 1;
         }
-        if let Some(film) = self.writer.as_mut().filter(|_| filmed) {
-            film.push(&picture)?;
+        if let Some(animation) = self.writer.as_mut().filter(|_| animated) {
+            animation.push(&picture)?;
         }
         if saved && self.on_sheet.binary_search(&frame).is_ok() {
             let report = simulation.report();
@@ -140,50 +140,54 @@ impl Pictures {
     }
 
     fn draw(&mut self, simulation: &mut Simulation) -> Result<Image, RenderError> {
-        if self.renderer.needs_read_back(&self.painting, simulation) {
+        if self
+            .renderer
+            .needs_read_back(&self.render_scene, simulation)
+        {
             simulation.read_back()?;
         }
         let frame = simulation.report().frame;
-        self.painting.set_blade(None);
+        self.render_scene.set_blade(None);
         for blade in self
             .strokes
             .iter()
             .filter_map(|stroke| stroke.blade_at(frame))
         {
-            self.painting.add_blade(&blade);
+            self.render_scene.add_blade(&blade);
         }
         let by = self.style.color_by;
         let wanted = by == ColorBy::Residual;
         let residuals = wanted.then(|| simulation.residuals_of_tets()).flatten();
-        self.painting.color(simulation, by, residuals.as_deref())?;
-        let (painting, camera) = (&self.painting, &self.camera);
+        self.render_scene
+            .color(simulation, by, residuals.as_deref())?;
+        let (render_scene, camera) = (&self.render_scene, &self.camera);
         self.renderer
-            .picture(painting, simulation, camera, &self.style, self.size)
+            .picture(render_scene, simulation, camera, &self.style, self.size)
     }
 
-    /// Completes sheet and film; returns what is to be said about them.
+    /// Completes the contact sheet and the animation; returns a line about them.
     pub(crate) fn finish(self, folder: &Path) -> anyhow::Result<String> {
-        let mut places = Vec::new();
+        let mut written = Vec::new();
         if self.saved {
             contact_sheet(&self.sheet, COLUMNS).write_png(folder.join("contact_sheet.png"))?;
-            places.push(format!(
+            written.push(format!(
                 "{} pictures and contact_sheet.png are in {}",
                 self.count,
                 folder.display()
             ));
         }
-        if let (Some(film), Some(path)) = (self.writer, &self.film) {
-            film.finish()?;
-            places.push(format!("the film is {}", path.display()));
+        if let (Some(animation), Some(path)) = (self.writer, &self.animation) {
+            animation.finish()?;
+            written.push(format!("animation: {}", path.display()));
         }
-        let drawn = self.renderer.describe();
+        let renderer = self.renderer.describe();
         let why = self.note.map(|note| format!(": {note}"));
         let why = why.unwrap_or_default();
-        Ok(format!("{}, drawn by {drawn}{why}", places.join(", ")))
+        Ok(format!("{}, drawn by {renderer}{why}", written.join(", ")))
     }
 }
 
-/// Sees the bodies and, if it is not far, the floor that they may fall on.
+/// A camera that shows the bodies and, if it is near, the ground below them.
 fn camera(
     arguments: &RunArguments,
     scene: &Scene,
@@ -198,24 +202,24 @@ fn camera(
     camera.azimuth = azimuth.to_radians();
     camera.elevation = elevation.to_radians();
     let [width, height] = arguments.size.unwrap_or(SIZE).map(f64::from);
-    // A picture wider than high keeps room at its sides for what falls apart.
+    // Wide images keep room at the sides for pieces that fall off.
     camera.fit_distance(low, high, (width / height).min(1.0));
     camera.zoom(1.0 / zoom);
     camera
 }
 
-/// Every how many frames a film has a picture.
+/// Frames from one image of an animation to the next.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     reason = "at least 1; what is beyond all frames is as good as any other"
 )]
-fn film_every(time_step: f64) -> u64 {
-    // A step of exactly a fraction is not to be rounded away.
+fn animation_every(time_step: f64) -> u64 {
+    // The small term keeps exact fractions from being rounded down.
     (1.0 / (PER_SECOND * time_step) + 1e-9).floor().max(1.0) as u64
 }
 
-/// The frames on the sheet: evenly spread over those that are saved.
+/// The frames on the contact sheet: evenly spread over those that are saved.
 fn on_sheet(frames: u64) -> Vec<u64> {
     let every = save_every(frames);
     let last = frames - 1;
@@ -224,7 +228,7 @@ fn on_sheet(frames: u64) -> Vec<u64> {
     let count = saved.min(ON_SHEET);
     (0..count)
         .map(|i| (i * (saved - 1) + (count - 1) / 2) / (count - 1).max(1))
-        .map(|place| (place * every).min(last))
+        .map(|saved| (saved * every).min(last))
         .collect()
 }
 
@@ -253,9 +257,9 @@ mod tests {
     }
 
     #[test]
-    fn films_have_some_25_pictures_a_second() {
+    fn animations_have_25_images_a_second() {
         assert_eq!(
-            [0.001, 0.01, 0.016, 0.02, 0.04, 0.5].map(film_every),
+            [0.001, 0.01, 0.016, 0.02, 0.04, 0.5].map(animation_every),
             [40, 4, 2, 2, 1, 1]
         );
     }

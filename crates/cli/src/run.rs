@@ -1,11 +1,10 @@
 //! `incise run`: simulates a scene.
 
 use std::collections::HashSet;
-use std::fs;
 use std::path::Path;
 
 use anyhow::anyhow;
-use incise::scene::{Backend, Method, Precision, Quantity, line_of};
+use incise::scene::{Backend, Method, Precision, Quantity, location};
 use incise::{Error, Scene, Simulation, Warning};
 use incise_render::{Animation, ColorBy};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -18,14 +17,14 @@ use crate::pictures::Pictures;
 use crate::print::print;
 use crate::summary::Summary;
 
-/// Frames of a run that does not say.
+/// Default number of frames.
 const FRAMES: u64 = 200;
 
 pub(crate) fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let Some(threads) = arguments.threads.map(usize::from) else {
         return simulate(arguments);
     };
-    // Here and not in the simulation alone: drawing shares them.
+    // Drawing shares the threads of the simulation.
     let pool = ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|error| Error::Threads {
         threads,
@@ -39,7 +38,7 @@ fn simulate(arguments: &RunArguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.save_mesh {
         require_mesh_file(path)?;
     }
-    if let Some(path) = &arguments.film {
+    if let Some(path) = &arguments.animation {
         Animation::check_path(path).map_err(|error| Failure::Input(error.into()))?;
     }
     let scene = scene(arguments)?;
@@ -69,7 +68,7 @@ fn simulate(arguments: &RunArguments) -> Result<(), Failure> {
         ));
         summary.add(report);
         for warning in report.warnings() {
-            // Each kind once for each part of the scene; the file has all.
+            // The terminal gets each warning once for each part of the scene, frames.jsonl all of them.
             if warned.insert((warning.code, warning.location.clone())) && !arguments.quiet {
                 progress.suspend(|| print_warning(warning));
             }
@@ -78,7 +77,7 @@ fn simulate(arguments: &RunArguments) -> Result<(), Failure> {
             && let Some(warning) = report.warnings().iter().find(|w| w.is_failure())
         {
             failed = Some(anyhow!(
-                "frame {}: {warning} (--keep-going simulates on)",
+                "frame {}: {warning} (--keep-going ignores this)",
                 report.frame
             ));
         }
@@ -141,15 +140,10 @@ pub(crate) fn load(path: Option<&Path>) -> Result<Scene, Failure> {
 
 /// An error about a scene, with the file and the line of the key that it is about.
 pub(crate) fn located(error: Error, path: Option<&Path>) -> Failure {
-    let line = || {
-        let text = fs::read_to_string(path?).ok()?;
-        line_of(&text, &error.key()?)
-    };
-    let (Some(path), Some(line)) = (path, line()) else {
-        return error.into();
-    };
-    let place = format!("{}: line {line}", path.display());
-    Failure::Input(anyhow::Error::from(error).context(place))
+    match path.and_then(|path| location(path, &error)) {
+        Some(location) => Failure::Input(anyhow::Error::from(error).context(location)),
+        None => error.into(),
+    }
 }
 
 /// The scene as asked for, with what the command line changes.

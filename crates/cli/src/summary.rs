@@ -3,7 +3,7 @@
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table};
 use incise::FrameReport;
-use incise::report::{BodyReport, Milliseconds, Missed, SoftenedReport};
+use incise::report::{BodyReport, Milliseconds, Shortfall, SoftenedReport};
 
 /// Name and time of each stage that has one.
 type Stage = (&'static str, fn(&Milliseconds) -> f64);
@@ -18,7 +18,7 @@ const STAGES: [Stage; 8] = [
     ("total", |ms| ms.total),
 ];
 
-/// What the frames of a run had in common, and the table of it.
+/// Times and counts of all frames of a run.
 #[derive(Debug)]
 pub(crate) struct Summary {
     times: Vec<Milliseconds>,
@@ -56,12 +56,7 @@ impl Summary {
     pub(crate) fn table(&self, kappa: [f64; 2], softened: &SoftenedReport) -> String {
         let mut stages = Table::new();
         stages.load_style(UTF8_FULL_CONDENSED);
-        stages.set_header([
-            "ms per frame",
-            "median",
-            "worst",
-            "median of cutting frames",
-        ]);
+        stages.set_header(["ms per frame", "median", "worst", "median with a cut"]);
         for (name, stage) in STAGES {
             let [all, cutting] = [&self.times, &self.cutting].map(|times| sorted(times, stage));
             let row = [
@@ -85,7 +80,7 @@ impl Summary {
             format!("{:.1}", 1e3 * frames as f64 / total),
         ]);
         counts.add_row([
-            "tets before, after".to_owned(),
+            "tets at start, end".to_owned(),
             format!("{}, {}", self.tets_before, self.last.tets),
         ]);
         counts.add_row(["particles".to_owned(), self.last.particles.to_string()]);
@@ -95,14 +90,14 @@ impl Summary {
             format!("{}, {}", self.last.clusters, self.last.colors),
         ]);
         counts.add_row([
-            "worst volume ratio of a cut".to_owned(),
+            "smallest child of a cut (part of its tet's volume)".to_owned(),
             format!("{:.2e}", self.worst_volume_ratio),
         ]);
         for body in &self.last.bodies {
             counts.add_row([substeps_of(&body.bodies), substeps(body)]);
         }
         counts.add_row([
-            "kappa before, after".to_owned(),
+            "kappa at start, end".to_owned(),
             format!("{:.2}, {:.2}", kappa[0], kappa[1]),
         ]);
         counts.add_row([
@@ -116,7 +111,7 @@ impl Summary {
         ]);
         if self.repaired > 0 {
             counts.add_row([
-                "particles put back (do not trust)".to_owned(),
+                "repaired particles (result not reliable)".to_owned(),
                 self.repaired.to_string(),
             ]);
         }
@@ -135,16 +130,16 @@ fn substeps_of(bodies: &[usize]) -> String {
     format!("substeps of body {}", numbers.join(", "))
 }
 
-/// Substeps, and why there are not more if more are wanted.
+/// The number of substeps, with the reason if more are needed.
 fn substeps(body: &BodyReport) -> String {
     let substeps = body.substeps;
     match body.choice {
-        Some(choice) => match choice.missed {
-            Some(Missed::Cap) => {
-                format!("{substeps} (the cap; {} wanted)", choice.substeps_wanted)
+        Some(choice) => match choice.shortfall {
+            Some(Shortfall::Cap) => {
+                format!("{substeps} (limited; {} needed)", choice.substeps_wanted)
             }
-            Some(Missed::Sliver) => format!(
-                "{substeps} ({} wanted by slivers, {} tets)",
+            Some(Shortfall::Sliver) => format!(
+                "{substeps} ({} needed by {} slivers)",
                 choice.substeps_wanted, choice.sliver_tets
             ),
             _ => substeps.to_string(),

@@ -6,7 +6,7 @@
 pub enum ClusteringError {
     /// No clustering method has this name.
     #[error(
-        "there is no clustering '{text}'; write none, serial:K, serial-loose:K, greedy-k:K or pressure:K with a cluster size K, as serial:10"
+        "unknown clustering '{text}'; write none, serial:K, serial-loose:K, greedy-k:K or pressure:K with a cluster size K, as serial:10"
     )]
     UnknownMethod {
         /// What was written.

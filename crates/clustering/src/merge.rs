@@ -1,6 +1,6 @@
 //! Clusters after a cut: what is loose joins small clusters or grows new ones, and what stays small merges.
 //!
-//! A cut takes members out of clusters and brings new constraints that are in none yet. Three passes over the place of
+//! A cut takes members out of clusters and brings new constraints that are in none yet. Three passes over the index of
 //! the cut, all along links between constraints (of tets: across faces), so that nothing grows across a cut:
 //!
 //! 1. Small clusters that a loose constraint or a seed is linked to, those that fill at most half of the size limit,
@@ -194,8 +194,8 @@ impl<N: IntoIterator<Item = u32>, F: Fn(u32) -> N> Merging<'_, F> {
             } = *candidate;
             (loose, Reverse(links), constraint)
         };
-        let places = 0..front.len();
-        let best = places.min_by_key(|&place| rank(&front[place]))?;
+        let indices = 0..front.len();
+        let best = indices.min_by_key(|&index| rank(&front[index]))?;
         Some(front.swap_remove(best))
     }
 

@@ -58,6 +58,11 @@ impl Method {
     }
 }
 
+impl Method {
+    /// The names that [`from_str`](Self::from_str) knows, without the cluster size.
+    pub const NAMES: [&str; 5] = ["none", "serial", "serial-loose", "greedy-k", "pressure"];
+}
+
 impl FromStr for Method {
     type Err = ClusteringError;
 

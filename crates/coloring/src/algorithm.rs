@@ -64,7 +64,7 @@ pub enum Algorithm {
     Tabu(NonZeroUsize),
 }
 
-/// A coloring and what it took to find it.
+/// A coloring, and the work of finding it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Colored {
@@ -72,7 +72,7 @@ pub struct Colored {
     pub coloring: Coloring,
     /// Parallel rounds; 1 for the sequential algorithms.
     pub rounds: usize,
-    /// Looks at neighbors, where the algorithm counts them; its statistics say which.
+    /// Number of looks at neighbors, for algorithms that count them; defined by their statistics.
     pub edge_visits: Option<u64>,
 }
 
@@ -93,7 +93,7 @@ const ORDERS: [(&str, Order); 5] = [
 ];
 
 impl Algorithm {
-    /// All names, the default first, without parameters except where these make another baseline.
+    /// All names, the default first; parameters only where they make another algorithm.
     pub const ALL: [Self; 17] = [
         Self::Auto,
         Self::Scgc(Shortcuts::ALL),
@@ -112,6 +112,23 @@ impl Algorithm {
         Self::Dsatur,
         Self::IteratedGreedy(number(50)),
         Self::Tabu(number(100_000)),
+    ];
+}
+
+impl Algorithm {
+    /// The names that [`from_str`](Self::from_str) knows, without parameters.
+    pub const NAMES: [&str; 11] = [
+        "auto",
+        "scgc",
+        "jones-plassmann",
+        "ecl-gc",
+        "vivace",
+        "wlc",
+        "mcs",
+        "greedy",
+        "dsatur",
+        "iterated-greedy",
+        "tabu",
     ];
 }
 
@@ -219,10 +236,10 @@ impl fmt::Display for Algorithm {
 /// Colors by the given algorithm. The result is proper, and the same for any number of threads.
 ///
 /// `seed` chooses the random numbers of `vivace`, `greedy:random`, `iterated-greedy` and `tabu`.
-/// Those that search stop at [`Conflicts::clique_bound`].
+/// Searching algorithms stop at [`Conflicts::clique_bound`].
 ///
 /// # Errors
-/// None of the algorithms fails as they are called here; a later one may.
+/// Returns an error if an algorithm fails. None of the present ones does with these settings.
 pub fn color(
     algorithm: Algorithm,
     conflicts: &impl Conflicts,

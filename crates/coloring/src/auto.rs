@@ -17,14 +17,14 @@ use incise_graph::Coloring;
 use crate::clique::clique_of_last_color;
 use crate::{Conflicts, Order, greedy, iterated_greedy, tabu};
 
-/// A coloring, what bounds it and what it took.
+/// A coloring, its lower bound, and the work of finding it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Auto {
     /// The coloring.
     pub coloring: Coloring,
-    /// [`Conflicts::clique_bound`], or of a graph perhaps more: if the coloring has as many colors, no
-    /// other has fewer.
+    /// Lower bound: [`Conflicts::clique_bound`], or for a graph possibly more. A coloring with this
+    /// number of colors is optimal.
     pub bound: usize,
     /// Passes of iterated greedy.
     pub passes: usize,
@@ -41,12 +41,12 @@ const MIN_STEPS: usize = 5000;
 /// Any fixed number will do.
 const SEED: u64 = 1;
 
-/// Colors with few colors; stops early where it can tell that there are no fewer.
+/// Finds a coloring with few colors; stops early if it meets the lower bound.
 ///
-/// Proper, deterministic, labels without gaps. Since [`Order::DegreeBound`] and the bound read a graph
-/// differently, it may give another coloring than the incidence it came from. From O(entries) when
-/// the first attempt meets the bound to O(vertices * (degree + colors)) for each color lost and the
-/// last one tried.
+/// Proper, deterministic, labels without gaps. A graph and the incidence it came from may give
+/// different colorings, because [`Order::DegreeBound`] and the bound read a graph differently. From
+/// O(entries) if the first attempt meets the bound to O(vertices * (degree + colors)) for each
+/// color saved and the last one tried.
 ///
 /// ```
 /// use incise_coloring::auto;

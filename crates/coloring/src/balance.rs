@@ -40,42 +40,41 @@ use flips::Flips;
 use partition::Partition;
 use surroundings::{Bits, Surroundings, Walk};
 
-/// What [`balance`] has done. Ranges are those of the colors that carry weight.
+/// Changes made by [`balance`]. Ranges are those of the colors that carry weight.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct BalanceStats {
-    /// Moves of the first step.
+    /// Number of moves of the first step.
     pub moves: usize,
-    /// Chains of the second step.
+    /// Number of chains of the second step.
     pub chains: usize,
-    /// Pairs of classes that exchanged components in the third step.
+    /// Number of pairs of classes that exchanged components in the third step.
     pub flips: usize,
-    /// Vertices whose color is another one than before.
+    /// Number of vertices that changed their color.
     pub changed: usize,
-    /// Heaviest less lightest class before.
+    /// Weight of the heaviest class minus that of the lightest before.
     pub range_before: u64,
-    /// Heaviest less lightest class now.
+    /// Weight of the heaviest class minus that of the lightest after.
     pub range: u64,
 }
 
-/// Makes the classes of a proper coloring even, with the same colors as before.
+/// Balances the weights of the classes of a proper coloring, without an additional color.
 ///
-/// `weights` holds what each vertex counts: 1 each for the number of vertices, or the sizes of
-/// clusters for the number of constraints. Only the colors that carry weight take part; each of
-/// them still does afterwards, and no other one is taken up. Vertices of weight 0 (vacant clusters)
-/// are neither moved by themselves nor counted. In terms of
-/// [`ColoringMetrics::by_weights`](incise_graph::ColoringMetrics::by_weights), `std` and `chi2`
-/// never rise, and fall if anything changes. If the coloring was proper, it stays so.
+/// `weights` has the weight of each vertex: 1 to balance the number of vertices, or the sizes of
+/// clusters to balance the number of constraints. Only the colors that carry weight take part, and
+/// each of them still does afterwards. Vertices of weight 0 (vacant clusters) are neither moved nor
+/// counted. `std` and `chi2` of
+/// [`ColoringMetrics::by_weights`](incise_graph::ColoringMetrics::by_weights) never rise, and fall
+/// if anything changes. A proper coloring stays proper.
 ///
-/// No promise is made on the range: in a star, one class has one vertex and the other all leaves,
-/// and there is nothing to be done. When vertices have few neighbors for the number of colors, as
-/// in meshes, expect a range of at most 1 with weights of 1, and seldom more than that with the
-/// sizes of clusters.
+/// The range is not guaranteed: in a star, one class has one vertex and the other all leaves, in
+/// any coloring. If vertices have few neighbors for the number of colors, as in meshes, expect a
+/// range of at most 1 with weights of 1, and seldom more with sizes of clusters.
 ///
-/// Sequential and deterministic; the same for a graph and the incidence it came from. Usually one
-/// or two passes over the input; every further round costs at most k passes, and their number is
-/// small, though no better bound than the fall of the sum of squares is known. Memory: O(n + k),
-/// from incidence also k bits per particle.
+/// Sequential and deterministic; a graph and the incidence it came from give equal results. Usually
+/// one or two passes over the input. Every further round costs at most k passes; the number of
+/// rounds is small, bounded only by the fall of the sum of squares. Memory: O(n + k), from
+/// incidence also k bits per particle.
 ///
 /// # Panics
 /// If there is not one color and one weight per vertex.

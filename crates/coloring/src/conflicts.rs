@@ -24,8 +24,8 @@ use rayon::prelude::*;
 use crate::clique::clique_of_hubs;
 use crate::first_fit::FirstFit;
 
-/// A set of vertices and their conflicts: [`ConstraintGraph`] (vertices and edges) or
-/// [`Incidence`] (constraints, which conflict when they share a particle).
+/// Vertices and their conflicts: [`ConstraintGraph`] (vertices and edges) or [`Incidence`]
+/// (constraints, which conflict when they share a particle).
 ///
 /// Conflicts are symmetric, and no vertex conflicts with itself. Both implementations of one problem
 /// give equal results in every algorithm of this crate, except where [`degree_bound`](Self::degree_bound)

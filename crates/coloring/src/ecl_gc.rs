@@ -26,29 +26,29 @@ use crate::color_sets::ColorSets;
 use crate::higher::Higher;
 use crate::{Conflicts, priorities};
 
-/// A coloring and how it came about.
+/// Result of [`ecl_gc`]: the coloring and statistics.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct EclGc {
     /// The coloring, equal to that of [`greedy`](crate::greedy()), largest first.
     pub coloring: Coloring,
-    /// Passes and shortcuts.
+    /// Counts of passes and shortcuts.
     pub stats: EclGcStats,
 }
 
-/// What the two halves did.
+/// Statistics of the two halves of ECL-GC.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct EclGcStats {
-    /// Passes over vertices with 32 neighbors or more.
+    /// Number of passes over vertices with 32 neighbors or more.
     pub large_rounds: usize,
-    /// Passes over the others.
+    /// Number of passes over vertices with fewer than 32 neighbors.
     pub small_rounds: usize,
-    /// Vertices that shortcut 1 colored while they still waited for a neighbor.
+    /// Number of vertices that shortcut 1 colored while they still waited for a neighbor.
     pub shortcut1: usize,
-    /// Edges dropped by shortcut 2.
+    /// Number of edges dropped by shortcut 2.
     pub shortcut2: usize,
-    /// How often an undecided vertex looked at a neighbor of higher priority.
+    /// Number of looks of undecided vertices at neighbors of higher priority.
     pub edge_visits: u64,
 }
 

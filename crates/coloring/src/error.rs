@@ -1,18 +1,18 @@
-//! What can be wrong with a request to color.
+//! [`ColoringError`]: invalid requests and improper colorings.
 
-/// A request that names something that does not exist.
+use crate::Algorithm;
+
+/// Errors of coloring: unknown names, invalid parameters, and failed checks.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ColoringError {
     /// No algorithm has this name.
-    #[error(
-        "there is no coloring algorithm '{name}'; known are: auto, scgc, jones-plassmann, ecl-gc, vivace, wlc, mcs, greedy, dsatur, iterated-greedy, tabu"
-    )]
+    #[error("unknown coloring algorithm '{name}'; known are: {}", Algorithm::NAMES.join(", "))]
     UnknownAlgorithm {
         /// The name asked for.
         name: String,
     },
-    /// An algorithm with a parameter that it has not.
+    /// The parameter of an algorithm is invalid.
     #[error("coloring algorithm '{text}': {expected} expected behind the name")]
     BadParameter {
         /// What was written.
@@ -28,18 +28,18 @@ pub enum ColoringError {
         /// Vertices without a color.
         uncolored: usize,
     },
-    /// An edit removes a vertex from a particle where it is not.
+    /// An edit removes a vertex from a particle that it does not have.
     #[error("vertex {vertex} cannot be removed from particle {particle}: it is not there")]
-    NotThere {
+    NoSuchPair {
         /// The vertex.
         vertex: u32,
         /// The particle.
         particle: u32,
     },
-    /// A coloring that is not proper, or not about the same vertices.
+    /// The coloring is not proper or has another number of vertices.
     #[error(transparent)]
     Graph(#[from] incise_graph::GraphError),
-    /// A count that is kept up to date differs from what it counts.
+    /// An incrementally updated count differs from its recomputed value: a defect of this crate.
     #[error("the counts kept beside the coloring are wrong: this is a defect, please report it")]
-    Books,
+    InconsistentCounts,
 }

@@ -11,15 +11,15 @@ use incise_graph::Coloring;
 use crate::Conflicts;
 use crate::random::Random;
 
-/// Colors again up to `passes` times, keeping the best, until at most `target` colors are left;
-/// returns the passes made.
+/// Improves a coloring by up to `passes` greedy passes, keeps the best, and stops at `target`
+/// colors. Returns the number of passes.
 ///
-/// The coloring must be proper and stays so; its number of colors never grows. Deterministic for a
-/// seed; a graph and the incidence it came from give the same. O(passes * (vertices + edges)), from
-/// incidence O(passes * entries) per 64 colors.
+/// The coloring must be proper and stays proper; its number of colors never grows. Deterministic
+/// for a seed; a graph and the incidence it came from give equal results. O(passes * (vertices +
+/// edges)), from incidence O(passes * entries) per 64 colors.
 ///
 /// # Panics
-/// If the coloring has not one color per vertex.
+/// If the number of colors differs from that of vertices.
 ///
 /// ```
 /// use incise_coloring::iterated_greedy;

@@ -1,17 +1,19 @@
-//! Colorings of constraints, or of clusters of them: which may be solved at the same time.
+//! Colors constraints, or clusters of them, so that those of one color can be solved at the same
+//! time.
 //!
-//! Constraints of one color share no particle. [`auto`] finds a coloring with few colors, as few as
-//! can be where the most crowded particle proves it; [`balance`] makes the colors even;
-//! [`Recoloring`] follows constraints that come and go. [`scgc`] is the paper's parallel algorithm
-//! (Algorithm 1) with its shortcuts as flags; [`jones_plassmann`] and [`ecl_gc`] are its ancestors,
-//! and [`greedy`] in [`Order::LargestFirst`] defines the result of all three, bit for bit, on any
-//! number of threads. [`vivace`], [`wlc`], [`dsatur`], [`iterated_greedy`] and [`tabu`] complete the
-//! set; [`Algorithm`] names them all. There is no limit on the number of colors.
+//! Constraints of one color share no particle. [`auto`] finds a coloring with few colors, often the
+//! lower bound, which is the largest number of constraints at a particle; [`balance`] evens out the
+//! classes; [`Recoloring`] updates a coloring when constraints are added and removed. [`scgc`] is
+//! the paper's parallel algorithm (Algorithm 1) with its shortcuts as flags; [`jones_plassmann`]
+//! and [`ecl_gc`] are its predecessors, and [`greedy`] in [`Order::LargestFirst`] defines the
+//! result of all three, bit for bit, on any number of threads. [`vivace`], [`wlc`], [`dsatur`],
+//! [`iterated_greedy`] and [`tabu`] complete the set; [`Algorithm`] has the names of all. The
+//! number of colors is not limited.
 //!
-//! Everything takes [`Conflicts`]: lists of particles per constraint
+//! All functions take [`Conflicts`]: lists of particles per constraint
 //! ([`Incidence`](incise_graph::Incidence)), which is often enough and much faster than building a
-//! graph, or any graph ([`ConstraintGraph`](incise_graph::ConstraintGraph)). Nothing here knows of
-//! meshes.
+//! graph, or any graph ([`ConstraintGraph`](incise_graph::ConstraintGraph)). The crate does not
+//! depend on meshes.
 //!
 //! ```
 //! use incise_coloring::{Order, auto, greedy, scgc};

@@ -13,14 +13,14 @@ use crate::buckets::{Buckets, Extreme};
 use crate::random::Random;
 use crate::{Conflicts, priority_order};
 
-/// Which vertices choose first.
+/// Order in which greedy coloring visits vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Order {
-    /// By number.
+    /// Ascending by number.
     Natural,
-    /// In an order drawn with this seed; the same on every machine.
+    /// Random with this seed; equal on every machine.
     Random(u64),
     /// Most neighbors first, ties by hash: [`priority_order`], that of the parallel algorithms
     /// (Welsh and Powell 1967).
@@ -29,14 +29,15 @@ pub enum Order {
     /// incidence this needs no edges, but where neighbors share several particles it differs from
     /// what a graph gives.
     DegreeBound,
-    /// Filled from the back: always the vertex with the fewest neighbors among those not placed yet.
+    /// Smallest last: filled from the back with the vertex that has the fewest neighbors among
+    /// those not placed yet.
     SmallestLast,
-    /// Next the vertex with the most neighbors among those already placed (maximum cardinality
-    /// search, MCS).
+    /// Maximum cardinality search (MCS): next is the vertex with the most neighbors among those
+    /// already placed.
     MaximumCardinality,
 }
 
-/// All vertices of `conflicts`, those that choose first in front.
+/// Returns all vertices of `conflicts` in an order, the first to choose in front.
 ///
 /// Deterministic, and but for `DegreeBound` the same for a graph and the incidence it came from. O(n)
 /// for `Natural`, O(n + entries) for `DegreeBound`, O(n) for `Random`, O(n log n + degrees) for
@@ -75,19 +76,19 @@ pub fn order(conflicts: &impl Conflicts, order: Order) -> Vec<u32> {
 fn by_degree_bound(conflicts: &impl Conflicts) -> Vec<u32> {
     let degree_bound = conflicts.degree_bound();
     let most = degree_bound.iter().max().map_or(0, |&most| most as usize);
-    // From the bound to the place of the next vertex that has it.
-    let mut place = vec![0u32; most + 2];
+    // Bound -> position of the next vertex with that bound.
+    let mut next = vec![0u32; most + 2];
     for &degree_bound in &degree_bound {
-        place[most - degree_bound as usize + 1] += 1;
+        next[most - degree_bound as usize + 1] += 1;
     }
     for i in 0..=most {
-        place[i + 1] += place[i];
+        next[i + 1] += next[i];
     }
     let mut order = vec![0; degree_bound.len()];
     for (v, &degree_bound) in (0..).zip(&degree_bound) {
-        let place = &mut place[most - degree_bound as usize];
-        order[*place as usize] = v;
-        *place += 1;
+        let next = &mut next[most - degree_bound as usize];
+        order[*next as usize] = v;
+        *next += 1;
     }
     order
 }

@@ -13,8 +13,8 @@ use rayon::prelude::*;
 
 use crate::Conflicts;
 
-/// A scrambled number; different for different `id`s. Integer arithmetic only, so the same
-/// everywhere.
+/// Returns a scrambled number, different for different `id`s. Integer arithmetic only, so it is
+/// equal on every machine.
 #[must_use]
 pub fn hash(id: u32) -> u32 {
     const ODD: u32 = 0x045d_9f3b;
@@ -23,10 +23,10 @@ pub fn hash(id: u32) -> u32 {
     (x >> 16) ^ x
 }
 
-/// The priority of every vertex: degree in the high 32 bits, hash in the low ones. Greater goes
-/// first; no two are equal.
+/// Returns the priority of every vertex: degree in the high 32 bits, hash in the low ones. The
+/// greater one goes first; no two are equal.
 ///
-/// Costs what [`Conflicts::degrees`] does.
+/// The cost is that of [`Conflicts::degrees`].
 ///
 /// ```
 /// use incise_coloring::priorities;
@@ -46,7 +46,7 @@ pub fn priorities(conflicts: &impl Conflicts) -> Vec<u64> {
         .collect()
 }
 
-/// All vertices, highest priority first. O(n log n) beside the priorities.
+/// Returns all vertices, highest priority first. O(n log n) beside the priorities.
 #[must_use]
 pub fn priority_order(conflicts: &impl Conflicts) -> Vec<u32> {
     let mut order: Vec<(u64, u32)> = priorities(conflicts).into_iter().zip(0..).collect();

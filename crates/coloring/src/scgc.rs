@@ -41,37 +41,37 @@ use rayon::prelude::*;
 use crate::search::{Rule, Search, State};
 use crate::{Conflicts, Shortcuts};
 
-/// A coloring and how it came about.
+/// Result of [`scgc`]: the coloring and statistics.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Scgc {
     /// The coloring, equal to that of [`greedy`](crate::greedy()).
     pub coloring: Coloring,
-    /// Rounds, work and rules.
+    /// Counts of rounds, work and rules.
     pub stats: ScgcStats,
 }
 
-/// What each rule of Algorithm 1 did. The four vertex counts add up to the number of vertices; a
-/// vertex counts for the cheapest rule that holds for all its neighbors, in the order of the
+/// Statistics of the rules of Algorithm 1. The four vertex counts add up to the number of vertices.
+/// A vertex counts for the cheapest rule that holds for all its neighbors, in the order of the
 /// fields.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct ScgcStats {
-    /// Parallel rounds until every vertex had a color.
+    /// Number of parallel rounds until every vertex had a color.
     pub rounds: usize,
-    /// How often a vertex looked at a neighbor of higher priority, and every edge twice for telling
-    /// the neighbors. From incidence the same number: neighbors met again do not count.
+    /// Number of looks of vertices at neighbors of higher priority, plus two for every edge to
+    /// notify the neighbors. An incidence gives the same number: repeated neighbors do not count.
     pub edge_visits: u64,
-    /// Vertices that waited for all their neighbors of higher priority (line 4).
+    /// Number of vertices that waited for all their neighbors of higher priority (line 4).
     pub dependency_free: usize,
-    /// Vertices with no neighbor left to wait for, some of them removed by shortcut 2.
+    /// Number of vertices with no neighbor left to wait for, some of them removed by shortcut 2.
     pub shortcut2: usize,
-    /// Vertices whose best color was smaller than that of every neighbor left. Shortcut 1 holds for
-    /// each of them too. None if shortcut 3 is off.
+    /// Number of vertices whose best color was smaller than that of every remaining neighbor.
+    /// Shortcut 1 holds for each of them, too. 0 if shortcut 3 is off.
     pub shortcut3: usize,
-    /// Vertices that shortcut 1 colored and shortcut 3, if it is on, alone would not have.
+    /// Number of vertices that shortcut 1 colored and shortcut 3 alone would not have.
     pub shortcut1: usize,
-    /// Edges removed by shortcut 2.
+    /// Number of edges removed by shortcut 2.
     pub removed_edges: usize,
 }
 
@@ -107,9 +107,9 @@ pub fn scgc(conflicts: &impl Conflicts) -> Scgc {
 /// Colors in parallel without shortcuts: every vertex waits for all its neighbors of higher
 /// priority (Jones and Plassmann 1993, with the priorities of ECL-GC instead of random ones).
 ///
-/// The coloring of [`scgc`] in several times as many rounds: their number is that of the vertices
-/// on the longest chain of falling priorities. Work: each edge three times, plus the number of
-/// undecided vertices summed over the rounds.
+/// Gives the coloring of [`scgc`] in several times as many rounds: their number is that of the
+/// vertices on the longest chain of falling priorities. Work: each edge three times, plus the
+/// number of undecided vertices summed over the rounds.
 ///
 /// ```
 /// use incise_coloring::{jones_plassmann, scgc};
@@ -127,7 +127,7 @@ pub fn jones_plassmann(conflicts: &impl Conflicts) -> Scgc {
     scgc_with(conflicts, Shortcuts::NONE)
 }
 
-/// [`scgc`] with some of the shortcuts. The coloring is the same for every choice; see
+/// Colors like [`scgc`] with some of the shortcuts. The coloring does not depend on the choice; see
 /// [`Shortcuts`].
 ///
 /// Adding a shortcut never adds a round, and adding shortcut 3 to shortcut 1 never saves one.

@@ -15,16 +15,16 @@ use crate::Conflicts;
 use crate::conflicts::UNCOLORED;
 use crate::random::Random;
 
-/// Tries to lose one color after the other until `target` are left, with up to `steps` steps for
-/// each; returns the steps made.
+/// Removes colors one after the other until `target` are left, with up to `steps` search steps for
+/// each. Returns the number of steps.
 ///
-/// The coloring must be proper and stays so; what was reached before the steps ran out is kept, and
-/// its number of colors never grows. Deterministic for a seed; a graph and the incidence it came
-/// from give the same. O(steps * (largest degree + colors)) for each color; from incidence the
+/// The coloring must be proper and stays proper. The best result before the steps ran out is kept;
+/// the number of colors never grows. Deterministic for a seed; a graph and the incidence it came
+/// from give equal results. O(steps * (largest degree + colors)) for each color; from incidence the
 /// degree counts shared particles.
 ///
 /// # Panics
-/// If the coloring has not one color per vertex.
+/// If the number of colors differs from that of vertices.
 ///
 /// ```
 /// use incise_coloring::tabu;

@@ -21,27 +21,28 @@ use crate::color_sets::ColorSets;
 use crate::random::scramble;
 use crate::{ColoringError, Conflicts};
 
-/// Which vertex keeps a color that neighbors picked, too.
+/// Rule for the vertex that keeps a color which neighbors picked, too.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Tie {
-    /// The highest number among neighbors that picked the same color.
+    /// The vertex with the highest number among neighbors that picked the same color.
     #[default]
     HighestOfSame,
-    /// Only a vertex of higher number than all uncolored neighbors: weaker, so slower.
+    /// Only a vertex with a higher number than all uncolored neighbors: fewer vertices a round, so
+    /// slower.
     HighestOfAll,
 }
 
-/// How to color.
+/// Settings of [`vivace`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VivaceOptions {
     /// The shrinking factor s, from 1: a palette starts with degree / s + 1 colors.
     pub shrinking: u32,
-    /// Chooses the random numbers.
+    /// Seed of the random numbers.
     pub seed: u64,
-    /// Which vertex keeps a color that neighbors picked, too.
+    /// Rule for the vertex that keeps a color which neighbors picked, too.
     pub tie: Tie,
-    /// Rounds after which vertices without a color are an error.
+    /// Largest number of rounds; vertices without a color after them are an error.
     pub max_rounds: usize,
 }
 
@@ -57,26 +58,26 @@ impl Default for VivaceOptions {
     }
 }
 
-/// A coloring and how it came about.
+/// Result of [`vivace`]: the coloring and statistics.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Vivace {
     /// The coloring, labels without gaps.
     pub coloring: Coloring,
-    /// Rounds and colors.
+    /// Counts of rounds and colors.
     pub stats: VivaceStats,
 }
 
-/// What it took.
+/// Statistics of [`vivace`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct VivaceStats {
-    /// Rounds until every vertex had a color.
+    /// Number of rounds until every vertex had a color.
     pub rounds: usize,
     /// The largest label plus one before gaps were closed. The paper seems to count these.
     pub labels: usize,
-    /// How often a vertex ran out of colors.
-    pub fed: usize,
+    /// Number of times that a vertex ran out of colors.
+    pub refills: usize,
     /// The neighbors of the uncolored vertices, summed over the rounds. A round looks at each of them
     /// up to three times.
     pub edge_visits: u64,
@@ -138,7 +139,7 @@ pub fn vivace(conflicts: &impl Conflicts, options: VivaceOptions) -> Result<Viva
             state.colors[v as usize] = state.picked[v as usize];
         }
         uncolored.retain(|&v| state.colors[v as usize] == NONE);
-        stats.fed += state.renew(&uncolored);
+        stats.refills += state.renew(&uncolored);
     }
     let mut coloring = Coloring::new(state.colors.into_iter().map(ColorId).collect());
     stats.labels = coloring.color_count();

@@ -24,23 +24,23 @@ use crate::Conflicts;
 use crate::conflicts::UNCOLORED;
 use crate::first_fit::FirstFit;
 
-/// A coloring and how it came about.
+/// Result of [`wlc`]: the coloring and statistics.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Wlc {
     /// The coloring.
     pub coloring: Coloring,
-    /// Rounds and repairs.
+    /// Counts of rounds and repairs.
     pub stats: WlcStats,
 }
 
-/// What it took.
+/// Statistics of [`wlc`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct WlcStats {
-    /// Worklists until one was empty.
+    /// Number of worklists until one was empty.
     pub rounds: usize,
-    /// How often a vertex lost its color.
+    /// Number of times that a vertex lost its color.
     pub conflicts: usize,
     /// The neighbors of the vertices of all worklists, counted twice: to choose and, at most, to
     /// compare.
@@ -50,8 +50,8 @@ pub struct WlcStats {
 /// Vertices per task at least.
 const GRAIN: usize = 64;
 
-/// Colors speculatively in parallel, in the current rayon thread pool; `chunk` vertices choose at
-/// the same time, fewer after rounds in which most lost.
+/// Colors speculatively in parallel, in the current rayon thread pool. `chunk` vertices choose at
+/// the same time, fewer after rounds with many conflicts.
 ///
 /// Proper, labels without gaps, at most one color more than the largest degree. The result depends
 /// on the chunk, but not on the number of threads, nor on whether a graph is given or the incidence

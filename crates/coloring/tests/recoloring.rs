@@ -159,7 +159,7 @@ fn edits_that_do_not_fit_change_nothing() {
         &[(0, 99)],
     ] {
         let error = recoloring.apply(removed, &[(7, 0)]).unwrap_err();
-        assert!(matches!(error, ColoringError::NotThere { .. }), "{error}");
+        assert!(matches!(error, ColoringError::NoSuchPair { .. }), "{error}");
         recoloring.check().unwrap();
         assert_eq!(
             (recoloring.coloring(), recoloring.incidence()),

@@ -21,7 +21,7 @@ pub struct SplitEdge {
     pub point: ParticleId,
 }
 
-/// Splits the tet `corners` at `edges`, in the order given, and writes the children to `children`.
+/// Splits the tet `corners` at `edges`, in their order, and writes the children to `children`.
 ///
 /// The order must be the same for every tet of an operation; [`crate::CuttableMesh`] takes the longest edge at rest
 /// first. Edges that are not edges of the tet are ignored. With no edge the only child is the tet itself.

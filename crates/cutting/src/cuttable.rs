@@ -11,9 +11,8 @@ use crate::{BoundaryTriangle, CutError};
 
 /// A tetrahedral mesh at rest that can be cut.
 ///
-/// Owns the mesh and what makes cutting it local: for each particle the tets around it, for each face what lies behind
-/// it, and a list of the boundary triangles. Strokes change both in place and return what they changed
-/// as a [`crate::CutDelta`].
+/// Owns the mesh and the lists that make cutting it local: the tets around each particle, the neighbor behind each
+/// face, and the boundary triangles. Strokes change these in place and return the changes as a [`crate::CutDelta`].
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CuttableMesh {
@@ -25,7 +24,7 @@ pub struct CuttableMesh {
 }
 
 impl CuttableMesh {
-    /// Takes over a mesh.
+    /// Creates a cuttable mesh from a mesh, which is checked.
     ///
     /// # Errors
     /// [`CutError::Mesh`] if the mesh does not pass [`TetMesh::check`].
@@ -41,13 +40,13 @@ impl CuttableMesh {
         })
     }
 
-    /// The mesh at rest, with all cuts made so far.
+    /// Returns the mesh at rest, with all cuts made so far.
     #[must_use]
     pub fn mesh(&self) -> &TetMesh {
         &self.mesh
     }
 
-    /// The tets around a particle, in no particular order (the same for the same history of cuts).
+    /// Returns the tets around a particle, in an unspecified order that depends only on the history of cuts.
     ///
     /// # Panics
     /// If the particle does not exist.
@@ -77,7 +76,7 @@ impl CuttableMesh {
         longest.sqrt()
     }
 
-    /// The tet behind each face of a tet, by the corner that the face lies opposite to; `None` on the boundary. O(1).
+    /// Returns the tet behind each face of a tet, by the corner opposite to the face; `None` on the boundary. O(1).
     ///
     /// # Panics
     /// If the tet does not exist.
@@ -89,16 +88,16 @@ impl CuttableMesh {
         })
     }
 
-    /// Number of boundary triangles. O(1).
+    /// Returns the number of boundary triangles. O(1).
     #[must_use]
     pub fn boundary_count(&self) -> usize {
         self.faces.boundary().len()
     }
 
-    /// The boundary triangles, outer ones and cut ones, without a pass over the mesh.
+    /// Returns the boundary triangles, outer ones and cut ones, without a pass over the mesh.
     ///
-    /// The order is the same for the same history of cuts: a triangle that is cut keeps its place for one of its parts,
-    /// new ones are appended.
+    /// The order depends only on the history of cuts: a triangle that is cut keeps its index for one of its parts; new
+    /// ones are appended.
     pub fn boundary(&self) -> impl Iterator<Item = BoundaryTriangle> + '_ {
         let faces = self.faces.boundary().iter();
         faces.filter_map(|&(face, _)| self.faces.triangle(&self.mesh, face))

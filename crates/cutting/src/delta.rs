@@ -1,4 +1,4 @@
-//! [`CutDelta`]: everything a cut changed, the only way a cut leaves this crate.
+//! [`CutDelta`]: all changes of a cut, and the only result of this crate's cuts.
 //!
 //! With the feature `serde` deltas can be written and read, so that a session can be recorded and replayed; take a
 //! format that keeps all digits (JSON through `serde_json` does so with its feature `float_roundtrip`).
@@ -15,13 +15,13 @@ use incise_mesh::{ParticleId, TetId, TetMesh};
 pub struct EdgePoint {
     /// The ends of the edge; both have smaller ids than the new particle.
     pub ends: [ParticleId; 2],
-    /// Where on the edge: 0 at the first end, 1 at the second. The same parameter interpolates rest position,
-    /// position, velocity and whatever else is carried by particles, so that mass, momentum and volume are kept.
+    /// Position on the edge: 0 at the first end, 1 at the second. The same parameter interpolates rest position,
+    /// position, velocity and other quantities of particles, so mass, momentum and volume are kept.
     pub parameter: f64,
 }
 
 impl EdgePoint {
-    /// The value at the point of a quantity carried by particles.
+    /// Interpolates a quantity of particles at the point.
     #[must_use]
     pub fn interpolate(&self, values: &[DVec3]) -> DVec3 {
         let [a, b] = self.ends.map(|p| values[p.index()]);
@@ -29,13 +29,13 @@ impl EdgePoint {
     }
 }
 
-/// A tet as it was before it was cut.
+/// A tet before it was cut or deleted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RemovedTet {
-    /// Its slot, which its first child has taken over.
+    /// Index of the tet, which its first child has taken over.
     pub tet: TetId,
-    /// The corners it had.
+    /// Corners of the tet before the cut.
     pub corners: [ParticleId; 4],
 }
 
@@ -45,45 +45,45 @@ pub struct RemovedTet {
 pub struct AddedTet {
     /// Its slot.
     pub tet: TetId,
-    /// The slot of the removed tet that it is a part of.
+    /// Index of the cut tet that the child is a part of.
     pub parent: TetId,
     /// Its corners.
     pub corners: [ParticleId; 4],
-    /// On which side of the cut it lies: the side the normal points to or the other one.
+    /// Whether the child is on the side of the cut that the normal points to.
     pub positive: bool,
 }
 
-/// A whole tet that now hangs on copies of some of its corners.
+/// A tet that was not cut but has copies of particles as corners now.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RelinkedTet {
     /// Its slot.
     pub tet: TetId,
-    /// Its corners before.
+    /// Corners before the cut.
     pub before: [ParticleId; 4],
-    /// Its corners now.
+    /// Corners after the cut.
     pub after: [ParticleId; 4],
 }
 
-/// A tet that took over the slot of one that was deleted, so that slots stay dense.
+/// A tet that moved to the index of a deleted one, so that indices stay dense.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MovedTet {
-    /// Its slot before.
+    /// Index before the removal.
     pub from: TetId,
-    /// Its slot now.
+    /// Index after the removal.
     pub to: TetId,
-    /// Its corners, which do not change.
+    /// Corners of the tet, which do not change.
     pub corners: [ParticleId; 4],
 }
 
-/// What a triangle of the boundary is.
+/// Kind of a boundary triangle: outer surface or cut face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum FaceTag {
-    /// Part of the surface the body had when it was made.
+    /// Part of the original surface of the body.
     Outer,
-    /// Laid bare by the stroke of this number.
+    /// Cut face, opened by the stroke with this number.
     Cut(u32),
 }
 
@@ -91,19 +91,19 @@ pub enum FaceTag {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BoundaryTriangle {
-    /// The tet it is a face of.
+    /// The tet that the triangle is a face of.
     pub tet: TetId,
-    /// The corner of that tet, 0 to 3, which it lies opposite to.
+    /// The corner of that tet, 0 to 3, opposite to the triangle.
     pub opposite: u8,
-    /// Its particles, counterclockwise seen from outside.
+    /// Particles of the triangle, counterclockwise seen from outside.
     pub particles: [ParticleId; 3],
-    /// What it is.
+    /// Kind of the triangle.
     pub tag: FaceTag,
 }
 
-/// Everything one cut changed.
+/// All changes of one cut: new particles, removed and added tets, tets with other corners, and boundary triangles.
 ///
-/// A cut splits tets and separates them; taking tets away deletes and moves tets. One delta does one or the other.
+/// A cut splits and separates tets; a removal deletes and moves tets. A delta describes one or the other.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CutDelta {
@@ -113,27 +113,27 @@ pub struct CutDelta {
     pub tets_before: usize,
     /// New particles on edges: point `i` is particle `particles_before + i`.
     pub points: Vec<EdgePoint>,
-    /// New particles where the body separated, each a copy of the particle named here: copy `i` is particle
+    /// New particles where the body separated, each a copy of the listed particle: copy `i` is particle
     /// `particles_before + points.len() + i`.
     pub copies: Vec<ParticleId>,
     /// The cut tets, ascending.
     pub removed: Vec<RemovedTet>,
-    /// Their children, ascending by parent, then by slot.
+    /// Children of the cut tets, ascending by parent, then by index.
     pub added: Vec<AddedTet>,
-    /// Tets that were not cut but have other corners now, ascending by the slot before any moves.
+    /// Tets that were not cut but have other corners now, ascending by index before any moves.
     pub relinked: Vec<RelinkedTet>,
-    /// Tets taken away without children, ascending by the slot they had before.
+    /// Tets removed without children, ascending by their index before.
     pub deleted: Vec<RemovedTet>,
-    /// The last tets, moved into the slots of deleted ones, ascending by `to`. No `to` lies at or past
-    /// [`CutDelta::tets_after`], every `from` does.
+    /// The last tets, moved to the indices of deleted ones, ascending by `to`. Every `to` is below
+    /// [`CutDelta::tets_after`], and no `from` is.
     pub moved: Vec<MovedTet>,
-    /// Triangles of the boundary that are gone, with the slots that their tets had before.
+    /// Removed boundary triangles, with the indices of their tets before the cut.
     pub surface_removed: Vec<BoundaryTriangle>,
-    /// Triangles of the boundary that are new, with the slots that their tets have now.
+    /// New boundary triangles, with the indices of their tets after the cut.
     pub surface_added: Vec<BoundaryTriangle>,
-    /// Particles that the surface was bent to by snapping.
+    /// Number of particles that the surface was snapped to.
     pub snapped: usize,
-    /// Those particles off a plane or level set that no earlier one had been bent to: kept for undo.
+    /// Snapped particles of a plane or level set that no earlier cut had snapped to, kept for undo.
     pub bent: Vec<ParticleId>,
     /// The smallest volume of a child as a fraction of its parent's (1 if none was cut).
     pub worst_volume_ratio: f64,
@@ -151,19 +151,19 @@ impl CutDelta {
             && self.deleted.is_empty()
     }
 
-    /// Number of particles after the cut.
+    /// Returns the number of particles after the cut.
     #[must_use]
     pub fn particles_after(&self) -> usize {
         self.particles_before + self.points.len() + self.copies.len()
     }
 
-    /// Number of tets after the cut.
+    /// Returns the number of tets after the cut.
     #[must_use]
     pub fn tets_after(&self) -> usize {
         self.tets_before + self.added.len() - self.removed.len() - self.deleted.len()
     }
 
-    /// The slot now of a tet that was not deleted.
+    /// Returns the index after the cut of a tet that was not deleted.
     #[must_use]
     pub fn slot_after(&self, tet: TetId) -> TetId {
         // Both ends of the moves ascend.
@@ -171,7 +171,7 @@ impl CutDelta {
         moved.map_or(tet, |i| self.moved[i].to)
     }
 
-    /// Extends a quantity carried by particles to the new ones: interpolated on edges, repeated for copies.
+    /// Extends a quantity of particles to the new ones: interpolated on edges, repeated for copies.
     ///
     /// # Panics
     /// If `values` does not have an entry for each particle before the cut.
@@ -179,8 +179,8 @@ impl CutDelta {
         self.extend_with(values, |a, b, t| *a + (*b - *a) * t);
     }
 
-    /// Extends a quantity of any kind carried by particles to the new ones, such as texture coordinates or
-    /// temperatures; `interpolate` gets the values at both ends of an edge and the parameter. Copies repeat the value.
+    /// Extends a quantity of particles of any type to the new ones, such as texture coordinates or temperatures.
+    /// `interpolate` gets the values at both ends of an edge and the parameter. Copies repeat the value.
     ///
     /// # Panics
     /// If `values` does not have an entry for each particle before the cut.

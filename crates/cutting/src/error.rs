@@ -1,8 +1,8 @@
-//! [`CutError`]: what can be wrong with a stroke.
+//! [`CutError`]: errors of cuts.
 
 use incise_mesh::MeshError;
 
-/// Why a stroke was refused. Nothing has been changed when one of these is returned.
+/// Error of a cut. Nothing has been changed when it is returned.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CutError {
@@ -118,7 +118,7 @@ pub enum CutError {
         /// Its area in m².
         area: f64,
     },
-    /// The mesh was changed since the last call without the stroke being told.
+    /// The mesh was changed since the last call without an update of the stroke.
     #[error(
         "the stroke goes on from a mesh of {particles} particles and {tets} tets, which has changed since: let it \
          follow cuts and removals, and go on with an earlier clone after an undo"
@@ -129,7 +129,7 @@ pub enum CutError {
         /// Tets the stroke knows.
         tets: usize,
     },
-    /// The pieces that are tracked are not those of the mesh, which would be a defect of this crate.
+    /// The tracked pieces differ from those of the mesh: a defect of this crate.
     #[error("the pieces are not current: {0}")]
     Pieces(String),
 }

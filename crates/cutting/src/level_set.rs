@@ -26,9 +26,9 @@ const RESOLUTION: f64 = 1e-15;
 /// distance. It should be continuous: where it jumps across zero, the jump is cut.
 ///
 /// # Returns
-/// What changed. Nothing, if the field has one sign everywhere. The surface is that of the mesh: it is straight within
-/// each tet. An edge that is crossed twice has ends of one sign and is not cut, so what is thinner than a tet is
-/// missed. Repeating a cut changes nothing; only with snapping, where the surface bends by much within a tet, it may.
+/// Returns the changes; none if the field has one sign everywhere. The cut surface is straight within each tet. An edge
+/// that the surface crosses twice has ends of one sign and is not cut, so parts thinner than a tet are missed. A
+/// repeated cut changes nothing, except where snapping bends a strongly curved surface.
 ///
 /// # Errors
 /// If the field is not finite at a particle or on a crossed edge, if the options are not valid, or if `positions` has

@@ -1,4 +1,4 @@
-//! Cutting tetrahedral meshes: planes and swept blades in, one [`CutDelta`] out.
+//! Cuts tetrahedral meshes with planes, surfaces and swept blades; each cut returns one [`CutDelta`].
 //!
 //! A [`CuttableMesh`] holds a mesh at rest. [`cut_plane`] cuts it with a whole plane at once, [`cut_level_set`] along
 //! the zero set of a field, [`cut_surface`] along triangles; a [`Sweep`] moves a blade through it frame by frame. All
@@ -24,7 +24,7 @@
 //! # Ok::<(), incise_cutting::CutError>(())
 //! ```
 //!
-//! This crate knows nothing of constraints, solvers, colors or the GPU.
+//! The crate does not depend on constraints, solvers, colors or the GPU.
 
 mod bisect;
 mod blade;

@@ -1,27 +1,27 @@
-//! [`CutOptions`]: how close to a particle a crossing may lie.
+//! [`CutOptions`]: snapping, separation and limits of a cut.
 
 use crate::CutError;
 
-/// How a body separates at the particles on a cut.
+/// Criterion by which a body separates at the particles on a cut.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Separation {
-    /// Faces on the surface with tets on both sides are cut; the parts of a particle's star that no uncut face joins
-    /// get a particle each. Right for snapped particles, partial cuts, repeated cuts and edges where more than two
-    /// parts of the boundary meet.
+    /// Faces on the surface with tets on both sides are cut. Parts of a particle's star that no uncut face connects get
+    /// a particle each. Correct for snapped particles, partial cuts, repeated cuts and edges where more than two parts
+    /// of the boundary meet.
     #[default]
     CutFaces,
     /// The paper's criterion (section 4.3): two tets at a particle on the cut stay joined if they share a particle that
-    /// was there before the cut. For an unsnapped cut of a sound mesh the same as [`Separation::CutFaces`]. Where a
-    /// particle was snapped it is wrong: that particle was there before, so both sides stay tied to it.
+    /// was there before the cut. For an unsnapped cut of a sound mesh it equals [`Separation::CutFaces`]. It fails at
+    /// snapped particles: they were there before, so both sides stay tied to them.
     SharedOriginal,
-    /// Two tets at a particle on the cut stay joined if they share a particle off the surface. Right also with snapped
-    /// particles. Wrong where tets lie on the surface with all four particles, which then share nothing and come off,
-    /// and where a surface grazes particles without crossing an edge, which it then tears.
+    /// Two tets at a particle on the cut stay joined if they share a particle off the surface. Correct with snapped
+    /// particles, too. It fails for tets with all four particles on the surface, which come off, and where a surface
+    /// grazes particles without crossing an edge, which tears the body there.
     SharedOffSurface,
 }
 
-/// How crossings close to a particle are treated.
+/// Settings of a cut: snapping, limits on new tets, separation, tag.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CutOptions {
@@ -34,15 +34,15 @@ pub struct CutOptions {
     /// double and 1e-5 for positions in single precision. Where cuts of cuts would leave tets thinner than a few units
     /// of the last digit of their coordinates at rest, crossings move to the nearer end, however far it is.
     pub tolerance: f64,
-    /// A guard on the volume of children as a fraction of their parent's, from 0 (off) to 0.015. Where snapping alone
-    /// does not promise it, crossings are snapped from as far as it takes. A tet whose edges were met in several steps
-    /// of one frame counts as many parents.
+    /// Lower bound on the volume of children as a fraction of their parent's, from 0 (off) to 0.015. Where snapping
+    /// alone does not guarantee it, crossings snap from farther away. A tet whose edges are crossed in several steps of
+    /// one frame counts as several parents.
     pub min_volume_ratio: f64,
-    /// How the body separates.
+    /// Criterion by which the body separates.
     pub separation: Separation,
-    /// The number that the faces laid bare are tagged with ([`crate::FaceTag::Cut`]).
+    /// Number that opened faces are tagged with ([`crate::FaceTag::Cut`]).
     pub tag: u32,
-    /// The most tets that a cut may leave the mesh with; one that would leave more is refused, with nothing changed.
+    /// Largest number of tets of the mesh after a cut. A cut that would exceed it is an error and changes nothing.
     pub max_tets: usize,
 }
 

@@ -2,10 +2,10 @@
 //!
 //! A piece is a set of tets connected through shared particles, as in [`incise_mesh::Pieces`]. The children of a cut
 //! tet belong to its piece, so something can come off only where particles were copied or tets taken away. From there
-//! the module `parts` searches in lockstep and stops when all parts but one are known; those come off as pieces of
+//! the module `component_search` searches in lockstep and stops when all parts but one are known; those come off as pieces of
 //! their own and the one left keeps its name.
 //!
-//! Cost: [`PieceTracker::new`] a pass over the tets. [`PieceTracker::follow`] what the cut touched, the way around the
+//! Cost: [`PieceTracker::new`] a pass over the tets. [`PieceTracker::apply_delta`] what the cut touched, the way around the
 //! front of a slit, and a few times the parts that come off, at most about three such passes. Memory: 4 bytes a tet and
 //! a particle. Measured on grids of 10,000, 80,000 and 660,000 tets, as tets looked at ([`PieceTracker::looks`]): 54 a
 //! frame for a slit four cells wide, whatever the grid; 6,000 for a corner of 426 tets; 220, 430 and 860 a frame for a
@@ -25,21 +25,21 @@ use crate::{CutDelta, CutError, CuttableMesh};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Piece {
-    /// Its number. Pieces are numbered from 0 as they come to be; no number is used twice.
+    /// Number of the piece. Pieces are numbered from 0 in the order of their detachment; no number is used twice.
     pub id: u32,
-    /// The piece it came off; none for the pieces a mesh had before all cuts.
+    /// The piece it was detached from; `None` for pieces from before all cuts.
     pub parent: Option<u32>,
-    /// Number of its tets.
+    /// Number of tets of the piece.
     pub tets: usize,
-    /// Its volume at rest in m³.
+    /// Volume at rest of the piece in m³.
     pub volume: f64,
 }
 
-/// What happened to a piece.
+/// An event of a piece: detached or vanished.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum PieceEvent {
-    /// A part came off and is a piece of its own now.
+    /// A part was detached and is a new piece.
     Detached {
         /// The new piece.
         piece: u32,
@@ -50,14 +50,14 @@ pub enum PieceEvent {
         /// Volume at rest of the new piece in m³.
         volume: f64,
     },
-    /// The last tets of a piece were taken away.
+    /// The last tets of a piece were removed.
     Vanished {
         /// The piece, which no longer exists.
         piece: u32,
     },
 }
 
-/// The pieces of a [`CuttableMesh`], following its deltas.
+/// The pieces of a [`CuttableMesh`], updated by its deltas.
 ///
 /// # Example
 /// ```
@@ -134,7 +134,7 @@ impl Sum {
 }
 
 impl PieceTracker {
-    /// The pieces of a mesh, numbered in the order of their first tets. O(tets).
+    /// Finds the pieces of a mesh, numbered in the order of their first tets. O(tets).
     ///
     /// # Panics
     /// If the mesh has 2³² pieces or more.
@@ -155,20 +155,20 @@ impl PieceTracker {
         }
     }
 
-    /// Follows a cut.
+    /// Applies a delta and returns the detached and vanished pieces.
     ///
-    /// A part that comes off gets the next number. Which part keeps the old one: the one whose search was still going
-    /// on when the searches of all others had ended, mostly the largest; if the last ended in the same round or the
-    /// searches were given up for a count, the one with the most tets, then the one with the lowest tet.
+    /// A detached part gets the next number. The part that keeps the old number is the one whose search was still
+    /// running when all other searches had ended, mostly the largest. If the last ones ended in the same round, or the
+    /// searches were given up for a count, it is the part with the most tets, then the one with the lowest tet.
     ///
     /// # Returns
-    /// What happened, ascending by the piece it happened to, then by the lowest tet of the part that came off.
+    /// Events, ascending by the piece that the part was detached from, then by the lowest tet of the part.
     ///
     /// # Determinism
     /// Equal histories give the same numbers and bits.
     ///
     /// # Panics
-    /// If the tracker does not follow the deltas of this mesh one by one, or from 2³² pieces on.
+    /// If the deltas of this mesh are not applied one by one, or from 2³² pieces on.
     pub fn apply_delta(&mut self, cuttable: &CuttableMesh, delta: &CutDelta) -> Vec<PieceEvent> {
         assert_eq!(
             self.piece_of.len(),
@@ -281,18 +281,18 @@ impl PieceTracker {
         }
     }
 
-    /// The pieces that exist, ascending by id.
+    /// Returns the present pieces, ascending by number.
     pub fn iter(&self) -> impl Iterator<Item = Piece> + '_ {
         (0..self.pieces.len()).filter_map(|id| self.piece(index(id)))
     }
 
-    /// How many pieces exist.
+    /// Returns the number of present pieces.
     #[must_use]
     pub fn count(&self) -> usize {
         self.alive
     }
 
-    /// A piece by its id, if it exists.
+    /// Returns the piece with a number, if it exists.
     #[must_use]
     pub fn piece(&self, id: u32) -> Option<Piece> {
         let record = self.pieces.get(id as usize)?;
@@ -304,7 +304,7 @@ impl PieceTracker {
         })
     }
 
-    /// The id of the piece that a tet belongs to.
+    /// Returns the number of a tet's piece.
     ///
     /// # Panics
     /// If the tet does not exist.
@@ -313,16 +313,15 @@ impl PieceTracker {
         self.piece_of[tet.index()]
     }
 
-    /// How often the last [`PieceTracker::follow`] looked at a tet: what it cost. A search looks at a tet once for each
-    /// of its corners, and once more for each if it came off; a count looks once at each.
+    /// Returns how often the last [`PieceTracker::apply_delta`] looked at a tet, a measure of its cost. A search looks
+    /// at a tet once for each of its corners, and once more for each if it was detached; a count looks once at each.
     #[must_use]
     pub fn looks(&self) -> usize {
         self.parts.looks
     }
 
-    /// Recounts everything and compares: partition, numbers of tets, and volumes to 1e-12 of each (and as much of the
-    /// body's as the rounded positions of new particles may make, 1e-15 and more far from the origin). O(tets); for
-    /// tests and on request.
+    /// Recounts all pieces and compares: partition, numbers of tets, and volumes to 1e-12 of each (and to 1e-15 of the
+    /// body's, more far from the origin, for rounded positions of new particles). O(tets); for tests and on request.
     ///
     /// # Errors
     /// [`CutError::Pieces`] names the first difference.

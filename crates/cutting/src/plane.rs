@@ -22,7 +22,7 @@ pub struct Plane {
 }
 
 impl Plane {
-    /// The unit normal.
+    /// Returns the unit normal.
     ///
     /// # Errors
     /// If the point or the normal is not finite or the normal has no direction.
@@ -45,7 +45,7 @@ impl Plane {
 /// fractions of its edges.
 ///
 /// # Returns
-/// What changed. Nothing, if the plane misses the body or only touches it.
+/// Returns the changes; none if the plane misses or only touches the body.
 ///
 /// # Errors
 /// If the plane or the options are not valid or `positions` has another length than the mesh or is not finite; nothing

@@ -17,7 +17,7 @@ use crate::finite::require_positions;
 use crate::operation::Operation;
 use crate::{CutError, CutOptions, CuttableMesh};
 
-/// Removes tets; `tets` may be in any order and repeat. The faces laid bare get the tag `tag`.
+/// Removes tets; `tets` may be in any order and repeat. The opened faces get the tag `tag`.
 ///
 /// # Errors
 /// [`CutError::NoSuchTet`] names the first tet that does not exist; nothing is changed then.

@@ -16,25 +16,25 @@ use incise_mesh::{ParticleId, TetId};
 use crate::delta::{BoundaryTriangle, CutDelta, FaceTag};
 use crate::index::index;
 
-/// A particle on one kind of boundary.
+/// A render vertex: a particle on one kind of boundary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct SkinVertex {
-    /// Whose position and attributes it has.
+    /// Particle that has the position and attributes of the vertex.
     pub particle: ParticleId,
-    /// The kind of boundary.
+    /// Kind of boundary: outer surface or the cut of a stroke.
     pub tag: FaceTag,
 }
 
-/// What [`Skin::follow`] changed, for partial uploads: ascending indices, each once.
+/// Changes by [`Skin::apply_delta`], for partial uploads: ascending indices, each once.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SkinChange {
-    /// Triangles that are new or have moved; those past the end of the list are gone.
+    /// New or moved triangles; those past the end of the list were removed.
     pub triangles: Vec<usize>,
     /// Vertices that are new.
     pub vertices: Vec<usize>,
 }
 
-/// A triangle list that follows cuts.
+/// The boundary as a triangle list for renderers, updated by deltas.
 ///
 /// # Example
 /// ```
@@ -76,7 +76,7 @@ pub struct Skin {
 }
 
 impl Skin {
-    /// The skin of the triangles given, as of [`crate::CuttableMesh::boundary`].
+    /// Creates the skin of some triangles, usually those of [`crate::CuttableMesh::boundary`].
     #[must_use]
     pub fn new(boundary: impl IntoIterator<Item = BoundaryTriangle>) -> Self {
         let mut skin = Self::default();
@@ -87,26 +87,26 @@ impl Skin {
         skin
     }
 
-    /// The corners of the triangles, counterclockwise seen from outside, as indices of vertices: those of the outer
-    /// surface first, then those of cuts.
+    /// Returns the corners of the triangles, counterclockwise seen from outside, as indices of vertices: first those of
+    /// the outer surface, then those of cuts.
     #[must_use]
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
 
-    /// The triangles of the outer surface: a range of [`Skin::triangles`].
+    /// Returns the triangles of the outer surface, a range of [`Skin::triangles`].
     #[must_use]
     pub fn outer_triangles(&self) -> Range<usize> {
         0..self.outer
     }
 
-    /// The triangles of cuts: a range of [`Skin::triangles`].
+    /// Returns the triangles of cuts, a range of [`Skin::triangles`].
     #[must_use]
     pub fn cut_triangles(&self) -> Range<usize> {
         self.outer..self.triangles.len()
     }
 
-    /// The tet behind a triangle.
+    /// Returns the tet behind a triangle.
     ///
     /// # Panics
     /// If there is no such triangle.
@@ -115,7 +115,7 @@ impl Skin {
         self.faces[triangle].0
     }
 
-    /// What a triangle is.
+    /// Returns the kind of a triangle.
     ///
     /// # Panics
     /// If there is no such triangle.
@@ -124,13 +124,13 @@ impl Skin {
         self.vertices[self.triangles[triangle][0] as usize].tag
     }
 
-    /// The vertices. Some may have no triangle: their places are used again.
+    /// Returns the vertices. Some may have no triangle; their indices are reused.
     #[must_use]
     pub fn vertices(&self) -> &[SkinVertex] {
         &self.vertices
     }
 
-    /// Follows a cut or a removal.
+    /// Applies the delta of a cut or a removal.
     ///
     /// # Panics
     /// If the delta does not follow the last one.
@@ -160,8 +160,8 @@ impl Skin {
         change
     }
 
-    /// The normals of the vertices of unit length for the present positions of the particles; zero where a vertex has
-    /// no triangle or only flat ones. O(triangles).
+    /// Returns the unit normals of the vertices for present positions of the particles; zero for vertices without
+    /// triangles or with flat ones only. O(triangles).
     ///
     /// # Panics
     /// If a particle has no position.

@@ -21,10 +21,11 @@ use crate::{CutDelta, CutOptions, CuttableMesh};
 /// Surfaces whose normals have at least this cosine run the same way.
 const ALIGNED: f64 = 0.9;
 
-/// What earlier strokes knew of the particles along them. The caller keeps it from stroke to stroke.
+/// Surfaces of earlier strokes, which later strokes can continue. The caller keeps it from stroke to stroke.
 ///
-/// Hand it to [`crate::Sweep::advance_joining`] and [`crate::cut_surface_joining`]; call [`StrokeRegistry::follow`] after
-/// cuts made without it. Without a registry strokes meet only if they overlap by a tet.
+/// Pass it to [`crate::Sweep::advance_joining`] and [`crate::cut_surface_joining`]; call
+/// [`StrokeRegistry::apply_delta`] after cuts made without it. Without a registry strokes join only if they overlap by
+/// a tet.
 ///
 /// # Example
 /// ```
@@ -55,7 +56,7 @@ pub struct StrokeRegistry {
 }
 
 impl StrokeRegistry {
-    /// Follows a cut that was made without this registry. `options` are those of the cut.
+    /// Applies the delta of a cut that was made without this registry. `options` are those of the cut.
     ///
     /// # Panics
     /// If `cuttable` is not the mesh as `delta` left it.
@@ -63,7 +64,7 @@ impl StrokeRegistry {
         self.apply_delta_to_others(u32::MAX, cuttable, delta, options.reach());
     }
 
-    /// Forgets all particles from the given number on, which an undone cut had made. Linear in the registry.
+    /// Removes the particles from number `particles` on, which an undone cut had added. Linear in the registry.
     pub fn truncate(&mut self, particles: usize) {
         self.known.retain(|key, _| key.0.index() < particles);
     }
@@ -163,7 +164,7 @@ impl StrokeRegistry {
         }
     }
 
-    /// Follows a cut with what all strokes but one know, as [`CutSurface::follow`] does.
+    /// Follows a cut with what all strokes but one know, as [`CutSurface::apply_delta`] does.
     pub(crate) fn apply_delta_to_others(
         &mut self,
         stroke: u32,

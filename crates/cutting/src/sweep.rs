@@ -6,7 +6,7 @@
 //! `ccd`), so a body that moves or deforms between frames leaves no gap.
 //!
 //! Source: paper section 4.3, with the moving front as described here. Cost: a pass over particles and tets at the
-//! start; in each frame a copy of the positions, the boxes of the boundary triangles (see the module `near`) and the
+//! start; in each frame a copy of the positions, the boxes of the boundary triangles (see the module `broad_phase`) and the
 //! cut.
 
 use glam::DVec3;
@@ -52,10 +52,10 @@ impl Blade for MovingBlade {
     }
 }
 
-/// A stroke in progress.
+/// A stroke of a moving blade (a polyline), which cuts frame by frame.
 ///
-/// Faces open only where all three particles lie on this stroke's surface: a stroke that is to meet an earlier one must
-/// overlap it by a tet, or share a [`StrokeRegistry`] with it.
+/// Faces open only where all three particles lie on this stroke's surface. To join an earlier stroke, a stroke must
+/// overlap it by a tet or share a [`StrokeRegistry`] with it.
 ///
 /// # Example
 /// ```
@@ -122,19 +122,19 @@ impl Sweep {
         })
     }
 
-    /// Moves the blade to its next pose and cuts what it meets on the way.
+    /// Moves the blade to its next pose and cuts the tets that it passes.
     ///
     /// # Arguments
-    /// `positions` are the particles' present positions; between the last call and this one they are taken to have
-    /// moved on straight lines, as are the blade's points.
+    /// `positions` are the particles' present positions. Between two calls particles and points of the blade are
+    /// assumed to move on straight lines.
     ///
     /// # Returns
-    /// What changed; nothing if the blade met no edge.
+    /// Returns the changes; none if the blade met no edge.
     ///
     /// # Errors
-    /// If the blade or `positions` are not finite or have another number of points than before and than the mesh, if
-    /// the mesh was changed without [`Sweep::follow`], or if it would grow beyond the options' limit. Mesh and stroke
-    /// are not changed then.
+    /// If the blade or `positions` are not finite or have another number of points than before or than the mesh, if the
+    /// mesh was changed without [`Sweep::apply_delta`], or if it would grow beyond the options' limit. Mesh and stroke
+    /// are unchanged then.
     ///
     /// # Determinism
     /// Equal histories give the same bits on every machine.
@@ -147,11 +147,11 @@ impl Sweep {
         self.advance_by(cuttable, positions, blade, None)
     }
 
-    /// Moves the blade to its next pose and cuts what it meets, for a stroke that joins earlier strokes of the same
-    /// surface: it may continue where one stopped, or meet one that came from another side, up to a quarter of an edge
-    /// beside it.
+    /// Moves the blade to its next pose and cuts, for a stroke that joins earlier strokes of the same surface: it may
+    /// continue where one stopped, or meet one from another side, up to a quarter of an edge beside it.
     ///
-    /// `registry` holds the earlier strokes and learns this one. Use it for every frame of the stroke or for none.
+    /// `registry` holds the earlier strokes, and this one is added to it. Use it for every frame of the stroke or for
+    /// none.
     ///
     /// # Errors
     /// The errors of [`Sweep::advance`].
@@ -228,11 +228,11 @@ impl Sweep {
 
     /// Updates the stroke after a cut or a removal made outside of it since the last call of [`Sweep::advance`].
     ///
-    /// There is no way to follow an undo: the stroke does not see again what it saw of the body in the undone cut.
-    /// Continue with a clone of the stroke from before the cut that was undone.
+    /// A stroke cannot be updated after an undo: edges that it met in the undone cut are not met again. Continue with a
+    /// clone of the stroke from before that cut.
     ///
     /// Two strokes at the same time must keep their fronts more than a tet apart where they cross: an edge that one
-    /// makes just behind the other's front is not met again, and the body may hang together there.
+    /// creates just behind the other's front is not met again, and the body may stay connected there.
     ///
     /// # Panics
     /// If `cuttable` is not the mesh as `delta` left it.

@@ -34,9 +34,9 @@ const BESIDE: f64 = 1.0 / 64.0;
 
 /// Triangles to cut along: a bounded plane, a strip, any open or closed surface.
 ///
-/// Triangles that share a side are turned the same way where that is possible; a surface with one side only (a Möbius
-/// strip) has a seam somewhere, at which tets may hang together. Surfaces may cross themselves; crossings within one
-/// tet may leave it uncut there, as with two strokes at the same time.
+/// Triangles that share a side get the same orientation where possible. A surface with one side (a Möbius strip) has a
+/// seam, where tets may stay connected. Surfaces may intersect themselves; crossings within one tet may leave it uncut
+/// there, as with two strokes at the same time.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TriangleSurface {
@@ -48,7 +48,8 @@ pub struct TriangleSurface {
 }
 
 impl TriangleSurface {
-    /// Takes over points in m, where the body is now, and three of them for each triangle.
+    /// Creates a surface from points in m, in the space of the deformed body, and three point indices for each
+    /// triangle.
     ///
     /// # Errors
     /// If there is no triangle, a point is not finite or does not exist, or a triangle has no area.
@@ -97,10 +98,10 @@ impl TriangleSurface {
         })
     }
 
-    /// A parallelogram around `center`, which reaches from it by plus and minus `half_u` and `half_v`, all in m.
+    /// Creates a parallelogram around `center` that extends by plus and minus `half_u` and `half_v`, all in m.
     ///
     /// # Errors
-    /// If a number is not finite or the two directions are the same.
+    /// If a number is not finite or the two directions are parallel.
     pub fn rectangle(center: DVec3, half_u: DVec3, half_v: DVec3) -> Result<Self, CutError> {
         let (low, high) = (half_u + half_v, half_u - half_v);
         let points = [center - low, center + high, center + low, center - high];
@@ -302,8 +303,8 @@ fn without_returns(meetings: &mut Vec<EdgeHit>, [a, b]: [DVec3; 2], tolerance: f
 /// fractions of its edges.
 ///
 /// # Returns
-/// What changed. Where the surface ends inside the body, the cut ends in the tet before: the rim of a slit. What is
-/// smaller than a tet and meets no edge cuts nothing.
+/// Returns the changes. Where the surface ends inside the body, the cut ends in the tet before. Surfaces smaller than a
+/// tet that meet no edge cut nothing.
 ///
 /// # Errors
 /// If the options are not valid or `positions` has another length than the mesh or is not finite; nothing is changed
@@ -337,8 +338,8 @@ pub fn cut_surface(
     cut(cuttable, positions, surface, options, None)
 }
 
-/// Cuts along a surface of triangles that continues where an earlier one stopped: see [`StrokeRegistry`], which holds the
-/// earlier strokes and learns this one.
+/// Cuts along a surface of triangles that may continue an earlier stroke. `registry` holds the earlier strokes, and
+/// this one is added to it: see [`StrokeRegistry`].
 ///
 /// # Errors
 /// The errors of [`cut_surface`].

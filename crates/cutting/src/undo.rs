@@ -9,13 +9,13 @@ use crate::faces::{Face, sorted};
 use crate::{CutDelta, CutError, CuttableMesh};
 
 impl CuttableMesh {
-    /// Takes the last cut or removal back.
+    /// Undoes the last cut or removal: restores the mesh before it, byte for byte.
     ///
-    /// Strokes in progress cannot follow: continue with clones from before, or start new ones. This holds for a
-    /// [`crate::StrokeRegistry`], too.
+    /// Strokes in progress and a [`crate::StrokeRegistry`] cannot be updated: continue with clones from before the cut,
+    /// or start new ones.
     ///
     /// # Errors
-    /// [`CutError::NotLast`] if the mesh has not the size that `delta` left it with; nothing is changed then.
+    /// [`CutError::NotLast`] if the mesh does not have the size that `delta` left it with; nothing is changed then.
     ///
     /// # Panics
     /// If `delta` is of another mesh of the same size.

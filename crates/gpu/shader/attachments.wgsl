@@ -1,8 +1,8 @@
-// Particles that hang on handles, and where their places are.
+// Attached particles and their anchors on handles.
 
 struct Attachment {
-    // The place in the handle's frame, relative to the middle of all places there.
-    place: vec3<f32>,
+    // The anchor in the handle's frame, relative to the center of all anchors there.
+    anchor: vec3<f32>,
     particle: u32,
     handle: u32,
     // In m/N; 0 is rigid.
@@ -19,11 +19,11 @@ struct Pose {
     z: vec4<f32>,
 }
 
-// Where a place is.
-fn at_pose(pose: Pose, place: vec3<f32>) -> vec3<f32> {
+// Position of an anchor in the world.
+fn at_pose(pose: Pose, anchor: vec3<f32>) -> vec3<f32> {
     return vec3(
-        dot(pose.x.xyz, place) + pose.x.w,
-        dot(pose.y.xyz, place) + pose.y.w,
-        dot(pose.z.xyz, place) + pose.z.w,
+        dot(pose.x.xyz, anchor) + pose.x.w,
+        dot(pose.y.xyz, anchor) + pose.y.w,
+        dot(pose.z.xyz, anchor) + pose.z.w,
     );
 }

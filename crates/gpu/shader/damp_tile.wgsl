@@ -17,8 +17,8 @@ fn solve_tile(tile: u32, lane: u32) {
     for (var k = 0u; k < steps; k++) {
         let end = tiles[ends + k];
         for (var i = start + lane; i < end; i += THREADS) {
-            let place = tile * TILE_TETS + i;
-            let corner = corners[place];
+            let slot = tile * TILE_TETS + i;
+            let corner = corners[slot];
             let x = Corners(
                 particles[tiles[list + corner.x]],
                 particles[tiles[list + corner.y]],
@@ -31,7 +31,7 @@ fn solve_tile(tile: u32, lane: u32) {
                 shared_velocities[corner.z],
                 shared_velocities[corner.w],
             );
-            let damped = damp_tet(tet_at(place), x, v);
+            let damped = damp_tet(tet_at(slot), x, v);
             shared_velocities[corner.x] = damped.x0;
             shared_velocities[corner.y] = damped.x1;
             shared_velocities[corner.z] = damped.x2;

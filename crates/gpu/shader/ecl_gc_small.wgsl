@@ -19,15 +19,15 @@ fn decides(v: u32) -> bool {
     // What the neighbors may still get.
     var around = 0u;
     for (var rest = left; rest != 0u; rest &= rest - 1u) {
-        let place = countTrailingZeros(rest);
-        let theirs = atomicLoad(&words[higher[begin + place]]);
+        let index = countTrailingZeros(rest);
+        let theirs = atomicLoad(&words[higher[begin + index]]);
         around |= theirs;
         if (palette & theirs) == 0u {
             palette &= ~(1u << (31u - countLeadingZeros(palette)));
-            left &= ~(1u << place);
+            left &= ~(1u << index);
         } else if countOneBits(theirs) == 1u {
             palette &= ~theirs;
-            left &= ~(1u << place);
+            left &= ~(1u << index);
         }
     }
     let color = countTrailingZeros(palette);

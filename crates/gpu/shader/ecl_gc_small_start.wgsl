@@ -9,7 +9,7 @@ const LARGE: u32 = 32u;
 @group(0) @binding(3) var<storage, read> searches: array<Search>;
 @group(0) @binding(4) var<storage, read> colors: array<u32>;
 @group(0) @binding(5) var<storage, read_write> words: array<u32>;
-// The higher neighbors that a small vertex waits for, a bit for each place in its list.
+// The higher neighbors that a small vertex waits for, a bit for each index in its list.
 @group(0) @binding(6) var<storage, read_write> waiting: array<u32>;
 
 @compute @workgroup_size(THREADS)

@@ -1,7 +1,7 @@
 // Chebyshev's leap of the multipliers. Twin: `Jacobi::extrapolate` of incise-xpbd.
 
 @group(0) @binding(0) var<storage, read_write> multipliers: array<vec2<f32>>;
-// Place -> the multipliers when this iteration began, and those when the previous one did.
+// Slot -> the multipliers when this iteration began, and those when the previous one did.
 @group(0) @binding(2) var<storage, read_write> history: array<vec4<f32>>;
 
 @compute @workgroup_size(64)
@@ -10,20 +10,20 @@ fn main(
     @builtin(workgroup_id) id: vec3<u32>,
     @builtin(num_workgroups) count: vec3<u32>,
 ) {
-    let place = workgroup_index(id, count) * THREADS + lane;
-    if place >= min(arrayLength(&multipliers), arrayLength(&history)) {
+    let slot = workgroup_index(id, count) * THREADS + lane;
+    if slot >= min(arrayLength(&multipliers), arrayLength(&history)) {
         return;
     }
-    var multiplier = multipliers[place];
+    var multiplier = multipliers[slot];
     // A substep begins without multipliers.
     var start = vec4(0.0);
     if current.iteration > 0u {
-        start = history[place];
+        start = history[slot];
     }
     if current.weight > 0.0 {
         multiplier = start.zw + (multiplier - start.zw) * current.weight;
-        multipliers[place] = multiplier;
+        multipliers[slot] = multiplier;
     }
     // Nothing but the tets changes them: the next iteration begins with these.
-    history[place] = vec4(multiplier, start.xy);
+    history[slot] = vec4(multiplier, start.xy);
 }

@@ -8,20 +8,20 @@ override JACOBI: bool = false;
 
 fn solve_group(group: u32, lane: u32) {
     for (var k = 0u; k < settings.depth; k++) {
-        let place = (group * settings.depth + k) * THREADS + lane;
-        let corner = corners[place];
+        let slot = (group * settings.depth + k) * THREADS + lane;
+        let corner = corners[slot];
         if corner.x == corner.y {
-            // The tets of a cluster are in its first places.
+            // The tets of a cluster are in its first slots.
             return;
         }
         let x = Corners(particles[corner.x], particles[corner.y], particles[corner.z], particles[corner.w]);
         var multiplier = vec2(0.0);
         if KEEPS {
-            multiplier = multipliers[place];
+            multiplier = multipliers[slot];
         }
-        let moved = solve_tet(tet_at(place), x, JACOBI, &multiplier);
+        let moved = solve_tet(tet_at(slot), x, JACOBI, &multiplier);
         if KEEPS {
-            multipliers[place] = multiplier;
+            multipliers[slot] = multiplier;
         }
         if JACOBI {
             corrections[corner.x] += vec4(moved.x0.xyz - x.x0.xyz, 0.0);

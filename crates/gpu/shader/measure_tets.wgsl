@@ -17,7 +17,7 @@ override TILE_NUMBERS: u32 = 2u + 5u * TILE_TETS;
 
 struct Units {
     // Places for tets.
-    places: u32,
+    tet_slots: u32,
     // The cube root of a tet's mean volume at rest in m.
     length: f32,
     // Where there is but one material.
@@ -54,8 +54,8 @@ fn gradient(at: u32, corner: u32) -> vec3<f32> {
     return vec3(rest[first], rest[first + THREADS], rest[first + 2u * THREADS]);
 }
 
-fn measure(place: u32, corner: vec4<u32>) -> TetSums {
-    let at = (place / THREADS) * (NUMBERS * THREADS) + place % THREADS;
+fn measure(slot: u32, corner: vec4<u32>) -> TetSums {
+    let at = (slot / THREADS) * (NUMBERS * THREADS) + slot % THREADS;
     let q1 = gradient(at, 0u);
     let q2 = gradient(at, 1u);
     let q3 = gradient(at, 2u);
@@ -63,8 +63,8 @@ fn measure(place: u32, corner: vec4<u32>) -> TetSums {
     var ratio = settings.material.x;
     var slope = units.slope;
     if !UNIFORM {
-        ratio = constants[place].x;
-        slope = constants[place].w;
+        ratio = constants[slot].x;
+        slope = constants[slot].w;
     }
     let origin = particles[corner.x].xyz;
     let e1 = particles[corner.y].xyz - origin;
@@ -104,14 +104,14 @@ fn main(
     @builtin(num_workgroups) count: vec3<u32>,
 ) {
     var sums = TetSums(0.0, 0.0, settings.one, 0u);
-    for (var place = id.x * THREADS + lane; place < units.places; place += count.x * THREADS) {
-        var corner = corners[place];
+    for (var slot = id.x * THREADS + lane; slot < units.tet_slots; slot += count.x * THREADS) {
+        var corner = corners[slot];
         if corner.x == corner.y {
             // There is no tet.
             continue;
         }
         if TILED {
-            let list = place / TILE_TETS * TILE_NUMBERS + 2u + TILE_TETS;
+            let list = slot / TILE_TETS * TILE_NUMBERS + 2u + TILE_TETS;
             corner = vec4(
                 tiles[list + corner.x],
                 tiles[list + corner.y],
@@ -119,7 +119,7 @@ fn main(
                 tiles[list + corner.w],
             );
         }
-        sums = add(sums, measure(place, corner));
+        sums = add(sums, measure(slot, corner));
     }
     lanes[lane] = sums;
     workgroupBarrier();

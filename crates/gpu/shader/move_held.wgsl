@@ -15,12 +15,12 @@ fn main(
     @builtin(num_workgroups) count: vec3<u32>,
 ) {
     let index = workgroup_index(id, count) * THREADS + lane;
-    if index >= settings.held {
+    if index >= settings.rigid {
         return;
     }
     let attachment = attachments[index];
     let row = (current.substep + 1u) * settings.handles;
-    let x = at_pose(poses[row + attachment.handle], attachment.place);
+    let x = at_pose(poses[row + attachment.handle], attachment.anchor);
     if are_finite(x) {
         particles[attachment.particle] = vec4(x, particles[attachment.particle].w);
     } else {

@@ -1,7 +1,7 @@
-// Puts tets into their places after a cut.
+// Puts tets into their slots after a cut.
 
 struct TetPatch {
-    place: u32,
+    slot: u32,
     unused: array<u32, 3>,
     corners: vec4<u32>,
     rest: array<f32, 16>,
@@ -28,13 +28,13 @@ fn main(
     if index >= dispatch_range.count {
         return;
     }
-    let place = patches[index].place;
-    corners[place] = patches[index].corners;
-    let at = (place / THREADS) * (NUMBERS * THREADS) + place % THREADS;
+    let slot = patches[index].slot;
+    corners[slot] = patches[index].corners;
+    let at = (slot / THREADS) * (NUMBERS * THREADS) + slot % THREADS;
     for (var k = 0u; k < NUMBERS; k++) {
         rest[at + k * THREADS] = patches[index].rest[k];
     }
     if !UNIFORM {
-        constants[place] = patches[index].constants;
+        constants[slot] = patches[index].constants;
     }
 }

@@ -4,10 +4,10 @@
 @group(0) @binding(0) var<uniform> settings: Settings;
 @group(0) @binding(2) var<storage, read_write> particles: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read> previous: array<vec4<f32>>;
-// The obstacles of one substep after those of another; what each number is, `Solver::obstacle_data` says.
-@group(0) @binding(4) var<storage, read> obstacles: array<f32>;
+// The colliders of one substep after those of another; what each number is, `Solver::obstacle_data` says.
+@group(0) @binding(4) var<storage, read> colliders: array<f32>;
 
-// Numbers of an obstacle.
+// Numbers of an collider.
 const NUMBERS: u32 = 20u;
 // How often a particle inside several colliders is handed around among them.
 const ROUNDS: u32 = 32u;
@@ -22,22 +22,22 @@ struct Nearest {
 }
 
 fn vector(at: u32) -> vec3<f32> {
-    return vec3(obstacles[at], obstacles[at + 1u], obstacles[at + 2u]);
+    return vec3(colliders[at], colliders[at + 1u], colliders[at + 2u]);
 }
 
 fn nearest_on_plane(at: u32, x: vec3<f32>) -> Nearest {
     let normal = vector(at + 8u);
-    let offset = obstacles[at + 2u];
+    let offset = colliders[at + 2u];
     let along = dot(normal, x);
     // Not `x` plus the depth: like this it lies on a level surface to the bit.
     return Nearest(normal, along - offset, x - normal * along + normal * offset);
 }
 
 fn nearest_on_capsule(at: u32, x: vec3<f32>) -> Nearest {
-    let radius = obstacles[at + 2u];
+    let radius = colliders[at + 2u];
     let start = vector(at + 8u);
     let axis = vector(at + 11u);
-    let part = clamp(dot(x - start, axis) * obstacles[at + 3u], 0.0, 1.0);
+    let part = clamp(dot(x - start, axis) * colliders[at + 3u], 0.0, 1.0);
     let center = start + axis * part;
     let away = direction(x - center);
     let normal = select(vector(at + 14u), away.xyz, away.w > 0.0);
@@ -45,7 +45,7 @@ fn nearest_on_capsule(at: u32, x: vec3<f32>) -> Nearest {
 }
 
 fn nearest_on_box(at: u32, x: vec3<f32>) -> Nearest {
-    let half = vec3(obstacles[at + 2u], obstacles[at + 3u], obstacles[at + 7u]);
+    let half = vec3(colliders[at + 2u], colliders[at + 3u], colliders[at + 7u]);
     let center = vector(at + 8u);
     let axes = mat3x3(vector(at + 11u), vector(at + 14u), vector(at + 17u));
     let away = x - center;
@@ -80,7 +80,7 @@ fn nearest_on_box(at: u32, x: vec3<f32>) -> Nearest {
 }
 
 fn nearest(at: u32, x: vec3<f32>) -> Nearest {
-    let kind = obstacles[at];
+    let kind = colliders[at];
     if kind == PLANE {
         return nearest_on_plane(at, x);
     }
@@ -95,7 +95,7 @@ fn rub(at: u32, surface: Nearest, before: vec3<f32>, x: vec3<f32>) -> vec3<f32> 
     let way = x - before - vector(at + 4u);
     let slide = way - surface.normal * dot(surface.normal, way);
     let length = sqrt(dot(slide, slide));
-    let hold = obstacles[at + 1u] * -surface.distance;
+    let hold = colliders[at + 1u] * -surface.distance;
     var share = settings.one;
     if length > hold {
         share = hold / length;
@@ -119,11 +119,11 @@ fn main(
         return;
     }
     let before = previous[p].xyz;
-    let number = settings.obstacles;
+    let number = settings.colliders;
     let first = current.substep * number;
     var x = particle.xyz;
     var moved = false;
-    // Obstacles in a row that the particle is not inside of.
+    // Colliders in a row that the particle is not inside of.
     var clear = 0u;
     for (var k = 0u; k < ROUNDS * number; k++) {
         let at = (first + k % number) * NUMBERS;

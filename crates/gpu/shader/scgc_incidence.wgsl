@@ -28,8 +28,8 @@ fn taken_around(v: u32) -> vec2<u32> {
     return around;
 }
 
-// Does u keep a constraint of lower priority from taking `best`, color `place` of the window?
-fn stops(u: u32, best: u32, place: u32) -> bool {
+// Does u keep a constraint of lower priority from taking `best`, color `bit` of the window?
+fn stops(u: u32, best: u32, bit: u32) -> bool {
     let held = atomicLoad(&colors[u]);
     if held < PENDING {
         // If it is the same, u has told so after v looked.
@@ -38,7 +38,7 @@ fn stops(u: u32, best: u32, place: u32) -> bool {
     if best < (held & ~PENDING) {
         return false;
     }
-    return ((atomicLoad(&waits[u].taken[place >> 5u]) >> (place & 31u)) & 1u) == 0u;
+    return ((atomicLoad(&waits[u].taken[bit >> 5u]) >> (bit & 31u)) & 1u) == 0u;
 }
 
 // Colors v if it can be; says whether v stays on the list.
@@ -46,9 +46,9 @@ fn stays_after(v: u32) -> bool {
     let around = taken_around(v);
     atomicStore(&waits[v].taken[0], around.x);
     atomicStore(&waits[v].taken[1], around.y);
-    var place = countTrailingZeros(~around.x);
+    var bit = countTrailingZeros(~around.x);
     if around.x == 0xffffffffu {
-        place = 32u + countTrailingZeros(~around.y);
+        bit = 32u + countTrailingZeros(~around.y);
         if around.y == 0xffffffffu {
             // Nothing in this window.
             atomicStore(&colors[v], PENDING | (work.window + 64u));
@@ -56,17 +56,17 @@ fn stays_after(v: u32) -> bool {
             return false;
         }
     }
-    let best = work.window + place;
+    let best = work.window + bit;
     atomicStore(&colors[v], PENDING | best);
     let last = waits[v].stopped_by;
-    if last > 0u && stops(last - 1u, best, place) {
+    if last > 0u && stops(last - 1u, best, bit) {
         return true;
     }
     for (var i = particles_of[v]; i < particles_of[v + 1u]; i++) {
         let p = particles_of[i];
         for (var k = constraints_of[p]; k < constraints_of[p + 1u]; k++) {
             let u = constraints_of[k];
-            if u != v && precedes(u, degrees[u], v, degrees[v]) && stops(u, best, place) {
+            if u != v && precedes(u, degrees[u], v, degrees[v]) && stops(u, best, bit) {
                 waits[v].stopped_by = u + 1u;
                 return true;
             }
@@ -75,7 +75,7 @@ fn stays_after(v: u32) -> bool {
     atomicStore(&colors[v], best);
     note_color(best);
     for (var i = particles_of[v]; i < particles_of[v + 1u]; i++) {
-        atomicOr(&taken[2u * particles_of[i] + (place >> 5u)], 1u << (place & 31u));
+        atomicOr(&taken[2u * particles_of[i] + (bit >> 5u)], 1u << (bit & 31u));
     }
     return false;
 }

@@ -18,10 +18,10 @@ struct Settings {
     // Places that a thread has for tets.
     depth: u32,
     // Colliders, handles, and what hangs on those rigidly or by a compliance.
-    obstacles: u32,
+    colliders: u32,
     handles: u32,
     held: u32,
-    hanging: u32,
+    soft: u32,
     // l/mu, gamma and the damping time, where there is but one material; then 0, which compilers must not know.
     material: vec4<f32>,
 }

@@ -18,7 +18,7 @@ fn main(
     @builtin(num_workgroups) count: vec3<u32>,
 ) {
     let index = workgroup_index(id, count) * THREADS + lane;
-    if index >= settings.hanging {
+    if index >= settings.soft {
         return;
     }
     let attachment = attachments[index];
@@ -28,8 +28,8 @@ fn main(
         return;
     }
     let row = current.substep * settings.handles + attachment.handle;
-    let start = at_pose(poses[row], attachment.place);
-    let target_ = at_pose(poses[row + settings.handles], attachment.place);
+    let start = at_pose(poses[row], attachment.anchor);
+    let target_ = at_pose(poses[row + settings.handles], attachment.anchor);
     var multiplier = vec3(0.0);
     if KEEPS && current.iteration > 0u {
         multiplier = multipliers[index].xyz;

@@ -1,6 +1,6 @@
 // The tets on the device, and the bindings that solving and damping share.
 //
-// A place is where a tet's numbers are. Those of 64 places lie side by side, number by number, so that adjacent threads
+// A slot holds the numbers of a tet. Those of 64 slots lie side by side, number by number, so that adjacent threads
 // read adjacent words.
 
 // Whether the body has a single material.
@@ -8,7 +8,7 @@ override UNIFORM: bool = true;
 
 @group(0) @binding(0) var<uniform> settings: Settings;
 @group(0) @binding(1) var<uniform> dispatch_range: DispatchRange;
-// Place -> corners; all 0 where there is no tet.
+// Slot -> corners; all 0 where there is no tet.
 @group(0) @binding(2) var<storage, read> corners: array<vec4<u32>>;
 @group(0) @binding(3) var<storage, read> rest: array<f32>;
 @group(0) @binding(4) var<storage, read> constants: array<vec4<f32>>;
@@ -17,11 +17,11 @@ override UNIFORM: bool = true;
 
 const NUMBERS: u32 = 16u;
 
-fn tet_at(place: u32) -> Tet {
-    let at = (place / THREADS) * (NUMBERS * THREADS) + place % THREADS;
+fn tet_at(slot: u32) -> Tet {
+    let at = (slot / THREADS) * (NUMBERS * THREADS) + slot % THREADS;
     var material = settings.material;
     if !UNIFORM {
-        material = constants[place];
+        material = constants[slot];
     }
     return Tet(
         vec3(rest[at], rest[at + THREADS], rest[at + 2u * THREADS]),

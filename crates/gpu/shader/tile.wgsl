@@ -16,8 +16,8 @@ fn solve_tile(tile: u32, lane: u32) {
     for (var k = 0u; k < steps; k++) {
         let end = tiles[ends + k];
         for (var i = start + lane; i < end; i += THREADS) {
-            let place = tile * TILE_TETS + i;
-            let corner = corners[place];
+            let slot = tile * TILE_TETS + i;
+            let corner = corners[slot];
             let x = Corners(
                 shared_particles[corner.x],
                 shared_particles[corner.y],
@@ -26,11 +26,11 @@ fn solve_tile(tile: u32, lane: u32) {
             );
             var multiplier = vec2(0.0);
             if KEEPS {
-                multiplier = multipliers[place];
+                multiplier = multipliers[slot];
             }
-            let moved = solve_tet(tet_at(place), x, false, &multiplier);
+            let moved = solve_tet(tet_at(slot), x, false, &multiplier);
             if KEEPS {
-                multipliers[place] = multiplier;
+                multipliers[slot] = multiplier;
             }
             shared_particles[corner.x] = moved.x0;
             shared_particles[corner.y] = moved.x1;

@@ -13,7 +13,7 @@ fn main(
     @builtin(num_workgroups) count: vec3<u32>,
 ) {
     let index = workgroup_index(id, count) * THREADS + lane;
-    if index >= settings.held {
+    if index >= settings.rigid {
         return;
     }
     let p = attachments[index].particle;

@@ -8,9 +8,9 @@
 @group(0) @binding(4) var<storage, read_write> palettes: array<atomic<u32>>;
 @group(0) @binding(5) var<storage, read_write> picked: array<u32>;
 
-// The color of v that has `place` smaller ones before it; there is one.
-fn nth(v: u32, place: u32) -> u32 {
-    var left = place;
+// The color of v that has `rank` smaller ones before it; there is one.
+fn nth(v: u32, rank: u32) -> u32 {
+    var left = rank;
     let begin = palette_begin(v);
     let words = palette_begin(v + 1u) - begin;
     for (var word = 0u; word < words; word++) {

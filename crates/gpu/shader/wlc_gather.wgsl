@@ -25,15 +25,15 @@ fn main(@builtin(local_invocation_index) thread: u32) {
     losers[thread] = sum;
     workgroupBarrier();
     let other = current.vertices - work.begin;
-    var place = work.lost;
+    var position = work.lost;
     for (var earlier = 0u; earlier < thread; earlier++) {
-        place += losers[earlier];
+        position += losers[earlier];
     }
     for (var i = begin; i < end; i++) {
         let v = work.list[work.begin + work.done + i];
         if lost[i] == 1u {
-            work.list[other + place] = v;
-            place += 1u;
+            work.list[other + position] = v;
+            position += 1u;
         } else {
             colors[v] = picked[v];
         }
@@ -43,7 +43,7 @@ fn main(@builtin(local_invocation_index) thread: u32) {
     storageBarrier();
     workgroupBarrier();
     if thread == THREADS - 1u && length > 0u {
-        work.lost = place;
+        work.lost = position;
         work.done += length;
         if work.done == work.count {
             work.rounds += 1u;

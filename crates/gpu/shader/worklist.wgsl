@@ -36,9 +36,9 @@ fn listed(i: u32) -> u32 {
 
 // Puts a vertex on the next round's list, if it is to stay. All threads of a workgroup have to come here, once.
 fn keep(stays: bool, v: u32, thread: u32) {
-    var place = 0u;
+    var position = 0u;
     if stays {
-        place = atomicAdd(&kept, 1u);
+        position = atomicAdd(&kept, 1u);
     }
     workgroupBarrier();
     let next = 1u - current.parity;
@@ -47,7 +47,7 @@ fn keep(stays: bool, v: u32, thread: u32) {
     }
     workgroupBarrier();
     if stays {
-        work.list[next * current.vertices + room + place] = v;
+        work.list[next * current.vertices + room + position] = v;
     }
 }
 

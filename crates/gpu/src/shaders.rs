@@ -112,10 +112,10 @@ pub fn shared_structs() -> Vec<SharedStruct> {
             max_cofactor_norm,
             particles,
             depth,
-            obstacles,
+            colliders,
             handles,
-            held,
-            hanging,
+            rigid,
+            soft,
             material
         }),
         shared!(DispatchRange { first, count }),
@@ -126,7 +126,7 @@ pub fn shared_structs() -> Vec<SharedStruct> {
             unused
         }),
         shared!(Attachment {
-            place,
+            anchor,
             particle,
             handle,
             compliance,
@@ -134,7 +134,7 @@ pub fn shared_structs() -> Vec<SharedStruct> {
             unused
         }),
         shared!(TetPatch {
-            place,
+            tet_slot,
             unused,
             corners,
             rest,
@@ -146,7 +146,7 @@ pub fn shared_structs() -> Vec<SharedStruct> {
             index
         }),
         shared!(Units {
-            places,
+            tet_slots,
             length,
             slope,
             unused

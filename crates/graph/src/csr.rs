@@ -27,7 +27,7 @@ pub(crate) fn fits(what: &'static str, count: usize) -> Result<(), GraphError> {
     }
 }
 
-/// Turns counts, stored one place to the right (`counts[i + 1]` for row `i`), into offsets.
+/// Turns counts, shifted by one (`counts[i + 1]` for row `i`), into offsets.
 pub(crate) fn accumulate(counts: &mut [u32]) {
     let mut sum = 0;
     for count in counts {
@@ -105,9 +105,9 @@ impl Csr {
         let mut values = vec![0; self.values.len()];
         for (id, row) in (0..).zip(self.rows()) {
             for &value in row {
-                let place = &mut cursor[value as usize];
-                values[*place as usize] = id;
-                *place += 1;
+                let position = &mut cursor[value as usize];
+                values[*position as usize] = id;
+                *position += 1;
             }
         }
         Self { offsets, values }
@@ -124,9 +124,9 @@ impl Csr {
         let mut cursor = offsets.clone();
         let mut values = vec![0; offsets[rows] as usize];
         for (id, label) in (0..).zip(labels) {
-            if let Some(place) = cursor[..rows].get_mut(label as usize) {
-                values[*place as usize] = id;
-                *place += 1;
+            if let Some(position) = cursor[..rows].get_mut(label as usize) {
+                values[*position as usize] = id;
+                *position += 1;
             }
         }
         Self { offsets, values }

@@ -30,22 +30,22 @@ pub struct Schedule {
     members: Rows<u32>,
     /// Constraint -> the cluster it is in here.
     labels: Vec<ClusterId>,
-    /// Cluster -> its color here and its place among the clusters of that color.
-    seats: Vec<Seat>,
+    /// Cluster -> its color here and its position among the clusters of that color.
+    slots: Vec<Slot>,
     journal: Journal,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-struct Seat {
+struct Slot {
     color: u32,
-    place: u32,
+    position: u32,
 }
 
-impl Seat {
+impl Slot {
     const NONE: Self = Self {
         color: NONE,
-        place: NONE,
+        position: NONE,
     };
 }
 
@@ -104,11 +104,11 @@ impl Schedule {
         self.members.refill(clustering.cluster_count(), members);
         self.labels.clear();
         self.labels.extend_from_slice(clustering.labels());
-        self.seats.clear();
-        self.seats.resize(clustering.cluster_count(), Seat::NONE);
+        self.slots.clear();
+        self.slots.resize(clustering.cluster_count(), Slot::NONE);
         for (color, clusters) in (0..).zip(self.colors.rows()) {
-            for (place, cluster) in (0..).zip(clusters) {
-                self.seats[cluster.index()] = Seat { color, place };
+            for (position, cluster) in (0..).zip(clusters) {
+                self.slots[cluster.index()] = Slot { color, position };
             }
         }
         self.journal.restart();
@@ -154,9 +154,9 @@ impl Schedule {
         clusters: &[ClusterId],
     ) -> u64 {
         expect_colors(clustering, coloring);
-        let count = clustering.cluster_count().max(self.seats.len());
+        let count = clustering.cluster_count().max(self.slots.len());
         self.members.set_row_count(count);
-        self.seats.resize(count, Seat::NONE);
+        self.slots.resize(count, Slot::NONE);
         let mut visited = constraints.len() + clusters.len();
         let mut changed = Vec::new();
         for &constraint in constraints {
@@ -164,7 +164,7 @@ impl Schedule {
         }
         let recolored = |cluster: &&ClusterId| {
             let color = self.color_of(**cluster, coloring);
-            self.seats[cluster.index()].color != color
+            self.slots[cluster.index()].color != color
         };
         changed.extend(clusters.iter().filter(recolored));
         changed.sort_unstable();
@@ -223,26 +223,26 @@ impl Schedule {
 
     /// Puts a cluster into a color.
     fn reseat(&mut self, cluster: ClusterId, color: u32) -> usize {
-        let old = self.seats[cluster.index()];
+        let old = self.slots[cluster.index()];
         if old.color == color {
             return 0;
         }
         if old.color != NONE {
-            let (row, place) = (old.color as usize, old.place as usize);
-            self.colors.swap_remove(row, place);
-            if let Some(other) = self.colors.row(row).get(place) {
-                self.seats[other.index()].place = old.place;
+            let (row, position) = (old.color as usize, old.position as usize);
+            self.colors.swap_remove(row, position);
+            if let Some(other) = self.colors.row(row).get(position) {
+                self.slots[other.index()].position = old.position;
             }
         }
-        self.seats[cluster.index()] = Seat::NONE;
+        self.slots[cluster.index()] = Slot::NONE;
         if color == NONE {
             return 1;
         }
         let row = color as usize;
         self.colors
             .set_row_count(self.colors.row_count().max(row + 1));
-        let place = offset(self.colors.row(row).len());
-        self.seats[cluster.index()] = Seat { color, place };
+        let position = offset(self.colors.row(row).len());
+        self.slots[cluster.index()] = Slot { color, position };
         1 + self.colors.push(row, cluster)
     }
 
@@ -297,8 +297,8 @@ impl Schedule {
     /// The color that a cluster runs in; `None` if it is vacant or unknown.
     #[must_use]
     pub fn color(&self, cluster: ClusterId) -> Option<ColorId> {
-        let seat = self.seats.get(cluster.index())?;
-        (seat.color != NONE).then_some(ColorId(seat.color))
+        let slot = self.slots.get(cluster.index())?;
+        (slot.color != NONE).then_some(ColorId(slot.color))
     }
 
     /// All constraints in solving order.

@@ -1,12 +1,12 @@
-//! The error to expect of a substep, and what follows from an accuracy that a scene asks for.
+//! Expected error of a substep, and the largest kappa for an accuracy.
 //!
 //! The error of a colored Gauss-Seidel pass in the split form was measured against Newton's method on held, twisted and
 //! compressed bars of kappa 1/32 to 1/2 and Poisson's ratio 0 to 0.49 (`tests/suite/reference.rs` of `incise-xpbd`).
 //! With `x = kappa · λ/E` (λ is Lamé's first constant) a state at rest is off by at most
 //! `0.03 kappa + 0.07 kappa² + 0.085 x² / (1 + 0.6 x)` of the displacement, and a motion over some periods, which a
-//! substep damps, by at most `0.13 √kappa` (`cargo xtask defaults`). Beyond a Poisson's ratio of 0.49 the error at rest is
-//! taken to grow with λ/E as well: at 0.4999 a beam that should be off by 10% was off by 33%. The block and sequential
-//! forms have `0.03 kappa + 0.1 x` at rest. The larger of both is the expected error; beyond 1 it says only that. Cost: O(1) a tet.
+//! substep damps, by at most `0.13 √kappa` (`cargo xtask defaults`). Beyond a Poisson's ratio of 0.49 the error at rest
+//! is assumed to grow with λ/E as well. The block and sequential forms have `0.03 kappa + 0.1 x` at rest. The larger of
+//! both is the expected error. Cost: O(1) a tet.
 
 use incise_xpbd::{Material, TetSolve};
 
@@ -57,13 +57,13 @@ pub(crate) fn is_nearly_incompressible(kappa: f64, poisson_ratio: f64, form: Tet
         && expected_error(kappa, poisson_ratio, form) > 2.0 * expected_error(kappa, 0.45, form)
 }
 
-/// The volume of the tets that are solved less accurately than asked for, kept up to date over cuts.
+/// The volume of the tets that are solved less accurately than the accuracy wanted, updated by cuts.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct OutsideVolume {
     /// The largest accurate kappa by material; empty where no accuracy is judged.
     limits: Vec<f64>,
-    /// Volume at rest in m³ outside the accuracy, and of that the part when substeps were chosen.
+    /// Volume at rest in m³ outside the accuracy, now and when substeps were chosen.
     pub(crate) outside: f64,
     pub(crate) at_choice: f64,
 }
@@ -95,7 +95,7 @@ impl OutsideVolume {
         self.outside += self.of(tet);
     }
 
-    /// Takes a tet away.
+    /// Removes a tet.
     pub(crate) fn remove(&mut self, tet: (u16, f64, f64)) {
         self.outside = (self.outside - self.of(tet)).max(0.0);
     }

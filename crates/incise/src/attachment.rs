@@ -1,9 +1,9 @@
-//! [`Attachment`]: part of a body that is held and moved, such as by an instrument or a bone.
+//! [`Attachment`]: part of a body that is held and moved, for example by an instrument or a bone.
 //!
-//! The particles of an attachment keep their places in a moving frame. A path that is known beforehand gives the frame's
-//! pose at the start of every frame of the simulation; once a program moves the attachment, the program does. The frame's
-//! origin lies in the center of the path's rotation, so that particles go around it on circles between two frames as
-//! well. Cost: a pass over the body's particles to attach, and one over all attached particles to detach.
+//! The particles of an attachment keep their positions in a moving frame. Its path gives the frame's pose at the start
+//! of every frame of the simulation, until a program moves the attachment. The frame's origin is the center of the
+//! path's rotation, so particles move on circles between two frames as well. Cost: a pass over the body's particles to
+//! attach, and one over all attached particles to detach.
 
 use glam::{DQuat, DVec3};
 use incise_xpbd::Pose;
@@ -15,7 +15,7 @@ use crate::region::particles;
 use crate::scene::{AttachmentSpec, along};
 use crate::validate::{coordinates, value, within};
 
-/// Names an attachment of a simulation from when it is added until it is removed.
+/// Handle of an attachment of a simulation, valid until the attachment is removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub struct AttachmentHandle(pub(crate) u32);
@@ -27,7 +27,7 @@ impl AttachmentHandle {
     }
 }
 
-/// What moves an attachment.
+/// Source of an attachment's motion.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 enum Motion {
@@ -206,7 +206,7 @@ impl Attachment {
         solver.backend_mut().move_handle(self.number, pose);
     }
 
-    /// Where its frame is at the start of a frame of the simulation.
+    /// Returns the pose of the attachment's frame at the start of a frame of the simulation.
     pub(crate) fn pose(&self, frame: u64) -> Pose {
         if let Motion::Program { to, .. } = self.motion {
             return to;

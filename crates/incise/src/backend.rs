@@ -1,7 +1,7 @@
-//! [`AnySolver`]: the solver that the scene asks for, and how it follows a cut.
+//! [`AnySolver`]: the solver of an island in either precision or on a device, and its update after a cut.
 //!
-//! What depends on where the state is, or on the method, is in [`SolverBackend`]. Edits and measurements that all solvers of
-//! `incise-xpbd` share are written once, for any precision, by `each!` and `each_mut!`.
+//! Functions that depend on the device or the method are in [`SolverBackend`]. Edits and measurements that all solvers
+//! of `incise-xpbd` share are written once, for either precision, with `each!` and `each_mut!`.
 
 use std::time::Instant;
 
@@ -31,7 +31,7 @@ pub(crate) enum AnySolver {
     Device(Box<Device>),
 }
 
-/// A solver and what its method needs beside it.
+/// A solver with the data of its method.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "save", serde(bound = ""))]
@@ -243,7 +243,7 @@ impl AnySolver {
             && each!(self, solver => (0..solver.tet_count()).any(|t| exceeds(solver, t, limit)))
     }
 
-    /// Whether it is on a device, in the form that settings ask for there.
+    /// Whether the solver is on a device with the cluster mapping of the settings.
     pub(crate) fn is_on(
         &self,
         compute_device: &ComputeDevice,

@@ -1,4 +1,4 @@
-//! [`Body`]: a body of a scene with its mesh, what it is made of and its fixed particles, all values checked.
+//! [`Body`]: a body of a scene with mesh, materials and fixed particles, all values checked.
 
 use incise_mesh::TetMesh;
 use incise_meshing::{Shape, generate};
@@ -21,7 +21,7 @@ pub(crate) struct Body {
     pub(crate) fixed: Vec<bool>,
     /// The regions that contain nothing of it, by their place in the scene.
     pub(crate) empty_regions: Vec<String>,
-    /// Of the volume constraints that it asks for.
+    /// Compliance of the volume constraints; `None` without them.
     pub(crate) volume_compliance: Option<f64>,
     pub(crate) substeps: Substeps,
 }

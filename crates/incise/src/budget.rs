@@ -1,10 +1,10 @@
-//! `solver.budget_ms`: substeps and method from the time that a frame may take.
+//! `solver.budget_ms`: chooses substeps and method for a time budget of a frame.
 //!
-//! Copies of the solvers take a few frames, which tells what a substep of Gauss-Seidel and a frame of two-level VBD cost
-//! here. All islands together may use [`SHARE`] of the budget; what each gets goes with what its accuracy needs. Without a
-//! stated accuracy what is left over buys more substeps. After cuts the cost grows with the number of tets, and substeps
-//! are reduced where they no longer fit. The choice depends on the speed of the machine, unlike everything else here:
-//! results differ from run to run. Cost: a few frames at the start.
+//! Copies of the solvers run a few frames to measure the cost of a substep of Gauss-Seidel and of a frame of two-level
+//! VBD. All islands together may use [`SHARE`] of the budget, each in proportion to the cost of its accuracy. Without a
+//! stated accuracy the rest buys more substeps. After cuts the cost grows with the number of tets, and substeps are
+//! reduced if they no longer fit. The choice depends on measured times, so results differ from run to run. Cost: a few
+//! frames at the start.
 
 use std::time::Instant;
 
@@ -17,7 +17,7 @@ use crate::island_builder::demands;
 use crate::method::{tet_solve, with_vbd};
 use crate::report::{Milliseconds, milliseconds};
 use crate::scene::SolverSpec;
-use crate::substeps::{Missed, choose};
+use crate::substeps::{Shortfall, choose};
 
 /// The part of the budget that solving may take; the rest is for cuts, positions and reports.
 const SHARE: f64 = 0.75;
@@ -91,7 +91,7 @@ pub(crate) fn fit(islands: &mut [Island], spec: &SolverSpec, budget: f64) -> Res
         island.take_substeps(substeps);
         let missed = island
             .choice
-            .is_some_and(|choice| choice.missed == Some(Missed::Budget));
+            .is_some_and(|choice| choice.shortfall == Some(Shortfall::Budget));
         if missed && island.leaves_method_open {
             try_vbd(island, spec, limits.share)?;
         }

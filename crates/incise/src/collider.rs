@@ -1,4 +1,4 @@
-//! The obstacles of a scene while it runs, and [`ColliderHandle`], their names.
+//! Obstacles of a running scene, and [`ColliderHandle`].
 
 use glam::{DQuat, DVec3};
 use incise_xpbd::{Collider, ColliderShape, StepSettings};
@@ -22,19 +22,19 @@ pub(crate) fn colliders(scene: &Scene) -> Result<Vec<Collider>, Error> {
     ground.into_iter().map(Ok).chain(others).collect()
 }
 
-/// Names a collider of a simulation from when it is added until it is removed.
+/// Handle of a collider of a simulation, valid until the collider is removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub struct ColliderHandle(u32);
 
 impl ColliderHandle {
-    /// The handle of the collider of a scene with this place in its list.
-    pub(crate) fn of_scene(place: usize) -> Self {
-        Self(u32::try_from(place).expect("colliders are numbered in 32 bits"))
+    /// The handle of the collider of a scene with this index in its list.
+    pub(crate) fn of_scene(index: usize) -> Self {
+        Self(u32::try_from(index).expect("colliders are numbered in 32 bits"))
     }
 }
 
-/// Which collider of the settings of all islands each handle names.
+/// Handle -> index of the collider in the settings of all islands.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Colliders {
@@ -42,7 +42,7 @@ pub(crate) struct Colliders {
     handles: Vec<Option<ColliderHandle>>,
     /// The handle of the next collider: none is given twice.
     next: u32,
-    /// Where some go in the frame to come.
+    /// Targets of colliders that move in the next frame.
     moves: Vec<(ColliderHandle, DVec3)>,
 }
 
@@ -58,8 +58,8 @@ impl Colliders {
         }
     }
 
-    /// The place of a collider in the settings, unless it was removed.
-    pub(crate) fn place(&self, handle: ColliderHandle) -> Option<usize> {
+    /// The index of a collider in the settings, unless it was removed.
+    pub(crate) fn index(&self, handle: ColliderHandle) -> Option<usize> {
         self.handles.iter().position(|h| *h == Some(handle))
     }
 
@@ -71,9 +71,9 @@ impl Colliders {
         handle
     }
 
-    /// Follows the removal of a collider from the settings.
-    pub(crate) fn remove(&mut self, place: usize) {
-        self.handles.remove(place);
+    /// Removes the handle of a collider that leaves the settings.
+    pub(crate) fn remove(&mut self, index: usize) {
+        self.handles.remove(index);
     }
 
     /// Notes where a collider goes in the next frame.
@@ -87,11 +87,11 @@ impl Colliders {
         self.moves.retain(|(h, _)| *h != handle);
     }
 
-    /// Which colliders of the settings go where in this frame.
+    /// Returns the colliders that move in this frame, by index in the settings, with their targets.
     pub(crate) fn take_moves(&mut self) -> Vec<(usize, DVec3)> {
         let moves = std::mem::take(&mut self.moves).into_iter();
         moves
-            .filter_map(|(h, to)| Some((self.place(h)?, to)))
+            .filter_map(|(h, to)| Some((self.index(h)?, to)))
             .collect()
     }
 
@@ -101,7 +101,7 @@ impl Colliders {
     }
 }
 
-/// Where a collider is: the point of a plane, the center of a sphere or a box, the middle of a capsule.
+/// Returns the position of a collider: the point of a plane, the center of a sphere or a box, the middle of a capsule.
 pub(crate) fn position(shape: &ColliderShape) -> DVec3 {
     match *shape {
         ColliderShape::Plane { point, .. } => point,
@@ -110,7 +110,7 @@ pub(crate) fn position(shape: &ColliderShape) -> DVec3 {
     }
 }
 
-/// Has a collider go to a place within `time` s.
+/// Sets the velocity of a collider so that it reaches a target within `time` s.
 pub(crate) fn send(collider: &mut Collider, to: DVec3, time: f64) {
     collider.velocity = (to - position(&collider.shape)) / time;
 }

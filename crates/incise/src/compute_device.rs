@@ -1,8 +1,8 @@
-//! [`ComputeDevice`]: where a scene is computed.
+//! [`ComputeDevice`]: the CPU or the GPU that computes a scene.
 //!
-//! `cpu` is this process, `gpu` a device or an error, `auto` a device if there is a real one that does what the scene
-//! asks for, and else the processor, with the reason. A device that is a processor in disguise is slower than the
-//! processor itself, so only `gpu` takes it. Cost: opening a device takes some hundred milliseconds, once.
+//! `cpu` is this process, `gpu` a device or an error; `auto` takes a hardware device that supports the scene's
+//! settings, and otherwise the CPU, with the reason. A software device is slower than the CPU path, so only `gpu` takes
+//! it. Cost: opening a device takes some hundred milliseconds, once.
 
 #[cfg(feature = "gpu")]
 use std::sync::Arc;
@@ -21,17 +21,17 @@ pub(crate) struct OpenDevice {
     pub(crate) gpu: Option<Arc<GpuContext>>,
 }
 
-/// Where a scene is computed.
+/// The CPU or the GPU that computes a scene.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ComputeDevice {
     #[cfg(feature = "gpu")]
     pub(crate) gpu: Option<Arc<GpuContext>>,
-    /// What is to be said about the choice.
+    /// Explanation of the choice, for the user.
     pub(crate) note: Option<String>,
 }
 
 impl ComputeDevice {
-    /// Where the scene wants to be computed; on which device if one is at hand.
+    /// Chooses the compute device of a scene; an open device is used if there is one.
     pub(crate) fn choose(scene: &Scene, open_device: &OpenDevice) -> Result<Self, Error> {
         let backend = scene.solver.backend;
         if backend.is_cpu() {
@@ -115,7 +115,7 @@ impl ComputeDevice {
     }
 }
 
-/// Refuses what a device does not do.
+/// Returns an error if the GPU path does not support a setting of the scene.
 pub(crate) fn check(scene: &Scene) -> Result<(), Error> {
     let solver = &scene.solver;
     if scene.contact.is_some() {

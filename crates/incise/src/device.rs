@@ -32,14 +32,14 @@ impl Device {
         spec: &SolverSpec,
     ) -> Result<Self, Error> {
         Ok(Self {
-            solver: GpuSolver::new(Arc::clone(gpu), solver, form(spec)?)?,
+            solver: GpuSolver::new(Arc::clone(gpu), solver, mapping(spec)?)?,
             reported: 0,
         })
     }
 
     /// Whether it is on a device and solves in the form that settings ask for.
     pub(crate) fn serves(&self, gpu: &Arc<GpuContext>, spec: &SolverSpec) -> Result<bool, Error> {
-        Ok(Arc::ptr_eq(self.solver.gpu(), gpu) && self.solver.form() == form(spec)?)
+        Ok(Arc::ptr_eq(self.solver.gpu(), gpu) && self.solver.cluster_mapping() == mapping(spec)?)
     }
 }
 
@@ -115,7 +115,7 @@ impl SolverBackend for Device {
 }
 
 /// Returns whether a thread or a workgroup solves each cluster.
-fn form(spec: &SolverSpec) -> Result<ClusterMapping, Error> {
+fn mapping(spec: &SolverSpec) -> Result<ClusterMapping, Error> {
     let method: Method = spec.clustering.parse()?;
     Ok(ClusterMapping::for_clusters_of(method.max_size().get()))
 }

@@ -1,6 +1,6 @@
-//! Sutures and springs between two points of bodies, checked and handed to a solver.
+//! Distance constraints between two points of bodies, checked and passed to a solver.
 //!
-//! A change of one of them hands all of an island to the solver again: O(distances of the island).
+//! A change of one passes all of an island to the solver again: O(distances of the island).
 
 use glam::DVec3;
 use incise_coloring::{Order, greedy};
@@ -12,7 +12,7 @@ use crate::scene::{DistanceSpec, EndSpec};
 use crate::validate::{LARGEST_COORDINATE, coordinates, existing, value, within};
 use crate::{Error, Scene};
 
-/// Names a distance constraint of a simulation from when it is added until it is removed.
+/// Handle of a distance constraint of a simulation, valid until the constraint is removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub struct DistanceHandle(pub(crate) u32);
@@ -87,7 +87,7 @@ pub(crate) fn constraint(
         )?,
         compliance: within(&format!("{field}.compliance"), spec.compliance, 0.0, 1e9)?,
         damping: 0.0,
-        only_when_longer: spec.tension_only,
+        tension_only: spec.tension_only,
     })
 }
 

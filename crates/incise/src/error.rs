@@ -1,15 +1,17 @@
-//! [`Error`]: why a scene or a simulation was refused.
+//! [`Error`]: errors of scenes and simulations.
 
 use std::path::PathBuf;
 
-use incise_clustering::ClusteringError;
-use incise_coloring::ColoringError;
+use incise_clustering::{ClusteringError, Method};
+use incise_coloring::{Algorithm, ColoringError};
 use incise_cutting::CutError;
 use incise_graph::GraphError;
 use incise_mesh::MeshError;
 use incise_mesh_io::MeshIoError;
-use incise_meshing::MeshingError;
+use incise_meshing::{MeshingError, Shape};
 use incise_xpbd::XpbdError;
+
+use crate::scene::suggestion;
 
 /// Why a scene could not be read or run.
 #[derive(Debug, thiserror::Error)]
@@ -20,7 +22,7 @@ pub enum Error {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         source: std::io::Error,
     },
     /// A scene is not valid TOML or has a key that does not exist or has the wrong type.
@@ -28,7 +30,7 @@ pub enum Error {
     Parse {
         /// The line, counted from 1, if known.
         line: Option<usize>,
-        /// What is wrong.
+        /// Description of the problem.
         message: String,
     },
     /// A value of a scene lies outside its range.
@@ -38,62 +40,62 @@ pub enum Error {
         field: String,
         /// Its value.
         value: String,
-        /// What it must be.
+        /// Allowed values.
         range: String,
     },
-    /// A body's mesh.
+    /// The mesh of a body is invalid.
     #[error("{field}: {source}")]
     Mesh {
         /// The body.
         field: String,
-        /// What is wrong with it.
+        /// Cause.
         source: MeshError,
     },
-    /// A body's mesh file.
+    /// The mesh file of a body could not be read.
     #[error("{field}: {source}")]
     MeshFile {
         /// The body.
         field: String,
-        /// Why it was not read.
+        /// Cause.
         source: MeshIoError,
     },
-    /// A body's shape.
-    #[error("{field}: {source}")]
+    /// The shape of a body could not be generated.
+    #[error("{field}: {source}{}", shape_suggestion(source))]
     Shape {
         /// The body.
         field: String,
-        /// Why it was not generated.
+        /// Cause.
         source: MeshingError,
     },
-    /// A body's material or a setting of the solver.
+    /// A material or a solver setting is invalid.
     #[error("{field}.{source}")]
     Xpbd {
         /// The part of the scene.
         field: String,
-        /// What is wrong with it.
+        /// Cause.
         source: XpbdError,
     },
-    /// A stroke.
+    /// A stroke is invalid or could not be carried out.
     #[error("{field}: {source}")]
     Cut {
         /// The stroke.
         field: String,
-        /// What is wrong with it.
+        /// Cause.
         source: CutError,
     },
-    /// The name of a coloring.
-    #[error("solver.coloring: {0}")]
+    /// The name of a coloring is unknown or its parameters are invalid.
+    #[error("solver.coloring: {}{}", .0, coloring_suggestion(.0))]
     Coloring(#[from] ColoringError),
-    /// The name of a clustering.
-    #[error("solver.clustering: {0}")]
+    /// The name of a clustering is unknown or its parameters are invalid.
+    #[error("solver.clustering: {}{}", .0, clustering_suggestion(.0))]
     Clustering(#[from] ClusteringError),
-    /// A derived structure no longer agrees with what it is derived from: a defect of this library.
+    /// A derived structure disagrees with its source: a defect of this library.
     #[error("internal check failed: {0}")]
     Inconsistent(String),
-    /// A GPU was asked for, and this build has no path to one.
+    /// A GPU was requested, but this build lacks the feature `gpu`.
     #[error("solver.backend is gpu, and this build has no GPU path: build with `--features gpu`")]
     NoGpuPath,
-    /// The GPU.
+    /// An error of the GPU.
     #[cfg(feature = "gpu")]
     #[error(transparent)]
     Gpu(#[from] incise_gpu::GpuError),
@@ -104,15 +106,15 @@ pub enum Error {
     /// The threads could not be started.
     #[error("cannot start {threads} threads: {message}")]
     Threads {
-        /// How many.
+        /// Number of threads.
         threads: usize,
-        /// Why.
+        /// Cause.
         message: String,
     },
 }
 
 impl Error {
-    /// The key of a scene that it is about, as in `body[0].scale`, if it is about one.
+    /// Returns the scene key that the error concerns, as in `body[0].scale`, if there is one.
     #[must_use]
     pub fn key(&self) -> Option<String> {
         match self {
@@ -132,6 +134,33 @@ impl Error {
             Self::NoGpuPath => Some("solver.backend".to_owned()),
             _ => None,
         }
+    }
+}
+
+/// The nearest known shape, as the end of a message; empty for other errors.
+#[must_use]
+pub fn shape_suggestion(error: &MeshingError) -> String {
+    match error {
+        MeshingError::UnknownShape { name, .. } => suggestion(name, Shape::NAMES),
+        _ => String::new(),
+    }
+}
+
+/// The nearest known coloring algorithm, as the end of a message; empty for other errors.
+#[must_use]
+pub fn coloring_suggestion(error: &ColoringError) -> String {
+    match error {
+        ColoringError::UnknownAlgorithm { name } => suggestion(name, Algorithm::NAMES),
+        _ => String::new(),
+    }
+}
+
+/// The nearest known clustering, as the end of a message; empty for other errors.
+#[must_use]
+pub fn clustering_suggestion(error: &ClusteringError) -> String {
+    match error {
+        ClusteringError::UnknownMethod { text } => suggestion(text, Method::NAMES),
+        _ => String::new(),
     }
 }
 

@@ -1,22 +1,23 @@
-//! [`Event`]: what happened in a frame, for programs that react to it: sounds, scores, effects.
+//! [`Event`]: an event of a frame, for programs that react with sounds, scores or effects.
 
 use crate::report::DetachedReport;
 
-/// Something that happened in the last frame: [`Simulation::events`](crate::Simulation::events).
+/// An event of the last frame: beginning and end of cuts, and detached pieces. See
+/// [`Simulation::events`](crate::Simulation::events).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub enum Event {
     /// A stroke has changed the mesh for the first time.
     CutBegan {
-        /// Its number, as in [`FaceTag::Cut`](crate::cutting::FaceTag::Cut).
+        /// Number of the stroke, as in [`FaceTag::Cut`](crate::cutting::FaceTag::Cut).
         stroke: u32,
     },
-    /// A piece has come off.
+    /// A piece has been detached.
     PieceDetached(DetachedReport),
-    /// A stroke that has changed the mesh is over.
+    /// A stroke that has changed the mesh has ended.
     CutEnded {
-        /// Its number.
+        /// Number of the stroke.
         stroke: u32,
     },
     /// Two pieces have begun to press on each other, in a scene with contact.

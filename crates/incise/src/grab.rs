@@ -1,4 +1,4 @@
-//! [`Hand`]: the interactive grabs of an island of bodies.
+//! [`Grabs`]: the interactive grabs of an island of bodies.
 //!
 //! A grab attaches particles to a handle of the solver that only this grab moves, and never turns. A released handle is
 //! reused by the next grab, so the solver grows with the largest number of grabs held at a time, not with their total.
@@ -14,19 +14,19 @@ use crate::Error;
 use crate::attachment::detach_all;
 use crate::backend::{AnySolver, each, each_mut};
 
-/// Something that is held, in the simulation that gave it: see [`Simulation::grab`](crate::Simulation::grab).
+/// Handle of an interactive grab in the simulation that returned it: see [`Simulation::grab`](crate::Simulation::grab).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Grab {
     pub(crate) island: usize,
-    /// Its grip in the island, and which user of the grip it is.
+    /// Index of the grab in the island, and the user number of the grab.
     slot: usize,
     user: u64,
 }
 
-/// A handle for grabs.
+/// A grab and its handle in the solver.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
-struct Grip {
+struct ActiveGrab {
     /// Its number in the solver.
     handle: u32,
     /// Number of grabs that have released it.
@@ -35,62 +35,62 @@ struct Grip {
     /// The point that was grabbed, and where it is to be at the end of the next frame.
     point: DVec3,
     to: DVec3,
-    /// Where the handle was when it took hold.
+    /// Position of the handle when the grab began.
     start: DVec3,
-    /// Whether `to` is news for the next frame.
+    /// Whether `to` has changed since the last frame.
     moved: bool,
 }
 
 /// The grabs of an island.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Hand {
-    grips: Vec<Grip>,
+pub(crate) struct Grabs {
+    active: Vec<ActiveGrab>,
 }
 
-impl Hand {
-    /// Whether something that is held is to move in the next frame.
+impl Grabs {
+    /// Whether a grab moves in the next frame.
     pub(crate) fn moves(&self) -> bool {
-        self.grips.iter().any(|grip| grip.held && grip.moved)
+        self.active.iter().any(|grab| grab.held && grab.moved)
     }
 
     /// Notes that a frame has been made.
     pub(crate) fn arrive(&mut self) {
-        for grip in &mut self.grips {
-            grip.moved = false;
+        for grab in &mut self.active {
+            grab.moved = false;
         }
     }
 
-    /// Says where the point of a grab is to be at the end of the next frame; tells whether there is such a grab.
+    /// Sets the target of a grab for the end of the next frame; returns whether the grab exists.
     pub(crate) fn move_to(&mut self, solver: &mut AnySolver, grab: Grab, to: DVec3) -> bool {
-        let Some(grip) = self.find(grab) else {
+        let Some(active) = self.find(grab) else {
             return false;
         };
-        // What is held stays awake only while it really moves.
-        grip.moved |= grip.to != to;
-        grip.to = to;
-        let pose = Pose::at(grip.start + (to - grip.point));
-        solver.backend_mut().move_handle(grip.handle, pose);
+        // A grab keeps its island awake only while it moves.
+        active.moved |= active.to != to;
+        active.to = to;
+        let pose = Pose::at(active.start + (to - active.point));
+        solver.backend_mut().move_handle(active.handle, pose);
         true
     }
 
-    /// Releases all particles attached to a grab's handle; tells whether there is such a grab.
+    /// Releases all particles of a grab; returns whether the grab exists.
     pub(crate) fn release(&mut self, solver: &mut AnySolver, grab: Grab) -> Result<bool, Error> {
-        let Some(grip) = self.find(grab) else {
+        let Some(active) = self.find(grab) else {
             return Ok(false);
         };
-        let_go(solver, grip.handle)?;
-        grip.held = false;
-        grip.user += 1;
+        detach(solver, active.handle)?;
+        active.held = false;
+        active.user += 1;
         Ok(true)
     }
 
-    fn find(&mut self, grab: Grab) -> Option<&mut Grip> {
-        let grip = self.grips.get_mut(grab.slot)?;
-        (grip.held && grip.user == grab.user).then_some(grip)
+    fn find(&mut self, grab: Grab) -> Option<&mut ActiveGrab> {
+        let active = self.active.get_mut(grab.slot)?;
+        (active.held && active.user == grab.user).then_some(active)
     }
 
-    /// Hangs particles on a handle that is free. `island` is the number of the island.
+    /// Attaches particles to a free handle. `island` is the number of the island.
     pub(crate) fn take(
         &mut self,
         island: usize,
@@ -99,21 +99,21 @@ impl Hand {
         point: DVec3,
         compliance: f64,
     ) -> Result<Grab, Error> {
-        let vacant = self.grips.iter().position(|grip| !grip.held);
-        let slot = vacant.unwrap_or(self.grips.len());
+        let vacant = self.active.iter().position(|grab| !grab.held);
+        let slot = vacant.unwrap_or(self.active.len());
         each_mut!(solver, solver => {
-            let known = self.grips.get(slot).map(|grip| grip.handle);
+            let known = self.active.get(slot).map(|grab| grab.handle);
             let handle = known.unwrap_or_else(|| solver.add_handle(Pose::at(DVec3::ZERO)));
             let pose = solver.handle(handle);
-            // It may be on its way back.
+            // The handle may still be moving back.
             solver.move_handle(handle, pose);
             for &p in particles {
                 solver
                     .attach(p, handle, compliance, 0.0)
                     .map_err(|source| Error::Xpbd { field: "grab".into(), source })?;
             }
-            let user = self.grips.get(slot).map_or(0, |grip| grip.user);
-            let grip = Grip {
+            let user = self.active.get(slot).map_or(0, |grab| grab.user);
+            let grab = ActiveGrab {
                 handle,
                 user,
                 held: true,
@@ -122,9 +122,9 @@ impl Hand {
                 start: pose.position,
                 moved: false,
             };
-            match self.grips.get_mut(slot) {
-                Some(old) => *old = grip,
-                None => self.grips.push(grip),
+            match self.active.get_mut(slot) {
+                Some(old) => *old = grab,
+                None => self.active.push(grab),
             }
             Ok(Grab { island, slot, user })
         })
@@ -133,15 +133,15 @@ impl Hand {
     /// Returns an error if a particle is attached to a released handle.
     pub(crate) fn check(&self, solver: &AnySolver) -> Result<(), Error> {
         let free = |handle| {
-            let mut grips = self.grips.iter();
-            grips.any(|grip| grip.handle == handle && !grip.held)
+            let mut active = self.active.iter();
+            active.any(|grab| grab.handle == handle && !grab.held)
         };
-        let hanging = each!(solver, solver => {
+        let attached = each!(solver, solver => {
             solver.attachments().find(|attachment| free(attachment.handle))
         });
-        hanging.map_or(Ok(()), |attachment| {
+        attached.map_or(Ok(()), |attachment| {
             let p = attachment.particle;
-            let what = format!("particle {p} hangs on a handle that was let go");
+            let what = format!("particle {p} is attached to a released handle");
             Err(Error::Inconsistent(what))
         })
     }
@@ -149,7 +149,7 @@ impl Hand {
 
 /// Detaches all particles from a handle and sends it back to where it began, so that its way does not add up from grab
 /// to grab.
-fn let_go(solver: &mut AnySolver, handle: u32) -> Result<(), Error> {
+fn detach(solver: &mut AnySolver, handle: u32) -> Result<(), Error> {
     detach_all(solver, handle)?;
     solver
         .backend_mut()

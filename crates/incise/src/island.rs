@@ -1,8 +1,7 @@
-//! [`Island`]: bodies that are solved together, with all that moves and cuts them.
+//! [`Island`]: bodies that are solved together, with their solver, partition, attachments and cuts.
 //!
-//! Mostly a single body. An island has its own mesh, solver, partition and substeps, so a stiff body makes no other one wait,
-//! each is precise around its own origin, and a body moves to the bit as it would alone in the scene. Cost: that of its
-//! parts.
+//! Mostly a single body. Each island has its own mesh, solver, partition, substeps and origin. A stiff body therefore
+//! does not slow down others, and a body moves bit-identically to a scene of its own. Cost: that of its parts.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -20,7 +19,7 @@ use crate::backend::{AnySolver, each, each_mut};
 use crate::compute_device::ComputeDevice;
 use crate::contacts::Contacts;
 use crate::distance::Distances;
-use crate::grab::{Grab, Hand};
+use crate::grab::{Grab, Grabs};
 use crate::island_builder::{IslandBuilder, demands, substeps};
 use crate::method::{leaves_open, resolve, tet_solve};
 use crate::partition::Partition;
@@ -29,8 +28,8 @@ use crate::report::{Milliseconds, milliseconds};
 use crate::scene::{
     AttachmentSpec, DistanceSpec, Method, Precision, Quantity, SolverSpec, Substeps,
 };
-use crate::sleep::Rest;
-use crate::substeps::{Choice, Missed, evaluate};
+use crate::sleep::SleepState;
+use crate::substeps::{Choice, Shortfall, evaluate};
 use crate::volume::Volumes;
 use crate::warning::{self, Warning, WarningCode};
 use crate::{Error, Scene, collider, distance};
@@ -63,7 +62,7 @@ pub(crate) struct Island {
     /// In a scene with contact.
     pub(crate) contacts: Option<Box<Contacts>>,
     /// The interactive grabs.
-    pub(crate) hand: Hand,
+    pub(crate) grabs: Grabs,
     volumes: Option<Volumes>,
     /// The present positions.
     pub(crate) positions: Vec<DVec3>,
@@ -73,30 +72,30 @@ pub(crate) struct Island {
     pub(crate) initial_volume: f64,
     /// Volume at rest in m³ that strokes have taken away.
     pub(crate) removed_volume: f64,
-    /// What was chosen, if the scene left it open.
+    /// Choice of substeps, if the scene leaves it open.
     #[cfg_attr(feature = "save", serde(with = "crate::substeps::saved"))]
     pub(crate) choice: Option<Choice>,
     /// The substeps before all cuts.
     first_substeps: u32,
-    /// What it costs and may cost, where there is a budget.
+    /// Cost and time limit, in a scene with a budget.
     pub(crate) budget: Option<Budget>,
     /// The longest side of the box around its bodies at rest in m.
     size: f64,
-    /// What is solved less accurately than asked for.
+    /// Volume that is solved less accurately than the accuracy wanted.
     pub(crate) outside: OutsideVolume,
     /// Whether the last frame of VBD missed the accuracy wanted.
     misses_accuracy: bool,
     /// Warnings for the next report.
     pub(crate) warnings: Vec<Warning>,
-    /// What the last cut did to kappa, if that is to be reported.
+    /// Change of kappa by the last cut, if it is reported.
     pub(crate) cut_kappa: Option<CutKappa>,
     /// Whether it sleeps, in a scene where bodies may.
-    pub(crate) rest: Option<Rest>,
-    /// What renews the partition, in a scene where partitions are renewed.
+    pub(crate) sleep: Option<SleepState>,
+    /// Background rebuild of the partition, in a scene with `recluster`.
     pub(crate) recluster: Option<Recluster>,
 }
 
-/// What an island costs and may cost.
+/// Cost of an island and its share of a time budget.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Budget {
@@ -124,7 +123,7 @@ fn whole(number: f64) -> u32 {
     whole.max(1)
 }
 
-/// What cuts did to kappa.
+/// Change of kappa by cuts.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct CutKappa {
@@ -158,7 +157,7 @@ const OUTSIDE_FRACTION: f64 = 0.01;
 /// slower without end.
 const MOST_GROWTH: u32 = 2;
 
-/// How much weaker than on earth gravity may be and still count for the precision.
+/// Factor by which gravity may be weaker than on earth and still decide the precision.
 const WEAKEST: f64 = 1e4;
 
 /// The longest side of the box around points, 0 without points.
@@ -237,7 +236,7 @@ impl Island {
             spare_frames: Vec::new(),
             distances: joined.distances,
             contacts,
-            hand: Hand::default(),
+            grabs: Grabs::default(),
             volumes,
             positions: Vec::new(),
             pieces: PieceTracker::new(&cuttable),
@@ -257,7 +256,7 @@ impl Island {
             misses_accuracy: false,
             warnings: Vec::new(),
             cut_kappa: None,
-            rest: scene.solver.sleep.map(Rest::new),
+            sleep: scene.solver.sleep.map(SleepState::new),
         };
         island.solver.positions(&mut island.positions);
         island.judge_settings();
@@ -309,9 +308,9 @@ impl Island {
         );
         if self
             .choice
-            .is_some_and(|c| c.missed == Some(Missed::Budget))
+            .is_some_and(|c| c.shortfall == Some(Shortfall::Budget))
         {
-            judged.missed = Some(Missed::Budget);
+            judged.shortfall = Some(Shortfall::Budget);
         }
         let chosen = self.choice.is_some();
         self.warnings.extend(warning::of_substeps(
@@ -369,8 +368,8 @@ impl Island {
         let form = tet_solve(self.spec.tet_solve);
         let tets = demands(&self.spec, &self.solver, self.cuttable.mesh(), |_| true);
         let mut choice = evaluate(tets, |_| substeps, form);
-        if choice.missed == Some(Missed::Cap) {
-            choice.missed = Some(Missed::Budget);
+        if choice.shortfall == Some(Shortfall::Cap) {
+            choice.shortfall = Some(Shortfall::Budget);
         }
         self.choice = Some(choice);
         self.set_substeps(substeps);
@@ -448,12 +447,12 @@ impl Island {
 
     /// Whether it is not solved until it is woken.
     pub(crate) fn asleep(&self) -> bool {
-        self.rest.is_some_and(|rest| rest.asleep())
+        self.sleep.is_some_and(|sleep| sleep.asleep())
     }
 
     /// Wakes it, in a scene where bodies may sleep.
     pub(crate) fn wake(&mut self) {
-        if let Some(rest) = &mut self.rest {
+        if let Some(rest) = &mut self.sleep {
             rest.wake();
         }
     }
@@ -464,7 +463,7 @@ impl Island {
         frame: u64,
         keeping_residuals: bool,
     ) -> Result<StepReport, Error> {
-        let moved = self.rest.is_some() && self.is_moved(frame);
+        let moved = self.sleep.is_some() && self.is_moved(frame);
         if moved {
             self.wake();
         }
@@ -491,12 +490,12 @@ impl Island {
         };
         self.judge_step();
         collider::advance(&mut self.settings);
-        self.hand.arrive();
+        self.grabs.arrive();
         for attachment in &mut self.attachments {
             attachment.arrive();
         }
         let time = self.settings.time_step;
-        if let Some(rest) = self.rest.as_mut().filter(|_| !moved) {
+        if let Some(rest) = self.sleep.as_mut().filter(|_| !moved) {
             let state = self.solver.backend_mut().state(None, &[Quantity::Speed])?;
             let falls_asleep = |speed| rest.count(speed, time);
             if state.max_speed.is_some_and(falls_asleep) {
@@ -648,7 +647,7 @@ impl Island {
         Ok(())
     }
 
-    /// Detaches what an attachment holds, and wakes it; tells whether there is such an attachment.
+    /// Releases the particles of an attachment and wakes the island; returns whether the attachment exists.
     pub(crate) fn remove_attachment(&mut self, name: AttachmentHandle) -> Result<bool, Error> {
         let Some(index) = self.attachments.iter().position(|a| a.name == name) else {
             return Ok(false);
@@ -687,7 +686,7 @@ impl Island {
                 .attachments
                 .iter()
                 .any(|attachment| attachment.moves(frame))
-            || self.hand.moves()
+            || self.grabs.moves()
     }
 
     /// The nearest particle to a point within a radius that can be held, and its squared distance.
@@ -721,8 +720,8 @@ impl Island {
         around.next().map(|tet| self.pieces.piece_of(tet))
     }
 
-    /// Takes hold of what can be held within a radius around a point, of the piece of the particle `nearest`. `number` is
-    /// that of the island. Wakes it.
+    /// Grabs the free particles within a radius around a point that belong to the piece of the particle `nearest`.
+    /// `number` is that of the island. Wakes the island.
     pub(crate) fn grab(
         &mut self,
         number: usize,
@@ -734,28 +733,28 @@ impl Island {
         let piece = self.piece_of(nearest);
         let near = self.holdable(point, radius).map(|(_, p)| p);
         let particles: Vec<usize> = near.filter(|&p| self.piece_of(p) == piece).collect();
-        let Self { hand, solver, .. } = self;
-        let grab = hand.take(number, solver, &particles, point, compliance)?;
+        let Self { grabs, solver, .. } = self;
+        let grab = grabs.take(number, solver, &particles, point, compliance)?;
         self.wake();
         Ok(grab)
     }
 
-    /// Says where the point of a grab is to be at the end of the next frame; tells whether there is such a grab.
+    /// Sets the target of a grab for the end of the next frame; returns whether the grab exists.
     pub(crate) fn move_grab(&mut self, grab: Grab, to: DVec3) -> bool {
-        self.hand.move_to(&mut self.solver, grab, to)
+        self.grabs.move_to(&mut self.solver, grab, to)
     }
 
-    /// Lets go of all that hangs on a grab's handle, and wakes the island; tells whether there is such a grab.
+    /// Releases the particles of a grab and wakes the island; returns whether the grab exists.
     pub(crate) fn release(&mut self, grab: Grab) -> Result<bool, Error> {
-        let is_held = self.hand.release(&mut self.solver, grab)?;
+        let is_held = self.grabs.release(&mut self.solver, grab)?;
         if is_held {
             self.wake();
         }
         Ok(is_held)
     }
 
-    /// Lets solver, pieces, clusters, colors, schedule and volume constraints follow a cut of the mesh, and wakes it.
-    /// Returns what happened to its pieces.
+    /// Applies a delta to solver, pieces, clusters, colors, schedule and volume constraints, and wakes the island.
+    /// Returns the events of its pieces.
     pub(crate) fn apply_delta(
         &mut self,
         delta: &CutDelta,
@@ -825,7 +824,7 @@ impl Island {
         Ok(renewed)
     }
 
-    /// Lets volume constraints follow another partition.
+    /// Updates volume constraints for another partition.
     pub(crate) fn reschedule_volumes(&mut self) -> Result<(), Error> {
         let Some(volumes) = &self.volumes else {
             return Ok(());
@@ -834,8 +833,8 @@ impl Island {
         volumes.apply_delta(&mut self.solver, &nothing, &self.cuttable, schedule)
     }
 
-    /// Has [`Island::follow`] note the largest kappa of the tets that the cuts of a frame make, and that of all tets before the
-    /// first of them if it is wanted, which is O(tets).
+    /// Makes [`Island::apply_delta`] note the largest kappa of the tets that the cuts of a frame create, and if wanted
+    /// that of all tets before the first cut, which is O(tets).
     pub(crate) fn note_kappa(&mut self, before: bool) {
         if self.cut_kappa.is_none() {
             self.cut_kappa = Some(CutKappa {
@@ -869,7 +868,7 @@ impl Island {
         }
         self.solver
             .check(&self.cuttable, &self.partition.schedule)?;
-        self.hand.check(&self.solver)?;
+        self.grabs.check(&self.solver)?;
         if let Some(contacts) = &self.contacts {
             contacts.check(&self.cuttable)?;
         }

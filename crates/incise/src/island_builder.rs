@@ -1,7 +1,7 @@
-//! [`IslandBuilder`]: the bodies of an island as one mesh, with all that is tied to their particles.
+//! [`IslandBuilder`]: the bodies of an island as one mesh, with attachments and distances in its numbers.
 //!
-//! Particles and tets are numbered body by body in the order of the scene; handles and links, which a scene gives by
-//! bodies and points, are translated here. Cost: O(particles + tets).
+//! Particles and tets are numbered body by body in the order of the scene. Attachments and distances, which a scene
+//! gives by bodies and points, are translated here. Cost: O(particles + tets).
 
 use std::ops::Range;
 
@@ -21,7 +21,7 @@ use crate::validate::{existing, value};
 use crate::volume::Volumes;
 use crate::{Error, Scene, distance};
 
-/// How many materials there may be.
+/// Error message for too many materials.
 const TOO_MANY: &str =
     "at most 65,536 bodies and parts of other materials that are solved together";
 
@@ -43,7 +43,7 @@ pub(crate) struct IslandBuilder {
     pub(crate) empty_regions: Vec<String>,
     pub(crate) attachments: Vec<Attachment>,
     pub(crate) distances: Distances,
-    /// What the body of each material asks for.
+    /// Volume compliance of each material's body.
     volume_compliances: Vec<Option<f64>>,
     pub(crate) substeps: Vec<Substeps>,
 }
@@ -202,7 +202,7 @@ pub(crate) fn substeps(
     (most.max(choice.substeps), Some(choice))
 }
 
-/// What the tets of some materials need for the accuracy of a scene.
+/// Returns the demands on substeps of the tets of some materials, for the accuracy of a scene.
 pub(crate) fn demands(
     spec: &SolverSpec,
     solver: &AnySolver,

@@ -1,13 +1,13 @@
-//! [`island_of_bodies`]: which bodies are solved together.
+//! [`island_of_bodies`]: groups of bodies that are solved together.
 //!
-//! Bodies that nothing joins do not see each other: each gets a solver, a schedule and substeps of its own. Bodies that
-//! are joined, directly or through others, must be solved as one. Source: the islands of rigid body engines, found as
-//! connected components by union-find. Cost: O(bodies + pairs).
+//! Bodies that no distance joins do not interact: each gets its own solver, schedule and substeps. Bodies joined
+//! directly or through others are solved as one. Source: the islands of rigid body engines, found as connected
+//! components by union-find. Cost: O(bodies + pairs).
 
 use incise_graph::DisjointSets;
 
-/// For each of `bodies` bodies the number of its island; islands are numbered in the order of their first body. `joined`
-/// lists pairs of bodies that must be solved together.
+/// Returns for each of `bodies` bodies the number of its island; islands are numbered in the order of their first body.
+/// `joined` lists pairs of bodies that must be solved together.
 ///
 /// # Panics
 /// If a pair names a body that does not exist.

@@ -1,9 +1,8 @@
 //! Cuts soft bodies in real time.
 //!
-//! This is the facade: a [`Scene`] or a [`SimulationBuilder`] says what is simulated, a [`Simulation`] moves it frame by
-//! frame, cuts included.
-//! The crates behind it are useful alone and re-exported here: [`mesh`], [`mesh_io`], [`meshing`], [`graph`],
-//! [`coloring`], [`clustering`], [`cutting`], [`xpbd`].
+//! This is the facade: a [`Scene`] or a [`SimulationBuilder`] describes bodies, cuts and settings, and a [`Simulation`]
+//! advances them frame by frame. The other crates of the workspace are usable alone and re-exported here: [`mesh`],
+//! [`mesh_io`], [`meshing`], [`graph`], [`coloring`], [`clustering`], [`cutting`], [`xpbd`].
 //!
 //! ```
 //! use incise::{Scene, Simulation};
@@ -67,7 +66,7 @@ mod warning;
 pub use attachment::AttachmentHandle;
 pub use collider::ColliderHandle;
 pub use distance::DistanceHandle;
-pub use error::Error;
+pub use error::{Error, clustering_suggestion, coloring_suggestion, shape_suggestion};
 pub use event::Event;
 pub use grab::Grab;
 pub use incise_clustering as clustering;

@@ -1,7 +1,7 @@
-//! [`LiveBlade`]: a blade whose path is not known, as a hand or a device moves it.
+//! [`LiveBlade`]: a blade that is moved frame by frame, by a mouse or a haptic device.
 //!
-//! It tells a stroke where it is, frame by frame; the stroke cuts with it as with a blade on a path, so that both cut the
-//! same to the bit where they come by the same poses. Cost: a copy of the points.
+//! The blade gives its stroke a pose for each frame. The stroke cuts bit-identically to one with a path through these
+//! poses. Cost: a copy of the points.
 
 use glam::DVec3;
 use incise_cutting::CutError;
@@ -9,7 +9,7 @@ use incise_cutting::CutError;
 use crate::Error;
 use crate::validate::coordinates;
 
-/// How far a blade is.
+/// State of a live blade between two frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 enum Progress {
@@ -30,7 +30,7 @@ pub(crate) struct LiveBlade {
 }
 
 impl LiveBlade {
-    /// In its first pose.
+    /// Creates a blade in its first pose.
     pub(crate) fn new(field: &str, pose: &[DVec3]) -> Result<Self, Error> {
         check(field, pose)?;
         long_enough(field, pose)?;
@@ -40,12 +40,12 @@ impl LiveBlade {
         })
     }
 
-    /// Where it is at the start of the next frame.
+    /// Returns the pose at the start of the next frame.
     pub(crate) fn pose(&self) -> &[DVec3] {
         &self.pose
     }
 
-    /// Says where it is at the start of the next frame.
+    /// Sets the pose at the start of the next frame.
     pub(crate) fn go_to(&mut self, field: &str, pose: &[DVec3]) -> Result<(), Error> {
         let (before, now) = (self.pose.len(), pose.len());
         if before != now {
@@ -60,7 +60,7 @@ impl LiveBlade {
         Ok(())
     }
 
-    /// Ends its stroke; tells whether the next frame has a pose to carry out first.
+    /// Ends the stroke; returns whether the next frame has a pose to carry out first.
     pub(crate) fn end(&mut self) -> bool {
         let cuts = self.progress == Progress::Moved;
         if cuts {

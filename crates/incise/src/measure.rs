@@ -1,7 +1,7 @@
-//! What all islands of bodies together are worth: the quantities of a report.
+//! Reported quantities over all islands of bodies.
 //!
-//! Sums, and the largest or smallest value where that is what is asked. For a single island they are its own numbers to
-//! the bit. Cost: a pass over the particles or tets each.
+//! Sums over the islands, or the largest or smallest value. A single island's values are unchanged. Cost: a pass over
+//! the particles or tets for each quantity.
 
 use glam::DVec3;
 use incise_xpbd::Volume;
@@ -181,7 +181,7 @@ pub(crate) fn by_body(islands: &mut [Island], with_kappa: bool) -> Vec<BodyRepor
             substeps: island.settings.substeps,
             method: island.choice.map(|_| ChosenMethod::of(&island.spec)),
             iterations: island.choice.map(|_| island.settings.iterations),
-            asleep: island.rest.map(|rest| rest.asleep()),
+            asleep: island.sleep.map(|sleep| sleep.asleep()),
             choice: island.choice,
             kappa: with_kappa.then(|| island.kappa()),
             kappa_before_cut: cut.and_then(|cut| cut.before),

@@ -1,11 +1,11 @@
-//! [`MergedMesh`]: several islands of bodies seen as one mesh.
+//! [`MergedMesh`]: all islands of bodies as one mesh.
 //!
 //! At the start particles and tets are numbered body by body in the order of the scene. A cut keeps all numbers: new
-//! particles and tets get the next ones, stroke by stroke and within a stroke island by island, each island's in the order
-//! of its own delta. Each island numbers its own from 0; the lists here translate, and one delta of an island becomes one
-//! of the merged mesh. Only scenes with more than one island have one; a single island is its own.
+//! particles and tets get the next ones, stroke by stroke and within a stroke island by island, each island's in the
+//! order of its own delta. Each island numbers its own from 0; the lists here translate the numbers and the deltas.
+//! Scenes with a single island use its mesh directly.
 //!
-//! Cost: following a cut costs what the cut touched; clusters and colors of the merged mesh are put together on request.
+//! Cost: a delta costs as much as it changes; clusters and colors are merged on request.
 
 use glam::DVec3;
 use incise_cutting::{
@@ -27,16 +27,16 @@ struct Numbers {
 }
 
 impl Numbers {
-    /// Appends particles of the island; their numbers in the merged mesh are the next ones, so `places` gets theirs at its end.
+    /// Appends particles of the island; their numbers in the merged mesh are the next ones, so `locations` gets theirs at its end.
     fn add_particles(
         &mut self,
         island: usize,
         new: impl Iterator<Item = ParticleId>,
-        places: &mut Vec<(u32, ParticleId)>,
+        locations: &mut Vec<(u32, ParticleId)>,
     ) {
         let island = u32::try_from(island).expect("each island has particles, numbered by 32 bits");
         for particle in new {
-            places.push((island, ParticleId::new(self.particles.len())));
+            locations.push((island, ParticleId::new(self.particles.len())));
             self.particles.push(particle);
         }
     }
@@ -50,7 +50,7 @@ pub(crate) struct MergedMesh {
     pub(crate) positions: Vec<DVec3>,
     numbers: Vec<Numbers>,
     /// For each particle its island and its number there.
-    places: Vec<(u32, ParticleId)>,
+    locations: Vec<(u32, ParticleId)>,
 }
 
 impl MergedMesh {
@@ -59,7 +59,7 @@ impl MergedMesh {
         let mut mesh = TetMesh::default();
         let islands = island_of.iter().max().map_or(0, |last| last + 1);
         let mut numbers: Vec<Numbers> = (0..islands).map(|_| Numbers::default()).collect();
-        let mut places = Vec::new();
+        let mut locations = Vec::new();
         for (body, &island) in bodies.iter().zip(island_of) {
             let first = mesh.positions.len();
             let shifted = |p: ParticleId| ParticleId::new(first + p.index());
@@ -69,7 +69,7 @@ impl MergedMesh {
             mesh.tets.extend(tets);
             let numbers = &mut numbers[island];
             let particles = (first..mesh.positions.len()).map(ParticleId::new);
-            numbers.add_particles(island, particles, &mut places);
+            numbers.add_particles(island, particles, &mut locations);
             let tets = (first_tet..mesh.tets.len()).map(TetId::new);
             numbers.tets.extend(tets);
         }
@@ -77,7 +77,7 @@ impl MergedMesh {
             positions: mesh.positions.clone(),
             mesh,
             numbers,
-            places,
+            locations,
         }
     }
 
@@ -87,7 +87,7 @@ impl MergedMesh {
             mesh: TetMesh::default(),
             positions: Vec::new(),
             numbers: Vec::new(),
-            places: Vec::new(),
+            locations: Vec::new(),
         };
         merged.add_island(island);
         merged
@@ -104,7 +104,7 @@ impl MergedMesh {
         self.mesh.tets.extend(tets);
         let mut numbers = Numbers::default();
         let particles = (first..self.mesh.positions.len()).map(ParticleId::new);
-        numbers.add_particles(self.numbers.len(), particles, &mut self.places);
+        numbers.add_particles(self.numbers.len(), particles, &mut self.locations);
         numbers
             .tets
             .extend((first_tet..self.mesh.tets.len()).map(TetId::new));
@@ -112,18 +112,18 @@ impl MergedMesh {
     }
 
     /// The island of a particle and its number there. O(1).
-    pub(crate) fn place(&self, particle: ParticleId) -> (usize, usize) {
-        let (island, number) = self.places[particle.index()];
+    pub(crate) fn location(&self, particle: ParticleId) -> (usize, usize) {
+        let (island, number) = self.locations[particle.index()];
         (island as usize, number.index())
     }
 
-    /// Follows a cut in one island; returns what it changed in the numbers of the merged mesh.
+    /// Applies a delta of one island; returns the delta in the numbers of the merged mesh.
     pub(crate) fn apply_delta(&mut self, island: usize, delta: &CutDelta) -> CutDelta {
         let numbers = &mut self.numbers[island];
         let (particles_before, tets_before) = (self.mesh.positions.len(), self.mesh.tets.len());
         let new = delta.particles_after() - delta.particles_before;
         let particles = (particles_before..particles_before + new).map(ParticleId::new);
-        numbers.add_particles(island, particles, &mut self.places);
+        numbers.add_particles(island, particles, &mut self.locations);
         let new = delta.added.len() - delta.removed.len();
         let new = (tets_before..tets_before + new).map(TetId::new);
         numbers.tets.extend(new);
@@ -238,7 +238,7 @@ impl MergedMesh {
         self.numbers[island].particles[particle].index()
     }
 
-    /// Puts what each island says of its tets in the order of the merged mesh.
+    /// Merges per-tet values of all islands in the order of the merged mesh.
     pub(crate) fn of_tets<T: Copy + Default>(&self, of_islands: &[Vec<T>]) -> Vec<T> {
         let mut of_tets = vec![T::default(); self.mesh.tets.len()];
         for (numbers, of_island) in self.numbers.iter().zip(of_islands) {
@@ -249,7 +249,7 @@ impl MergedMesh {
         of_tets
     }
 
-    /// Takes over the islands' positions.
+    /// Copies the positions of the islands.
     pub(crate) fn collect_positions(&mut self, islands: &[Island]) {
         for (numbers, island) in self.numbers.iter().zip(islands) {
             for (p, x) in numbers.particles.iter().zip(&island.positions) {
@@ -306,7 +306,7 @@ impl MergedMesh {
                 particles[number.index()] += 1;
                 if self.mesh.positions[number.index()] != mesh.positions[p]
                     || self.positions[number.index()] != island.positions[p]
-                    || self.place(*number) != (g, p)
+                    || self.location(*number) != (g, p)
                 {
                     return differs("a particle");
                 }

@@ -1,23 +1,23 @@
-//! How the settings of a scene become those of a solver, and what `method = "auto"` takes.
+//! Converts the settings of a scene to those of a solver, and resolves `method = "auto"`.
 //!
-//! Gauss-Seidel, Jacobi and Chebyshev are ways through the same constraints of XPBD. VBD lowers the potential of the
-//! implicit step, in which damping, links, soft handles and volume constraints are terms, so it takes every scene.
+//! Gauss-Seidel, Jacobi and Chebyshev solve the constraints of XPBD. VBD lowers the potential of the implicit step,
+//! which has terms for damping, distances, soft attachments and volume constraints, so it supports every scene.
 //!
-//! `auto` takes Gauss-Seidel wherever `max_substeps` are enough for the accuracy wanted, and two-level VBD with one step
-//! a frame for bodies that are too stiff for that.
+//! `auto` takes Gauss-Seidel where `max_substeps` are enough for the accuracy wanted, and two-level VBD with one step a
+//! frame for stiffer bodies.
 
 use incise_xpbd::{StepSettings, VbdSettings};
 
 use crate::accuracy::DEFAULT_ACCURACY;
 use crate::scene::{Integrator, Method, SolverSpec, Substeps, TetSolve};
-use crate::substeps::{Choice, Missed};
+use crate::substeps::{Choice, Shortfall};
 use crate::validate::{coordinates, value, within};
 use crate::{Error, Scene, collider};
 
 /// Rounds of two-level VBD in a frame, at most: what has not converged then is reported.
 const MOST_ROUNDS: u32 = 20;
 
-/// The solver's name of a form.
+/// Converts the scene's enum to the solver's.
 pub(crate) fn tet_solve(form: TetSolve) -> incise_xpbd::TetSolve {
     match form {
         TetSolve::Split => incise_xpbd::TetSolve::Split,
@@ -26,7 +26,7 @@ pub(crate) fn tet_solve(form: TetSolve) -> incise_xpbd::TetSolve {
     }
 }
 
-/// The solver's name of an integrator.
+/// Converts the scene's integrator to the solver's.
 pub(crate) fn integrator(integrator: Integrator) -> incise_xpbd::Integrator {
     match integrator {
         Integrator::Bdf2 => incise_xpbd::Integrator::Bdf2,
@@ -97,7 +97,7 @@ pub(crate) fn resolve(
     match choice {
         Some(capped)
             if is_open
-                && capped.missed == Some(Missed::Cap)
+                && capped.shortfall == Some(Shortfall::Cap)
                 && capped.expected_error > DEFAULT_ACCURACY =>
         {
             let (own, choice) = with_vbd(spec, capped);

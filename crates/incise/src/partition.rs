@@ -15,9 +15,8 @@ use crate::{Error, Scene};
 
 /// Number of colors that cuts may add before all clusters are recolored.
 ///
-/// Each color is a barrier in every iteration, but a full coloring with its new schedule costs more than a frame. With
-/// 2, one stroke through a body of 11 000 tets took two full colorings; with 4 none. The price: a new schedule also
-/// repacks the tets, and without it solving that stroke took 7 % more instructions.
+/// Each color is a barrier in every iteration, but a full coloring with its new schedule costs more than a frame. A
+/// smaller slack causes more full colorings; a larger one leaves a less dense layout.
 const SLACK: usize = 4;
 
 /// The clusters of a mesh, their colors, and the schedule in which they are solved.
@@ -34,7 +33,7 @@ pub(crate) struct Partition {
     lists: Lists,
 }
 
-/// How a partition is made and kept.
+/// Settings of a partition: clustering, coloring, merging.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct PartitionSettings {
@@ -44,7 +43,7 @@ pub(crate) struct PartitionSettings {
     merges: bool,
 }
 
-/// Lists that following a cut works with, kept so that a frame need not allocate them.
+/// Work lists of an update, kept to avoid allocations in a frame.
 #[derive(Debug, Default)]
 struct Lists {
     /// Pairs of a cluster and a particle that are no more, one for each tet.
@@ -60,7 +59,7 @@ struct Lists {
     merging: MergeLists,
 }
 
-/// What they hold is of no use after the cut, and copies begin without.
+/// Copies are empty: the contents are only used during an update.
 impl Clone for Lists {
     fn clone(&self) -> Self {
         Self::default()
@@ -68,7 +67,7 @@ impl Clone for Lists {
 }
 
 impl PartitionSettings {
-    /// What settings ask for.
+    /// Reads the settings of a partition from those of the solver.
     pub(crate) fn new(solver: &SolverSpec) -> Result<Self, Error> {
         Ok(Self {
             method: solver.clustering.parse()?,
@@ -173,8 +172,8 @@ impl Partition {
         Ok(())
     }
 
-    /// Follows several cuts at once, whose last left the mesh as `cuttable`. If clusters are merged, children stay loose
-    /// until the end. Costs what the cuts did, and O(tets).
+    /// Applies several deltas at once, the last of which left the mesh as `cuttable`. If clusters are merged, children
+    /// stay loose until the end. Costs what the cuts changed, and O(tets).
     pub(crate) fn catch_up(
         &mut self,
         deltas: &[CutDelta],
@@ -357,7 +356,7 @@ impl Partition {
         Ok(full)
     }
 
-    /// Lets the schedule follow clusters and colors.
+    /// Updates the schedule after clusters and colors.
     fn reschedule(&mut self, delta: &CutDelta, all: bool) {
         let coloring = self.recoloring.coloring();
         if all {

@@ -1,11 +1,12 @@
 //! [`PieceNumbers`]: the pieces of all islands under one numbering.
 //!
-//! Each island follows its own pieces ([`incise_cutting::PieceTracker`]) and numbers them from 0. Here each gets a number
-//! in the scene: at the start island by island, then as they come off, stroke by stroke and within a stroke island by
-//! island. Numbers stay and none is used twice. A piece belongs to one body, as bodies share no particles.
+//! Each island tracks its own pieces ([`incise_cutting::PieceTracker`]) and numbers them from 0. Here each gets a
+//! number in the scene: at the start island by island, then in the order of detachment, stroke by stroke and within a
+//! stroke island by island. Numbers never change, and none is used twice. A piece belongs to one body, since bodies
+//! share no particles.
 //!
-//! Cost: a pass over the tets at the start, then O(1) for each piece that comes off. Where an island has several densities,
-//! the masses of pieces are summed over its tets: O(tets) when some come off, and for a report.
+//! Cost: a pass over the tets at the start, then O(1) for each detached piece. In islands with several densities masses
+//! are summed over the tets: O(tets) when pieces are detached, and for a report.
 
 use std::collections::BTreeMap;
 
@@ -31,7 +32,7 @@ struct Number {
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct PieceNumbers {
-    /// By number in the scene.
+    /// Pieces by number in the scene.
     pieces: Vec<Number>,
     /// For each island the numbers of its pieces in the scene, in the order of their own.
     of_island: Vec<Numbers>,
@@ -78,7 +79,7 @@ impl PieceNumbers {
         id
     }
 
-    /// Notes what came off in an island of a number; adds it to `detached`.
+    /// Numbers the pieces detached in an island and adds them to `detached`.
     pub(crate) fn apply_delta(
         &mut self,
         number: usize,

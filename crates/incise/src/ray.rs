@@ -1,13 +1,14 @@
-//! [`RayHit`]: where a ray meets the skin of the bodies first.
+//! [`RayHit`]: the first intersection of a ray with the skin of the bodies.
 //!
-//! Every boundary triangle is tried: O(triangles), some ten nanoseconds each, which a click can afford and a hierarchy that
-//! follows cuts would not repay. Source: T. Möller and B. Trumbore, "Fast, minimum storage ray/triangle intersection", 1997.
+//! Every boundary triangle is tested: O(triangles), some ten nanoseconds each. Rays are rare, so a hierarchy with
+//! updates after cuts would not pay off. Source: T. Möller and B. Trumbore, "Fast, minimum storage ray/triangle
+//! intersection", 1997.
 
 use glam::DVec3;
 use incise_cutting::{BoundaryTriangle, FaceTag};
 use incise_mesh::{ParticleId, TetId};
 
-/// Where a ray meets a body first: [`Simulation::ray_cast`](crate::Simulation::ray_cast).
+/// First intersection of a ray with a body: see [`Simulation::ray_cast`](crate::Simulation::ray_cast).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct RayHit {
@@ -15,17 +16,17 @@ pub struct RayHit {
     pub tet: TetId,
     /// The particles at its corners, counterclockwise seen from outside.
     pub particles: [ParticleId; 3],
-    /// The place in m.
+    /// Position of the intersection in m.
     pub point: DVec3,
-    /// From the ray's origin in lengths of its direction.
+    /// Distance from the ray's origin in lengths of its direction.
     pub distance: f64,
     /// The normal of the triangle, of unit length, pointing out of the body.
     pub normal: DVec3,
-    /// What the triangle is.
+    /// Kind of the triangle: outer surface or the stroke that opened it.
     pub tag: FaceTag,
 }
 
-/// The first triangle that a ray meets, from whichever side; of those at the same distance the first.
+/// Finds the first triangle that a ray meets from either side; of several at one distance the first in the list.
 pub(crate) fn first_hit(
     triangles: impl Iterator<Item = BoundaryTriangle>,
     positions: &[DVec3],
@@ -55,7 +56,7 @@ pub(crate) fn first_hit(
     })
 }
 
-/// How far along a ray it meets a triangle.
+/// Distance along a ray to a triangle, in lengths of its direction; `None` if it misses.
 fn meet([a, b, c]: [DVec3; 3], origin: DVec3, direction: DVec3) -> Option<f64> {
     let (ab, ac) = (b - a, c - a);
     let across = direction.cross(ac);

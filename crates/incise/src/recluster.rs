@@ -1,18 +1,18 @@
-//! [`Recluster`]: fresh clusters and colors for a degraded partition, made in the background.
+//! [`Recluster`]: rebuilds clusters and colors of a degraded partition in the background.
 //!
-//! Cuts change clusters where they are, so a partition degrades: after many cuts it has more colors and smaller clusters than one
-//! made from the mesh as it is now. When it has degraded enough, a copy of the mesh goes to a thread of its own, which
-//! clusters and colors it as at the start. A fixed number of frames later, after the strokes of that frame, the new partition
-//! takes the place of the old one, and follows the cuts made meanwhile: first each by itself, then small clusters around
-//! all of them are merged. If the thread is not done by then the frame waits. So it depends on the scene alone in which
-//! frame which partition comes, never on time or on the number of threads.
+//! Cuts change clusters locally, so a partition degrades: after many cuts it has more colors and smaller clusters than
+//! a rebuilt one. Once it has degraded enough, a thread clusters and colors a copy of the mesh. A fixed number of
+//! frames later, after the strokes of that frame, the new partition replaces the old one. The cuts made meanwhile are
+//! applied to it first, one by one, and then small clusters around all of them are merged. If the thread has not
+//! finished by then, the frame waits. The frame of the replacement thus depends on the scene alone, never on time or on
+//! the number of threads.
 //!
-//! The trade: the thread needs a core; the frame that starts it copies the mesh, the one that swaps costs what following
-//! the cuts of the frames between took, and a schedule and layout, as any frame with a cut. More frames between wait less
-//! and follow more. Clusters and colors far from all cuts change, too, and with them the order of solving: the result
-//! differs as much as between two numberings of the mesh.
+//! Trade-off: the thread needs a core. The frame that starts it copies the mesh; the frame of the replacement applies
+//! the pending cuts and rebuilds schedule and layout. More frames between mean less waiting and more cuts to apply.
+//! Clusters and colors far from all cuts change as well, and with them the order of solving: results differ as much as
+//! between two numberings of the mesh.
 //!
-//! The paper leaves this open. Cost: clustering and coloring in the background; beside it two divisions a frame.
+//! The paper leaves this open. Cost: clustering and coloring in the background, and two divisions a frame.
 
 use std::thread::JoinHandle;
 
@@ -22,7 +22,7 @@ use crate::Error;
 use crate::partition::{Partition, PartitionSettings};
 use crate::scene::ReclusterSpec;
 
-/// What watches over the degradation of a partition.
+/// Monitors the degradation of a partition and rebuilds it in the background.
 #[derive(Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Recluster {
@@ -30,7 +30,7 @@ pub(crate) struct Recluster {
     pending: Option<Pending>,
 }
 
-/// A copy has no thread: a partition in the making is left out, unless [`Recluster::settle`] was called.
+/// A copy has no thread: a partition in the rebuild is left out, unless [`Recluster::settle`] was called.
 impl Clone for Recluster {
     fn clone(&self) -> Self {
         Self {
@@ -40,13 +40,13 @@ impl Clone for Recluster {
     }
 }
 
-/// A partition in the making.
+/// A partition that is being rebuilt.
 #[derive(Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 struct Pending {
     /// The frame that takes it.
     due: u64,
-    making: Making,
+    rebuild: Rebuild,
     /// The cuts since.
     deltas: Vec<CutDelta>,
 }
@@ -54,11 +54,11 @@ struct Pending {
 /// A partition, or the thread that makes it.
 #[derive(Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
-enum Making {
-    Made(Box<Partition>),
+enum Rebuild {
+    Done(Box<Partition>),
     // Last, since a variant that is skipped must not shift the numbers of others. A snapshot has none.
     #[cfg_attr(feature = "save", serde(skip))]
-    Thread(JoinHandle<Result<Partition, Error>>),
+    Running(JoinHandle<Result<Partition, Error>>),
 }
 
 impl Recluster {
@@ -69,12 +69,12 @@ impl Recluster {
         }
     }
 
-    /// Replaces the spec. A partition in the making is still taken in the frame that was set before.
+    /// Replaces the spec. A partition that is being rebuilt is still taken in the frame that was set before.
     pub(crate) fn with(self, spec: ReclusterSpec) -> Self {
         Self { spec, ..self }
     }
 
-    /// Notes a cut for the partition in the making.
+    /// Notes a cut for the partition in the rebuild.
     pub(crate) fn note(&mut self, delta: &CutDelta) {
         if let Some(pending) = &mut self.pending {
             pending.deltas.push(delta.clone());
@@ -99,19 +99,19 @@ impl Recluster {
         Ok(true)
     }
 
-    /// Waits for a partition in the making, so that a copy has it, too. It is taken in the same frame as it would be.
+    /// Waits for a partition in the rebuild, so that a copy has it, too. It is taken in the same frame as it would be.
     pub(crate) fn settle(&mut self) -> Result<(), Error> {
         let Some(pending) = self.pending.take() else {
             return Ok(());
         };
         self.pending = Some(Pending {
-            making: Making::Made(Box::new(pending.making.partition()?)),
+            rebuild: Rebuild::Done(Box::new(pending.rebuild.partition()?)),
             ..pending
         });
         Ok(())
     }
 
-    /// Whether a partition is in the making.
+    /// Whether a partition is in the rebuild.
     pub(crate) fn is_pending(&self) -> bool {
         self.pending.is_some()
     }
@@ -137,37 +137,37 @@ impl Pending {
             .map_err(|error| refused(error.to_string()))?;
         Ok(Self {
             due,
-            making: Making::Thread(thread),
+            rebuild: Rebuild::Running(thread),
             deltas: Vec::new(),
         })
     }
 
     fn copy(&self) -> Option<Self> {
-        match &self.making {
-            Making::Thread(_) => None,
-            Making::Made(partition) => Some(Self {
+        match &self.rebuild {
+            Rebuild::Running(_) => None,
+            Rebuild::Done(partition) => Some(Self {
                 due: self.due,
-                making: Making::Made(partition.clone()),
+                rebuild: Rebuild::Done(partition.clone()),
                 deltas: self.deltas.clone(),
             }),
         }
     }
 
-    /// Waits for the partition and lets it follow what has been cut meanwhile.
+    /// Waits for the partition and applies the cuts made meanwhile.
     fn finish(self, cuttable: &CuttableMesh) -> Result<Partition, Error> {
-        let mut partition = self.making.partition()?;
+        let mut partition = self.rebuild.partition()?;
         partition.catch_up(&self.deltas, cuttable)?;
         Ok(partition)
     }
 }
 
-impl Making {
+impl Rebuild {
     /// The partition; waits for it.
     fn partition(self) -> Result<Partition, Error> {
         let failed = |_| Error::Inconsistent("clustering in the background failed".into());
         match self {
-            Self::Thread(thread) => thread.join().map_err(failed)?,
-            Self::Made(partition) => Ok(*partition),
+            Self::Running(thread) => thread.join().map_err(failed)?,
+            Self::Done(partition) => Ok(*partition),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! [`Solid`]: a region of a scene in space, and which particles of a body lie in it.
+//! [`Solid`]: a region of a scene in space, and the particles of a body in it.
 
 use glam::DVec3;
 use incise_mesh::{TetId, TetMesh};

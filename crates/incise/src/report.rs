@@ -1,4 +1,4 @@
-//! [`FrameReport`]: what a frame did, as one line of JSON.
+//! [`FrameReport`]: counts, times and quantities of a frame, as one line of JSON.
 //!
 //! Only quantities that were computed appear.
 
@@ -11,30 +11,30 @@ use serde::Serialize;
 
 use crate::contacts::ContactCounts;
 use crate::scene::{Method, SolverSpec};
-pub use crate::substeps::{Choice, Missed};
+pub use crate::substeps::{Choice, Shortfall};
 use crate::warning::Warning;
 
-/// What a frame did.
+/// Report on a frame: counts, times, and the quantities that the scene requests.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct FrameReport {
     /// Number of the frame, from 0.
     pub frame: u64,
-    /// Simulated time at its end in s.
+    /// Simulated time at the end of the frame in s.
     pub time_s: f64,
-    /// Particles.
+    /// Number of particles.
     pub particles: usize,
-    /// Tets.
+    /// Number of tets.
     pub tets: usize,
-    /// Clusters with at least one tet.
+    /// Number of clusters with at least one tet.
     pub clusters: usize,
-    /// Colors.
+    /// Number of colors of the schedule; the largest if bodies are solved separately.
     pub colors: usize,
-    /// Pieces: sets of tets connected through shared particles.
+    /// Number of pieces: sets of tets connected through shared particles.
     pub pieces: usize,
-    /// What was cut, if anything.
+    /// Counts of the frame's cuts, if there were any.
     pub cut: Option<CutReport>,
-    /// What came off in this frame, in the order in which it did; absent if nothing.
+    /// Pieces detached in this frame, in order; absent if none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub detached: Vec<DetachedReport>,
     /// Wall time by stage.
@@ -66,32 +66,33 @@ pub struct FrameReport {
     /// The tets softened to keep the limit of kappa.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub softened: Option<SoftenedReport>,
-    /// By body what its substeps and its kappa are, in the order of the scene; in all frames if `substeps` is `auto` for
-    /// a body or bodies may sleep, else where kappa is reported, else absent.
+    /// Substeps and kappa by body, in the order of the scene; in all frames if `substeps` is `auto` for a body or
+    /// bodies may sleep, otherwise where kappa is reported.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub bodies: Vec<BodyReport>,
     /// Contacts, in a scene that declares contact.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contact: Option<ContactReport>,
-    /// Particles that had to be put back because they would have become infinite; absent if none. From a device they
-    /// are known in the frames that ask it for something (a blade, a quantity of the state), for all frames since.
+    /// Number of particles that were put back because they would have become Inf or NaN; absent if none. From a device
+    /// it is known only in frames that read data back (for a blade or a reported quantity), for all frames since the
+    /// last one.
     #[serde(skip_serializing_if = "is_zero")]
     pub repaired: usize,
-    /// What must be known about the frame; absent if nothing. See [`Warning`].
+    /// Warnings about the frame; absent if none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<Warning>,
-    /// Islands of joined bodies whose clusters and colors were rebuilt in the background and taken in this frame; absent
-    /// if none.
+    /// Number of islands whose clusters and colors were rebuilt in the background and replaced in this frame; absent if
+    /// none.
     #[serde(skip_serializing_if = "is_zero")]
     pub reclustered: usize,
-    /// Where it was computed: `cpu` or `gpu`.
+    /// Compute device: `cpu` or `gpu`.
     pub backend: &'static str,
-    /// In which precision: `f32` or `f64`.
+    /// Precision of the solver: `f32` or `f64`.
     pub precision: &'static str,
 }
 
 impl FrameReport {
-    /// What must be known about the frame; empty in most frames.
+    /// Returns the warnings about the frame; empty in most frames.
     #[must_use]
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
@@ -140,20 +141,20 @@ impl ChosenMethod {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct BodyReport {
-    /// The numbers of the bodies in the scene; mostly one.
+    /// Numbers of the bodies in the scene; one unless distances join several.
     pub bodies: Vec<usize>,
     /// Substeps of a frame.
     pub substeps: u32,
-    /// The method, where substeps or method are `auto`.
+    /// Chosen method; only if substeps or method are `auto`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub method: Option<ChosenMethod>,
-    /// Iterations of a substep, for VBD the most of them, where substeps or method are `auto`.
+    /// Iterations of a substep, for VBD the largest number; only if substeps or method are `auto`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub iterations: Option<u32>,
-    /// Whether it is at rest and not solved, in a scene where bodies may sleep.
+    /// Whether the body sleeps, in a scene where bodies may sleep.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub asleep: Option<bool>,
-    /// How they were chosen, if `auto` was to: its keys are among those of the body.
+    /// Details of the choice by `auto`; its keys are written among those of the body.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub choice: Option<Choice>,
     /// The largest `E Δt² / (ρ h²)` of a tet, had none been softened; where kappa is reported.
@@ -171,20 +172,20 @@ pub struct BodyReport {
     pub softened: Option<SoftenedReport>,
 }
 
-/// What a frame's strokes cut.
+/// Counts and quality of the cuts of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CutReport {
-    /// Tets that were cut.
+    /// Number of tets that were cut.
     pub tets_cut: usize,
-    /// Tets they were cut into.
+    /// Number of tets that cut tets were split into.
     pub tets_created: usize,
-    /// New particles, on edges and as copies.
+    /// Number of new particles, on edges and as copies.
     pub particles_created: usize,
-    /// Particles the surface was bent to.
+    /// Number of particles that the cut surface was snapped to.
     pub snapped: usize,
     /// The smallest volume of a new tet as a fraction of the one it was cut from.
     pub worst_volume_ratio: f64,
-    /// Tets that were taken away; absent if none.
+    /// Number of removed tets; absent if none.
     #[serde(skip_serializing_if = "is_zero")]
     pub tets_removed: usize,
     /// The smallest and the largest dihedral angle of a new tet at rest in degrees; absent if none is new.
@@ -223,14 +224,14 @@ impl Default for CutReport {
     }
 }
 
-/// A part that came off a piece and is a piece of its own from now on.
+/// A part that was detached from a piece and is a new piece.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 #[cfg_attr(feature = "save", derive(serde::Deserialize))]
 pub struct DetachedReport {
     /// The number of the new piece.
     pub piece: u32,
-    /// The piece that it came off, which keeps the rest.
+    /// The piece it was part of, which keeps the rest.
     pub from: u32,
     /// Its tets.
     pub tets: usize,
@@ -244,9 +245,9 @@ pub struct DetachedReport {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct PieceReport {
-    /// Its number, which it keeps.
+    /// Number of the piece, which never changes.
     pub id: u32,
-    /// The piece that it came off; absent for those that were there before all cuts.
+    /// The piece it was detached from; absent for pieces from before all cuts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parent: Option<u32>,
     /// The number of its body in the scene.
@@ -259,10 +260,10 @@ pub struct PieceReport {
     pub mass: f64,
 }
 
-/// Wall time by stage in ms; stages that did not happen took none.
+/// Wall time by stage in ms; 0 for stages that did not run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Milliseconds {
-    /// Cutting the mesh, following its pieces and handing the cut to the solver.
+    /// Cutting the mesh, updating its pieces, and applying the cut to the solver.
     pub cut: f64,
     /// Updating clusters.
     pub cluster: f64,
@@ -272,13 +273,13 @@ pub struct Milliseconds {
     pub schedule: f64,
     /// Sending to a device.
     pub upload: f64,
-    /// Solving. On a device: telling it what to do, after waiting for the frame before the last one if that is not done; it
-    /// works on by itself.
+    /// Solving. On a device: submitting the frame, after waiting for the frame before the last one; the device
+    /// continues asynchronously.
     pub solve: f64,
     /// Finding contacts and coloring them, where contact is declared: that of the island of bodies which took longest.
     #[serde(skip_serializing_if = "is_none")]
     pub contact: f64,
-    /// Waiting for a device and fetching from it, where that is needed: for a blade, for a reported quantity.
+    /// Waiting for a device and reading back, if a blade or a reported quantity needs it.
     pub readback: f64,
     /// Everything else: positions and reported quantities.
     pub other: f64,
@@ -290,25 +291,25 @@ pub struct Milliseconds {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct ResidualReport {
-    /// What XPBD drops, in kg·m.
+    /// Primal residual in kg·m: the part of the equations of motion that XPBD leaves out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub primal: Option<f64>,
     /// `primal` as a part of the weight's norm times the square of the substep; absent without gravity.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub primal_relative: Option<f64>,
-    /// What it iterates on, without unit.
+    /// Dual residual, without unit: the error of the constraints that XPBD iterates on.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dual: Option<f64>,
-    /// Its root mean square over all constraints.
+    /// Root mean square of the dual residual over all constraints.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dual_rms: Option<f64>,
-    /// The unbalanced force of the implicit step in N, from positions alone. XPBD counts that of colliders as
-    /// unbalanced; VBD leaves out what they bear.
+    /// Unbalanced force of the implicit step in N, from positions alone. For XPBD it includes forces of colliders; for
+    /// VBD it does not.
     pub force: f64,
     /// `force` as a part of the weight's norm; absent without gravity.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub force_relative: Option<f64>,
-    /// The energy in J that the implicit step would make least.
+    /// Potential in J that the implicit step minimizes.
     pub potential: f64,
 }
 
@@ -370,22 +371,22 @@ pub struct ContactForce {
 /// Energies in J.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct EnergyReport {
-    /// Of motion.
+    /// Kinetic energy.
     pub kinetic: f64,
-    /// Of deformation.
+    /// Elastic energy.
     pub elastic: f64,
-    /// Of height, relative to the origin.
+    /// Gravitational energy, relative to the origin.
     pub gravity: f64,
 }
 
-/// Tets that are softer than their material, because no substep of this length could follow them.
+/// Tets that `kappa_limit` has made softer than their material.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct SoftenedReport {
-    /// How many.
+    /// Number of softened tets.
     pub tets: usize,
-    /// Their share of the volume at rest.
+    /// Share of the softened tets in the volume at rest.
     pub volume_fraction: f64,
-    /// The largest factor by which one's stiffness was divided.
+    /// Largest factor by which the stiffness of a tet was divided.
     pub strongest: f64,
 }
 

@@ -1,7 +1,7 @@
-//! How a state is written and read where deriving is not enough.
+//! Serialization of state that derived code cannot handle.
 //!
-//! Settings leave out what has its default, which only formats with names can read. So they are written as TOML, within
-//! whatever format the rest has.
+//! Settings leave out defaults, which only self-describing formats can read, so they are written as TOML inside any
+//! other format.
 
 /// A value as TOML text: `#[serde(with = "as_toml")]`.
 pub(crate) mod as_toml {

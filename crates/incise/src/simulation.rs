@@ -1,8 +1,7 @@
-//! [`Simulation`]: a scene in motion.
+//! [`Simulation`]: advances a scene frame by frame.
 //!
-//! One frame: strokes that are due cut the meshes; their deltas go to solver, clusters, colors and schedule; the solvers
-//! advance, those of different islands of bodies in parallel; the report is made. A frame without a cut touches only the
-//! solvers.
+//! One frame: strokes that are due cut the meshes; solver, clusters, colors and schedule apply their deltas; the
+//! solvers advance, islands of bodies in parallel; the report is made. A frame without a cut runs only the solvers.
 
 mod builder;
 mod edit;
@@ -48,7 +47,7 @@ pub use snapshot::Snapshot;
 
 use state::{Clock, Cut, NextNumbers, State};
 
-/// A scene in motion.
+/// A running simulation of a scene: bodies, cuts and solvers, advanced frame by frame.
 ///
 /// # Example
 /// ```
@@ -81,15 +80,15 @@ pub struct Simulation {
     state: State,
     /// The devices that are open, for settings that ask for one.
     open_device: OpenDevice,
-    /// What the strokes of the last frame changed.
+    /// Deltas of the last frame's strokes.
     deltas: Vec<CutDelta>,
-    /// What happened in the last frame.
+    /// Events of the last frame.
     events: Vec<Event>,
     pool: Option<ThreadPool>,
 }
 
 impl Simulation {
-    /// Sets a scene up, on as many threads as rayon's global pool has.
+    /// Creates a simulation of a scene, on the threads of rayon's global pool.
     ///
     /// # Errors
     /// If a value of the scene lies outside its range or a mesh cannot be read or is broken.
@@ -103,7 +102,8 @@ impl Simulation {
         SimulationBuilder::default()
     }
 
-    /// Sets a scene up, on a pool of `threads` threads of its own. Results are bit-identical for any number of threads.
+    /// Creates a simulation of a scene on its own pool of `threads` threads. Results are bit-identical for any number
+    /// of threads.
     ///
     /// # Errors
     /// Returns the errors of [`Simulation::new`], and one if the threads cannot be started.
@@ -113,11 +113,11 @@ impl Simulation {
         builder.build()
     }
 
-    /// Sets a scene up on a device that is open, whatever its `solver.backend` says: a renderer's, that of another
-    /// simulation.
+    /// Creates a simulation of a scene on an open device, such as that of a renderer or of another simulation;
+    /// `solver.backend` is ignored.
     ///
     /// # Errors
-    /// Returns the errors of [`Simulation::new`], and one if the device cannot do what the scene asks for.
+    /// Returns the errors of [`Simulation::new`], and one if the device does not support the scene's settings.
     #[cfg(feature = "gpu")]
     pub fn on_device(scene: &Scene, gpu: Arc<crate::gpu::GpuContext>) -> Result<Self, Error> {
         let mut builder = SimulationBuilder::from_scene(scene.clone());
@@ -238,7 +238,7 @@ impl Simulation {
         }
     }
 
-    /// Adds a stroke. A plane whose frame has come cuts at the start of the next step.
+    /// Adds a stroke. A stroke whose frame has passed cuts at the start of the next step.
     ///
     /// # Errors
     /// If a value of the stroke lies outside its range.
@@ -249,7 +249,7 @@ impl Simulation {
     /// Advances by one frame and reports on it.
     ///
     /// # Errors
-    /// If a stroke cannot be carried out; the bodies it has not cut yet are then as they were before that stroke.
+    /// If a stroke cannot be carried out. Bodies that it has not cut yet are unchanged.
     pub fn step(&mut self) -> Result<&FrameReport, Error> {
         // The pool is taken out so that the closure may borrow the rest.
         match self.pool.take() {
@@ -423,7 +423,7 @@ impl Simulation {
         }
     }
 
-    /// Whether the frame to come is to report a quantity.
+    /// Whether the next frame reports a quantity.
     fn wants(&self, quantity: Quantity) -> bool {
         self.state
             .clock
@@ -445,7 +445,7 @@ impl Simulation {
         self.state
             .islands
             .iter()
-            .any(|island| island.rest.is_some())
+            .any(|island| island.sleep.is_some())
     }
 
     /// Removes bodies and cuts what is due, with all that depends on the meshes; adds what comes off to `detached`.
@@ -476,14 +476,14 @@ impl Simulation {
         Ok(report)
     }
 
-    /// The report on the last frame; before the first, only its counts and the chosen substeps mean something.
+    /// Returns the report on the last frame. Before the first frame only its counts and the chosen substeps are valid.
     #[must_use]
     pub fn report(&self) -> &FrameReport {
         &self.state.report
     }
 
-    /// The positions of all particles in m: the present ones, or, if the state is on a device, those when it was last
-    /// fetched: see [`Simulation::read_back`].
+    /// Returns the positions of all particles in m, in the numbers of [`Simulation::mesh`]. If the state is on a
+    /// device, these are the positions of the last [`Simulation::read_back`].
     #[must_use]
     pub fn positions(&self) -> &[DVec3] {
         match &self.state.merged {
@@ -492,11 +492,11 @@ impl Simulation {
         }
     }
 
-    /// The mesh at rest of all bodies, with all cuts made so far.
+    /// Returns the mesh at rest of all bodies, with all cuts made so far.
     ///
-    /// At the start particles and tets are numbered body by body in the order of the scene. Cuts change no number: the
-    /// first child of a cut tet takes over its number, other new tets and new particles get the next ones, stroke by
-    /// stroke and within a stroke body by body.
+    /// At the start particles and tets are numbered body by body in the order of the scene. Cuts do not change numbers:
+    /// the first child of a cut tet takes over its number; other new tets and new particles get the next ones, stroke
+    /// by stroke and within a stroke body by body.
     #[must_use]
     pub fn mesh(&self) -> &TetMesh {
         match &self.state.merged {
@@ -505,28 +505,29 @@ impl Simulation {
         }
     }
 
-    /// The boundary triangles, outer and cut, as the mesh is now. O(n log n).
+    /// Returns the boundary triangles of the present mesh, outer and cut. O(n log n).
     #[must_use]
     pub fn surface(&self) -> Surface {
         self.mesh().surface()
     }
 
-    /// What happened in the last frame: cuts that began, pieces that came off, cuts that ended; then contacts that began
-    /// and ended.
+    /// Returns the events of the last frame: cuts that began, pieces that were detached, cuts that ended; then contacts
+    /// that began and ended.
     #[must_use]
     pub fn events(&self) -> &[Event] {
         &self.events
     }
 
-    /// What the strokes of the last frame changed, in the order in which they did, in the numbers of
-    /// [`Simulation::mesh`]: for renderers ([`incise_cutting::Skin`]), recorders and other consumers of the mesh.
+    /// Returns the topology changes of the last frame's strokes in order, in the numbers of [`Simulation::mesh`], for
+    /// renderers ([`incise_cutting::Skin`]), recorders and other users of the mesh.
     #[must_use]
     pub fn deltas(&self) -> &[CutDelta] {
         &self.deltas
     }
 
-    /// The boundary triangles with what each of them is: outer surface or laid bare by the stroke of a number, counted
-    /// from 0 in the order of the scene, of [`Simulation::cut`] and of [`Simulation::begin_stroke`]. No pass over the mesh.
+    /// Returns the boundary triangles with their kind: outer surface, or the number of the stroke that opened it,
+    /// counted from 0 in the order of the scene, of [`Simulation::cut`] and of [`Simulation::begin_stroke`]. No pass
+    /// over the mesh.
     pub fn boundary(&self) -> impl Iterator<Item = BoundaryTriangle> + '_ {
         let islands = self.state.islands.iter().enumerate();
         islands.flat_map(move |(g, island)| {
@@ -538,26 +539,27 @@ impl Simulation {
         })
     }
 
-    /// Whether each particle is on a cut face; empty before the first cut. At the rim, triangles of the outer surface can
-    /// have three such particles, too: [`Simulation::boundary`] tells them apart.
+    /// Returns for each particle whether it is on a cut face; empty before the first cut. Triangles of the outer
+    /// surface at the rim of a cut can have three such particles, too; [`Simulation::boundary`] tells them apart.
     #[must_use]
     pub fn on_cut(&self) -> &[bool] {
         &self.state.on_cut
     }
 
-    /// The pieces of all bodies with their numbers, ascending: which piece each one came off, and how much it weighs.
+    /// Returns the pieces of all bodies by ascending number, with tets, volume, mass and the piece each was detached
+    /// from.
     ///
-    /// Before all cuts the pieces are numbered body by body (bodies that links join count where the first of them
-    /// stands), those of a body by their first tets; what comes off gets the next numbers, stroke by stroke and within a
-    /// stroke body by body. The larger part of a piece that is split mostly keeps its number, see
-    /// [`PieceTracker::follow`](incise_cutting::PieceTracker::follow). No number is used twice. O(pieces there ever
-    /// were).
+    /// Before all cuts pieces are numbered body by body (joined bodies at the place of the first of them), those of a
+    /// body by their first tets. Detached pieces get the next numbers, stroke by stroke and within a stroke body by
+    /// body. Mostly the larger part of a split piece keeps its number, see
+    /// [`PieceTracker::apply_delta`](incise_cutting::PieceTracker::apply_delta). No number is used twice. O(pieces,
+    /// including former ones).
     #[must_use]
     pub fn pieces(&self) -> Vec<PieceReport> {
         self.state.pieces.report(&self.state.islands)
     }
 
-    /// The number of the piece of each tet of [`Simulation::mesh`], as [`Simulation::pieces`] numbers them. O(tets).
+    /// Returns the piece number of each tet of [`Simulation::mesh`], as in [`Simulation::pieces`]. O(tets).
     #[must_use]
     pub fn piece_numbers(&self) -> Vec<u32> {
         let State {
@@ -576,8 +578,8 @@ impl Simulation {
         }
     }
 
-    /// The clusters of tets. With several bodies they are put together: O(tets), and the clusters of a body are
-    /// numbered after those of the bodies before it, so that a cut can change their numbers.
+    /// Returns the clusters of tets. With several islands of bodies they are merged in O(tets), and clusters of an
+    /// island are numbered after those of the islands before it, so a cut can change their numbers.
     #[must_use]
     pub fn clustering(&self) -> Cow<'_, Clustering> {
         match &self.state.merged {
@@ -586,7 +588,7 @@ impl Simulation {
         }
     }
 
-    /// The colors of the clusters. With several bodies they are put together: O(tets).
+    /// Returns the colors of the clusters. With several islands of bodies they are merged: O(tets).
     #[must_use]
     pub fn coloring(&self) -> Cow<'_, Coloring> {
         match &self.state.merged {
@@ -595,8 +597,8 @@ impl Simulation {
         }
     }
 
-    /// The order of solving. With several bodies it is put together, O(tets): each body is solved in this order, but
-    /// none waits for another.
+    /// Returns the order of solving. With several islands of bodies the schedules are merged, O(tets); islands do not
+    /// wait for each other.
     #[must_use]
     pub fn schedule(&self) -> Cow<'_, Schedule> {
         match &self.state.merged {
@@ -608,22 +610,23 @@ impl Simulation {
         }
     }
 
-    /// The largest `E Δt² / (ρ h²)` of a tet, had none been softened: up to about 0.5 the motion is accurate. Δt is the
-    /// substep of the tet's body.
+    /// Returns the largest kappa of a tet, `E Δt² / (ρ h²)`, without softening. Up to about 0.5 the motion is accurate.
+    /// Δt is the substep of the tet's body.
     #[must_use]
     pub fn kappa(&self) -> f64 {
         kappa(&self.state.islands)
     }
 
-    /// The tets that are softer than their material to keep the scene's limit of kappa.
+    /// Returns the number and volume of tets that `kappa_limit` has made softer than their material.
     #[must_use]
     pub fn softened(&self) -> SoftenedReport {
         softened(&self.state.islands)
     }
 
-    /// Recomputes everything derived and compares: the mesh, the lists around its particles, volume, masses, clusters,
-    /// colors, schedule, pieces. O(n log n); for tests and on request. A device is sent what changes with the next step:
-    /// ask after one, not before the first or between [`Simulation::grab`] or [`Simulation::release`] and the next.
+    /// Recomputes all derived data and compares: the mesh, the lists around its particles, volume, masses, clusters,
+    /// colors, schedule, pieces. O(n log n); for tests and on request. A device receives changes with the next step, so
+    /// call this after a step, not before the first one or between [`Simulation::grab`] or [`Simulation::release`] and
+    /// the next.
     ///
     /// # Errors
     /// [`Error::Inconsistent`] or [`Error::Cut`] name the first difference.

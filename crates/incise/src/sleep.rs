@@ -1,28 +1,28 @@
-//! [`Rest`]: how long an island of bodies has been at rest, and whether it sleeps.
+//! [`SleepState`]: the sleep timer of an island of bodies.
 //!
-//! A body whose fastest particle has stayed below a speed for a time is no longer solved: it keeps its positions to the
-//! bit, its velocities become zero, and it costs nothing until it is cut or one of its handles moves. A collider with a
-//! velocity keeps all bodies awake, wherever it is: which bodies it will meet is not predicted.
+//! A body whose fastest particle has stayed below a speed for a time is not solved any more: it keeps its positions bit
+//! for bit, its velocities become zero, and it costs nothing until it is cut or one of its attachments moves. A
+//! collider with a velocity keeps all bodies awake, since future contacts are not predicted.
 //!
-//! The trade: what is left of its motion, at most that speed, and slow creep are lost. Shear is damped only by the
-//! substeps, so that a large soft body rings for seconds before it rests. The time keeps a body awake that only turns
-//! around, as at the top of its flight.
+//! Trade-off: the remaining motion below that speed and slow creep are lost. Shear is damped only by the substeps, so a
+//! large soft body vibrates for seconds before it sleeps. The time condition keeps a body awake that is slow only for a
+//! moment, as at the top of its flight.
 //!
 //! Source: sleeping islands as in rigid body engines. Cost: a pass over the particles a frame while awake, none asleep.
 
 use crate::scene::SleepSpec;
 
-/// The rest of an island.
+/// Sleep timer of an island.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Rest {
+pub(crate) struct SleepState {
     spec: SleepSpec,
     /// Time at rest so far in s.
     still: f64,
     asleep: bool,
 }
 
-impl Rest {
+impl SleepState {
     pub(crate) fn new(spec: SleepSpec) -> Self {
         Self {
             spec,
@@ -61,7 +61,7 @@ mod tests {
             speed: 1.0,
             time: 0.5,
         };
-        let mut rest = Rest::new(spec);
+        let mut rest = SleepState::new(spec);
         assert!(!rest.count(1.0, 0.25));
         assert!(!rest.count(1.1, 0.25));
         assert!(!rest.count(0.0, 0.25));

@@ -1,4 +1,4 @@
-//! [`SolverBackend`]: what the runtime asks of a solver, wherever and however it computes.
+//! [`SolverBackend`]: the interface of the runtime to a solver on the CPU or on a GPU.
 
 use glam::DVec3;
 use incise_graph::Schedule;
@@ -8,7 +8,7 @@ use crate::Error;
 use crate::report::Milliseconds;
 use crate::scene::Quantity;
 
-/// How far the last substep is from a solution of its equations; XPBD knows more than that.
+/// Residuals of the last substep; XPBD has more of them than VBD.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum LastSubstep {
     Constraints(Residuals),
@@ -23,8 +23,8 @@ pub(crate) struct Measures {
     pub(crate) max_speed: Option<f64>,
 }
 
-/// A solver on the processor in one precision, by XPBD or VBD, or one on a device. Functions that only one of them has a
-/// use for do nothing in the others.
+/// A solver on the CPU in one precision, by XPBD or VBD, or one on a device. Functions that only one kind needs do
+/// nothing in the others.
 pub(crate) trait SolverBackend {
     /// Advances by one frame, keeping what [`SolverBackend::last_substep`] needs if told to.
     fn step(
@@ -45,7 +45,7 @@ pub(crate) trait SolverBackend {
     /// The residuals of the last substep, if they were kept.
     fn last_substep(&self, substep_time: f64) -> Option<LastSubstep>;
 
-    /// Says where a handle is at the end of the next frame.
+    /// Sets the pose of a handle at the end of the next frame.
     fn move_handle(&mut self, handle: u32, pose: Pose);
 
     /// Bytes of a copy.
@@ -60,7 +60,7 @@ pub(crate) trait SolverBackend {
     /// The error that the last frame of two-level VBD left over.
     fn vbd_error(&self) -> Option<f64>;
 
-    /// Lets go of what only VBD needs.
+    /// Drops the data of VBD.
     fn end_vbd(&mut self);
 
     /// Makes the state of a device known here; returns how many particles it had to put back since the last time.

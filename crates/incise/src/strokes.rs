@@ -13,7 +13,7 @@ use crate::tool::{Tool, tool};
 use crate::validate::value;
 use crate::{Error, Event};
 
-/// A stroke and how far it is.
+/// A stroke and its progress.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 struct Stroke {
@@ -52,8 +52,8 @@ impl Timeline {
         }
     }
 
-    /// Adds a stroke, if all its values are in their ranges. Faces it lays bare are tagged with its number, counted from
-    /// 0 in the order of adding.
+    /// Adds a stroke, if all its values are in their ranges. Faces that it opens are tagged with its number, counted
+    /// from 0 in the order of adding.
     pub(crate) fn add(&mut self, spec: &StrokeSpec) -> Result<(), Error> {
         let field = self.next_field();
         let (tool, snap) = tool(&field, spec)?;
@@ -102,7 +102,7 @@ impl Timeline {
         Ok(number)
     }
 
-    /// Says where the blade of a live stroke is at the start of the next frame.
+    /// Sets the blade of a live stroke for the start of the next frame.
     pub(crate) fn move_blade(&mut self, stroke: u32, pose: &[DVec3]) -> Result<(), Error> {
         let (_, field, blade) = self.live(stroke)?;
         blade.go_to(field, pose)
@@ -176,8 +176,8 @@ impl Timeline {
         }
     }
 
-    /// Carries out what is due in `frame` on every island; hands each delta to `apply_delta` before the next stroke moves. The
-    /// islands' positions are kept current.
+    /// Carries out the strokes that are due in `frame` on every island. Passes each delta to `apply_delta` before the
+    /// next stroke moves, and keeps the islands' positions current.
     pub(crate) fn advance(
         &mut self,
         frame: u64,
@@ -231,7 +231,7 @@ impl Timeline {
 }
 
 impl Stroke {
-    /// What its end is to the world.
+    /// Returns the event of the stroke's end, if it has cut.
     fn end(&self) -> Option<Event> {
         let stroke = self.options.tag;
         self.has_cut.then_some(Event::CutEnded { stroke })
@@ -268,7 +268,9 @@ impl Stroke {
                 cut_surface_joining(cuttable, positions, surface, options, registry)
             }
             Tool::Plane(plane) => cut_plane(cuttable, positions, plane, options),
-            Tool::Plug(solid) => cut_level_set(cuttable, positions, |x| solid.distance(x), options),
+            Tool::Punch(solid) => {
+                cut_level_set(cuttable, positions, |x| solid.distance(x), options)
+            }
             Tool::Remove(solid) => carve(cuttable, positions, |x| solid.contains(x), options.tag),
         };
         let delta = cut.map_err(|source| Error::Cut {

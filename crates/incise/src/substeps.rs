@@ -1,10 +1,10 @@
-//! [`Choice`]: how many substeps `auto` chooses for a body.
+//! [`Choice`]: the number of substeps that `auto` chooses for a body.
 //!
 //! The error of a substep grows with kappa, `E Δt² / (ρ h²)` with h the smallest altitude of a tet, and with Poisson's
-//! ratio (`accuracy.rs`). Kappa falls with the square of the number of substeps, so one pass over the tets at rest tells
-//! the number that every tet needs for the accuracy wanted, and the largest decides, with two exceptions, which are
-//! reported. No more than a cap is taken. And a few slivers do not decide for the whole body: tets that need more than
-//! twice the substeps of all others, together less than a thousandth of the volume, are solved less accurately.
+//! ratio (`accuracy.rs`). Kappa falls with the square of the number of substeps. One pass over the tets at rest gives
+//! the number that every tet needs for the accuracy wanted; the largest decides, with two exceptions, which are
+//! reported. The number is capped. And a few slivers do not decide for the whole body: tets that need more than twice
+//! the substeps of all others, together less than a thousandth of the volume, are solved less accurately.
 //!
 //! Source: kappa is the square of a Courant number; that substeps and not iterations make XPBD accurate, Macklin et al.
 //! 2019. Cost: O(n log n) for each choice.
@@ -20,25 +20,25 @@ const SLIVER_VOLUME: f64 = 1e-3;
 /// ... and more than this much stiffer than all other tets: they want more than twice as many substeps.
 const SLIVER_KAPPA: f64 = 4.0;
 
-/// Why not all tets have the substeps they want.
+/// Reason for fewer substeps than all tets need.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 #[cfg_attr(feature = "save", derive(serde::Deserialize))]
-pub enum Missed {
-    /// They want more than `max_substeps`.
+pub enum Shortfall {
+    /// More than `max_substeps` are needed.
     Cap,
-    /// They want more than `budget_ms` allows.
+    /// More are needed than `budget_ms` allows.
     Budget,
-    /// Those that want more are few slivers.
+    /// Only a few slivers need more.
     Sliver,
 }
 
-/// What `auto` chose for a body, and what it left undone.
+/// Choice of substeps by `auto` for a body, and its expected error.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Choice {
-    /// The substeps that would solve every tet with the accuracy wanted.
+    /// Number of substeps that would solve every tet with the accuracy wanted.
     pub substeps_wanted: u32,
     /// The substeps that would solve all tets but slivers with it.
     #[serde(skip)]
@@ -46,11 +46,11 @@ pub struct Choice {
     /// The number that was chosen; that of the body is larger if it is joined to one with more.
     #[serde(skip)]
     pub substeps: u32,
-    /// Why it was not all that is wanted, if it was not; the cap if both reasons hold.
-    pub missed: Option<Missed>,
-    /// Tets that were left aside as slivers.
+    /// Reason for a smaller number than `substeps_wanted`, if it is smaller; the cap takes precedence.
+    pub shortfall: Option<Shortfall>,
+    /// Number of tets that were ignored as slivers.
     pub sliver_tets: usize,
-    /// Their share of the volume at rest.
+    /// Share of the slivers in the volume at rest.
     pub sliver_volume_fraction: f64,
     /// The expected error of all other tets with the chosen number, as a fraction of the motion; 1 stands for 1 or more.
     pub expected_error: f64,
@@ -67,7 +67,7 @@ pub struct Choice {
 pub(crate) mod saved {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-    use super::{Choice, Missed};
+    use super::{Choice, Shortfall};
 
     #[derive(Serialize, Deserialize)]
     #[serde(remote = "Choice")]
@@ -75,7 +75,7 @@ pub(crate) mod saved {
         substeps_wanted: u32,
         substeps_needed: u32,
         substeps: u32,
-        missed: Option<Missed>,
+        shortfall: Option<Shortfall>,
         sliver_tets: usize,
         sliver_volume_fraction: f64,
         expected_error: f64,
@@ -102,11 +102,11 @@ pub(crate) mod saved {
 }
 
 impl Choice {
-    /// What becomes of it where two-level VBD with this expected error takes the place of too many substeps.
+    /// Returns the choice with two-level VBD of this expected error in place of too many substeps.
     pub(crate) fn solved_by_vbd(self, expected_error: f64) -> Self {
         Self {
             substeps: 1,
-            missed: None,
+            shortfall: None,
             sliver_tets: 0,
             sliver_volume_fraction: 0.0,
             expected_error,
@@ -140,7 +140,7 @@ pub(crate) fn choose(tets: Vec<TetDemand>, max_substeps: u32, form: TetSolve) ->
     evaluate(tets, |needed| needed.min(max_substeps), form)
 }
 
-/// What a number of substeps, taken from the needed one, means for tets.
+/// Evaluates the number of substeps that `take` returns for the needed one.
 pub(crate) fn evaluate(
     mut tets: Vec<TetDemand>,
     take: impl FnOnce(u32) -> u32,
@@ -174,10 +174,10 @@ pub(crate) fn evaluate(
         substeps_wanted: wanted,
         substeps_needed: chosen,
         substeps,
-        missed: if chosen > substeps {
-            Some(Missed::Cap)
+        shortfall: if chosen > substeps {
+            Some(Shortfall::Cap)
         } else if wanted > chosen {
-            Some(Missed::Sliver)
+            Some(Shortfall::Sliver)
         } else {
             None
         },
@@ -251,16 +251,22 @@ mod tests {
         // 90 slivers are 0.09 % of the volume, 200 are 0.2 %.
         let few = choice(&body(90), 200);
         assert_eq!((few.substeps, few.substeps_wanted), (4, 40));
-        assert_eq!((few.missed, few.sliver_tets), (Some(Missed::Sliver), 90));
+        assert_eq!(
+            (few.shortfall, few.sliver_tets),
+            (Some(Shortfall::Sliver), 90)
+        );
         assert!((few.sliver_volume_fraction - 0.9 / 1000.9).abs() < 1e-12);
         let many = choice(&body(200), 200);
-        assert_eq!((many.substeps, many.missed), (40, None));
+        assert_eq!((many.substeps, many.shortfall), (40, None));
         // Tets just smaller than the others are no slivers.
         let graded = choice(&[(8.0, 1000.0), (30.0, 0.1)], 200);
-        assert_eq!((graded.substeps, graded.missed), (8, None));
+        assert_eq!((graded.substeps, graded.shortfall), (8, None));
         // The cap is reported before the slivers.
         let capped = choice(&body(90), 3);
-        assert_eq!((capped.substeps, capped.missed), (3, Some(Missed::Cap)));
+        assert_eq!(
+            (capped.substeps, capped.shortfall),
+            (3, Some(Shortfall::Cap))
+        );
         assert!(capped.expected_error > few.expected_error);
         assert_eq!(choice(&[], 200).substeps, 1);
     }
@@ -277,21 +283,21 @@ mod tests {
             let choice = choice(&tets, cap);
             let total: f64 = tets.iter().map(|t| t.1).sum();
             let served = |n: u32| tets.iter().filter(move |t| t.0 / 0.5 <= f64::from(n).powi(2));
-            let missed = |n: u32| total - served(n).map(|t| t.1).sum::<f64>();
+            let shortfall = |n: u32| total - served(n).map(|t| t.1).sum::<f64>();
             prop_assert!(choice.substeps <= cap);
-            if choice.missed == Some(Missed::Cap) {
+            if choice.shortfall == Some(Shortfall::Cap) {
                 prop_assert_eq!(choice.substeps, cap);
                 prop_assert!(served(cap).count() < tets.len());
             } else {
-                prop_assert!(missed(choice.substeps) <= 1.001e-3 * total);
+                prop_assert!(shortfall(choice.substeps) <= 1.001e-3 * total);
                 prop_assert!(tets.len() - served(choice.substeps).count() <= choice.sliver_tets);
                 prop_assert_eq!(
-                    choice.missed.is_none(),
+                    choice.shortfall.is_none(),
                     served(choice.substeps).count() == tets.len()
                 );
             }
             // One fewer would leave a tet behind that is no sliver.
-            if choice.substeps > 1 && choice.missed.is_none() {
+            if choice.substeps > 1 && choice.shortfall.is_none() {
                 prop_assert!(served(choice.substeps - 1).count() < tets.len());
             }
             prop_assert!(choice.substeps_wanted == 1 || served(choice.substeps_wanted - 1).count() < tets.len());

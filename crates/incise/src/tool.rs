@@ -1,4 +1,4 @@
-//! [`Tool`]: what a stroke of the scene cuts with, its values checked.
+//! [`Tool`]: the geometry of a stroke of the scene, its values checked.
 
 use glam::DVec3;
 use incise_cutting::{CutError, Plane, TriangleSurface};
@@ -9,15 +9,15 @@ use crate::region::Solid;
 use crate::scene::{Region, StrokeSpec};
 use crate::validate::{coordinates, direction, value};
 
-/// What a stroke cuts with.
+/// The geometry that a stroke cuts with, checked.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) enum Tool {
     Plane(Plane),
     Surface(TriangleSurface),
-    /// What is inside comes off.
-    Plug(Solid),
-    /// What is inside goes.
+    /// The inside is cut off.
+    Punch(Solid),
+    /// Tets inside are removed.
     Remove(Solid),
     /// A polyline and the offsets it passes through.
     Sweep {
@@ -75,7 +75,7 @@ pub(crate) fn tool(field: &str, spec: &StrokeSpec) -> Result<(Tool, f64), Error>
             let triangles = TriangleSurface::new(&corners, triangles);
             (surface("triangles", triangles)?, *snap)
         }
-        StrokeSpec::Plug { region, snap, .. } => (Tool::Plug(solid(field, region)?), *snap),
+        StrokeSpec::Punch { region, snap, .. } => (Tool::Punch(solid(field, region)?), *snap),
         StrokeSpec::Remove { region, .. } => (Tool::Remove(solid(field, region)?), 0.0),
         StrokeSpec::Sweep {
             frames,

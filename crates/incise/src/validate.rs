@@ -1,4 +1,4 @@
-//! Validation: ranges that numbers of a scene must stay in, and the errors that name those that do not.
+//! Validation of numbers against their ranges, and the errors for values outside.
 
 use incise_mesh::glam::DVec3;
 

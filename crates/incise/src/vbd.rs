@@ -1,9 +1,9 @@
-//! [`VBD`]: what an island that is solved by VBD keeps, and how it follows a cut.
+//! [`Vbd`]: data of an island that is solved by VBD, and its update after a cut.
 //!
-//! VBD visits particles, so these have colors of their own; tets, clusters and their colors stay as they are for
-//! reports and renderers. After a cut particles keep their colors; only new ones, and those that now share a tet
-//! with one of their color, are colored again. Cost: O(tets) after each cut, as the stars of all particles are sorted
-//! again and all tets are checked.
+//! VBD visits particles, so these have their own colors; tets, clusters and their colors are kept for reports and
+//! renderers. After a cut particles keep their colors; only new ones, and those that now share a tet with one of their
+//! color, are colored again. Cost: O(tets) after each cut, since the stars of all particles are rebuilt and all tets
+//! are checked.
 
 use std::time::Instant;
 
@@ -24,9 +24,8 @@ const AGGREGATES: usize = 24;
 /// The size of an aggregate below which more of them gain nothing.
 const SMALLEST: usize = 12;
 
-/// How far conjugate gradients lower the residual of a correction: what the forces change within a step leaves about as
-/// much. Measured on a liver of 11,363 tets, E = 1e7 Pa, Poisson's ratio 0.49, pulled by 3 cm: 1.6% largest error in place
-/// of 0.9% with 0.01, in 7 iterations in place of 16.
+/// Reduction of the residual of a correction by conjugate gradients. A smaller one costs more iterations and gains
+/// little, because the forces change within a step.
 const REDUCTION: f64 = 0.1;
 
 /// Colors that cuts may add before all particles are colored again.
@@ -41,12 +40,12 @@ pub(crate) struct Vbd<R: Real> {
     /// The color of each particle, and how many there were when all were colored.
     colors: Vec<Option<u32>>,
     color_count: usize,
-    /// Where corrections are asked for.
+    /// Coarse correction, for two-level VBD.
     correction: Option<CoarseCorrection<R>>,
-    /// Where rounds end before the last one.
+    /// Accuracy at which rounds end early.
     accuracy: Option<f64>,
     integrator: Integrator,
-    /// What the last frame said of itself.
+    /// Report of the last frame.
     pub(crate) last: VbdReport,
 }
 
@@ -75,7 +74,7 @@ impl<R: Real> Vbd<R> {
         self.stars.bytes() + self.correction.as_ref().map_or(0, CoarseCorrection::bytes)
     }
 
-    /// Follows a cut, after the solver has.
+    /// Updates stars, colors and correction after the solver has applied a cut.
     pub(crate) fn sync(&mut self, solver: &Solver<R>, ms: &mut Milliseconds) -> Result<(), Error> {
         let start = Instant::now();
         let incidence = solver.star_incidence();

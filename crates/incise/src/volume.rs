@@ -1,8 +1,7 @@
-//! [`Volumes`]: the volume constraints of an island's bodies that ask for them, one for each tet, and how they follow a
-//! cut.
+//! [`Volumes`]: the volume constraints of an island's tets, and their update after a cut.
 //!
-//! Constraint `i` is that of tet `i`, so the schedule of the tets is theirs as well. Tets of other bodies of the island
-//! take no part. Cost: O(tets) at the start, then what a cut touched and a copy of the schedule.
+//! Constraint `i` is that of tet `i`, so the schedule of the tets serves both. Tets of bodies without volume
+//! constraints take no part. Cost: O(tets) at the start, then that of a cut and a copy of the schedule.
 
 use glam::DVec3;
 use incise_cutting::{CutDelta, CuttableMesh};
@@ -13,7 +12,7 @@ use incise_xpbd::{VolumeConstraint, XpbdError};
 use crate::Error;
 use crate::backend::{AnySolver, each_mut};
 
-/// What the body of each material of an island asks for.
+/// Volume compliance of each material's body in an island.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Volumes {
@@ -21,7 +20,7 @@ pub(crate) struct Volumes {
 }
 
 impl Volumes {
-    /// `None` if no body asks.
+    /// Creates the constraints; `None` if no body has them.
     pub(crate) fn new(compliances: Vec<Option<f64>>) -> Option<Self> {
         let any = compliances.iter().any(Option::is_some);
         any.then_some(Self { compliances })
@@ -46,7 +45,7 @@ impl Volumes {
         })
     }
 
-    /// Follows a cut, after the solver and the schedule have.
+    /// Applies a delta, after the solver and the schedule have.
     pub(crate) fn apply_delta(
         &self,
         solver: &mut AnySolver,

@@ -1,4 +1,4 @@
-//! [`Warning`]: what a user of a result must know about it.
+//! [`Warning`]: a problem of a result, with its cause and a fix.
 //!
 //! Warnings of the settings come with the first frame and whenever settings change, those of a cut or of the motion with
 //! the frame in which they begin. Cost: a pass over the particles a frame for the largest speed; the others cost what
@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::accuracy::DEFAULT_ACCURACY;
 use crate::scene::SolverSpec;
-use crate::substeps::{Choice, Missed};
+use crate::substeps::{Choice, Shortfall};
 
 /// The kind of a [`Warning`], written in JSON as `substeps_capped` and so on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
@@ -47,14 +47,14 @@ pub enum WarningCode {
     Diverged,
 }
 
-/// What a user of a result must know about it.
+/// A problem of a result: its kind, its place in the scene, and a sentence with cause and fix.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 #[cfg_attr(feature = "save", derive(serde::Deserialize))]
 pub struct Warning {
-    /// Its kind.
+    /// Kind of the warning.
     pub code: WarningCode,
-    /// One sentence: what is wrong and what helps.
+    /// One sentence: the problem and a fix.
     pub message: String,
     /// The part of the scene, as in `body 0`.
     #[serde(rename = "where")]
@@ -125,12 +125,12 @@ pub(crate) fn of_substeps(
         choice.substeps,
         100.0 * accuracy
     );
-    let capped = chosen && choice.missed == Some(Missed::Cap);
+    let capped = chosen && choice.shortfall == Some(Shortfall::Cap);
     let (code, fix) = if choice.nearly_incompressible {
         let fix =
             "Poisson's ratio is near 0.5: lower it, or set method = \"vbd\" and two_level = true";
         (WarningCode::NearlyIncompressible, fix)
-    } else if choice.missed == Some(Missed::Budget) {
+    } else if choice.shortfall == Some(Shortfall::Budget) {
         let fix = "raise budget_ms, use fewer tets or a softer material";
         (WarningCode::BudgetTooSmall, fix)
     } else if capped {

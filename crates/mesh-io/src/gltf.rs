@@ -82,9 +82,9 @@ impl Numbers {
             let [a, b, c] = triangle.map(|p| surface.positions[p.index()]);
             let normal = (b - a).cross(c - a);
             for corner in triangle {
-                let place = used.places[corner.index()];
-                sums[place as usize] += normal;
-                indices.push(place);
+                let index = used.indices[corner.index()];
+                sums[index as usize] += normal;
+                indices.push(index);
             }
         }
         // Normals must have the length 1, those of points without a direction, too.
@@ -103,11 +103,11 @@ impl Numbers {
         floats.chain(indices).flatten().collect()
     }
 
-    /// The text, with more about the place of the numbers.
+    /// Writes the text; `index` writes the object of the index array.
     fn describe(
         &self,
         out: &mut dyn Write,
-        place: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+        index: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> io::Result<()> {
         let (points, corners) = (self.positions.len(), self.indices.len());
         let low = self
@@ -144,7 +144,7 @@ impl Numbers {
             triangles = 4 * corners,
             all = 24 * points + 4 * corners,
         )?;
-        place(out)?;
+        index(out)?;
         write!(out, "}}]}}")
     }
 }

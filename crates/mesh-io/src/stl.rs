@@ -112,14 +112,14 @@ pub(crate) fn parse_stl(bytes: &[u8], path: &Path) -> Result<TriangleSurface, Me
     for (i, triangle) in triangles.take(count.unwrap_or(0)).enumerate() {
         let mut corners = [DVec3::ZERO; 3];
         let (numbers, _) = triangle[12..].as_chunks::<4>();
-        for (place, &number) in numbers.iter().enumerate().take(9) {
+        for (offset, &number) in numbers.iter().enumerate().take(9) {
             let number = f64::from(f32::from_le_bytes(number));
             if !number.is_finite() {
-                let byte = HEADER + i * TRIANGLE + 12 + 4 * place;
+                let byte = HEADER + i * TRIANGLE + 12 + 4 * offset;
                 let message = format!("the coordinate {number} is not finite, correct it");
                 return Err(error(byte, message));
             }
-            corners[place / 3][place % 3] = number;
+            corners[offset / 3][offset % 3] = number;
         }
         merger.add(corners);
     }

@@ -2,10 +2,10 @@
 
 use incise_mesh::ParticleId;
 
-/// The particles in ascending order, and the place of each among them (0 for those that are not).
+/// The particles in ascending order, and the index of each among them (0 for those that are not).
 pub(super) struct Used {
     pub(super) particles: Vec<usize>,
-    pub(super) places: Vec<u32>,
+    pub(super) indices: Vec<u32>,
 }
 
 impl Used {
@@ -13,10 +13,10 @@ impl Used {
         let mut particles: Vec<usize> = triangles.iter().flatten().map(|p| p.index()).collect();
         particles.sort_unstable();
         particles.dedup();
-        let mut places = vec![0; count];
-        for (place, &particle) in (0..).zip(&particles) {
-            places[particle] = place;
+        let mut indices = vec![0; count];
+        for (index, &particle) in (0..).zip(&particles) {
+            indices[particle] = index;
         }
-        Self { particles, places }
+        Self { particles, indices }
     }
 }

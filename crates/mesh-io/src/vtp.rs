@@ -41,7 +41,7 @@ pub fn write_vtp(
     fields.check(positions.len(), triangles.len())?;
     let Used {
         particles: used,
-        places,
+        indices,
     } = Used::new(triangles, positions.len());
     write_atomically(path, |out| {
         xml::open(out, "PolyData")?;
@@ -59,7 +59,7 @@ pub fn write_vtp(
         let corners = triangles
             .iter()
             .flatten()
-            .map(|p| i64::from(places[p.index()]).to_le_bytes());
+            .map(|p| i64::from(indices[p.index()]).to_le_bytes());
         xml::integers(out, "Int64", "connectivity", corners)?;
         xml::integers(
             out,

@@ -1,6 +1,6 @@
 //! All triangular faces of a set of tets, sorted so that the sides of one face are neighbors in the list.
 //!
-//! A side is one face seen from one tet. Its three particles, in ascending order, and its place `4 * tet + local face`
+//! A side is one face seen from one tet. Its three particles, in ascending order, and its index `4 * tet + local face`
 //! are packed into one `u128`, so that sorting needs no indirection. Sorting 4 n packed keys is the cost:
 //! O(n log n), on all cores; all keys differ, so that the order does not depend on their number.
 
@@ -19,29 +19,29 @@ impl FaceSide {
     fn new(tets: &[[ParticleId; 4]], tet: usize, local: usize) -> Self {
         let mut face = outward_face(tets[tet], local).map(|p| p.0);
         face.sort_unstable();
-        let place = u32::try_from(4 * tet + local).expect("the mesh has fewer than 2^30 tets");
+        let index = u32::try_from(4 * tet + local).expect("the mesh has fewer than 2^30 tets");
         let [a, b, c] = face.map(u128::from);
-        Self(a << 96 | b << 64 | c << 32 | u128::from(place))
+        Self(a << 96 | b << 64 | c << 32 | u128::from(index))
     }
 
     /// The tet this side belongs to.
     #[must_use]
     pub fn tet(self) -> TetId {
-        TetId(self.place() / 4)
+        TetId(self.index() / 4)
     }
 
     /// Which of the tet's four faces it is, in the order of [`Surface`](crate::Surface).
     #[must_use]
     pub fn local(self) -> usize {
-        self.place() as usize % 4
+        self.index() as usize % 4
     }
 
     /// Position of the side in the order by tet, then local face.
     #[expect(
         clippy::cast_possible_truncation,
-        reason = "the low 32 bits are the place"
+        reason = "the low 32 bits are the index"
     )]
-    pub(crate) fn place(self) -> u32 {
+    pub(crate) fn index(self) -> u32 {
         self.0 as u32
     }
 

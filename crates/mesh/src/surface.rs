@@ -48,15 +48,15 @@ impl TetMesh {
         let mut boundary: Vec<u32> = faces
             .iter()
             .filter(|sides| sides.len() == 1)
-            .map(|sides| sides[0].place())
+            .map(|sides| sides[0].index())
             .collect();
         boundary.sort_unstable();
         Surface {
             triangles: boundary
                 .iter()
-                .map(|&place| outward_face(self.tets[place as usize / 4], place as usize % 4))
+                .map(|&index| outward_face(self.tets[index as usize / 4], index as usize % 4))
                 .collect(),
-            tets: boundary.iter().map(|&place| TetId(place / 4)).collect(),
+            tets: boundary.iter().map(|&index| TetId(index / 4)).collect(),
         }
     }
 }

@@ -5,7 +5,7 @@
 #[non_exhaustive]
 pub enum MeshingError {
     /// A name that is not a [`Shape`](crate::Shape).
-    #[error("there is no shape named {name:?}: use one of {known}")]
+    #[error("unknown shape '{name}'; known are: {known}")]
     UnknownShape {
         /// The name given.
         name: String,

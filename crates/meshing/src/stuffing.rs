@@ -103,7 +103,7 @@ pub fn stuff_graded(
 pub(super) enum Slope {
     /// Nothing: it is sampled everywhere.
     Any,
-    /// It differs between two places by no more than their distance: far from the surface few samples do.
+    /// It differs between two points by no more than their distance: far from the surface few samples do.
     AtMostOne,
 }
 
@@ -117,8 +117,8 @@ pub(super) struct Grid {
     steps: [[isize; 14]; 2],
     /// Per vertex.
     sides: Vec<Side>,
-    /// Per vertex: its place in `near`, if it has an edge with a cut.
-    places: Vec<u32>,
+    /// Vertex -> its index in `near`, if it has an edge with a cut.
+    near_indices: Vec<u32>,
     /// The vertices that have an edge with a cut, in ascending order.
     near: Vec<Near>,
     cuts: Vec<DVec3>,
@@ -149,7 +149,7 @@ impl Grid {
             lattice: *lattice,
             steps: steps(lattice.cells),
             sides: vec![Side::Outside; vertices],
-            places: Vec::new(),
+            near_indices: Vec::new(),
             near: Vec::new(),
             cuts: Vec::new(),
             doubled: Doubled::default(),
@@ -241,14 +241,14 @@ impl Grid {
 
     /// Locates the surface on every edge from an inside to an outside vertex.
     fn cut(&mut self, values: &[f64], distance: &(impl Fn(DVec3) -> f64 + Sync)) {
-        self.places = vec![NONE; self.sides.len()];
+        self.near_indices = vec![NONE; self.sides.len()];
         let mut edges = Vec::new();
         for vertex in 0..self.sides.len() {
             let opposite = self.opposite_neighbors(vertex);
             if opposite == 0 {
                 continue;
             }
-            self.places[vertex] = index(self.near.len());
+            self.near_indices[vertex] = index(self.near.len());
             self.near.push(Near {
                 vertex: index(vertex),
                 opposite,
@@ -291,10 +291,10 @@ impl Grid {
     fn warp(&mut self) {
         let long = self.lattice.spacing;
         let short = long * (0.75_f64).sqrt();
-        for place in 0..self.near.len() {
+        for near_index in 0..self.near.len() {
             let Near {
                 vertex, opposite, ..
-            } = self.near[place];
+            } = self.near[near_index];
             let vertex = vertex as usize;
             let at = self.lattice.coordinates(vertex);
             let position = self.lattice.position(at);
@@ -305,9 +305,9 @@ impl Grid {
                     continue;
                 }
                 let cut = if self.sides[vertex] == Side::Inside {
-                    self.cut_at(place, direction)
+                    self.cut_at(near_index, direction)
                 } else {
-                    self.cut_at(self.places[neighbor] as usize, backward(direction))
+                    self.cut_at(self.near_indices[neighbor] as usize, backward(direction))
                 };
                 let distance = self.cuts[cut].distance(position);
                 let bound = if direction < 6 {
@@ -320,17 +320,17 @@ impl Grid {
                 }
             }
             if nearest.1 != NONE {
-                self.near[place].moved = nearest.1;
+                self.near[near_index].moved = nearest.1;
                 self.sides[vertex] = Side::Surface;
             }
         }
     }
 
-    /// The cut on the edge in a direction from the inside vertex with this place in `near`.
-    fn cut_at(&self, place: usize, direction: usize) -> usize {
+    /// The cut on the edge in a direction from the inside vertex with this index in `near`.
+    fn cut_at(&self, near_index: usize, direction: usize) -> usize {
         let Near {
             opposite, first, ..
-        } = self.near[place];
+        } = self.near[near_index];
         let before = opposite & ((1 << direction) - 1);
         (first + before.count_ones()) as usize
     }
@@ -450,9 +450,9 @@ impl Output {
     fn particle(&mut self, grid: &Grid, node: Node) -> ParticleId {
         let (entry, position) = match node {
             Node::Vertex(corner) => {
-                let moved = match grid.places[corner.vertex] {
+                let moved = match grid.near_indices[corner.vertex] {
                     NONE => NONE,
-                    place => grid.near[place as usize].moved,
+                    near_index => grid.near[near_index as usize].moved,
                 };
                 let position = match moved {
                     NONE => grid.lattice.position(corner.at),
@@ -461,8 +461,8 @@ impl Output {
                 (&mut self.vertices[corner.vertex], position)
             }
             Node::Cut(inside, outside) => {
-                let place = grid.places[inside.vertex] as usize;
-                let cut = grid.cut_at(place, direction(inside, outside));
+                let near_index = grid.near_indices[inside.vertex] as usize;
+                let cut = grid.cut_at(near_index, direction(inside, outside));
                 (&mut self.cuts[cut], grid.cuts[cut])
             }
         };

@@ -27,12 +27,12 @@ struct Seen {
 
 fn put(vertex: u32) -> vec3<f32> {
     let found = vertices[vertex];
-    let place = positions[found.x].xyz + parts[found.y & 0x7fffffffu].xyz - ground.center.xyz;
+    let position = positions[found.x].xyz + parts[found.y & 0x7fffffffu].xyz - ground.center.xyz;
     let scale = 1.0 / (SHARE * ground.center.w);
     return vec3<f32>(
-        dot(place, ground.u.xyz) * scale,
-        dot(place, ground.v.xyz) * scale,
-        dot(place, cross(ground.u.xyz, ground.v.xyz)),
+        dot(position, ground.u.xyz) * scale,
+        dot(position, ground.v.xyz) * scale,
+        dot(position, cross(ground.u.xyz, ground.v.xyz)),
     );
 }
 

@@ -33,13 +33,13 @@ fn vertex(@builtin(vertex_index) index: u32, grid: Patch) -> Seen {
     let corner = select(index, select(second, 1u, index == 4u), index > 2u);
     let x = select(-1.0, 1.0, (corner & 1u) == 1u);
     let y = select(-1.0, 1.0, (corner & 2u) == 2u);
-    let place = grid.center.xyz + (grid.u.xyz * x + grid.v.xyz * y) * grid.center.w;
-    return Seen(view.clip * vec4<f32>(place, 1.0), grid.center, grid.u, grid.v, grid.numbers);
+    let position = grid.center.xyz + (grid.u.xyz * x + grid.v.xyz * y) * grid.center.w;
+    return Seen(view.clip * vec4<f32>(position, 1.0), grid.center, grid.u, grid.v, grid.numbers);
 }
 
 // How much of a pixel the lines across an axis cover.
-fn line(axis: vec4<f32>, spacing: f32, place: vec3<f32>, right: vec3<f32>, down: vec3<f32>) -> f32 {
-    let at = (dot(place, axis.xyz) + axis.w) / spacing;
+fn line(axis: vec4<f32>, spacing: f32, position: vec3<f32>, right: vec3<f32>, down: vec3<f32>) -> f32 {
+    let at = (dot(position, axis.xyz) + axis.w) / spacing;
     let width = (abs(dot(right, axis.xyz)) + abs(dot(down, axis.xyz))) / spacing;
     let distance = abs(at - floor(at + 0.5));
     return (1.0 - smoothstep(0.4 * width, 1.3 * width, distance)) * (1.0 - smoothstep(0.08, 0.45, width));
@@ -51,8 +51,8 @@ fn fragment(seen: Seen) -> @location(0) vec4<f32> {
     let normal = cross(seen.u.xyz, seen.v.xyz);
     let slope = dot(ray, normal);
     let depth = dot(seen.center.xyz, normal) / slope;
-    let place = ray * depth;
-    let away = length(place - seen.center.xyz) / seen.center.w;
+    let position = ray * depth;
+    let away = length(position - seen.center.xyz) / seen.center.w;
     if !(depth > 0.0 && away < 1.0) {
         discard;
     }
@@ -62,11 +62,11 @@ fn fragment(seen: Seen) -> @location(0) vec4<f32> {
     let right = (step_right - ray * (dot(step_right, normal) / slope)) * depth;
     let down = (step_down - ray * (dot(step_down, normal) / slope)) * depth;
     let lines = max(
-        line(seen.u, seen.numbers.x, place, right, down),
-        line(seen.v, seen.numbers.x, place, right, down),
+        line(seen.u, seen.numbers.x, position, right, down),
+        line(seen.v, seen.numbers.x, position, right, down),
     );
     // All pixels look it up: a lookup by only some in a square of pixels is not defined.
-    let from_center = vec2<f32>(dot(place - seen.center.xyz, seen.u.xyz), dot(place - seen.center.xyz, seen.v.xyz));
+    let from_center = vec2<f32>(dot(position - seen.center.xyz, seen.u.xyz), dot(position - seen.center.xyz, seen.v.xyz));
     let at = from_center / (SHARE * seen.center.w) * 0.5 + 0.5;
     let dark = textureSampleLevel(contact_shadow, between, at, 0.0).x;
     let edge = 0.5 / vec2<f32>(textureDimensions(contact_shadow));

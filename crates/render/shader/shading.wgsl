@@ -52,8 +52,8 @@ fn skin_normal(normal: vec3<f32>, face: vec3<f32>, cut: bool, smoothly: bool) ->
 }
 
 // What a surface sends to the eye.
-fn shade(base_color: vec3<f32>, glossiness: f32, place: vec3<f32>, shading: vec3<f32>, face: vec3<f32>) -> vec3<f32> {
-    let to_eye = direction(-place);
+fn shade(base_color: vec3<f32>, glossiness: f32, position: vec3<f32>, shading: vec3<f32>, face: vec3<f32>) -> vec3<f32> {
+    let to_eye = direction(-position);
     let light = view.light.xyz;
     var normal = shading;
     var base = base_color;

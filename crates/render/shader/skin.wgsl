@@ -21,7 +21,7 @@ const CUT: u32 = 0x80000000u;
 
 struct Seen {
     @builtin(position) clip: vec4<f32>,
-    @location(0) @interpolate(perspective, centroid) place: vec3<f32>,
+    @location(0) @interpolate(perspective, centroid) position: vec3<f32>,
     @location(1) @interpolate(perspective, centroid) normal: vec3<f32>,
     @location(2) @interpolate(flat) face: vec3<f32>,
     // w: the gloss, negative for what a cut laid bare.
@@ -29,7 +29,7 @@ struct Seen {
     @location(4) @interpolate(linear, centroid) distances: vec3<f32>,
 }
 
-fn place_of(vertex: u32) -> vec3<f32> {
+fn position_of(vertex: u32) -> vec3<f32> {
     let found = vertices[vertex];
     return positions[found.x].xyz + parts[found.y & ~CUT].xyz;
 }
@@ -53,13 +53,13 @@ fn vertex(@builtin(vertex_index) index: u32) -> Seen {
     let triangle = index / 3u;
     let corner = index % 3u;
     let corners = vec3<u32>(triangles[3u * triangle], triangles[3u * triangle + 1u], triangles[3u * triangle + 2u]);
-    let a = place_of(corners.x);
-    let b = place_of(corners.y);
-    let c = place_of(corners.z);
+    let a = position_of(corners.x);
+    let b = position_of(corners.y);
+    let c = position_of(corners.z);
     let mine = corners[corner];
     var seen: Seen;
-    seen.place = place_of(mine);
-    seen.clip = view.clip * vec4<f32>(seen.place, 1.0);
+    seen.position = position_of(mine);
+    seen.clip = view.clip * vec4<f32>(seen.position, 1.0);
     seen.face = direction(cross(direction(b - a), direction(c - a)));
     seen.normal = direction(vec3<f32>(f32(sums[3u * mine]), f32(sums[3u * mine + 1u]), f32(sums[3u * mine + 2u])));
     let cut = (vertices[mine].y & CUT) != 0u;
@@ -86,7 +86,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> Seen {
 fn fragment(seen: Seen) -> @location(0) vec4<f32> {
     let smoothly = (view.flags & 2u) != 0u;
     let normal = skin_normal(seen.normal, seen.face, seen.base.w < 0.0, smoothly);
-    let color = shade(seen.base.xyz, abs(seen.base.w), seen.place, normal, seen.face);
+    let color = shade(seen.base.xyz, abs(seen.base.w), seen.position, normal, seen.face);
     if (view.flags & 1u) != 0u {
         return vec4<f32>(wire(color, max(seen.distances, vec3<f32>(0.0))), 1.0);
     }

@@ -1,4 +1,4 @@
-// What is the same for all that is drawn in a picture; `View` of view.rs. All places are relative to the eye.
+// What is the same for all that is drawn in a picture; `View` of view.rs. All positions are relative to the eye.
 
 struct View {
     clip: mat4x4<f32>,
@@ -18,7 +18,7 @@ struct View {
 
 @group(0) @binding(0) var<uniform> view: View;
 
-// The ray through a place in the picture, in pixels from its upper left corner; as long as is a depth of 1.
+// The ray through a position in the picture, in pixels from its upper left corner; as long as is a depth of 1.
 fn ray_through(at: vec2<f32>) -> vec3<f32> {
     let x = view.right.w * (2.0 * at.x / view.size.x - 1.0);
     let y = view.up.w * (1.0 - 2.0 * at.y / view.size.y);

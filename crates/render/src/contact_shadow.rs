@@ -29,14 +29,14 @@ pub(crate) struct ContactShadow {
 }
 
 impl ContactShadow {
-    /// What triangles leave on a plane, with corners at places relative to the eye.
-    pub(crate) fn new(plane: Plane, triangles: &[[u32; 3]], places: &[Vec3]) -> Self {
+    /// What triangles leave on a plane, with corners at positions relative to the eye.
+    pub(crate) fn new(plane: Plane, triangles: &[[u32; 3]], positions: &[Vec3]) -> Self {
         let mut texels = vec![0.0; SIDE * SIDE];
         let normal = plane.u.cross(plane.v);
         let scale = SIDE as f32 * 0.5 / (SHARE * plane.radius);
         let half = SIDE as f32 * 0.5;
-        let put = |place: Vec3| {
-            let from = place - plane.center;
+        let put = |position: Vec3| {
+            let from = position - plane.center;
             // Texels across and down, and the height.
             Vec3::new(
                 from.dot(plane.u) * scale + half,
@@ -44,10 +44,10 @@ impl ContactShadow {
                 from.dot(normal),
             )
         };
-        let places: Vec<Vec3> = places.iter().map(|place| put(*place)).collect();
+        let positions: Vec<Vec3> = positions.iter().map(|position| put(*position)).collect();
         let inside = |x: Vec3| x.x >= 0.0 && x.y >= 0.0 && x.x <= SIDE as f32 && x.y <= SIDE as f32;
         for corners in triangles {
-            let corners = corners.map(|v| places[v as usize]);
+            let corners = corners.map(|v| positions[v as usize]);
             // Not clipped: what sticks out of the square is far from what pictures show.
             if !corners.into_iter().all(inside) {
                 continue;
@@ -81,11 +81,11 @@ impl ContactShadow {
         }
     }
 
-    /// How dark it is at a place relative to the eye, from 0 to 1: between texels.
-    pub(crate) fn at(&self, place: Vec3) -> f32 {
+    /// How dark it is at a position relative to the eye, from 0 to 1: between texels.
+    pub(crate) fn at(&self, position: Vec3) -> f32 {
         let plane = &self.plane;
         let scale = 1.0 / (SHARE * plane.radius);
-        let from = place - plane.center;
+        let from = position - plane.center;
         let side = SIDE as f32;
         let at = [plane.u, plane.v].map(|axis| (from.dot(axis) * scale * 0.5 + 0.5) * side - 0.5);
         let within = |(at, [low, high]): (&f32, &[f32; 2])| (*low..*high).contains(at);

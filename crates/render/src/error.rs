@@ -37,23 +37,23 @@ pub enum RenderError {
         /// How many tets there are.
         tets: usize,
     },
-    /// A film in a format that is not written.
-    #[error("{}: unknown ending: films are written as {known}", .path.display())]
-    UnknownFilm {
+    /// An animation in a format that is not supported.
+    #[error("{}: unknown ending; animations are written as {known}", .path.display())]
+    UnknownAnimation {
         /// The file.
         path: PathBuf,
         /// The endings that are.
         known: &'static str,
     },
-    /// A film whose pictures are shown for a time that it cannot say.
-    #[error("a film with {given} s a picture: from 0.01 s to 10 s can be written")]
+    /// An animation with a frame time that its format cannot store.
+    #[error("an animation with {given} s for each image; use 0.01 s to 10 s")]
     FrameTime {
         /// What was asked for.
         given: f64,
     },
-    /// A picture that does not fit into its film.
+    /// An image whose size is not that of its animation.
     #[error(
-        "a picture of {width} x {height} pixels in a film of {film_width} x {film_height} pixels"
+        "an image of {width} x {height} pixels in an animation of {animation_width} x {animation_height} pixels"
     )]
     OtherSize {
         /// Pixels across.
@@ -61,12 +61,12 @@ pub enum RenderError {
         /// Pixels down.
         height: u32,
         /// Those of the film.
-        film_width: u32,
+        animation_width: u32,
         /// Those of the film.
-        film_height: u32,
+        animation_height: u32,
     },
     /// A film without a picture.
-    #[error("{}: a film needs a picture", .path.display())]
+    #[error("{}: an animation needs an image", .path.display())]
     EmptyFilm {
         /// The file.
         path: PathBuf,

@@ -10,7 +10,7 @@ use glam::Vec3;
 /// What a length of 1 is in the sums. Angles around a vertex would have to add up to 2000 to overflow.
 const UNIT: f32 = 1_048_576.0;
 
-/// Three sums a vertex, for corners of triangles and the places of vertices in m. They are no unit vectors; a vertex
+/// Three sums a vertex, for corners of triangles and the positions of vertices in m. They are no unit vectors; a vertex
 /// without a triangle, or with flat ones only, has zeros.
 ///
 /// # Panics
@@ -20,16 +20,16 @@ const UNIT: f32 = 1_048_576.0;
 /// ```
 /// use glam::Vec3;
 ///
-/// let places = [Vec3::ZERO, Vec3::X, Vec3::Y];
-/// let sums = incise_render::normal_sums(&[[0, 1, 2]], &places);
+/// let positions = [Vec3::ZERO, Vec3::X, Vec3::Y];
+/// let sums = incise_render::normal_sums(&[[0, 1, 2]], &positions);
 /// assert!(sums.iter().all(|&[x, y, z]| x == 0 && y == 0 && z > 0));
 /// assert_eq!(sums[1], sums[2]); // both have an angle of 45°
 /// ```
 #[must_use]
-pub fn normal_sums(triangles: &[[u32; 3]], places: &[Vec3]) -> Vec<[i32; 3]> {
-    let mut sums = vec![[0; 3]; places.len()];
+pub fn normal_sums(triangles: &[[u32; 3]], positions: &[Vec3]) -> Vec<[i32; 3]> {
+    let mut sums = vec![[0; 3]; positions.len()];
     for corners in triangles {
-        let [a, b, c] = corners.map(|v| places[v as usize]);
+        let [a, b, c] = corners.map(|v| positions[v as usize]);
         let (ab, bc, ca) = (unit(b - a), unit(c - b), unit(a - c));
         let normal = unit(ab.cross(-ca));
         if normal == Vec3::ZERO {

@@ -37,8 +37,8 @@ impl Legend {
     /// # let mut scene = Scene::built_in();
     /// # scene.body[0].shape = Some(ShapeSpec { kind: "box".into(), tets: 500 });
     /// # let mut simulation = Simulation::new(&scene)?;
-    /// let mut painting = RenderScene::new(&simulation, &scene);
-    /// let legend = painting.color(&mut simulation, ColorBy::Stretch, None)?.expect("values");
+    /// let mut render_scene = RenderScene::new(&simulation, &scene);
+    /// let legend = render_scene.color(&mut simulation, ColorBy::Stretch, None)?.expect("values");
     /// assert_eq!(legend.low, 1.0);
     /// assert!(legend.color(0.0)[2] > legend.color(1.0)[2], "from blue to red");
     /// # Ok::<(), incise_render::RenderError>(())

@@ -29,7 +29,7 @@ const PATCH: f64 = 2.2;
 #[repr(C)]
 pub(crate) struct PropCorner {
     /// Relative to the eye.
-    pub(crate) place: [f32; 3],
+    pub(crate) position: [f32; 3],
     pub(crate) normal: [f32; 3],
     /// sRGB, and the gloss.
     pub(crate) color: [u8; 4],
@@ -44,7 +44,7 @@ pub(crate) struct Plane {
     /// Along the grid; their cross product is the normal.
     pub(crate) u: Vec3,
     pub(crate) v: Vec3,
-    /// What is added to a place along them, so that lines are at multiples of the spacing.
+    /// Offsets along the axes, so that lines are at multiples of the spacing.
     pub(crate) offsets: [f32; 2],
     pub(crate) spacing: f32,
     pub(crate) opacity: f32,
@@ -62,19 +62,19 @@ pub(crate) struct Props {
 }
 
 impl Props {
-    pub(crate) fn new(painting: &RenderScene, simulation: &Simulation, view: &View) -> Self {
+    pub(crate) fn new(render_scene: &RenderScene, simulation: &Simulation, view: &View) -> Self {
         let mut props = Self::default();
-        let [low, high] = painting.start();
+        let [low, high] = render_scene.start();
         let (middle, size) = ((low + high) * 0.5, (high - low).length().max(1e-6));
         let time = simulation.report().time_s;
-        if let Some(ground) = painting.ground() {
+        if let Some(ground) = render_scene.ground() {
             let point = DVec3::Z * ground.height;
             props.plane(view, point, DVec3::Z, middle, size, true);
         }
-        for obstacle in painting.obstacles() {
+        for obstacle in render_scene.obstacles() {
             props.obstacle(view, obstacle, time, middle, size);
         }
-        for blade in painting.blades().filter(|blade| blade.len() > 1) {
+        for blade in render_scene.blades().filter(|blade| blade.len() > 1) {
             props.tube(view, blade, BLADE * size, AROUND_BLADE, STEEL);
         }
         let distance = |plane: &Plane| plane.center.length();
@@ -172,9 +172,9 @@ impl Props {
         });
     }
 
-    fn corner(&mut self, view: &View, place: DVec3, normal: DVec3, color: [u8; 4]) {
+    fn corner(&mut self, view: &View, position: DVec3, normal: DVec3, color: [u8; 4]) {
         self.corners.push(PropCorner {
-            place: view.relative(place).to_array(),
+            position: view.relative(position).to_array(),
             normal: normal.as_vec3().to_array(),
             color,
         });
@@ -190,8 +190,8 @@ impl Props {
                 let corner = |x: f64, y: f64| center + turn * ((normal + a * x + b * y) * half);
                 let (one, two) = (corner(-1.0, -1.0), corner(1.0, -1.0));
                 let (three, four) = (corner(1.0, 1.0), corner(-1.0, 1.0));
-                for place in [one, two, three, one, three, four] {
-                    self.corner(view, place, turn * normal, STONE);
+                for position in [one, two, three, one, three, four] {
+                    self.corner(view, position, turn * normal, STONE);
                 }
             }
         }

@@ -37,14 +37,14 @@ const NONE: u32 = 0;
 ///     "#,
 /// )?;
 /// let mut simulation = Simulation::new(&scene)?;
-/// let mut painting = RenderScene::new(&simulation, &scene);
-/// let [low, high] = painting.bounds(&simulation);
+/// let mut render_scene = RenderScene::new(&simulation, &scene);
+/// let [low, high] = render_scene.bounds(&simulation);
 /// let camera = Camera::fit(low, high);
 /// for _ in 0..3 {
 ///     simulation.step()?;
-///     painting.sync(&simulation);
+///     render_scene.sync(&simulation);
 ///     let size = [64, 48];
-///     let picture = software_picture(&painting, &simulation, &camera, &Style::default(), size)?;
+///     let picture = software_picture(&render_scene, &simulation, &camera, &Style::default(), size)?;
 ///     assert_eq!(picture.rgba.len(), 64 * 48 * 4);
 /// }
 /// # Ok::<(), incise_render::RenderError>(())
@@ -80,7 +80,7 @@ impl RenderScene {
     /// All of a simulation as it is now; of `scene`, which it was made from, ground and obstacles. O(tets).
     #[must_use]
     pub fn new(simulation: &Simulation, scene: &Scene) -> Self {
-        let mut painting = Self {
+        let mut render_scene = Self {
             skin: Skin::default(),
             colors: Vec::new(),
             shown: ColorBy::Tissue,
@@ -96,9 +96,9 @@ impl RenderScene {
             blade_ends: Vec::new(),
             start: [DVec3::ZERO; 2],
         };
-        painting.reset(simulation);
-        painting.start = painting.bounds(simulation);
-        painting
+        render_scene.reset(simulation);
+        render_scene.start = render_scene.bounds(simulation);
+        render_scene
     }
 
     /// Follows a step of the simulation. To be called after each; a second call after the same one does nothing.

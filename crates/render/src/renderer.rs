@@ -67,17 +67,17 @@ impl Renderer {
     }
 
     /// Whether a simulation has to be [read back](Simulation::read_back) for a picture of the present: it is on a device,
-    /// and not drawn from there. Until a step after the painting was made or reset, no simulation is drawn from a device.
+    /// and not drawn from there. Until a step after the render scene was made or reset, no simulation is drawn from a device.
     #[must_use]
-    pub fn needs_read_back(&self, painting: &RenderScene, simulation: &Simulation) -> bool {
+    pub fn needs_read_back(&self, render_scene: &RenderScene, simulation: &Simulation) -> bool {
         match self {
             #[cfg(feature = "gpu")]
-            Self::Gpu(renderer) => renderer.needs_read_back(painting, simulation),
+            Self::Gpu(renderer) => renderer.needs_read_back(render_scene, simulation),
             #[cfg(feature = "gpu")]
             Self::Software => simulation.device_solvers().next().is_some(),
             #[cfg(not(feature = "gpu"))]
             Self::Software => {
-                let _ = (painting, simulation);
+                let _ = (render_scene, simulation);
                 false
             }
         }
@@ -102,10 +102,10 @@ impl Renderer {
     /// If a side of the picture is 0 or too large; if a device is lost or out of memory.
     ///
     /// # Panics
-    /// If the painting does not follow the simulation.
+    /// If the render scene does not follow the simulation.
     pub fn picture(
         &mut self,
-        painting: &RenderScene,
+        render_scene: &RenderScene,
         simulation: &Simulation,
         camera: &Camera,
         style: &Style,
@@ -113,8 +113,8 @@ impl Renderer {
     ) -> Result<Image, RenderError> {
         match self {
             #[cfg(feature = "gpu")]
-            Self::Gpu(renderer) => renderer.picture(painting, simulation, camera, style, size),
-            Self::Software => software_picture(painting, simulation, camera, style, size),
+            Self::Gpu(renderer) => renderer.picture(render_scene, simulation, camera, style, size),
+            Self::Software => software_picture(render_scene, simulation, camera, style, size),
         }
     }
 }

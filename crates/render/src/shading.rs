@@ -35,7 +35,7 @@ pub(crate) struct Surface {
     pub(crate) base: Vec3,
     pub(crate) gloss: f32,
     /// Relative to the eye.
-    pub(crate) place: Vec3,
+    pub(crate) position: Vec3,
     /// The normal that shading goes by, of length 1.
     pub(crate) normal: Vec3,
     /// That of the triangle, of length 1.
@@ -86,7 +86,7 @@ pub(crate) fn skin_normal(normal: Vec3, face: Vec3, cut: bool, smooth: bool) -> 
 
 /// What a surface sends to the eye.
 pub(crate) fn shade(surface: Surface, light: Vec3) -> Vec3 {
-    let to_eye = direction(-surface.place);
+    let to_eye = direction(-surface.position);
     let (mut normal, mut base, mut gloss) = (surface.normal, surface.base, surface.gloss);
     if surface.face.dot(to_eye) < 0.0 {
         // The inside.
@@ -123,7 +123,7 @@ pub(crate) fn background(y: f32) -> Vec3 {
 }
 
 /// A plane where the ray through a pixel meets it: its color in linear light and how much of what is behind it covers;
-/// and the depth. `shade_of` is the contact shadow of what stands on it, from 0 to 1, at a place relative to the eye.
+/// and the depth. `shade_of` is the contact shadow of what stands on it, from 0 to 1, at a position relative to the eye.
 pub(crate) fn plane(
     view: &View,
     plane: &Plane,
@@ -133,8 +133,8 @@ pub(crate) fn plane(
     let normal = plane.u.cross(plane.v);
     let slope = ray.dot(normal);
     let depth = plane.center.dot(normal) / slope;
-    let place = ray * depth;
-    let away = (place - plane.center).length() / plane.radius;
+    let position = ray * depth;
+    let away = (position - plane.center).length() / plane.radius;
     if !(depth > 0.0 && away < 1.0) {
         return None;
     }
@@ -142,18 +142,18 @@ pub(crate) fn plane(
     let steps = view
         .ray_steps()
         .map(|step| (step - ray * (step.dot(normal) / slope)) * depth);
-    let across = line(plane.u, plane.offsets[0], plane.spacing, place, steps);
-    let along = line(plane.v, plane.offsets[1], plane.spacing, place, steps);
+    let across = line(plane.u, plane.offsets[0], plane.spacing, position, steps);
+    let along = line(plane.v, plane.offsets[1], plane.spacing, position, steps);
     let lines = across.max(along);
-    let shadow = shade_of(place);
+    let shadow = shade_of(position);
     let color = TABLE.lerp(TABLE_LINE, 0.55 * lines) * (1.0 - 0.62 * shadow);
     let cover = plane.opacity + (1.0 - plane.opacity) * (0.8 * shadow).max(0.35 * lines);
     Some((color, cover * fade, depth))
 }
 
 /// How much of a pixel the lines across an axis cover.
-fn line(axis: Vec3, offset: f32, spacing: f32, place: Vec3, steps: [Vec3; 2]) -> f32 {
-    let at = (place.dot(axis) + offset) / spacing;
+fn line(axis: Vec3, offset: f32, spacing: f32, position: Vec3, steps: [Vec3; 2]) -> f32 {
+    let at = (position.dot(axis) + offset) / spacing;
     let width = (steps[0].dot(axis).abs() + steps[1].dot(axis).abs()) / spacing;
     let distance = (at - floor(at + 0.5)).abs();
     (1.0 - smoothstep(0.4 * width, 1.3 * width, distance)) * (1.0 - smoothstep(0.08, 0.45, width))

@@ -22,7 +22,7 @@ use crate::srgb::{decode, encode};
 use crate::view::{LARGEST_SIDE, View};
 use crate::{Camera, Image, RenderError, RenderScene, Style};
 
-/// Where the samples of a pixel are: the standard places of Vulkan, Metal and Direct3D.
+/// Where the samples of a pixel are: the standard positions of Vulkan, Metal and Direct3D.
 const SAMPLES: [Vec2; 4] = [
     Vec2::new(0.375, 0.125),
     Vec2::new(0.875, 0.375),
@@ -31,7 +31,7 @@ const SAMPLES: [Vec2; 4] = [
 ];
 /// Rows that a thread does at once.
 const BAND: usize = 16;
-/// Triangles that a thread places at once.
+/// Triangles that a thread projects at once.
 const CHUNK: usize = 512;
 /// No triangle.
 const NOTHING: u32 = u32::MAX;
@@ -44,19 +44,19 @@ const NOTHING: u32 = u32::MAX;
 /// If a side of the picture is 0 or more than [`LARGEST_SIDE`].
 ///
 /// # Panics
-/// If the painting does not follow the simulation.
+/// If the render scene does not follow the simulation.
 ///
 /// # Example
 /// See [`RenderScene`].
 pub fn software_picture(
-    painting: &RenderScene,
+    render_scene: &RenderScene,
     simulation: &Simulation,
     camera: &Camera,
     style: &Style,
     size: [u32; 2],
 ) -> Result<Image, RenderError> {
     let view = View::new(camera, size, LARGEST_SIDE)?;
-    let frame = Frame::new(view, painting, simulation, *style);
+    let frame = Frame::new(view, render_scene, simulation, *style);
     let placed = frame.place();
     let [width, height] = size.map(|side| side as usize);
     let mut rgba = vec![0; 4 * width * height];
@@ -76,10 +76,10 @@ pub fn software_picture(
 struct Frame<'a> {
     view: View,
     style: Style,
-    painting: &'a RenderScene,
+    render_scene: &'a RenderScene,
     colors: &'a [u32],
     /// Of the skin's vertices, relative to the eye.
-    places: Vec<Vec3>,
+    positions: Vec<Vec3>,
     normals: Vec<Vec3>,
     props: Props,
     contact_shadow: Option<ContactShadow>,
@@ -93,9 +93,9 @@ struct Placed {
     triangle: u32,
 }
 
-/// What a triangle shows at a place.
+/// What a triangle shows at a position.
 struct Corners<'a> {
-    places: [Vec3; 3],
+    positions: [Vec3; 3],
     kind: Kind<'a>,
 }
 
@@ -105,8 +105,13 @@ enum Kind<'a> {
 }
 
 impl<'a> Frame<'a> {
-    fn new(view: View, painting: &'a RenderScene, simulation: &Simulation, style: Style) -> Self {
-        let skin = painting.skin();
+    fn new(
+        view: View,
+        render_scene: &'a RenderScene,
+        simulation: &Simulation,
+        style: Style,
+    ) -> Self {
+        let skin = render_scene.skin();
         let positions = simulation.positions();
         let origin = positions.first().copied().unwrap_or_default();
         let vertices = skin.vertices().par_iter().with_min_len(CHUNK);
@@ -121,16 +126,19 @@ impl<'a> Frame<'a> {
             vec![Vec3::Z; local.len()]
         };
         let from_eye = view.relative(origin);
-        let places: Vec<Vec3> = local.into_iter().map(|place| place + from_eye).collect();
-        let props = Props::new(painting, simulation, &view);
+        let positions: Vec<Vec3> = local
+            .into_iter()
+            .map(|position| position + from_eye)
+            .collect();
+        let props = Props::new(render_scene, simulation, &view);
         let ground = props.planes.iter().find(|plane| plane.ground);
         let contact_shadow =
-            ground.map(|plane| ContactShadow::new(*plane, skin.triangles(), &places));
+            ground.map(|plane| ContactShadow::new(*plane, skin.triangles(), &positions));
         Self {
             style,
-            colors: painting.colors_for(style.color_by),
-            painting,
-            places,
+            colors: render_scene.colors_for(style.color_by),
+            render_scene,
+            positions,
             normals,
             props,
             contact_shadow,
@@ -139,21 +147,21 @@ impl<'a> Frame<'a> {
     }
 
     fn triangles(&self) -> usize {
-        self.painting.skin().triangles().len() + self.props.corners.len() / 3
+        self.render_scene.skin().triangles().len() + self.props.corners.len() / 3
     }
 
     fn corners(&self, triangle: usize) -> Corners<'_> {
-        let skin = self.painting.skin().triangles();
+        let skin = self.render_scene.skin().triangles();
         match skin.get(triangle) {
             Some(corners) => Corners {
-                places: corners.map(|v| self.places[v as usize]),
+                positions: corners.map(|v| self.positions[v as usize]),
                 kind: Kind::Skin(triangle),
             },
             None => {
                 let first = 3 * (triangle - skin.len());
                 let corners = &self.props.corners[first..first + 3];
                 Corners {
-                    places: [0, 1, 2].map(|i| Vec3::from_array(corners[i].place)),
+                    positions: [0, 1, 2].map(|i| Vec3::from_array(corners[i].position)),
                     kind: Kind::Prop(corners),
                 }
             }
@@ -176,9 +184,9 @@ impl<'a> Frame<'a> {
     }
 
     fn place_one(&self, triangle: u32, placed: &mut Vec<Placed>) {
-        let places = self.corners(triangle as usize).places;
+        let positions = self.corners(triangle as usize).positions;
         clip(
-            places.map(|place| self.view.clip * place.extend(1.0)),
+            positions.map(|position| self.view.clip * position.extend(1.0)),
             |part| {
                 placed.push(Placed {
                     corners: part.map(|corner| self.screen(corner)),
@@ -198,32 +206,32 @@ impl<'a> Frame<'a> {
         )
     }
 
-    /// What a triangle sends to the eye at a place of the picture.
+    /// What a triangle sends to the eye at a position of the picture.
     fn shade(&self, triangle: u32, at: Vec2) -> Vec3 {
-        let Corners { places, kind } = self.corners(triangle as usize);
-        let shares = shares(places, self.view.ray(at.x, at.y));
+        let Corners { positions, kind } = self.corners(triangle as usize);
+        let shares = shares(positions, self.view.ray(at.x, at.y));
         let mix = |of: [Vec3; 3]| of[0] * shares.x + of[1] * shares.y + of[2] * shares.z;
-        let place = mix(places);
+        let position = mix(positions);
         match kind {
             Kind::Skin(triangle) => {
-                let skin = self.painting.skin();
+                let skin = self.render_scene.skin();
                 let corners = skin.triangles()[triangle];
                 let cut = skin.tag(triangle) != FaceTag::Outer;
                 let word = self.colors.get(triangle).copied().unwrap_or(0);
                 let (base, gloss) = shading::skin_base(word, cut);
-                let [ab, ac] = [places[1] - places[0], places[2] - places[0]];
+                let [ab, ac] = [positions[1] - positions[0], positions[2] - positions[0]];
                 let face = direction(direction(ab).cross(direction(ac)));
                 let normal = mix(corners.map(|v| self.normals[v as usize]));
                 let surface = Surface {
                     base,
                     gloss,
-                    place,
+                    position,
                     normal: shading::skin_normal(normal, face, cut, self.style.smooth),
                     face,
                 };
                 let color = shading::shade(surface, self.view.light);
                 if self.style.wireframe {
-                    shading::wire(color, self.distances(places, at))
+                    shading::wire(color, self.distances(positions, at))
                 } else {
                     color
                 }
@@ -234,7 +242,7 @@ impl<'a> Frame<'a> {
                 let surface = Surface {
                     base: Vec3::from_array([r, g, b].map(decode)),
                     gloss: f32::from(gloss) / 255.0,
-                    place,
+                    position,
                     normal,
                     face: normal,
                 };
@@ -244,8 +252,9 @@ impl<'a> Frame<'a> {
     }
 
     /// Distances in pixels from the edges of a triangle; far away if a corner is not in front of the eye.
-    fn distances(&self, places: [Vec3; 3], at: Vec2) -> Vec3 {
-        let [Some(a), Some(b), Some(c)] = places.map(|place| self.view.pixel(place)) else {
+    fn distances(&self, positions: [Vec3; 3], at: Vec2) -> Vec3 {
+        let [Some(a), Some(b), Some(c)] = positions.map(|position| self.view.pixel(position))
+        else {
             return Vec3::splat(1e6);
         };
         let from = |p: Vec2, q: Vec2| (q - p).perp_dot(at - p).abs() / (q - p).length().max(1e-6);
@@ -295,8 +304,8 @@ impl<'a> Frame<'a> {
         colors: &mut [Vec3],
     ) -> bool {
         let contact_shadow = self.contact_shadow.as_ref().filter(|_| plane.ground);
-        let seen = shading::plane(&self.view, plane, ray, |place| {
-            contact_shadow.map_or(0.0, |contact_shadow| contact_shadow.at(place))
+        let seen = shading::plane(&self.view, plane, ray, |position| {
+            contact_shadow.map_or(0.0, |contact_shadow| contact_shadow.at(position))
         });
         let Some((color, cover, depth)) = seen else {
             return false;
@@ -327,8 +336,8 @@ fn opaque(color: Vec3) -> [u8; 4] {
 fn middle_of(triangle: u32, samples: [(u32, f32); 4]) -> Vec2 {
     let shown = SAMPLES.iter().zip(samples);
     let shown = shown.filter(|(_, sample)| sample.0 == triangle);
-    let (sum, count) = shown.fold((Vec2::ZERO, 0.0), |(sum, count), (place, _)| {
-        (sum + *place, count + 1.0)
+    let (sum, count) = shown.fold((Vec2::ZERO, 0.0), |(sum, count), (position, _)| {
+        (sum + *position, count + 1.0)
     });
     sum / count
 }
@@ -383,9 +392,9 @@ impl Band {
     /// Puts a triangle into the samples where it is in front; of several at one depth the first stays.
     fn fill(&mut self, placed: &Placed, top: usize, width: usize) {
         let height = self.samples.len() / width;
-        for (sample, place) in SAMPLES.iter().enumerate() {
+        for (sample, position) in SAMPLES.iter().enumerate() {
             // The rasterizer asks for the middle of a pixel.
-            let shift = 0.5 - *place;
+            let shift = 0.5 - *position;
             let corners = placed.corners.map(|corner| corner + shift.extend(0.0));
             fill(corners, width, top..top + height, |row| {
                 let first = (row.y - top) * width;

@@ -1,7 +1,7 @@
 //! [`Viewer`]: the window.
 //!
-//! Each of its frames takes input, lets simulated time catch up with real time, draws, and lays panel and overlays around
-//! the picture. Errors of a running body stop it and are shown in a dialog; nothing is lost and nothing panics.
+//! A frame of the window handles input, advances the simulation to real time, and draws picture, panel and overlays. An
+//! error while simulating pauses the simulation and opens a dialog.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -24,6 +24,22 @@ use crate::panel::{self, Controls, UiCommands};
 use crate::session::Session;
 use crate::tool::Tool;
 
+/// An error to show: title and text.
+struct ErrorDialog {
+    title: &'static str,
+    text: String,
+}
+
+impl ErrorDialog {
+    fn new(title: &'static str, error: &anyhow::Error) -> Self {
+        let text = format!("{error:#}");
+        Self { title, text }
+    }
+}
+
+/// Title of the dialog if a file cannot be opened.
+const LOAD_ERROR: &str = "Could not load file";
+
 /// The window.
 pub(crate) struct Viewer {
     canvas: Canvas,
@@ -34,18 +50,18 @@ pub(crate) struct Viewer {
     notes: Vec<String>,
     session: Option<Session>,
     loading: Option<Loading>,
-    /// A sentence that waits to be read.
-    error: Option<String>,
+    /// The error shown in a dialog.
+    error: Option<ErrorDialog>,
     style: Style,
     tool: Tool,
     clock: FrameClock,
     running: bool,
     has_panel: bool,
     has_help: bool,
-    /// What is typed into the field for a file.
+    /// Text of the field for a file name.
     file: String,
-    /// Whether the tool is in use: the left button went down on the picture and is not up yet.
-    working: bool,
+    /// Whether the tool is in use: the left button was pressed on the picture and is down.
+    tool_in_use: bool,
     /// The line that is being drawn, in points of the window.
     line: Vec<Pos2>,
 }
@@ -86,7 +102,7 @@ impl Viewer {
             has_panel: true,
             has_help: false,
             file: String::new(),
-            working: false,
+            tool_in_use: false,
             line: Vec::new(),
         };
         viewer.load(&creation.egui_ctx, source);
@@ -102,27 +118,27 @@ impl Viewer {
     fn load_file(&mut self, context: &Context, path: &Path) {
         match Source::new(Some(path), self.tets) {
             Ok(source) => self.load(context, source),
-            Err(error) => self.error = Some(format!("{error:#}")),
+            Err(error) => self.error = Some(ErrorDialog::new(LOAD_ERROR, &error)),
         }
     }
 
-    /// Keeps an error for the dialog and stops.
+    /// Shows an error and pauses.
     fn fail(&mut self, error: &anyhow::Error) {
-        self.error = Some(format!("{error:#}"));
+        self.error = Some(ErrorDialog::new("Simulation paused by an error", error));
         self.running = false;
         self.clock.pause();
     }
 
-    fn take(&mut self, result: anyhow::Result<()>) {
+    fn check(&mut self, result: anyhow::Result<()>) {
         if let Err(error) = result {
             self.fail(&error);
         }
     }
 
-    /// Does something with the session, if there is one; keeps its error for the dialog.
+    /// Calls a function with the session, if there is one, and shows its error.
     fn with_session(&mut self, act: impl FnOnce(&mut Session) -> anyhow::Result<()>) {
         if let Some(result) = self.session.as_mut().map(act) {
-            self.take(result);
+            self.check(result);
         }
     }
 
@@ -142,11 +158,11 @@ impl Viewer {
                     session.name
                 )));
                 self.session = Some(session);
-                (self.working, self.line) = (false, Vec::new());
+                (self.tool_in_use, self.line) = (false, Vec::new());
                 self.clock.pause();
             }
-            // What was loaded before continues.
-            Err(error) => self.error = Some(format!("{error:#}")),
+            // The session that was open stays.
+            Err(error) => self.error = Some(ErrorDialog::new(LOAD_ERROR, &error)),
         }
     }
 
@@ -164,7 +180,7 @@ impl Viewer {
             Action::Undo => {
                 let undone = self.session.as_mut().map_or(Ok(None), Session::undo);
                 match undone {
-                    // It would cut again at once.
+                    // The stroke would begin again at once.
                     Ok(Some(true)) => {
                         self.running = false;
                         self.clock.pause();
@@ -173,8 +189,8 @@ impl Viewer {
                     Err(error) => self.fail(&error),
                 }
             }
-            Action::Take(tool) => {
-                self.let_go();
+            Action::Use(tool) => {
+                self.release();
                 self.tool = tool;
             }
             Action::Fit => self.with_session(|session| {
@@ -187,22 +203,22 @@ impl Viewer {
             Action::Panel => self.has_panel = !self.has_panel,
             Action::Help => self.has_help = !self.has_help,
             Action::Cancel => {
-                self.let_go();
+                self.release();
                 (self.has_help, self.error) = (false, None);
             }
         }
     }
 
-    fn let_go(&mut self) {
-        self.working = false;
+    fn release(&mut self) {
+        self.tool_in_use = false;
         self.line.clear();
         if let Some(session) = &mut self.session {
             session.lift_blade();
-            session.let_go();
+            session.release();
         }
     }
 
-    /// What the mouse does in the picture.
+    /// Applies mouse input on the picture.
     fn mouse(&mut self, response: &Response, rect: Rect) {
         let context = &response.ctx;
         let size = [f64::from(rect.width()), f64::from(rect.height())];
@@ -216,9 +232,9 @@ impl Viewer {
         let by = |button| response.dragged_by(button);
         let delta = response.drag_delta();
         let part = |points: f32| f64::from(points) / size[1];
-        let turns = by(PointerButton::Secondary)
-            || (self.tool == Tool::SettingChange && by(PointerButton::Primary));
-        if turns {
+        let orbits = by(PointerButton::Secondary)
+            || (self.tool == Tool::Orbit && by(PointerButton::Primary));
+        if orbits {
             session
                 .camera
                 .orbit(-4.0 * part(delta.x), 4.0 * part(delta.y));
@@ -233,7 +249,7 @@ impl Viewer {
                 session.camera.zoom(factor);
             }
         }
-        if self.tool == Tool::SettingChange {
+        if self.tool == Tool::Orbit {
             return;
         }
         let primary = PointerButton::Primary;
@@ -243,33 +259,33 @@ impl Viewer {
             let at = origin
                 .or(response.interact_pointer_pos())
                 .unwrap_or(rect.min);
-            (self.working, self.line) = (true, vec![at]);
+            (self.tool_in_use, self.line) = (true, vec![at]);
             result = match self.tool {
                 Tool::Blade => session.press_blade(pixel(at), size),
-                _ => session.take(pixel(at), size).map(|_| ()),
+                _ => session.grab_at(pixel(at), size).map(|_| ()),
             };
         }
-        if !self.working {
+        if !self.tool_in_use {
             return;
         }
-        let places = places(context);
+        let positions = pointer_positions(context);
         result = result.and_then(|()| match self.tool {
-            Tool::Blade => places.iter().try_for_each(|&at| {
+            Tool::Blade => positions.iter().try_for_each(|&at| {
                 self.line.push(at);
                 session.draw_blade(pixel(at), size)
             }),
-            _ => places
+            _ => positions
                 .last()
                 .map_or(Ok(()), |&at| session.pull(pixel(at), size)),
         });
-        // Not when the drag ends, which any button's release does.
+        // The release of any button ends a drag, so the button itself decides.
         if !context.input(|input| input.pointer.button_down(primary)) {
-            self.let_go();
+            self.release();
         }
-        self.take(result);
+        self.check(result);
     }
 
-    /// Lets simulated time catch up.
+    /// Simulates until simulated time has caught up with real time.
     fn advance(&mut self) {
         let Some(session) = &mut self.session else {
             return;
@@ -283,7 +299,7 @@ impl Viewer {
             result = session.step();
             result.is_ok()
         });
-        self.take(result);
+        self.check(result);
     }
 
     fn picture(&mut self, ui: &mut Ui) {
@@ -294,7 +310,7 @@ impl Viewer {
         let Some(session) = &mut self.session else {
             return;
         };
-        // What is to be shown has to be measured.
+        // Residuals that are shown have to be measured.
         let measured = match self.style.color_by {
             ColorBy::Residual if !session.measures() => session.measure(true),
             _ => Ok(()),
@@ -303,7 +319,7 @@ impl Viewer {
             .and_then(|()| session.color(self.style.color_by))
             .and_then(|()| self.canvas.show(ui, rect, session, &self.style));
         overlay(ui, rect, session, &self.line);
-        self.take(drawn);
+        self.check(drawn);
     }
 
     fn windows(&mut self, context: &Context) {
@@ -326,17 +342,17 @@ impl Viewer {
                 .resizable(false)
                 .anchor(Align2::CENTER_CENTER, [0.0, 60.0])
                 .show(context, |ui| {
-                    ui.label("let go to load: a scene, a tet mesh, a closed surface");
+                    ui.label("Drop to open: scene, tet mesh or closed surface");
                 });
         }
         if let Some(error) = &self.error {
             let mut closed = false;
-            Window::new("That did not work")
+            Window::new(error.title)
                 .collapsible(false)
                 .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
                 .show(context, |ui| {
-                    ui.label(error);
-                    closed = ui.button("close").clicked();
+                    ui.label(&error.text);
+                    closed = ui.button("Close").clicked();
                 });
             if closed {
                 self.error = None;
@@ -347,7 +363,7 @@ impl Viewer {
         }
     }
 
-    fn fulfil(&mut self, context: &Context, commands: UiCommands) {
+    fn apply(&mut self, context: &Context, commands: UiCommands) {
         if let Some(path) = commands.file {
             self.load_file(context, &path);
         }
@@ -357,14 +373,14 @@ impl Viewer {
         if let Some(on) = commands.measure {
             self.with_session(|session| session.measure(on));
         }
-        if let Some(turn) = commands.turn {
-            let turned = self
+        if let Some(change) = commands.change {
+            let changed = self
                 .session
                 .as_mut()
-                .map_or(Ok(()), |session| session.turn(&turn));
-            // A knob that cannot be turned is no reason to stop.
-            if let Err(error) = turned {
-                self.error = Some(format!("{error:#}"));
+                .map_or(Ok(()), |session| session.change_setting(&change));
+            // The simulation continues with its old settings.
+            if let Err(error) = changed {
+                self.error = Some(ErrorDialog::new("Setting not changed", &error));
             }
         }
     }
@@ -393,7 +409,7 @@ impl eframe::App for Viewer {
                 commands = panel::show(ui, session, &mut controls);
             });
         }
-        self.fulfil(&context, commands);
+        self.apply(&context, commands);
         CentralPanel::default()
             .frame(Frame::NONE)
             .show(ui, |ui| self.picture(ui));
@@ -405,18 +421,18 @@ impl eframe::App for Viewer {
     }
 }
 
-/// All places of the pointer since the last frame in which the left button was down, so that a fast stroke keeps its shape.
-fn places(context: &Context) -> Vec<Pos2> {
+/// All pointer positions since the last frame while the left button was down, so that a fast stroke keeps its shape.
+fn pointer_positions(context: &Context) -> Vec<Pos2> {
     context.input(|input| {
-        let mut places = Vec::new();
+        let mut positions = Vec::new();
         for event in &input.raw.events {
             match event {
-                egui::Event::PointerMoved(at) => places.push(*at),
+                egui::Event::PointerMoved(at) => positions.push(*at),
                 egui::Event::PointerButton {
                     button: PointerButton::Primary,
                     pressed: true,
                     ..
-                } => places.clear(),
+                } => positions.clear(),
                 egui::Event::PointerButton {
                     button: PointerButton::Primary,
                     pressed: false,
@@ -425,18 +441,18 @@ fn places(context: &Context) -> Vec<Pos2> {
                 _ => {}
             }
         }
-        places
+        positions
     })
 }
 
-/// The drawn line, the hand and what the button would do.
+/// Draws the line of the blade and the target of the grab.
 fn overlay(ui: &Ui, rect: Rect, session: &Session, line: &[Pos2]) {
     let painter = ui.painter_at(rect);
     if session.cuts() && line.len() > 1 {
         let thin = Stroke::new(1.5, Color32::from_rgb(190, 30, 30));
         painter.line(line.to_vec(), thin);
     }
-    if let Some(to) = session.hand() {
+    if let Some(to) = session.grab_target() {
         let size = [f64::from(rect.width()), f64::from(rect.height())];
         if let Some(at) = session.camera.project(to, size) {
             #[expect(clippy::cast_possible_truncation, reason = "pixels of a window")]

@@ -44,7 +44,7 @@ impl Canvas {
                 };
                 (device, None)
             }
-            Err(error) => (processor, Some(format!("drawn by the processor: {error}"))),
+            Err(error) => (processor, Some(format!("the CPU draws: {error}"))),
         }
     }
 
@@ -64,7 +64,7 @@ impl Canvas {
                 shown,
             } => {
                 let view = renderer.draw(
-                    &session.painting,
+                    &session.render_scene,
                     &session.simulation,
                     &session.camera,
                     style,
@@ -91,7 +91,7 @@ impl Canvas {
             Self::Processor { texture } => {
                 session.simulation.read_back()?;
                 let picture = software_picture(
-                    &session.painting,
+                    &session.render_scene,
                     &session.simulation,
                     &session.camera,
                     style,

@@ -1,11 +1,11 @@
-//! [`FrameClock`]: how many frames of the simulation a frame of the window carries.
+//! [`FrameClock`]: the number of simulation frames in a frame of the window.
 //!
-//! Simulated time follows real time. A simulation that is too slow falls behind instead of freezing the window: what
-//! does not fit into [`PATIENCE`] is dropped, and the panel tells by how much the body lags.
+//! Simulated time keeps up with real time. If the simulation is too slow, time beyond [`PATIENCE`] is dropped, so that
+//! the window stays responsive; the panel shows the speed that is reached.
 
 use std::time::{Duration, Instant};
 
-/// The most time that the window spends on simulating before it shows something.
+/// Longest simulation time between two pictures.
 const PATIENCE: Duration = Duration::from_millis(40);
 
 /// Weight of the newest frame in the mean speed.
@@ -67,7 +67,7 @@ impl FrameClock {
         }
     }
 
-    /// Mean simulated time for each second, of late.
+    /// Recent mean of simulated time over real time.
     pub(crate) fn reached(&self) -> f64 {
         self.reached
     }

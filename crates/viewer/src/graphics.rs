@@ -1,8 +1,8 @@
 //! The window's device: one for drawing and, if it can, for simulating.
 //!
-//! An adapter that allows what the kernels need gets a device that both share, so that what is computed is drawn
-//! without a copy. A lesser one (OpenGL of an old driver) only shows the window: bodies are then simulated and drawn by
-//! the processor, and the panel says so.
+//! An adapter with the limits that the kernels need gets a device that solver and renderer share, so that results are
+//! drawn without a copy. A lesser one (OpenGL of an old driver) only shows the window: the CPU then simulates and draws,
+//! and the panel says so.
 
 use std::sync::Arc;
 
@@ -26,12 +26,12 @@ pub(crate) fn configuration() -> WgpuConfiguration {
     }
 }
 
-/// Whether an adapter allows what the kernels need.
+/// Tests whether an adapter has the limits that the kernels need.
 fn can_simulate(adapter: &wgpu::Adapter) -> bool {
     wgpu::Limits::default().check_limits(&adapter.limits())
 }
 
-/// The window's device for simulating and drawing, or why it is not one.
+/// The window's device for simulating and drawing, or the reason why it cannot be used.
 pub(crate) fn share(state: &RenderState) -> Result<Arc<GpuContext>, String> {
     if can_simulate(&state.adapter) {
         let (device, queue) = (state.device.clone(), state.queue.clone());
@@ -39,7 +39,7 @@ pub(crate) fn share(state: &RenderState) -> Result<Arc<GpuContext>, String> {
     }
     let info = state.adapter.get_info();
     Err(format!(
-        "{} ({}) cannot run the kernels: simulated and drawn by the processor",
+        "{} ({}) does not support the kernels; the CPU simulates and draws",
         info.name, info.backend
     ))
 }
@@ -52,13 +52,13 @@ pub(crate) fn why_no_window(error: &eframe::Error) -> String {
             let error = error.to_string();
             let why = error.rsplit(": ").next().unwrap_or(&error);
             format!(
-                "no window can be opened, is there a display? `incise run` makes pictures without one ({why})"
+                "cannot open a window; a display is needed ({why}). Without one, `incise run` writes pictures"
             )
         }
         eframe::Error::Wgpu(error) => format!(
-            "no graphics adapter can show a window (Vulkan, Metal, Direct3D 12, OpenGL); `incise run` makes pictures \
-             without one ({error})"
+            "cannot open a window; no graphics adapter was found (Vulkan, Metal, Direct3D 12, OpenGL): {error}. Without one, \
+             `incise run` writes pictures"
         ),
-        other => format!("no window can be opened: {other}"),
+        other => format!("cannot open a window: {other}"),
     }
 }

@@ -5,14 +5,14 @@ use incise_render::ColorBy;
 
 use crate::tool::Tool;
 
-/// What a key does.
+/// Effect of a key or button.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Action {
     Pause,
     Step,
     Reset,
     Undo,
-    Take(Tool),
+    Use(Tool),
     Fit,
     Wireframe,
     Smooth,
@@ -27,96 +27,116 @@ type Chord = (Modifiers, Key);
 
 const PLAIN: Modifiers = Modifiers::NONE;
 
-/// The keys, what they do, and what the overlay says about them.
+/// The keys with their names, actions and the texts of the overlay.
 const KEYS: [(Chord, &str, Action, &str); 20] = [
     (
         (PLAIN, Key::Space),
         "Space",
         Action::Pause,
-        "pause or go on",
+        "Pause or resume",
     ),
-    ((PLAIN, Key::Period), ".", Action::Step, "one frame"),
+    ((PLAIN, Key::Period), ".", Action::Step, "Step one frame"),
     (
         (PLAIN, Key::R),
         "R",
         Action::Reset,
-        "back to the first frame",
+        "Reset to the first frame",
     ),
     (
         (Modifiers::COMMAND, Key::Z),
         "Ctrl+Z",
         Action::Undo,
-        "take the last cut back",
+        "Undo the last cut",
     ),
-    ((PLAIN, Key::U), "U", Action::Undo, "the same"),
+    ((PLAIN, Key::U), "U", Action::Undo, "Undo the last cut"),
     (
         (PLAIN, Key::B),
         "B",
-        Action::Take(Tool::Blade),
-        "blade: drag to cut",
+        Action::Use(Tool::Blade),
+        "Cut: drag to move the blade",
     ),
     (
         (PLAIN, Key::G),
         "G",
-        Action::Take(Tool::Hand),
-        "hand: drag to grab and pull",
+        Action::Use(Tool::Grab),
+        "Grab: drag to pull",
     ),
     (
         (PLAIN, Key::T),
         "T",
-        Action::Take(Tool::SettingChange),
-        "turn the view with the left button, too",
+        Action::Use(Tool::Orbit),
+        "Orbit with the left button",
     ),
-    ((PLAIN, Key::F), "F", Action::Fit, "see the whole body"),
-    ((PLAIN, Key::W), "W", Action::Wireframe, "wireframe"),
-    ((PLAIN, Key::S), "S", Action::Smooth, "smooth or flat"),
+    (
+        (PLAIN, Key::F),
+        "F",
+        Action::Fit,
+        "Fit the view to the body",
+    ),
+    ((PLAIN, Key::W), "W", Action::Wireframe, "Wireframe"),
+    (
+        (PLAIN, Key::S),
+        "S",
+        Action::Smooth,
+        "Smooth or flat shading",
+    ),
     (
         (PLAIN, Key::Num1),
         "1",
         Action::Color(ColorBy::Tissue),
-        "tissue",
+        "Color by tissue",
     ),
     (
         (PLAIN, Key::Num2),
         "2",
         Action::Color(ColorBy::Color),
-        "colors of constraints",
+        "Color by constraint color",
     ),
     (
         (PLAIN, Key::Num3),
         "3",
         Action::Color(ColorBy::Cluster),
-        "clusters",
+        "Color by cluster",
     ),
     (
         (PLAIN, Key::Num4),
         "4",
         Action::Color(ColorBy::Piece),
-        "pieces",
+        "Color by piece",
     ),
     (
         (PLAIN, Key::Num5),
         "5",
         Action::Color(ColorBy::Stretch),
-        "stretch",
+        "Color by stretch",
     ),
     (
         (PLAIN, Key::Num6),
         "6",
         Action::Color(ColorBy::Residual),
-        "residual",
+        "Color by residual",
     ),
-    ((PLAIN, Key::P), "P", Action::Panel, "panel"),
-    ((PLAIN, Key::F1), "F1", Action::Help, "this help"),
-    ((PLAIN, Key::Escape), "Esc", Action::Cancel, "let go, close"),
+    (
+        (PLAIN, Key::P),
+        "P",
+        Action::Panel,
+        "Show or hide the panel",
+    ),
+    (
+        (PLAIN, Key::F1),
+        "F1",
+        Action::Help,
+        "Show or hide this help",
+    ),
+    ((PLAIN, Key::Escape), "Esc", Action::Cancel, "Cancel, close"),
 ];
 
 const MOUSE: [(&str, &str); 5] = [
-    ("left button", "what is in hand: blade, hand"),
-    ("right button", "turn the view"),
-    ("middle button", "move the view"),
-    ("wheel", "closer, farther"),
-    ("drop a file", "load a scene, a mesh or a surface"),
+    ("Left button", "Use the tool: cut, grab or orbit"),
+    ("Right button", "Orbit"),
+    ("Middle button", "Pan"),
+    ("Wheel", "Zoom"),
+    ("Drop a file", "Open a scene, mesh or surface"),
 ];
 
 /// Actions of the keys pressed since the last frame; none while a text field has the keyboard.
@@ -139,7 +159,7 @@ pub(crate) fn actions(context: &Context) -> Vec<Action> {
     })
 }
 
-/// What a key asks for. Held down, only the one for a frame asks again.
+/// The action of a key. Of keys that are held down, only the one for a single frame repeats.
 fn action(key: Key, modifiers: Modifiers, repeats: bool) -> Option<Action> {
     let mut known = KEYS.iter();
     let found = known.find(|((with, of), ..)| *of == key && modifiers.matches_logically(*with));
@@ -191,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn no_key_does_two_things() {
+    fn each_key_has_one_action() {
         for (i, (chord, ..)) in KEYS.iter().enumerate() {
             assert!(
                 KEYS[..i].iter().all(|(other, ..)| other != chord),

@@ -1,7 +1,7 @@
-//! [`History`]: where the strokes began, to go back there.
+//! [`History`]: undo points, one before each stroke.
 //!
-//! Taking a stroke back goes back in time, to the frame in which it began: what has fallen off since then is where it was.
-//! Only the newest snapshots are kept, as many as fit into [`BUDGET`].
+//! Undo restores the whole simulation as it was in the frame in which the stroke began. The newest snapshots are kept, as
+//! many as fit into [`BUDGET`].
 
 use std::collections::VecDeque;
 
@@ -10,45 +10,45 @@ use incise::{Grab, Snapshot};
 /// The most memory for snapshots, in bytes.
 const BUDGET: usize = 1 << 30;
 
-/// The moment before a stroke.
+/// The state before a stroke.
 #[derive(Debug)]
 pub(crate) struct UndoPoint {
     pub(crate) snapshot: Snapshot,
-    /// Whether the stroke is the scene's: it will begin again.
+    /// Whether the stroke is part of the scene, so that it begins again.
     pub(crate) scripted: bool,
-    /// The stroke in progress at that moment.
+    /// The stroke in progress at that time.
     pub(crate) stroke: Option<u32>,
-    /// The grab in use at that moment.
+    /// The grab in use at that time.
     pub(crate) grab: Option<Grab>,
 }
 
-/// The moments before the strokes, oldest first.
+/// Undo points, oldest first.
 #[derive(Debug, Default)]
 pub(crate) struct History {
-    moments: VecDeque<UndoPoint>,
+    points: VecDeque<UndoPoint>,
 }
 
 impl History {
-    /// Keeps a moment, and drops the oldest ones that have no room any more.
-    pub(crate) fn keep(&mut self, moment: UndoPoint) {
-        self.moments.push_back(moment);
-        let bytes = |moment: &UndoPoint| moment.snapshot.bytes();
-        let mut sum: usize = self.moments.iter().map(bytes).sum();
-        while sum > BUDGET && self.moments.len() > 1 {
-            sum -= self.moments.pop_front().as_ref().map_or(0, bytes);
+    /// Adds an undo point and drops the oldest ones that exceed the budget.
+    pub(crate) fn push(&mut self, point: UndoPoint) {
+        self.points.push_back(point);
+        let bytes = |point: &UndoPoint| point.snapshot.bytes();
+        let mut sum: usize = self.points.iter().map(bytes).sum();
+        while sum > BUDGET && self.points.len() > 1 {
+            sum -= self.points.pop_front().as_ref().map_or(0, bytes);
         }
     }
 
-    /// The last moment, which is then forgotten.
-    pub(crate) fn take(&mut self) -> Option<UndoPoint> {
-        self.moments.pop_back()
+    /// Removes and returns the newest undo point.
+    pub(crate) fn pop(&mut self) -> Option<UndoPoint> {
+        self.points.pop_back()
     }
 
     pub(crate) fn len(&self) -> usize {
-        self.moments.len()
+        self.points.len()
     }
 
     pub(crate) fn clear(&mut self) {
-        self.moments.clear();
+        self.points.clear();
     }
 }

@@ -1,7 +1,7 @@
-//! [`Source`]: what is to be loaded, and [`Loading`]: the thread that does it.
+//! [`Source`]: a file or scene to open, and [`Loading`]: the thread that opens it.
 //!
-//! A scene is taken as it is. A mesh alone is put on a table, z up, glued to it by its lowest part, at the size of an organ; a
-//! closed surface is filled with tets first. Setting up a million tets takes seconds, so the window does not wait for it.
+//! A mesh without a scene is scaled to the size of an organ and placed on a table, z up, with its lowest part pinned; a
+//! closed surface is filled with tets first. Setting up a million tets takes seconds, so a thread does it.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use anyhow::{Context, anyhow};
 use incise::gpu::GpuContext;
 use incise::mesh::glam::DVec3;
 use incise::meshing::Solid;
-use incise::scene::{Backend, GroundSpec};
+use incise::scene::{Backend, GroundSpec, location};
 use incise::{Body, Scene, Simulation, SimulationBuilder};
 use incise::{mesh_io, meshing};
 
@@ -22,36 +22,37 @@ pub(crate) const TETS: u32 = 11_000;
 /// The longest side of a mesh that comes without a scene, in m.
 const SIZE: f64 = 0.25;
 
-/// Its stiffness in Pa: so that a body of that size stands and still yields to a hand.
+/// Young's modulus of such a mesh in Pa: it carries its weight and deforms when pulled.
 const STIFFNESS: f64 = 4e4;
 
-/// What is to be loaded.
+/// A simulation to load.
 #[derive(Clone, Debug)]
 pub(crate) enum Source {
-    /// A scene and its name.
-    Scene(Box<Scene>, String),
+    /// A scene, its file and its name.
+    Scene(Box<Scene>, Option<PathBuf>, String),
     /// A mesh or a surface without a scene, and tets to fill a surface with.
     Mesh(PathBuf, u32),
 }
 
 impl Source {
-    /// What a file holds, or the built-in scene.
+    /// The source in a file, or the built-in scene.
     ///
     /// A scene is read here, so that its errors are known at once; a mesh only has to exist.
     pub(crate) fn new(path: Option<&Path>, tets: u32) -> anyhow::Result<Self> {
         let Some(path) = path else {
             let name = "built-in liver".to_owned();
-            return Ok(Self::Scene(Box::new(Scene::built_in()), name));
+            return Ok(Self::Scene(Box::new(Scene::built_in()), None, name));
         };
         if path
             .extension()
             .is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
         {
             let scene = Scene::load(path).with_context(|| path.display().to_string())?;
-            return Ok(Self::Scene(Box::new(scene), name_of(path)));
+            let file = Some(path.to_owned());
+            return Ok(Self::Scene(Box::new(scene), file, name_of(path)));
         }
         if !path.is_file() {
-            return Err(anyhow!("{}: there is no such file", path.display()));
+            return Err(anyhow!("{}: file not found", path.display()));
         }
         Ok(Self::Mesh(path.to_owned(), tets))
     }
@@ -59,21 +60,33 @@ impl Source {
     /// For the title.
     pub(crate) fn name(&self) -> String {
         match self {
-            Self::Scene(_, name) => name.clone(),
+            Self::Scene(_, _, name) => name.clone(),
             Self::Mesh(path, _) => name_of(path),
+        }
+    }
+
+    /// Adds the line of the scene file to an error about a key.
+    fn locate(&self, error: incise::Error) -> anyhow::Error {
+        let location = match self {
+            Self::Scene(_, Some(path), _) => location(path, &error),
+            _ => None,
+        };
+        match location {
+            Some(location) => anyhow::Error::new(error).context(location),
+            None => error.into(),
         }
     }
 
     /// The scene, and a builder of its simulation on the processor.
     fn open(&self) -> anyhow::Result<(Scene, SimulationBuilder)> {
         match self {
-            Self::Scene(scene, _) => {
+            Self::Scene(scene, ..) => {
                 let mut scene = (**scene).clone();
-                // The window's device or none: one of its own could not be drawn from.
+                // The renderer can only draw from the window's device.
                 scene.solver.backend = Backend::Cpu;
                 Ok((scene.clone(), SimulationBuilder::from_scene(scene)))
             }
-            Self::Mesh(path, tets) => around(path, *tets),
+            Self::Mesh(path, tets) => scene_around(path, *tets),
         }
     }
 }
@@ -83,8 +96,8 @@ fn name_of(path: &Path) -> String {
     name.to_string_lossy().into_owned()
 }
 
-/// A scene around a mesh, which fills the surface if the file has one.
-fn around(path: &Path, tets: u32) -> anyhow::Result<(Scene, SimulationBuilder)> {
+/// A scene with a mesh on a table; a surface is filled with tets.
+fn scene_around(path: &Path, tets: u32) -> anyhow::Result<(Scene, SimulationBuilder)> {
     let mesh = if mesh_io::is_surface(path) {
         let surface = mesh_io::read_surface(path)?;
         let solid = Solid::new(&surface).with_context(|| path.display().to_string())?;
@@ -110,19 +123,19 @@ fn around(path: &Path, tets: u32) -> anyhow::Result<(Scene, SimulationBuilder)> 
         friction: 0.5,
     };
     scene.world.ground = Some(table);
-    let glued = low.z + 0.1 * (high.z - low.z);
+    let pinned_below = low.z + 0.1 * (high.z - low.z);
     let middle = (low + high) / 2.0;
     let body = Body::new(mesh)
         .scale(scale)
         .position(DVec3::new(-middle.x, -middle.y, -low.z) * scale)
         .young_modulus(STIFFNESS)
-        .pinned(|x| x.z <= glued);
+        .pinned(|x| x.z <= pinned_below);
     let mut builder = SimulationBuilder::from_scene(scene.clone());
     builder.add_body(body);
     Ok((scene, builder))
 }
 
-/// What was loaded.
+/// A loaded simulation.
 #[derive(Debug)]
 pub(crate) struct Loaded {
     pub(crate) name: String,
@@ -130,7 +143,7 @@ pub(crate) struct Loaded {
     pub(crate) simulation: Simulation,
 }
 
-/// Something on its way.
+/// A simulation that is being loaded.
 #[derive(Debug)]
 pub(crate) struct Loading {
     pub(crate) name: String,
@@ -160,7 +173,7 @@ impl Loading {
         }
     }
 
-    /// What was loaded, once it is.
+    /// The loaded simulation or the error, once the thread has ended.
     pub(crate) fn poll(&self) -> Option<anyhow::Result<Loaded>> {
         match self.receiver.try_recv() {
             Ok(result) => Some(result),
@@ -172,12 +185,13 @@ impl Loading {
 
 fn load(source: &Source, backend: Backend, gpu: Option<Arc<GpuContext>>) -> anyhow::Result<Loaded> {
     let (mut scene, builder) = source.open()?;
-    let mut simulation = builder.build()?;
+    let mut simulation = builder.build().map_err(|error| source.locate(error))?;
     if let Some(gpu) = gpu {
         simulation.offer_device(gpu);
         if backend != Backend::Cpu {
             scene.solver.backend = backend;
-            simulation.set_solver(&scene.solver)?;
+            let set = simulation.set_solver(&scene.solver);
+            set.map_err(|error| source.locate(error))?;
         }
     }
     Ok(Loaded {
@@ -221,7 +235,21 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_read_is_said() {
+    fn errors_of_a_scene_name_file_line_and_key() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.toml");
+        let text = "[[body]]\nshape = { kind = \"box\", tets = 10 }\n\nyoung_modulus = -1.0\n";
+        std::fs::write(&path, text).unwrap();
+        let source = Source::new(Some(&path), TETS).unwrap();
+        let error = format!("{:#}", load(&source, Backend::Cpu, None).unwrap_err());
+        assert!(
+            error.contains("scene.toml: line 4: body[0].young_modulus"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn errors_name_the_file() {
         let missing = Source::new(Some(Path::new("missing.vtk")), TETS).unwrap_err();
         assert!(missing.to_string().contains("missing.vtk"));
         let folder = tempfile::tempdir().unwrap();

@@ -1,8 +1,8 @@
 //! `incise-viewer`: a window to cut soft bodies in.
 //!
-//! A scene is loaded beside the window and advances in it at the pace of real time; what the mouse draws is a blade or a
-//! hand, what the panel shows are the stages of a frame and the knobs that trade speed for accuracy, with what each turn
-//! of them did. Everything here is input and picture: `incise` simulates and cuts, `incise-render` draws.
+//! A scene is loaded in the background and simulated in real time. The mouse cuts, grabs and pulls; the panel shows stage
+//! times and solver settings with the measured effect of each change. This crate is input and display only: `incise`
+//! simulates and cuts, `incise-render` draws.
 
 mod app;
 mod canvas;
@@ -10,11 +10,11 @@ mod frame_clock;
 mod graphics;
 mod help;
 mod history;
-mod knobs;
 mod load;
 mod panel;
 mod session;
 mod setting_effects;
+mod settings;
 mod times;
 mod tool;
 
@@ -30,8 +30,8 @@ use crate::load::Source;
 
 /// A window to cut soft bodies in.
 ///
-/// Left mouse button: the blade or the hand; right: turn, middle: move, wheel: come closer. F1 shows all keys. Drop a
-/// scene, a mesh or a closed surface onto the window to load it.
+/// Mouse: left button cuts or grabs, right orbits, middle pans, wheel zooms. F1 shows all keys. Drop a scene, a mesh or a
+/// closed surface onto the window to open it.
 ///
 /// Example: incise-viewer fixtures/crossing.toml
 #[derive(Debug, Parser)]
@@ -39,25 +39,25 @@ use crate::load::Source;
 struct Arguments {
     /// A scene (.toml), a tet mesh or a closed triangle surface; absent: the built-in liver.
     file: Option<PathBuf>,
-    /// Where to simulate; `auto` takes a real GPU if there is one.
+    /// Backend of the simulation; `auto` takes a hardware GPU if there is one.
     #[arg(long, value_enum, default_value_t = BackendName::Auto)]
     backend: BackendName,
-    /// Waits for the space bar before the first frame.
+    /// Start paused; the space bar starts the simulation.
     #[arg(long)]
     paused: bool,
-    /// Tets to fill a closed surface with, about.
+    /// Approximate number of tets that fill a closed surface.
     #[arg(long, default_value_t = load::TETS, value_parser = clap::value_parser!(u32).range(100..=2_000_000))]
     tets: u32,
 }
 
-/// Where to simulate.
+/// Backend of the simulation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum BackendName {
-    /// On the processor.
+    /// The CPU.
     Cpu,
-    /// On the window's GPU, whatever it is.
+    /// The GPU of the window, of any kind.
     Gpu,
-    /// On the window's GPU if it is a real one that can.
+    /// The GPU of the window if it is a hardware one that supports the kernels, else the CPU.
     Auto,
 }
 

@@ -1,4 +1,4 @@
-//! The panel at the side: what the body is, what a frame costs, and the knobs.
+//! The side panel: counts of the body, stage times of a frame, and solver settings.
 
 use std::path::PathBuf;
 
@@ -9,11 +9,11 @@ use incise_render::{ColorBy, Legend, Style};
 
 use crate::frame_clock::FrameClock;
 use crate::help::Action;
-use crate::knobs::{self, SettingChange};
 use crate::session::Session;
+use crate::settings::{self, SettingChange};
 use crate::tool::Tool;
 
-/// What the panel shows and changes beside the session.
+/// State of the window that the panel shows and changes, beside the session.
 #[derive(Debug)]
 pub(crate) struct Controls<'a> {
     pub(crate) running: bool,
@@ -24,22 +24,22 @@ pub(crate) struct Controls<'a> {
     pub(crate) has_gpu: bool,
     /// The text of the field for a file.
     pub(crate) file: &'a mut String,
-    /// What is to be said about where it is computed and drawn.
+    /// Notes about the backend and the renderer.
     pub(crate) notes: &'a [String],
 }
 
-/// What was asked for in the panel.
+/// Commands given in the panel.
 #[derive(Debug, Default)]
 pub(crate) struct UiCommands {
     pub(crate) actions: Vec<Action>,
-    pub(crate) turn: Option<SettingChange>,
-    /// A file to load.
+    pub(crate) change: Option<SettingChange>,
+    /// A file to open.
     pub(crate) file: Option<PathBuf>,
-    /// Whether residuals are to be measured, if that was changed.
+    /// New state of the checkbox for residuals, if it was changed.
     pub(crate) measure: Option<bool>,
 }
 
-/// Shows the panel; without a session only what it takes to load one.
+/// Shows the panel; without a session only the field to open a file.
 pub(crate) fn show(
     ui: &mut Ui,
     session: Option<&mut Session>,
@@ -62,7 +62,7 @@ pub(crate) fn show(
             ui.separator();
             ui.strong("Speed and accuracy");
             let on_gpu = session.simulation.device_solvers().next().is_some();
-            commands.turn = knobs::show(ui, session.solver(), controls.has_gpu, on_gpu);
+            commands.change = settings::show(ui, session.solver(), controls.has_gpu, on_gpu);
             effects(ui, session);
             ui.separator();
             note = session.simulation.backend_note();
@@ -77,14 +77,14 @@ pub(crate) fn show(
 
 fn buttons(ui: &mut Ui, session: &Session, controls: &mut Controls<'_>, commands: &mut UiCommands) {
     ui.horizontal_wrapped(|ui| {
-        let pause = if controls.running { "pause" } else { "go on" };
+        let pause = if controls.running { "Pause" } else { "Resume" };
         for (text, action, on) in [
             (pause, Action::Pause, true),
-            ("step", Action::Step, !controls.running),
-            ("reset", Action::Reset, true),
-            ("undo cut", Action::Undo, session.strokes() > 0),
-            ("fit", Action::Fit, true),
-            ("help", Action::Help, true),
+            ("Step", Action::Step, !controls.running),
+            ("Reset", Action::Reset, true),
+            ("Undo cut", Action::Undo, session.strokes() > 0),
+            ("Fit", Action::Fit, true),
+            ("Help", Action::Help, true),
         ] {
             if ui.add_enabled(on, Button::new(text)).clicked() {
                 commands.actions.push(action);
@@ -94,7 +94,7 @@ fn buttons(ui: &mut Ui, session: &Session, controls: &mut Controls<'_>, commands
     ui.add(
         Slider::new(&mut controls.clock.speed, 0.05..=2.0)
             .logarithmic(true)
-            .text("of real time"),
+            .text("Speed (x real time)"),
     );
 }
 
@@ -106,58 +106,61 @@ fn tools(
 ) {
     ui.horizontal(|ui| {
         for (tool, name) in [
-            (Tool::Blade, "blade"),
-            (Tool::Hand, "hand"),
-            (Tool::SettingChange, "turn"),
+            (Tool::Blade, "Cut"),
+            (Tool::Grab, "Grab"),
+            (Tool::Orbit, "Orbit"),
         ] {
             let mut chosen = controls.tool;
             if ui.selectable_value(&mut chosen, tool, name).clicked() {
-                commands.actions.push(Action::Take(tool));
+                commands.actions.push(Action::Use(tool));
             }
         }
     });
-    let grip = &mut session.grip;
+    let tool_settings = &mut session.tool_settings;
     match controls.tool {
         Tool::Blade => {
             ui.add(
-                Slider::new(&mut grip.depth, 0.02..=1.0)
-                    .text("depth")
+                Slider::new(&mut tool_settings.depth, 0.02..=1.0)
+                    .text("Depth")
                     .custom_formatter(|depth, _| match depth {
-                        depth if depth >= 1.0 => "through".to_owned(),
-                        depth => format!("{:.0} %", 100.0 * depth),
+                        depth if depth >= 1.0 => "Through".to_owned(),
+                        depth => format!("{:.0}%", 100.0 * depth),
                     }),
             );
-            ui.add(Slider::new(&mut grip.snap, 0.0..=0.25).text("snap"));
+            ui.add(Slider::new(&mut tool_settings.snap, 0.0..=0.25).text("Snap (part of an edge)"));
         }
-        Tool::Hand => {
-            ui.add(Slider::new(&mut grip.radius, 0.01..=0.3).text("radius"));
+        Tool::Grab => {
             ui.add(
-                Slider::new(&mut grip.compliance, 1e-5..=1.0)
+                Slider::new(&mut tool_settings.radius, 0.01..=0.3)
+                    .text("Radius (part of the size)"),
+            );
+            ui.add(
+                Slider::new(&mut tool_settings.compliance, 1e-5..=1.0)
                     .logarithmic(true)
-                    .text("softness in m/N"),
+                    .text("Compliance (m/N)"),
             );
         }
-        Tool::SettingChange => {}
+        Tool::Orbit => {}
     }
 }
 
 fn look(ui: &mut Ui, session: &Session, controls: &mut Controls<'_>) {
     let style = &mut *controls.style;
     ui.horizontal(|ui| {
-        ComboBox::from_label("colors")
+        ComboBox::from_label("Color by")
             .selected_text(style.color_by.to_string())
             .show_ui(ui, |ui| {
                 for by in ColorBy::ALL {
                     ui.selectable_value(&mut style.color_by, by, by.to_string());
                 }
             });
-        ui.checkbox(&mut style.wireframe, "wireframe");
-        ui.checkbox(&mut style.smooth, "smooth");
+        ui.checkbox(&mut style.wireframe, "Wireframe");
+        ui.checkbox(&mut style.smooth, "Smooth");
     });
     if let Some(legend) = &session.legend {
         bar(ui, legend);
     } else if style.color_by == ColorBy::Residual {
-        ui.label(RichText::new("no residuals of tets yet; vbd has none").small());
+        ui.label(RichText::new("No residuals of tets yet (VBD has none)").small());
     }
 }
 
@@ -206,18 +209,18 @@ fn counts(ui: &mut Ui, session: &mut Session, controls: &Controls<'_>, commands:
     let report = session.report();
     let mut rows = vec![
         (
-            "frame",
-            format!("{}  at {:.2} s", report.frame, report.time_s),
+            "Frame",
+            format!("{} ({:.2} s)", report.frame, report.time_s),
         ),
-        ("tets", report.tets.to_string()),
-        ("particles", report.particles.to_string()),
-        ("pieces", report.pieces.to_string()),
-        ("clusters", report.clusters.to_string()),
-        ("colors", report.colors.to_string()),
+        ("Tets", report.tets.to_string()),
+        ("Particles", report.particles.to_string()),
+        ("Pieces", report.pieces.to_string()),
+        ("Clusters", report.clusters.to_string()),
+        ("Colors", report.colors.to_string()),
         (
-            "a frame",
+            "Frame time",
             format!(
-                "{:.1} of {:.0} ms, {:.2} of real time",
+                "{:.1} ms (budget {:.0} ms), {:.2}x real time",
                 session.frame_ms,
                 1e3 * session.solver().time_step,
                 controls.clock.reached(),
@@ -228,20 +231,20 @@ fn counts(ui: &mut Ui, session: &mut Session, controls: &Controls<'_>, commands:
     if let Some(residual) = measured.and_then(|report| report.residual) {
         let force = residual.force_relative.map_or_else(
             || format!("{} N", number(residual.force)),
-            |relative| format!("{} of the weight", number(relative)),
+            |relative| format!("{} x weight", number(relative)),
         );
-        rows.push(("residual", force));
+        rows.push(("Unbalanced force", force));
     }
     if let Some(error) = measured.and_then(|report| report.volume_error) {
-        rows.push(("volume error", format!("{:.2} %", 100.0 * error)));
+        rows.push(("Volume error", format!("{:.2}%", 100.0 * error)));
     }
     let inverted = measured.and_then(|report| report.inverted_tets);
     if let Some(inverted) = inverted.filter(|&count| count > 0) {
-        rows.push(("inverted tets", inverted.to_string()));
+        rows.push(("Inverted tets", inverted.to_string()));
     }
     rows.push((
-        "computed",
-        format!("{} {}", report.backend, report.precision),
+        "Backend",
+        format!("{}, {}", report.backend.to_uppercase(), report.precision),
     ));
     Grid::new("counts")
         .num_columns(2)
@@ -253,30 +256,30 @@ fn counts(ui: &mut Ui, session: &mut Session, controls: &Controls<'_>, commands:
                 ui.end_row();
             }
         });
-    // What is shown is measured.
+    // Residuals that are shown have to be measured.
     let free = controls.style.color_by != ColorBy::Residual;
     let mut measures = session.measures();
-    let mark = Checkbox::new(&mut measures, "measure the residual (costs time)");
+    let mark = Checkbox::new(&mut measures, "Measure the residual (slower)");
     if ui.add_enabled(free, mark).changed() {
         commands.measure = Some(measures);
     }
 }
 
-/// A field for a file, since not every desktop hands over what is dropped onto a window.
+/// A field for a file name, since not every desktop supports dropping files onto a window.
 fn files(ui: &mut Ui, controls: &mut Controls<'_>, commands: &mut UiCommands) {
     ui.horizontal(|ui| {
-        let field = TextEdit::singleline(controls.file).hint_text("scene, mesh or surface");
+        let field = TextEdit::singleline(controls.file).hint_text("Scene, mesh or surface file");
         let typed = ui.add(field.desired_width(230.0));
         let enter = typed.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
         let on = !controls.file.trim().is_empty();
-        if ui.add_enabled(on, Button::new("load")).clicked() || (enter && on) {
+        if ui.add_enabled(on, Button::new("Open")).clicked() || (enter && on) {
             commands.file = Some(controls.file.trim().into());
         }
     });
 }
 
 fn effects(ui: &mut Ui, session: &Session) {
-    for effect in session.effects.turns() {
+    for effect in session.effects.changes() {
         ui.label(RichText::new(&effect.what).strong());
         let mut text = effect.time();
         let residual = effect.residual();

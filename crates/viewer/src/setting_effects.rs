@@ -1,23 +1,22 @@
-//! [`SettingEffects`]: what turning a knob did, measured.
+//! [`SettingEffects`]: the measured effect of changed settings.
 //!
-//! The frames before a turn are compared with those after it: time of a frame without its cuts, and what the frame left
-//! unsolved. Both are medians, so that a frame in which something else happened does not count. Frames right after the
-//! turn are left out, since the body has to settle into the new settings.
+//! Frames before and after a change are compared by the median frame time and the median residual; frames with a cut are
+//! left out. Frames right after the change do not count, since the body has to settle.
 
 use std::collections::VecDeque;
 
 use incise::FrameReport;
 
-/// Frames on each side of a turn.
+/// Frames compared on each side of a change.
 const FRAMES: usize = 60;
-/// Frames after a turn that do not count.
+/// Frames after a change that do not count.
 const SETTLE: usize = 20;
-/// Fewest frames to say something.
+/// Smallest number of frames for a median.
 const FEWEST: usize = 10;
-/// Turns that are remembered.
-const TURNS: usize = 6;
+/// Number of changes that are kept.
+const CHANGES: usize = 6;
 
-/// What is measured of a frame.
+/// Measurements of a frame.
 #[derive(Clone, Copy, Debug)]
 struct Sample {
     ms: f64,
@@ -31,35 +30,35 @@ pub(crate) struct Measure {
     pub(crate) residual: Option<f64>,
 }
 
-/// A turn of a knob and what it did.
+/// A changed setting and its effect.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Effect {
-    /// The change as text, for example `substeps 5 to 10`.
+    /// The change as text, for example `Substeps 5 to 10`.
     pub(crate) what: String,
     pub(crate) before: Option<Measure>,
-    /// Of the frames so far.
+    /// Medians of the frames since the change.
     pub(crate) after: Option<Measure>,
 }
 
-/// The last turns of knobs.
+/// Effects of the last changes.
 #[derive(Debug, Default)]
 pub(crate) struct SettingEffects {
-    /// Since the last turn, at most [`FRAMES`].
+    /// Frames since the last change, at most [`FRAMES`].
     recent: VecDeque<Sample>,
-    /// Frames since the last turn that do not count yet.
+    /// Frames to skip until the body has settled.
     settling: usize,
     /// Newest last.
-    turns: VecDeque<Effect>,
+    changes: VecDeque<Effect>,
 }
 
 impl SettingEffects {
-    /// Takes a frame in.
+    /// Adds a frame.
     pub(crate) fn note(&mut self, report: &FrameReport, ms: f64) {
         if self.settling > 0 {
             self.settling -= 1;
             return;
         }
-        // A cut is no matter of these knobs.
+        // The time of a cut does not depend on solver settings.
         if report.cut.is_some() {
             return;
         }
@@ -72,39 +71,40 @@ impl SettingEffects {
             self.recent.pop_front();
         }
         let measure = self.measure();
-        if let Some(turn) = self.turns.back_mut() {
-            turn.after = measure;
+        if let Some(effect) = self.changes.back_mut() {
+            effect.after = measure;
         }
     }
 
-    /// A knob was turned. Turns of the same knob in a row before anything could be measured count as one.
-    pub(crate) fn turned(&mut self, knob: &str, from: &str, to: &str) {
+    /// Adds a change. Successive changes of one setting that were not measured count as one.
+    pub(crate) fn note_change(&mut self, setting: &str, from: &str, to: &str) {
         let before = self.measure();
         self.recent.clear();
         self.settling = SETTLE;
-        let same = |turn: &&mut Effect| turn.after.is_none() && turn.what.starts_with(knob);
-        if let Some(turn) = self.turns.back_mut().filter(same) {
-            let from = turn.what[knob.len()..]
+        let same =
+            |effect: &&mut Effect| effect.after.is_none() && effect.what.starts_with(setting);
+        if let Some(effect) = self.changes.back_mut().filter(same) {
+            let from = effect.what[setting.len()..]
                 .split(" to ")
                 .next()
                 .unwrap_or(from)
                 .trim();
-            turn.what = format!("{knob} {from} to {to}");
+            effect.what = format!("{setting} {from} to {to}");
             return;
         }
-        self.turns.push_back(Effect {
-            what: format!("{knob} {from} to {to}"),
+        self.changes.push_back(Effect {
+            what: format!("{setting} {from} to {to}"),
             before,
             after: None,
         });
-        if self.turns.len() > TURNS {
-            self.turns.pop_front();
+        if self.changes.len() > CHANGES {
+            self.changes.pop_front();
         }
     }
 
-    /// The turns, newest first.
-    pub(crate) fn turns(&self) -> impl Iterator<Item = &Effect> {
-        self.turns.iter().rev()
+    /// The changes, newest first.
+    pub(crate) fn changes(&self) -> impl Iterator<Item = &Effect> {
+        self.changes.iter().rev()
     }
 
     fn measure(&self) -> Option<Measure> {
@@ -149,7 +149,7 @@ fn compare(before: Option<f64>, after: Option<f64>, unit: &str) -> String {
             format!("{before} to {after} {unit} (×{factor})")
         }
         (_, Some(after)) => format!("{} {unit}", number(after)),
-        (_, None) => "measuring".to_owned(),
+        (_, None) => "measuring...".to_owned(),
     }
 }
 
@@ -164,35 +164,35 @@ mod tests {
     }
 
     #[test]
-    fn a_turn_is_compared_with_the_frames_before_it() {
+    fn a_change_is_compared_with_the_frames_before_it() {
         let mut effects = SettingEffects::default();
         frames(&mut effects, 30, 2.0);
-        effects.turned("substeps", "5", "10");
-        assert_eq!(effects.turns().next().unwrap().time(), "measuring");
+        effects.note_change("Substeps", "5", "10");
+        assert_eq!(effects.changes().next().unwrap().time(), "measuring...");
         // While it settles nothing counts, then one slow frame in ten does not.
         frames(&mut effects, SETTLE, 1000.0);
         for _ in 0..4 {
             frames(&mut effects, 9, 4.0);
             frames(&mut effects, 1, 90.0);
         }
-        let effect = effects.turns().next().unwrap();
-        assert_eq!(effect.what, "substeps 5 to 10");
+        let effect = effects.changes().next().unwrap();
+        assert_eq!(effect.what, "Substeps 5 to 10");
         assert_eq!(effect.time(), "2.00 to 4.00 ms (×2.00)");
         assert_eq!(effect.residual(), "");
     }
 
     #[test]
-    fn a_drag_of_a_knob_is_one_turn() {
+    fn a_drag_of_a_slider_is_one_change() {
         let mut effects = SettingEffects::default();
         frames(&mut effects, 30, 2.0);
         for to in 6..=9 {
             let from = (to - 1).to_string();
-            effects.turned("substeps", &from, &to.to_string());
+            effects.note_change("Substeps", &from, &to.to_string());
             frames(&mut effects, 3, 3.0);
         }
-        assert_eq!(effects.turns().count(), 1);
-        let effect = effects.turns().next().unwrap();
-        assert_eq!(effect.what, "substeps 5 to 9");
+        assert_eq!(effects.changes().count(), 1);
+        let effect = effects.changes().next().unwrap();
+        assert_eq!(effect.what, "Substeps 5 to 9");
         assert_eq!(effect.before.unwrap().ms, 2.0);
     }
 }

@@ -1,4 +1,4 @@
-//! [`Times`]: the stages of the last frames, as a rolling plot.
+//! [`Times`]: stage times of the last frames as a rolling plot.
 
 use std::collections::VecDeque;
 
@@ -37,7 +37,7 @@ pub(crate) struct Times {
 
 impl Times {
     pub(crate) fn note(&mut self, frame: u64, ms: Milliseconds) {
-        // After a jump back the plot would run into itself.
+        // After a reset or undo, frames would overlap in the plot.
         if self.frames.back().is_some_and(|last| last.0 >= frame) {
             self.frames.clear();
         }
@@ -64,7 +64,7 @@ impl Times {
             .allow_boxed_zoom(false)
             .include_y(0.0)
             .legend(Legend::default())
-            .y_axis_label("ms a frame");
+            .y_axis_label("Frame time (ms)");
         plot.show(ui, |plot| {
             for (name, color, stage) in STAGES {
                 let mean = self.mean(stage);
@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_the_last_frames_are_kept_and_a_jump_back_starts_anew() {
+    fn the_last_frames_are_kept_and_a_reset_clears_the_plot() {
         let mut times = Times::default();
         for frame in 0..300 {
             let ms = Milliseconds {

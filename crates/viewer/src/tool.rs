@@ -1,4 +1,4 @@
-//! What the left mouse button holds: a blade or a hand.
+//! Tools of the left mouse button: cut, grab, orbit.
 //!
 //! A blade is the part of the view ray under the pointer from in front of the body to a chosen depth below its surface, so
 //! a stroke is the drawn line swept along the view direction: seen from where it was drawn, it is that line.
@@ -6,32 +6,32 @@
 use incise::mesh::glam::DVec3;
 use incise_render::Camera;
 
-/// What the left mouse button holds.
+/// Tool of the left mouse button.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Tool {
     /// Cuts along the drawn line.
     #[default]
     Blade,
-    /// Takes hold of the body and pulls.
-    Hand,
-    /// Turns the camera, as the right button always does.
-    SettingChange,
+    /// Grabs the body and pulls.
+    Grab,
+    /// Orbits the camera, as the right button always does.
+    Orbit,
 }
 
-/// How the tools act.
+/// Settings of the tools.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Grip {
-    /// How deep the blade goes below the surface, as a fraction of the body's size; 1 and more goes through.
+pub(crate) struct ToolSettings {
+    /// Depth of the blade below the surface as a fraction of the body's size; 1 and more goes through.
     pub(crate) depth: f64,
     /// Snap distance as a fraction of an edge.
     pub(crate) snap: f64,
-    /// What the hand takes hold of, as a fraction of the body's size.
+    /// Radius of the grabbed region as a fraction of the body's size.
     pub(crate) radius: f64,
-    /// How softly it holds, in m/N.
+    /// Compliance of the grab in m/N.
     pub(crate) compliance: f64,
 }
 
-impl Default for Grip {
+impl Default for ToolSettings {
     fn default() -> Self {
         Self {
             depth: 1.0,

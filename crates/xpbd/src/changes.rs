@@ -1,17 +1,17 @@
-//! [`Changes`]: what edits of a solver have changed, for a device that solves on its own. Cost: a number an edit.
+//! [`Changes`]: changes by edits of a solver, for a device that solves on its own. Cost: a number an edit.
 
-/// What edits have changed.
+/// Changes by edits of a solver, for a device that solves on its own.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Changes {
-    /// Masses or materials have changed and their tets are not named: all tets are to be read again.
+    /// Whether masses or materials have changed without a list of their tets, so that all tets must be read again.
     pub all_tets: bool,
-    /// Tets with other corners, another rest shape or corners of another mass, with repetitions; some may be gone
-    /// since.
+    /// Tets with other corners, another rest shape or corners of another mass, with repetitions; some may no longer
+    /// exist.
     pub tets: Vec<u32>,
-    /// The origin has moved: all particles are to be read again.
+    /// Whether the origin has moved, so that all particles must be read again.
     pub all_particles: bool,
-    /// Particles that are new or have another position, velocity or mass, with repetitions; some may be gone since.
+    /// Particles that are new or have another position, velocity or mass, with repetitions; some may no longer exist.
     pub particles: Vec<u32>,
     /// Whether particles were attached, detached or appended with an attachment.
     pub attachments: bool,
@@ -22,7 +22,7 @@ pub struct Changes {
 }
 
 impl Changes {
-    /// Everything, for a device that begins.
+    /// Returns a value that marks everything as changed, for a new device.
     #[must_use]
     pub fn everything() -> Self {
         Self {

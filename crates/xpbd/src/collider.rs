@@ -1,6 +1,6 @@
 //! [`Collider`]: the shape and motion of a solid obstacle, with its signed distance in closed form.
 //!
-//! How particles are kept outside: `constraints/colliders.rs`.
+//! `constraints/colliders.rs` keeps particles outside.
 
 mod solid;
 
@@ -12,7 +12,7 @@ pub(crate) use solid::{Nearest, Solid};
 /// A solid obstacle.
 ///
 /// # Example
-/// A particle falls on a ball and lies on its top.
+/// A particle falls on a ball and comes to rest on its top.
 /// ```
 /// use glam::DVec3;
 /// use incise_graph::Schedule;
@@ -36,11 +36,11 @@ pub(crate) use solid::{Nearest, Solid};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Collider {
-    /// Its shape and place at the start of the frame.
+    /// Shape and position at the start of the frame.
     pub shape: ColliderShape,
     /// Coulomb's coefficient of friction, at least 0.
     pub friction: f64,
-    /// Its velocity in m/s during the frame. The next frame starts where its caller says: see [`Collider::moved`].
+    /// Velocity in m/s during the frame. The caller sets the position for the next frame: see [`Collider::moved`].
     pub velocity: DVec3,
 }
 
@@ -69,19 +69,19 @@ pub enum ColliderShape {
         /// Its radius in m, positive.
         radius: f64,
     },
-    /// A turned box.
+    /// A rotated box.
     Box {
         /// Its center in m.
         center: DVec3,
         /// Half its edges in m, positive.
         half_extents: DVec3,
-        /// How it is turned, of any length but 0.
+        /// Rotation, of any length but 0.
         rotation: DQuat,
     },
 }
 
 impl Collider {
-    /// A collider at rest, without friction.
+    /// Creates a collider at rest without friction.
     #[must_use]
     pub fn new(shape: ColliderShape) -> Self {
         Self {
@@ -91,7 +91,7 @@ impl Collider {
         }
     }
 
-    /// A horizontal floor at a height in m; up is z.
+    /// Creates a horizontal floor at a height in m; up is z.
     #[must_use]
     pub fn ground(height: f64, friction: f64) -> Self {
         let shape = ColliderShape::Plane {
@@ -104,7 +104,7 @@ impl Collider {
         }
     }
 
-    /// The collider where its velocity takes it in `time` s.
+    /// Returns the collider moved by its velocity for `time` s.
     #[must_use]
     pub fn moved(&self, time: f64) -> Self {
         self.shifted(self.velocity * time)
@@ -122,10 +122,10 @@ impl Collider {
         moved
     }
 
-    /// The distance of a point from the surface in m, negative inside, and the direction in which it grows fastest.
+    /// Returns the signed distance of a point from the surface in m, negative inside, and its gradient.
     ///
-    /// Where there are several such directions (the center of a sphere, the axis of a capsule, the middle of a box),
-    /// it is always the same one of them.
+    /// Where the gradient is not unique (the center of a sphere, the axis of a capsule, the middle of a box), always
+    /// one fixed direction is returned.
     ///
     /// # Example
     /// ```

@@ -1,12 +1,11 @@
-//! [`jitter`]: a body on an exact line is given a little width.
+//! [`jitter`]: adds a little width to a body on an exact line.
 //!
-//! Where all tets lie on one line, det F is zero to second order: the constraint of volume has no slope, the other one
-//! pulls along the line, and nothing can ever leave it. The state is as unstable as a pencil on its tip; what is
-//! missing is only the first touch, which rounding provides on most lines that are not along an axis. On a plane the
-//! constraint of volume has a slope and nothing is needed; on a point no touch helps, because that is a minimum of the
-//! energy.
+//! Where all tets lie on one line, det F is zero to second order: the volume constraint has no gradient, the other
+//! constraint pulls along the line, and no constraint moves a particle off it. The state is an unstable equilibrium; on
+//! most lines that are not along an axis, rounding alone leaves it. On a plane the volume constraint has a gradient and
+//! no jitter is needed. On a point jitter does not help, because that is a minimum of the energy.
 //!
-//! Cost: the look at one tet in a frame, unless that is degenerate.
+//! Cost: a test of one tet in a frame, unless that is degenerate.
 
 use glam::DVec3;
 

@@ -1,5 +1,5 @@
-//! What a device that solves on its own needs of a [`Solver`]: tets and particles as plain numbers, what edits have
-//! changed since it last asked, and the way back of a state.
+//! Interface of a [`Solver`] for a device that solves on its own: tets and particles as plain numbers, changes since
+//! the last query, and loading of a state.
 //!
 //! Tets, masses and materials are edited in the solver here; a GPU applies the same changes that the layout of this
 //! crate applies. Changes are tracked on request only. Cost: a number an edit.
@@ -10,7 +10,7 @@ use crate::neo_hookean::MAX_COFACTOR_NORM;
 use crate::particles::Particles;
 use crate::{Changes, Float, Solver, StepSettings, TetSolve};
 
-/// A tet as a kernel wants it.
+/// A tet as plain numbers for a kernel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TetData<R> {
     /// Its particles.
@@ -24,12 +24,12 @@ pub struct TetData<R> {
 }
 
 impl<R: Float> Solver<R> {
-    /// From now on keeps track of changes; [`Solver::take_changes`] begins with everything.
+    /// Starts tracking changes. The first [`Solver::take_changes`] afterwards returns everything.
     pub fn track_changes(&mut self) {
         self.changes = Some(Changes::everything());
     }
 
-    /// What has changed since the last call; nothing unless [`Solver::track_changes`] was called.
+    /// Returns the changes since the last call; none unless [`Solver::track_changes`] was called.
     ///
     /// # Example
     /// ```
@@ -55,7 +55,7 @@ impl<R: Float> Solver<R> {
             .unwrap_or_default()
     }
 
-    /// A tet as a kernel wants it.
+    /// Returns a tet as plain numbers for a kernel.
     ///
     /// # Panics
     /// If the tet does not exist.
@@ -69,7 +69,7 @@ impl<R: Float> Solver<R> {
         }
     }
 
-    /// The volume of a tet at rest in m³, negative if it is inverted there.
+    /// Returns the volume of a tet at rest in m³, negative if it is inverted there.
     ///
     /// # Panics
     /// If the tet does not exist.
@@ -78,7 +78,7 @@ impl<R: Float> Solver<R> {
         self.tets.rest_volumes[tet]
     }
 
-    /// Whether a tet takes part: one too flat to be represented does not.
+    /// Returns whether a tet is solved. Tets too flat to be represented are not.
     ///
     /// # Panics
     /// If the tet does not exist.
@@ -87,20 +87,20 @@ impl<R: Float> Solver<R> {
         self.tets.list[tet].inverse_rest != [R::ZERO; 9]
     }
 
-    /// Whether there is but one material, so that the constants of all tets are the same.
+    /// Returns whether there is a single material, so that all tets have equal constants.
     #[must_use]
     pub fn is_uniform(&self) -> bool {
         self.tets.materials.len() < 2
     }
 
-    /// Whether a material is damped.
+    /// Returns whether any material is damped.
     #[must_use]
     pub fn is_damped(&self) -> bool {
         self.tets.is_damped()
     }
 
-    /// Position relative to [`Solver::origin`] in m and inverse mass in 1/kg, which is 0 for what is held; velocity in
-    /// m/s.
+    /// Returns the position relative to [`Solver::origin`] in m with the inverse mass in 1/kg (0 for fixed and rigidly
+    /// attached particles), and the velocity in m/s.
     ///
     /// # Panics
     /// If the particle does not exist.
@@ -110,8 +110,8 @@ impl<R: Float> Solver<R> {
         (data, R::components(self.particles.velocities[particle]))
     }
 
-    /// What a step of this solver does with its state before it begins: gives a body that has moved on a new origin,
-    /// and one on an exact line a little width; returns how many particles that moved.
+    /// Prepares the state as a step does first: moves the origin with a body that has moved far, and adds a little
+    /// width to a body on an exact line. Returns the number of particles that the latter moved.
     pub fn prepare_state(&mut self) -> usize {
         let origin = self.particles.origin;
         let unfolded = self.prepare();
@@ -121,11 +121,11 @@ impl<R: Float> Solver<R> {
         unfolded
     }
 
-    /// Takes over positions (the fourth number is ignored) and velocities that were computed elsewhere from this
-    /// solver's, relative to the same origin. What was kept for residuals of an earlier step is gone.
+    /// Loads positions (the fourth number is ignored) and velocities that were computed elsewhere from this solver's
+    /// state, relative to the same origin. Data for residuals of an earlier step is dropped.
     ///
     /// # Panics
-    /// If there is not one of each for every particle.
+    /// If the number of positions or velocities differs from that of particles.
     pub fn load_state(&mut self, positions: &[[R; 4]], velocities: &[[R; 4]]) {
         let count = self.particle_count();
         assert_eq!((positions.len(), velocities.len()), (count, count));
@@ -146,12 +146,12 @@ impl<R: Float> Solver<R> {
         self.stepper.last.clear();
     }
 
-    /// Takes over what [`Solver::residuals`] needs of a last substep that was made elsewhere: the positions before the
+    /// Loads the data of a last substep computed elsewhere, for [`Solver::residuals`]: the positions before the
     /// constraints were solved (the fourth number is ignored), the two multipliers of each tet, and the form that
     /// solved the tets.
     ///
     /// # Panics
-    /// If there is not one of the first for every particle and one of the second for every tet.
+    /// If the number of positions differs from that of particles, or the number of multipliers from that of tets.
     pub fn load_last_substep(
         &mut self,
         predicted: &[[R; 4]],
@@ -168,22 +168,22 @@ impl<R: Float> Solver<R> {
         last.tet_solve = tet_solve;
     }
 
-    /// Ends a frame that was computed elsewhere: the handles have arrived.
+    /// Ends a frame that was computed elsewhere: handles take their poses at its end.
     pub fn end_frame(&mut self) {
         self.constraints.end_frame();
     }
 }
 
 impl Solver<f32> {
-    /// The norm of the derivative of det F (√3 at rest) up to which tets resist a change of volume as their material
-    /// says; from there on derivative, det F and γ are scaled down to it.
+    /// Norm of the derivative of det F (√3 at rest) up to which tets resist a change of volume as their material
+    /// states; beyond it derivative, det F and γ are scaled down to this norm.
     pub const MAX_COFACTOR_NORM: f64 = MAX_COFACTOR_NORM;
 
-    /// The colliders `elapsed` s after the start of the frame, at the end of a substep, relative to the origin, as 20
-    /// numbers each.
+    /// Returns the colliders `elapsed` s after the start of the frame, at the end of a substep, relative to the origin,
+    /// as 20 numbers each.
     ///
-    /// The first is the kind: 0 plane, 1 capsule or sphere, 2 box; the second the friction; the fifth to seventh what
-    /// it moved in the substep. Of a plane follow the offset along the normal in the third place and the unit normal
+    /// The first number is the kind: 0 plane, 1 capsule or sphere, 2 box; the second the friction; the fifth to seventh
+    /// the motion in the substep. Of a plane follow the offset along the normal in the third place and the unit normal
     /// from the ninth on; of a capsule the radius in the third, one over the squared length of the axis in the fourth
     /// (0 for a sphere), and from the ninth on its start, its axis and the normal of points on the axis; of a box half
     /// its edges in the third, fourth and eighth, and from the ninth on its center and its three axes.

@@ -1,15 +1,15 @@
-//! [`XpbdError`]: what can be wrong with a material, a setting or a constraint.
+//! [`XpbdError`]: errors of materials, settings and constraints.
 
 use incise_graph::GraphError;
 
-/// Why a solver refused its input.
+/// Error of a solver about its input.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum XpbdError {
     /// A material constant outside its range.
     #[error("{what} is {value}: it must be {range}")]
     Material {
-        /// The constant.
+        /// Name of the constant.
         what: &'static str,
         /// Its value.
         value: f64,
@@ -19,7 +19,7 @@ pub enum XpbdError {
     /// A setting of the solver outside its range.
     #[error("{what} is {value}: it must be {range}")]
     Setting {
-        /// The setting.
+        /// Name of the setting.
         what: &'static str,
         /// Its value.
         value: f64,
@@ -38,12 +38,12 @@ pub enum XpbdError {
         /// The range it must lie in.
         range: &'static str,
     },
-    /// What a step would solve is not what schedule, tets and masses say.
+    /// The layout differs from schedule, tets and masses.
     #[error("the layout has another {what} {number} than schedule, tets and masses say")]
     Layout {
-        /// What differs.
+        /// Kind of item that differs.
         what: &'static str,
-        /// Its number.
+        /// Number of the item.
         number: usize,
     },
     /// Contacts were set and the method does not solve them.
@@ -54,12 +54,12 @@ pub enum XpbdError {
         /// The name of the method.
         method: &'static str,
     },
-    /// Constraints on particles that do not exist, or a schedule that is not theirs.
+    /// Constraints on particles that do not exist, or a schedule of other constraints.
     #[error("{what} constraints: {source}")]
     Schedule {
         /// The kind of constraint.
         what: &'static str,
-        /// What is wrong.
+        /// Cause.
         source: GraphError,
     },
 }

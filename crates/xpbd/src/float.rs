@@ -24,8 +24,7 @@ pub trait Saved {}
 #[cfg(not(feature = "serde"))]
 impl<T> Saved for T {}
 
-/// Arithmetic of the scalar that a solver computes with: `f32` or `f64`. Code that steps solvers asks for
-/// [`crate::Real`].
+/// Arithmetic of a solver's scalar: `f32` or `f64`. Code that steps solvers requires [`crate::Real`].
 pub trait Float:
     Copy
     + Debug

@@ -1,14 +1,15 @@
 //! The origin of a solver: the point that its particles' positions are relative to.
 //!
-//! A single holds seven digits. Ten kilometers from the origin of the world they end at a millimeter, and a body that
-//! falls by a hundredth of that in a substep hangs in the air. So positions are kept relative to a point in the body,
-//! which is known in double precision, and a body moves wherever it is as it would at the origin of the world.
+//! A single-precision number has seven digits: ten kilometers from the origin of the world the last one is a
+//! millimeter, and a body that falls by a hundredth of that in a substep does not move. Positions are therefore
+//! relative to a point in the body, which is known in double precision, and precision does not depend on the position
+//! in the world.
 //!
-//! The origin is the center of the bounding box, rounded to multiples of the power of two above the box's longest side:
-//! coordinates are at most one and a half times as long as that side. A body that contains or touches the origin of the
-//! world mostly keeps that as its own, and bodies that differ by a shift of such a multiple have the same relative
-//! positions to the bit, as long as double precision holds the shifted ones. A body that has moved on by more than
-//! twice its size gets a new origin between frames.
+//! The origin is the center of the bounding box, rounded to multiples of the power of two above the box's longest side,
+//! so coordinates are at most one and a half times as long as that side. A body that contains or touches the origin of
+//! the world mostly keeps it as its own. Bodies that differ by a shift of such a multiple have bit-identical relative
+//! positions, if double precision holds the shifted ones. A body that has moved by more than twice its size gets a new
+//! origin between frames.
 //!
 //! Cost: a pass over the particles a frame, one more when the origin moves.
 

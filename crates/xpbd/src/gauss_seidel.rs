@@ -1,9 +1,8 @@
-//! One pass over the tets: color after color, within a color in parallel, several tets in an instruction.
+//! One pass over the tets: color by color, within a color in parallel, several tets in an instruction.
 //!
-//! Clusters of one color share no particle. They are dealt to the threads in equal parts, and within a thread to the
-//! lanes of the processor; a color too small to be worth a second thread stays on one. Every tet sees the same numbers
-//! and rounds them in the same way on every thread and lane, so threads and instruction sets change nothing but the
-//! time. A Jacobi pass goes the same way and writes elsewhere.
+//! Clusters of one color share no particle. They are distributed evenly to threads, and within a thread to SIMD lanes;
+//! a small color stays on one thread. Every tet has the same inputs and rounding on every thread and lane, so results
+//! do not depend on threads and instruction sets. A Jacobi pass is the same loop with another destination.
 //!
 //! Source: paper sections 3 and 4.1. Cost: see [`crate::simd_kernel`]; a barrier a color.
 

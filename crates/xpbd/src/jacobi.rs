@@ -1,9 +1,9 @@
-//! [`Jacobi`]: what an iteration needs that corrects all constraints from the same positions, and its extrapolation.
+//! [`Jacobi`]: data of an iteration that corrects all constraints from one set of positions, and its extrapolation.
 //!
-//! Corrections are gathered color by color, so that no two threads add to one particle at once and every sum has the
-//! same order. Chebyshev's semi-iteration then leaps ahead along the line through the iterate before last:
-//! `x ← ω (x̂ - x⁻) + x⁻` with x̂ the Jacobi iterate and x⁻ the one before last, and the multipliers likewise: leaping
-//! with positions only would leave them behind.
+//! Corrections are summed color by color, so that no two threads add to one particle at once and every sum has a fixed
+//! order. Chebyshev's semi-iteration then extrapolates along the line through the iterate before last:
+//! `x ← ω (x̂ - x⁻) + x⁻` with x̂ the Jacobi iterate and x⁻ the one before last. Multipliers are extrapolated in the same
+//! way, so that they match the positions.
 //!
 //! Source: Wang 2015, algorithm 1, for the extrapolation; paper section 5.3 for the comparison.
 //! Cost: that of a Gauss-Seidel pass, a pass over the particles, and with Chebyshev two more copies of the state.

@@ -1,7 +1,8 @@
-//! XPBD soft bodies: Stable Neo-Hookean tetrahedra solved by colored Gauss-Seidel.
+//! Soft bodies of Stable Neo-Hookean tetrahedra, solved by XPBD (colored Gauss-Seidel) or vertex block descent.
 //!
-//! A [`Solver`] holds particles and tets in single or double precision from one source; [`Solver::step`] advances a
-//! frame over an `incise_graph::Schedule` from any source. The result is the same to the bit for any number of threads.
+//! A [`Solver`] holds particles and tets in single or double precision. [`Solver::step`] advances it by a frame of XPBD
+//! over an `incise_graph::Schedule`, [`Solver::step_vbd`] by a frame of VBD. Results are bit-identical for any number
+//! of threads.
 //!
 //! ```
 //! use glam::DVec3;
@@ -35,8 +36,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! What it cannot do: iterating a large step does not converge to the implicit solution of that step, because XPBD
-//! leaves out the primal residual; use substeps, and watch [`Solver::kappa`].
+//! Limit of XPBD: iterating a large step does not converge to the implicit solution of that step, because XPBD leaves
+//! out the primal residual. Use substeps and watch [`Solver::kappa`], or VBD.
 
 mod changes;
 mod collider;

@@ -1,4 +1,4 @@
-//! [`Material`]: what a body is made of, and the constants of its Stable Neo-Hookean energy.
+//! [`Material`]: elastic constants, density and damping of a body, and the constants of its Stable Neo-Hookean energy.
 //!
 //! The energy density is `μ/2 (|F|² - 3) + l/2 (det F - γ)²` with `l = λ + μ` and `γ = 1 + μ/l`. Written with the Lamé
 //! λ in place of `l`, as it is often printed, the material would have the small-strain constant `λ - μ`: at Poisson's
@@ -50,13 +50,13 @@ impl Material {
         Ok(())
     }
 
-    /// Lamé's second constant μ (the shear modulus) in Pa.
+    /// Returns Lamé's second constant μ (the shear modulus) in Pa.
     #[must_use]
     pub fn mu(&self) -> f64 {
         self.young_modulus / (2.0 * (1.0 + self.poisson_ratio))
     }
 
-    /// The factor `l = λ + μ` of the volume term in Pa.
+    /// Returns the factor `l = λ + μ` of the volume term in Pa.
     #[must_use]
     pub fn volume_stiffness(&self) -> f64 {
         let nu = self.poisson_ratio;
@@ -64,7 +64,8 @@ impl Material {
         lambda + self.mu()
     }
 
-    /// The rest value `γ = 1 + μ/l` of the determinant in the volume term, which makes the rest shape free of stress.
+    /// Returns the rest value `γ = 1 + μ/l` of the determinant in the volume term, which makes the rest shape free of
+    /// stress.
     #[must_use]
     pub fn gamma(&self) -> f64 {
         1.0 + self.mu() / self.volume_stiffness()

@@ -1,7 +1,7 @@
-//! What a state is worth: energies, volume, kappa. Computed on request, in double precision.
+//! Measurements of a state: energies, volume, kappa. Computed on request, in double precision.
 //!
-//! Everything is summed one after the other in the order of particles and tets, so the numbers do not depend on the
-//! number of threads. Cost: a pass over particles or tets.
+//! Sums are sequential in the order of particles and tets, so the numbers do not depend on the number of threads. Cost:
+//! a pass over particles or tets.
 
 use glam::{DMat3, DVec3};
 
@@ -10,15 +10,15 @@ use crate::{Float, Solver};
 /// Energies in J.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Energy {
-    /// Of motion.
+    /// Kinetic energy.
     pub kinetic: f64,
-    /// Of deformation; 0 at rest.
+    /// Elastic energy; 0 at rest.
     pub elastic: f64,
-    /// Of height, relative to the origin of the world; 0 without gravity.
+    /// Gravitational energy, relative to the origin of the world; 0 without gravity.
     pub gravity: f64,
 }
 
-/// Volumes as the tets are now.
+/// Volumes of the present tets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Volume {
     /// Sum of the signed volumes in m³.
@@ -31,19 +31,19 @@ pub struct Volume {
     pub inverted: usize,
 }
 
-/// The tets that are softer than their material.
+/// Tets that were made softer than their material by [`Solver::limit_kappa`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Softened {
-    /// How many.
+    /// Number of softened tets.
     pub tets: usize,
-    /// Their share of the volume at rest.
+    /// Share of the softened tets in the volume at rest.
     pub volume_fraction: f64,
-    /// The largest factor by which one's stiffness was divided.
+    /// Largest factor by which the stiffness of a tet was divided.
     pub strongest: f64,
 }
 
 impl<R: Float> Solver<R> {
-    /// The energies of the present state.
+    /// Returns the energies of the present state.
     #[must_use]
     pub fn energy(&self, gravity: Option<DVec3>) -> Energy {
         let mut energy = Energy::default();
@@ -59,7 +59,7 @@ impl<R: Float> Solver<R> {
         energy
     }
 
-    /// The volumes of the present state.
+    /// Returns the volumes of the present state.
     #[must_use]
     pub fn volume(&self) -> Volume {
         let mut volume = Volume {
@@ -78,7 +78,7 @@ impl<R: Float> Solver<R> {
         volume
     }
 
-    /// The largest speed of a particle in m/s.
+    /// Returns the largest speed of a particle in m/s.
     #[must_use]
     pub fn max_speed(&self) -> f64 {
         (0..self.particle_count())
@@ -86,10 +86,9 @@ impl<R: Float> Solver<R> {
             .fold(0.0, f64::max)
     }
 
-    /// The largest `E Δt² / (ρ h²)` over all tets, with h the smallest altitude: the square of the distance in tets
-    /// that a wave of stress travels in a substep of `substep_time`. Up to about 0.5 a substep of one iteration is
-    /// accurate; up to 1 a body at rest stays so; above about 2 shear is far too soft, and from 4 on even a body at
-    /// rest rings itself to pieces.
+    /// Returns the largest kappa of a tet, `E Δt² / (ρ h²)` with h the smallest altitude: the square of the number of
+    /// tets that a stress wave crosses in a substep of `substep_time`. Up to about 0.5 a substep of one iteration is
+    /// accurate. In the block and sequential forms a body at rest is stable up to 1 and unstable from 4 on.
     #[must_use]
     pub fn kappa(&self, substep_time: f64) -> f64 {
         (0..self.tet_count())
@@ -97,7 +96,7 @@ impl<R: Float> Solver<R> {
             .fold(0.0, f64::max)
     }
 
-    /// [`Solver::kappa`] of one tet.
+    /// Returns the kappa of one tet: see [`Solver::kappa`].
     ///
     /// # Panics
     /// If the tet does not exist.
@@ -107,7 +106,7 @@ impl<R: Float> Solver<R> {
         self.tets.list[tet].kappa(material, substep_time)
     }
 
-    /// The tets softened by [`Solver::limit_kappa`]. O(tets).
+    /// Returns number and volume of the tets softened by [`Solver::limit_kappa`]. O(tets).
     #[must_use]
     pub fn softened(&self) -> Softened {
         let mut softened = Softened {

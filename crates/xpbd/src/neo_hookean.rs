@@ -1,4 +1,4 @@
-//! [`TetConstraint`]: what a Stable Neo-Hookean tet is at rest, and its two constraints with their gradients.
+//! [`TetConstraint`]: rest data of a Stable Neo-Hookean tet, and its two constraints with their gradients.
 //!
 //! This is the plain form, one tet at a time: measurements use it in double precision, and it is the oracle of the
 //! kernel that steps use, [`crate::simd_kernel`].

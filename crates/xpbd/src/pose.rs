@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec3};
 
-/// Where a handle is and how it is turned.
+/// Position and rotation of a handle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pose {
@@ -13,7 +13,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// At a position, not turned.
+    /// Creates a pose at a position, without rotation.
     #[must_use]
     pub fn at(position: DVec3) -> Self {
         Self {
@@ -22,13 +22,13 @@ impl Pose {
         }
     }
 
-    /// Where a point of the handle's frame is in the world.
+    /// Transforms a point of the handle's frame to the world.
     #[must_use]
     pub fn apply(&self, point: DVec3) -> DVec3 {
         self.position + self.rotation * point
     }
 
-    /// The pose at a fraction of the way to another one; that one itself at 1.
+    /// Interpolates to another pose, which is returned exactly at a fraction of 1.
     #[must_use]
     pub fn toward(&self, to: &Self, fraction: f64) -> Self {
         if fraction >= 1.0 || self == to {

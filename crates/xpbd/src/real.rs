@@ -1,4 +1,4 @@
-//! [`Real`]: the precisions that a solver steps in, and the functions that advance it.
+//! [`Real`]: the precisions of solvers, and the functions that advance them.
 //!
 //! The large algorithms are called through this trait, so they are compiled once for each precision, with this crate;
 //! called directly they would be compiled again in every crate that steps a solver.
@@ -12,7 +12,7 @@ use crate::{
     XpbdError,
 };
 
-/// A precision that solvers step in: `f32` or `f64`.
+/// A precision of solvers that can advance: `f32` or `f64`.
 pub trait Real: Float {
     /// Advances a solver by some substeps of a frame of XPBD.
     #[doc(hidden)]
@@ -92,7 +92,7 @@ impl<R: Real> Solver<R> {
         R::step(self, schedule, settings, 0..settings.substeps, false)
     }
 
-    /// Advances by one frame and keeps what [`Solver::residuals`] needs from the last substep.
+    /// Advances by one frame and keeps the data of the last substep for [`Solver::residuals`].
     ///
     /// # Errors
     /// If the settings do not pass [`StepSettings::check`]; nothing has moved then.
@@ -146,11 +146,11 @@ impl<R: Real> Solver<R> {
         R::step(self, schedule, settings, part, keep_residuals)
     }
 
-    /// Puts the tets into the order of a schedule, unless they are, as a step does first. To measure what a cut costs,
-    /// call this before the step.
+    /// Updates the layout of the tets for a schedule, as a step does first. To measure the cost of a cut, call this
+    /// before the step.
     ///
-    /// A schedule that has been [updated](Schedule::update) since the last call costs what has changed of it and of the
-    /// tets, amortized; another one, even an equal one, and new materials cost O(tets).
+    /// A schedule that was [updated](Schedule::update) since the last call costs as much as the changes of schedule and
+    /// tets, amortized. Another schedule, even an equal one, and new materials cost O(tets).
     ///
     /// # Panics
     /// If the schedule names a tet that does not exist.
@@ -158,24 +158,24 @@ impl<R: Real> Solver<R> {
         R::lay_out(self, schedule);
     }
 
-    /// Advances by one frame of `settings.step.time_step` by sweeps of vertex block descent. May take turns with
+    /// Advances by one frame of `settings.step.time_step` by sweeps of vertex block descent. Frames may alternate with
     /// [`Solver::step`].
     ///
-    /// Damping, distances, volume constraints and attachments mean what they mean to [`Solver::step`]: both go to the
-    /// same motion with smaller substeps. Hard constraints (compliance 0) are met by multipliers that each iteration
-    /// improves; with few iterations a part of their violation is left.
+    /// Damping, distances, volume constraints and attachments have the meaning of [`Solver::step`]: both methods
+    /// converge to one motion with smaller substeps. Hard constraints (compliance 0) have multipliers that each
+    /// iteration improves; with few iterations a part of their violation is left.
     ///
     /// # Errors
     /// If the settings do not pass [`VbdSettings::check`]; nothing has moved then.
     ///
     /// # Panics
-    /// If the stars are those of another number of particles, tets or constraints.
+    /// If the stars have another number of particles, tets or constraints.
     ///
     /// # Determinism
     /// Bit-identical for any number of threads.
     ///
     /// # Example
-    /// A tet of steel hangs from a corner; kappa is 1e4, far beyond what XPBD can do in one substep.
+    /// A tet of steel hangs from a corner. Kappa is 1e4, far beyond the reach of XPBD in one substep.
     /// ```
     /// use glam::DVec3;
     /// use incise_graph::{Clustering, ColorId, Coloring, Schedule};
@@ -212,14 +212,14 @@ impl<R: Real> Solver<R> {
     }
 
     /// Advances by one frame of VBD with a coarse correction after each sweep. A substep also ends when the accuracy of
-    /// the settings is reached, or when two corrections in a row find nothing to gain: in single precision that is soon
-    /// so in a stiff body.
+    /// the settings is reached, or when two corrections in a row do not lower the potential; in single precision this
+    /// happens soon in a stiff body.
     ///
     /// # Errors
     /// Those of [`Solver::step_vbd`].
     ///
     /// # Panics
-    /// If stars or correction are those of another number of particles or tets.
+    /// If stars or correction have another number of particles or tets.
     ///
     /// # Determinism
     /// Bit-identical for any number of threads.

@@ -1,9 +1,10 @@
-//! [`Residuals`]: how far the last substep is from a solution of its equations, in stated norms and units.
+//! [`Residuals`]: residuals of the last substep, in stated norms and units.
 //!
-//! Backward Euler asks for `M (x - x̃) = ∇Cᵀ λ` and `C + α̃ λ = 0` at once; XPBD iterates on the second alone, so a
-//! small dual residual proves nothing. Without multipliers both are one equation, `M (x - x̃) / Δt² + ∇U(x) = 0`, the
-//! slope of the incremental potential `‖x - x̃‖²_M / (2 Δt²) + U(x)`: the force residual is taken from positions alone,
-//! and no state that fails to move as it should, collapsed or stalled, can make it small.
+//! Backward Euler requires `M (x - x̃) = ∇Cᵀ λ` and `C + α̃ λ = 0` at once. XPBD iterates on the second alone, so a
+//! small dual residual does not show convergence. Without multipliers both are one equation,
+//! `M (x - x̃) / Δt² + ∇U(x) = 0`, the gradient of the incremental potential `‖x - x̃‖²_M / (2 Δt²) + U(x)`. The force
+//! residual is computed from positions alone, so it is large for any state that does not solve the step, also for a
+//! collapsed or stalled one.
 //!
 //! Sources: Macklin, Müller, Chentanez 2016 (primal and dual); Gast et al. 2015 (incremental potential). Everything is
 //! in double precision and summed in the order of particles and tets. Cost: one pass over the tets, on request only.
@@ -13,34 +14,32 @@ use glam::DVec3;
 use crate::neo_hookean::{Evaluation, TetConstraint};
 use crate::{Float, Solver, TetSolve};
 
-/// How far the last substep is from a solution of its equations.
+/// Residuals of the last substep: the difference from a solution of its equations.
 ///
-/// Sums go over the particles that move and the tets that take part. Forces other than elastic ones and gravity are no
-/// part of the equations, so where a body touches the ground or is damped, `primal`, `force` and `potential` show that.
-/// In single precision the last digit of a position over Δt² is the floor of `force`. A value too large for a double is
-/// [`f64::MAX`].
+/// Sums are over free particles and solved tets. The equations contain only elastic forces and gravity, so ground
+/// contact and damping contribute to `primal`, `force` and `potential`. In single precision the last digit of a
+/// position over Δt² is the smallest `force` that can be reached. A value too large for a double is [`f64::MAX`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Residuals {
-    /// `‖M (x - x̃) - ∇Cᵀ λ‖` in kg·m: the part of the equations of motion that XPBD drops. To be compared with
-    /// `Δt²` times [`Solver::load`].
+    /// `‖M (x - x̃) - ∇Cᵀ λ‖` in kg·m: the part of the equations of motion that XPBD leaves out. Compare it with `Δt²`
+    /// times [`Solver::load`].
     pub primal: f64,
-    /// `‖C + α̃ λ‖` without unit: the part it iterates on.
+    /// `‖C + α̃ λ‖` without unit: the part that XPBD iterates on.
     pub dual: f64,
-    /// The root of the mean square of `C + α̃ λ`, which does not grow with the number of constraints.
+    /// Root mean square of `C + α̃ λ`, which does not grow with the number of constraints.
     pub dual_rms: f64,
-    /// The number of constraints that it is the mean of: two for each tet that takes part.
+    /// Number of constraints: two for each solved tet.
     pub constraints: usize,
-    /// `‖M (x - x̃) / Δt² + ∇U(x)‖` in N, from positions alone: what backward Euler makes zero. To be compared with
+    /// `‖M (x - x̃) / Δt² + ∇U(x)‖` in N, from positions alone: zero in the solution of backward Euler. Compare it with
     /// [`Solver::load`].
     pub force: f64,
-    /// The incremental potential `‖x - x̃‖²_M / (2 Δt²) + U(x)` in J, which backward Euler makes least. `U` is 0 at
-    /// rest.
+    /// The incremental potential `‖x - x̃‖²_M / (2 Δt²) + U(x)` in J, which backward Euler minimizes. `U` is 0 at rest.
     pub potential: f64,
 }
 
 impl<R: Float> Solver<R> {
-    /// The residuals of the last substep; `None` unless it was made by [`Solver::step_keeping_residuals`] with
-    /// `substep_time` and no particle or tet has come since. They are those of the positions as they are now.
+    /// Returns the residuals of the last substep at the present positions; `None` unless it was made by
+    /// [`Solver::step_keeping_residuals`] with `substep_time` and no particle or tet was added since.
     ///
     /// # Example
     /// A single tet at rest falls freely, which it does without residual.
@@ -124,9 +123,8 @@ impl<R: Float> Solver<R> {
         })
     }
 
-    /// For each tet how far its constraints are from solved: `‖C + α̃ λ‖` over its two, without unit, 0 if it takes no
-    /// part. The root of the sum of their squares is [`Residuals::dual`]. `None` where [`Solver::residuals`] is.
-    /// O(tets).
+    /// Returns for each tet the residual of its two constraints, `‖C + α̃ λ‖` without unit, 0 if it is not solved. The
+    /// root of the sum of squares is [`Residuals::dual`]. `None` where [`Solver::residuals`] is. O(tets).
     ///
     /// # Example
     /// ```
@@ -178,7 +176,8 @@ impl<R: Float> Solver<R> {
         last.predicted.len() == self.particle_count() && last.multipliers.len() == self.tet_count()
     }
 
-    /// `‖M g‖` over the particles that move, in N: the size of the forces in play, by which residuals are judged.
+    /// Returns `‖M g‖` over the free particles in N, the scale to judge residuals by. The sum of squares shrinks with
+    /// the size of the particles as that of [`Residuals::force`] does.
     ///
     /// The sum of squares shrinks with the size of the particles as that of [`Residuals::force`] does.
     #[must_use]

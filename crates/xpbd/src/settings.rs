@@ -1,14 +1,14 @@
-//! [`StepSettings`]: how a frame is computed and which forces there are.
+//! [`StepSettings`]: settings of a frame: time step, method, gravity, colliders.
 
 use glam::DVec3;
 
 use crate::{Collider, XpbdError};
 
-/// How one frame is computed.
+/// Settings of one frame.
 ///
-/// Accuracy is bought by `substeps`: more of them approach the true motion, while more `iterations` of a large step
-/// approach something else (the projection leaves out part of the equations of motion). The number that decides is
-/// [`crate::Solver::kappa`].
+/// To gain accuracy raise `substeps`: they converge to the true motion. More `iterations` of a large step converge to
+/// another state, because the projection leaves out part of the equations of motion. [`crate::Solver::kappa`] is the
+/// number to look at.
 ///
 /// In single precision a substep can be too short: see [`shortest_substep_of_f32`].
 #[derive(Clone, Debug, PartialEq)]
@@ -20,9 +20,9 @@ pub struct StepSettings {
     pub substeps: u32,
     /// Passes over all constraints in a substep, at least 1.
     pub iterations: u32,
-    /// How an iteration is made.
+    /// Method of an iteration over the constraints.
     pub method: Method,
-    /// How the energy of a tet is solved.
+    /// Constraints that represent the energy of a tet.
     pub tet_solve: TetSolve,
     /// Factor on each correction, above 0 and at most 2; 1 is none.
     pub relaxation: f64,
@@ -32,11 +32,11 @@ pub struct StepSettings {
     pub colliders: Vec<Collider>,
 }
 
-/// The shortest substep in s in which single precision is sound for a body whose longest side is `size` m.
+/// Returns the shortest substep in s for which single precision is accurate, for a body whose longest side is `size` m.
 ///
-/// A position is rounded to 6e-8 of the body's size. Over a shorter substep gravity moves a particle by less than four
-/// times that, and each rounding becomes a kick to its velocity: the body heats up, at an eighth of this substep to
-/// several times its energy within 100,000 substeps. Use double precision below it.
+/// A position is rounded to 6e-8 of the body's size. In a shorter substep gravity moves a particle by less than four
+/// times that, and rounding adds energy: at an eighth of this substep several times the body's energy within 100,000
+/// substeps. Use double precision below it.
 ///
 /// ```
 /// assert!((incise_xpbd::shortest_substep_of_f32(1.0) - 1.56e-4).abs() < 1e-6);
@@ -46,38 +46,38 @@ pub fn shortest_substep_of_f32(size: f64) -> f64 {
     (2.4e-7 * size / 9.81).sqrt()
 }
 
-/// How an iteration over the constraints is made.
+/// Method of an iteration over the constraints.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Method {
-    /// Color after color, each constraint seeing the corrections before it.
+    /// Gauss-Seidel: color by color, each constraint uses the corrections before it.
     #[default]
     GaussSeidel,
-    /// All constraints see the particles as they were before the iteration, and the corrections are added up. Stable
-    /// only with a relaxation below about 2 over the largest number of tets around a particle: the paper takes 0.1.
+    /// Jacobi: all constraints use the positions before the iteration, and the corrections are added up. Stable only
+    /// with a relaxation below about 2 over the largest number of tets around a particle; the paper takes 0.1.
     Jacobi,
     /// Jacobi, extrapolated from the two last iterates of positions and multipliers with growing weights
     /// `ω = 4 / (4 - ρ² ω)`, the first being `2 / (2 - ρ²)`.
     Chebyshev {
-        /// The spectral radius ρ of the Jacobi iteration, from 0 to below 1: the larger, the bolder.
+        /// Spectral radius ρ of the Jacobi iteration, from 0 to below 1. Larger values extrapolate further.
         spectral_radius: f64,
         /// Plain iterations before the first extrapolation, at least 1.
         chebyshev_start: u32,
     },
 }
 
-/// How the elastic energy of a tet is split into constraints and solved.
+/// Constraints that represent the elastic energy of a tet.
 ///
 /// All three have the same energy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum TetSolve {
     /// A shear part and a volume part that both vanish at rest. A body at rest stays at rest and a loaded body stays
-    /// bounded at any stiffness, so the number of substeps is a matter of accuracy alone.
+    /// bounded at any stiffness, so the number of substeps affects accuracy only.
     #[default]
     Split,
-    /// `|F|` and `det F - γ` as one system of two unknowns. Unstable from a kappa of about 2 on, unless tets are
-    /// softened by [`crate::KappaLimit`].
+    /// `|F|` and `det F - γ` as one system of two unknowns. At rest stable up to kappa 1 and unstable from 4 on, unless
+    /// tets are softened by [`crate::KappaLimit`].
     Block,
     /// The constraints of the block form one after the other, deviatoric first, as in the paper and in most
     /// implementations.
@@ -97,7 +97,7 @@ impl Method {
 }
 
 impl StepSettings {
-    /// One substep of one iteration, no forces.
+    /// Returns settings with one substep of one iteration, without forces.
     #[must_use]
     pub fn new(time_step: f64) -> Self {
         Self {
@@ -112,7 +112,7 @@ impl StepSettings {
         }
     }
 
-    /// The time of a substep in s.
+    /// Returns the time of a substep in s.
     #[must_use]
     pub fn substep_time(&self) -> f64 {
         self.time_step / f64::from(self.substeps)

@@ -19,7 +19,7 @@
 //! repeated. E, not F, enters `Ψ_D`: in single precision `|F|² - 3` loses all digits at a strain of 1e-4.
 //!
 //! **Block**. `C_D = |F|` and `C_H = J - γ` as one 2×2 system. The deviatoric constraint is not 0 at rest, so shear is
-//! explicit without a limit: from a kappa of 2 to 4 on a body at rest becomes unstable.
+//! explicit without a limit: a body at rest becomes unstable from a kappa between 2 and 4 on.
 //!
 //! **Sequential**. The two constraints of the block form one after the other, as in the paper.
 //!
@@ -28,8 +28,8 @@
 //! coordinates.
 //!
 //! Products and sums are rounded one by one, not fused, so that every instruction set gives the same bits. Arrays of
-//! lanes are written out: the closure of `[T; N]::map` is compiled without the instructions of the kernel, so each sum
-//! in it becomes a call, which made the split form two thirds slower.
+//! lanes are written out, because the closure of `[T; N]::map` is compiled without the instructions of the kernel, so
+//! each sum in it becomes a call.
 //!
 //! Source: Smith, de Goes, Kim 2018 (energy), Macklin and Müller 2021 (constraints), Ton-That et al. 2023 (block
 //! solve), paper equations 5 and 6 (the paper prints a minus in its equation 6; its equation 3 gives the plus used

@@ -23,14 +23,14 @@ use crate::substep::Substep;
 use crate::tets::TetSet;
 use crate::{Float, Method, StepSettings, TetSolve};
 
-/// The report of a step.
+/// Report of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StepReport {
-    /// Particles that would have become infinite or NaN and were put back where they were instead, counted once for
-    /// each substep. Anything but 0 means the step is not to be trusted: use more substeps.
+    /// Number of particles that would have become Inf or NaN and were put back, counted once for each substep. Above 0
+    /// the step cannot be trusted: use more substeps.
     pub repaired: usize,
-    /// Particles that were moved by a millionth of a tet's size because all tets lay on one line to the last digit,
-    /// from where no constraint could have brought them back.
+    /// Number of particles that were moved by a millionth of a tet's size because all tets lay on one exact line, from
+    /// which no constraint could move them.
     pub unfolded: usize,
 }
 

@@ -1,4 +1,4 @@
-//! [`Substep`]: the part of a frame that is solved at present, as constraints see it.
+//! [`Substep`]: the present substep as constraints see it.
 
 use crate::{Float, StepSettings};
 

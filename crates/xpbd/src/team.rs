@@ -1,9 +1,9 @@
-//! [`parallel_rounds`]: threads that work through rounds of chunks together, a barrier between rounds.
+//! [`parallel_rounds`]: runs rounds of chunks on several threads, with a barrier between rounds.
 //!
-//! A color lasts tens of microseconds, and waking a thread takes as long. So helpers are woken once for all colors and
-//! meet at a counter after each. A free thread takes the next chunk of the round. Helpers that have not started are not
-//! waited for: if the pool is busy elsewhere, the caller does all chunks. A thread without a chunk waits for the round
-//! to end by spinning a little and then parks, since on a busy machine the thread it waits for may need its processor.
+//! A color takes about as long as waking a thread. Helpers are therefore woken once for all colors and meet at a
+//! counter after each. A free thread takes the next chunk of the round. Helpers that have not started are not waited
+//! for: if the pool is busy elsewhere, the caller does all chunks. A thread without a chunk spins briefly and then
+//! parks, since on a busy machine the thread it waits for may need its core.
 
 use std::sync::atomic::{AtomicU32, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};

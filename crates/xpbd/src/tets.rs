@@ -15,7 +15,7 @@ use crate::{Float, Material, XpbdError};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct KappaLimit {
-    /// The largest kappa of a tet.
+    /// Largest kappa of a tet.
     pub kappa: f64,
     /// The time of a substep in s.
     pub substep_time: f64,

@@ -195,7 +195,7 @@ impl Plot {
             let labelled = series.points.iter().zip(&series.labels);
             for (&point, label) in labelled.filter(|(p, _)| self.shows(**p)) {
                 let at = chart.backend_coord(&point);
-                if let Some(free) = words.place(at, label) {
+                if let Some(free) = words.position(at, label) {
                     let font = ("sans-serif", FONT).into_font();
                     root.draw(&Text::new(label.clone(), free, font))
                         .map_err(failed)?;
@@ -215,11 +215,11 @@ const FONT: i32 = 11;
 struct Words(Vec<[i32; 4]>);
 
 impl Words {
-    /// A free place for words at a point, above it or below; none where both are taken.
-    fn place(&mut self, (x, y): (i32, i32), label: &str) -> Option<(i32, i32)> {
+    /// A free position for words at a point, above it or below; none where both are taken.
+    fn position(&mut self, (x, y): (i32, i32), label: &str) -> Option<(i32, i32)> {
         let width = i32::try_from(label.chars().count()).unwrap_or(i32::MAX / 8) * 6;
-        let places = [(x + 5, y - 13), (x + 5, y + 4)];
-        let free = places.into_iter().find(|&(x, y)| {
+        let positions = [(x + 5, y - 13), (x + 5, y + 4)];
+        let free = positions.into_iter().find(|&(x, y)| {
             let clear = |&[left, right, top, bottom]: &[i32; 4]| {
                 x >= right || x + width <= left || y >= bottom || y + FONT <= top
             };
@@ -251,10 +251,10 @@ mod tests {
     #[test]
     fn words_stand_above_below_or_not_at_all() {
         let mut words = Words::default();
-        assert_eq!(words.place((100, 100), "four"), Some((105, 87)));
-        assert_eq!(words.place((110, 100), "four"), Some((115, 104)));
-        assert_eq!(words.place((112, 100), "four"), None);
-        assert_eq!(words.place((140, 100), "four"), Some((145, 87)));
+        assert_eq!(words.position((100, 100), "four"), Some((105, 87)));
+        assert_eq!(words.position((110, 100), "four"), Some((115, 104)));
+        assert_eq!(words.position((112, 100), "four"), None);
+        assert_eq!(words.position((140, 100), "four"), Some((145, 87)));
     }
 
     #[test]

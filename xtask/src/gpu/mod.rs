@@ -106,6 +106,8 @@ pub(crate) fn sweep(arguments: &GpuArguments) -> anyhow::Result<()> {
         Some(path) => path.clone(),
         None => arguments.out_dir.join(format!("{name}.{ending}")),
     };
+    std::fs::create_dir_all(&arguments.out_dir)
+        .with_context(|| arguments.out_dir.display().to_string())?;
     write(&path(&arguments.out, "md"), &page)?;
     let json = serde_json::to_string_pretty(&report)?;
     write(&path(&arguments.json, "json"), &format!("{json}\n"))

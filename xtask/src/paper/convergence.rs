@@ -121,7 +121,7 @@ impl PaperMethod {
             Self::Chebyshev => (
                 Method::Chebyshev {
                     spectral_radius: 0.99,
-                    delay: 10,
+                    chebyshev_start: 10,
                 },
                 0.1,
             ),

@@ -110,7 +110,7 @@ fn runs(mesh: &TetMesh, quick: bool) -> anyhow::Result<Vec<(String, Vec<Point>)>
         let settings = StepSettings {
             method: Method::Chebyshev {
                 spectral_radius,
-                delay: 10,
+                chebyshev_start: 10,
             },
             ..jacobi.clone()
         };

@@ -1,4 +1,4 @@
-//! The rows of the matrix that a solver alone can show: extreme states, materials, steps, masses, places and sizes.
+//! The rows of the matrix that a solver alone can show: extreme states, materials, steps, masses, poses and sizes.
 //!
 //! Each is a beam of 1 m × 0.25 m × 0.25 m of E = 1e6 Pa and Poisson's ratio 0.45, with one thing changed. Extremes of
 //! state are left alone, without gravity, one end held or none, so that the shape at rest is what they should come back
@@ -22,7 +22,7 @@ const FRAME: f64 = 1.0 / 60.0;
 const MOST_FRAMES: f64 = 1000.0;
 
 /// Where a particle is put at the start.
-type Place = fn(&mut Random, DVec3) -> DVec3;
+type Deformation = fn(&mut Random, DVec3) -> DVec3;
 
 /// A body, its surroundings and its start.
 #[derive(Clone)]
@@ -42,7 +42,7 @@ pub(crate) struct Extreme {
     pub(crate) time: f64,
     /// Substeps of a frame, for the columns that have more than one.
     pub(crate) substeps: Option<u32>,
-    place: Place,
+    pose: Deformation,
 }
 
 /// The whole list; a coarser body if `quick`.
@@ -64,7 +64,7 @@ pub(crate) fn extremes(quick: bool) -> anyhow::Result<Vec<Extreme>> {
         gravity: GRAVITY,
         time: 1.0,
         substeps: None,
-        place: |_, x| x,
+        pose: |_, x| x,
     };
     let mut extremes = vec![plain.clone()];
     let mut add = |id: String, name: String, change: &dyn Fn(&mut Extreme)| {
@@ -77,9 +77,9 @@ pub(crate) fn extremes(quick: bool) -> anyhow::Result<Vec<Extreme>> {
         extremes.push(extreme);
     };
     for (how, held) in [("held", true), ("free", false)] {
-        for (id, what, place) in states() {
+        for (id, what, pose) in states() {
             add(format!("{id}-{how}"), format!("{what}, {how}"), &|e| {
-                (e.held, e.place, e.gravity) = (held, place, 0.0);
+                (e.held, e.pose, e.gravity) = (held, pose, 0.0);
             });
         }
     }
@@ -156,7 +156,7 @@ pub(crate) fn extremes(quick: bool) -> anyhow::Result<Vec<Extreme>> {
     Ok(extremes)
 }
 
-fn states() -> [(&'static str, &'static str, Place); 8] {
+fn states() -> [(&'static str, &'static str, Deformation); 8] {
     [
         ("point", "on a point", |_, _| DVec3::new(0.3, 0.1, 0.1)),
         ("speck", "within 1e-6 m", |noise, _| noise.vector() * 1e-6),
@@ -221,7 +221,7 @@ impl Extreme {
         let mut noise = Random(17);
         for (p, &x) in self.mesh.positions.iter().enumerate() {
             if !solver.is_fixed(p) {
-                solver.set_position(p, (self.place)(&mut noise, x));
+                solver.set_position(p, (self.pose)(&mut noise, x));
             }
         }
         Ok(solver)

@@ -118,7 +118,7 @@ impl Method {
                 Jacobi => XpbdMethod::Jacobi,
                 Chebyshev => XpbdMethod::Chebyshev {
                     spectral_radius: 0.9,
-                    delay: 10,
+                    chebyshev_start: 10,
                 },
                 _ => XpbdMethod::GaussSeidel,
             },

@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-use crate::bad_input::{place, refused_in_a_sentence};
-use crate::support::Place;
+use crate::bad_input::{refused_in_a_sentence, sandbox};
+use crate::support::Sandbox;
 
 /// A small beam that Newton's method can do.
 const BEAM: &str = r#"
@@ -16,8 +16,8 @@ poisson_ratio = 0.3
 fixed = [{ half_space = { point = [-0.4, 0.0, 0.0], normal = [-1.0, 0.0, 0.0] } }]
 "#;
 
-fn ask(place: &Place, arguments: &[&str]) -> Value {
-    let text = place.good(
+fn ask(sandbox: &Sandbox, arguments: &[&str]) -> Value {
+    let text = sandbox.good(
         &[
             &["advise", "scene.toml", "--json", "--frames", "3"],
             arguments,
@@ -27,17 +27,17 @@ fn ask(place: &Place, arguments: &[&str]) -> Value {
     serde_json::from_str(&text).unwrap()
 }
 
-fn beam() -> Place {
-    let place = Place::new();
-    place.write("scene.toml", BEAM);
-    place
+fn beam() -> Sandbox {
+    let sandbox = Sandbox::new();
+    sandbox.write("scene.toml", BEAM);
+    sandbox
 }
 
 /// The best is the most accurate within the budget, to what is left of the reference's error, and its lines run.
 #[test]
 fn the_best_setting_is_measured_and_can_be_pasted_in() {
-    let place = beam();
-    let advice = ask(&place, &["--budget-ms", "10000"]);
+    let sandbox = beam();
+    let advice = ask(&sandbox, &["--budget-ms", "10000"]);
     assert_eq!(advice["reference"]["kind"], "newton");
     assert_eq!(advice["reference"]["why_not_newton"], Value::Null);
     let left = advice["reference"]["left"]["largest"].as_f64().unwrap();
@@ -49,22 +49,22 @@ fn the_best_setting_is_measured_and_can_be_pasted_in() {
     assert_eq!(advice["next"], Value::Null);
     assert_eq!(
         rows.iter()
-            .filter(|row| row["of_the_scene"] == true)
+            .filter(|row| row["is_scene_setting"] == true)
             .count(),
         1
     );
     let lines = best["solver"].as_str().unwrap();
-    place.write("scene.toml", format!("{BEAM}{lines}"));
-    place.good(&["run", "scene.toml", "--frames", "1", "--quiet"]);
+    sandbox.write("scene.toml", format!("{BEAM}{lines}"));
+    sandbox.good(&["run", "scene.toml", "--frames", "1", "--quiet"]);
 }
 
 #[test]
 fn it_says_so_if_nothing_meets_the_budget() {
-    let place = beam();
-    let advice = ask(&place, &["--budget-ms", "1e-9"]);
+    let sandbox = beam();
+    let advice = ask(&sandbox, &["--budget-ms", "1e-9"]);
     assert_eq!(advice["best"], Value::Null);
     assert!(advice["next"].is_u64(), "{advice}");
-    let text = place.good(&[
+    let text = sandbox.good(&[
         "advise",
         "scene.toml",
         "--frames",
@@ -72,10 +72,7 @@ fn it_says_so_if_nothing_meets_the_budget() {
         "--budget-ms",
         "1e-9",
     ]);
-    assert!(
-        text.contains("no setting that was measured meets"),
-        "{text}"
-    );
+    assert!(text.contains("no measured setting meets"), "{text}");
     assert!(text.contains("[solver]"), "{text}");
 }
 
@@ -89,9 +86,9 @@ fn scenes_that_newton_cannot_do_are_measured_against_the_solver() {
             "strokes after frame 0",
         ),
     ] {
-        let place = Place::new();
-        place.write("scene.toml", format!("{BEAM}{more}"));
-        let advice = ask(&place, &["--budget-ms", "1000"]);
+        let sandbox = Sandbox::new();
+        sandbox.write("scene.toml", format!("{BEAM}{more}"));
+        let advice = ask(&sandbox, &["--budget-ms", "1000"]);
         assert_eq!(advice["reference"]["kind"], "xpbd");
         let reason = advice["reference"]["why_not_newton"].as_str().unwrap();
         assert!(reason.contains(why), "{reason}");
@@ -100,14 +97,14 @@ fn scenes_that_newton_cannot_do_are_measured_against_the_solver() {
 
 #[test]
 fn bad_questions_are_refused() {
-    let place = place();
+    let sandbox = sandbox();
     refused_in_a_sentence(
-        &place,
+        &sandbox,
         &["advise", "scene.toml", "--budget-ms", "0"],
         &["budget-ms is 0", "positive"],
     );
     refused_in_a_sentence(
-        &place,
+        &sandbox,
         &["advise", "none.toml", "--budget-ms", "5"],
         &["none.toml"],
     );
@@ -116,6 +113,6 @@ fn bad_questions_are_refused() {
         &["advise", "scene.toml", "--budget-ms", "soon"],
         &["advise", "scene.toml", "--budget-ms", "5", "--frames", "0"],
     ] {
-        assert_eq!(place.incise(arguments).code, 2, "{arguments:?}");
+        assert_eq!(sandbox.incise(arguments).code, 2, "{arguments:?}");
     }
 }

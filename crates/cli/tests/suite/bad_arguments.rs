@@ -1,11 +1,11 @@
-//! Arguments that cannot be meant and places that cannot be written end like any other bad input.
+//! Arguments that cannot be meant and sandboxes that cannot be written end like any other bad input.
 
-use crate::bad_input::{place, refused, refused_in_a_sentence};
+use crate::bad_input::{refused, refused_in_a_sentence, sandbox};
 use crate::support::SCENE;
 
 #[test]
 fn places_that_cannot_be_written() {
-    let place = place();
+    let sandbox = sandbox();
     let run = |rest: &[&'static str]| [&["run", "scene.toml", "--frames", "2"], rest].concat();
     // A path below a regular file exists for no user, not even for the administrator.
     for (rest, part) in [
@@ -19,40 +19,57 @@ fn places_that_cannot_be_written() {
         (&["--save-mesh", "last.xyz"], "last.xyz"),
         (&["--save-mesh", "last"], "last"),
         (&["--jsonl", "/"], "cannot write /"),
-        (&["--film", "none/film.gif"], "none/film.gif"),
-        (&["--film", "tet.vtk/film.png"], "tet.vtk/film.png"),
+        (&["--animation", "none/animation.gif"], "none/animation.gif"),
         (
-            &["--film", "film.mp4"],
-            "film.mp4: unknown ending: films are written as .gif, .png, .apng",
+            &["--animation", "tet.vtk/animation.png"],
+            "tet.vtk/animation.png",
         ),
-        (&["--film", "film"], "unknown ending"),
         (
-            &["--out", "a/b/c", "--film", "none/film.gif"],
-            "none/film.gif",
+            &["--animation", "animation.mp4"],
+            "animation.mp4: unknown ending; animations are written as .gif, .png, .apng",
         ),
-        (&["--no-pictures", "--film", "film.avi"], "film.avi"),
+        (&["--animation", "animation"], "unknown ending"),
+        (
+            &["--out", "a/b/c", "--animation", "none/animation.gif"],
+            "none/animation.gif",
+        ),
+        (
+            &["--no-pictures", "--animation", "animation.avi"],
+            "animation.avi",
+        ),
         (
             &["--out", "a/b/c", "--jsonl", "none/frames.jsonl"],
             "none/frames.jsonl",
         ),
     ] {
-        refused_in_a_sentence(&place, &run(rest), &[part]);
+        refused_in_a_sentence(&sandbox, &run(rest), &[part]);
     }
-    // A picture of a film cannot be shown for as long as a step of this scene takes.
+    // An image of an animation cannot be shown for as long as a step of this scene takes.
     let slow = SCENE.replace("[world]", "[solver]\ntime_step = 20.0\n[world]");
-    place.write("slow.toml", slow);
-    let film = ["run", "slow.toml", "--frames", "2", "--film", "film.gif"];
-    refused_in_a_sentence(&place, &film, &["20 s a picture", "0.01 s to 10 s"]);
+    sandbox.write("slow.toml", slow);
+    let animation = [
+        "run",
+        "slow.toml",
+        "--frames",
+        "2",
+        "--animation",
+        "animation.gif",
+    ];
+    refused_in_a_sentence(
+        &sandbox,
+        &animation,
+        &["20 s for each image", "0.01 s to 10 s"],
+    );
     for command in [
         &["color", "tet.vtk", "--csv", "tet.vtk/colors.csv"][..],
         &["color", "tet.vtk", "--csv", "none/colors.csv"],
         &["mesh", "convert", "tet.vtk", "none/tet.vtk"],
         &["mesh", "generate", "box", "--tets", "300", "none/box.vtk"],
     ] {
-        refused_in_a_sentence(&place, command, &["cannot write"]);
+        refused_in_a_sentence(&sandbox, command, &["cannot write"]);
     }
     refused_in_a_sentence(
-        &place,
+        &sandbox,
         &["mesh", "convert", "tet.vtk", "tet.xyz"],
         &["tet.xyz", ".vtu"],
     );
@@ -60,7 +77,7 @@ fn places_that_cannot_be_written() {
 
 #[test]
 fn names_and_numbers_that_do_not_exist() {
-    let place = place();
+    let sandbox = sandbox();
     for (command, parts) in [
         (
             &["color", "tet.vtk", "--algorithm", "gredy"][..],
@@ -100,14 +117,14 @@ fn names_and_numbers_that_do_not_exist() {
             &["a.xyz"],
         ),
     ] {
-        refused_in_a_sentence(&place, command, parts);
+        refused_in_a_sentence(&sandbox, command, parts);
     }
 }
 
 /// Here the message has the form of the argument parser.
 #[test]
 fn arguments_that_do_not_exist() {
-    let place = place();
+    let sandbox = sandbox();
     for (command, parts) in [
         (
             &["run", "scene.toml", "--frmes", "3"][..],
@@ -172,16 +189,16 @@ fn arguments_that_do_not_exist() {
         (&["color"], &["INPUT"]),
         (&["mesh"], &["info"]),
     ] {
-        refused(&place, command, parts);
+        refused(&sandbox, command, parts);
     }
 }
 
 #[test]
 fn an_option_of_a_run_without_its_command() {
-    let place = place();
-    refused(&place, &["--out", "a"], &["incise run --out"]);
-    refused(&place, &["--frames=3"], &["incise run --frames=3"]);
+    let sandbox = sandbox();
+    refused(&sandbox, &["--out", "a"], &["incise run --out"]);
+    refused(&sandbox, &["--frames=3"], &["incise run --frames=3"]);
     for other in [&["--oot", "a"][..], &["mesh", "--out", "a"]] {
-        assert!(!refused(&place, other, &[]).contains("incise run"));
+        assert!(!refused(&sandbox, other, &[]).contains("incise run"));
     }
 }

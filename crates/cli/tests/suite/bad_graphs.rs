@@ -1,7 +1,7 @@
 //! Graph files with a mistake: one sentence that names file and line, exit code 2, nothing left behind.
 
 use crate::bad_input::refused_in_a_sentence;
-use crate::support::Place;
+use crate::support::Sandbox;
 
 /// The first line of a matrix of edges.
 const HEAD: &str = "%%MatrixMarket matrix coordinate pattern symmetric\n";
@@ -10,12 +10,12 @@ const HEAD: &str = "%%MatrixMarket matrix coordinate pattern symmetric\n";
 type Case<'a> = (&'a [u8], usize, &'a str);
 
 fn refused(name: &str, cases: &[Case<'_>]) {
-    let place = Place::new();
+    let sandbox = Sandbox::new();
     for &(content, line, part) in cases {
-        place.write(name, content);
+        sandbox.write(name, content);
         let start = format!("error: {name}:{line}: ");
         let command = ["color", name, "--csv", "colors.csv", "--json"];
-        refused_in_a_sentence(&place, &command, &[&start, part]);
+        refused_in_a_sentence(&sandbox, &command, &[&start, part]);
     }
 }
 
@@ -98,10 +98,10 @@ fn dimacs_files() {
 
 #[test]
 fn clusterings_and_places() {
-    let place = Place::new();
-    place.write("ring.col", "p edge 3 3\ne 1 2\ne 2 3\ne 3 1\n");
-    place.write("ring.xyz", "p edge 3 3\ne 1 2\ne 2 3\ne 3 1\n");
-    std::fs::create_dir(place.path("folder.mtx")).unwrap();
+    let sandbox = Sandbox::new();
+    sandbox.write("ring.col", "p edge 3 3\ne 1 2\ne 2 3\ne 3 1\n");
+    sandbox.write("ring.xyz", "p edge 3 3\ne 1 2\ne 2 3\ne 3 1\n");
+    std::fs::create_dir(sandbox.path("folder.mtx")).unwrap();
     for (command, parts) in [
         (
             &["color", "ring.col", "--clustering", "greedy-k:4"][..],
@@ -114,6 +114,6 @@ fn clusterings_and_places() {
             &["ring.xyz", ".vtk", ".mtx", ".col"],
         ),
     ] {
-        refused_in_a_sentence(&place, command, parts);
+        refused_in_a_sentence(&sandbox, command, parts);
     }
 }

@@ -1,22 +1,22 @@
 //! Bad input: one clear sentence on the error stream, exit code 2, nothing printed, nothing left behind.
 
-use crate::support::{Place, SCENE};
+use crate::support::{SCENE, Sandbox};
 
 /// A mesh of a single tet, as text.
 const TET: &str = "# vtk DataFile Version 3.0\na tet\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n\
                    0 0 0\n1 0 0\n0 1 0\n0 0 1\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n";
 
 /// The folder of every case: a sound scene, a sound mesh and whatever is wrong.
-pub(crate) fn place() -> Place {
-    let place = Place::with_scene();
-    place.write("tet.vtk", TET);
-    place
+pub(crate) fn sandbox() -> Sandbox {
+    let sandbox = Sandbox::with_scene();
+    sandbox.write("tet.vtk", TET);
+    sandbox
 }
 
 /// Runs the binary on bad input; the message must contain all of `parts`.
-pub(crate) fn refused(place: &Place, arguments: &[&str], parts: &[&str]) -> String {
-    let before = place.list();
-    let outcome = place.incise(arguments);
+pub(crate) fn refused(sandbox: &Sandbox, arguments: &[&str], parts: &[&str]) -> String {
+    let before = sandbox.list();
+    let outcome = sandbox.incise(arguments);
     let message = outcome.stderr;
     assert_eq!(outcome.code, 2, "{arguments:?}: {message}");
     assert_eq!(outcome.stdout, "", "{arguments:?} printed something");
@@ -27,16 +27,16 @@ pub(crate) fn refused(place: &Place, arguments: &[&str], parts: &[&str]) -> Stri
         );
     }
     assert!(
-        place.list() == before,
+        sandbox.list() == before,
         "{arguments:?} left something behind: {:?}",
-        place.list().keys()
+        sandbox.list().keys()
     );
     message
 }
 
 /// Runs the binary on bad input; the message must contain all of `parts` and be one line that says nothing twice.
-pub(crate) fn refused_in_a_sentence(place: &Place, arguments: &[&str], parts: &[&str]) {
-    let message = refused(place, arguments, parts);
+pub(crate) fn refused_in_a_sentence(sandbox: &Sandbox, arguments: &[&str], parts: &[&str]) {
+    let message = refused(sandbox, arguments, parts);
     assert!(
         message.starts_with("error: ") && message.ends_with('\n'),
         "{message:?}"
@@ -126,7 +126,11 @@ fn scenes_with_a_mistake() {
         ("normal = [1.0, 0.1, 0.0]", "", &["scene.toml", "normal"]),
         ("tets = 300", "tets = 0", &["body[0].shape", "0 tets"]),
         ("tets = 300", "tets = -5", &["scene.toml: line 5"]),
-        ("\"box\"", "\"bx\"", &["body[0].shape", "\"bx\"", "box"]),
+        (
+            "\"box\"",
+            "\"bx\"",
+            &["body[0].shape", "did you mean 'box'?"],
+        ),
         (
             "shape = { kind = \"box\", tets = 300 }",
             "mesh = \"none.vtk\"",
@@ -143,23 +147,23 @@ fn scenes_with_a_mistake() {
             &["body[0] is given mesh and shape"],
         ),
     ] {
-        let place = place();
+        let sandbox = sandbox();
         assert!(SCENE.contains(sound), "{sound}");
-        place.write("scene.toml", SCENE.replacen(sound, mistaken, 1));
-        refused_in_a_sentence(&place, &["run", "scene.toml", "--frames", "2"], parts);
+        sandbox.write("scene.toml", SCENE.replacen(sound, mistaken, 1));
+        refused_in_a_sentence(&sandbox, &["run", "scene.toml", "--frames", "2"], parts);
     }
-    let place = place();
-    place.write("scene.toml", "[world]\ngravity = [0, 0, -9.81]\n");
-    refused_in_a_sentence(&place, &["run", "scene.toml"], &["body is missing"]);
+    let sandbox = sandbox();
+    sandbox.write("scene.toml", "[world]\ngravity = [0, 0, -9.81]\n");
+    refused_in_a_sentence(&sandbox, &["run", "scene.toml"], &["body is missing"]);
     refused_in_a_sentence(
-        &place,
+        &sandbox,
         &["run", "scene.toml", "--mesh", "tet.vtk"],
         &["[[body]]"],
     );
     let blade = "[[stroke]]\nkind = \"sweep\"\nframes = [1, 2]\nblade = [[0, 0, 1], [0, 0, 1]]\npath = [[0, 0, 0], [0, 0, -1]]\n";
-    place.write("scene.toml", SCENE.to_owned() + blade);
+    sandbox.write("scene.toml", SCENE.to_owned() + blade);
     refused_in_a_sentence(
-        &place,
+        &sandbox,
         &["run", "scene.toml"],
         &["stroke[1].blade", "at least two different points"],
     );
@@ -222,13 +226,13 @@ fn meshes_with_a_mistake() {
             &["alone.ele"],
         ),
     ] {
-        let place = place();
-        place.write(name, content);
-        refused_in_a_sentence(&place, &["run", "scene.toml", "--mesh", name], parts);
-        refused_in_a_sentence(&place, &["color", name, "--csv", "colors.csv"], parts);
-        refused_in_a_sentence(&place, &["mesh", "info", name], parts);
+        let sandbox = sandbox();
+        sandbox.write(name, content);
+        refused_in_a_sentence(&sandbox, &["run", "scene.toml", "--mesh", name], parts);
+        refused_in_a_sentence(&sandbox, &["color", name, "--csv", "colors.csv"], parts);
+        refused_in_a_sentence(&sandbox, &["mesh", "info", name], parts);
     }
-    let place = place();
+    let sandbox = sandbox();
     for command in [
         &["color", "none.vtk"][..],
         &["mesh", "info", "none.vtk"],
@@ -236,6 +240,6 @@ fn meshes_with_a_mistake() {
         &["run", "--mesh", "none.vtk"],
         &["run", "none.toml"],
     ] {
-        refused_in_a_sentence(&place, command, &["cannot read none."]);
+        refused_in_a_sentence(&sandbox, command, &["cannot read none."]);
     }
 }

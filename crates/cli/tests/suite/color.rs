@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use serde_json::Value;
 
-use crate::support::{Place, keys, names};
+use crate::support::{Sandbox, keys, names};
 
 const KEYS: &str = "input, constraints, particles, clusters, edges, algorithm, clustering, backend, seed, colors, \
                     max_clique, std, range, chi2, max_over_mean, lanes_32, lanes_256, by_constraints, rounds, verified, ms";
@@ -106,15 +106,15 @@ pub(crate) fn assert_evenness(report: &Value, rows: &[(usize, usize)]) {
 
 #[test]
 fn colorings_are_proper_and_reported_truly() {
-    let place = Place::with_mesh();
-    place.good(&["mesh", "generate", "torus", "--tets", "1200", "torus.node"]);
-    place.good(&["mesh", "convert", "torus.node", "torus.vtk"]);
+    let sandbox = Sandbox::with_mesh();
+    sandbox.good(&["mesh", "generate", "torus", "--tets", "1200", "torus.node"]);
+    sandbox.good(&["mesh", "convert", "torus.node", "torus.vtk"]);
     for (file, source) in [("box.vtk", "box.vtk"), ("torus.ele", "torus.vtk")] {
-        let tets = tets(&place.read(source));
+        let tets = tets(&sandbox.read(source));
         for clustering in ["none", "serial:5", "serial:10"] {
             let mut all = Vec::new();
             for algorithm in ["greedy", "scgc", "scgc:2", "jones-plassmann", "ecl-gc"] {
-                let report: Value = serde_json::from_str(&place.good(&[
+                let report: Value = serde_json::from_str(&sandbox.good(&[
                     "color",
                     file,
                     "--algorithm",
@@ -126,7 +126,7 @@ fn colorings_are_proper_and_reported_truly() {
                     "--json",
                 ]))
                 .unwrap();
-                let rows = rows(&place.read("colors.csv"));
+                let rows = rows(&sandbox.read("colors.csv"));
                 assert_proper(&tets, &rows);
                 assert_evenness(&report, &rows);
                 let clusters: HashSet<usize> = rows.iter().map(|row| row.0).collect();
@@ -166,16 +166,16 @@ fn colorings_are_proper_and_reported_truly() {
 /// What each name gives is proper by this file alone, and balancing keeps the number of colors.
 #[test]
 fn every_algorithm_and_clustering_can_be_named() {
-    let place = Place::with_mesh();
-    let tets = tets(&place.read("box.vtk"));
+    let sandbox = Sandbox::with_mesh();
+    let tets = tets(&sandbox.read("box.vtk"));
     let color = |arguments: &[&str]| {
         let all = [
             &["color", "box.vtk", "--json", "--csv", "colors.csv"],
             arguments,
         ]
         .concat();
-        let report: Value = serde_json::from_str(&place.good(&all)).unwrap();
-        let rows = rows(&place.read("colors.csv"));
+        let report: Value = serde_json::from_str(&sandbox.good(&all)).unwrap();
+        let rows = rows(&sandbox.read("colors.csv"));
         assert_proper(&tets, &rows);
         assert_evenness(&report, &rows);
         assert_eq!(report["verified"], true);
@@ -222,8 +222,8 @@ fn every_algorithm_and_clustering_can_be_named() {
 
 #[test]
 fn the_object_has_exactly_the_promised_keys() {
-    let place = Place::with_mesh();
-    let text = place.good(&["color", "box.vtk", "--seed", "7", "--json"]);
+    let sandbox = Sandbox::with_mesh();
+    let text = sandbox.good(&["color", "box.vtk", "--seed", "7", "--json"]);
     assert_eq!(text.lines().count(), 1);
     let report: Value = serde_json::from_str(&text).unwrap();
     assert_eq!(keys(&report), names(KEYS));
@@ -234,12 +234,12 @@ fn the_object_has_exactly_the_promised_keys() {
         (&7.into(), &"none".into(), &"auto".into())
     );
     assert!(!text.contains("null"), "{text}");
-    assert_eq!(place.names("."), ["box.vtk"]);
+    assert_eq!(sandbox.names("."), ["box.vtk"]);
 }
 
 #[test]
 fn without_json_there_is_a_table() {
-    let table = Place::with_mesh().good(&["color", "box.vtk", "--clustering", "serial:5"]);
+    let table = Sandbox::with_mesh().good(&["color", "box.vtk", "--clustering", "serial:5"]);
     for part in [
         "box.vtk",
         "colors",

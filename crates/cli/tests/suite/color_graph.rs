@@ -6,7 +6,7 @@ use std::fmt::Write;
 use serde_json::Value;
 
 use crate::color::{assert_evenness, rows};
-use crate::support::Place;
+use crate::support::Sandbox;
 
 /// A graph with vertices from 0, and the least number of colors that it can have.
 struct Known {
@@ -92,7 +92,7 @@ fn matrix_market(graph: &Known) -> String {
 
 #[test]
 fn known_graphs_get_enough_colors_and_not_too_many() {
-    let place = Place::new();
+    let sandbox = Sandbox::new();
     for (name, graph, clique) in [
         ("mycielski3", mycielski(2), 2),
         ("mycielski5", mycielski(4), 2),
@@ -102,9 +102,9 @@ fn known_graphs_get_enough_colors_and_not_too_many() {
     ] {
         let degree = |v: usize| graph.edges.iter().filter(|e| e.0 == v || e.1 == v).count();
         let most = (0..graph.vertices).map(degree).max().unwrap() + 1;
-        place.write(&format!("{name}.col"), dimacs(&graph));
-        place.write(&format!("{name}.MTX"), matrix_market(&graph));
-        let default = place.good(&["color", &format!("{name}.col"), "--json"]);
+        sandbox.write(&format!("{name}.col"), dimacs(&graph));
+        sandbox.write(&format!("{name}.MTX"), matrix_market(&graph));
+        let default = sandbox.good(&["color", &format!("{name}.col"), "--json"]);
         let default: Value = serde_json::from_str(&default).unwrap();
         assert_eq!(default["colors"], graph.chromatic, "{name}");
         let mut all = Vec::new();
@@ -119,8 +119,8 @@ fn known_graphs_get_enough_colors_and_not_too_many() {
                     "colors.csv",
                     "--json",
                 ];
-                let report: Value = serde_json::from_str(&place.good(&arguments)).unwrap();
-                let rows = rows(&place.read("colors.csv"));
+                let report: Value = serde_json::from_str(&sandbox.good(&arguments)).unwrap();
+                let rows = rows(&sandbox.read("colors.csv"));
                 assert_eq!(rows.len(), graph.vertices);
                 for &(a, b) in &graph.edges {
                     assert_ne!(rows[a].1, rows[b].1, "{file}: {a} and {b}");
@@ -150,10 +150,10 @@ fn known_graphs_get_enough_colors_and_not_too_many() {
 
 #[test]
 fn graphs_are_clustered_serially() {
-    let place = Place::new();
+    let sandbox = Sandbox::new();
     let graph = mycielski(5);
-    place.write("graph.col", dimacs(&graph));
-    let text = place.good(&[
+    sandbox.write("graph.col", dimacs(&graph));
+    let text = sandbox.good(&[
         "color",
         "graph.col",
         "--clustering",
@@ -163,7 +163,7 @@ fn graphs_are_clustered_serially() {
         "--json",
     ]);
     let report: Value = serde_json::from_str(&text).unwrap();
-    let rows = rows(&place.read("colors.csv"));
+    let rows = rows(&sandbox.read("colors.csv"));
     for &(a, b) in &graph.edges {
         assert!(rows[a].0 == rows[b].0 || rows[a].1 != rows[b].1, "{a}, {b}");
     }
@@ -172,7 +172,7 @@ fn graphs_are_clustered_serially() {
     assert_eq!(report["clusters"], clusters);
     assert_eq!(report["verified"], true);
     assert_evenness(&report, &rows);
-    let table = place.good(&["color", "graph.col"]);
+    let table = sandbox.good(&["color", "graph.col"]);
     assert!(
         table.contains("vertices") && !table.contains("particles"),
         "{table}"
@@ -181,15 +181,15 @@ fn graphs_are_clustered_serially() {
 
 #[test]
 fn graphs_without_edges_or_vertices() {
-    let place = Place::new();
-    place.write("none.col", "p edge 0 0\n");
-    place.write(
+    let sandbox = Sandbox::new();
+    sandbox.write("none.col", "p edge 0 0\n");
+    sandbox.write(
         "loose.mtx",
         "%%MatrixMarket matrix coordinate pattern general\n70 70 0\n",
     );
     for (file, vertices, colors) in [("none.col", 0, 0), ("loose.mtx", 70, 1)] {
         for algorithm in ["scgc", "greedy"] {
-            let text = place.good(&[
+            let text = sandbox.good(&[
                 "color",
                 file,
                 "--algorithm",
@@ -199,7 +199,7 @@ fn graphs_without_edges_or_vertices() {
                 "--json",
             ]);
             let report: Value = serde_json::from_str(&text).unwrap();
-            assert_eq!(rows(&place.read("colors.csv")).len(), vertices);
+            assert_eq!(rows(&sandbox.read("colors.csv")).len(), vertices);
             assert_eq!(report["colors"], colors);
             assert_eq!(report["max_clique"], colors);
             assert_eq!(report["verified"], true);

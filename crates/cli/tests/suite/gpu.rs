@@ -4,7 +4,7 @@ use std::io::Write;
 
 use serde_json::Value;
 
-use crate::support::Place;
+use crate::support::Sandbox;
 
 /// Whether a GPU answers, software or not; if not, says so.
 fn has_gpu(test: &str, stderr: &str, code: i32) -> bool {
@@ -25,7 +25,7 @@ fn has_gpu(test: &str, stderr: &str, code: i32) -> bool {
 
 #[test]
 fn a_scene_runs_on_a_gpu_or_says_why_not() {
-    let place = Place::with_scene();
+    let sandbox = Sandbox::with_scene();
     let run = [
         "run",
         "scene.toml",
@@ -36,7 +36,7 @@ fn a_scene_runs_on_a_gpu_or_says_why_not() {
         "--out",
         "there",
     ];
-    let outcome = place.incise(&run);
+    let outcome = sandbox.incise(&run);
     if !has_gpu(
         "a_scene_runs_on_a_gpu_or_says_why_not",
         &outcome.stderr,
@@ -49,7 +49,7 @@ fn a_scene_runs_on_a_gpu_or_says_why_not() {
         "{}",
         outcome.stdout
     );
-    place.good(&[
+    sandbox.good(&[
         "run",
         "scene.toml",
         "--frames",
@@ -60,7 +60,7 @@ fn a_scene_runs_on_a_gpu_or_says_why_not() {
         "here",
     ]);
     let frames = |folder: &str| -> Vec<Value> {
-        let text = place.read(&format!("{folder}/frames.jsonl"));
+        let text = sandbox.read(&format!("{folder}/frames.jsonl"));
         text.lines()
             .map(|line| serde_json::from_str(line).unwrap())
             .collect()
@@ -74,24 +74,24 @@ fn a_scene_runs_on_a_gpu_or_says_why_not() {
             assert_eq!(there[key], here[key]);
         }
     }
-    assert_eq!(place.names("there"), place.names("here"));
+    assert_eq!(sandbox.names("there"), sandbox.names("here"));
 }
 
 #[test]
 fn auto_always_runs_and_says_where() {
-    let place = Place::with_scene();
-    let out = place.good(&["run", "scene.toml", "--frames", "2", "--backend", "auto"]);
+    let sandbox = Sandbox::with_scene();
+    let out = sandbox.good(&["run", "scene.toml", "--frames", "2", "--backend", "auto"]);
     assert!(out.contains("computed on "), "{out}");
-    let silent = place.good(&["run", "scene.toml", "--frames", "2"]);
+    let silent = sandbox.good(&["run", "scene.toml", "--frames", "2"]);
     assert!(!silent.contains("computed on "), "{silent}");
 }
 
 #[test]
 fn colorings_on_a_gpu_are_those_of_the_processor() {
-    let place = Place::new();
-    place.good(&["mesh", "generate", "box", "--tets", "300", "tet.vtk"]);
+    let sandbox = Sandbox::new();
+    sandbox.good(&["mesh", "generate", "box", "--tets", "300", "tet.vtk"]);
     let color = |backend: &str, algorithm: &str, csv: &str| {
-        place.incise(&[
+        sandbox.incise(&[
             "color",
             "tet.vtk",
             "--backend",
@@ -111,8 +111,8 @@ fn colorings_on_a_gpu_are_those_of_the_processor() {
         }
         assert_eq!(color("cpu", algorithm, "here.csv").code, 0);
         assert_eq!(
-            place.read("there.csv"),
-            place.read("here.csv"),
+            sandbox.read("there.csv"),
+            sandbox.read("here.csv"),
             "{algorithm}"
         );
         let report: Value = serde_json::from_str(&there.stdout).unwrap();

@@ -1,10 +1,10 @@
 //! Every command explains itself, with an example.
 
-use crate::support::Place;
+use crate::support::Sandbox;
 
 #[test]
 fn every_help_has_an_example() {
-    let place = Place::new();
+    let sandbox = Sandbox::new();
     for command in [
         &[][..],
         &["run"],
@@ -19,7 +19,7 @@ fn every_help_has_an_example() {
         &["man"],
     ] {
         for flag in ["--help", "-h"] {
-            let help = place.good(&[command, &[flag]].concat());
+            let help = sandbox.good(&[command, &[flag]].concat());
             let example = help
                 .lines()
                 .find(|line| line.starts_with("Example: incise "));
@@ -27,13 +27,13 @@ fn every_help_has_an_example() {
             assert!(example.contains(&command.join(" ")), "{example}");
         }
     }
-    assert!(place.list().is_empty());
+    assert!(sandbox.list().is_empty());
 }
 
 #[test]
 fn graphs_are_mentioned() {
-    let place = Place::new();
-    let help = place.good(&["color", "--help"]);
+    let sandbox = Sandbox::new();
+    let help = sandbox.good(&["color", "--help"]);
     for part in [".mtx", ".col", "graph"] {
         assert!(help.contains(part), "{part} is not in\n{help}");
     }
@@ -41,7 +41,7 @@ fn graphs_are_mentioned() {
 
 #[test]
 fn the_version_is_that_of_the_package() {
-    let version = Place::new().good(&["--version"]);
+    let version = Sandbox::new().good(&["--version"]);
     assert_eq!(
         version.trim(),
         concat!("incise ", env!("CARGO_PKG_VERSION"))
@@ -50,9 +50,9 @@ fn the_version_is_that_of_the_package() {
 
 #[test]
 fn shells_complete_commands_and_options() {
-    let place = Place::new();
+    let sandbox = Sandbox::new();
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
-        let script = place.good(&["completions", shell]);
+        let script = sandbox.good(&["completions", shell]);
         for word in ["advise", "tetrahedralize", "wireframe"] {
             assert!(script.contains(word), "{shell} does not complete {word}");
         }
@@ -61,22 +61,22 @@ fn shells_complete_commands_and_options() {
 
 #[test]
 fn every_command_has_a_manual_page() {
-    let place = Place::new();
-    std::fs::create_dir(place.path("man1")).unwrap();
-    place.good(&["man", "man1"]);
+    let sandbox = Sandbox::new();
+    std::fs::create_dir(sandbox.path("man1")).unwrap();
+    sandbox.good(&["man", "man1"]);
     for name in [
         "incise",
         "incise-run",
         "incise-scene",
         "incise-mesh-convert",
     ] {
-        let page = std::fs::read_to_string(place.path(&format!("man1/{name}.1"))).unwrap();
+        let page = std::fs::read_to_string(sandbox.path(&format!("man1/{name}.1"))).unwrap();
         assert!(
             page.contains(".TH") && page.contains(".SH SYNOPSIS"),
             "{name}"
         );
     }
-    let refused = place.incise(&["man", "absent"]);
+    let refused = sandbox.incise(&["man", "absent"]);
     assert_eq!(refused.code, 2);
     assert!(
         refused.stderr.contains("absent: cannot write manual pages"),

@@ -2,19 +2,19 @@
 
 use serde_json::Value;
 
-use crate::support::{Place, keys, names};
+use crate::support::{Sandbox, keys, names};
 
 const KEYS: &str = "input, tets, particles, pieces, boundary_triangles, euler_characteristic, volume, min_altitude, \
                     min_dihedral_degrees, max_dihedral_degrees, worst_radius_ratio, max_tets_per_particle, genus, substeps, \
                     dihedral_histogram, radius_ratio_histogram";
 
-fn info(place: &Place, file: &str) -> Value {
-    serde_json::from_str(&place.good(&["mesh", "info", file, "--json"])).unwrap()
+fn info(sandbox: &Sandbox, file: &str) -> Value {
+    serde_json::from_str(&sandbox.good(&["mesh", "info", file, "--json"])).unwrap()
 }
 
 #[test]
 fn every_shape_is_generated_with_about_the_wanted_tets() {
-    let place = Place::new();
+    let sandbox = Sandbox::new();
     for (shape, pieces, euler) in [
         ("box", 1, 2),
         ("beam", 1, 2),
@@ -30,10 +30,10 @@ fn every_shape_is_generated_with_about_the_wanted_tets() {
     ] {
         let file = format!("{shape}.vtk");
         assert_eq!(
-            place.good(&["mesh", "generate", shape, "--tets", "4000", &file]),
+            sandbox.good(&["mesh", "generate", shape, "--tets", "4000", &file]),
             ""
         );
-        let report = info(&place, &file);
+        let report = info(&sandbox, &file);
         let tets = report["tets"].as_u64().unwrap();
         assert!(tets.abs_diff(4000) <= 80, "{shape}: {tets}");
         assert_eq!(
@@ -51,29 +51,30 @@ fn every_shape_is_generated_with_about_the_wanted_tets() {
 
 #[test]
 fn converting_there_and_back_keeps_every_bit() {
-    let place = Place::with_mesh();
-    place.good(&["mesh", "convert", "box.vtk", "box.node"]);
-    place.good(&["mesh", "convert", "box.ele", "back.vtk"]);
-    assert!(place.read("box.vtk") == place.read("back.vtk"));
-    place.good(&["mesh", "convert", "back.vtk", "box.vtu"]);
-    assert!(place.read("box.vtu").contains("UnstructuredGrid"));
-    let (mut a, mut b) = (info(&place, "box.vtk"), info(&place, "box.node"));
+    let sandbox = Sandbox::with_mesh();
+    sandbox.good(&["mesh", "convert", "box.vtk", "box.node"]);
+    sandbox.good(&["mesh", "convert", "box.ele", "back.vtk"]);
+    assert!(sandbox.read("box.vtk") == sandbox.read("back.vtk"));
+    sandbox.good(&["mesh", "convert", "back.vtk", "box.vtu"]);
+    assert!(sandbox.read("box.vtu").contains("UnstructuredGrid"));
+    let (mut a, mut b) = (info(&sandbox, "box.vtk"), info(&sandbox, "box.node"));
     assert_ne!(a["input"].take(), b["input"].take());
     assert_eq!(a, b);
     let files = ["back.vtk", "box.ele", "box.node", "box.vtk", "box.vtu"];
-    assert_eq!(place.names("."), files);
+    assert_eq!(sandbox.names("."), files);
 }
 
 #[test]
 fn the_table_says_the_same() {
-    let place = Place::with_mesh();
+    let sandbox = Sandbox::with_mesh();
     let (table, report) = (
-        place.good(&["mesh", "info", "box.vtk"]),
-        info(&place, "box.vtk"),
+        sandbox.good(&["mesh", "info", "box.vtk"]),
+        info(&sandbox, "box.vtk"),
     );
     for part in [
-        format!("{}, {}", report["tets"], report["particles"]),
-        "sound".into(),
+        report["tets"].to_string(),
+        report["particles"].to_string(),
+        "valid".into(),
         "pieces".into(),
     ] {
         assert!(table.contains(&part), "{part} is not in\n{table}");
@@ -83,21 +84,21 @@ fn the_table_says_the_same() {
 /// A written file replaces the one before it, also the one it was made from.
 #[test]
 fn a_mesh_may_be_converted_in_place() {
-    let place = Place::with_mesh();
-    let before = place.read("box.vtk");
-    place.good(&["mesh", "convert", "box.vtk", "box.vtk"]);
-    assert!(place.read("box.vtk") == before);
-    assert_eq!(place.names("."), ["box.vtk"]);
+    let sandbox = Sandbox::with_mesh();
+    let before = sandbox.read("box.vtk");
+    sandbox.good(&["mesh", "convert", "box.vtk", "box.vtk"]);
+    assert!(sandbox.read("box.vtk") == before);
+    assert_eq!(sandbox.names("."), ["box.vtk"]);
 }
 
 #[test]
 fn what_a_mesh_is_like_is_shown_in_bars() {
-    let place = Place::with_mesh();
-    let out = place.good(&["mesh", "info", "box.vtk"]);
+    let sandbox = Sandbox::with_mesh();
+    let out = sandbox.good(&["mesh", "info", "box.vtk"]);
     for part in ["genus", "substeps", "dihedral angles", "radius ratios", "█"] {
         assert!(out.contains(part), "{part}: {out}");
     }
-    let soft = info(&place, "box.vtk");
+    let soft = info(&sandbox, "box.vtk");
     let stiff = [
         "mesh",
         "info",
@@ -106,14 +107,14 @@ fn what_a_mesh_is_like_is_shown_in_bars() {
         "--young-modulus",
         "1e7",
     ];
-    let stiff: Value = serde_json::from_str(&place.good(&stiff)).unwrap();
+    let stiff: Value = serde_json::from_str(&sandbox.good(&stiff)).unwrap();
     // Ten times the speed of sound.
     let [soft, stiff] = [&soft, &stiff].map(|report| report["substeps"].as_f64().unwrap());
     assert!(
         (stiff / soft - 10.0).abs() < 1.0 + 10.0 / soft,
         "{soft} {stiff}"
     );
-    let refused = place.incise(&["mesh", "info", "box.vtk", "--density", "0"]);
+    let refused = sandbox.incise(&["mesh", "info", "box.vtk", "--density", "0"]);
     assert_eq!(refused.code, 2);
     assert!(
         refused.stderr.contains("--density is 0"),
@@ -124,15 +125,15 @@ fn what_a_mesh_is_like_is_shown_in_bars() {
 
 #[test]
 fn repairs_are_told_one_by_one() {
-    let place = Place::new();
-    place.good(&["mesh", "generate", "box", "--tets", "300", "box.node"]);
+    let sandbox = Sandbox::new();
+    sandbox.good(&["mesh", "generate", "box", "--tets", "300", "box.node"]);
     assert_eq!(
-        place.good(&["mesh", "convert", "box.node", "same.node", "--repair"]),
+        sandbox.good(&["mesh", "convert", "box.node", "same.node", "--repair"]),
         "nothing\n"
     );
-    assert!(place.read("box.ele") == place.read("same.ele"));
+    assert!(sandbox.read("box.ele") == sandbox.read("same.ele"));
     // A tet twice; the reader turns what is inside out by itself.
-    let tets = place.read("box.ele");
+    let tets = sandbox.read("box.ele");
     let mut lines: Vec<String> = tets.lines().map(str::to_owned).collect();
     let first = lines
         .iter()
@@ -149,30 +150,30 @@ fn repairs_are_told_one_by_one() {
         "{} {} {} {} {}",
         count, words[2], words[1], words[3], words[4]
     ));
-    place.write("broken.ele", lines.join("\n") + "\n");
-    place.write("broken.node", place.read("box.node"));
-    let out = place.good(&["mesh", "convert", "broken.node", "mended.vtk", "--repair"]);
+    sandbox.write("broken.ele", lines.join("\n") + "\n");
+    sandbox.write("broken.node", sandbox.read("box.node"));
+    let out = sandbox.good(&["mesh", "convert", "broken.node", "mended.vtk", "--repair"]);
     assert!(
         out.contains("1 tets removed that were there twice"),
         "{out}"
     );
-    place.good(&["mesh", "info", "mended.vtk"]);
+    sandbox.good(&["mesh", "info", "mended.vtk"]);
 }
 
 /// Through all formats and back: the same tets, to the bit, with what belongs to them.
 #[test]
 fn regions_survive_a_round_through_the_formats() {
-    let place = Place::new();
-    place.good(&["mesh", "generate", "box", "--tets", "300", "a.vtk"]);
+    let sandbox = Sandbox::new();
+    sandbox.good(&["mesh", "generate", "box", "--tets", "300", "a.vtk"]);
     for pair in [
         "a.vtk", "a.msh", "a.mesh", "a.meshb", "a.vtu", "a.node", "b.vtk",
     ]
     .windows(2)
     {
-        place.good(&["mesh", "convert", pair[0], pair[1]]);
+        sandbox.good(&["mesh", "convert", pair[0], pair[1]]);
     }
-    assert!(place.read("a.vtk") == place.read("b.vtk"));
-    let tetgen = place.read("a.ele");
+    assert!(sandbox.read("a.vtk") == sandbox.read("b.vtk"));
+    let tetgen = sandbox.read("a.ele");
     let mut lines = tetgen.lines();
     let first = lines.next().unwrap().replace(" 0", " 1");
     let rows = lines
@@ -181,19 +182,19 @@ fn regions_survive_a_round_through_the_formats() {
     let rows: Vec<String> = rows
         .map(|(i, line)| format!("{line} {}", 1 + i % 3))
         .collect();
-    place.write("r.ele", format!("{first}\n{}\n", rows.join("\n")));
-    place.write("r.node", place.read("a.node"));
+    sandbox.write("r.ele", format!("{first}\n{}\n", rows.join("\n")));
+    sandbox.write("r.node", sandbox.read("a.node"));
     let formats = [
         "r.node", "r.msh", "r.mesh", "r.meshb", "r.vtu", "r.vtk", "s.node",
     ];
     for pair in formats.windows(2) {
-        place.good(&["mesh", "convert", pair[0], pair[1]]);
+        sandbox.good(&["mesh", "convert", pair[0], pair[1]]);
     }
     assert!(
-        place
+        sandbox
             .read("r.ele")
             .split_whitespace()
-            .eq(place.read("s.ele").split_whitespace())
+            .eq(sandbox.read("s.ele").split_whitespace())
     );
 }
 
@@ -203,9 +204,9 @@ const CUBE: &str = "OFF\n8 6 0\n-1 -1 -1\n1 -1 -1\n1 1 -1\n-1 1 -1\n-1 -1 1\n1 -
 
 #[test]
 fn a_surface_is_filled_and_the_fit_told() {
-    let place = Place::new();
-    place.write("cube.off", CUBE);
-    let told = place.good(&[
+    let sandbox = Sandbox::new();
+    sandbox.write("cube.off", CUBE);
+    let told = sandbox.good(&[
         "mesh",
         "tetrahedralize",
         "cube.off",
@@ -213,12 +214,8 @@ fn a_surface_is_filled_and_the_fit_told() {
         "--tets",
         "5000",
     ]);
-    assert!(
-        told.contains("that of the surface is 8.000000 m³"),
-        "{}",
-        told
-    );
-    let report = info(&place, "cube.vtk");
+    assert!(told.contains("(surface: 8.000000 m³)"), "{}", told);
+    let report = info(&sandbox, "cube.vtk");
     let tets = report["tets"].as_u64().unwrap();
     assert!(tets.abs_diff(5_000) <= 100);
     assert_eq!(
@@ -233,14 +230,14 @@ fn a_surface_is_filled_and_the_fit_told() {
 
 #[test]
 fn surfaces_that_cannot_be_filled_are_refused_in_a_sentence() {
-    let place = Place::new();
-    place.write(
+    let sandbox = Sandbox::new();
+    sandbox.write(
         "open.off",
         CUBE.replace("8 6 0", "8 5 0").replace("4 3 0 4 7\n", ""),
     );
-    place.write("cube.off", CUBE);
+    sandbox.write("cube.off", CUBE);
     let bad = |arguments: &[&str]| {
-        let outcome = place.incise(arguments);
+        let outcome = sandbox.incise(arguments);
         assert_eq!(outcome.code, 2, "{}", outcome.stderr);
         assert_eq!(outcome.stderr.lines().count(), 1, "{}", outcome.stderr);
         outcome.stderr
@@ -268,16 +265,16 @@ fn surfaces_that_cannot_be_filled_are_refused_in_a_sentence() {
         "500",
     ]);
     assert!(format.contains(".stl"), "{format}");
-    assert!(!place.path("a.vtk").exists());
+    assert!(!sandbox.path("a.vtk").exists());
 }
 
 #[test]
 fn the_boundary_of_a_body_is_written_as_a_surface_and_filled_again() {
-    let place = Place::with_mesh();
-    place.good(&["mesh", "convert", "box.vtk", "box.stl"]);
-    place.good(&["mesh", "convert", "box.vtk", "box.glb"]);
-    assert!(place.path("box.glb").exists());
-    let told = place.good(&[
+    let sandbox = Sandbox::with_mesh();
+    sandbox.good(&["mesh", "convert", "box.vtk", "box.stl"]);
+    sandbox.good(&["mesh", "convert", "box.vtk", "box.glb"]);
+    assert!(sandbox.path("box.glb").exists());
+    let told = sandbox.good(&[
         "mesh",
         "tetrahedralize",
         "box.stl",
@@ -287,7 +284,7 @@ fn the_boundary_of_a_body_is_written_as_a_surface_and_filled_again() {
         "--levels",
         "2",
     ]);
-    assert!(told.contains("pieces 1"), "{told}");
-    let report = info(&place, "again.msh");
+    assert!(told.contains("1 piece\n"), "{told}");
+    let report = info(&sandbox, "again.msh");
     assert!(report["tets"].as_u64().unwrap().abs_diff(600) <= 12);
 }

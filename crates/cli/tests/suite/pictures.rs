@@ -3,30 +3,30 @@
 use std::fs;
 
 use crate::bad_input::refused_in_a_sentence;
-use crate::support::Place;
+use crate::support::Sandbox;
 
 /// A run of the small scene with these arguments more; what it printed.
-fn run(place: &Place, rest: &[&str]) -> String {
-    place.good(&[&["run", "scene.toml"], rest].concat())
+fn run(sandbox: &Sandbox, rest: &[&str]) -> String {
+    sandbox.good(&[&["run", "scene.toml"], rest].concat())
 }
 
 /// Width and height as a PNG file says.
-fn size(place: &Place, name: &str) -> [u32; 2] {
-    let bytes = fs::read(place.path(name)).unwrap();
+fn size(sandbox: &Sandbox, name: &str) -> [u32; 2] {
+    let bytes = fs::read(sandbox.path(name)).unwrap();
     assert!(bytes.starts_with(b"\x89PNG\r\n\x1a\n"), "{name}");
     assert!(bytes.ends_with(b"IEND\xae\x42\x60\x82"), "{name} is whole");
     [16, 20].map(|at| u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap()))
 }
 
-fn pngs(place: &Place, folder: &str) -> Vec<String> {
-    let names = place.names(folder).into_iter();
+fn pngs(sandbox: &Sandbox, folder: &str) -> Vec<String> {
+    let names = sandbox.names(folder).into_iter();
     names.filter(|name| name.ends_with(".png")).collect()
 }
 
 #[test]
 fn a_run_is_seen() {
-    let place = Place::with_scene();
-    let said = run(&place, &["--frames", "4"]);
+    let sandbox = Sandbox::with_scene();
+    let said = run(&sandbox, &["--frames", "4"]);
     assert!(
         said.contains("4 pictures and contact_sheet.png are in out, drawn by "),
         "{said}"
@@ -34,52 +34,52 @@ fn a_run_is_seen() {
     let frames = [0, 1, 2, 3].map(|frame| format!("frame_{frame:05}.png"));
     let mut expected = vec!["contact_sheet.png"];
     expected.extend(frames.iter().map(String::as_str));
-    assert_eq!(pngs(&place, "out"), expected);
+    assert_eq!(pngs(&sandbox, "out"), expected);
     for frame in &frames {
-        assert_eq!(size(&place, &format!("out/{frame}")), [640, 480]);
+        assert_eq!(size(&sandbox, &format!("out/{frame}")), [640, 480]);
     }
     // Four columns of half the size with margins of 10, and a row with captions of 20.
     assert_eq!(
-        size(&place, "out/contact_sheet.png"),
+        size(&sandbox, "out/contact_sheet.png"),
         [10 + 4 * 330, 10 + 270]
     );
-    let read = |frame: &String| fs::read(place.path("out").join(frame)).unwrap();
+    let read = |frame: &String| fs::read(sandbox.path("out").join(frame)).unwrap();
     assert_ne!(read(&frames[0]), read(&frames[3]), "it falls");
 }
 
 #[test]
 fn about_fifty_frames_are_seen() {
-    let place = Place::with_scene();
-    run(&place, &["--frames", "120", "--size", "24x16", "--quiet"]);
-    let surfaces = place.names("out").into_iter();
+    let sandbox = Sandbox::with_scene();
+    run(&sandbox, &["--frames", "120", "--size", "24x16", "--quiet"]);
+    let surfaces = sandbox.names("out").into_iter();
     let surfaces = surfaces.filter(|name| name.ends_with(".vtp")).count();
     // One more is the sheet.
-    assert_eq!(pngs(&place, "out").len(), surfaces + 1);
+    assert_eq!(pngs(&sandbox, "out").len(), surfaces + 1);
     assert!((40..=51).contains(&surfaces), "{surfaces}");
     // Twelve in three rows.
     assert_eq!(
-        size(&place, "out/contact_sheet.png"),
+        size(&sandbox, "out/contact_sheet.png"),
         [10 + 4 * 34, 10 + 3 * 46]
     );
 }
 
 #[test]
 fn what_nobody_wants_is_not_there() {
-    let place = Place::with_scene();
-    let said = run(&place, &["--frames", "2", "--no-pictures"]);
+    let sandbox = Sandbox::with_scene();
+    let said = run(&sandbox, &["--frames", "2", "--no-pictures"]);
     assert!(!said.contains("drawn"), "{said}");
-    assert!(pngs(&place, "out").is_empty());
+    assert!(pngs(&sandbox, "out").is_empty());
 }
 
 #[test]
-fn films_are_written_in_both_formats() {
-    let place = Place::with_scene();
+fn animations_are_written_in_both_formats() {
+    let sandbox = Sandbox::with_scene();
     // A step of 16 ms: every other frame.
     let arguments = ["--frames", "12", "--size", "48x40"];
-    let film = |rest: &[&str]| run(&place, &[&arguments, rest].concat());
-    let said = film(&["--film", "run.gif", "--out", "a"]);
-    assert!(said.contains("the film is run.gif"), "{said}");
-    let gif = fs::read(place.path("run.gif")).unwrap();
+    let animation = |rest: &[&str]| run(&sandbox, &[&arguments, rest].concat());
+    let said = animation(&["--animation", "run.gif", "--out", "a"]);
+    assert!(said.contains("animation: run.gif"), "{said}");
+    let gif = fs::read(sandbox.path("run.gif")).unwrap();
     assert!(
         gif.starts_with(b"GIF89a") && gif.ends_with(&[0x3b]),
         "whole"
@@ -91,17 +91,17 @@ fn films_are_written_in_both_formats() {
         .filter(|bytes| *bytes == [0x21, 0xf9, 4])
         .count();
     assert_eq!(controls, 6);
-    assert_eq!(pngs(&place, "a").len(), 13);
+    assert_eq!(pngs(&sandbox, "a").len(), 13);
 
-    let said = film(&["--film", "b/run.png", "--no-pictures", "--out", "b"]);
-    assert!(said.contains("the film is b/run.png, drawn by"), "{said}");
-    assert_eq!(pngs(&place, "b"), ["run.png"]);
-    assert_eq!(size(&place, "b/run.png"), [48, 40]);
-    let png = fs::read(place.path("b/run.png")).unwrap();
+    let said = animation(&["--animation", "b/run.png", "--no-pictures", "--out", "b"]);
+    assert!(said.contains("animation: b/run.png, drawn by"), "{said}");
+    assert_eq!(pngs(&sandbox, "b"), ["run.png"]);
+    assert_eq!(size(&sandbox, "b/run.png"), [48, 40]);
+    let png = fs::read(sandbox.path("b/run.png")).unwrap();
     let at = png.windows(4).position(|name| name == b"acTL").unwrap();
     assert_eq!(png[at + 4..at + 8], [0, 0, 0, 6]);
     assert!(
-        place
+        sandbox
             .names(".")
             .iter()
             .all(|name| !name.contains("partial"))
@@ -110,7 +110,7 @@ fn films_are_written_in_both_formats() {
 
 #[test]
 fn how_it_is_seen_can_be_chosen() {
-    let place = Place::with_scene();
+    let sandbox = Sandbox::with_scene();
     let mut pictures = Vec::new();
     for (i, rest) in [
         &[][..],
@@ -128,10 +128,10 @@ fn how_it_is_seen_can_be_chosen() {
         let usual = [
             "--frames", "2", "--size", "60x40", "--quiet", "--out", &folder,
         ];
-        run(&place, &[&usual, rest].concat());
+        run(&sandbox, &[&usual, rest].concat());
         let name = format!("{folder}/frame_00001.png");
-        assert_eq!(size(&place, &name), [60, 40]);
-        pictures.push(fs::read(place.path(&name)).unwrap());
+        assert_eq!(size(&sandbox, &name), [60, 40]);
+        pictures.push(fs::read(sandbox.path(&name)).unwrap());
     }
     for (i, picture) in pictures.iter().enumerate() {
         assert!(!pictures[..i].contains(picture), "{i}");
@@ -140,13 +140,13 @@ fn how_it_is_seen_can_be_chosen() {
     let usual = [
         "--frames", "2", "--size", "60x40", "--quiet", "--out", "again",
     ];
-    run(&place, &[&usual[..], &["--view", "-60,22"]].concat());
-    assert!(fs::read(place.path("again/frame_00001.png")).unwrap() == pictures[0]);
+    run(&sandbox, &[&usual[..], &["--view", "-60,22"]].concat());
+    assert!(fs::read(sandbox.path("again/frame_00001.png")).unwrap() == pictures[0]);
 }
 
 #[test]
 fn residuals_are_shown_where_there_are_some() {
-    let place = Place::with_scene();
+    let sandbox = Sandbox::with_scene();
     let usual = [
         "--frames",
         "2",
@@ -156,43 +156,47 @@ fn residuals_are_shown_where_there_are_some() {
         "--color-by",
         "residual",
     ];
-    run(&place, &usual);
-    let lines = place.read("out/frames.jsonl");
+    run(&sandbox, &usual);
+    let lines = sandbox.read("out/frames.jsonl");
     assert_eq!(lines.matches("\"residual\":").count(), 2, "{lines}");
     let scene = crate::support::SCENE.replace("[world]", "[solver]\nmethod = \"vbd\"\n[world]");
-    place.write("vbd.toml", scene);
+    sandbox.write("vbd.toml", scene);
     let command = [&["run", "vbd.toml"], &usual[..]].concat();
-    refused_in_a_sentence(&place, &command, &["--color-by residual", "vbd"]);
+    refused_in_a_sentence(&sandbox, &command, &["--color-by residual", "vbd"]);
     // Where nothing is drawn, residuals are not needed.
     let nothing = [&command[..], &["--no-pictures"]].concat();
-    place.good(&nothing);
-    run(&place, &[&usual[..], &["--no-pictures"]].concat());
-    let lines = place.read("out/frames.jsonl");
+    sandbox.good(&nothing);
+    run(&sandbox, &[&usual[..], &["--no-pictures"]].concat());
+    let lines = sandbox.read("out/frames.jsonl");
     assert!(!lines.contains("\"residual\":"), "{lines}");
-    let film = [&nothing[..], &["--film", "film.gif"]].concat();
-    refused_in_a_sentence(&place, &film, &["--color-by residual", "vbd"]);
+    let animation = [&nothing[..], &["--animation", "animation.gif"]].concat();
+    refused_in_a_sentence(&sandbox, &animation, &["--color-by residual", "vbd"]);
 }
 
 #[test]
 fn pictures_of_an_earlier_run_are_not_left_among_those_of_this_one() {
-    let place = Place::with_scene();
+    let sandbox = Sandbox::with_scene();
     let usual = ["--size", "30x20", "--quiet", "--frames"];
-    run(&place, &[&usual[..], &["4"]].concat());
+    run(&sandbox, &[&usual[..], &["4"]].concat());
     for name in ["frame_1.png", "frame_0000x.png", "my_frame_00001.png"] {
-        place.write(&format!("out/{name}"), "of a user");
+        sandbox.write(&format!("out/{name}"), "of a user");
     }
     // What is refused removes nothing.
     let refused = [
-        &["run", "scene.toml", "--film", "none/film.gif"],
+        &["run", "scene.toml", "--animation", "none/animation.gif"],
         &usual[..],
     ]
     .concat();
-    refused_in_a_sentence(&place, &[&refused[..], &["2"]].concat(), &["none/film.gif"]);
-    assert_eq!(pngs(&place, "out").len(), 4 + 1 + 3);
-    run(&place, &[&usual[..], &["2"]].concat());
+    refused_in_a_sentence(
+        &sandbox,
+        &[&refused[..], &["2"]].concat(),
+        &["none/animation.gif"],
+    );
+    assert_eq!(pngs(&sandbox, "out").len(), 4 + 1 + 3);
+    run(&sandbox, &[&usual[..], &["2"]].concat());
     let mut expected = vec!["contact_sheet.png", "frame_00000.png", "frame_00001.png"];
     expected.extend(["frame_0000x.png", "frame_1.png", "my_frame_00001.png"]);
-    assert_eq!(pngs(&place, "out"), expected);
-    run(&place, &[&usual[..], &["2", "--no-pictures"]].concat());
-    assert_eq!(pngs(&place, "out"), expected[3..]);
+    assert_eq!(pngs(&sandbox, "out"), expected);
+    run(&sandbox, &[&usual[..], &["2", "--no-pictures"]].concat());
+    assert_eq!(pngs(&sandbox, "out"), expected[3..]);
 }

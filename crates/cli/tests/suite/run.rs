@@ -4,14 +4,14 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
-use crate::support::{Place, SCENE, keys, names};
+use crate::support::{SCENE, Sandbox, keys, names};
 
 const ALWAYS: &str =
     "frame, time_s, particles, tets, clusters, colors, pieces, cut, bodies, ms, backend, precision";
 
 /// The objects of a file of lines.
-fn frames(place: &Place, file: &str) -> Vec<Value> {
-    let text = place.read(file);
+fn frames(sandbox: &Sandbox, file: &str) -> Vec<Value> {
+    let text = sandbox.read(file);
     assert!(text.ends_with('\n'));
     text.lines()
         .map(|line| serde_json::from_str(line).unwrap())
@@ -20,13 +20,13 @@ fn frames(place: &Place, file: &str) -> Vec<Value> {
 
 #[test]
 fn a_run_prints_a_table_and_writes_its_files() {
-    let place = Place::with_scene();
-    let table = place.good(&["run", "scene.toml", "--frames", "4", "--no-pictures"]);
+    let sandbox = Sandbox::with_scene();
+    let table = sandbox.good(&["run", "scene.toml", "--frames", "4", "--no-pictures"]);
     for part in [
         "ms per frame",
         "solve",
         "4 (1 with a cut)",
-        "tets before, after",
+        "tets at start, end",
         "pieces",
         "kappa",
         "files are in out",
@@ -36,17 +36,17 @@ fn a_run_prints_a_table_and_writes_its_files() {
     let surfaces = [0, 1, 2, 3].map(|frame| format!("surface_{frame:05}.vtp"));
     let mut expected = vec!["frames.jsonl", "mesh.vtu", "scene.toml", "surface.pvd"];
     expected.extend(surfaces.iter().map(String::as_str));
-    assert_eq!(place.names("out"), expected);
-    assert_eq!(place.names("."), ["out", "scene.toml"]);
+    assert_eq!(sandbox.names("out"), expected);
+    assert_eq!(sandbox.names("."), ["out", "scene.toml"]);
     for surface in &surfaces {
-        assert!(place.read("out/surface.pvd").contains(surface));
+        assert!(sandbox.read("out/surface.pvd").contains(surface));
         assert!(
-            place
+            sandbox
                 .read(&format!("out/{surface}"))
                 .contains("Name=\"cut\"")
         );
     }
-    let mesh = place.read("out/mesh.vtu");
+    let mesh = sandbox.read("out/mesh.vtu");
     for field in ["rest_position", "cluster", "color", "piece"] {
         assert!(mesh.contains(&format!("Name=\"{field}\"")), "{field}");
     }
@@ -54,8 +54,8 @@ fn a_run_prints_a_table_and_writes_its_files() {
 
 #[test]
 fn every_line_has_exactly_the_promised_keys() {
-    let place = Place::with_scene();
-    place.good(&[
+    let sandbox = Sandbox::with_scene();
+    sandbox.good(&[
         "run",
         "scene.toml",
         "--frames",
@@ -64,8 +64,11 @@ fn every_line_has_exactly_the_promised_keys() {
         "--jsonl",
         "lines.jsonl",
     ]);
-    assert_eq!(place.read("lines.jsonl"), place.read("out/frames.jsonl"));
-    let frames = frames(&place, "lines.jsonl");
+    assert_eq!(
+        sandbox.read("lines.jsonl"),
+        sandbox.read("out/frames.jsonl")
+    );
+    let frames = frames(&sandbox, "lines.jsonl");
     assert_eq!(frames.len(), 4);
     for (i, frame) in frames.iter().enumerate() {
         let came_off = if i == 1 { ", detached" } else { "" };
@@ -94,10 +97,10 @@ fn every_line_has_exactly_the_promised_keys() {
 
 #[test]
 fn reports_appear_when_asked_for() {
-    let place = Place::new();
+    let sandbox = Sandbox::new();
     let report = "[report]\nevery = 2\nquantities = [\"residual\", \"energy\", \"volume\", \"speed\", \"kappa\"]\n";
-    place.write("scene.toml", report.to_owned() + SCENE);
-    place.good(&[
+    sandbox.write("scene.toml", report.to_owned() + SCENE);
+    sandbox.good(&[
         "run",
         "scene.toml",
         "--frames",
@@ -105,7 +108,7 @@ fn reports_appear_when_asked_for() {
         "--quiet",
         "--no-pictures",
     ]);
-    let frames = frames(&place, "out/frames.jsonl");
+    let frames = frames(&sandbox, "out/frames.jsonl");
     let all = format!(
         "{ALWAYS}, residual, energy, volume, volume_error, min_volume_ratio, max_speed, inverted_tets, kappa, softened"
     );
@@ -125,10 +128,10 @@ fn reports_appear_when_asked_for() {
 
 #[test]
 fn chosen_substeps_are_in_the_table_and_in_every_line() {
-    let place = Place::new();
+    let sandbox = Sandbox::new();
     let solver = "[solver]\nmethod = \"gauss-seidel\"\nmax_substeps = 2\n";
-    place.write("scene.toml", SCENE.replace("1e4", "1e6") + solver);
-    let outcome = place.incise(&["run", "scene.toml", "--frames", "3", "--no-pictures"]);
+    sandbox.write("scene.toml", SCENE.replace("1e4", "1e6") + solver);
+    let outcome = sandbox.incise(&["run", "scene.toml", "--frames", "3", "--no-pictures"]);
     assert_eq!(outcome.code, 0);
     let warning = outcome.stderr;
     assert!(
@@ -136,25 +139,25 @@ fn chosen_substeps_are_in_the_table_and_in_every_line() {
         "{warning}"
     );
     assert_eq!(warning.lines().count(), 1, "{warning}");
-    let lines = frames(&place, "out/frames.jsonl");
+    let lines = frames(&sandbox, "out/frames.jsonl");
     assert_eq!(lines[0]["warnings"][0]["code"], "substeps_capped");
     assert_eq!(lines[0]["warnings"][0]["where"], "body 0");
     assert!(lines[1].get("warnings").is_none());
     let table = outcome.stdout;
     assert!(table.contains("substeps of body 0"), "{table}");
-    assert!(table.contains("2 (the cap; "), "{table}");
-    for frame in frames(&place, "out/frames.jsonl") {
+    assert!(table.contains("2 (limited; "), "{table}");
+    for frame in frames(&sandbox, "out/frames.jsonl") {
         assert_eq!(frame["bodies"][0]["substeps"], 2);
-        assert_eq!(frame["bodies"][0]["missed"], "cap");
+        assert_eq!(frame["bodies"][0]["shortfall"], "cap");
     }
 }
 
 /// Chebyshev with too large a relaxation diverges: the run ends in that frame with exit code 1, unless it is told to go on.
 #[test]
 fn a_diverged_run_fails() {
-    let place = Place::new();
+    let sandbox = Sandbox::new();
     let solver = "[solver]\nmethod = \"chebyshev\"\nrelaxation = 1.9\nsubsteps = 1\n";
-    place.write("scene.toml", SCENE.to_owned() + solver);
+    sandbox.write("scene.toml", SCENE.to_owned() + solver);
     let run = [
         "run",
         "scene.toml",
@@ -163,32 +166,32 @@ fn a_diverged_run_fails() {
         "--no-pictures",
         "--quiet",
     ];
-    let outcome = place.incise(&run);
+    let outcome = sandbox.incise(&run);
     assert_eq!(outcome.code, 1, "{outcome:?}");
     assert!(outcome.stderr.contains("diverged"), "{outcome:?}");
-    assert!(frames(&place, "out/frames.jsonl").len() < 60);
-    let outcome = place.incise(&[&run[..], &["--keep-going"]].concat());
+    assert!(frames(&sandbox, "out/frames.jsonl").len() < 60);
+    let outcome = sandbox.incise(&[&run[..], &["--keep-going"]].concat());
     assert_eq!((outcome.code, outcome.stderr.as_str()), (0, ""));
-    assert_eq!(frames(&place, "out/frames.jsonl").len(), 60);
+    assert_eq!(frames(&sandbox, "out/frames.jsonl").len(), 60);
 }
 
 #[test]
 fn quiet_prints_nothing() {
-    let place = Place::with_scene();
+    let sandbox = Sandbox::with_scene();
     assert_eq!(
-        place.good(&["run", "scene.toml", "--frames", "2", "--quiet", "--check"]),
+        sandbox.good(&["run", "scene.toml", "--frames", "2", "--quiet", "--check"]),
         ""
     );
 }
 
 #[test]
 fn check_says_how_many_cuts_it_checked() {
-    let place = Place::new();
+    let sandbox = Sandbox::new();
     let second =
         "[[stroke]]\nkind = \"plane\"\nframe = 3\npoint = [0, 0.02, 0]\nnormal = [0, 1, 0]\n";
-    place.write("scene.toml", SCENE.to_owned() + second);
+    sandbox.write("scene.toml", SCENE.to_owned() + second);
     for (frames, cuts) in [("1", 0), ("3", 1), ("5", 2)] {
-        let text = place.good(&[
+        let text = sandbox.good(&[
             "run",
             "scene.toml",
             "--frames",
@@ -205,13 +208,13 @@ fn check_says_how_many_cuts_it_checked() {
 
 #[test]
 fn without_frames_all_strokes_are_carried_out() {
-    let place = Place::new();
+    let sandbox = Sandbox::new();
     let late = SCENE
         .replace("frame = 1", "frame = 203")
         .replace("tets = 300", "tets = 200");
-    place.write("scene.toml", late);
-    place.good(&["run", "scene.toml", "--quiet", "--no-pictures"]);
-    let frames = frames(&place, "out/frames.jsonl");
+    sandbox.write("scene.toml", late);
+    sandbox.good(&["run", "scene.toml", "--quiet", "--no-pictures"]);
+    let frames = frames(&sandbox, "out/frames.jsonl");
     assert_eq!(frames.len(), 204);
     assert_eq!(frames[203]["pieces"], 2);
 }
@@ -219,10 +222,10 @@ fn without_frames_all_strokes_are_carried_out() {
 /// A reader that stops reading, as `head` does, is no reason to panic.
 #[test]
 fn a_closed_pipe_is_no_failure() {
-    let place = Place::with_mesh();
+    let sandbox = Sandbox::with_mesh();
     let mut child = Command::new(env!("CARGO_BIN_EXE_incise"))
         .args(["mesh", "info", "box.vtk"])
-        .current_dir(place.path("."))
+        .current_dir(sandbox.path("."))
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()

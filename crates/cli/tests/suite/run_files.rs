@@ -2,27 +2,31 @@
 
 use std::fs;
 
-use crate::support::{Place, SCENE};
+use crate::support::{SCENE, Sandbox};
 
 /// All but the times: those are of no two runs the same.
-fn same_files(place: &Place, a: &str, b: &str) {
-    assert_eq!(place.names(a), place.names(b));
-    for name in place.names(a).iter().filter(|name| *name != "frames.jsonl") {
-        let [a, b] = [a, b].map(|folder| fs::read(place.path(folder).join(name)).unwrap());
+fn same_files(sandbox: &Sandbox, a: &str, b: &str) {
+    assert_eq!(sandbox.names(a), sandbox.names(b));
+    for name in sandbox
+        .names(a)
+        .iter()
+        .filter(|name| *name != "frames.jsonl")
+    {
+        let [a, b] = [a, b].map(|folder| fs::read(sandbox.path(folder).join(name)).unwrap());
         assert!(a == b, "{name} differs");
     }
 }
 
 #[test]
 fn any_number_of_threads_writes_the_same_bytes() {
-    let place = Place::new();
+    let sandbox = Sandbox::new();
     // Large enough that threads share the work of a color; pictures are drawn by the same threads, in bands of 16 rows.
     let scene = SCENE
         .replace("tets = 300", "tets = 9000")
         .replace("[world]", "[solver]\nclustering = \"serial:20\"\n[world]");
-    place.write("scene.toml", scene);
+    sandbox.write("scene.toml", scene);
     for threads in ["1", "3"] {
-        place.good(&[
+        sandbox.good(&[
             "run",
             "scene.toml",
             "--frames",
@@ -36,16 +40,16 @@ fn any_number_of_threads_writes_the_same_bytes() {
             threads,
         ]);
     }
-    same_files(&place, "1", "3");
+    same_files(&sandbox, "1", "3");
     let drawn = |name: &String| name.ends_with(".png");
-    assert_eq!(place.names("1").into_iter().filter(drawn).count(), 4);
+    assert_eq!(sandbox.names("1").into_iter().filter(drawn).count(), 4);
 }
 
 #[test]
 fn precision_is_as_asked_for() {
-    let place = Place::with_scene();
+    let sandbox = Sandbox::with_scene();
     for precision in ["f32", "f64"] {
-        place.good(&[
+        sandbox.good(&[
             "run",
             "scene.toml",
             "--frames",
@@ -57,7 +61,7 @@ fn precision_is_as_asked_for() {
             "--out",
             precision,
         ]);
-        let lines = place.read(&format!("{precision}/frames.jsonl"));
+        let lines = sandbox.read(&format!("{precision}/frames.jsonl"));
         assert_eq!(
             lines
                 .matches(&format!("\"precision\":\"{precision}\""))
@@ -65,19 +69,19 @@ fn precision_is_as_asked_for() {
             2
         );
         assert!(
-            place
+            sandbox
                 .read(&format!("{precision}/scene.toml"))
                 .contains(&format!("precision = \"{precision}\""))
         );
     }
-    assert!(place.read("f32/mesh.vtu") != place.read("f64/mesh.vtu"));
+    assert!(sandbox.read("f32/mesh.vtu") != sandbox.read("f64/mesh.vtu"));
 }
 
 #[test]
 fn the_written_scene_runs_again_to_the_same_files() {
-    let place = Place::new();
-    fs::create_dir(place.path("scenes")).unwrap();
-    place.good(&[
+    let sandbox = Sandbox::new();
+    fs::create_dir(sandbox.path("scenes")).unwrap();
+    sandbox.good(&[
         "mesh",
         "generate",
         "sphere",
@@ -85,14 +89,14 @@ fn the_written_scene_runs_again_to_the_same_files() {
         "400",
         "scenes/sphere.vtk",
     ]);
-    place.write(
+    sandbox.write(
         "scenes/scene.toml",
         SCENE.replace(
             "shape = { kind = \"box\", tets = 300 }",
             "mesh = \"sphere.vtk\"",
         ),
     );
-    place.good(&[
+    sandbox.good(&[
         "run",
         "scenes/scene.toml",
         "--frames",
@@ -103,7 +107,7 @@ fn the_written_scene_runs_again_to_the_same_files() {
         "--out",
         "deep/first",
     ]);
-    place.good(&[
+    sandbox.good(&[
         "run",
         "deep/first/scene.toml",
         "--frames",
@@ -114,14 +118,14 @@ fn the_written_scene_runs_again_to_the_same_files() {
         "--out",
         "second",
     ]);
-    same_files(&place, "deep/first", "second");
+    same_files(&sandbox, "deep/first", "second");
 }
 
 #[test]
 fn a_mesh_from_the_command_line_replaces_that_of_the_scene() {
-    let place = Place::with_scene();
-    place.good(&["mesh", "generate", "torus", "--tets", "700", "torus.node"]);
-    place.good(&[
+    let sandbox = Sandbox::with_scene();
+    sandbox.good(&["mesh", "generate", "torus", "--tets", "700", "torus.node"]);
+    sandbox.good(&[
         "run",
         "scene.toml",
         "--mesh",
@@ -130,7 +134,7 @@ fn a_mesh_from_the_command_line_replaces_that_of_the_scene() {
         "1",
         "--quiet",
     ]);
-    let count = place
+    let count = sandbox
         .read("torus.ele")
         .lines()
         .next()
@@ -140,7 +144,7 @@ fn a_mesh_from_the_command_line_replaces_that_of_the_scene() {
         .unwrap()
         .to_owned();
     assert!(
-        place
+        sandbox
             .read("out/frames.jsonl")
             .contains(&format!("\"tets\":{count},"))
     );
@@ -148,9 +152,9 @@ fn a_mesh_from_the_command_line_replaces_that_of_the_scene() {
 
 #[test]
 fn the_last_mesh_is_saved_in_every_format() {
-    let place = Place::with_scene();
+    let sandbox = Sandbox::with_scene();
     for name in ["last.vtk", "last.vtu", "last.node", "LAST.VTU"] {
-        place.good(&[
+        sandbox.good(&[
             "run",
             "scene.toml",
             "--frames",
@@ -161,7 +165,7 @@ fn the_last_mesh_is_saved_in_every_format() {
         ]);
     }
     assert_eq!(
-        place.names("."),
+        sandbox.names("."),
         [
             "LAST.VTU",
             "last.ele",
@@ -172,19 +176,19 @@ fn the_last_mesh_is_saved_in_every_format() {
             "scene.toml"
         ]
     );
-    assert!(place.read("last.vtu").contains("Name=\"position\""));
-    assert!(place.read("last.vtu") == place.read("LAST.VTU"));
+    assert!(sandbox.read("last.vtu").contains("Name=\"position\""));
+    assert!(sandbox.read("last.vtu") == sandbox.read("LAST.VTU"));
     // What was saved is the cut mesh, at rest, and sound.
     for name in ["last.vtk", "last.node"] {
-        let info = place.good(&["mesh", "info", name, "--json"]);
+        let info = sandbox.good(&["mesh", "info", name, "--json"]);
         assert!(info.contains("\"pieces\":2"), "{info}");
     }
 }
 
 #[test]
 fn the_same_lines_may_be_asked_for_twice() {
-    let place = Place::with_scene();
-    place.good(&[
+    let sandbox = Sandbox::with_scene();
+    sandbox.good(&[
         "run",
         "scene.toml",
         "--frames",
@@ -193,22 +197,22 @@ fn the_same_lines_may_be_asked_for_twice() {
         "--jsonl",
         "out/frames.jsonl",
     ]);
-    assert_eq!(place.read("out/frames.jsonl").lines().count(), 3);
+    assert_eq!(sandbox.read("out/frames.jsonl").lines().count(), 3);
     assert!(
-        place
+        sandbox
             .names("out")
             .iter()
             .all(|name| !name.contains("partial"))
     );
 }
 
-/// A folder in the place of a surface makes the run fail in its middle.
+/// A folder in the sandbox of a surface makes the run fail in its middle.
 #[test]
 fn a_failed_run_leaves_nothing_half_written() {
-    let place = Place::with_scene();
-    fs::create_dir_all(place.path("out/surface_00002.vtp/full")).unwrap();
-    place.write("lines.jsonl", "of an earlier run\n");
-    let outcome = place.incise(&[
+    let sandbox = Sandbox::with_scene();
+    fs::create_dir_all(sandbox.path("out/surface_00002.vtp/full")).unwrap();
+    sandbox.write("lines.jsonl", "of an earlier run\n");
+    let outcome = sandbox.incise(&[
         "run",
         "scene.toml",
         "--frames",
@@ -217,8 +221,8 @@ fn a_failed_run_leaves_nothing_half_written() {
         "lines.jsonl",
         "--save-mesh",
         "last.vtk",
-        "--film",
-        "film.gif",
+        "--animation",
+        "animation.gif",
         "--size",
         "64x48",
     ]);
@@ -237,12 +241,12 @@ fn a_failed_run_leaves_nothing_half_written() {
         "surface_00001.vtp",
         "surface_00002.vtp",
     ];
-    assert_eq!(place.names("out"), left);
-    assert_eq!(place.names("."), ["lines.jsonl", "out", "scene.toml"]);
-    assert_eq!(place.read("lines.jsonl"), "of an earlier run\n");
+    assert_eq!(sandbox.names("out"), left);
+    assert_eq!(sandbox.names("."), ["lines.jsonl", "out", "scene.toml"]);
+    assert_eq!(sandbox.read("lines.jsonl"), "of an earlier run\n");
     for whole in &left[3..5] {
         assert!(
-            place
+            sandbox
                 .read(&format!("out/{whole}"))
                 .trim_end()
                 .ends_with("</VTKFile>")

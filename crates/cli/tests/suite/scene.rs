@@ -6,7 +6,7 @@ use incise::Scene;
 use incise::scene::BodySpec;
 use serde_json::Value;
 
-use crate::support::{Place, SCENE};
+use crate::support::{SCENE, Sandbox};
 
 /// A file of the folder `docs` of the workspace.
 fn page(name: &str) -> String {
@@ -18,13 +18,13 @@ fn page(name: &str) -> String {
 
 #[test]
 fn pages_are_those_of_the_structs() {
-    let place = Place::new();
+    let sandbox = Sandbox::new();
     for (flag, name) in [
         ("--reference", "scene.md"),
         ("--schema", "scene.schema.json"),
     ] {
         assert!(
-            place.good(&["scene", flag]) == page(name),
+            sandbox.good(&["scene", flag]) == page(name),
             "docs/{name} is stale: run `cargo run --release -- scene {flag} > docs/{name}`"
         );
     }
@@ -44,14 +44,14 @@ fn properties(schema: &Value, into: &mut Vec<String>) {
 
 #[test]
 fn every_key_is_on_the_page_with_a_meaning() {
-    let schema: Value = serde_json::from_str(&Place::new().good(&["scene", "--schema"])).unwrap();
+    let schema: Value = serde_json::from_str(&Sandbox::new().good(&["scene", "--schema"])).unwrap();
     let mut keys = Vec::new();
     properties(&schema, &mut keys);
     assert!(keys.len() > 80, "{}", keys.len());
     let reference = page("scene.md");
     for key in keys {
         assert!(
-            reference.contains(&format!("`{key}")),
+            reference.contains(&format!("`{key}`")) || reference.contains(&format!("[{key}]")),
             "{key} is not on the page"
         );
     }
@@ -67,8 +67,8 @@ fn every_key_is_on_the_page_with_a_meaning() {
 
 #[test]
 fn the_commented_scene_has_every_default() {
-    let place = Place::new();
-    let text = place.good(&["scene", "--defaults"]);
+    let sandbox = Sandbox::new();
+    let text = sandbox.good(&["scene", "--defaults"]);
     let mut scene = Scene::from_toml(&text).unwrap();
     assert!(scene.body[0].shape.take().is_some());
     let expected = Scene {
@@ -76,8 +76,8 @@ fn the_commented_scene_has_every_default() {
         ..Scene::default()
     };
     assert_eq!(scene, expected);
-    place.write("scene.toml", &text);
-    let checked = place.good(&["scene", "--check", "scene.toml"]);
+    sandbox.write("scene.toml", &text);
+    let checked = sandbox.good(&["scene", "--check", "scene.toml"]);
     assert!(
         checked.starts_with("scene.toml: valid: 1 body, "),
         "{checked}"
@@ -86,15 +86,15 @@ fn the_commented_scene_has_every_default() {
 
 #[test]
 fn a_wrong_scene_is_refused_with_line_and_key() {
-    let place = Place::with_scene();
-    let valid = place.good(&["scene", "--check", "scene.toml"]);
+    let sandbox = Sandbox::with_scene();
+    let valid = sandbox.good(&["scene", "--check", "scene.toml"]);
     assert!(valid.ends_with("tets, 1 stroke\n"), "{valid}");
-    assert_eq!(place.list().len(), 1);
+    assert_eq!(sandbox.list().len(), 1);
     for (from, to, expected) in [
         (
             "young_modulus = 1e4",
             "young_modulus = -1.0",
-            "scene.toml: line 6: ",
+            "wrong.toml: line 6: ",
         ),
         (
             "kind = \"plane\"",
@@ -104,11 +104,11 @@ fn a_wrong_scene_is_refused_with_line_and_key() {
         ("frame = 1", "fram = 1", "did you mean 'frame'?"),
     ] {
         assert!(SCENE.contains(from));
-        place.write("wrong.toml", SCENE.replacen(from, to, 1));
-        let outcome = place.incise(&["scene", "--check", "wrong.toml"]);
+        sandbox.write("wrong.toml", SCENE.replacen(from, to, 1));
+        let outcome = sandbox.incise(&["scene", "--check", "wrong.toml"]);
         assert_eq!(outcome.code, 2);
         assert!(outcome.stderr.contains(expected), "{}", outcome.stderr);
     }
-    assert_eq!(place.incise(&["scene"]).code, 2);
-    assert_eq!(place.incise(&["scene", "--schema", "--defaults"]).code, 2);
+    assert_eq!(sandbox.incise(&["scene"]).code, 2);
+    assert_eq!(sandbox.incise(&["scene", "--schema", "--defaults"]).code, 2);
 }

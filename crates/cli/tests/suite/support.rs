@@ -31,25 +31,25 @@ pub(crate) struct Outcome {
 }
 
 /// A folder of its own, gone at the end of the test.
-pub(crate) struct Place(TempDir);
+pub(crate) struct Sandbox(TempDir);
 
-impl Place {
+impl Sandbox {
     pub(crate) fn new() -> Self {
         Self(tempfile::tempdir().unwrap())
     }
 
     /// With the small scene as `scene.toml`.
     pub(crate) fn with_scene() -> Self {
-        let place = Self::new();
-        place.write("scene.toml", SCENE);
-        place
+        let sandbox = Self::new();
+        sandbox.write("scene.toml", SCENE);
+        sandbox
     }
 
     /// With a generated box as `box.vtk`.
     pub(crate) fn with_mesh() -> Self {
-        let place = Self::new();
-        place.good(&["mesh", "generate", "box", "--tets", "400", "box.vtk"]);
-        place
+        let sandbox = Self::new();
+        sandbox.good(&["mesh", "generate", "box", "--tets", "400", "box.vtk"]);
+        sandbox
     }
 
     pub(crate) fn path(&self, name: &str) -> PathBuf {

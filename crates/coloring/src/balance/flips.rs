@@ -16,7 +16,7 @@ use super::surroundings::Surroundings;
 struct Component {
     /// By how much its part in the heavy class outweighs that in the light one.
     surplus: i128,
-    /// The place of its first vertex; [`NONE`] stands for no component at all.
+    /// Index of its first vertex; [`NONE`] stands for no component at all.
     root: u32,
 }
 
@@ -25,13 +25,13 @@ struct Component {
 pub(super) struct Flips {
     /// The members of the heavy class, then those of the light one.
     vertices: Vec<u32>,
-    /// Vertex -> its place in `vertices`, for members of the two classes at hand.
-    place: Vec<u32>,
-    /// Place -> an earlier place in the same component, or itself.
+    /// Vertex -> its local index in `vertices`, for members of the two classes at hand.
+    local: Vec<u32>,
+    /// Local index -> an earlier one in the same component, or itself.
     parent: Vec<u32>,
-    /// Place of a root -> surplus of the component.
+    /// Local index of a root -> surplus of the component.
     surplus: Vec<i128>,
-    /// Place of a root -> is the component to be flipped?
+    /// Local index of a root -> whether the component to be flipped?
     chosen: Vec<bool>,
     /// By surplus.
     components: Vec<Component>,
@@ -41,7 +41,7 @@ impl Flips {
     pub(super) fn new(partition: &Partition<'_>) -> Self {
         Self {
             vertices: Vec::new(),
-            place: vec![0; partition.class.len()],
+            local: vec![0; partition.class.len()],
             parent: Vec::new(),
             surplus: Vec::new(),
             chosen: Vec::new(),
@@ -92,16 +92,16 @@ impl Flips {
         let border = self.vertices.len();
         self.vertices.extend(members.of(light));
         self.parent.clear();
-        for (place, &v) in (0..).zip(&self.vertices) {
-            self.place[v as usize] = place;
-            self.parent.push(place);
+        for (local, &v) in (0..).zip(&self.vertices) {
+            self.local[v as usize] = local;
+            self.parent.push(local);
         }
-        let (vertices, place) = (&self.vertices, &self.place);
+        let (vertices, local) = (&self.vertices, &self.local);
         let parent = &mut self.parent;
         let (first, second) = vertices.split_at(border);
         around.join([heavy, light], [first, second], &partition.class, |v, u| {
-            let v = root(parent, place[v as usize]);
-            let u = root(parent, place[u as usize]);
+            let v = root(parent, local[v as usize]);
+            let u = root(parent, local[u as usize]);
             parent[v.max(u) as usize] = v.min(u);
         });
         self.surplus.clear();
@@ -186,7 +186,7 @@ impl Flips {
     }
 }
 
-/// The first place of the component, by path halving.
+/// The first local index of the component, by path halving.
 fn root(parent: &mut [u32], mut at: u32) -> u32 {
     while parent[at as usize] != at {
         let above = parent[parent[at as usize] as usize];

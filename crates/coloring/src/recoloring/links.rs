@@ -5,7 +5,7 @@
 //! a link counts how often it was added; it goes when it was removed as often. The valence of a
 //! particle is the number of its links. How many particles have each valence is kept up to date,
 //! and with it the largest valence, which bounds the colors from below. Cost: O(links at the
-//! particle) to add, and O(links of the vertex) more for a link that goes; its place is used again.
+//! particle) to add, and O(links of the vertex) more for a link that goes; its slot is used again.
 
 use incise_graph::Incidence;
 
@@ -69,14 +69,14 @@ impl Links {
         }
     }
 
-    /// The place of the link between a vertex and a particle.
+    /// The slot of the link between a vertex and a particle.
     fn find(&self, vertex: u32, particle: u32) -> Option<u32> {
-        let mut place = *self.at_particle.get(particle as usize)?;
-        while let Some(link) = self.links.get(place as usize) {
+        let mut slot = *self.at_particle.get(particle as usize)?;
+        while let Some(link) = self.links.get(slot as usize) {
             if link.vertex == vertex {
-                return Some(place);
+                return Some(slot);
             }
-            place = link.next_at_particle;
+            slot = link.next_at_particle;
         }
         None
     }
@@ -90,18 +90,18 @@ impl Links {
 
     /// Counts a link once more; false if there is none. O(links at the particle).
     pub(super) fn repeat(&mut self, vertex: u32, particle: u32) -> bool {
-        let place = self.find(vertex, particle);
-        if let Some(place) = place {
-            self.links[place as usize].count += 1;
+        let slot = self.find(vertex, particle);
+        if let Some(slot) = slot {
+            self.links[slot as usize].count += 1;
         }
-        place.is_some()
+        slot.is_some()
     }
 
     /// Counts a link once more if it is the last that came to the particle; false if it is not. Does
     /// what [`repeat`](Self::repeat) does where no other link can be meant. O(1).
     pub(super) fn repeat_last(&mut self, vertex: u32, particle: u32) -> bool {
-        let place = self.at_particle.get(particle as usize).copied();
-        let last = place.and_then(|place| self.links.get_mut(place as usize));
+        let slot = self.at_particle.get(particle as usize).copied();
+        let last = slot.and_then(|slot| self.links.get_mut(slot as usize));
         match last {
             Some(link) if link.vertex == vertex => {
                 link.count += 1;
@@ -130,10 +130,10 @@ impl Links {
             previous_at_particle: NONE,
             next_of_vertex: self.of_vertex[vertex as usize],
         };
-        let place = match self.free.pop() {
-            Some(place) => {
-                self.links[place as usize] = link;
-                place
+        let slot = match self.free.pop() {
+            Some(slot) => {
+                self.links[slot as usize] = link;
+                slot
             }
             None => {
                 self.links.push(link);
@@ -141,16 +141,16 @@ impl Links {
             }
         };
         if first != NONE {
-            self.links[first as usize].previous_at_particle = place;
+            self.links[first as usize].previous_at_particle = slot;
         }
-        self.at_particle[particle as usize] = place;
-        self.of_vertex[vertex as usize] = place;
+        self.at_particle[particle as usize] = slot;
+        self.of_vertex[vertex as usize] = slot;
     }
 
     /// Takes back one addition of a link; `None` if there is none, else whether the link is gone.
     pub(super) fn remove(&mut self, vertex: u32, particle: u32) -> Option<bool> {
-        let place = self.find(vertex, particle)?;
-        let link = &mut self.links[place as usize];
+        let slot = self.find(vertex, particle)?;
+        let link = &mut self.links[slot as usize];
         link.count -= 1;
         if link.count > 0 {
             return Some(false);
@@ -165,16 +165,16 @@ impl Links {
                 link.previous_at_particle;
         }
         let first = self.of_vertex[vertex as usize];
-        if first == place {
+        if first == slot {
             self.of_vertex[vertex as usize] = link.next_of_vertex;
         } else {
             let mut before = first;
-            while self.links[before as usize].next_of_vertex != place {
+            while self.links[before as usize].next_of_vertex != slot {
                 before = self.links[before as usize].next_of_vertex;
             }
             self.links[before as usize].next_of_vertex = link.next_of_vertex;
         }
-        self.free.push(place);
+        self.free.push(slot);
         self.move_particle(particle, self.valence[particle as usize] - 1);
         Some(true)
     }

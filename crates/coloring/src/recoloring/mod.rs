@@ -27,29 +27,29 @@ use crate::{ColoringError, auto};
 use links::Links;
 use taken::Taken;
 
-/// What an edit did.
+/// Statistics of an edit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Recolored {
-    /// Vertices that got a color, the same as before or another one; after a full coloring all of
-    /// them.
+    /// Number of vertices that were colored by the edit, with an old or a new color; after a full
+    /// coloring all of them.
     pub colored: usize,
-    /// Vertices outside of the edit that moved to another color.
+    /// Number of vertices outside the edit that changed their color.
     pub displaced: usize,
-    /// Links looked at, the work of this edit; a full coloring is not counted.
+    /// Number of links visited, the work of the edit, without a full coloring.
     pub visited: u64,
     /// Whether all vertices were recolored.
     pub full: bool,
-    /// The number of colors now.
+    /// Number of colors after the edit.
     pub colors: usize,
-    /// The clique bound now.
+    /// Clique bound after the edit.
     pub bound: usize,
 }
 
-/// Constraints, or clusters of constraints, and a proper coloring of them that follows edits.
+/// A proper coloring of constraints or clusters that is updated by edits.
 ///
-/// Numbers of vertices and particles are the caller's and may grow at any time. A vertex without
-/// particles has color 0. Deterministic: the same edits give the same colors.
+/// The caller chooses the numbers of vertices and particles, which may grow at any time. A vertex
+/// without particles has color 0. Deterministic: equal edits give equal colors.
 ///
 /// ```
 /// use incise_coloring::Recoloring;
@@ -90,11 +90,11 @@ pub struct Recoloring {
 }
 
 impl Recoloring {
-    /// Colors the constraints of `incidence` with [`auto`] and gets ready for edits.
+    /// Colors the constraints of `incidence` with [`auto`] and prepares for edits.
     ///
-    /// Edits may add up to `slack` colors before all vertices are recolored: 0 keeps the count as
-    /// low as full colorings do, `usize::MAX` never recolors all. Costs what [`auto`] does, plus
-    /// O(sum over particles of valence squared) once.
+    /// Edits may add up to `slack` colors before all vertices are recolored: 0 keeps the number as
+    /// low as full colorings do, `usize::MAX` never recolors all. The cost is that of [`auto`],
+    /// plus O(sum over particles of valence squared) once.
     #[must_use]
     pub fn new(incidence: &Incidence, slack: usize) -> Self {
         let rows = (0..).take(incidence.constraint_count());
@@ -108,11 +108,11 @@ impl Recoloring {
         Self::linked(pairs, coloring, slack)
     }
 
-    /// Takes (vertex, particle) pairs that are colored already; pairs may repeat, as in
+    /// Starts from (vertex, particle) pairs that have a coloring; pairs may repeat, as in
     /// [`apply`](Self::apply). O(sum over particles of pairs squared).
     ///
     /// # Errors
-    /// The coloring is not proper, or not about as many vertices as the pairs are.
+    /// If the coloring is not proper or has another number of vertices than the pairs.
     ///
     /// ```
     /// use incise_coloring::Recoloring;
@@ -163,45 +163,46 @@ impl Recoloring {
         recoloring
     }
 
-    /// The colors, one for every vertex number up to the largest ever used.
+    /// Returns the colors, one for every vertex number up to the largest ever used.
     #[must_use]
     pub fn coloring(&self) -> &Coloring {
         &self.coloring
     }
 
-    /// The number of colors: the largest label plus one. O(1).
+    /// Returns the number of colors, the largest label plus one. O(1).
     #[must_use]
     pub fn color_count(&self) -> usize {
         self.sizes.len()
     }
 
-    /// The largest number of vertices at one particle, below which no number of colors can be.
-    /// O(1).
+    /// Returns the largest number of vertices at one particle, a lower bound on the number of
+    /// colors. O(1).
     #[must_use]
     pub fn bound(&self) -> usize {
         self.links.bound()
     }
 
-    /// The largest number of colors that an edit may leave without recoloring all vertices.
+    /// Returns the largest number of colors that an edit may leave without recoloring all vertices.
     #[must_use]
     pub fn limit(&self) -> usize {
         self.reference.max(self.bound()).saturating_add(self.slack)
     }
 
-    /// The particles of all vertices as they are now. O(links log links).
+    /// Returns the present particles of all vertices. O(links log links).
     #[must_use]
     pub fn incidence(&self) -> Incidence {
         self.links.incidence()
     }
 
-    /// The vertices that the last edit may have given another color, or that came or went with it, ascending; all after
-    /// a full coloring.
+    /// Returns the vertices whose color may have changed in the last edit, and those added or
+    /// removed by it, ascending; all vertices after a full coloring.
     #[must_use]
     pub fn changed(&self) -> &[u32] {
         &self.changed
     }
 
-    /// Makes sure that there are `vertices` vertices at least; new ones have no particles and color 0. O(new vertices).
+    /// Adds vertices up to a number of `vertices`; new ones have no particles and color 0. O(new
+    /// vertices).
     pub fn reserve(&mut self, vertices: usize) {
         self.links.reserve_vertices(vertices);
         let before = self.coloring.vertex_count();
@@ -211,7 +212,7 @@ impl Recoloring {
         }
     }
 
-    /// Removes and adds (vertex, particle) pairs and colors what needs a color.
+    /// Removes and adds (vertex, particle) pairs and colors the vertices that need a new color.
     ///
     /// Removals come first. A vertex is removed by removing all its pairs, moved to a copy of a
     /// particle by removing one pair and adding another. Pairs may repeat: a cluster has one for
@@ -219,7 +220,7 @@ impl Recoloring {
     /// [report](Recolored); if [`limit`](Self::limit) is exceeded, that of [`recolor`](Self::recolor).
     ///
     /// # Errors
-    /// A removed pair that does not exist. Nothing is changed then.
+    /// If a removed pair does not exist. Nothing is changed then.
     pub fn apply(
         &mut self,
         removed: &[(u32, u32)],
@@ -279,7 +280,7 @@ impl Recoloring {
         Ok(report)
     }
 
-    /// Recolors all vertices with [`auto`], at the cost of [`auto`].
+    /// Recolors all vertices with [`auto`], at its cost.
     pub fn recolor(&mut self) {
         let incidence = self.links.incidence();
         self.coloring = auto(&incidence).coloring;
@@ -308,10 +309,10 @@ impl Recoloring {
         taken
     }
 
-    /// Recomputes everything from the links and compares. O(links log links).
+    /// Recomputes all derived data from the links and compares. O(links log links).
     ///
     /// # Errors
-    /// Two vertices of one color share a particle, or the books are wrong.
+    /// If two vertices of one color share a particle, or a derived count is wrong.
     pub fn check(&self) -> Result<(), ColoringError> {
         let incidence = self.links.incidence();
         self.coloring.verify_incidence(&incidence)?;
@@ -323,7 +324,7 @@ impl Recoloring {
         if sizes == self.sizes && at_particles && self.links.counts_agree(&incidence) {
             Ok(())
         } else {
-            Err(ColoringError::Books)
+            Err(ColoringError::InconsistentCounts)
         }
     }
 
@@ -342,7 +343,7 @@ impl Recoloring {
                         let color = self.coloring.color(vertex as usize);
                         self.taken.take(std::iter::once(particle), color);
                     }
-                    return Err(ColoringError::NotThere { vertex, particle });
+                    return Err(ColoringError::NoSuchPair { vertex, particle });
                 }
             }
         }

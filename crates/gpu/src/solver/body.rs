@@ -1,15 +1,15 @@
 //! [`Body`]: the arrays of a body on the device, and how they follow a solver on the host.
 //!
-//! What a cut changes arrives as patches, which a kernel puts where they belong: the tets of a place lie number by number
-//! in 16 parts of an array. Nothing else is sent. Memory: 96 bytes a place and 48 a particle; 16 a place more with
+//! What a cut changes arrives as patches, which a kernel puts where they belong: the tets of a slot lie number by number
+//! in 16 parts of an array. Nothing else is sent. Memory: 96 bytes a slot and 48 a particle; 16 a slot more with
 //! several materials, 8 where multipliers are kept, 16 a particle for Jacobi. Cost: O(what changed).
 
 use incise_graph::Schedule;
 use incise_xpbd::{Changes, Solver};
 
+use super::attachments::Attachments;
 use super::colors::Colors;
 use super::gpu_types::{DispatchRange, NUMBERS, ParticlePatch, TetPatch};
-use super::handles::Handles;
 use super::kernels::{Kernels, Kind, PATCH_PARTICLES, PATCH_TETS, Variant};
 use super::layout::{ClusterMapping, Layout, THREADS};
 use super::scalar_constraints::ScalarConstraints;
@@ -40,7 +40,7 @@ pub(crate) struct Body {
     /// Empty until a step is Jacobi's; all 0 between its iterations.
     pub(crate) corrections: Array<[f32; 4]>,
     /// If something hangs on handles.
-    pub(crate) handles: Option<Handles>,
+    pub(crate) attachments: Option<Attachments>,
     /// If there are such constraints.
     pub(crate) distances: Option<ScalarConstraints>,
     pub(crate) volumes: Option<ScalarConstraints>,
@@ -50,9 +50,9 @@ pub(crate) struct Body {
 }
 
 impl Body {
-    pub(crate) fn new(gpu: &GpuContext, form: ClusterMapping) -> Result<Self, GpuError> {
+    pub(crate) fn new(gpu: &GpuContext, mapping: ClusterMapping) -> Result<Self, GpuError> {
         Ok(Self {
-            layout: Layout::new(form),
+            layout: Layout::new(mapping),
             colors: Colors::new(gpu)?,
             particles: Array::zeros(gpu, "positions", 0)?,
             previous: Array::zeros(gpu, "previous positions", 0)?,
@@ -63,7 +63,7 @@ impl Body {
             tiles: Array::zeros(gpu, "tiles", 0)?,
             multipliers: Array::zeros(gpu, "multipliers", 0)?,
             corrections: Array::zeros(gpu, "corrections", 0)?,
-            handles: None,
+            attachments: None,
             distances: None,
             volumes: None,
             tet_patches: Array::zeros(gpu, "patches of tets", 0)?,
@@ -82,7 +82,7 @@ impl Body {
         changes: &Changes,
     ) -> Result<(), GpuError> {
         self.sync_particles(gpu, kernels, solver, changes)?;
-        Handles::sync(&mut self.handles, gpu, solver, changes)?;
+        Attachments::sync(&mut self.attachments, gpu, solver, changes)?;
         if changes.distances {
             ScalarConstraints::sync(&mut self.distances, gpu, solver, Kind::Distance)?;
         }
@@ -94,17 +94,17 @@ impl Body {
             self.colors.sync(gpu, self.layout.slots.groups())?;
         }
         let various = !solver.is_uniform();
-        let places = self.layout.place_count();
+        let tet_slots = self.layout.tet_slot_count();
         if patch.is_rebuilt {
-            self.corners = Array::zeros(gpu, "corners of tets", places)?;
+            self.corners = Array::zeros(gpu, "corners of tets", tet_slots)?;
         }
-        self.corners.resize(gpu, places)?;
+        self.corners.resize(gpu, tet_slots)?;
         self.rest
-            .resize(gpu, places.next_multiple_of(THREADS) * NUMBERS)?;
+            .resize(gpu, tet_slots.next_multiple_of(THREADS) * NUMBERS)?;
         if various {
-            self.constants.resize(gpu, places)?;
+            self.constants.resize(gpu, tet_slots)?;
         }
-        if self.layout.form == ClusterMapping::Workgroups {
+        if self.layout.mapping == ClusterMapping::Workgroups {
             let tiles = self.layout.slots.slot_count();
             let room = self.layout.depth();
             let numbers_of_tile = number_count(room);
@@ -215,7 +215,7 @@ impl Body {
         .map(wgpu::Buffer::size)
         .sum();
         let scalars = self.distances.iter().chain(&self.volumes);
-        let handles = self.handles.as_ref().map_or(0, Handles::bytes);
+        let handles = self.attachments.as_ref().map_or(0, Attachments::bytes);
         arrays + handles + scalars.map(ScalarConstraints::bytes).sum::<u64>()
     }
 }

@@ -65,26 +65,26 @@ impl GpuSolver {
 
     fn check_tet(&self, tet: u32, copy: &Copy) -> Result<(), GpuError> {
         let wrong = |what| differs(&format!("{what} of tet {tet}"));
-        let Some(place) = self.body.layout.place(tet as usize) else {
-            return wrong("the place");
+        let Some(tet_slot) = self.body.layout.tet_slot(tet as usize) else {
+            return wrong("the tet_slot");
         };
         let data = self.host.tet_data(tet);
-        let mut corners = copy.corners[place];
-        if self.form() == ClusterMapping::Workgroups {
+        let mut corners = copy.corners[tet_slot];
+        if self.cluster_mapping() == ClusterMapping::Workgroups {
             let room = self.body.layout.depth();
-            let list = place / room * number_count(room) + 2 + room;
+            let list = tet_slot / room * number_count(room) + 2 + room;
             corners = corners.map(|p| copy.tiles[list + p as usize]);
         }
         if corners != data.corners {
             return wrong("the corners");
         }
-        let start = place / THREADS * THREADS * NUMBERS + place % THREADS;
+        let start = tet_slot / THREADS * THREADS * NUMBERS + tet_slot % THREADS;
         for (k, number) in data.rest.iter().enumerate() {
             if copy.rest[start + k * THREADS].to_bits() != number.to_bits() {
                 return wrong("the rest shape");
             }
         }
-        if !self.host.is_uniform() && copy.constants[place][..3] != data.constants {
+        if !self.host.is_uniform() && copy.constants[tet_slot][..3] != data.constants {
             return wrong("the material");
         }
         Ok(())
@@ -95,9 +95,9 @@ impl GpuSolver {
         // Colors without clusters have no dispatch.
         let colors = (0..schedule.color_count()).filter(|&c| !schedule.clusters(c).is_empty());
         let mut turn = vec![None; self.host.tet_count()];
-        for (place, color) in colors.enumerate() {
+        for (tet_slot, color) in colors.enumerate() {
             for tet in schedule.color_constraints(color) {
-                turn[tet as usize] = Some(place);
+                turn[tet as usize] = Some(tet_slot);
             }
         }
         let mut now = 0;
@@ -106,8 +106,8 @@ impl GpuSolver {
             let [first, count] = [copy.ranges[at], copy.ranges[at + 1]].map(|n| n as usize);
             let groups = &copy.lists[first..first + count];
             for groups in groups.chunks(if run.tail { 1 } else { count }) {
-                for place in groups.iter().flat_map(|&group| self.places(group, copy)) {
-                    let tet = self.body.layout.tet(place) as usize;
+                for tet_slot in groups.iter().flat_map(|&group| self.tet_slots(group, copy)) {
+                    let tet = self.body.layout.tet(tet_slot) as usize;
                     if turn[tet].take() != Some(now) {
                         return differs(&format!("when tet {tet} is solved"));
                     }
@@ -121,13 +121,13 @@ impl GpuSolver {
         }
     }
 
-    /// The places of a group that have a tet.
-    fn places(&self, group: u32, copy: &Copy) -> Vec<usize> {
+    /// The tet slots of a group that have a tet.
+    fn tet_slots(&self, group: u32, copy: &Copy) -> Vec<usize> {
         let group = group as usize;
-        match self.form() {
+        match self.cluster_mapping() {
             ClusterMapping::Threads => {
-                let places = self.body.layout.depth() * THREADS;
-                let all = group * places..(group + 1) * places;
+                let tet_slots = self.body.layout.depth() * THREADS;
+                let all = group * tet_slots..(group + 1) * tet_slots;
                 all.filter(|&p| copy.corners[p][0] != copy.corners[p][1])
                     .collect()
             }
@@ -146,7 +146,7 @@ impl GpuSolver {
 
     /// Looks whether the tets of a step share a particle.
     fn check_steps(&self, copy: &Copy) -> Result<(), GpuError> {
-        if self.form() == ClusterMapping::Threads {
+        if self.cluster_mapping() == ClusterMapping::Threads {
             return Ok(());
         }
         let slots = &self.body.layout.slots;

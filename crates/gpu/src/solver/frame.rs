@@ -6,16 +6,16 @@
 use incise_xpbd::{Solver, StepSettings, TetSolve};
 use wgpu::{Buffer, BufferUsages, SubmissionIndex};
 
+use super::attachments::{AttachmentKernels, Attachments};
 use super::body::Body;
+use super::colliders::Colliders;
 use super::gpu_types::Settings;
-use super::handles::{AttachmentKernels, Handles};
 use super::iterations::{self, IterationUniforms};
 use super::jacobi::{Jacobi, JacobiKernels};
 use super::kernels::{
     BoundKernel, CLEAR, Kernels, PREDICT, UPDATE_VELOCITIES, Variant, damp_tets, solve_tets,
 };
 use super::layout::{ClusterMapping, THREADS};
-use super::obstacles::Obstacles;
 use super::scalar_constraints::ScalarKernels;
 use super::shared::Shared;
 use super::stages::{Clock, Stage::*, Track};
@@ -30,7 +30,7 @@ pub(crate) struct Frame {
     /// If something asks for its uniform.
     uniforms: Option<IterationUniforms>,
     /// If there are colliders.
-    obstacles: Option<Obstacles>,
+    colliders: Option<Colliders>,
     /// If iterations are Jacobi's.
     jacobi: Option<Jacobi>,
     /// Positions before the constraints of the last substep; empty unless a step keeps them.
@@ -57,7 +57,7 @@ impl Frame {
             settings: Array::with_usage(gpu, "settings", 1, BufferUsages::UNIFORM)?,
             sent: None,
             uniforms: None,
-            obstacles: None,
+            colliders: None,
             jacobi: None,
             predicted: Array::zeros(gpu, "predicted positions", 0)?,
             kept: None,
@@ -98,7 +98,7 @@ impl Frame {
                 handles.move_held(track.at(Other), start);
             }
             if let Some(clear) = &passes.clear {
-                let words = 2 * body.layout.place_count();
+                let words = 2 * body.layout.tet_slot_count();
                 clear.run(track.at(Other), &[], words.div_ceil(THREADS));
             }
             for scalars in &passes.scalars {
@@ -149,11 +149,11 @@ impl Frame {
     ) -> Result<(), GpuError> {
         self.send_settings(gpu, body, host, settings);
         if keeps {
-            body.multipliers.resize(gpu, body.layout.place_count())?;
+            body.multipliers.resize(gpu, body.layout.tet_slot_count())?;
         }
         Jacobi::prepare(&mut self.jacobi, gpu, body, host.particle_count(), settings)?;
-        Obstacles::sync(&mut self.obstacles, gpu, host, settings)?;
-        if let Some(handles) = &mut body.handles {
+        Colliders::sync(&mut self.colliders, gpu, host, settings)?;
+        if let Some(handles) = &mut body.attachments {
             handles.prepare(gpu, host, settings)?;
         }
         if settings.iterations > 1 {
@@ -161,7 +161,7 @@ impl Frame {
                 scalars.keep_multipliers(gpu)?;
             }
         }
-        let asks = self.obstacles.is_some() || body.handles.is_some() || self.jacobi.is_some();
+        let asks = self.colliders.is_some() || body.attachments.is_some() || self.jacobi.is_some();
         IterationUniforms::sync(&mut self.uniforms, gpu, settings, asks)
     }
 
@@ -179,7 +179,7 @@ impl Frame {
         if host.is_uniform() && host.tet_count() > 0 {
             material[..3].copy_from_slice(&host.tet_data(0).constants);
         }
-        let depth = match body.layout.form {
+        let depth = match body.layout.mapping {
             ClusterMapping::Threads => body.layout.depth(),
             ClusterMapping::Workgroups => 0,
         };
@@ -198,10 +198,18 @@ impl Frame {
             max_cofactor_norm: Solver::<f32>::MAX_COFACTOR_NORM as f32,
             particles: index(host.particle_count()),
             depth: index(depth),
-            obstacles: index(settings.colliders.len()),
-            handles: index(body.handles.as_ref().map_or(0, Handles::handle_count)),
-            held: index(body.handles.as_ref().map_or(0, Handles::held_count)),
-            hanging: index(body.handles.as_ref().map_or(0, Handles::hanging_count)),
+            colliders: index(settings.colliders.len()),
+            handles: index(
+                body.attachments
+                    .as_ref()
+                    .map_or(0, Attachments::handle_count),
+            ),
+            rigid: index(
+                body.attachments
+                    .as_ref()
+                    .map_or(0, Attachments::rigid_count),
+            ),
+            soft: index(body.attachments.as_ref().map_or(0, Attachments::soft_count)),
             material,
         };
         if self.sent != Some(values) {
@@ -226,11 +234,11 @@ impl Frame {
             .uniforms
             .as_ref()
             .map_or(0, |uniforms| uniforms.buffer().size());
-        let obstacles = self.obstacles.as_ref().map_or(0, Obstacles::bytes);
+        let colliders = self.colliders.as_ref().map_or(0, Colliders::bytes);
         let jacobi = self.jacobi.as_ref().map_or(0, Jacobi::bytes);
         let always = self.settings.buffer().size() + self.predicted.buffer().size();
         let clock = self.clock.as_ref().map_or(0, Clock::bytes);
-        always + uniforms + obstacles + jacobi + clock
+        always + uniforms + colliders + jacobi + clock
     }
 
     /// Records copies of what residuals need, if the last step kept it.
@@ -256,7 +264,7 @@ impl Frame {
 #[derive(Debug)]
 pub(crate) struct LastSubstep {
     pub(crate) predicted: Copy<[f32; 4]>,
-    /// Place -> multipliers.
+    /// Tet slot -> multipliers.
     pub(crate) multipliers: Copy<[f32; 2]>,
     pub(crate) tet_solve: TetSolve,
 }
@@ -298,7 +306,7 @@ impl Frame {
         let (particles, previous) = (body.particles.buffer(), body.previous.buffer());
         let velocities = body.velocities.buffer();
         let several = settings.iterations > 1;
-        let mapping = body.layout.form;
+        let mapping = body.layout.mapping;
         let plain = Variant::default();
         let damping = Variant {
             various: !host.is_uniform(),
@@ -378,11 +386,11 @@ impl Frame {
                 }
                 false => None,
             },
-            project: match (&self.obstacles, &shared) {
-                (Some(obstacles), Some(shared)) => Some(obstacles.bind(gpu, kernels, shared)?),
+            project: match (&self.colliders, &shared) {
+                (Some(colliders), Some(shared)) => Some(colliders.bind(gpu, kernels, shared)?),
                 _ => None,
             },
-            handles: match (&body.handles, &shared) {
+            handles: match (&body.attachments, &shared) {
                 (Some(handles), Some(shared)) => Some(handles.bind(gpu, kernels, shared, several)?),
                 _ => None,
             },
@@ -398,5 +406,5 @@ impl Frame {
 }
 
 fn index(value: usize) -> u32 {
-    u32::try_from(value).expect("particles and places are numbered by 32 bits")
+    u32::try_from(value).expect("particles and slots are numbered by 32 bits")
 }

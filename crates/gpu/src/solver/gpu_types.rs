@@ -19,10 +19,10 @@ pub(crate) struct Settings {
     pub(crate) max_cofactor_norm: f32,
     pub(crate) particles: u32,
     pub(crate) depth: u32,
-    pub(crate) obstacles: u32,
+    pub(crate) colliders: u32,
     pub(crate) handles: u32,
-    pub(crate) held: u32,
-    pub(crate) hanging: u32,
+    pub(crate) rigid: u32,
+    pub(crate) soft: u32,
     pub(crate) material: [f32; 4],
 }
 
@@ -48,7 +48,7 @@ pub(crate) struct IterationUniform {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Attachment {
-    pub(crate) place: [f32; 3],
+    pub(crate) anchor: [f32; 3],
     pub(crate) particle: u32,
     pub(crate) handle: u32,
     pub(crate) compliance: f32,
@@ -60,7 +60,7 @@ pub(crate) struct Attachment {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Units {
-    pub(crate) places: u32,
+    pub(crate) tet_slots: u32,
     pub(crate) length: f32,
     pub(crate) slope: f32,
     pub(crate) unused: u32,
@@ -90,7 +90,7 @@ pub(crate) struct ParticleSums {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct TetPatch {
-    pub(crate) place: u32,
+    pub(crate) tet_slot: u32,
     pub(crate) unused: [u32; 3],
     /// All 0 where there is no tet.
     pub(crate) corners: [u32; 4],

@@ -5,7 +5,7 @@
 //! of positions and of multipliers, and its weights are in the uniforms. Only threads gather: a tile has its particles in
 //! workgroup memory, where a correction would be seen at once. Twin: `jacobi.rs` of incise-xpbd.
 //!
-//! Cost: a dispatch an iteration, with Chebyshev two; 16 bytes a particle, with Chebyshev 16 more and 16 a place.
+//! Cost: a dispatch an iteration, with Chebyshev two; 16 bytes a particle, with Chebyshev 16 more and 16 a tet slot.
 
 use incise_xpbd::{Method, StepSettings};
 use wgpu::Buffer;
@@ -24,7 +24,7 @@ pub(crate) struct Jacobi {
     extrapolating: bool,
     /// Where the previous iteration began; empty without extrapolation.
     before: Array<[f32; 4]>,
-    /// Place -> multipliers at the start of this iteration and of the one before; empty without extrapolation.
+    /// Tet slot -> multipliers at the start of this iteration and of the one before; empty without extrapolation.
     history: Array<[f32; 4]>,
 }
 
@@ -41,7 +41,7 @@ impl Jacobi {
             *this = None;
             return Ok(());
         }
-        if body.layout.form == ClusterMapping::Workgroups {
+        if body.layout.mapping == ClusterMapping::Workgroups {
             return Err(GpuError::Unsupported {
                 what: "Jacobi iterations in workgroups (threads do them)",
             });

@@ -52,7 +52,7 @@ macro_rules! text {
 
 /// Bytes of a dispatch range, and of a turn.
 const DISPATCH_RANGE: u64 = 8;
-const TURN: u64 = 16;
+const ITERATION_UNIFORM: u64 = 16;
 
 /// Bindings of the kernels that solve tets in threads; the last one is the sums of Jacobi corrections.
 const TETS: &[BindingKind] = &[
@@ -313,7 +313,7 @@ pub(crate) const PROJECT_TO_COLLIDERS: Source = Source {
     ),
     uses: &[
         BindingKind::Uniform,
-        BindingKind::DynamicUniform(TURN),
+        BindingKind::DynamicUniform(ITERATION_UNIFORM),
         BindingKind::Write,
         BindingKind::Read,
         BindingKind::Read,
@@ -332,7 +332,7 @@ pub(crate) const MOVE_HELD: Source = Source {
     ),
     uses: &[
         BindingKind::Uniform,
-        BindingKind::DynamicUniform(TURN),
+        BindingKind::DynamicUniform(ITERATION_UNIFORM),
         BindingKind::Write,
         BindingKind::Read,
         BindingKind::Read,
@@ -352,7 +352,7 @@ pub(crate) const SOLVE_ATTACHMENTS: Source = Source {
     ),
     uses: &[
         BindingKind::Uniform,
-        BindingKind::DynamicUniform(TURN),
+        BindingKind::DynamicUniform(ITERATION_UNIFORM),
         BindingKind::Write,
         BindingKind::Read,
         BindingKind::Read,
@@ -380,7 +380,7 @@ pub(crate) const APPLY_CORRECTIONS: Source = Source {
     parts: text!("common", "settings", "iteration", "apply_corrections"),
     uses: &[
         BindingKind::Uniform,
-        BindingKind::DynamicUniform(TURN),
+        BindingKind::DynamicUniform(ITERATION_UNIFORM),
         BindingKind::Write,
         BindingKind::Write,
         BindingKind::Write,
@@ -393,7 +393,7 @@ pub(crate) const EXTRAPOLATE_MULTIPLIERS: Source = Source {
     parts: text!("common", "iteration", "extrapolate_multipliers"),
     uses: &[
         BindingKind::Write,
-        BindingKind::DynamicUniform(TURN),
+        BindingKind::DynamicUniform(ITERATION_UNIFORM),
         BindingKind::Write,
     ],
     flags: &[],
@@ -608,10 +608,10 @@ impl Kernels {
     ) -> Result<Arc<Kernel>, GpuError> {
         let kernel = match self.compiled.entry((source.name, variant)) {
             Entry::Occupied(kernel) => kernel.into_mut(),
-            Entry::Vacant(place) => {
+            Entry::Vacant(tet_slot) => {
                 let constants: Vec<_> = source.flags.iter().map(|f| variant.value(*f)).collect();
                 let (name, parts, uses) = (source.name, source.parts, source.uses);
-                place.insert(Arc::new(Kernel::new(gpu, name, parts, uses, &constants)?))
+                tet_slot.insert(Arc::new(Kernel::new(gpu, name, parts, uses, &constants)?))
             }
         };
         Ok(Arc::clone(kernel))

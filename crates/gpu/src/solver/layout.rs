@@ -1,9 +1,9 @@
-//! [`Layout`]: which tet is in which place on the device, and what has to be sent there after a change.
+//! [`Layout`]: the slot of each tet on the device, and the patches to send after a change.
 //!
 //! Two forms of the same schedule. [`ClusterMapping::Threads`] is the paper's: a thread solves a cluster, tet after tet, 64
 //! clusters of a color a workgroup. [`ClusterMapping::Workgroups`] takes clusters of up to 128 tets: a workgroup solves one, with
 //! its particles in workgroup memory and its tets in steps that share no particle, so that a small body needs few colors
-//! and thus few dispatches. Either way a cluster has a slot (`slots.rs`) and its tets the places of that slot.
+//! and thus few dispatches. Either way a cluster has a slot (`slots.rs`), and its tets have the tet slots within it.
 //!
 //! Cost: O(tets of changed clusters and changed tets), O(tets) for another schedule or other masses.
 
@@ -47,18 +47,18 @@ impl ClusterMapping {
     }
 }
 
-/// The places of clusters and tets on the device.
+/// The slots of clusters and tets on the device.
 #[derive(Debug)]
 pub(crate) struct Layout {
-    pub(crate) form: ClusterMapping,
-    /// Tets that a slot has places for.
+    pub(crate) mapping: ClusterMapping,
+    /// Tet slots of a cluster slot.
     depth: usize,
     pub(crate) slots: Slots,
     /// Slot -> tets in it.
     filled: Vec<u32>,
-    /// Tet -> place.
-    places: Vec<u32>,
-    /// Place -> tet, in places that have one.
+    /// Tet -> tet slot.
+    tet_slots: Vec<u32>,
+    /// Tet slot -> tet, in slots that have one.
     tets: Vec<u32>,
 }
 
@@ -67,7 +67,7 @@ pub(crate) struct Layout {
 pub(crate) struct Patch {
     /// Whether nothing on the device is of use any more.
     pub(crate) is_rebuilt: bool,
-    /// No two of one place.
+    /// Patches of different tet slots.
     pub(crate) tets: Vec<TetPatch>,
     /// Tiles by number.
     pub(crate) tiles: Vec<(u32, Tile)>,
@@ -76,23 +76,23 @@ pub(crate) struct Patch {
 }
 
 impl Layout {
-    pub(crate) fn new(form: ClusterMapping) -> Self {
-        let width = match form {
+    pub(crate) fn new(mapping: ClusterMapping) -> Self {
+        let width = match mapping {
             ClusterMapping::Threads => THREADS,
             ClusterMapping::Workgroups => 1,
         };
         Self {
-            form,
+            mapping,
             depth: 1,
             slots: Slots::new(width),
             filled: Vec::new(),
-            places: Vec::new(),
+            tet_slots: Vec::new(),
             tets: Vec::new(),
         }
     }
 
     /// Places on the device.
-    pub(crate) fn place_count(&self) -> usize {
+    pub(crate) fn tet_slot_count(&self) -> usize {
         self.slots.slot_count() * self.depth
     }
 
@@ -101,36 +101,36 @@ impl Layout {
         self.filled.iter().map(|&tets| tets as usize).sum()
     }
 
-    /// Rows of 64 places that a group has.
+    /// Rows of 64 tet slots that a group has.
     pub(crate) fn depth(&self) -> usize {
         self.depth
     }
 
     /// Tets that a tile has room for; 0 without tiles.
     pub(crate) fn tile(&self) -> u32 {
-        match self.form {
+        match self.mapping {
             ClusterMapping::Threads => 0,
             ClusterMapping::Workgroups => index(self.depth),
         }
     }
 
-    /// The place of a tet, if the schedule solves it.
-    pub(crate) fn place(&self, tet: usize) -> Option<usize> {
-        let place = self.places.get(tet).copied();
-        place
-            .filter(|&place| place != NONE)
-            .map(|place| place as usize)
+    /// The tet slot of a tet, if the schedule solves it.
+    pub(crate) fn tet_slot(&self, tet: usize) -> Option<usize> {
+        let tet_slot = self.tet_slots.get(tet).copied();
+        tet_slot
+            .filter(|&tet_slot| tet_slot != NONE)
+            .map(|tet_slot| tet_slot as usize)
     }
 
-    /// The tet in a place that has one.
-    pub(crate) fn tet(&self, place: usize) -> u32 {
-        self.tets[place]
+    /// The tet in a tet slot that has one.
+    pub(crate) fn tet(&self, tet_slot: usize) -> u32 {
+        self.tets[tet_slot]
     }
 
     /// Where the `k`-th tet of a slot is.
-    fn place_of(&self, slot: u32, k: usize) -> usize {
+    fn tet_slot_of(&self, slot: u32, k: usize) -> usize {
         let slot = slot as usize;
-        match self.form {
+        match self.mapping {
             ClusterMapping::Threads => {
                 ((slot / THREADS) * self.depth + k) * THREADS + slot % THREADS
             }
@@ -164,21 +164,21 @@ impl Layout {
                 patch.is_rebuilt = true;
                 let slots: Vec<u32> = (0..index(self.slots.slot_count())).collect();
                 let largest = self.largest(&slots, schedule)?;
-                self.depth = match self.form {
+                self.depth = match self.mapping {
                     ClusterMapping::Threads => largest.max(1),
                     ClusterMapping::Workgroups => tile::room_for(largest),
                 };
                 self.filled.clear();
-                self.places.clear();
+                self.tet_slots.clear();
                 slots
             }
             Moved::Slots(slots) => self.with_changed(slots, changes, solver, &mut patch),
         };
         patch.regrouped = patch.is_rebuilt || !slots.is_empty();
         self.filled.resize(self.slots.slot_count(), 0);
-        self.tets.resize(self.place_count(), NONE);
-        self.places
-            .resize(solver.tet_count().max(self.places.len()), NONE);
+        self.tets.resize(self.tet_slot_count(), NONE);
+        self.tet_slots
+            .resize(solver.tet_count().max(self.tet_slots.len()), NONE);
         // All slots are emptied before any is filled: a tet may have changed its slot.
         for &slot in &slots {
             self.empty(slot);
@@ -194,7 +194,7 @@ impl Layout {
         let clusters = slots.iter().filter_map(|&slot| self.slots.cluster(slot));
         let sized = clusters.map(|cluster| (schedule.constraints(cluster).len(), cluster));
         let (tets, cluster) = sized.max().unwrap_or((0, ClusterId(0)));
-        if self.form == ClusterMapping::Workgroups && tets > tile::LARGEST {
+        if self.mapping == ClusterMapping::Workgroups && tets > tile::LARGEST {
             self.slots.forget();
             return Err(GpuError::Block {
                 cluster: cluster.0,
@@ -205,7 +205,7 @@ impl Layout {
         Ok(tets)
     }
 
-    /// Patches changed tets in their places; a tile with one is rebuilt.
+    /// Patches changed tets in their slots; a tile with one is rebuilt.
     fn with_changed(
         &mut self,
         mut slots: Vec<u32>,
@@ -218,21 +218,21 @@ impl Layout {
         changed.dedup();
         let known = slots.len();
         for tet in changed {
-            let Some(place) = self.place(tet as usize) else {
+            let Some(tet_slot) = self.tet_slot(tet as usize) else {
                 continue;
             };
-            let slot = index(match self.form {
+            let slot = index(match self.mapping {
                 ClusterMapping::Threads => {
-                    place / (self.depth * THREADS) * THREADS + place % THREADS
+                    tet_slot / (self.depth * THREADS) * THREADS + tet_slot % THREADS
                 }
-                ClusterMapping::Workgroups => place / self.depth,
+                ClusterMapping::Workgroups => tet_slot / self.depth,
             });
             if slots[..known].binary_search(&slot).is_ok() {
                 continue;
             }
-            match self.form {
+            match self.mapping {
                 // One that is gone is in no schedule, so its slot is among those.
-                ClusterMapping::Threads => patch.tets.push(filled_in(place, tet, solver)),
+                ClusterMapping::Threads => patch.tets.push(filled_in(tet_slot, tet, solver)),
                 ClusterMapping::Workgroups => slots.push(slot),
             }
         }
@@ -244,38 +244,38 @@ impl Layout {
     /// Forgets where the tets of a slot were.
     fn empty(&mut self, slot: u32) {
         for k in 0..self.filled[slot as usize] as usize {
-            let place = self.place_of(slot, k);
-            let tet = &mut self.places[self.tets[place] as usize];
-            if *tet == index(place) {
+            let tet_slot = self.tet_slot_of(slot, k);
+            let tet = &mut self.tet_slots[self.tets[tet_slot] as usize];
+            if *tet == index(tet_slot) {
                 *tet = NONE;
             }
         }
     }
 
-    fn put(&mut self, tet: u32, place: usize) {
-        self.places[tet as usize] = index(place);
-        self.tets[place] = tet;
+    fn put(&mut self, tet: u32, tet_slot: usize) {
+        self.tet_slots[tet as usize] = index(tet_slot);
+        self.tets[tet_slot] = tet;
     }
 
-    /// Fills a slot with the tets of its cluster, and clears the places behind them that had one.
+    /// Fills a cluster slot with the tets of its cluster, and clears the tet slots behind them.
     fn fill(&mut self, slot: u32, schedule: &Schedule, solver: &Solver<f32>, patch: &mut Patch) {
         let cluster = self.slots.cluster(slot);
         let tets = cluster.map_or(&[][..], |cluster| schedule.constraints(cluster));
-        match self.form {
+        match self.mapping {
             ClusterMapping::Threads => {
                 for (k, &tet) in tets.iter().enumerate() {
-                    let place = self.place_of(slot, k);
-                    self.put(tet, place);
-                    patch.tets.push(filled_in(place, tet, solver));
+                    let tet_slot = self.tet_slot_of(slot, k);
+                    self.put(tet, tet_slot);
+                    patch.tets.push(filled_in(tet_slot, tet, solver));
                 }
             }
             ClusterMapping::Workgroups if tets.is_empty() => {}
             ClusterMapping::Workgroups => {
                 let tile = Tile::new(tets, |tet| solver.tet_particles(tet as usize));
                 for (k, (tet, corners)) in tile.tets().enumerate() {
-                    let place = self.place_of(slot, k);
-                    self.put(tet, place);
-                    let filled = filled_in(place, tet, solver);
+                    let tet_slot = self.tet_slot_of(slot, k);
+                    self.put(tet, tet_slot);
+                    let filled = filled_in(tet_slot, tet, solver);
                     patch.tets.push(TetPatch { corners, ..filled });
                 }
                 patch.tiles.push((slot, tile));
@@ -283,7 +283,7 @@ impl Layout {
         }
         for k in tets.len()..self.filled[slot as usize] as usize {
             patch.tets.push(TetPatch {
-                place: index(self.place_of(slot, k)),
+                tet_slot: index(self.tet_slot_of(slot, k)),
                 ..TetPatch::default()
             });
         }
@@ -291,11 +291,11 @@ impl Layout {
     }
 }
 
-fn filled_in(place: usize, tet: u32, solver: &Solver<f32>) -> TetPatch {
+fn filled_in(tet_slot: usize, tet: u32, solver: &Solver<f32>) -> TetPatch {
     let data = solver.tet_data(tet);
     let [ratio, gamma, damping] = data.constants;
     TetPatch {
-        place: index(place),
+        tet_slot: index(tet_slot),
         unused: [0; 3],
         corners: data.corners,
         rest: data.rest,
@@ -313,5 +313,5 @@ pub(crate) fn slope([ratio, gamma, _]: [f32; 3]) -> f32 {
 }
 
 fn index(value: usize) -> u32 {
-    u32::try_from(value).expect("fewer than 2^32 places")
+    u32::try_from(value).expect("fewer than 2^32 tet_slots")
 }

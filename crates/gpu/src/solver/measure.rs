@@ -135,7 +135,7 @@ impl Measuring {
         &mut self,
         gpu: &GpuContext,
         solver: &Solver<f32>,
-        places: usize,
+        tet_slots: usize,
     ) -> Result<(), GpuError> {
         if self.stale {
             let constants = Constants::of(solver);
@@ -146,7 +146,7 @@ impl Measuring {
             self.stale = false;
         }
         let units = Units {
-            places: u32::try_from(places).expect("places are numbered by 32 bits"),
+            tet_slots: u32::try_from(tet_slots).expect("tet_slots are numbered by 32 bits"),
             length: self.constants.mean_volume.cbrt() as f32,
             slope: match solver.tet_count() {
                 0 => 0.0,
@@ -268,8 +268,8 @@ impl GpuSolver {
             Some(measuring) => measuring,
             none => none.insert(Measuring::new(gpu)?),
         };
-        let places = body.layout.place_count();
-        measuring.sync(gpu, host, places)?;
+        let tet_slots = body.layout.tet_slot_count();
+        measuring.sync(gpu, host, tet_slots)?;
         let variant = Variant {
             various: !host.is_uniform(),
             tile: body.layout.tile(),
@@ -297,7 +297,7 @@ impl GpuSolver {
         let plain = Variant::default();
         let of_particles = kernels.bind(gpu, &MEASURE_PARTICLES, plain, &buffers)?;
         let groups = |number: usize| number.div_ceil(THREADS).min(GROUPS);
-        let (over_tets, over_particles) = (groups(places), groups(host.particle_count()));
+        let (over_tets, over_particles) = (groups(tet_slots), groups(host.particle_count()));
         let mut encoder = gpu.encoder("measure");
         let mut pass = Recorder::new(gpu, &mut encoder, "measure", None);
         tets.run(&mut pass, &[], over_tets);

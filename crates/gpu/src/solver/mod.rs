@@ -11,18 +11,18 @@
 //! Cost: a dispatch a color and two or three a substep, with damping another one a color, one more for each other thing
 //! in the scene; uploads only of what edits changed and of handles and colliders that move.
 
+mod attachments;
 mod body;
 mod check;
+mod colliders;
 mod colors;
 mod frame;
 mod gpu_types;
-mod handles;
 mod iterations;
 mod jacobi;
 mod kernels;
 mod layout;
 mod measure;
-mod obstacles;
 mod scalar_constraints;
 #[cfg(test)]
 mod shaders;
@@ -121,11 +121,11 @@ impl GpuSolver {
     pub fn new(
         gpu: Arc<GpuContext>,
         mut solver: Solver<f32>,
-        form: ClusterMapping,
+        mapping: ClusterMapping,
     ) -> Result<Self, GpuError> {
         solver.track_changes();
         Ok(Self {
-            body: Body::new(&gpu, form)?,
+            body: Body::new(&gpu, mapping)?,
             frame: Frame::new(&gpu)?,
             repaired: Array::zeros(&gpu, "count of repairs", 1)?,
             known_repaired: 0,
@@ -146,8 +146,8 @@ impl GpuSolver {
 
     /// The unit of the device that solves a cluster.
     #[must_use]
-    pub fn form(&self) -> ClusterMapping {
-        self.body.layout.form
+    pub fn cluster_mapping(&self) -> ClusterMapping {
+        self.body.layout.mapping
     }
 
     /// Advances by one frame of `settings.time_step`; returns when the commands are with the driver, not when they are
@@ -271,7 +271,7 @@ impl GpuSolver {
         Ok(&mut self.host)
     }
 
-    /// Puts another solver in the place of the host's; the device takes over all of it, with its state, in the next step.
+    /// Puts another solver in place of the host's; the device takes over all of it, with its state, in the next step.
     /// Kernels and memory stay. The state of the device is lost: to keep it, or the count of repairs up to now, call
     /// [`GpuSolver::host`] before. O(particles + tets) in the next step.
     pub fn replace(&mut self, mut solver: Solver<f32>) {
@@ -326,8 +326,8 @@ impl GpuSolver {
         self.known_repaired = repaired.collect(gpu)?[0];
         if let Some((predicted, multipliers, tet_solve)) = last {
             let (predicted, multipliers) = (predicted.collect(gpu)?, multipliers.collect(gpu)?);
-            let place = |tet| self.body.layout.place(tet);
-            let of_tet = |tet| place(tet).map_or([0.0; 2], |place| multipliers[place]);
+            let slot = |tet| self.body.layout.tet_slot(tet);
+            let of_tet = |tet| slot(tet).map_or([0.0; 2], |tet_slot| multipliers[tet_slot]);
             let multipliers: Vec<_> = (0..self.host.tet_count()).map(of_tet).collect();
             self.host
                 .load_last_substep(&predicted, &multipliers, tet_solve);

@@ -164,7 +164,7 @@ impl Kind {
                 let data = solver.distance_data(constraint);
                 let [a, b] = data.particles;
                 let numbers = [data.length, data.compliance, data.damping, 0.0];
-                ([a, b, u32::from(data.only_when_longer), 0], numbers)
+                ([a, b, u32::from(data.tension_only), 0], numbers)
             }
             Self::Volume => {
                 let data = solver.volume_data(constraint);

@@ -200,7 +200,7 @@ fn iterations_that_diverge() {
     let chebyshev = StepSettings {
         method: Method::Chebyshev {
             spectral_radius: 0.999,
-            delay: 1,
+            chebyshev_start: 1,
         },
         ..jacobi.clone()
     };

@@ -53,7 +53,7 @@ fn turn(test: &str, settings: &StepSettings) {
             .map(|p| (p, twins.host.position(p)))
             .collect::<Vec<_>>();
         let held = beyond(&twins.host, 1.0);
-        let places: Vec<_> = held
+        let anchors: Vec<_> = held
             .iter()
             .map(|&p| pose(0).rotation.conjugate() * (twins.host.position(p) - pose(0).position))
             .collect();
@@ -68,10 +68,10 @@ fn turn(test: &str, settings: &StepSettings) {
         let device = twins.device.cached_host();
         assert!(!held.is_empty() && !fixed.is_empty());
         let mut fastest = 0.0;
-        for (&p, place) in held.iter().zip(places) {
+        for (&p, anchor) in held.iter().zip(anchors) {
             let x = device.position(p);
             // Rotation and sum in single precision.
-            assert!(x.distance(pose(10).apply(place)) < 1e-6);
+            assert!(x.distance(pose(10).apply(anchor)) < 1e-6);
             let apart = device.velocity(p).distance(twins.host.velocity(p));
             // The last digit of a position over the time of a substep.
             assert!(apart < 1e-6 / settings.substep_time(), "{test}: {apart}");

@@ -37,7 +37,7 @@ fn springs(mesh: &TetMesh, damping: f64) -> Vec<DistanceConstraint> {
             length: mesh.positions[a].distance(mesh.positions[b]) * (0.9 + 0.02 * (k % 8) as f64),
             compliance: [1e-4, 1e-3, 0.0, 1e-2][k % 4],
             damping: damping * (k % 3) as f64,
-            only_when_longer: k % 2 == 1,
+            tension_only: k % 2 == 1,
         })
         .collect()
 }
@@ -148,12 +148,12 @@ fn what_has_no_direction_waits() {
             length: 1.0,
             compliance: 0.0,
             damping: 0.0,
-            only_when_longer: false,
+            tension_only: false,
         };
         let thread = DistanceConstraint {
             particles: [2, 3],
             length: 2.0,
-            only_when_longer: true,
+            tension_only: true,
             ..spring
         };
         let order = order(4, &[spring.particles, thread.particles], false);

@@ -56,15 +56,15 @@ impl Schedule {
             let color = (!members.is_empty()).then(|| coloring.color(k));
             occupied += usize::from(color.is_some());
             let seated = color.is_none_or(|color| {
-                let place = self.seats[k].place as usize;
+                let position = self.slots[k].position as usize;
                 let clusters = self.colors.rows().nth(color.index()).unwrap_or(&[]);
-                clusters.get(place) == Some(&cluster)
+                clusters.get(position) == Some(&cluster)
             });
             if self.constraints(cluster) != members || self.color(cluster) != color || !seated {
                 return Err(GraphError::Misplaced { cluster });
             }
         }
-        // Each was found at a place of its own, so nothing else is there.
+        // Each was found at a position of its own, so nothing else is there.
         let labels = clustering.labels().iter();
         let labels = labels.copied().chain(std::iter::repeat(ClusterId::NONE));
         let labeled = self

@@ -1,8 +1,8 @@
-//! [`candidates`]: the settings that are worth a measurement for a scene; their names and their lines of TOML.
+//! [`candidates`]: solver settings to measure for a scene, with their names and their TOML tables.
 //!
-//! They are multiples of the substeps that bring kappa to 0.5, so that they fit the scene whatever its size, stiffness
-//! and time step. Relaxation, Jacobi and Chebyshev are left out: wherever they were measured (`cargo xtask trade`),
-//! Gauss-Seidel with relaxation 1 was as fast and more accurate.
+//! They are multiples of the substeps that bring kappa to 0.5, so they fit scenes of any size, stiffness and time step.
+//! Relaxation, Jacobi and Chebyshev are left out: in all measurements (`cargo xtask accuracy`) Gauss-Seidel with
+//! relaxation 1 was as fast and more accurate.
 
 use crate::method::check_vbd;
 use crate::scene::{Method, Precision, Scene, SolverSpec, Substeps, TetSolve};
@@ -10,10 +10,10 @@ use crate::{Error, Simulation};
 
 use super::reference::with;
 
-/// Accuracies that `auto` is asked for.
+/// Accuracies for which `auto` chooses substeps.
 const ACCURACIES: [f64; 4] = [0.2, 0.1, 0.05, 0.02];
 
-/// The substeps that `auto` wants for a scene, without its cap: the most of all its bodies.
+/// Returns the largest number of substeps that `auto` would take for a body of a scene without `max_substeps`.
 ///
 /// # Errors
 /// Returns the errors of [`Simulation::new`].
@@ -29,8 +29,8 @@ pub fn accurate_substeps(scene: &Scene) -> Result<u32, Error> {
     Ok(bodies.map(|body| body.substeps).max().unwrap_or(1))
 }
 
-/// Settings from coarse to fine around `substeps`, which is what [`accurate_substeps`] says. What a scene's `[solver]`
-/// says of clusters, colors, sleep, softening and the backend is kept.
+/// Returns settings from coarse to fine around `substeps`, a result of [`accurate_substeps`]. The scene's keys for
+/// clusters, colors, sleep, softening and the backend are kept.
 #[must_use]
 pub fn candidates(scene: &Scene, substeps: u32) -> Vec<SolverSpec> {
     let of = |method| SolverSpec {
@@ -107,7 +107,7 @@ pub fn candidates(scene: &Scene, substeps: u32) -> Vec<SolverSpec> {
     all
 }
 
-/// A short name: method, substeps x iterations, width, and whatever is not the default of the method.
+/// Returns a short name: method, substeps x iterations, precision, and settings other than the defaults of the method.
 ///
 /// ```
 /// use incise::{Scene, advise::name};
@@ -164,10 +164,10 @@ pub fn name(spec: &SolverSpec) -> String {
     name
 }
 
-/// The `[solver]` table of a scene with these settings, without what is the default of the method.
+/// Returns the `[solver]` table of a scene with these settings, without the defaults of the method.
 ///
 /// # Errors
-/// [`Error::Parse`] if the settings cannot be written, which does not happen to those that can be read.
+/// [`Error::Parse`] if the settings cannot be written. Settings read from a scene can always be written.
 pub fn solver_table(spec: &SolverSpec) -> Result<String, Error> {
     let failed = |error: toml::ser::Error| Error::Parse {
         line: None,

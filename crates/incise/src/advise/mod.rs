@@ -1,15 +1,14 @@
-//! Which settings a scene is best run with: measured on this machine, against a reference of the same scene.
+//! Search for the best solver settings of a scene, measured on this machine against a reference.
 //!
-//! Users trade speed for accuracy. [`advise`] measures that trade for one scene: it runs [`candidates`] for some frames,
-//! takes the time of each and its [`Deviation`] from a [`Reference`], and picks the most accurate that meets a budget.
-//! The parts are public, since sweeps over settings need the same ones.
+//! [`advise`] runs [`candidates`] for some frames, takes the time of each and its [`Deviation`] from a [`Reference`],
+//! and recommends the most accurate settings within a time budget. The parts are public for sweeps over settings.
 //!
-//! Errors are of positions, as a part of the motion and of the body's size, and of the volume; settings are compared by the
-//! first. Settings whose errors are below what is left of the reference's own cannot be told apart; of those the fastest is
-//! taken.
+//! Errors are those of positions, relative to the motion and to the size of the body, and of the volume; settings are
+//! compared by the first. Settings with errors below that of the reference cannot be distinguished; the fastest of them
+//! is taken.
 //!
-//! Cost: seven runs of the reference's coarsest, and each candidate three times, those far beyond the budget for two
-//! frames only.
+//! Cost: seven times the coarsest run of the reference, and each candidate three times (two frames only, if far beyond
+//! the budget).
 
 mod candidates;
 mod motion;
@@ -27,88 +26,89 @@ use serde::Serialize;
 use crate::scene::{Method, Scene, SolverSpec};
 use crate::{Error, Simulation};
 
-/// Frames that are measured unless told otherwise: at most so many, and at least these seconds.
+/// Largest default number of measured frames.
 const MOST_FRAMES: u32 = 100;
 const SECONDS: f64 = 0.5;
 
-/// Tets times frames up to which Newton's method is asked, some ten seconds.
+/// Tets times frames up to which Newton's method is the reference; takes some ten seconds.
 const NEWTON_WORK: usize = 60_000;
-/// Steps of a frame of its coarsest run.
+/// Steps of a frame in the coarsest run of Newton's method.
 const NEWTON_STEPS: u32 = 4;
 /// Candidates this much beyond the budget are not measured.
 const FAR: f64 = 8.0;
 /// Runs of each candidate, of which each frame's fastest counts.
 const ROUNDS: u32 = 2;
 
-/// What [`advise`] is asked.
+/// Conditions of a search for settings by [`advise`].
 #[derive(Clone, Copy, Debug)]
-pub struct Question {
-    /// Time of a frame in ms that may be spent, positive.
+pub struct AdviseSettings {
+    /// Time budget of a frame in ms, positive.
     pub budget_ms: f64,
-    /// Frames that are measured, from the scene's start, at least 1.
+    /// Number of measured frames from the scene's start, at least 1.
     pub frames: u32,
-    /// Threads, or rayon's pool.
+    /// Number of threads; `None` uses rayon's pool.
     pub threads: Option<usize>,
 }
 
-/// A setting and what it was measured to be worth.
+/// Settings of the solver with their measured time and error.
 #[derive(Clone, Debug, Serialize)]
 pub struct Measured {
-    /// The setting in a few words.
+    /// Short name of the settings.
     pub name: String,
-    /// Its `[solver]` table.
+    /// The settings as a `[solver]` table.
     pub solver: String,
     /// Mean time of a frame in ms, of each frame's fastest.
     pub ms: f64,
-    /// That of the slowest frame.
+    /// Time of the slowest frame in ms.
     pub slowest_ms: f64,
-    /// How far it is from the reference.
+    /// Error against the reference.
     pub error: Deviation,
-    /// Whether it is what the scene has.
-    pub of_the_scene: bool,
-    /// Whether no other one is as fast and as accurate.
+    /// Whether these are the settings of the scene.
+    pub is_scene_setting: bool,
+    /// Whether no other settings are both as fast and as accurate.
     pub non_dominated: bool,
 }
 
-/// What is measured against.
+/// The reference of an [`Advice`].
 #[derive(Clone, Debug, Serialize)]
-pub struct Against {
-    /// Where it comes from.
+pub struct ReferenceSummary {
+    /// Method that computed the reference.
     pub kind: ReferenceKind,
-    /// Why not from Newton's method.
+    /// Reason for not using Newton's method.
     pub why_not_newton: Option<String>,
-    /// Steps of a frame in its three runs.
+    /// Steps of a frame in the three runs of the reference.
     pub steps: [u32; 3],
-    /// The order of convergence they show; absent where they do not differ.
+    /// Order of convergence of the three runs; absent if they do not differ.
     pub order: Option<f64>,
-    /// What may be left of its error.
+    /// Estimate of the reference's own error.
     pub left: Deviation,
 }
 
-/// The answer.
+/// Result of [`advise`]: measured settings and the recommended ones.
 #[derive(Clone, Debug, Serialize)]
 pub struct Advice {
-    /// Time budget of a frame in ms, from [`Question::budget_ms`].
+    /// Time budget of a frame in ms, from [`AdviseSettings::budget_ms`].
     pub budget_ms: f64,
-    /// Number of measured frames, from [`Question::frames`].
+    /// Number of measured frames, from [`AdviseSettings::frames`].
     pub frames: u32,
     /// Tets of the scene before all cuts.
     pub tets: usize,
     /// Substeps of a frame that bring kappa to 0.5.
     pub accurate_substeps: u32,
-    /// What errors are measured against.
-    pub reference: Against,
-    /// All that was measured, by rising time.
+    /// The reference that errors are measured against.
+    pub reference: ReferenceSummary,
+    /// Measured settings by rising time.
     pub measured: Vec<Measured>,
-    /// Settings that are far too slow for the budget or that the scene cannot be run with, by name.
+    /// Names of settings that are far too slow for the budget or not possible for the scene.
     pub left_out: Vec<String>,
-    /// The most accurate that meets the budget, by its number in `measured`; absent if none does.
+    /// Index in `measured` of the most accurate settings within the budget; absent if there are none.
     pub best: Option<usize>,
-    /// The fastest that is more accurate than the best, or, without one, the fastest of all.
+    /// Index in `measured` of the fastest settings that are more accurate than `best`, or without `best` the fastest of
+    /// all.
     pub next: Option<usize>,
 }
 
-/// Settings with the accuracy that they have by default, for comparison with those that name it.
+/// Returns settings with their default accuracy filled in, for comparison with settings that state it.
 fn with_default_accuracy(spec: &SolverSpec) -> SolverSpec {
     let is_default = spec.method == Method::Auto && spec.budget_ms.is_none();
     SolverSpec {
@@ -119,7 +119,7 @@ fn with_default_accuracy(spec: &SolverSpec) -> SolverSpec {
     }
 }
 
-/// Frames enough for a scene's strokes and handles and for half a second, at most 100.
+/// Returns the number of frames that covers a scene's strokes and attachments and half a second, at most 100.
 #[must_use]
 pub fn default_frames(scene: &Scene) -> u32 {
     #[expect(
@@ -134,11 +134,11 @@ pub fn default_frames(scene: &Scene) -> u32 {
     frames.max(needed).min(MOST_FRAMES)
 }
 
-/// Measures what settings of a scene's solver cost and are worth on this machine, and picks.
+/// Measures time and error of solver settings for a scene on this machine, and recommends settings for a time budget.
 ///
 /// ```
 /// use incise::Scene;
-/// use incise::advise::{Question, advise};
+/// use incise::advise::{AdviseSettings, advise};
 ///
 /// let scene = Scene::from_toml(
 ///     r#"
@@ -149,7 +149,7 @@ pub fn default_frames(scene: &Scene) -> u32 {
 ///     fixed = [{ half_space = { point = [-0.45, 0.0, 0.0], normal = [-1.0, 0.0, 0.0] } }]
 ///     "#,
 /// )?;
-/// let question = Question { budget_ms: 1e3, frames: 2, threads: Some(1) };
+/// let question = AdviseSettings { budget_ms: 1e3, frames: 2, threads: Some(1) };
 /// let advice = advise(&scene, &question)?;
 /// let best = &advice.measured[advice.best.expect("a second is enough")];
 /// println!("{}: {:.2} ms, {:.3} % off\n{}", best.name, best.ms, best.error.largest, best.solver);
@@ -158,9 +158,9 @@ pub fn default_frames(scene: &Scene) -> u32 {
 /// ```
 ///
 /// # Errors
-/// [`Error::Value`] for a question out of its range, and as [`Simulation::new`] for the scene.
-pub fn advise(scene: &Scene, question: &Question) -> Result<Advice, Error> {
-    let Question {
+/// [`Error::Value`] if a value of the question lies outside its range; the errors of [`Simulation::new`] for the scene.
+pub fn advise(scene: &Scene, question: &AdviseSettings) -> Result<Advice, Error> {
+    let AdviseSettings {
         budget_ms,
         frames,
         threads,
@@ -225,7 +225,7 @@ pub fn advise(scene: &Scene, question: &Question) -> Result<Advice, Error> {
             ms: motion.ms_per_frame(),
             slowest_ms: motion.slowest_ms(),
             error: motion.deviation(&reference.motion),
-            of_the_scene: *i == 0,
+            is_scene_setting: *i == 0,
             non_dominated: false,
         });
     }
@@ -245,7 +245,7 @@ pub fn advise(scene: &Scene, question: &Question) -> Result<Advice, Error> {
         frames,
         tets,
         accurate_substeps: substeps,
-        reference: Against {
+        reference: ReferenceSummary {
             kind: reference.kind,
             why_not_newton: reference.why_not_newton,
             steps: reference.steps,
@@ -259,7 +259,8 @@ pub fn advise(scene: &Scene, question: &Question) -> Result<Advice, Error> {
     })
 }
 
-/// By Newton's method if that can do the scene in reasonable time, else by the solver itself.
+/// Computes the reference by Newton's method if it supports the scene in reasonable time, otherwise by the solver
+/// itself.
 fn reference_of(
     scene: &Scene,
     tets: usize,
@@ -280,8 +281,8 @@ fn reference_of(
     Ok(reference)
 }
 
-/// The most accurate of a front that meets a budget, and the next that is more accurate: without the first, the fastest
-/// of all. A front rises in time and falls in error.
+/// Returns the most accurate point of a front within a budget, and the next more accurate one; without the first, the
+/// fastest of all. A front rises in time and falls in error.
 fn pick(points: &[[f64; 2]], front: &[usize], budget: f64) -> (Option<usize>, Option<usize>) {
     let meets = front.partition_point(|&i| points[i][0] <= budget);
     (

@@ -1,9 +1,9 @@
-//! [`Motion`]: where a scene's particles are after each frame and how long that took; [`Deviation`]: how far two motions
-//! are apart.
+//! [`Motion`]: positions of a scene's particles after each frame, and times; [`Deviation`]: the difference of two
+//! motions.
 //!
-//! Motions are compared at the particles that the scene starts with: cuts change no number, and what they add depends on
-//! where the body is when it is cut. Cost: a copy of the positions and a pass over the tets after each frame, which is
-//! not counted as time of the frame.
+//! Motions are compared at the particles that the scene starts with: cuts do not change their numbers, and the
+//! particles that cuts add depend on the position of the body. Cost: a copy of the positions and a pass over the tets
+//! after each frame, not counted as time of the frame.
 
 use std::time::Instant;
 
@@ -25,31 +25,29 @@ pub struct Motion {
     pub positions: Vec<DVec3>,
     /// The volume after each frame, as a part of that at rest.
     pub volumes: Vec<f64>,
-    /// What each frame took in ms; empty for a limit that no run has reached.
+    /// Time of each frame in ms; empty for an extrapolated motion.
     pub ms: Vec<f64>,
 }
 
-/// How far a motion is from another one, in %.
+/// Difference of two motions in %.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Deviation {
-    /// Of the positions: the root mean square distance of all particles in all frames, as a part of that of what it is
-    /// compared with from its start.
+    /// Root mean square distance of all particles in all frames, relative to the displacements from the start in the
+    /// motion compared with.
     pub motion: f64,
-    /// Of the positions, the largest of all frames: the root mean square distance of the particles, as a part of the
-    /// size of what moves.
+    /// Largest root mean square distance of the particles in a frame, relative to the size of the scene.
     pub largest: f64,
-    /// Of the positions, in the last frame: the root mean square distance of the particles, as a part of the size of
-    /// what moves.
+    /// Root mean square distance of the particles in the last frame, relative to the size of the scene.
     pub end: f64,
-    /// Of the volume, the largest of all frames, as a part of that at rest.
+    /// Largest difference of the volume in a frame, relative to the volume at rest.
     pub volume: f64,
 }
 
 impl Motion {
     /// Runs a scene for some frames, on `threads` threads or on rayon's pool.
     ///
-    /// A frame's time is that of [`Simulation::step`] and [`Simulation::read_back`]: on a device it includes the way
-    /// back of the positions.
+    /// The time of a frame is that of [`Simulation::step`] and [`Simulation::read_back`]; on a device it includes
+    /// reading the positions back.
     ///
     /// # Errors
     /// If the scene or one of its strokes is refused.
@@ -75,7 +73,7 @@ impl Motion {
         Ok(motion)
     }
 
-    /// Of no frames, with the first `particles` of a mesh.
+    /// Returns a motion without frames, of the first `particles` of a mesh.
     pub(super) fn still(mesh: &TetMesh, particles: usize) -> Self {
         let low = mesh
             .positions
@@ -99,7 +97,7 @@ impl Motion {
         self.volumes.push(volume);
     }
 
-    /// The mean time of a frame in ms; 0 if nothing was timed.
+    /// Mean time of a frame in ms; 0 without timed frames.
     #[must_use]
     pub fn ms_per_frame(&self) -> f64 {
         self.ms.iter().sum::<f64>() / self.ms.len().max(1) as f64
@@ -124,7 +122,7 @@ impl Motion {
         }
     }
 
-    /// How far it is from what it should be. Whatever diverged is finite here, too.
+    /// Returns the deviation from another motion. A diverged motion gives a finite value, too.
     ///
     /// # Panics
     /// If the motions are not of the same particles and frames.
@@ -165,7 +163,7 @@ impl Motion {
         deviation
     }
 
-    /// A linear combination; it has taken no time.
+    /// Returns a linear combination of two motions, without times.
     pub(super) fn combined(&self, a: f64, other: &Self, b: f64) -> Self {
         let positions = self.positions.iter().zip(&other.positions);
         let volumes = self.volumes.iter().zip(&other.volumes);

@@ -1,9 +1,9 @@
-//! [`Newton`]: a scene by implicit Euler and Newton's method, if it has only what the reference knows.
+//! [`Newton`]: a scene solved by implicit Euler and Newton's method, if the reference supports its features.
 //!
-//! The reference of `incise-reference` knows tets, fixed particles and gravity. A rigid handle is a fixed particle that
-//! is moved, along the same way within a frame as in the solver. Strokes of frame 0 act before anything has moved, so
-//! the body is given to the reference as they leave it. A link of no length and no compliance makes two particles one.
-//! Everything else (obstacles, damping, springs, later strokes) is refused with a message.
+//! `incise-reference` supports tets, fixed particles and gravity. A rigid attachment becomes a moving fixed particle,
+//! on the path of the solver within a frame. Strokes of frame 0 act before any motion, so the reference gets the body
+//! after them. A distance constraint without length and compliance merges two particles. Everything else (obstacles,
+//! damping, springs, later strokes) is an error.
 //!
 //! Source: `incise-reference`. Cost: some sparse factorizations a step.
 
@@ -16,31 +16,31 @@ use crate::backend::{AnySolver, each};
 use crate::island::Island;
 use crate::{Error, Scene, Simulation};
 
-/// A scene that the reference can do.
+/// A scene that the reference solver supports.
 #[derive(Debug)]
 pub(super) struct Newton {
     simulation: Simulation,
     parts: Vec<Part>,
     time_step: f64,
     gravity: DVec3,
-    /// How many particles there are before all cuts.
+    /// Number of particles before all cuts.
     particles: usize,
 }
 
-/// An island of bodies as the reference sees it.
+/// An island of bodies as a body of the reference solver.
 #[derive(Debug)]
 struct Part {
     mesh_at_rest: Vec<DVec3>,
     tets: Vec<[u32; 4]>,
     materials: Vec<Material>,
     fixed: Vec<bool>,
-    /// For each particle that of the reference's body: less than its number where links have made two of them one.
+    /// Particle -> particle of the reference's body: the lower of two particles that a distance constraint merges.
     seat: Vec<u32>,
-    /// What is moved: the handle, the particle and its place in the handle's frame.
+    /// Attached particles: attachment, particle, and its position in the attachment's frame.
     held: Vec<(usize, usize, DVec3)>,
 }
 
-/// What keeps a scene from the reference, in words that complete "the scene has".
+/// Returns the first feature of a scene that the reference does not support, in words that complete "the scene has".
 pub(super) fn obstacle(scene: &Scene) -> Option<&'static str> {
     let links = |f: fn(&crate::scene::DistanceSpec) -> bool| scene.distance.iter().any(f);
     let later = |stroke: &crate::scene::StrokeSpec| stroke.last_frame() > 0;
@@ -186,7 +186,7 @@ impl Part {
     }
 }
 
-/// For each particle the lowest one that links tie it to.
+/// Particle -> lowest particle that rigid distance constraints merge it with.
 fn seats(solver: &AnySolver, particles: usize) -> Vec<u32> {
     let mut seat: Vec<u32> = (0..).take(particles).collect();
     let pairs: Vec<[u32; 2]> = each!(solver, solver => {

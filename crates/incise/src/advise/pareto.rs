@@ -1,11 +1,10 @@
-//! [`non_dominated`]: which of several measured settings are worth considering at all.
+//! [`non_dominated`]: the Pareto front of measured settings.
 //!
-//! A setting is dominated if another one is as fast and as accurate, and better in one of both. What is left is the
-//! Pareto front: along it speed can only be had for accuracy. Source: Kung, Luccio and Preparata 1975, in two
-//! dimensions. Cost: O(n log n).
+//! A setting is dominated if another one is as fast and as accurate, and better in one of both. The others form the
+//! Pareto front. Source: Kung, Luccio and Preparata 1975, in two dimensions. Cost: O(n log n).
 
-/// The numbers of the points that no other point dominates, by rising first coordinate (so falling second one). Of equal
-/// points the first is kept; points that are not finite are not considered.
+/// Returns the indices of the points that no other point dominates, by rising first and thus falling second coordinate.
+/// Of equal points the first is kept; points that are not finite are ignored.
 ///
 /// ```
 /// use incise::advise::non_dominated;

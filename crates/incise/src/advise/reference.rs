@@ -1,10 +1,10 @@
-//! [`Reference`]: what the motion of a scene should be, and how well that is known.
+//! [`Reference`]: the motion of a scene to compare with, and its estimated error.
 //!
-//! By Newton's method where `incise-reference` knows all that the scene has: implicit Euler at three step sizes, from
-//! which Richardson's extrapolation removes the first two orders of the error; how much removing the second has changed
-//! is what may be left. Otherwise by the solver itself, Gauss-Seidel in double precision with one iteration and three
-//! numbers of substeps: the finest run counts as it is, and what may be left is its distance from the next coarser one.
-//! The second kind is no proof: it shows where the solver goes, not that it goes to the right place.
+//! Newton's method is used where `incise-reference` supports the scene: implicit Euler at three step sizes, from which
+//! Richardson's extrapolation removes the first two orders of the error. The change by the second extrapolation is the
+//! estimated error. Otherwise the solver itself is used, Gauss-Seidel in double precision with one iteration and three
+//! numbers of substeps: the finest run counts, and its distance from the next coarser one is the estimated error. The
+//! second kind shows the limit of the solver and does not prove that it is correct.
 //!
 //! Source: Richardson 1911. Cost: seven times the coarsest run.
 
@@ -15,7 +15,7 @@ use super::newton::{Newton, obstacle};
 use crate::Error;
 use crate::scene::{Backend, Method, Precision, Scene, SolverSpec, Substeps};
 
-/// Where a reference comes from.
+/// Method that computes a reference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ReferenceKind {
@@ -25,32 +25,32 @@ pub enum ReferenceKind {
     Xpbd,
 }
 
-/// What a motion should be.
+/// A motion to compare with, and its estimated error.
 #[derive(Clone, Debug)]
 pub struct Reference {
     /// The motion.
     pub motion: Motion,
-    /// What may be left of its error.
+    /// Estimate of the error of `motion`.
     pub left: Deviation,
-    /// Where it comes from.
+    /// Method that computed `motion`.
     pub kind: ReferenceKind,
-    /// Why Newton's method was not taken.
+    /// Reason for not using Newton's method.
     pub why_not_newton: Option<String>,
     /// The steps, or substeps, of a frame in each of the three runs.
     pub steps: [u32; 3],
-    /// How far each of the three runs is from `motion`.
+    /// Deviation of each of the three runs from `motion`.
     pub errors: [Deviation; 3],
-    /// The order of convergence that the three runs show, by the largest differences of their positions: `log2` of how
-    /// much less the two finer runs differ than the two coarser ones. Not finite if they do not differ.
+    /// Order of convergence of the three runs, by the largest differences of their positions: `log2` of the ratio of
+    /// the difference of the two coarser runs to that of the two finer ones. Not finite if they do not differ.
     pub order: f64,
 }
 
 impl Reference {
-    /// By Newton's method with `steps`, twice and four times as many steps a frame.
+    /// Computes a reference by Newton's method with `steps`, twice and four times as many steps a frame.
     ///
     /// # Errors
-    /// Returns [`Error::Advise`] if the scene has something that the reference does not know or a step cannot be
-    /// solved, and the errors of [`crate::Simulation::new`].
+    /// Returns [`Error::Advise`] if the reference does not support a feature of the scene or cannot solve a step, and
+    /// the errors of [`crate::Simulation::new`].
     pub fn newton(scene: &Scene, frames: u32, steps: u32) -> Result<Self, Error> {
         let newton = newton(scene)?;
         let steps = [1, 2, 4].map(|n| n * steps.max(1));
@@ -69,7 +69,8 @@ impl Reference {
         ))
     }
 
-    /// By the solver itself with `substeps`, twice and four times as many substeps a frame, all bodies with the same.
+    /// Computes a reference by the solver itself with `substeps`, twice and four times as many substeps a frame for all
+    /// bodies.
     ///
     /// # Errors
     /// Returns the errors of [`Motion::of`].
@@ -120,7 +121,7 @@ impl Reference {
     }
 }
 
-/// The motion of a scene by implicit Euler and Newton's method with `steps` steps a frame.
+/// Computes the motion of a scene by implicit Euler and Newton's method with `steps` steps a frame.
 ///
 /// # Errors
 /// Returns the errors of [`Reference::newton`].
@@ -142,7 +143,7 @@ fn run(newton: &Newton, frames: u32, steps: u32) -> Result<Motion, Error> {
     motion.map_err(|error| Error::Advise(format!("the reference fails: {error}")))
 }
 
-/// The scene with other settings for all bodies, reporting nothing but times.
+/// Returns the scene with other solver settings for all bodies, and reports of times only.
 #[must_use]
 pub fn with(scene: &Scene, solver: &SolverSpec) -> Scene {
     let mut scene = scene.clone();

@@ -1,10 +1,10 @@
-//! [`check`]: ranges of settings that can be told from the scene alone.
+//! [`check`]: checks ranges of settings that do not depend on meshes.
 
 use super::Scene;
 use crate::Error;
 use crate::validate::value;
 
-/// Refuses settings of the solver that are out of their ranges, whatever the bodies are.
+/// Checks the ranges of solver settings, without looking at bodies.
 pub(crate) fn check(scene: &Scene) -> Result<(), Error> {
     if let Some(accuracy) = scene.solver.accuracy
         && !(accuracy > 0.0 && accuracy <= 1.0)

@@ -18,7 +18,7 @@ pub struct DistanceSpec {
     #[serde(default)]
     #[schemars(extend("unit" = "m/N"), range(min = 0.0, max = 1e9))]
     pub compliance: f64,
-    /// Whether it acts only while it is longer than at rest, like a thread.
+    /// Act only while longer than at rest, like a thread.
     #[serde(default)]
     pub tension_only: bool,
 }

@@ -1,6 +1,10 @@
-//! [`line_of`]: where in the text of a scene a key is, so that an error about a value can name its line.
+//! [`line_of`]: the line of a key in the text of a scene, for errors about its value.
+
+use std::path::Path;
 
 use toml::de::{DeTable, DeValue};
+
+use crate::Error;
 
 /// The line, counted from 1, of a key such as `body[0].young_modulus` in the TOML text of a scene; that of the table or list
 /// around it if the text does not name the key itself, since its default applies. `None` if nothing of it is there. O(text).
@@ -25,7 +29,7 @@ pub fn line_of(text: &str, key: &str) -> Option<usize> {
         let Some((key, value)) = found else {
             break;
         };
-        let mut place = key.span().start;
+        let mut start = key.span().start;
         let mut value = value;
         for index in indices.split(['[', ']']).filter(|index| !index.is_empty()) {
             let (DeValue::Array(items), Ok(index)) = (value.get_ref(), index.parse::<usize>())
@@ -34,9 +38,9 @@ pub fn line_of(text: &str, key: &str) -> Option<usize> {
             };
             // A list that is too short does not have it.
             value = items.get(index)?;
-            place = value.span().start;
+            start = value.span().start;
         }
-        at = Some(place);
+        at = Some(start);
         match value.get_ref() {
             DeValue::Table(inside) => table = inside,
             _ => break,
@@ -44,6 +48,15 @@ pub fn line_of(text: &str, key: &str) -> Option<usize> {
     }
     let before = text.get(..at?)?;
     Some(1 + before.matches('\n').count())
+}
+
+/// Where in a scene file the key of an error is, as `scene.toml: line 6`; `None` if the error is about no key or the file
+/// has no trace of it. Reads the file.
+#[must_use]
+pub fn location(path: &Path, error: &Error) -> Option<String> {
+    let text = std::fs::read_to_string(path).ok()?;
+    let line = line_of(&text, &error.key()?)?;
+    Some(format!("{}: line {line}", path.display()))
 }
 
 #[cfg(test)]

@@ -49,7 +49,7 @@ pub enum TetSolve {
     /// A shear part and a volume part that both vanish at rest: bounded at any stiffness.
     #[default]
     Split,
-    /// `|F|` and `det F` as one system of two unknowns: unstable from a kappa of about 2 on unless `kappa_limit` softens.
+    /// `|F|` and `det F` as one system of two unknowns: stable up to a kappa of 1, unstable from 4 on unless `kappa_limit` softens.
     Block,
     /// `|F|` and `det F` in sequence, the paper's form.
     Sequential,

@@ -41,10 +41,17 @@ fn without_null(schema: &mut Schema) {
     if let Some(Value::Array(choices)) = object.get_mut("anyOf") {
         choices.retain(|choice| choice["type"] != "null");
         if let [choice] = &choices[..] {
-            // Validators of this draft ignore all keys beside a reference.
             let choice = choice.clone();
             object.remove("anyOf");
-            object.insert("allOf".to_owned(), Value::Array(vec![choice]));
+            match choice {
+                Value::Object(keys) if !keys.contains_key("$ref") => {
+                    object.extend(keys);
+                }
+                // Validators of this draft ignore all keys beside a reference.
+                choice => {
+                    object.insert("allOf".to_owned(), Value::Array(vec![choice]));
+                }
+            }
         }
     }
     if object.get("default") == Some(&Value::Null) {

@@ -1,6 +1,6 @@
-//! [`SolverSpec`]: how a scene is computed.
+//! [`SolverSpec`]: solver settings of a scene.
 //!
-//! Keys that a scene names replace those of its preset or method, which are sets of other defaults.
+//! Keys of a scene override the defaults of its preset or method.
 
 use std::num::NonZeroU32;
 
@@ -57,7 +57,7 @@ pub struct SolverSpec {
     /// extrapolation would amplify.
     #[schemars(range(min = 1))]
     pub chebyshev_start: u32,
-    /// For VBD: whether each sweep is followed by a coarse correction of the whole body, which costs some 100 sweeps.
+    /// For VBD: follow each sweep by a coarse correction of the whole body, which costs as much as about 100 sweeps.
     #[serde(skip_serializing_if = "is_false")]
     #[schemars(extend("default" = false))]
     pub two_level: bool,
@@ -67,7 +67,7 @@ pub struct SolverSpec {
     pub integrator: Integrator,
     /// Clustering of the tets: `none`, `serial:K` or `pressure:K`, with K tets a cluster.
     pub clustering: String,
-    /// Whether clusters that a cut leaves small are merged with neighbors. A cut then costs a little more and frames after
+    /// Merge clusters that a cut leaves small with their neighbors. A cut then costs a little more and frames after
     /// many cuts cost less; without it clusters shrink and colors grow with every cut, as in the paper.
     #[serde(skip_serializing_if = "is_true")]
     #[schemars(extend("default" = true))]
@@ -218,9 +218,9 @@ fn is_true(flag: &bool) -> bool {
 }
 
 impl SolverSpec {
-    /// The defaults that go with a method: those of [`SolverSpec::default`], but
+    /// Returns the defaults of a method: those of [`SolverSpec::default`], with these differences:
     ///
-    /// * Jacobi, Chebyshev and VBD take 20 `iterations`, as one of theirs does little;
+    /// * Jacobi, Chebyshev and VBD take 20 `iterations`, since one of theirs converges little;
     /// * Jacobi and Chebyshev have a `relaxation` of 0.1: with 1 they overshoot where more than two tets meet;
     /// * VBD takes one substep, as it is stable at any stiffness.
     ///
@@ -243,15 +243,14 @@ impl SolverSpec {
         spec
     }
 
-    /// The setting of the paper's experiments: frames of 0.016 s in a single step of many iterations, one constraint of
-    /// a tet after the other, relaxation 0.8 for Gauss-Seidel and 0.1 for Jacobi and Chebyshev (table 3), SCGC colors
-    /// on serial clusters of 10 that are never merged, nothing softened. The paper's convergence experiments take 500 iterations (section
-    /// 5.1.1); how many its animations take it does not say. It has no VBD; with that, the keys that only
-    /// constraints have keep their defaults.
+    /// Returns the settings of the paper's experiments: frames of 0.016 s in a single step of 500 iterations (section
+    /// 5.1.1), sequential constraints, relaxation 0.8 for Gauss-Seidel and 0.1 for Jacobi and Chebyshev (table 3), SCGC
+    /// colors on serial clusters of 10 that are never merged, no softening. The paper does not state the iterations of
+    /// its animations. It has no VBD; with VBD, keys of constraints keep their defaults.
     ///
-    /// It is there to compare with, not to use: its kappa is far beyond what is accurate or even stable, as the paper's
-    /// body has `young_modulus = 1e7`, `poisson_ratio = 0.49` and `damping = 0.05` (section 5.2; it does not give size
-    /// and density).
+    /// For comparison only: kappa is far beyond what is accurate or stable, because the paper's body has
+    /// `young_modulus = 1e7`, `poisson_ratio = 0.49` and `damping = 0.05` (section 5.2, which does not state size and
+    /// density).
     ///
     /// ```
     /// let scene = incise::Scene::from_toml("[solver]\npreset = \"paper\"\niterations = 20")?;
@@ -284,7 +283,7 @@ impl SolverSpec {
         }
     }
 
-    /// What a scene's text says about the solver, over the defaults of the preset and the method that it names.
+    /// Returns the solver settings of a scene's text over the defaults of the preset and method that it names.
     pub(crate) fn with_defaults(self, text: &str) -> Result<Self, Error> {
         let defaults = match self.preset {
             Some(Preset::Paper) => Self::paper(self.method),

@@ -1,7 +1,7 @@
-//! [`StrokeSpec`]: a cut, as a scene file describes it.
+//! [`StrokeSpec`]: a cut in a scene file.
 //!
-//! Every kind names the frame at whose start it acts, in the space where the body is then. What is carried out:
-//! `tool.rs` checks and prepares, `strokes.rs` cuts.
+//! Every kind states the frame at whose start it acts, in the world coordinates of that frame. `tool.rs` checks and
+//! prepares the geometry; `strokes.rs` cuts.
 
 use glam::DVec3;
 use schemars::JsonSchema;
@@ -74,8 +74,8 @@ pub enum StrokeSpec {
         #[schemars(range(min = 0.0, max = 0.25))]
         snap: f64,
     },
-    /// A cut around a region, made at once: the inside comes off as a plug.
-    Plug {
+    /// A cut around a region, made at once: the inside comes off as a piece.
+    Punch {
         /// Frame at whose start the cut is made.
         frame: u64,
         /// Region that is cut out, in the world at that frame; not `particles` or `tets`.
@@ -111,14 +111,14 @@ impl StrokeSpec {
             Self::Plane { frame, .. }
             | Self::Rectangle { frame, .. }
             | Self::Surface { frame, .. }
-            | Self::Plug { frame, .. }
+            | Self::Punch { frame, .. }
             | Self::Remove { frame, .. } => *frame,
             Self::Sweep { frames, .. } => frames[1],
         }
     }
 
-    /// Where the blade is at the start of a frame, a polyline in m; `None` before it begins, after it has ended, for strokes
-    /// that cut at once, and for a path that no simulation takes. The same arithmetic as that of the cut.
+    /// Returns the blade at the start of a frame, a polyline in m; `None` before the stroke begins, after it has ended,
+    /// for strokes that cut at once, and for an invalid path. Bit-identical to the blade of the simulation.
     ///
     /// ```
     /// use incise::Scene;

@@ -1,4 +1,4 @@
-//! [`Substeps`]: how many substeps a frame has.
+//! [`Substeps`]: number of substeps of a frame.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{Unexpected, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// How many substeps a frame has: in a scene a number, or `"auto"`.
+/// Number of substeps of a frame: in a scene a number, or `"auto"`.
 ///
 /// ```
 /// use incise::{Scene, scene::Substeps};
@@ -18,11 +18,11 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Substeps {
-    /// This many, at least 1.
+    /// A fixed number, at least 1.
     Fixed(u32),
-    /// For each body the fewest that solve its tets with the accuracy wanted, few slivers left aside, but no more than
-    /// `max_substeps`. The number rises, at most to twice itself, when cuts leave more than 1% of the
-    /// volume outside that accuracy.
+    /// Chosen for each body: the fewest substeps that reach the accuracy wanted, except for a few slivers, and at most
+    /// `max_substeps`. The number rises, at most to twice itself, when cuts leave more than 1% of the volume outside
+    /// the accuracy.
     Auto,
 }
 

@@ -1,8 +1,8 @@
 //! [`SimulationBuilder`]: a simulation from meshes in memory.
 //!
-//! A program that has its own meshes needs no scene file: it adds bodies, obstacles, attachments and strokes, and builds.
-//! A builder is a [`Scene`] and the meshes that the scene does not name, so both ways lead to the same simulation, bit
-//! for bit. Cost: that of the simulation.
+//! A program with its own meshes needs no scene file: it adds bodies, obstacles, attachments and strokes. The builder
+//! holds a [`Scene`] and the meshes in memory, so both ways give bit-identical simulations. Cost: that of the
+//! simulation.
 
 #[cfg(feature = "gpu")]
 use std::sync::Arc;
@@ -76,7 +76,7 @@ impl Body {
         self
     }
 
-    /// Sets where the origin of the mesh goes, in m.
+    /// Sets the position of the mesh's origin in m.
     #[must_use]
     pub fn position(mut self, position: DVec3) -> Self {
         self.spec.position = position.to_array();
@@ -115,17 +115,17 @@ impl Body {
 pub struct BodyHandle(pub(super) usize);
 
 impl BodyHandle {
-    /// The index: that of `body` in reports, attachments and distances.
+    /// Returns the index, which reports, attachments and distances use as `body`.
     #[must_use]
     pub fn index(self) -> usize {
         self.0
     }
 }
 
-/// Sets a simulation up from meshes in memory: [`Simulation::builder`].
+/// Builder of a simulation from meshes in memory; see [`Simulation::builder`].
 ///
 /// # Example
-/// A bar of jelly that is held at one end and cut through.
+/// A soft bar that is fixed at one end and cut through.
 /// ```
 /// use incise::meshing::{Shape, generate};
 /// use incise::mesh::glam::DVec3;
@@ -187,13 +187,13 @@ impl SimulationBuilder {
         self
     }
 
-    /// Sets how bodies are solved. The defaults choose method, substeps and precision for an error of 10% of the motion.
+    /// Sets the solver settings. The defaults choose method, substeps and precision for an error of 10% of the motion.
     pub fn solver(&mut self, solver: SolverSpec) -> &mut Self {
         self.scene.solver = solver;
         self
     }
 
-    /// Sets what frames report beside times and counts.
+    /// Sets the quantities that frames report besides times and counts.
     pub fn report(&mut self, report: ReportSpec) -> &mut Self {
         self.scene.report = report;
         self
@@ -221,7 +221,7 @@ impl SimulationBuilder {
         handle
     }
 
-    /// Adds an obstacle, which [`Simulation::move_collider`] moves.
+    /// Adds an obstacle. [`Simulation::move_collider`] moves it.
     pub fn add_collider(&mut self, collider: ColliderSpec) -> ColliderHandle {
         let handle = ColliderHandle::of_scene(self.scene.collider.len());
         self.scene.collider.push(collider);
@@ -251,8 +251,8 @@ impl SimulationBuilder {
     /// Builds the simulation.
     ///
     /// # Errors
-    /// If there is no body, a value lies outside its range, a mesh is broken or cannot be read, a pinned particle does not
-    /// exist, the threads cannot be started, or the device cannot do what is asked for.
+    /// If there is no body, a value lies outside its range, a mesh is invalid or cannot be read, a pinned particle does
+    /// not exist, the threads cannot be started, or the device does not support the settings.
     pub fn build(self) -> Result<Simulation, Error> {
         let scene = self.scene;
         #[cfg(feature = "gpu")]

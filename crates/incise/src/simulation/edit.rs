@@ -1,7 +1,7 @@
-//! What a program changes between frames: bodies, gravity, colliders, attachments, distances, impulses; and what it asks, by rays.
+//! Changes between frames: bodies, gravity, colliders, attachments, distances, impulses; and ray casts.
 //!
-//! Every island of bodies has the colliders of the world among its settings, so a change goes to all of them. Cost: that of
-//! the change; an impulse wakes what sleeps and, on a device, fetches the positions.
+//! Every island of bodies has a copy of the colliders in its settings, so a change goes to all of them. Cost: that of
+//! the change; an impulse wakes the bodies and, on a device, reads the positions back.
 
 use std::sync::Arc;
 
@@ -25,7 +25,7 @@ use crate::validate::{LARGEST_COORDINATE, coordinates, value, within};
 use crate::{Error, Scene, body, budget, contacts};
 
 impl Simulation {
-    /// Sets the acceleration of gravity in m/s² from the next frame on; `None` is weightlessness. Wakes what sleeps.
+    /// Sets the acceleration of gravity in m/s² from the next frame on; `None` is no gravity. Wakes all bodies.
     ///
     /// # Errors
     /// If a component is not finite or beyond 1e9 m/s²; nothing has changed then.
@@ -41,13 +41,13 @@ impl Simulation {
         Ok(())
     }
 
-    /// Adds an obstacle from the next frame on. Bodies may be in its way: they are pushed out in the next substep.
+    /// Adds an obstacle from the next frame on. Bodies that overlap it are pushed out in the next substep.
     ///
     /// # Errors
     /// If a value lies outside its range; nothing has changed then.
     ///
     /// # Example
-    /// A plate comes down on a ball of jelly and is taken away again.
+    /// A plate presses a soft ball and is removed.
     /// ```
     /// use incise::meshing::{Shape, generate};
     /// use incise::mesh::glam::DVec3;
@@ -83,20 +83,20 @@ impl Simulation {
         Ok(handle)
     }
 
-    /// Has a collider go to a place in a straight line during the next frame and stay there; of several calls before a
-    /// frame the last one holds. Bodies that it touches feel its velocity. The place is that of the point of a plane,
-    /// the center of a sphere or a box, the middle of a capsule, in m.
+    /// Moves a collider in a straight line to a position during the next frame, where it stays. Of several calls before
+    /// a frame the last one counts. Contacts use its velocity. The position is the point of a plane, the center of a
+    /// sphere or a box, the middle of a capsule, in m.
     ///
     /// # Errors
     /// If the collider was removed, or a coordinate is not finite or beyond 1e9 m; nothing has changed then.
     pub fn move_collider(&mut self, handle: ColliderHandle, to: DVec3) -> Result<(), Error> {
         coordinates("collider.to", to.to_array())?;
-        self.collider_place(handle)?;
+        self.collider_index(handle)?;
         self.state.colliders.go_to(handle, to);
         Ok(())
     }
 
-    /// Makes a collider another one: shape, place, friction and velocity, from the start of the next frame on.
+    /// Replaces shape, position, friction and velocity of a collider from the start of the next frame on.
     ///
     /// # Errors
     /// If the collider was removed, or a value lies outside its range; nothing has changed then.
@@ -105,44 +105,44 @@ impl Simulation {
         handle: ColliderHandle,
         collider: &ColliderSpec,
     ) -> Result<(), Error> {
-        let place = self.collider_place(handle)?;
+        let index = self.collider_index(handle)?;
         let new = collider::collider("collider", collider)?;
         self.state.colliders.stay(handle);
         for island in &mut self.state.islands {
-            island.settings.colliders[place] = new;
+            island.settings.colliders[index] = new;
             island.wake();
         }
         Ok(())
     }
 
-    /// Where a collider is, in the sense of [`Simulation::move_collider`].
+    /// Returns the position of a collider in m, as in [`Simulation::move_collider`].
     ///
     /// # Errors
     /// If the collider was removed.
     pub fn collider_position(&self, handle: ColliderHandle) -> Result<DVec3, Error> {
-        let place = self.collider_place(handle)?;
+        let index = self.collider_index(handle)?;
         Ok(collider::position(
-            &self.state.islands[0].settings.colliders[place].shape,
+            &self.state.islands[0].settings.colliders[index].shape,
         ))
     }
 
-    /// Takes a collider away. Its handle is void from then on.
+    /// Removes a collider. Its handle becomes invalid.
     ///
     /// # Errors
     /// If it was removed before.
     pub fn remove_collider(&mut self, handle: ColliderHandle) -> Result<(), Error> {
-        let place = self.collider_place(handle)?;
-        self.state.colliders.remove(place);
+        let index = self.collider_index(handle)?;
+        self.state.colliders.remove(index);
         for island in &mut self.state.islands {
-            island.settings.colliders.remove(place);
+            island.settings.colliders.remove(index);
             island.wake();
         }
         Ok(())
     }
 
-    fn collider_place(&self, handle: ColliderHandle) -> Result<usize, Error> {
-        let place = self.state.colliders.place(handle);
-        place.ok_or_else(|| removed("collider", handle))
+    fn collider_index(&self, handle: ColliderHandle) -> Result<usize, Error> {
+        let index = self.state.colliders.index(handle);
+        index.ok_or_else(|| removed("collider", handle))
     }
 
     /// Changes friction, thickness, recovery time and self-contact of what is made of tets from the next frame on, and
@@ -192,10 +192,10 @@ impl Simulation {
         Ok(())
     }
 
-    /// Holds part of a body from the next frame on: its particles that lie at rest in the regions of the attachment. They
-    /// stay where they are until the attachment moves, by its path from the frames that it names, or by
-    /// [`Simulation::move_attachment`]. O(particles of the body); with a compliance of 0 the next step lays out all tets
-    /// again. On a device the positions are fetched.
+    /// Attaches part of a body from the next frame on: the particles that lie at rest in the regions of the attachment.
+    /// They stay in place until the attachment moves, by its path in the frames that it states, or by
+    /// [`Simulation::move_attachment`]. O(particles of the body); with a compliance of 0 the next step rebuilds the
+    /// layout of all tets. On a device the positions are read back.
     ///
     /// # Errors
     /// If the body does not exist, a value lies outside its range, another attachment or a grab holds one of the particles,
@@ -210,17 +210,17 @@ impl Simulation {
     /// let scene = Scene::from_toml("[[body]]\nshape = { kind = \"beam\", tets = 300 }")?;
     /// let mut simulation = Simulation::new(&scene)?;
     /// let end = Region::HalfSpace { point: [0.45, 0.0, 0.0], normal: [1.0, 0.0, 0.0] };
-    /// let grip = simulation.add_attachment(&AttachmentSpec::new(0, vec![end]))?;
+    /// let attachment = simulation.add_attachment(&AttachmentSpec::new(0, vec![end]))?;
     /// for frame in 1..=10 {
     ///     let offset = DVec3::Z * 0.01 * f64::from(frame);
-    ///     simulation.move_attachment(grip, offset, DQuat::IDENTITY)?;
+    ///     simulation.move_attachment(attachment, offset, DQuat::IDENTITY)?;
     ///     simulation.step()?;
     /// }
     /// let mesh = simulation.mesh().positions.iter();
     /// let lifted = mesh.zip(simulation.positions()).filter(|(rest, _)| rest.x >= 0.45);
     /// assert!(lifted.clone().count() > 3);
     /// assert!(lifted.clone().all(|(rest, x)| (x.z - rest.z - 0.1).abs() < 1e-6));
-    /// simulation.remove_attachment(grip)?;
+    /// simulation.remove_attachment(attachment)?;
     /// # Ok::<(), incise::Error>(())
     /// ```
     pub fn add_attachment(&mut self, spec: &AttachmentSpec) -> Result<AttachmentHandle, Error> {
@@ -233,10 +233,10 @@ impl Simulation {
         Ok(name)
     }
 
-    /// Has an attachment go within the next frame to where its particles, as they were when they were attached, are
-    /// turned by `rotation` about their center and then displaced by `offset` in m. From then on the program moves it, not
-    /// its path; until told again, it stays there. Moves of more than a tet or half a turn in a frame may turn tets
-    /// inside out for a while.
+    /// Moves an attachment during the next frame. The target pose is that of its particles when they were attached,
+    /// rotated by `rotation` about their center and then displaced by `offset` in m. From then on its path has no
+    /// effect, and it stays there until the next call. Moves of more than a tet or half a turn in a frame may invert
+    /// tets for a while.
     ///
     /// # Errors
     /// If the attachment was removed, the offset is not finite or beyond 1e9 m, or the rotation is not of length 1; nothing
@@ -255,8 +255,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// Sets the compliance by which an attachment holds each of its particles, in m/N; 0 is rigid. What is held stays
-    /// where it is at that moment. O(attached particles).
+    /// Sets the compliance of an attachment for each of its particles, in m/N; 0 is rigid. The particles stay where
+    /// they are at that moment. O(attached particles).
     ///
     /// # Errors
     /// If the attachment was removed, the compliance is not between 0 and 1e9, or the device is lost; nothing has changed
@@ -271,7 +271,8 @@ impl Simulation {
         attachment.set_compliance(solver, compliance)
     }
 
-    /// Lets go of what an attachment holds, what cuts made of it too. Its handle is void from then on.
+    /// Removes an attachment and releases its particles, including those that cuts have added. Its handle becomes
+    /// invalid.
     ///
     /// # Errors
     /// If it was removed before, or the device is lost; nothing has changed then.
@@ -298,11 +299,12 @@ impl Simulation {
         Err(removed("attachment", handle))
     }
 
-    /// Ties two particles of a body together, or of bodies that are tied together already: a suture, a rod or a spring
-    /// from the next frame on. O(particles of the bodies + distances). On a device the positions are fetched.
+    /// Adds a distance constraint (a suture, a rod or a spring) between two particles of one body, or of bodies that
+    /// distances already join, from the next frame on. O(particles of the bodies + distances). On a device the
+    /// positions are read back.
     ///
-    /// Bodies that nothing ties together have solvers of their own. To tie them while the simulation runs, declare a
-    /// distance between them before it starts, such as one that acts only under tension and is longer than the scene.
+    /// Bodies that no distance joins have separate solvers. To join them while the simulation runs, declare a distance
+    /// between them before it starts, such as one with `tension_only` that is longer than the scene.
     ///
     /// # Errors
     /// If a body does not exist, the bodies have solvers of their own, a value lies outside its range, both ends are on one
@@ -319,7 +321,7 @@ impl Simulation {
         Ok(name)
     }
 
-    /// Sets rest length in m and compliance in m/N of a distance constraint, such as of a suture that is pulled tight.
+    /// Sets rest length in m and compliance in m/N of a distance constraint, for example to tighten a suture.
     /// O(distances of its bodies).
     ///
     /// # Errors
@@ -342,7 +344,7 @@ impl Simulation {
         Err(removed("distance", handle))
     }
 
-    /// Removes a distance constraint: the suture is cut. Its handle is void from then on. O(distances of its bodies).
+    /// Removes a distance constraint. Its handle becomes invalid. O(distances of its bodies).
     ///
     /// # Errors
     /// If it was removed before, or the device is lost; nothing has changed then.
@@ -356,10 +358,10 @@ impl Simulation {
         Err(removed("distance", handle))
     }
 
-    /// Adds a body, which takes part from the next frame on, at rest. It has a solver of its own, with the present
-    /// settings. Its particles and tets get the next numbers. O(tets) of the body; of all bodies where there was one.
+    /// Adds a body at rest from the next frame on. It has its own solver with the present settings. Its particles and
+    /// tets get the next numbers. O(tets) of the body; of all bodies if there was one.
     ///
-    /// What draws the skin starts again from [`Simulation::boundary`]. On a device the positions are fetched.
+    /// Renderers must rebuild their skin from [`Simulation::boundary`]. On a device the positions are read back.
     ///
     /// # Errors
     /// If a value lies outside its range, the mesh is broken, the device is lost, or contact is declared for all pairs of
@@ -448,9 +450,9 @@ impl Simulation {
         Ok(BodyHandle(number))
     }
 
-    /// Removes a body, whatever pieces it is in, at the start of the next frame: its tets, in one of the
-    /// [`Simulation::deltas`]. Its particles stay in [`Simulation::mesh`] without tets, and attachments and distances on
-    /// them hold nothing. The numbers of other bodies stay. O(tets) of the bodies that are solved with it.
+    /// Removes a body with all its pieces at the start of the next frame. One of the [`Simulation::deltas`] then lists
+    /// its tets. Its particles stay in [`Simulation::mesh`] without tets, and attachments and distances on them have no
+    /// effect. The numbers of other bodies do not change. O(tets) of the bodies that are solved with it.
     ///
     /// # Errors
     /// If it was removed before.
@@ -492,9 +494,9 @@ impl Simulation {
         Ok(from)
     }
 
-    /// Gives what lies within a radius in m of a point an impulse in N·s, and wakes what sleeps: all particles there change
-    /// their velocity by the same amount, the impulse over their mass. What is fixed or rigidly attached takes no part. Returns whether
-    /// something was there. O(particles); on a device the positions are fetched.
+    /// Applies an impulse in N·s to the particles within a radius in m of a point: all of them change their velocity by
+    /// the impulse over their total mass. Fixed and rigidly attached particles are left out. Wakes the bodies. Returns
+    /// whether there were such particles. O(particles); on a device the positions are read back.
     ///
     /// # Errors
     /// If a component is not finite or beyond 1e9, the radius is not between 0 and 1e9 m, or the device is lost; nothing has changed then.
@@ -536,9 +538,9 @@ impl Simulation {
         Ok(true)
     }
 
-    /// Where a ray meets the bodies first, on whichever side of a boundary triangle, in the numbers of
-    /// [`Simulation::mesh`]. The direction may have any length but 0. On a device [`Simulation::read_back`] first: positions are those
-    /// of [`Simulation::positions`]. O(boundary triangles).
+    /// Returns the first intersection of a ray with the bodies, from either side of a boundary triangle, in the numbers
+    /// of [`Simulation::mesh`]. The direction may have any length but 0. Uses [`Simulation::positions`]: on a device
+    /// call [`Simulation::read_back`] first. O(boundary triangles).
     ///
     /// # Example
     /// ```
@@ -558,7 +560,7 @@ impl Simulation {
     }
 }
 
-/// The error about a handle of something that is gone.
+/// Error for the handle of a removed item.
 fn removed(field: &str, handle: impl std::fmt::Debug) -> Error {
     value(field, format!("{handle:?}"), "one that was not removed")
 }

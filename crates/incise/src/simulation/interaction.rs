@@ -1,8 +1,9 @@
-//! Hands in a [`Simulation`]: blades, grabs and velocities whose future is not known, as a viewer, a haptic device or a
-//! controller gives them.
+//! Interactive input of a [`Simulation`]: blades, grabs and velocities that a viewer, a haptic device or a controller
+//! sets frame by frame.
 //!
-//! What moves is told between two frames and carried out in the next one. Cost: that of cuts and of handles. On a device a
-//! frame with a live blade waits for the positions, and so do taking hold and letting go; moving a grab does not.
+//! Calls between two frames take effect in the next one. Cost: that of cuts and of handles. On a device a frame with a
+//! live blade waits for the positions, and so do [`Simulation::grab`] and [`Simulation::release`]; moving a grab does
+//! not.
 
 use glam::DVec3;
 
@@ -12,18 +13,19 @@ use crate::validate::{coordinates, value, within};
 use crate::{Error, Grab};
 
 impl Simulation {
-    /// Begins a stroke whose blade is moved interactively, and returns its number: faces that it lays bare are tagged
-    /// with it, as those of the scene's strokes are.
+    /// Begins a stroke whose blade is moved frame by frame, and returns its number. Faces that it opens are tagged with
+    /// this number, as those of the scene's strokes are.
     ///
     /// `blade` is a polyline of at least two points in m: its first pose, taken at the start of the next frame, which
     /// does not cut yet. `snap` is the snap distance as in [`StrokeSpec`](crate::scene::StrokeSpec), from 0 to 0.25 of an
     /// edge; scenes take 0.1 by default.
     ///
-    /// Such a stroke cuts as a sweep of the scene that comes by the same poses, to the bit. It is due in every frame
-    /// until it ends: a blade that stands still cuts a body that moves through it. Several may be held at once, more
-    /// than a tet apart where they cross.
+    /// The stroke cuts bit-identically to a sweep of the scene with the same poses. It is active in every frame until
+    /// it ends: a blade that does not move cuts a body that moves through it. Several strokes may be active at once if
+    /// they stay more than a tet apart where they cross.
     ///
-    /// Cost: as [`incise_cutting::Sweep`]; on a device every frame fetches the positions while the stroke is held.
+    /// Cost: that of [`incise_cutting::Sweep`]; on a device every frame reads the positions back while a stroke is
+    /// active.
     ///
     /// # Errors
     /// If the blade has fewer than two different points, if a coordinate is not finite or beyond 1e9 m, or if `snap` lies
@@ -51,8 +53,8 @@ impl Simulation {
         self.state.timeline.begin(blade, snap)
     }
 
-    /// Says where the blade of a stroke is at the start of the next frame; of several calls before a frame the last one
-    /// holds. Until told again, it stays there.
+    /// Sets the blade of a stroke for the start of the next frame. Of several calls before a frame the last one counts.
+    /// Without a call the blade stays in place.
     ///
     /// # Errors
     /// If the stroke was not begun by [`Simulation::begin_stroke`] or has ended, if the blade has another number of
@@ -61,8 +63,8 @@ impl Simulation {
         self.state.timeline.move_blade(stroke, blade)
     }
 
-    /// Ends a stroke: after the next frame if its blade was moved since the last one, so that no pose is lost, or else at
-    /// once. A stroke that no frame has seen leaves nothing. In either case it can be moved no more.
+    /// Ends a stroke: after the next frame if its blade was moved since the last one, otherwise at once. A stroke
+    /// without a frame leaves nothing. The stroke cannot be moved after this call.
     ///
     /// # Errors
     /// If the stroke was not begun by [`Simulation::begin_stroke`] or has ended.
@@ -70,19 +72,17 @@ impl Simulation {
         self.state.timeline.end(stroke)
     }
 
-    /// Takes hold of the body at a point, to move it by hand; `None` if there is nothing to hold.
+    /// Grabs the body at a point, to move it interactively; `None` if there is no particle to grab.
     ///
-    /// Held are the particles that lie within `radius` m of `point` now and belong to the same piece as the nearest one,
-    /// so that nothing is tied together that hangs apart. Those that are fixed or that a handle or another grab holds
-    /// stay with these; the nearest one is the nearest of the others.
+    /// Grabs the particles that are within `radius` m of `point` now and belong to the piece of the nearest one. Fixed
+    /// particles and those of attachments or other grabs are left out, also in the search for the nearest one.
     ///
-    /// `compliance` is one over the stiffness by which each particle is held, in m/N, as in
-    /// [`AttachmentSpec`](crate::scene::AttachmentSpec): 0 holds rigidly, whatever the body does, and a large one lets the
-    /// body pull away from the hand. VBD knows 0 only.
+    /// `compliance` applies to each particle, in m/N, as in [`AttachmentSpec`](crate::scene::AttachmentSpec): 0 is
+    /// rigid; with a large one the body can move away from the grab. VBD supports only 0.
     ///
-    /// A body that sleeps wakes. Cuts through what is held leave both sides held.
+    /// Wakes the body. A cut through the grabbed part leaves both sides grabbed.
     ///
-    /// O(particles); with a compliance of 0 the next step costs O(tets) more. On a device the positions are fetched.
+    /// O(particles); with a compliance of 0 the next step costs O(tets) more. On a device the positions are read back.
     ///
     /// # Errors
     /// If a coordinate is not finite or beyond 1e9 m, `radius` or `compliance` is not from 0 to 1e9, the compliance is not
@@ -129,14 +129,14 @@ impl Simulation {
         Ok(Some(grab))
     }
 
-    /// Says where the point that was grabbed is to be at the end of the next frame; of several calls before a frame the
-    /// last one holds. Until told again, it stays there.
+    /// Sets the target of a grabbed point for the end of the next frame. Of several calls before a frame the last one
+    /// counts. Without a call the point stays in place.
     ///
-    /// What is held moves there in a straight line and does not turn. The shorter the way in a frame, the better: a jump
-    /// of more than a tet may turn tets inside out for a while. O(grabs of the body), nothing waits.
+    /// The grabbed particles move there in a straight line without rotation. A jump of more than a tet in a frame may
+    /// invert tets for a while. O(grabs of the body), without waiting for a device.
     ///
     /// # Errors
-    /// If the grab was released, or if a coordinate is not finite or beyond 1e9 m. The hand stays where it was then.
+    /// If the grab was released, or if a coordinate is not finite or beyond 1e9 m. The grab does not move then.
     pub fn move_grab(&mut self, grab: Grab, to: DVec3) -> Result<(), Error> {
         coordinates("grab.to", to.to_array())?;
         let island = self.state.islands.get_mut(grab.island);
@@ -146,10 +146,10 @@ impl Simulation {
         }
     }
 
-    /// Releases a grab; what was held keeps its velocity, that of the hand in the last frame.
+    /// Releases a grab. Its particles keep the velocity of the grab in the last frame.
     ///
-    /// What cuts made of it is released, too. O(particles attached to handles); after a grab with a compliance of 0 the
-    /// next step costs O(tets) more. On a device the positions are fetched.
+    /// Particles that cuts added to the grab are released, too. O(particles attached to handles); after a grab with a
+    /// compliance of 0 the next step costs O(tets) more. On a device the positions are read back.
     ///
     /// # Errors
     /// If the grab was released before, or the device is lost.
@@ -161,17 +161,17 @@ impl Simulation {
         }
     }
 
-    /// Gives each particle that nothing holds a velocity in m/s, as a function of its position in m, and wakes what sleeps.
+    /// Sets the velocity in m/s of each free particle as a function of its position in m, and wakes all bodies.
     ///
     /// Without a call bodies begin at rest. The next frame starts with these velocities. O(particles); on a device the
-    /// positions are fetched.
+    /// positions are read back.
     ///
     /// # Errors
     /// If a velocity is not finite or a component is beyond 1e9 m/s, in which case all stay as they were; or if the device
     /// is lost.
     ///
     /// # Example
-    /// A box flies at 2 m/s. One that spins has `|x| rate.cross(x - center)`.
+    /// A box moves at 2 m/s. For a spinning one use `|x| rate.cross(x - center)`.
     /// ```
     /// use incise::mesh::glam::DVec3;
     /// use incise::{Scene, Simulation};

@@ -1,7 +1,8 @@
 //! Reading the state of a [`Simulation`]: positions, reported quantities, readback from a device.
 //!
-//! On the processor it is here after each frame. On a device it stays there: reported sums are taken there, and only what
-//! needs every particle fetches it. Cost: a pass over what is reported; a wait for the device where it is asked.
+//! On the CPU the state is available after each frame. On a device it stays there: reported sums are computed there,
+//! and only data of all particles is read back. Cost: a pass for the reported quantities; a wait for the device if they
+//! need it.
 
 use std::time::Instant;
 
@@ -80,7 +81,7 @@ impl Simulation {
         }
     }
 
-    /// Fills in the counts.
+    /// Fills in the counts of the report.
     pub(super) fn count(&mut self) {
         let mesh = self.mesh();
         let (particles, tets) = (mesh.positions.len(), mesh.tets.len());
@@ -119,11 +120,11 @@ impl Simulation {
         Ok(repaired)
     }
 
-    /// Makes [`Simulation::positions`] those of now, if the state is on a device: waits for it and fetches them.
-    /// Otherwise they are, and nothing happens.
+    /// Updates [`Simulation::positions`] if the state is on a device: waits for it and reads the positions back. On the
+    /// CPU they are always current, and nothing happens.
     ///
-    /// A frame does this by itself only if a stroke is due, since a blade has to know where the body is, or if it reports
-    /// residuals. Energies, volume and speed are summed up on the device.
+    /// A frame reads positions back by itself only if a stroke is due or it reports residuals. Energies, volume and
+    /// speed are summed on the device.
     ///
     /// # Errors
     /// If the device is lost.
@@ -134,8 +135,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// What is to be said about where it is computed: the device, or why there is none; `None` if the scene asked for
-    /// the processor.
+    /// Returns a note on the compute device: its name, or why `auto` took the CPU; `None` if the scene requests the
+    /// CPU.
     #[must_use]
     pub fn backend_note(&self) -> Option<&str> {
         self.state.compute_device.note.as_deref()
@@ -147,18 +148,19 @@ impl Simulation {
         self.state.clock.time_step
     }
 
-    /// The number of the frame to come, counted from 0: that of the frames that were made.
+    /// Returns the number of the next frame, counted from 0.
     #[must_use]
     pub fn next_frame(&self) -> u64 {
         self.state.clock.next_frame
     }
 
-    /// In which island of bodies a particle of [`Simulation::mesh`] is solved, and its number there. O(1).
+    /// Returns the island of bodies that solves a particle of [`Simulation::mesh`], and the particle's number there.
+    /// O(1).
     ///
-    /// Bodies that links join are an island, every other one is an island of its own; islands are numbered in the order of
-    /// their first bodies. On a device the island is the number of its solver in `Simulation::device_solvers`: a renderer
-    /// that draws the whole mesh from the buffers of the solvers looks its particles up here, once at the start and then
-    /// those that [`Simulation::deltas`] append. A particle keeps its place for good.
+    /// Bodies joined by distances are one island, every other body is its own; islands are numbered in the order of
+    /// their first bodies. On a device the island is the index of its solver in `Simulation::device_solvers`: a
+    /// renderer that draws the whole mesh from the buffers of the solvers looks up its particles here, all of them once
+    /// at the start and later those that [`Simulation::deltas`] append. The result for a particle never changes.
     ///
     /// # Panics
     /// If the particle does not exist.
@@ -179,22 +181,22 @@ impl Simulation {
     /// )?;
     /// let simulation = Simulation::new(&scene)?;
     /// let last = ParticleId::new(simulation.mesh().positions.len() - 1);
-    /// assert_eq!(simulation.place_of(ParticleId(0)), (0, 0));
-    /// assert_eq!(simulation.place_of(last).0, 1);
+    /// assert_eq!(simulation.location_of(ParticleId(0)), (0, 0));
+    /// assert_eq!(simulation.location_of(last).0, 1);
     /// # Ok::<(), incise::Error>(())
     /// ```
     #[must_use]
-    pub fn place_of(&self, particle: ParticleId) -> (usize, usize) {
+    pub fn location_of(&self, particle: ParticleId) -> (usize, usize) {
         let count = self.mesh().positions.len();
         assert!(particle.index() < count, "the mesh has {count} particles");
         match &self.state.merged {
-            Some(merged) => merged.place(particle),
+            Some(merged) => merged.location(particle),
             None => (0, particle.index()),
         }
     }
 
-    /// The device solvers of the scene's islands of bodies, for renderers; none on the processor. Which of them has a
-    /// particle: [`Simulation::place_of`].
+    /// Returns the device solvers of the islands of bodies, for renderers; none on the CPU. [`Simulation::location_of`]
+    /// maps particles to them.
     #[cfg(feature = "gpu")]
     pub fn device_solvers(&self) -> impl Iterator<Item = &crate::gpu::GpuSolver> + '_ {
         self.state
@@ -257,12 +259,12 @@ impl Simulation {
         .collect()
     }
 
-    /// For each tet of [`Simulation::mesh`] how far its constraints are from solved in the last substep: the norm of
-    /// `C + α̃ λ` over its two, without unit. The root of the sum of squares is the `dual` of the residuals that the frame
-    /// reports. 0 for tets that take no part and for bodies asleep.
+    /// Returns the residual of each tet of [`Simulation::mesh`] in the last substep: the norm of `C + α̃ λ` over its
+    /// two constraints, without unit. The root of the sum of squares is the `dual` of the reported residuals. 0 for
+    /// removed tets and sleeping bodies.
     ///
-    /// `None` unless the last frame has reported [`Quantity::Residual`], and after [`Simulation::set_solver`] until the next
-    /// one does. VBD knows no multipliers and its force is a matter of particles: `None`, too. O(tets).
+    /// `None` unless the last frame has reported [`Quantity::Residual`], after [`Simulation::set_solver`] until the
+    /// next such frame, and for VBD, which has no multipliers. O(tets).
     ///
     /// ```
     /// use incise::{Scene, Simulation};

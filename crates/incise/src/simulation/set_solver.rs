@@ -1,12 +1,13 @@
-//! [`Simulation::set_solver`]: other settings of the solver for a simulation that runs.
+//! [`Simulation::set_solver`]: changes the solver settings of a running simulation.
 //!
-//! Mesh, cuts, positions, velocities, pieces, handles, obstacles and strokes stay as they are. From the settings follow
-//! substeps, softened tets, partitions, what VBD needs and the device: what differs is rebuilt from the body as it is
-//! now, as a new simulation would make it from such a body, and what does not differ is not touched. Everything that can
-//! fail is made first, beside what is there; only then it takes its place.
+//! Mesh, cuts, positions, velocities, pieces, attachments, obstacles and strokes are kept. Substeps, softened tets,
+//! partitions, data of VBD and the device depend on the settings: those that differ are rebuilt from the present body
+//! as a new simulation would build them, and the others are kept. All steps that can fail come first, so an error
+//! changes nothing.
 //!
-//! Cost: nothing for iterations, relaxation, form and the methods of XPBD; a pass over the tets for the time of a substep
-//! and the limit of kappa; clustering and coloring for those; a copy of the solvers for VBD and for another device.
+//! Cost: nothing for iterations, relaxation, form and the methods of XPBD; a pass over the tets for the time of a
+//! substep and the limit of kappa; clustering and coloring for their keys; a copy of the solvers for VBD and for
+//! another device.
 
 use rayon::prelude::*;
 
@@ -22,12 +23,12 @@ use crate::method::{leaves_open, resolve, settings};
 use crate::partition::{Partition, PartitionSettings};
 use crate::recluster::Recluster;
 use crate::scene::{Method, Precision, ReportSpec, SolverSpec, Substeps};
-use crate::sleep::Rest;
+use crate::sleep::SleepState;
 use crate::substeps::Choice;
 use crate::validate::value;
 use crate::{Error, Scene};
 
-/// What other settings make of an island; what is `None` stays.
+/// Changes of an island by other settings; `None` is unchanged.
 #[derive(Debug)]
 struct ChangedSolver {
     settings: StepSettings,
@@ -46,34 +47,33 @@ struct ChangedSolver {
 }
 
 impl Simulation {
-    /// The settings of the solver as they are now: those of the scene, or of the last [`Simulation::set_solver`].
+    /// Returns the present solver settings: those of the scene, or of the last [`Simulation::set_solver`].
     #[must_use]
     pub fn solver_spec(&self) -> &SolverSpec {
         &self.state.solver
     }
 
-    /// Continues the simulation with other settings of the solver from the next frame on. Whatever is cut, moves and
-    /// holds stays as it is. At frame 0 the result is to the bit a simulation set up with these settings.
+    /// Changes the solver settings from the next frame on. Cuts, motion, attachments and grabs are kept. At frame 0 the
+    /// result is bit-identical to a new simulation with these settings.
     ///
-    /// * `time_step`: handles and strokes go by frames, so they pass through the world faster or slower; obstacles keep
-    ///   their velocities; the simulated time continues from where it is.
-    /// * `substeps`, `max_substeps`: `auto` chooses again, from the present tets, if one of these, `time_step` or
-    ///   `accuracy`, `tet_solve` changes. Substeps that bodies ask for themselves stay.
-    /// * `kappa_limit`, or another time of a substep: tets are softened to the new limit, and those that need not be any
-    ///   more are what their material says.
+    /// * `time_step`: attachments and strokes are defined by frames, so they move faster or slower; obstacles keep
+    ///   their velocities; the simulated time continues.
+    /// * `substeps`, `max_substeps`: `auto` chooses again for the present tets if one of these, `time_step`, `accuracy`
+    ///   or `tet_solve` changes. Substeps that a body sets itself stay.
+    /// * `kappa_limit`, or another time of a substep: tets are softened to the new limit, and others get the stiffness
+    ///   of their material.
     /// * `clustering`, `coloring`, `merge_clusters`: clusters and colors of all tets are rebuilt.
-    /// * `recluster`: counts the degradation since clusters and colors were last rebuilt. Those in the making are still taken,
-    ///   unless they are those of other settings.
-    /// * `backend`, and with `auto` also `method` and `clustering`: the state goes over to a device or comes back. The
-    ///   device is the present one, or that of `offer_device`, or one that the simulation has left, or else it is opened.
-    /// * `precision = "auto"`: the width stays what it was when the simulation was set up.
-    /// * `preset`: a name only. Its defaults are applied when a scene is read.
+    /// * `recluster`: degradation counts from the last rebuild of clusters and colors. A pending rebuild is still
+    ///   taken, unless it has other settings.
+    /// * `backend`, and with `auto` also `method` and `clustering`: the state moves to a device or back. The device is
+    ///   the present one, that of `offer_device`, one used before by this simulation, or a newly opened one.
+    /// * `precision = "auto"`: the precision does not change after setup.
+    /// * `preset`: has no effect here. Its defaults are applied when a scene is read.
     ///
-    /// Any difference wakes all bodies, for they were at rest under the settings before. Settings equal to those before
-    /// change nothing.
+    /// Any difference wakes all bodies. Equal settings change nothing.
     ///
-    /// Costs what differs: see this module's head in the source; iterations, relaxation, form and methods other than
-    /// VBD cost nothing.
+    /// The cost depends on the changed keys (see the header of this module in the source); `iterations`, `relaxation`,
+    /// `tet_solve` and methods other than VBD cost nothing.
     ///
     /// # Errors
     /// Returns the errors of [`Simulation::new`] for these settings, and one if `precision` differs. Nothing has
@@ -160,9 +160,9 @@ impl Simulation {
         Ok(())
     }
 
-    /// Hands a device over that is open, a window's above all: it is the one to be used when [`Simulation::set_solver`] asks
-    /// for one next and the simulation is not on one. Without an offer the simulation goes back to a device that it has
-    /// left, or opens one as [`Simulation::new`] does.
+    /// Offers an open device, typically that of a window. [`Simulation::set_solver`] uses it when it next moves the
+    /// simulation to a device. Without an offer it uses a device that the simulation has left, or opens one as
+    /// [`Simulation::new`] does.
     ///
     /// ```
     /// use std::sync::Arc;
@@ -190,7 +190,7 @@ impl Simulation {
         self.open_device.gpu = Some(gpu);
     }
 
-    /// Where the scene with other settings is computed.
+    /// Chooses the compute device for other settings.
     fn compute_device_for(&self, scene: &Scene) -> Result<ComputeDevice, Error> {
         let (before, after) = (&self.state.solver, &scene.solver);
         if (before.backend, before.method, &before.clustering)
@@ -201,7 +201,7 @@ impl Simulation {
         ComputeDevice::choose(scene, &self.state.compute_device.or(&self.open_device))
     }
 
-    /// Keeps the present device at hand, unless another one is.
+    /// Keeps the present device open, unless another one is kept.
     pub(super) fn leave_device(&mut self) {
         #[cfg(feature = "gpu")]
         if self.open_device.gpu.is_none() {
@@ -212,7 +212,7 @@ impl Simulation {
     }
 }
 
-/// Whether a step asks for all that differs, and nothing has been made of it.
+/// Whether all changed settings are read by each step, without derived data.
 fn is_light(before: &SolverSpec, after: &SolverSpec) -> bool {
     let is_vbd = |spec: &SolverSpec| spec.method == Method::Vbd;
     let light = SolverSpec {
@@ -235,7 +235,7 @@ fn is_light(before: &SolverSpec, after: &SolverSpec) -> bool {
 }
 
 impl ChangedSolver {
-    /// What becomes of an island under the settings of `scene`.
+    /// Computes the changes of an island for the settings of `scene`.
     fn of(
         island: &Island,
         before: &SolverSpec,
@@ -360,7 +360,7 @@ impl ChangedSolver {
             (Some(spec), Some(old)) if !planned => Some(old.with(spec)),
             (spec, _) => spec.map(Recluster::new),
         };
-        island.rest = spec.sleep.map(Rest::new);
+        island.sleep = spec.sleep.map(SleepState::new);
         island.set_first_substeps(self.settings.substeps);
         island.settings = self.settings;
         island.choice = self.choice;
@@ -372,7 +372,7 @@ impl ChangedSolver {
     }
 }
 
-/// What the substeps of an island follow from.
+/// Returns the settings that the choice of substeps depends on, for comparison.
 fn substeps_follow_from(spec: &SolverSpec) -> impl PartialEq + use<> {
     (
         spec.time_step.to_bits(),

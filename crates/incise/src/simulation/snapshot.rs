@@ -1,13 +1,13 @@
-//! [`Snapshot`]: a simulation at one moment, to undo cuts, to fork and, with the feature `save`, to continue from a file.
+//! [`Snapshot`]: a copy of the state of a simulation, to undo cuts, to fork and, with the feature `save`, to continue
+//! from a file.
 //!
-//! It is a copy of all that decides what comes next: meshes, cuts, pieces, solvers, partitions, handles, colliders, strokes
-//! under way. What follows from the rest is left out and rebuilt: the layout of the solvers, and buffers on a device.
-//! Types are written by derived serde code, field by field; settings, which leave out defaults, as TOML (`saved.rs`).
-//! (Undoing a [`CutDelta`](incise_cutting::CutDelta) takes back a mesh; it does not take back where the body has
-//! moved since, which is why cuts are taken back this way.)
+//! It has all data that decides the future: meshes, cuts, pieces, solvers, partitions, attachments, colliders, active
+//! strokes. Data that can be derived is rebuilt: the layout of the solvers, and buffers on a device. Types are written
+//! by derived serde code, field by field; settings, which leave out defaults, as TOML (`saved.rs`). (Undoing a
+//! [`CutDelta`](incise_cutting::CutDelta) restores a mesh but not the motion since, so cuts are undone by snapshots.)
 //!
-//! Cost: a copy of all arrays, 0.25 to 0.4 kB a tet, with VBD up to 0.6; the first step after coming back lays out
-//! all tets, and sends a device everything.
+//! Cost: a copy of all arrays, 0.25 to 0.4 kB a tet, with VBD up to 0.6; the first step after a restore rebuilds the
+//! layout and sends a device all data.
 
 #[cfg(feature = "gpu")]
 use std::sync::Arc;
@@ -23,7 +23,7 @@ use crate::scene::ReportSpec;
 use crate::validate::value;
 use crate::{Error, Scene};
 
-/// A simulation at one moment: see [`Simulation::snapshot`].
+/// A copy of the state of a simulation, to undo, fork or save: see [`Simulation::snapshot`].
 #[derive(Clone, Debug)]
 pub struct Snapshot(State);
 
@@ -32,16 +32,15 @@ const CUTTING: usize = 16 + 32 + 16;
 /// Bytes of a particle there: its position at rest, the head of its list.
 const CUTTING_PARTICLE: usize = 24 + 4;
 /// About the bytes of a tet in clusters, colors and schedule; with clusters of 10 it is 54, with smaller ones more.
-const PLAN: usize = 58;
+const PARTITION: usize = 58;
 /// Bytes of a tet in the lists of pieces.
 const PIECES: usize = 4;
 /// Bytes of a particle's present position.
 const POSITION: usize = 24;
 
 impl Snapshot {
-    /// About the bytes that it takes, for memory budgets: solvers and the merged mesh to the byte, the rest by what a tet and
-    /// a particle take there. Off by a fifth at most in the scenes of the tests; what strokes remember of earlier
-    /// cuts is the least certain. O(bodies + particles).
+    /// Returns the approximate size in bytes, for memory budgets: exact for solvers and the merged mesh, estimated for
+    /// the rest, and off by a fifth at most in the scenes of the tests. O(bodies + particles).
     #[must_use]
     pub fn bytes(&self) -> usize {
         let State {
@@ -117,22 +116,22 @@ impl Island {
             .map_or(0, |contacts| contacts.bytes());
         self.solver.backend().bytes()
             + contacts
-            + tets * (CUTTING + PIECES + partitions * PLAN)
+            + tets * (CUTTING + PIECES + partitions * PARTITION)
             + particles * (CUTTING_PARTICLE + POSITION)
     }
 }
 
 impl Simulation {
-    /// The present moment, to come back to with [`Simulation::restore`].
+    /// Copies the present state, for [`Simulation::restore`] and [`Simulation::from_snapshot`].
     ///
-    /// A state on a device is fetched. Clusters that are made in the background are waited for; they are taken in the
-    /// frame in which they would be. O(particles + tets).
+    /// A state on a device is read back. A background rebuild of clusters is waited for; it is still taken in its own
+    /// frame. O(particles + tets).
     ///
     /// # Errors
     /// If the device is lost.
     ///
     /// # Example
-    /// A cut is taken back.
+    /// Undoes a cut.
     /// ```
     /// use incise::{Scene, Simulation, scene::StrokeSpec};
     ///
@@ -161,15 +160,15 @@ impl Simulation {
         Ok(Snapshot(self.state.clone()))
     }
 
-    /// Goes to the moment of a snapshot: what follows is to the bit what followed then, on a device on the same device
-    /// and driver. The snapshot can be used again.
+    /// Restores the state of a snapshot. The simulation continues bit-identically, on a device if device and driver are
+    /// the same. The snapshot can be used again.
     ///
-    /// Everything goes back: bodies, colliders, the settings of [`Simulation::set_solver`] and [`Simulation::set_report`], and
-    /// the number of the next frame. Strokes added since are gone. Grabs and strokes begun since are void: their numbers
-    /// may come to name later ones. To keep the present settings of the solver, hand a copy of
-    /// [`Simulation::solver_spec`] to `set_solver` afterwards. [`Simulation::deltas`] is empty: renderers and recorders start
-    /// again from [`Simulation::boundary`], and find other buffers in the solvers of a device. A snapshot of another
-    /// simulation makes this one continue that one. O(particles + tets).
+    /// Everything is restored: bodies, colliders, the settings of [`Simulation::set_solver`] and
+    /// [`Simulation::set_report`], and the number of the next frame. Strokes added later are gone; handles of grabs and
+    /// strokes begun later are invalid, and their numbers may be reused. To keep the present solver settings, pass a
+    /// copy of [`Simulation::solver_spec`] to `set_solver` afterwards. [`Simulation::deltas`] is empty: renderers and
+    /// recorders must rebuild from [`Simulation::boundary`], and buffers of device solvers change. With a snapshot of
+    /// another simulation, this one continues that one. O(particles + tets).
     ///
     /// # Errors
     /// If the device is lost or out of memory; nothing has changed then.
@@ -191,23 +190,23 @@ impl Simulation {
         Ok(())
     }
 
-    /// Makes a simulation of its own that continues from the moment of a snapshot: what follows is to the bit what
-    /// followed then, on a device on the same device and driver. It runs on as many threads as rayon's global pool has.
+    /// Creates a new simulation that continues from a snapshot bit-identically, on a device if device and driver are
+    /// the same. It uses the threads of rayon's global pool.
     ///
-    /// With the feature `save` a snapshot can be written to a file by any binary format of serde, such as `postcard`,
-    /// and read in another process, by the same version of this crate. A snapshot that was read has no device: one is
-    /// opened if the settings of the solver ask for it. [`Simulation::report`] counts what there is; its measures come
-    /// with the next frame. O(particles + tets).
+    /// With the feature `save` a snapshot can be written to a file in any binary format of serde, such as `postcard`,
+    /// and read in another process by the same version of this crate. A snapshot from a file has no device: one is
+    /// opened if the solver settings request it. [`Simulation::report`] has the counts; measured quantities come with
+    /// the next frame. O(particles + tets).
     ///
     /// # Errors
     /// If the device cannot be opened or is out of memory, or if the parts of the state contradict each other, as in a
     /// damaged file.
     ///
     /// # Panics
-    /// A damaged file can name particles or tets that do not exist.
+    /// If a damaged file refers to particles or tets that do not exist.
     ///
     /// # Example
-    /// Two hands continue from the same moment.
+    /// Two simulations continue from one state.
     /// ```
     /// use incise::{Scene, Simulation};
     ///
@@ -249,7 +248,7 @@ impl Simulation {
         Ok(simulation)
     }
 
-    /// Sets what is reported from the next frame on, and how often.
+    /// Sets the reported quantities and their interval from the next frame on.
     ///
     /// # Errors
     /// If `every` is 0; nothing has changed then.

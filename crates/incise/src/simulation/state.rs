@@ -1,8 +1,7 @@
-//! [`State`]: all of a simulation that changes with time.
+//! [`State`]: the state of a simulation that changes with time.
 //!
-//! A snapshot is a copy of it, and a simulation that takes a state over continues as the one it came from, to the bit.
-//! What follows from the rest is left out and built again: the layout of the solvers, and what a device has. Cost of a
-//! copy: O(particles + tets).
+//! A snapshot is a copy of it, and a simulation with this state continues bit-identically. Data that can be derived is
+//! left out and rebuilt: the layout of the solvers, and buffers on a device. Cost of a copy: O(particles + tets).
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -22,7 +21,7 @@ use crate::scene::{Precision, ReportSpec, SolverSpec};
 use crate::strokes::Timeline;
 use crate::{Error, Scene};
 
-/// All of a simulation that changes with time. A copy has its solvers on the processor.
+/// State of a simulation that changes with time. A copy has its solvers on the processor.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct State {
@@ -67,7 +66,7 @@ pub(super) struct Removal {
     pub(super) is_done: bool,
 }
 
-/// What the strokes and removals of a frame do.
+/// Results of the strokes and removals of a frame.
 pub(super) struct Cut<'a> {
     /// The number of the frame.
     pub(super) number: u64,
@@ -80,7 +79,7 @@ pub(super) struct Cut<'a> {
     pub(super) measuring: f64,
 }
 
-/// All that depends on the mesh of an island, but the island itself.
+/// Data outside an island that depends on its mesh.
 struct Dependents<'a> {
     merged: &'a mut Option<MergedMesh>,
     pieces: &'a mut PieceNumbers,

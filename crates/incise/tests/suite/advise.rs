@@ -4,7 +4,7 @@
 use std::fmt::Write;
 
 use incise::advise::{
-    Measured, Motion, Question, Reference, ReferenceKind, accurate_substeps, advise,
+    AdviseSettings, Measured, Motion, Reference, ReferenceKind, accurate_substeps, advise,
     default_frames, newton_motion, with,
 };
 use incise::mesh::glam::{DQuat, DVec3};
@@ -76,7 +76,7 @@ fn errors_fall_with_substeps() {
 #[test]
 fn the_advised_scene_is_as_accurate_as_it_says() {
     let frames = 6;
-    let question = Question {
+    let question = AdviseSettings {
         budget_ms: 1e3,
         frames,
         threads: Some(1),

@@ -1,6 +1,6 @@
 //! What `method = "auto"` and `budget_ms` choose, and what follows from it.
 
-use incise::report::{ChosenMethod, Missed};
+use incise::report::{ChosenMethod, Shortfall};
 use incise::scene::{GroundSpec, Method, Precision};
 use incise::{Scene, Simulation, WarningCode};
 
@@ -40,7 +40,7 @@ fn stiff_bodies_are_solved_by_vbd_and_soft_ones_are_not() {
     let mut stiff = simulation(&beam("1e9", ""));
     assert_eq!(chosen(&stiff), (ChosenMethod::TwoLevelVbd, 1, 20));
     let choice = stiff.report().bodies[0].choice.unwrap();
-    assert_eq!(choice.missed, None);
+    assert_eq!(choice.shortfall, None);
     assert!(choice.substeps_wanted > 200 && choice.expected_error <= 0.1);
     let report = stiff.step().unwrap();
     assert_eq!(report.precision, "f64");
@@ -183,7 +183,7 @@ fn bodies_have_their_own_methods() {
     simulation.step().unwrap();
     assert_eq!(methods(&simulation), [ChosenMethod::GaussSeidel; 2]);
     let capped = simulation.report().bodies[1].choice.unwrap();
-    assert_eq!(capped.missed, Some(Missed::Cap));
+    assert_eq!(capped.shortfall, Some(Shortfall::Cap));
     spec.method = Method::Auto;
     simulation.set_solver(&spec).unwrap();
     simulation.step().unwrap();
@@ -198,7 +198,7 @@ fn bodies_that_move_slowly_keep_their_substeps() {
     let report = simulation.step().unwrap();
     let body = &report.bodies[0];
     let choice = body.choice.unwrap();
-    assert_eq!(choice.missed, Some(Missed::Cap));
+    assert_eq!(choice.shortfall, Some(Shortfall::Cap));
     assert!(choice.expected_error > 0.01 && choice.expected_error < 0.1);
     assert_eq!(body.method.unwrap(), ChosenMethod::GaussSeidel);
     let codes: Vec<_> = report.warnings().iter().map(|w| w.code).collect();
@@ -225,7 +225,7 @@ fn a_budget_decides_substeps() {
     assert!(choice.expected_error < 0.1);
     assert_eq!(substeps("budget_ms = 1e5\naccuracy = 0.1").0, needed);
     let (poor, choice, codes) = substeps("budget_ms = 1e-6\nmethod = \"gauss-seidel\"");
-    assert_eq!((poor, choice.missed), (1, Some(Missed::Budget)));
+    assert_eq!((poor, choice.shortfall), (1, Some(Shortfall::Budget)));
     assert!(choice.expected_error > 0.1);
     assert!(codes.contains(&WarningCode::BudgetTooSmall), "{codes:?}");
     // More tets after a cut do not exceed a budget that is already too small.

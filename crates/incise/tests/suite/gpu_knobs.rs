@@ -144,14 +144,14 @@ fn the_state_goes_there_and_comes_back() {
         kappa_limit: 0.1,
         ..scene.solver.clone()
     };
-    let places = [
+    let backends = [
         (Backend::Cpu, &scene.solver),
         (Backend::Gpu, &scene.solver),
         (Backend::Gpu, &limited),
         (Backend::Cpu, &limited),
         (Backend::Gpu, &scene.solver),
     ];
-    for (turn, (backend, solver)) in places.into_iter().enumerate() {
+    for (turn, (backend, solver)) in backends.into_iter().enumerate() {
         stays.set_solver(solver).unwrap();
         moves.read_back().unwrap();
         let before = moves.positions().to_vec();

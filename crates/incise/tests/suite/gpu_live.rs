@@ -131,7 +131,7 @@ fn a_live_blade_does_the_same_as_a_sweep() {
     // Each particle of the whole is where the solver says that has it.
     let solvers: Vec<_> = live.device_solvers().collect();
     for (p, x) in live.positions().iter().enumerate() {
-        let (island, number) = live.place_of(ParticleId::new(p));
+        let (island, number) = live.location_of(ParticleId::new(p));
         assert_eq!(solvers[island].cached_host().position(number), *x);
     }
 }

@@ -212,7 +212,7 @@ fn particles_are_found_in_their_islands() {
     }
     let mut counts = [0; 2];
     for (p, x) in simulation.mesh().positions.iter().enumerate() {
-        let (island, number) = simulation.place_of(ParticleId::new(p));
+        let (island, number) = simulation.location_of(ParticleId::new(p));
         assert_eq!(island, usize::from(x.x > 1.5));
         // Particles of an island keep their order.
         assert_eq!(number, counts[island]);
@@ -220,7 +220,7 @@ fn particles_are_found_in_their_islands() {
     }
     assert!(counts[0] > 60 && counts[1] > 60, "{counts:?}");
     let alone = self::simulation(&scene(&body("box", 200, [0.0; 3])));
-    assert_eq!(alone.place_of(ParticleId(7)), (0, 7));
+    assert_eq!(alone.location_of(ParticleId(7)), (0, 7));
     assert_eq!((alone.time_step(), alone.next_frame()), (0.016, 0));
     assert_eq!(simulation.next_frame(), 3);
 }

@@ -20,7 +20,7 @@ mod gpu_knobs;
 #[cfg(feature = "gpu")]
 mod gpu_live;
 mod grab;
-mod hands;
+mod interaction;
 mod kappa;
 mod knobs;
 mod live;

@@ -101,7 +101,7 @@ fn each_method_runs_through_a_cut_and_does_not_depend_on_threads() {
     }
 }
 
-/// Chebyshev's own keys arrive: a `chebyshev_start` as long as the iterations, or a radius of 0, is Jacobi.
+/// A start as late as the last iteration, or a spectral radius of 0, makes Chebyshev equal to Jacobi.
 #[test]
 fn chebyshev_without_extrapolation_is_jacobi() {
     let run = |keys: &str| {

@@ -70,8 +70,8 @@ const TABLES: [(&str, &str, &str); 18] = [
     ),
     (
         "StrokeSpec",
-        "plug",
-        "[[stroke]]\nkind = \"plug\"\nframe = 1\nregion = { sphere = { center = [0, 0, 0], radius = 0.2 } }\nKEY\n",
+        "punch",
+        "[[stroke]]\nkind = \"punch\"\nframe = 1\nregion = { sphere = { center = [0, 0, 0], radius = 0.2 } }\nKEY\n",
     ),
     (
         "",

@@ -22,7 +22,7 @@ const STROKES: &str = r#"
     triangles = [[0, 1, 2], [0, 2, 3]]
 
     [[stroke]]
-    kind = "plug"
+    kind = "punch"
     frame = 3
     region = { sphere = { center = [-0.2, 0.0, 0.2], radius = 0.15 } }
 
@@ -156,7 +156,7 @@ fn mistakes_name_the_key() {
         "stroke[0].triangles",
     );
     refuse(
-        "kind = \"plug\"\nframe = 1\nregion = { sphere = { center = [0,0,0], radius = -1.0 } }",
+        "kind = \"punch\"\nframe = 1\nregion = { sphere = { center = [0,0,0], radius = -1.0 } }",
         "stroke[0].region.sphere.radius",
     );
     refuse(
@@ -164,7 +164,7 @@ fn mistakes_name_the_key() {
         "stroke[0].region",
     );
     refuse(
-        "kind = \"plug\"\nframe = 1\nsnap = 0.3\nregion = { sphere = { center = [0,0,0], radius = 1.0 } }",
+        "kind = \"punch\"\nframe = 1\nsnap = 0.3\nregion = { sphere = { center = [0,0,0], radius = 1.0 } }",
         "stroke[0].snap",
     );
 }

@@ -1,6 +1,6 @@
 //! Substeps chosen for each body: enough and no more, capped, not ruled by slivers, and all of it reported.
 
-use incise::report::{BodyReport, Missed};
+use incise::report::{BodyReport, Shortfall};
 use incise::scene::{Precision, Substeps};
 use incise::{Scene, Simulation};
 use serde_json::Value;
@@ -35,7 +35,7 @@ fn each_body_gets_the_fewest_sufficient_substeps() {
         let mut alone = scene.clone();
         alone.body = vec![scene.body[number].clone()];
         let choice = report.choice.unwrap();
-        assert_eq!((choice.missed, choice.sliver_tets), (None, 0));
+        assert_eq!((choice.shortfall, choice.sliver_tets), (None, 0));
         assert_eq!(choice.substeps_wanted, report.substeps);
         // With the number itself kappa is low enough, with one fewer it is not.
         let kappa = |substeps: u32| {
@@ -106,7 +106,7 @@ fn the_cap_is_kept_and_reported_and_the_result_finite() {
             let report = simulation.step().unwrap();
             let body = &report.bodies[0];
             let choice = body.choice.unwrap();
-            assert_eq!((body.substeps, choice.missed), (8, Some(Missed::Cap)));
+            assert_eq!((body.substeps, choice.shortfall), (8, Some(Shortfall::Cap)));
             assert!(choice.substeps_wanted > 8);
             assert_eq!(report.repaired, 0);
         }
@@ -144,7 +144,7 @@ fn a_sliver_does_not_decide_and_is_reported() {
     let mut simulation = simulation(&scene(&text));
     let report = bodies(&simulation)[0].clone();
     let choice = report.choice.unwrap();
-    assert_eq!(choice.missed, Some(Missed::Sliver));
+    assert_eq!(choice.shortfall, Some(Shortfall::Sliver));
     assert_eq!(choice.sliver_tets, 1);
     assert!(choice.sliver_volume_fraction > 0.0 && choice.sliver_volume_fraction < 1e-3);
     assert!(choice.substeps_wanted > 20 * report.substeps);

@@ -1,6 +1,6 @@
-//! The binary form: sections with a numbered keyword and the place of the next one.
+//! The binary form: sections with a numbered keyword and the offset of the next one.
 //!
-//! | version | coordinates | places | counts, corners, references |
+//! | version | coordinates | offsets | counts, corners, references |
 //! |---|---|---|---|
 //! | 1 | f32 | 32 bits | 32 bits |
 //! | 2 | f64 | 32 bits | 32 bits |
@@ -24,7 +24,7 @@ const VERTICES: i32 = 4;
 const TETRAHEDRA: i32 = 8;
 const END: i32 = 54;
 
-/// The bytes of a place and of a whole number.
+/// Bytes of an offset and of a whole number.
 fn widths(version: i32) -> (u64, u64) {
     (
         if version < 3 { 4 } else { 8 },
@@ -34,12 +34,12 @@ fn widths(version: i32) -> (u64, u64) {
 
 /// Where the sections of a written file end: dimension, points, tets.
 fn ends(mesh: &TetMesh, version: i32) -> [u64; 3] {
-    let (place, whole) = widths(version);
+    let (offset, whole) = widths(version);
     let points = mesh.positions.len() as u64;
     let tets = mesh.tets.len() as u64;
-    let dimension = 8 + 4 + place + 4;
-    let vertices = dimension + 4 + place + whole + points * (24 + whole);
-    let tetrahedra = vertices + 4 + place + whole + tets * 5 * whole;
+    let dimension = 8 + 4 + offset + 4;
+    let vertices = dimension + 4 + offset + whole + points * (24 + whole);
+    let tetrahedra = vertices + 4 + offset + whole + tets * 5 * whole;
     [dimension, vertices, tetrahedra]
 }
 
@@ -58,23 +58,23 @@ pub(super) fn lowest_version(mesh: &TetMesh) -> i32 {
 /// Writes a file of a version from 2 on that has room for it.
 pub(super) fn write(out: &mut dyn Write, file: &MeshFile, version: i32) -> io::Result<()> {
     let (mesh, points) = (&file.mesh, point_references(file).unwrap_or_default());
-    let (place, whole) = widths(version);
+    let (offset, whole) = widths(version);
     let [dimension, vertices, tetrahedra] = ends(mesh, version);
     let number = |out: &mut dyn Write, number: i64, width: u64| {
         // The lower bytes of a number that fits are the number.
         out.write_all(&number.to_le_bytes()[..if width == 4 { 4 } else { 8 }])
     };
-    let place = |out: &mut dyn Write, code: i32, next: u64| {
+    let offset = |out: &mut dyn Write, code: i32, next: u64| {
         out.write_all(&code.to_le_bytes())?;
-        number(out, next.cast_signed(), place)
+        number(out, next.cast_signed(), offset)
     };
     let count = |out: &mut dyn Write, count: usize| number(out, count as u64 as i64, whole);
     out.write_all(&1_i32.to_le_bytes())?;
     out.write_all(&version.to_le_bytes())?;
-    place(out, DIMENSION, dimension)?;
+    offset(out, DIMENSION, dimension)?;
     out.write_all(&3_i32.to_le_bytes())?;
 
-    place(out, VERTICES, vertices)?;
+    offset(out, VERTICES, vertices)?;
     count(out, mesh.positions.len())?;
     for (i, position) in mesh.positions.iter().enumerate() {
         for coordinate in position.to_array() {
@@ -82,7 +82,7 @@ pub(super) fn write(out: &mut dyn Write, file: &MeshFile, version: i32) -> io::R
         }
         number(out, reference(&points, i).into(), whole)?;
     }
-    place(out, TETRAHEDRA, tetrahedra)?;
+    offset(out, TETRAHEDRA, tetrahedra)?;
     count(out, mesh.tets.len())?;
     for (i, tet) in mesh.tets.iter().enumerate() {
         for corner in tet {
@@ -90,7 +90,7 @@ pub(super) fn write(out: &mut dyn Write, file: &MeshFile, version: i32) -> io::R
         }
         number(out, reference(&file.regions, i).into(), whole)?;
     }
-    place(out, END, 0)
+    offset(out, END, 0)
 }
 
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<MeshFile, MeshIoError> {
@@ -128,9 +128,9 @@ impl Reader<'_> {
             let start = self.at;
             let code = self.i32("the keyword End")?;
             let next = if self.version < 3 {
-                self.i32("the place of the next keyword")?.into()
+                self.i32("the offset of the next keyword")?.into()
             } else {
-                self.i64("the place of the next keyword")?
+                self.i64("the offset of the next keyword")?
             };
             let other = OTHER_VOLUMES.iter().find(|&&(_, other)| other == code);
             match code {

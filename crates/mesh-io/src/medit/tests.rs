@@ -75,11 +75,11 @@ proptest! {
     }
 
     #[test]
-    fn noise_is_no_reason_to_panic(place: prop::sample::Index, byte: u8, length in 1..9_usize) {
+    fn noise_is_no_reason_to_panic(offset: prop::sample::Index, byte: u8, length in 1..9_usize) {
         for mut bytes in forms(&small()) {
-            let place = place.index(bytes.len());
-            let end = (place + length).min(bytes.len());
-            bytes[place..end].fill(byte);
+            let offset = offset.index(bytes.len());
+            let end = (offset + length).min(bytes.len());
+            bytes[offset..end].fill(byte);
             if let Ok(file) = parse(&bytes) {
                 prop_assert!(file.mesh.positions.iter().all(|p| p.is_finite()));
                 let particles = file.mesh.positions.len();
@@ -224,13 +224,13 @@ fn by_hand(version: u8, big_endian: bool) -> Vec<u8> {
             bytes.extend(&number.to_le_bytes()[..width]);
         }
     };
-    let (place, whole) = [(4, 4), (4, 4), (8, 4), (8, 8)][usize::from(version) - 1];
+    let (offset, whole) = [(4, 4), (4, 4), (8, 4), (8, 8)][usize::from(version) - 1];
     number(&mut bytes, 1, 4);
     number(&mut bytes, version.into(), 4);
     let section = |bytes: &mut Vec<u8>, code: i64, content: &[u8]| {
         number(bytes, code, 4);
-        let next = bytes.len() + place + content.len();
-        number(bytes, i64::try_from(next).unwrap(), place);
+        let next = bytes.len() + offset + content.len();
+        number(bytes, i64::try_from(next).unwrap(), offset);
         bytes.extend(content);
     };
     let mut content = Vec::new();
@@ -266,7 +266,7 @@ fn by_hand(version: u8, big_endian: bool) -> Vec<u8> {
     }
     section(&mut bytes, 8, &content);
     number(&mut bytes, 54, 4);
-    number(&mut bytes, 0, place);
+    number(&mut bytes, 0, offset);
     bytes
 }
 

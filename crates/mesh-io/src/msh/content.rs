@@ -32,7 +32,7 @@ pub(super) struct Tet {
     pub(super) entity: i32,
     /// The physical group, 0 for none.
     pub(super) physical: i32,
-    pub(super) place: usize,
+    pub(super) offset: usize,
 }
 
 /// A volume of section `$Entities` or `$PartitionedEntities`.
@@ -95,7 +95,7 @@ impl Content {
                         "element {} uses node {tag}, which does not exist, correct it",
                         tet.tag
                     );
-                    source.error_at(tet.place, message)
+                    source.error_at(tet.offset, message)
                 })?);
             }
             tets.push(corners);
@@ -168,7 +168,7 @@ impl Data {
         source: &Source<'_>,
     ) -> Result<Option<NamedValues>, MeshIoError> {
         let mut found = 0;
-        for &(tag, place) in &self.tags {
+        for &(tag, offset) in &self.tags {
             match numbers.index(tag) {
                 Some(_) => found += 1,
                 None if self.of_nodes => {
@@ -176,7 +176,7 @@ impl Data {
                         "the data {:?} has a value for node {tag}, which does not exist, correct it",
                         self.name
                     );
-                    return Err(source.error_at(place, message));
+                    return Err(source.error_at(offset, message));
                 }
                 // An element of lower dimension, which was passed over.
                 None => {}
@@ -234,7 +234,7 @@ impl Numbers {
     }
 
     fn index(&self, tag: u64) -> Option<usize> {
-        let place = self.0.binary_search_by_key(&tag, |&(tag, _)| tag).ok()?;
-        Some(self.0[place].1)
+        let offset = self.0.binary_search_by_key(&tag, |&(tag, _)| tag).ok()?;
+        Some(self.0[offset].1)
     }
 }

@@ -61,9 +61,9 @@ pub(super) fn read_data(
     }
     for _ in 0..count {
         let tag = source.short_tag("the number of a node or element")?;
-        let place = source.place();
+        let offset = source.offset();
         if wanted {
-            data.tags.push((tag, place));
+            data.tags.push((tag, offset));
         }
         for _ in 0..components {
             let value = source.double("a value")?;

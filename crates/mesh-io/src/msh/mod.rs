@@ -6,7 +6,7 @@
 //!
 //! Regions are the physical groups of the tets (0 for a tet in none; the first one of several), or, where no tet is in
 //! one, the elementary entities. A single entity 1 without a group, which Gmsh writes for want of anything else, is no
-//! region at all. The names of groups (`$PhysicalNames`) are not kept: no other format has a place for them.
+//! region at all. The names of groups (`$PhysicalNames`) are not kept: no other format stores them.
 //!
 //! `$NodeData` and `$ElementData` with 1 or 3 components are fields; each time step is one; elements without a value
 //! have NaN, and a file is refused that needs more than eight times its size for them. Orientation is kept as it is.
@@ -64,7 +64,7 @@ pub(crate) fn parse_msh(bytes: &[u8], path: &Path) -> Result<MeshFile, MeshIoErr
             let message = format!("a section ($Name) expected but {:?} found", show(name));
             return Err(source.error(message));
         };
-        let place = source.place();
+        let offset = source.offset();
         source.line();
         let needs = |wanted: Option<Version>| {
             wanted.ok_or_else(|| {
@@ -72,7 +72,7 @@ pub(crate) fn parse_msh(bytes: &[u8], path: &Path) -> Result<MeshFile, MeshIoErr
                     "section ${} stands before $MeshFormat: no file of Gmsh",
                     show(name)
                 );
-                source.error_at(place, message)
+                source.error_at(offset, message)
             })
         };
         match name {

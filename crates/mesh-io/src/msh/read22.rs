@@ -53,7 +53,7 @@ pub(super) fn read_elements_1(
     content.tets.reserve(source.room_for(count, 18));
     for _ in 0..count {
         let tag = source.short_tag("the number of an element")?;
-        let place = source.place();
+        let offset = source.offset();
         let skip = Content::nodes_to_skip(source)?;
         let physical = source.int("a physical group")?;
         let entity = source.int("an entity")?;
@@ -69,7 +69,7 @@ pub(super) fn read_elements_1(
             corners,
             entity,
             physical,
-            place,
+            offset,
         })?;
     }
     Ok(())
@@ -87,10 +87,10 @@ pub(super) fn read_elements_2(
     while left > 0 {
         if source.encoding == Encoding::Text {
             let tag = source.short_tag("the number of an element")?;
-            let place = source.place();
+            let offset = source.offset();
             let skip = Content::nodes_to_skip(source)?;
             let tags = source.int("the number of tags")?;
-            read_element_2(source, content, skip, tags, (tag, place))?;
+            read_element_2(source, content, skip, tags, (tag, offset))?;
             left -= 1;
             continue;
         }
@@ -105,8 +105,8 @@ pub(super) fn read_elements_2(
         let tags = source.int("the number of tags")?;
         for _ in 0..batch {
             let tag = source.short_tag("the number of an element")?;
-            let place = source.place();
-            read_element_2(source, content, skip, tags, (tag, place))?;
+            let offset = source.offset();
+            read_element_2(source, content, skip, tags, (tag, offset))?;
         }
         left -= batch;
     }
@@ -119,7 +119,7 @@ fn read_element_2(
     content: &mut Content,
     skip: Option<usize>,
     tags: i32,
-    (tag, place): (u64, usize),
+    (tag, offset): (u64, usize),
 ) -> Result<(), MeshIoError> {
     // Entity 1 and no group are what an element without tags belongs to.
     let (mut physical, mut entity) = (0, 1);
@@ -136,7 +136,7 @@ fn read_element_2(
         corners,
         entity,
         physical,
-        place,
+        offset,
     })
 }
 

@@ -80,7 +80,7 @@ pub(super) fn read_nodes(
     let mut left = count;
     for _ in 0..blocks {
         let dimension = source.int("the dimension of an entity")?;
-        let place = source.place();
+        let offset = source.offset();
         source.int("the number of an entity")?;
         let parametric = source.int("whether the nodes have parameters")?;
         let parameters = match (parametric, dimension) {
@@ -88,7 +88,7 @@ pub(super) fn read_nodes(
             (_, 0..=3) => dimension,
             _ => {
                 let message = format!("{dimension} is not a dimension: 0 to 3 expected");
-                return Err(source.error_at(place, message));
+                return Err(source.error_at(offset, message));
             }
         };
         let nodes = read_block(source, &mut left, "nodes")?;
@@ -125,7 +125,7 @@ pub(super) fn read_elements(
         let elements = read_block(source, &mut left, "elements")?;
         for _ in 0..elements {
             let tag = source.long_tag("the number of an element")?;
-            let place = source.place();
+            let offset = source.offset();
             content.elements += 1;
             if let Some(nodes) = skip {
                 for _ in 0..nodes {
@@ -142,7 +142,7 @@ pub(super) fn read_elements(
                 corners,
                 entity,
                 physical: 0,
-                place,
+                offset,
             });
         }
     }

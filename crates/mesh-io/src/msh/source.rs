@@ -20,7 +20,7 @@ pub(super) enum Encoding {
     Big,
 }
 
-/// A file in memory and the place reached in it.
+/// A file in memory and the read position in it.
 pub(super) struct Source<'a> {
     path: &'a Path,
     bytes: &'a [u8],
@@ -50,7 +50,7 @@ impl<'a> Source<'a> {
     }
 
     /// Where the item read last starts.
-    pub(super) const fn place(&self) -> usize {
+    pub(super) const fn offset(&self) -> usize {
         self.item
     }
 
@@ -59,11 +59,11 @@ impl<'a> Source<'a> {
         self.error_at(self.item, message)
     }
 
-    /// An error at the given place.
-    pub(super) fn error_at(&self, place: usize, message: impl Into<String>) -> MeshIoError {
+    /// An error at the given offset.
+    pub(super) fn error_at(&self, offset: usize, message: impl Into<String>) -> MeshIoError {
         let (path, message) = (self.path.to_owned(), message.into());
         if self.encoding == Encoding::Text {
-            let before = &self.bytes[..place.min(self.bytes.len())];
+            let before = &self.bytes[..offset.min(self.bytes.len())];
             let line = 1 + before.iter().filter(|&&b| b == b'\n').count();
             MeshIoError::Parse {
                 path,
@@ -73,7 +73,7 @@ impl<'a> Source<'a> {
         } else {
             MeshIoError::ParseBytes {
                 path,
-                byte: place,
+                byte: offset,
                 message,
             }
         }
@@ -131,16 +131,16 @@ impl<'a> Source<'a> {
         let rest = &self.bytes[self.at..];
         let mut from = 0;
         while let Some(dollar) = rest[from..].iter().position(|&b| b == b'$') {
-            let place = from + dollar;
-            let starts_line = self.bytes[..self.at + place]
+            let offset = from + dollar;
+            let starts_line = self.bytes[..self.at + offset]
                 .last()
                 .is_none_or(u8::is_ascii_whitespace);
-            let after = rest[place..].strip_prefix(end);
+            let after = rest[offset..].strip_prefix(end);
             if starts_line && after.is_some_and(|a| a.first().is_none_or(u8::is_ascii_whitespace)) {
-                self.at += place + end.len();
+                self.at += offset + end.len();
                 return Ok(());
             }
-            from = place + 1;
+            from = offset + 1;
         }
         Err(self.ends_early(&show(end)))
     }

@@ -284,7 +284,7 @@ fn write_data(sink: &mut Sink<'_>, section: &str, values: &NamedValues) -> io::R
     sink.finish(&format!("$End{section}"))
 }
 
-/// A number for a place of 32 bits.
+/// A number as an offset of 32 bits.
 fn short(number: usize) -> io::Result<i32> {
     i32::try_from(number).map_err(|_| {
         io::Error::new(

@@ -85,7 +85,7 @@ impl<'b, I: Iterator<Item = Word<'b>>> Body<'b, '_, I> {
             return Ok(number as u32);
         }
         let message = format!("{number} is not {what}: a whole number from 0 expected");
-        Err(self.error(self.place(), message))
+        Err(self.error(self.offset(), message))
     }
 
     /// The next bytes, turned to little-endian order.
@@ -108,23 +108,23 @@ impl<'b, I: Iterator<Item = Word<'b>>> Body<'b, '_, I> {
             }
         }
         let message = format!("the file ends early: {what} expected, get the complete file");
-        Err(self.error(self.place(), message))
+        Err(self.error(self.offset(), message))
     }
 
     /// The line or byte of the last value.
-    pub(super) fn place(&self) -> usize {
+    pub(super) fn offset(&self) -> usize {
         match self {
             Body::Ascii { line, .. } => *line,
             Body::Binary { last, .. } => *last,
         }
     }
 
-    pub(super) fn error(&self, place: usize, message: String) -> MeshIoError {
+    pub(super) fn error(&self, offset: usize, message: String) -> MeshIoError {
         match self {
-            Body::Ascii { text, .. } => text.error(place, message),
+            Body::Ascii { text, .. } => text.error(offset, message),
             Body::Binary { path, .. } => MeshIoError::ParseBytes {
                 path: path.to_path_buf(),
-                byte: place,
+                byte: offset,
                 message,
             },
         }

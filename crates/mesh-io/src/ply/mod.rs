@@ -148,9 +148,9 @@ pub(crate) fn parse_ply(bytes: &[u8], path: &Path) -> Result<TriangleSurface, Me
                 for _ in 0..count {
                     if corners {
                         let corner = ParticleId(body.natural(property.value, "a corner")?);
-                        let place = body.place();
+                        let offset = body.offset();
                         if largest.is_none_or(|(largest, _)| corner > largest) {
-                            largest = Some((corner, place));
+                            largest = Some((corner, offset));
                         }
                         list.push(corner);
                     } else {
@@ -161,7 +161,7 @@ pub(crate) fn parse_ply(bytes: &[u8], path: &Path) -> Result<TriangleSurface, Me
                             if !value.is_finite() {
                                 let message =
                                     format!("the coordinate {value} is not finite, correct it");
-                                return Err(body.error(body.place(), message));
+                                return Err(body.error(body.offset(), message));
                             }
                             position[axis] = value;
                         }
@@ -176,10 +176,10 @@ pub(crate) fn parse_ply(bytes: &[u8], path: &Path) -> Result<TriangleSurface, Me
     }
     let particles = surface.positions.len();
     match largest {
-        Some((corner, place)) if corner.index() >= particles => {
+        Some((corner, offset)) if corner.index() >= particles => {
             let message =
                 format!("a face has the point {corner} but there are {particles}, from 0");
-            Err(body.error(place, message))
+            Err(body.error(offset, message))
         }
         _ if surface.triangles.is_empty() => Err(text.error(1, "the file has no faces")),
         _ => Ok(surface),

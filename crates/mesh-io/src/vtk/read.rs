@@ -34,7 +34,7 @@ fn parse(bytes: &[u8], path: &Path, with_data: bool) -> Result<MeshFile, MeshIoE
     let mut reader = Reader {
         cursor,
         grid: Grid::default(),
-        places: Places::Cells(0),
+        tets_at: CellSource::Cells(0),
         has: [false; 3],
         target: Target::None,
         of_particles: Announced::default(),
@@ -98,7 +98,7 @@ pub(super) struct Announced {
 }
 
 /// Where the cells are in the file.
-enum Places {
+enum CellSource {
     /// Where their list starts, in which each has its number of points before it.
     Cells(usize),
     /// Where the list of all their points starts, of numbers of a type.
@@ -108,7 +108,7 @@ enum Places {
 pub(super) struct Reader<'b> {
     pub(super) cursor: Cursor<'b>,
     pub(super) grid: Grid,
-    places: Places,
+    tets_at: CellSource,
     /// Whether points, cells and cell types have been read.
     has: [bool; 3],
     pub(super) target: Target,
@@ -206,7 +206,7 @@ impl Reader<'_> {
         if self.cursor.peek().is_some_and(|word| word.is("OFFSETS")) {
             return self.cells_with_offsets(count, size);
         }
-        self.places = Places::Cells(self.cursor.at);
+        self.tets_at = CellSource::Cells(self.cursor.at);
         // A list of so many numbers has one for each cell and one for each point of a cell.
         let numbers = self.cursor.room_for(size);
         let cells = count.min(numbers);
@@ -288,7 +288,7 @@ impl Reader<'_> {
         }
         let kind = self.cursor.kind("the data type of the connectivity")?;
         self.start_data();
-        self.places = Places::Connectivity(self.cursor.at, kind);
+        self.tets_at = CellSource::Connectivity(self.cursor.at, kind);
         self.grid.points = self.cursor.indices(kind, size, "a point of a cell")?;
         self.grid.offsets = offsets;
         Ok(())
@@ -304,9 +304,9 @@ impl Reader<'_> {
 
     /// An error at a cell, before which there are so many points of cells.
     fn cell_error(&self, cell: usize, points_before: usize, message: String) -> MeshIoError {
-        let (start, kind, before) = match self.places {
-            Places::Cells(start) => (start, Kind::I32, cell + points_before),
-            Places::Connectivity(start, kind) => (start, kind, points_before),
+        let (start, kind, before) = match self.tets_at {
+            CellSource::Cells(start) => (start, Kind::I32, cell + points_before),
+            CellSource::Connectivity(start, kind) => (start, kind, points_before),
         };
         let mut words = Cursor {
             at: start,

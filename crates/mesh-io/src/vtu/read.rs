@@ -24,7 +24,7 @@ pub(crate) fn parse_vtu(bytes: &[u8], path: &Path) -> Result<MeshFile, MeshIoErr
         0
     };
     let mut document = Document {
-        place: Place { path, bytes },
+        input: Input { path, bytes },
         storage: None,
         piece: None,
         arrays: Vec::new(),
@@ -37,12 +37,12 @@ pub(crate) fn parse_vtu(bytes: &[u8], path: &Path) -> Result<MeshFile, MeshIoErr
 
 /// The file, for errors.
 #[derive(Clone, Copy)]
-struct Place<'b> {
+struct Input<'b> {
     path: &'b Path,
     bytes: &'b [u8],
 }
 
-impl Place<'_> {
+impl Input<'_> {
     /// An error on the line of the given byte.
     fn error(self, at: usize, message: impl Into<String>) -> MeshIoError {
         let before = &self.bytes[..at.min(self.bytes.len())];
@@ -104,7 +104,7 @@ enum Format {
 }
 
 struct Document<'b> {
-    place: Place<'b>,
+    input: Input<'b>,
     storage: Option<Storage>,
     /// The numbers of points and cells.
     piece: Option<[usize; 2]>,
@@ -117,8 +117,8 @@ struct Document<'b> {
 
 impl Document<'_> {
     fn walk(&mut self, start: usize) -> Result<(), MeshIoError> {
-        let place = self.place;
-        let mut reader = quick_xml::Reader::from_reader(&place.bytes[start..]);
+        let input = self.input;
+        let mut reader = quick_xml::Reader::from_reader(&input.bytes[start..]);
         reader.config_mut().expand_empty_elements = true;
         let mut section = None;
         // How many elements are open inside an array, itself included: text belongs to it at 1.
@@ -128,19 +128,19 @@ impl Document<'_> {
         loop {
             let position = |reader: &quick_xml::Reader<&[u8]>| {
                 usize::try_from(reader.buffer_position())
-                    .map_or(place.bytes.len(), |position| start + position)
+                    .map_or(input.bytes.len(), |position| start + position)
             };
             let at = position(&reader);
             let event = reader
                 .read_event()
-                .map_err(|error| place.error(at, format!("the file is no sound XML: {error}")))?;
+                .map_err(|error| input.error(at, format!("the file is no sound XML: {error}")))?;
             match event {
                 Event::Start(_) if depth > 0 => depth += 1,
                 Event::Start(element) => match element.name().as_ref() {
-                    "VTKFile" => self.storage = Some(storage(&Element { element, place, at })?),
-                    "Piece" => self.piece(&Element { element, place, at })?,
+                    "VTKFile" => self.storage = Some(storage(&Element { element, input, at })?),
+                    "Piece" => self.piece(&Element { element, input, at })?,
                     "AppendedData" => {
-                        let element = Element { element, place, at };
+                        let element = Element { element, input, at };
                         let raw = element.text("encoding")?.is_some_and(|name| name == "raw");
                         self.appended = Some((position(&reader), raw));
                         return Ok(());
@@ -149,7 +149,7 @@ impl Document<'_> {
                         depth = 1;
                         kept = false;
                         if let Some(section) = section {
-                            let array = array(&Element { element, place, at }, section)?;
+                            let array = array(&Element { element, input, at }, section)?;
                             // An array takes more here than in the file, so that those of no use are left out.
                             kept = match section {
                                 Section::Points => !std::mem::replace(&mut has_points, true),
@@ -175,7 +175,7 @@ impl Document<'_> {
                 }
                 Event::Text(text) if depth == 1 && kept => self.text(text.as_bytes()),
                 Event::CData(text) if depth == 1 && kept => self.text(text.as_bytes()),
-                Event::Eof => return Err(place.ends_early("</VTKFile>")),
+                Event::Eof => return Err(input.ends_early("</VTKFile>")),
                 _ => {}
             }
         }
@@ -205,30 +205,30 @@ impl Document<'_> {
     }
 
     fn finish(self) -> Result<MeshFile, MeshIoError> {
-        let place = self.place;
+        let input = self.input;
         let [points, cells] = self
             .piece
-            .ok_or_else(|| place.ends_early("an element Piece"))?;
+            .ok_or_else(|| input.ends_early("an element Piece"))?;
         let array = |section, name: Option<&str>| {
             self.arrays
                 .iter()
                 .find(|a| a.section == section && name.is_none_or(|name| a.name == name))
                 .ok_or_else(|| {
                     let name = name.unwrap_or("Points");
-                    place.ends_early(&format!("an array {name}"))
+                    input.ends_early(&format!("an array {name}"))
                 })
         };
         let coordinates = array(Section::Points, None)?;
         let values = self.reals(coordinates, points.checked_mul(3))?;
         if let Some(value) = values.iter().find(|value| !value.is_finite()) {
             let message = format!("the coordinate {value} is not finite, correct it");
-            return Err(place.error(coordinates.at, message));
+            return Err(input.error(coordinates.at, message));
         }
         let ends = array(Section::Cells, Some("offsets"))?;
         let mut offsets = vec![0];
         offsets.extend(self.indices(ends, cells)?);
         if !offsets.is_sorted() {
-            return Err(place.error(ends.at, "the offsets are not in order, correct them"));
+            return Err(input.error(ends.at, "the offsets are not in order, correct them"));
         }
         let connectivity = array(Section::Cells, Some("connectivity"))?;
         let size = offsets.last().copied().unwrap_or(0);
@@ -240,13 +240,13 @@ impl Document<'_> {
             particles: self.fields(Section::PointData, points)?,
             cells: self.fields(Section::CellData, cells)?,
         };
-        grid.into_file(|_, _, message| place.error(connectivity.at, message))
+        grid.into_file(|_, _, message| input.error(connectivity.at, message))
     }
 
     fn fields(&self, section: Section, count: usize) -> Result<Vec<NamedValues>, MeshIoError> {
         let mut fields = Vec::new();
         for array in self.arrays.iter().filter(|a| a.section == section) {
-            // Tensors and the like have no place in a mesh file.
+            // A mesh file does not represent tensors.
             if matches!(array.components, 1 | 3) {
                 let values = self.reals(array, count.checked_mul(array.components))?;
                 fields.extend(named_values(array.name.clone(), array.components, values));
@@ -256,7 +256,7 @@ impl Document<'_> {
     }
 
     fn reals(&self, array: &Array, count: Option<usize>) -> Result<Vec<f64>, MeshIoError> {
-        let count = count.ok_or_else(|| self.place.error(array.at, "the counts are too large"))?;
+        let count = count.ok_or_else(|| self.input.error(array.at, "the counts are too large"))?;
         self.numbers(
             array,
             count,
@@ -284,14 +284,14 @@ impl Document<'_> {
     ) -> Result<Vec<T>, MeshIoError> {
         let here = |message: String| {
             let message = format!("array {:?}: {message}", array.name);
-            self.place.error(array.at, message)
+            self.input.error(array.at, message)
         };
         let kind = array
             .kind
             .ok_or_else(|| here("its type is not known".to_owned()))?;
         let storage = self
             .storage
-            .ok_or_else(|| self.place.error(0, "there is no element VTKFile"))?;
+            .ok_or_else(|| self.input.error(0, "there is no element VTKFile"))?;
         let size = kind
             .bytes(count)
             .ok_or_else(|| here(format!("{count} numbers are too many")))?;
@@ -331,14 +331,14 @@ impl Document<'_> {
         storage: Storage,
     ) -> Result<Vec<u8>, MeshIoError> {
         let Some((start, raw)) = self.appended else {
-            return Err(self.place.ends_early("an element AppendedData"));
+            return Err(self.input.ends_early("an element AppendedData"));
         };
-        let bytes = self.place.bytes;
+        let bytes = self.input.bytes;
         let rest = &bytes[start.min(bytes.len())..];
         let blanks = rest.iter().take_while(|b| b.is_ascii_whitespace()).count();
         if rest.get(blanks) != Some(&b'_') {
             return Err(self
-                .place
+                .input
                 .error(start, "the appended data do not start with _"));
         }
         let start = start + blanks + 1;
@@ -350,7 +350,7 @@ impl Document<'_> {
             false => Stream::Base64(data, Vec::new()),
         };
         let error = |message: String| MeshIoError::ParseBytes {
-            path: self.place.path.to_owned(),
+            path: self.input.path.to_owned(),
             byte: start.saturating_add(offset).min(bytes.len()),
             message: format!("array {:?}: {message}", array.name),
         };
@@ -369,13 +369,13 @@ impl Document<'_> {
 /// An element with its attributes, and where it starts.
 struct Element<'b> {
     element: BytesStart<'b>,
-    place: Place<'b>,
+    input: Input<'b>,
     at: usize,
 }
 
 impl Element<'_> {
     fn error(&self, message: impl Into<String>) -> MeshIoError {
-        self.place.error(self.at, message)
+        self.input.error(self.at, message)
     }
 
     fn text(&self, name: &str) -> Result<Option<String>, MeshIoError> {

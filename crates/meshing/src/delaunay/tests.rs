@@ -8,7 +8,7 @@ use super::*;
 use crate::delaunay::cells::is_in_sphere;
 use crate::random::in_cube;
 
-/// A sound mesh whose surface is convex, that uses each place once, with empty circumspheres.
+/// A sound mesh whose surface is convex, that uses each position once, with empty circumspheres.
 fn assert_delaunay(points: &[DVec3]) -> TetMesh {
     let mesh = delaunay(points).expect("the points span a volume");
     assert_eq!(mesh.positions, points);
@@ -31,19 +31,19 @@ fn assert_delaunay(points: &[DVec3]) -> TetMesh {
         let corners = scaled.corners(TetId::new(t));
         assert!(!scaled.positions.iter().any(|&p| is_in_sphere(corners, p)));
     }
-    let mut places: Vec<[u64; 3]> = points
+    let mut positions: Vec<[u64; 3]> = points
         .iter()
         .map(|p| (*p + 0.0).to_array().map(f64::to_bits))
         .collect();
     let mut used: Vec<ParticleId> = mesh.tets.iter().flatten().copied().collect();
     used.sort_unstable();
     used.dedup();
-    let mut used: Vec<_> = used.iter().map(|p| places[p.index()]).collect();
-    for list in [&mut places, &mut used] {
+    let mut used: Vec<_> = used.iter().map(|p| positions[p.index()]).collect();
+    for list in [&mut positions, &mut used] {
         list.sort_unstable();
     }
-    places.dedup();
-    assert_eq!(used, places, "each place once");
+    positions.dedup();
+    assert_eq!(used, positions, "each position once");
     mesh
 }
 

@@ -32,15 +32,15 @@ pub(super) fn carve(mut mesh: TetMesh, shape: Shape, spacing: f64) -> Option<Tet
     let mut kept: Vec<bool> = distances.iter().map(|&d| d < -ON_SURFACE).collect();
     let all = std::mem::take(&mut mesh.tets);
     for round in 0..ROUNDS {
-        let places: Vec<usize> = (0..all.len()).filter(|&t| kept[t]).collect();
-        mesh.tets = places.iter().map(|&t| all[t]).collect();
+        let indices: Vec<usize> = (0..all.len()).filter(|&t| kept[t]).collect();
+        mesh.tets = indices.iter().map(|&t| all[t]).collect();
         let pieces = mesh.face_pieces();
         if pieces.count > shape.pieces() {
             let sizes = pieces.sizes();
             let mut order: Vec<usize> = (0..sizes.len()).collect();
             order.sort_by_key(|&piece| Reverse(sizes[piece]));
             order.truncate(shape.pieces());
-            for (&t, &label) in places.iter().zip(&pieces.labels) {
+            for (&t, &label) in indices.iter().zip(&pieces.labels) {
                 kept[t] &= order.contains(&(label as usize));
             }
             continue;

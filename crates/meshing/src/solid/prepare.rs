@@ -84,18 +84,18 @@ fn fault<T>(message: String) -> Result<T, MeshingError> {
     Err(MeshingError::Surface(message))
 }
 
-/// For each point the first one at the same place.
+/// The first point with the same coordinates, for each point.
 fn weld(positions: &[DVec3]) -> Vec<u32> {
-    // Zeros of either sign are one place.
-    let place = |p: u32| {
+    // Zeros of either sign are equal.
+    let location = |p: u32| {
         positions[p as usize]
             .to_array()
             .map(|x| (x + 0.0).to_bits())
     };
     let mut order: Vec<u32> = (0..ParticleId::new(positions.len()).0).collect();
-    order.sort_unstable_by_key(|&p| (place(p), p));
+    order.sort_unstable_by_key(|&p| (location(p), p));
     let mut same = vec![0; positions.len()];
-    for group in order.chunk_by(|&p, &q| place(p) == place(q)) {
+    for group in order.chunk_by(|&p, &q| location(p) == location(q)) {
         for &p in group {
             same[p as usize] = group[0];
         }
@@ -185,23 +185,23 @@ fn describe(triangles: &[[u32; 3]], positions: &[DVec3], [a, b]: [u32; 2]) -> St
     let at_edge: Vec<usize> = (0..triangles.len())
         .filter(|&t| triangles[t].contains(&a) && triangles[t].contains(&b))
         .collect();
-    let place = format!(
+    let location = format!(
         "the edge from point {a} at {} to point {b} at {}",
         positions[a as usize], positions[b as usize]
     );
     match at_edge.as_slice() {
-        [_] => format!("{place} has one triangle: the surface is open there, close it"),
+        [_] => format!("{location} has one triangle: the surface is open there, close it"),
         [_, _] => {
-            format!("{place} joins triangles that face opposite ways: the surface has no inside")
+            format!("{location} joins triangles that face opposite ways: the surface has no inside")
         }
         odd if odd.len() % 2 == 1 => {
             format!(
-                "{place} has {} triangles, an odd number: the surface has no inside",
+                "{location} has {} triangles, an odd number: the surface has no inside",
                 odd.len()
             )
         }
         many => format!(
-            "{place} has {} triangles, not as many in either direction: turn or separate them",
+            "{location} has {} triangles, not as many in either direction: turn or separate them",
             many.len()
         ),
     }

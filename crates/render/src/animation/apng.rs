@@ -56,8 +56,8 @@ impl Apng {
             around(shown, &picture.rgba, self.size[0], |a, b| a != b)
         };
         let mut control = self.next().to_be_bytes().to_vec();
-        let places = [part.width, part.height, part.left, part.top];
-        control.extend(places.iter().flat_map(|place| place.to_be_bytes()));
+        let bounds = [part.width, part.height, part.left, part.top];
+        control.extend(bounds.iter().flat_map(|bound| bound.to_be_bytes()));
         control.extend(
             [delay, PER_SECOND]
                 .iter()

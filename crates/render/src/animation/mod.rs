@@ -145,8 +145,8 @@ impl Animation {
             return Err(RenderError::OtherSize {
                 width,
                 height,
-                film_width: self.size[0],
-                film_height: self.size[1],
+                animation_width: self.size[0],
+                animation_height: self.size[1],
             });
         }
         let (number, seconds) = (self.pictures, self.seconds);
@@ -220,7 +220,7 @@ fn is_gif(path: &Path) -> Result<bool, RenderError> {
     } else if is("png") || is("apng") {
         Ok(false)
     } else {
-        Err(RenderError::UnknownFilm {
+        Err(RenderError::UnknownAnimation {
             path: path.to_owned(),
             known: KNOWN,
         })

@@ -51,11 +51,11 @@ const WIDEST: u32 = 65_535;
 /// let mut scene = Scene::built_in();
 /// scene.body[0].shape = Some(ShapeSpec { kind: "liver".into(), tets: 500 });
 /// let simulation = Simulation::new(&scene)?;
-/// let painting = RenderScene::new(&simulation, &scene);
-/// let [low, high] = painting.bounds(&simulation);
+/// let render scene = RenderScene::new(&simulation, &scene);
+/// let [low, high] = render_scene.bounds(&simulation);
 /// let mut renderer = GpuRenderer::new(gpu)?;
 /// let camera = Camera::fit(low, high);
-/// let picture = renderer.picture(&painting, &simulation, &camera, &Style::default(), [64, 48])?;
+/// let picture = renderer.picture(&render_scene, &simulation, &camera, &Style::default(), [64, 48])?;
 /// assert_ne!(picture.pixel(32, 24), picture.pixel(0, 0));
 /// # Ok::<(), incise_render::RenderError>(())
 /// ```
@@ -106,11 +106,11 @@ impl GpuRenderer {
     }
 
     /// Whether a simulation has to be [read back](Simulation::read_back) for a picture of the present: it is on another
-    /// device than this, or on any and has made no step since the painting was made or reset.
+    /// device than this, or on any and has made no step since the render scene was made or reset.
     #[must_use]
-    pub fn needs_read_back(&self, painting: &RenderScene, simulation: &Simulation) -> bool {
+    pub fn needs_read_back(&self, render_scene: &RenderScene, simulation: &Simulation) -> bool {
         let mut solvers = simulation.device_solvers();
-        let current = painting.device_is_current();
+        let current = render_scene.device_is_current();
         solvers.any(|solver| !current || !Arc::ptr_eq(solver.gpu(), &self.gpu))
     }
 
@@ -118,17 +118,17 @@ impl GpuRenderer {
     /// a window to show: its colors as they are stored (`Rgba8Unorm`), to be sampled. Returns when the commands are with the
     /// driver.
     ///
-    /// A simulation on this device is drawn from there, once it has made a step since the painting was made or reset. Of
+    /// A simulation on this device is drawn from there, once it has made a step since the render scene was made or reset. Of
     /// others, and until then, the positions that the host knows are sent: see [`GpuRenderer::needs_read_back`].
     ///
     /// # Errors
     /// If a side of the picture is 0 or more than the device allows; if the device is lost or out of memory.
     ///
     /// # Panics
-    /// If the painting does not follow the simulation.
+    /// If the render scene does not match the simulation.
     pub fn draw(
         &mut self,
-        painting: &RenderScene,
+        render_scene: &RenderScene,
         simulation: &Simulation,
         camera: &Camera,
         style: &Style,
@@ -141,13 +141,13 @@ impl GpuRenderer {
             Some(target) if target.size == size => target,
             _ => Target::new(&self.gpu, size)?,
         };
-        let solvers = if painting.device_is_current() {
+        let solvers = if render_scene.device_is_current() {
             solvers_here(&self.gpu, simulation)
         } else {
             Vec::new()
         };
         self.upload
-            .send(&self.gpu, painting, simulation, &solvers, style, &view)?;
+            .send(&self.gpu, render_scene, simulation, &solvers, style, &view)?;
         self.record(&target, &solvers);
         self.gpu.check()?;
         Ok(&self.target.insert(target).shown)
@@ -293,13 +293,13 @@ impl GpuRenderer {
     /// Panics where [`GpuRenderer::draw`] does.
     pub fn picture(
         &mut self,
-        painting: &RenderScene,
+        render_scene: &RenderScene,
         simulation: &Simulation,
         camera: &Camera,
         style: &Style,
         size: [u32; 2],
     ) -> Result<Image, RenderError> {
-        self.draw(painting, simulation, camera, style, size)?;
+        self.draw(render_scene, simulation, camera, style, size)?;
         match &self.target {
             Some(target) => target.read(&self.gpu, &mut self.readbacks),
             None => unreachable!("a picture was drawn into it"),

@@ -103,32 +103,32 @@ impl Upload {
     pub(super) fn send(
         &mut self,
         gpu: &GpuContext,
-        painting: &RenderScene,
+        render_scene: &RenderScene,
         simulation: &Simulation,
         solvers: &[&GpuSolver],
         style: &Style,
         view: &View,
     ) -> Result<(), RenderError> {
-        let skin = (painting.topology(), !solvers.is_empty());
+        let skin = (render_scene.topology(), !solvers.is_empty());
         // A key stands for what has arrived: none while something is on its way and may fail.
         if self.skin != skin {
             self.skin = NOTHING;
-            self.send_skin(gpu, painting, simulation, solvers)?;
+            self.send_skin(gpu, render_scene, simulation, solvers)?;
             self.skin = skin;
         }
         self.send_positions(gpu, simulation, solvers, view)?;
-        let colors = painting.colors_for(style.color_by);
-        if !colors.is_empty() && self.coloring != painting.coloring() {
+        let colors = render_scene.colors_for(style.color_by);
+        if !colors.is_empty() && self.coloring != render_scene.coloring() {
             self.coloring = 0;
             self.colors.replace(gpu, colors)?;
-            self.coloring = painting.coloring();
+            self.coloring = render_scene.coloring();
         }
         let flags = u32::from(style.wireframe)
             | u32::from(style.smooth) << 1
             | u32::from(!colors.is_empty()) << 2;
         self.view.replace(gpu, &[view_numbers(view, flags)])?;
 
-        let props = Props::new(painting, simulation, view);
+        let props = Props::new(render_scene, simulation, view);
         self.props.replace(gpu, &props.corners)?;
         let planes: Vec<_> = props.planes.iter().map(plane_numbers).collect();
         self.planes.replace(gpu, &planes)?;
@@ -144,11 +144,11 @@ impl Upload {
     fn send_skin(
         &mut self,
         gpu: &GpuContext,
-        painting: &RenderScene,
+        render_scene: &RenderScene,
         simulation: &Simulation,
         solvers: &[&GpuSolver],
     ) -> Result<(), RenderError> {
-        let skin = painting.skin();
+        let skin = render_scene.skin();
         // Where the particles of each solver begin.
         let mut first = Vec::with_capacity(solvers.len());
         let mut particles = 0;
@@ -162,8 +162,8 @@ impl Upload {
             if solvers.is_empty() {
                 return [vertex.particle.0, cut];
             }
-            let (part, place) = simulation.place_of(vertex.particle);
-            [first[part] + count(place), count(part) | cut]
+            let (part, offset) = simulation.location_of(vertex.particle);
+            [first[part] + count(offset), count(part) | cut]
         };
         let vertices: Vec<[u32; 2]> = skin.vertices().iter().map(vertex).collect();
         self.vertices.replace(gpu, &vertices)?;
@@ -188,8 +188,8 @@ impl Upload {
             // Near the bodies: far from the origin of the world single precision would not do.
             let origin = positions.first().copied().unwrap_or_default();
             let local = |x: &DVec3| (*x - origin).as_vec3().extend(0.0).to_array();
-            let places: Vec<[f32; 4]> = positions.iter().map(local).collect();
-            self.positions.replace(gpu, &places)?;
+            let local: Vec<[f32; 4]> = positions.iter().map(local).collect();
+            self.positions.replace(gpu, &local)?;
             self.parts.replace(gpu, &[part(origin)])?;
             return Ok(());
         }
@@ -213,11 +213,11 @@ impl Upload {
         if let [only] = solvers {
             return only.positions();
         }
-        let mut place = 0;
+        let mut offset = 0;
         for solver in solvers {
             let (from, bytes) = (solver.positions(), bytes_of(solver));
-            encoder.copy_buffer_to_buffer(from, 0, self.positions.raw(), place, bytes);
-            place += bytes;
+            encoder.copy_buffer_to_buffer(from, 0, self.positions.raw(), offset, bytes);
+            offset += bytes;
         }
         self.positions.raw()
     }

@@ -18,11 +18,11 @@ const SIZE: [u32; 2] = [120, 90];
 /// Draws on both and compares. The same tolerances as for the references, but for what both see the same.
 fn assert_alike(renderer: &mut GpuRenderer, shown: &Shown, style: &Style, what: &str) {
     let camera = shown.camera();
-    let (painting, simulation) = (&shown.painting, &shown.simulation);
+    let (render_scene, simulation) = (&shown.render_scene, &shown.simulation);
     let there = renderer
-        .picture(painting, simulation, &camera, style, SIZE)
+        .picture(render_scene, simulation, &camera, style, SIZE)
         .unwrap();
-    let here = software_picture(painting, simulation, &camera, style, SIZE);
+    let here = software_picture(render_scene, simulation, &camera, style, SIZE);
     let difference = Difference::of(&there, &here.unwrap(), 24);
     assert!(
         difference.mean < 1.0 && difference.share < 0.04,
@@ -36,7 +36,7 @@ fn both_draw_the_same() {
         return;
     };
     let mut renderer = GpuRenderer::new(gpu).unwrap();
-    // One renderer for all, so that what it keeps of one painting does not show in another.
+    // One renderer for all, so that what it keeps of one render_scene does not show in another.
     let mut liver = Shown::new(LIVER, 0);
     let bodies = Shown::new(TWO_BODIES, 2);
     for frame in 0..4 {
@@ -44,7 +44,7 @@ fn both_draw_the_same() {
         assert_alike(&mut renderer, &bodies, &Style::default(), "bodies");
         let by = [ColorBy::Color, ColorBy::Piece, ColorBy::Stretch][frame % 3];
         liver
-            .painting
+            .render_scene
             .color(&mut liver.simulation, by, None)
             .unwrap();
         for smooth in [true, false] {
@@ -62,13 +62,13 @@ fn both_draw_the_same() {
 /// Reads the simulation back, draws it by software and compares. As in `assert_alike`.
 fn assert_present(
     there: &Image,
-    painting: &RenderScene,
+    render_scene: &RenderScene,
     simulation: &mut Simulation,
     camera: &Camera,
     what: &str,
 ) {
     simulation.read_back().unwrap();
-    let here = software_picture(painting, simulation, camera, &Style::default(), SIZE).unwrap();
+    let here = software_picture(render_scene, simulation, camera, &Style::default(), SIZE).unwrap();
     let difference = Difference::of(there, &here, 24);
     assert!(
         difference.mean < 1.0 && difference.share < 0.04,
@@ -79,7 +79,7 @@ fn assert_present(
 /// Draws twice; the second time sends no positions and no skin, and neither reads.
 fn assert_little_is_sent(
     renderer: &mut GpuRenderer,
-    painting: &RenderScene,
+    render_scene: &RenderScene,
     simulation: &Simulation,
     camera: &Camera,
 ) {
@@ -88,7 +88,7 @@ fn assert_little_is_sent(
     for sent in &mut sent {
         let before = renderer.uploaded_bytes();
         renderer
-            .draw(painting, simulation, camera, &Style::default(), SIZE)
+            .draw(render_scene, simulation, camera, &Style::default(), SIZE)
             .unwrap();
         *sent = renderer.uploaded_bytes() - before;
     }
@@ -104,29 +104,41 @@ fn positions_do_not_leave_the_device() {
     };
     let scene = Scene::from_toml(&LIVER.replace("substeps = 8", "substeps = 1")).unwrap();
     let mut simulation = Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap();
-    let mut painting = RenderScene::new(&simulation, &scene);
+    let mut render_scene = RenderScene::new(&simulation, &scene);
     let mut renderer = GpuRenderer::new(gpu).unwrap();
     let camera = Camera::fit(Vec3::splat(-0.22).into(), Vec3::splat(0.2).into());
     let style = Style::default();
     // Before the first step too, when the device has no positions yet.
     let there = renderer
-        .picture(&painting, &simulation, &camera, &style, SIZE)
+        .picture(&render_scene, &simulation, &camera, &style, SIZE)
         .unwrap();
-    assert_present(&there, &painting, &mut simulation, &camera, "at the start");
+    assert_present(
+        &there,
+        &render_scene,
+        &mut simulation,
+        &camera,
+        "at the start",
+    );
     for _ in 0..20 {
         simulation.step().unwrap();
-        painting.sync(&simulation);
+        render_scene.sync(&simulation);
     }
-    assert!(!renderer.needs_read_back(&painting, &simulation));
-    assert_little_is_sent(&mut renderer, &painting, &simulation, &camera);
+    assert!(!renderer.needs_read_back(&render_scene, &simulation));
+    assert_little_is_sent(&mut renderer, &render_scene, &simulation, &camera);
     let there = renderer
-        .picture(&painting, &simulation, &camera, &style, SIZE)
+        .picture(&render_scene, &simulation, &camera, &style, SIZE)
         .unwrap();
     // The host does not know yet how far it fell.
-    let old = software_picture(&painting, &simulation, &camera, &style, SIZE).unwrap();
+    let old = software_picture(&render_scene, &simulation, &camera, &style, SIZE).unwrap();
     let difference = Difference::of(&there, &old, 24);
     assert!(difference.mean > 1.0, "{difference:?}");
-    assert_present(&there, &painting, &mut simulation, &camera, "20 frames on");
+    assert_present(
+        &there,
+        &render_scene,
+        &mut simulation,
+        &camera,
+        "20 frames on",
+    );
 }
 
 #[test]
@@ -142,18 +154,24 @@ fn a_painting_made_late_needs_positions_of_the_host() {
     for _ in 0..10 {
         simulation.step().unwrap();
     }
-    let mut painting = RenderScene::new(&simulation, &scene);
+    let mut render_scene = RenderScene::new(&simulation, &scene);
     for what in ["made", "reset"] {
-        assert!(renderer.needs_read_back(&painting, &simulation), "{what}");
+        assert!(
+            renderer.needs_read_back(&render_scene, &simulation),
+            "{what}"
+        );
         simulation.read_back().unwrap();
         let there = renderer
-            .picture(&painting, &simulation, &camera, &style, SIZE)
+            .picture(&render_scene, &simulation, &camera, &style, SIZE)
             .unwrap();
-        assert_present(&there, &painting, &mut simulation, &camera, what);
+        assert_present(&there, &render_scene, &mut simulation, &camera, what);
         simulation.step().unwrap();
-        painting.sync(&simulation);
-        assert!(!renderer.needs_read_back(&painting, &simulation), "{what}");
-        painting.reset(&simulation);
+        render_scene.sync(&simulation);
+        assert!(
+            !renderer.needs_read_back(&render_scene, &simulation),
+            "{what}"
+        );
+        render_scene.reset(&simulation);
     }
 }
 
@@ -166,20 +184,20 @@ fn bodies_of_several_solvers_are_put_together_on_the_device() {
     let scene = Scene::from_toml(&format!("{TWO_BODIES}{cuts}")).unwrap();
     let mut simulation = Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap();
     assert_eq!(simulation.device_solvers().count(), 2);
-    let mut painting = RenderScene::new(&simulation, &scene);
+    let mut render_scene = RenderScene::new(&simulation, &scene);
     let mut renderer = GpuRenderer::new(gpu).unwrap();
-    let [low, high] = painting.bounds(&simulation);
+    let [low, high] = render_scene.bounds(&simulation);
     let (camera, style) = (Camera::fit(low, high), Style::default());
     for frame in 0..3 {
         simulation.step().unwrap();
-        painting.sync(&simulation);
-        assert!(!renderer.needs_read_back(&painting, &simulation));
+        render_scene.sync(&simulation);
+        assert!(!renderer.needs_read_back(&render_scene, &simulation));
         let there = renderer
-            .picture(&painting, &simulation, &camera, &style, SIZE)
+            .picture(&render_scene, &simulation, &camera, &style, SIZE)
             .unwrap();
         assert_present(
             &there,
-            &painting,
+            &render_scene,
             &mut simulation,
             &camera,
             &format!("frame {frame}"),
@@ -192,10 +210,16 @@ fn bodies_of_several_solvers_are_put_together_on_the_device() {
 fn normals_of_both(renderer: &mut GpuRenderer, shown: &Shown) -> [Vec<[i32; 3]>; 2] {
     let (camera, style) = (shown.camera(), Style::default());
     renderer
-        .draw(&shown.painting, &shown.simulation, &camera, &style, SIZE)
+        .draw(
+            &shown.render_scene,
+            &shown.simulation,
+            &camera,
+            &style,
+            SIZE,
+        )
         .unwrap();
     let there = renderer.read_normal_sums().unwrap();
-    let skin = shown.painting.skin();
+    let skin = shown.render_scene.skin();
     let positions = shown.simulation.positions();
     let place = |p: usize| (positions[p] - positions[0]).as_vec3();
     let vertices = skin.vertices().iter();
@@ -215,7 +239,7 @@ fn normals_are_those_of_the_processor() {
     let shown = Shown::new(LIVER, 4);
     let mut renderer = GpuRenderer::new(gpu).unwrap();
     let [here, there] = normals_of_both(&mut renderer, &shown);
-    let skin = shown.painting.skin();
+    let skin = shown.render_scene.skin();
     let mut used = vec![false; here.len()];
     skin.triangles()
         .iter()
@@ -251,7 +275,7 @@ fn triangles_without_an_area_have_no_normal() {
     );
     let mut renderer = GpuRenderer::new(gpu).unwrap();
     let [here, there] = normals_of_both(&mut renderer, &shown);
-    let skin = shown.painting.skin();
+    let skin = shown.render_scene.skin();
     let rest = &shown.simulation.mesh().positions;
     let mut flat = 0;
     for (v, vertex) in skin.vertices().iter().enumerate() {
@@ -274,7 +298,7 @@ fn sizes_that_are_no_pictures_are_refused() {
     let camera = shown.camera();
     let mut draw = |size| {
         let picture = renderer.picture(
-            &shown.painting,
+            &shown.render_scene,
             &shown.simulation,
             &camera,
             &Style::default(),

@@ -6,7 +6,7 @@ use incise_render::{Camera, ColorBy, Image, RenderError, Style, software_picture
 use crate::support::{LIVER, Shown, TWO_BODIES};
 
 fn draw(shown: &Shown, camera: &Camera, style: &Style, size: [u32; 2]) -> Image {
-    software_picture(&shown.painting, &shown.simulation, camera, style, size).unwrap()
+    software_picture(&shown.render_scene, &shown.simulation, camera, style, size).unwrap()
 }
 
 /// Numbers of pixels of what is red, by connected regions, the largest first; below ten pixels nothing counts.
@@ -63,7 +63,7 @@ fn sizes_that_are_no_pictures_are_refused() {
     let camera = shown.camera();
     for size in [[0, 1], [1, 0], [0, 0], [8193, 1], [1, u32::MAX]] {
         let picture = software_picture(
-            &shown.painting,
+            &shown.render_scene,
             &shown.simulation,
             &camera,
             &Style::default(),
@@ -166,7 +166,7 @@ fn styles_show() {
         ColorBy::Stretch,
     ] {
         shown
-            .painting
+            .render_scene
             .color(&mut shown.simulation, by, None)
             .unwrap();
         let style = Style {
@@ -178,14 +178,14 @@ fn styles_show() {
         assert_eq!(draw(&shown, &camera, &plain, [80, 60]), pictures[0]);
     }
     let blade = [DVec3::new(0.0, -0.3, 0.0), DVec3::new(0.0, 0.3, 0.1)];
-    shown.painting.set_blade(Some(&blade));
+    shown.render_scene.set_blade(Some(&blade));
     pictures.push(draw(&shown, &camera, &plain, [80, 60]));
     for (i, a) in pictures.iter().enumerate() {
         assert!(pictures[..i].iter().all(|b| b != a), "{i}");
     }
-    shown.painting.set_blade(Some(&blade[..1]));
+    shown.render_scene.set_blade(Some(&blade[..1]));
     assert_eq!(draw(&shown, &camera, &plain, [80, 60]), pictures[0]);
-    shown.painting.set_blade(None);
+    shown.render_scene.set_blade(None);
     assert_eq!(draw(&shown, &camera, &plain, [80, 60]), pictures[0]);
 }
 

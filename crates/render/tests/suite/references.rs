@@ -20,15 +20,15 @@ fn references() -> [Reference; 3] {
     let liver = Shown::new(LIVER, 16);
     let mut colored = Shown::new(LIVER, 6);
     colored
-        .painting
+        .render_scene
         .color(&mut colored.simulation, ColorBy::Color, None)
         .unwrap();
-    let [low, high] = colored.painting.bounds(&colored.simulation);
+    let [low, high] = colored.render_scene.bounds(&colored.simulation);
     let closer = Camera::fit(low, high);
     let mut bodies = Shown::new(TWO_BODIES, 5);
     let blade = [[-0.5, -0.5, 0.2], [0.2, 0.0, 0.25], [0.5, 0.5, 0.1]];
     bodies
-        .painting
+        .render_scene
         .set_blade(Some(&blade.map(glam::DVec3::from_array)));
     [
         Reference {
@@ -74,8 +74,8 @@ fn software_draws_the_references() {
             camera,
             style,
         } = reference;
-        let (painting, simulation) = (&shown.painting, &shown.simulation);
-        let drawn = software_picture(painting, simulation, &camera, &style, SIZE);
+        let (render_scene, simulation) = (&shown.render_scene, &shown.simulation);
+        let drawn = software_picture(render_scene, simulation, &camera, &style, SIZE);
         let drawn = drawn.unwrap();
         if std::env::var_os("INCISE_BLESS").is_some() {
             drawn.write_png(path(name)).unwrap();
@@ -104,9 +104,9 @@ fn a_device_draws_the_references() {
             camera,
             style,
         } = reference;
-        let (painting, simulation) = (&shown.painting, &shown.simulation);
+        let (render_scene, simulation) = (&shown.render_scene, &shown.simulation);
         let drawn = renderer
-            .picture(painting, simulation, &camera, &style, SIZE)
+            .picture(render_scene, simulation, &camera, &style, SIZE)
             .unwrap();
         let expected = stored(name);
         // Formulas are the same, so areas agree to rounding: half a step of a byte, twice. Samples of a pixel are where

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 
 use crate::support::{LIVER, Shown, TWO_BODIES};
 
-/// Two bodies, cut by a plane, a moving blade, a plug, and with a part taken away.
+/// Two bodies, cut by a plane, a moving blade, a punch, and with a part taken away.
 const STROKES: &str = r#"
 [solver]
 substeps = 2
@@ -29,7 +29,7 @@ frames = [2, 6]
 blade = [[-1.0, 0.05, 1.0], [3.0, 0.1, 1.0]]
 path = [[0.0, 0.0, 0.0], [0.0, 0.0, -2.0]]
 [[stroke]]
-kind = "plug"
+kind = "punch"
 frame = 4
 region = { sphere = { center = [1.2, 0.2, 0.3], radius = 0.2 } }
 [[stroke]]
@@ -41,13 +41,13 @@ region = { box = { low = [-1.0, -1.0, -1.0], high = [-0.2, 1.0, 0.0] } }
 type Triangle = (TetId, [ParticleId; 3], FaceTag, Option<[u8; 3]>);
 
 /// All triangles with their colors, in an order that does not depend on how they came about.
-fn triangles(painting: &RenderScene) -> Vec<Triangle> {
-    let skin = painting.skin();
+fn triangles(render_scene: &RenderScene) -> Vec<Triangle> {
+    let skin = render_scene.skin();
     let triangle = |t: usize| {
         let mut corners = skin.triangles()[t].map(|v| skin.vertices()[v as usize].particle);
         let first = (0..3).min_by_key(|&i| corners[i]).unwrap();
         corners.rotate_left(first);
-        (skin.tet(t), corners, skin.tag(t), painting.color_of(t))
+        (skin.tet(t), corners, skin.tag(t), render_scene.color_of(t))
     };
     let mut all: Vec<_> = (0..skin.triangles().len()).map(triangle).collect();
     all.sort_unstable_by_key(|triangle| (triangle.0, triangle.1));
@@ -63,30 +63,30 @@ fn following_is_starting_anew() {
         ColorBy::Stretch,
     ] {
         let mut shown = Shown::new(STROKES, 0);
-        let before = triangles(&shown.painting).len();
+        let before = triangles(&shown.render_scene).len();
         for _ in 0..9 {
             shown.advance(1);
             // A second time changes nothing.
-            shown.painting.sync(&shown.simulation);
+            shown.render_scene.sync(&shown.simulation);
             let legend = shown
-                .painting
+                .render_scene
                 .color(&mut shown.simulation, by, None)
                 .unwrap();
             assert_eq!(legend.is_some(), by == ColorBy::Stretch);
             let mut rebuilt = RenderScene::new(&shown.simulation, &shown.scene);
             rebuilt.color(&mut shown.simulation, by, None).unwrap();
-            let all = triangles(&shown.painting);
+            let all = triangles(&shown.render_scene);
             assert_eq!(all, triangles(&rebuilt), "{by}");
             assert!(all.iter().all(|t| t.3.is_some() == (by != ColorBy::Tissue)));
         }
-        assert!(triangles(&shown.painting).len() > before);
-        let followed = triangles(&shown.painting);
-        shown.painting.reset(&shown.simulation);
+        assert!(triangles(&shown.render_scene).len() > before);
+        let followed = triangles(&shown.render_scene);
+        shown.render_scene.reset(&shown.simulation);
         shown
-            .painting
+            .render_scene
             .color(&mut shown.simulation, by, None)
             .unwrap();
-        assert_eq!(followed, triangles(&shown.painting));
+        assert_eq!(followed, triangles(&shown.render_scene));
     }
 }
 
@@ -98,7 +98,7 @@ fn pieces_keep_their_colors_and_new_ones_get_others() {
     for frame in 0..9 {
         shown.advance(1);
         shown
-            .painting
+            .render_scene
             .color(&mut shown.simulation, ColorBy::Piece, None)
             .unwrap();
         let ball = triangles_of_ball(&shown);
@@ -110,7 +110,7 @@ fn pieces_keep_their_colors_and_new_ones_get_others() {
         let labels = shown.simulation.mesh().pieces();
         // Each piece has one color, and each color one piece.
         let mut of_piece = vec![None; labels.count];
-        for (tet, _, _, color) in triangles(&shown.painting) {
+        for (tet, _, _, color) in triangles(&shown.render_scene) {
             let color = color.unwrap();
             let piece = labels.labels[tet.index()] as usize;
             assert_eq!(*of_piece[piece].get_or_insert(color), color);
@@ -130,7 +130,7 @@ fn pieces_keep_their_colors_and_new_ones_get_others() {
 /// The triangles of the second body, by their particles, which no cut renumbers, with their colors.
 fn triangles_of_ball(shown: &Shown) -> Vec<([ParticleId; 3], Option<[u8; 3]>)> {
     let rest = &shown.simulation.mesh().positions;
-    let mut all: Vec<_> = triangles(&shown.painting)
+    let mut all: Vec<_> = triangles(&shown.render_scene)
         .into_iter()
         .filter(|(_, corners, ..)| rest[corners[0].index()].x > 0.6)
         .map(|(_, corners, _, color)| (corners, color))
@@ -160,8 +160,10 @@ fn a_piece_keeps_its_color_when_another_is_carved() {
     );
     let mut color = || {
         let simulation = &mut shown.simulation;
-        let painting = &mut shown.painting;
-        painting.color(simulation, ColorBy::Piece, None).unwrap();
+        let render_scene = &mut shown.render_scene;
+        render_scene
+            .color(simulation, ColorBy::Piece, None)
+            .unwrap();
         let ball = triangles_of_ball(&shown);
         shown.advance(1);
         ball
@@ -176,48 +178,48 @@ fn a_piece_keeps_its_color_when_another_is_carved() {
 fn colors_that_nobody_made_are_tissue() {
     let mut shown = Shown::new(STROKES, 0);
     shown
-        .painting
+        .render_scene
         .color(&mut shown.simulation, ColorBy::Color, None)
         .unwrap();
-    assert!(triangles(&shown.painting).iter().all(|t| t.3.is_some()));
+    assert!(triangles(&shown.render_scene).iter().all(|t| t.3.is_some()));
     shown.advance(2);
-    let bare: Vec<_> = triangles(&shown.painting)
+    let bare: Vec<_> = triangles(&shown.render_scene)
         .into_iter()
         .filter(|t| t.3.is_none())
         .collect();
     assert!(!bare.is_empty(), "what a cut made has no color yet");
     shown
-        .painting
+        .render_scene
         .color(&mut shown.simulation, ColorBy::Color, None)
         .unwrap();
-    assert!(triangles(&shown.painting).iter().all(|t| t.3.is_some()));
+    assert!(triangles(&shown.render_scene).iter().all(|t| t.3.is_some()));
 }
 
 #[test]
 fn residuals_are_one_a_tet() {
     let mut shown = Shown::new(STROKES, 1);
     let Shown {
-        painting,
+        render_scene,
         simulation,
         ..
     } = &mut shown;
     let tets = simulation.mesh().tets.len();
-    let missing = painting.color(simulation, ColorBy::Residual, None);
+    let missing = render_scene.color(simulation, ColorBy::Residual, None);
     assert!(matches!(missing, Err(RenderError::NoResiduals)));
-    let few = painting.color(simulation, ColorBy::Residual, Some(&[1.0]));
+    let few = render_scene.color(simulation, ColorBy::Residual, Some(&[1.0]));
     assert!(matches!(few, Err(RenderError::Residuals { given: 1, .. })));
     // Powers of ten, from 1e-9 on: the legend spans the upper six.
     let values: Vec<f64> = (0..tets)
         .map(|t| 10_f64.powi(i32::try_from(t % 9).unwrap() - 9))
         .collect();
-    let legend = painting
+    let legend = render_scene
         .color(simulation, ColorBy::Residual, Some(&values))
         .unwrap()
         .unwrap();
     assert!(legend.logarithmic && (legend.high / 0.1 - 1.0).abs() < 1e-9);
     assert!((legend.fraction(1e-4) - 0.5).abs() < 1e-9);
     assert_eq!(legend.fraction(1e-9), 0.0);
-    for (tet, _, _, color) in triangles(painting) {
+    for (tet, _, _, color) in triangles(render_scene) {
         let expected = legend.color(legend.fraction(values[tet.index()]));
         assert_eq!(color, Some(expected));
     }
@@ -265,14 +267,14 @@ fn flat_tets_have_no_stretch() {
 fn a_body_at_rest_is_not_stretched() {
     let mut shown = Shown::new(TWO_BODIES, 0);
     let legend = shown
-        .painting
+        .render_scene
         .color(&mut shown.simulation, ColorBy::Stretch, None)
         .unwrap();
     let lowest = legend.unwrap().color(0.0);
     // Positions in the solver are single precision: one in ten million.
     let near = |color: [u8; 3]| (0..3).all(|i| color[i].abs_diff(lowest[i]) <= 1);
     assert!(
-        triangles(&shown.painting)
+        triangles(&shown.render_scene)
             .iter()
             .all(|t| near(t.3.unwrap()))
     );
@@ -284,7 +286,7 @@ fn normals_of_a_ball_point_away_from_its_middle() {
         "[[body]]\nshape = { kind = \"sphere\", tets = 2000 }\nscale = 1e-3\nposition = [5.0, 0.0, 0.0]",
         0,
     );
-    let skin = shown.painting.skin();
+    let skin = shown.render_scene.skin();
     let middle = DVec3::new(5.0, 0.0, 0.0);
     let place = |v: usize| {
         (shown.simulation.positions()[skin.vertices()[v].particle.index()] - middle).as_vec3()
@@ -297,6 +299,6 @@ fn normals_of_a_ball_point_away_from_its_middle() {
         assert!(normal.dot(place.normalize()) > 0.99, "{normal} {place}");
     }
     let cut = Shown::new(LIVER, 2);
-    let bounds = cut.painting.bounds(&cut.simulation);
+    let bounds = cut.render_scene.bounds(&cut.simulation);
     assert!(bounds[0].cmplt(bounds[1]).all());
 }

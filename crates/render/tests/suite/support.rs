@@ -7,18 +7,18 @@ use incise_render::{Camera, Image, RenderScene};
 pub(crate) struct Shown {
     pub(crate) scene: Scene,
     pub(crate) simulation: Simulation,
-    pub(crate) painting: RenderScene,
+    pub(crate) render_scene: RenderScene,
 }
 
 impl Shown {
     pub(crate) fn new(toml: &str, frames: usize) -> Self {
         let scene = Scene::from_toml(toml).unwrap();
         let simulation = Simulation::new(&scene).unwrap();
-        let painting = RenderScene::new(&simulation, &scene);
+        let render_scene = RenderScene::new(&simulation, &scene);
         let mut shown = Self {
             scene,
             simulation,
-            painting,
+            render_scene,
         };
         shown.advance(frames);
         shown
@@ -27,13 +27,13 @@ impl Shown {
     pub(crate) fn advance(&mut self, frames: usize) {
         for _ in 0..frames {
             self.simulation.step().unwrap();
-            self.painting.sync(&self.simulation);
+            self.render_scene.sync(&self.simulation);
         }
     }
 
     /// Sees the bodies as they are now, and the floor.
     pub(crate) fn camera(&self) -> Camera {
-        let [mut low, high] = self.painting.bounds(&self.simulation);
+        let [mut low, high] = self.render_scene.bounds(&self.simulation);
         if let Some(ground) = self.scene.world.ground {
             low.z = low.z.min(ground.height);
         }

@@ -1,7 +1,7 @@
 //! [`Session`]: a simulation that is shown and edited in the window.
 //!
-//! It holds what belongs to a loaded scene: the simulation, what is drawn of it, the strokes that can be taken back, the
-//! blade and the hand in use. Input comes as pixels; what it means in space is decided here.
+//! A session owns all that belongs to a loaded scene: the simulation, its render scene, undo points, the blade and the grab
+//! in use. Input comes in pixels and is converted to world space here.
 
 mod interaction;
 
@@ -17,41 +17,41 @@ use incise_render::{Camera, ColorBy, Legend, RenderScene};
 
 use self::interaction::Line;
 use crate::history::{History, UndoPoint};
-use crate::knobs::SettingChange;
 use crate::load::Loaded;
 use crate::setting_effects::SettingEffects;
+use crate::settings::SettingChange;
 use crate::times::Times;
-use crate::tool::Grip;
+use crate::tool::ToolSettings;
 
 /// Residuals are measured every so many frames.
 const EVERY: u64 = 5;
 
-/// A hand in use.
+/// A grab in use.
 #[derive(Clone, Copy, Debug)]
-struct Hold {
+struct ActiveGrab {
     grab: Grab,
-    /// How far from the eye along the camera's direction, in m.
+    /// Depth of the target along the camera's direction in m.
     depth: f64,
-    /// Where it pulls to.
+    /// Target of the grab.
     to: DVec3,
 }
 
-/// A simulation at work.
+/// A loaded simulation with its view and tools.
 #[derive(Debug)]
 pub(crate) struct Session {
     pub(crate) name: String,
     pub(crate) scene: Scene,
     pub(crate) simulation: Simulation,
-    pub(crate) painting: RenderScene,
+    pub(crate) render_scene: RenderScene,
     pub(crate) camera: Camera,
-    pub(crate) grip: Grip,
+    pub(crate) tool_settings: ToolSettings,
     pub(crate) times: Times,
     pub(crate) effects: SettingEffects,
-    /// Time of the last frame until it was done, on a device too, in ms.
+    /// Time of the last frame in ms, until the device had finished.
     pub(crate) frame_ms: f64,
-    /// What the colors mean, if they stand for numbers.
+    /// The scale of the colors, if they show numbers.
     pub(crate) legend: Option<Legend>,
-    /// What is shown by the colors.
+    /// The quantity that the colors show.
     shown: ColorBy,
     /// The last report that measured the body.
     pub(crate) measured: Option<FrameReport>,
@@ -59,9 +59,9 @@ pub(crate) struct Session {
     measures: bool,
     start: Snapshot,
     history: History,
-    /// Drawn lines that the body has not met to the end, oldest first.
+    /// Drawn lines that are not cut to their end, oldest first.
     lines: VecDeque<Line>,
-    hold: Option<Hold>,
+    active_grab: Option<ActiveGrab>,
     /// The diagonal of all bodies when they were loaded, in m.
     extent: f64,
     /// First frames of the scene's own strokes.
@@ -75,8 +75,8 @@ impl Session {
             scene,
             mut simulation,
         } = loaded;
-        let painting = RenderScene::new(&simulation, &scene);
-        let [low, high] = painting.bounds(&simulation);
+        let render_scene = RenderScene::new(&simulation, &scene);
+        let [low, high] = render_scene.bounds(&simulation);
         let start = simulation.snapshot()?;
         let mut session = Self {
             name,
@@ -87,9 +87,9 @@ impl Session {
                 .collect(),
             scene,
             simulation,
-            painting,
+            render_scene,
             camera: Camera::fit(low, high),
-            grip: Grip::default(),
+            tool_settings: ToolSettings::default(),
             times: Times::default(),
             effects: SettingEffects::default(),
             frame_ms: 0.0,
@@ -100,7 +100,7 @@ impl Session {
             start,
             history: History::default(),
             lines: VecDeque::new(),
-            hold: None,
+            active_grab: None,
             extent: (high - low).length(),
         };
         session.measure(true)?;
@@ -112,7 +112,7 @@ impl Session {
         self.measures
     }
 
-    /// Has residuals measured or not.
+    /// Turns the measurement of residuals on or off.
     pub(crate) fn measure(&mut self, on: bool) -> anyhow::Result<()> {
         let mut report = ReportSpec::default();
         if on {
@@ -126,12 +126,12 @@ impl Session {
         Ok(())
     }
 
-    /// Advances by one frame. If that fails, blades are taken away, and what is drawn is what is there.
+    /// Advances by one frame. If that fails, drawn lines are dropped and the whole body is drawn again.
     pub(crate) fn step(&mut self) -> anyhow::Result<()> {
         let result = self.frame();
         if result.is_err() {
             self.drop_lines();
-            self.painting.reset(&self.simulation);
+            self.render_scene.reset(&self.simulation);
         }
         result
     }
@@ -139,15 +139,15 @@ impl Session {
     fn frame(&mut self) -> anyhow::Result<()> {
         let frame = self.simulation.next_frame();
         if self.scripted.contains(&frame) {
-            let moment = self.moment(true)?;
-            self.history.keep(moment);
+            let point = self.undo_point(true)?;
+            self.history.push(point);
         }
         self.move_blade()?;
         let start = Instant::now();
         let report = self.simulation.step()?.clone();
         self.wait()?;
         self.frame_ms = start.elapsed().as_secs_f64() * 1e3;
-        self.painting.sync(&self.simulation);
+        self.render_scene.sync(&self.simulation);
         self.show_scripted_blade(frame);
         self.times.note(report.frame, report.ms);
         self.effects.note(&report, self.frame_ms);
@@ -165,7 +165,7 @@ impl Session {
         if self.lines.is_empty() && !self.scripted.is_empty() {
             let strokes = self.scene.stroke.iter();
             let blade = strokes.filter_map(|stroke| stroke.blade_at(frame)).next();
-            self.painting.set_blade(blade.as_deref());
+            self.render_scene.set_blade(blade.as_deref());
         }
     }
 
@@ -181,7 +181,7 @@ impl Session {
         self.simulation.report()
     }
 
-    /// Colors the body for the present frame; as tissue where residuals are to be shown and none is known yet.
+    /// Colors the body for the present frame; as tissue while no residual has been measured.
     pub(crate) fn color(&mut self, by: ColorBy) -> anyhow::Result<()> {
         let residuals = match by {
             ColorBy::Residual => self.simulation.residuals_of_tets(),
@@ -194,45 +194,44 @@ impl Session {
             _ => by,
         };
         let painted = self
-            .painting
+            .render_scene
             .color(&mut self.simulation, by, residuals.as_deref());
         (self.legend, self.shown) = (painted?, by);
         Ok(())
     }
 
-    /// Sees the whole body.
+    /// Fits the view to the body.
     pub(crate) fn fit(&mut self) {
-        let [low, high] = self.painting.bounds(&self.simulation);
+        let [low, high] = self.render_scene.bounds(&self.simulation);
         let fitted = Camera::fit(low, high);
         (self.camera.target, self.camera.distance) = (fitted.target, fitted.distance);
     }
 
-    /// The present moment, with what hands are doing in it.
-    fn moment(&mut self, scripted: bool) -> anyhow::Result<UndoPoint> {
+    /// The present state with the stroke and the grab in use.
+    fn undo_point(&mut self, scripted: bool) -> anyhow::Result<UndoPoint> {
         Ok(UndoPoint {
             snapshot: self.simulation.snapshot()?,
             scripted,
             stroke: self.lines.front().and_then(|line| line.stroke),
-            grab: self.hold.map(|hold| hold.grab),
+            grab: self.active_grab.map(|active| active.grab),
         })
     }
 
-    /// The strokes that can be taken back.
+    /// Number of strokes that can be undone.
     pub(crate) fn strokes(&self) -> usize {
         self.history.len()
     }
 
-    /// Goes back to before the last stroke; tells whether that one will begin again by itself, and nothing if there is
-    /// none.
+    /// Undoes the last stroke; returns whether it is part of the scene and begins again, and `None` without a stroke.
     pub(crate) fn undo(&mut self) -> anyhow::Result<Option<bool>> {
-        let Some(moment) = self.history.take() else {
+        let Some(point) = self.history.pop() else {
             return Ok(None);
         };
-        self.go_to(&moment)?;
-        Ok(Some(moment.scripted))
+        self.go_to(&point)?;
+        Ok(Some(point.scripted))
     }
 
-    /// Goes back to the first frame.
+    /// Resets to the first frame.
     pub(crate) fn reset(&mut self) -> anyhow::Result<()> {
         let start = UndoPoint {
             snapshot: self.start.clone(),
@@ -244,47 +243,47 @@ impl Session {
         self.go_to(&start)
     }
 
-    /// Goes to another time, with the knobs as they are now and empty hands.
-    fn go_to(&mut self, moment: &UndoPoint) -> anyhow::Result<()> {
+    /// Restores the state of an undo point with the present solver settings and without a blade or grab.
+    fn go_to(&mut self, point: &UndoPoint) -> anyhow::Result<()> {
         self.drop_lines();
-        self.let_go();
+        self.release();
         let spec = self.simulation.solver_spec().clone();
-        self.simulation.restore(&moment.snapshot)?;
-        // The stroke and the grab of that moment are active again, but no input ends them: end them here.
-        if let Some(stroke) = moment.stroke {
+        self.simulation.restore(&point.snapshot)?;
+        // The stroke and the grab of that state are active again, but no input ends them: end them here.
+        if let Some(stroke) = point.stroke {
             self.simulation.end_stroke(stroke)?;
         }
-        if let Some(grab) = moment.grab {
+        if let Some(grab) = point.grab {
             self.simulation.release(grab)?;
         }
-        let turned = self.simulation.set_solver(&spec);
+        let changed = self.simulation.set_solver(&spec);
         let measured = self.measure(self.measures);
-        // Whatever the knobs say, the body is another one.
+        // The body has changed even if the settings could not be kept.
         self.repaint()?;
-        turned?;
+        changed?;
         measured
     }
 
-    /// Redraws from the host's state; a device's state is drawn again after the next step.
+    /// Redraws from the host's state; the device's state is drawn again after the next step.
     fn repaint(&mut self) -> anyhow::Result<()> {
         self.simulation.read_back()?;
-        self.painting.reset(&self.simulation);
+        self.render_scene.reset(&self.simulation);
         (self.legend, self.shown) = (None, ColorBy::Tissue);
         Ok(())
     }
 
-    /// Takes a turned knob over.
-    pub(crate) fn turn(&mut self, turn: &SettingChange) -> anyhow::Result<()> {
+    /// Applies a changed setting.
+    pub(crate) fn change_setting(&mut self, change: &SettingChange) -> anyhow::Result<()> {
         let SettingChange {
-            knob,
+            setting,
             from,
             to,
             spec,
-        } = turn;
+        } = change;
         self.simulation
             .set_solver(spec)
-            .with_context(|| format!("{knob} stays at {from}"))?;
-        self.effects.turned(knob, from, to);
+            .with_context(|| format!("{setting} not changed, it stays at {from}"))?;
+        self.effects.note_change(setting, from, to);
         self.repaint()
     }
 

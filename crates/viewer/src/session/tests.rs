@@ -31,7 +31,7 @@ normal = [1, 0, 0]
 
 fn to_vbd() -> SettingChange {
     SettingChange {
-        knob: "method",
+        setting: "Method",
         from: String::new(),
         to: String::new(),
         spec: SolverSpec::of(Method::Vbd),
@@ -53,7 +53,7 @@ fn cut(session: &mut Session) {
 }
 
 #[test]
-fn a_drawn_line_cuts_and_is_taken_back() {
+fn a_drawn_line_cuts_and_is_undone() {
     let mut session = session("");
     session.step().unwrap();
     let tets = session.report().tets;
@@ -63,7 +63,7 @@ fn a_drawn_line_cuts_and_is_taken_back() {
     assert_eq!(session.undo().unwrap(), Some(false));
     assert_eq!((session.report().pieces, session.report().tets), (1, tets));
     assert_eq!(session.undo().unwrap(), None);
-    // A cut that was taken back can be made again.
+    // A cut that was undone can be made again.
     cut(&mut session);
     assert_eq!(session.report().pieces, 2);
     session.reset().unwrap();
@@ -71,7 +71,7 @@ fn a_drawn_line_cuts_and_is_taken_back() {
 }
 
 #[test]
-fn lines_drawn_while_time_stands_still_are_cut_one_after_the_other() {
+fn lines_drawn_while_paused_are_cut_in_order() {
     let mut session = session("");
     for x in [330.0, 470.0] {
         session.press_blade([x, 20.0], SIZE).unwrap();
@@ -92,7 +92,7 @@ fn lines_drawn_while_time_stands_still_are_cut_one_after_the_other() {
 }
 
 #[test]
-fn a_line_beside_the_body_is_nothing_to_take_back() {
+fn a_line_beside_the_body_adds_no_undo_point() {
     let mut session = session("");
     session.press_blade([10.0, 20.0], SIZE).unwrap();
     session.draw_blade([10.0, 580.0], SIZE).unwrap();
@@ -104,29 +104,29 @@ fn a_line_beside_the_body_is_nothing_to_take_back() {
 }
 
 #[test]
-fn what_was_held_at_a_moment_is_free_when_it_comes_back() {
+fn undo_releases_the_grab_of_its_state() {
     let mut session = session(PLANE);
-    assert!(session.take([400.0, 300.0], SIZE).unwrap());
+    assert!(session.grab_at([400.0, 300.0], SIZE).unwrap());
     for step in 1..=4 {
         let x = 400.0 + 5.0 * f64::from(step);
         session.pull([x, 300.0], SIZE).unwrap();
         session.step().unwrap();
     }
-    session.let_go();
-    session.turn(&to_vbd()).unwrap();
+    session.release();
+    session.change_setting(&to_vbd()).unwrap();
     // Held softly at that time, which VBD does not know.
     assert_eq!(session.undo().unwrap(), Some(true));
-    assert_eq!((session.report().pieces, session.hand()), (1, None));
+    assert_eq!((session.report().pieces, session.grab_target()), (1, None));
     session.step().unwrap();
     assert_eq!(session.solver().method, Method::Vbd);
-    // Nothing hangs on a handle any more: the same place can be taken again.
-    assert!(session.take([400.0, 300.0], SIZE).unwrap());
+    // No grab is left: the body can be grabbed at the same point.
+    assert!(session.grab_at([400.0, 300.0], SIZE).unwrap());
 }
 
 #[test]
 fn a_shallow_stroke_does_not_go_through() {
     let mut session = session("");
-    session.grip.depth = 0.15;
+    session.tool_settings.depth = 0.15;
     let tets = session.simulation.mesh().tets.len();
     cut(&mut session);
     assert_eq!(session.report().pieces, 1);
@@ -134,7 +134,7 @@ fn a_shallow_stroke_does_not_go_through() {
 }
 
 #[test]
-fn a_stroke_of_the_scene_is_taken_back_and_would_begin_again() {
+fn undo_of_a_scene_stroke_says_that_it_begins_again() {
     let mut session = session(PLANE);
     for _ in 0..4 {
         session.step().unwrap();
@@ -148,23 +148,26 @@ fn a_stroke_of_the_scene_is_taken_back_and_would_begin_again() {
 }
 
 #[test]
-fn the_hand_pulls_what_it_holds() {
+fn a_grab_pulls_the_body() {
     let mut session = session("");
     let middle = |session: &Session| {
         let positions = session.simulation.positions();
         positions.iter().sum::<DVec3>() / positions.len() as f64
     };
     let before = middle(&session);
-    assert!(!session.take([2.0, 2.0], SIZE).unwrap(), "nothing is there");
-    assert!(session.take([400.0, 300.0], SIZE).unwrap());
-    let from = session.hand().unwrap();
+    assert!(
+        !session.grab_at([2.0, 2.0], SIZE).unwrap(),
+        "nothing is there"
+    );
+    assert!(session.grab_at([400.0, 300.0], SIZE).unwrap());
+    let from = session.grab_target().unwrap();
     for step in 1..=30 {
         session
             .pull([400.0 + 4.0 * f64::from(step), 300.0], SIZE)
             .unwrap();
         session.step().unwrap();
     }
-    let pulled = session.hand().unwrap() - from;
+    let pulled = session.grab_target().unwrap() - from;
     let right = session.camera.right();
     assert!(pulled.dot(right) > 0.9 * pulled.length(), "to the right");
     let moved = (middle(&session) - before).dot(right);
@@ -173,16 +176,16 @@ fn the_hand_pulls_what_it_holds() {
         "{moved} of {}",
         pulled.length()
     );
-    session.let_go();
-    assert_eq!(session.hand(), None);
+    session.release();
+    assert_eq!(session.grab_target(), None);
 }
 
 #[test]
-fn knobs_are_turned_on_a_body_that_is_cut() {
+fn settings_change_on_a_cut_body() {
     let mut session = session("");
     cut(&mut session);
-    let turn = |to: &str, spec: SolverSpec| SettingChange {
-        knob: "knob",
+    let change = |to: &str, spec: SolverSpec| SettingChange {
+        setting: "Setting",
         from: "here".to_owned(),
         to: to.to_owned(),
         spec,
@@ -193,25 +196,28 @@ fn knobs_are_turned_on_a_body_that_is_cut() {
         clustering: "serial:4".to_owned(),
         ..session.solver().clone()
     };
-    let this = turn("there", spec.clone());
-    session.turn(&this).unwrap();
+    let this = change("there", spec.clone());
+    session.change_setting(&this).unwrap();
     session.step().unwrap();
     assert_eq!(session.solver(), &spec);
     assert_eq!(
-        session.effects.turns().next().unwrap().what,
-        "knob here to there"
+        session.effects.changes().next().unwrap().what,
+        "Setting here to there"
     );
     assert_eq!(session.report().pieces, 2);
-    // A knob that cannot be turned stays where it was.
+    // A refused setting keeps its value.
     let impossible = SolverSpec {
         relaxation: -1.0,
         ..SolverSpec::of(Method::Jacobi)
     };
-    let this = turn("nowhere", impossible);
-    let refused = format!("{:#}", session.turn(&this).unwrap_err());
-    assert!(refused.starts_with("knob stays at here"), "{refused}");
+    let this = change("nowhere", impossible);
+    let refused = format!("{:#}", session.change_setting(&this).unwrap_err());
+    assert!(
+        refused.starts_with("Setting not changed, it stays at here"),
+        "{refused}"
+    );
     assert_eq!(session.solver(), &spec);
-    // A jump in time leaves knobs as they are.
+    // Reset keeps the settings.
     session.reset().unwrap();
     assert_eq!(session.solver(), &spec);
     session.step().unwrap();
@@ -238,7 +244,7 @@ fn all_colors_can_be_shown_at_any_time() {
         session.step().unwrap();
         session.color(by).unwrap();
     }
-    session.turn(&to_vbd()).unwrap();
+    session.change_setting(&to_vbd()).unwrap();
     session.measure(true).unwrap();
     session.step().unwrap();
     session.color(residual).unwrap();

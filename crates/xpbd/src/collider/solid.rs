@@ -1,7 +1,7 @@
 //! [`Solid`]: the nearest point of a plane, a sphere, a capsule or a box, with its distance and normal.
 //!
-//! A sphere is a capsule without length, a box is asked in its own axes. Where several points are nearest, it is always
-//! the same one that is answered. Cost: 10 to 60 operations.
+//! A sphere is a capsule without length; a box is evaluated in its own axes. Where several points are nearest, a fixed
+//! one of them is returned. Cost: 10 to 60 operations.
 
 use glam::{DMat3, DVec3};
 

@@ -1,7 +1,7 @@
 //! [`Attachments`]: particles that are attached to moving handles, such as an instrument's jaws or a bone.
 //!
 //! A handle goes from pose to pose, one a frame; in between, its position is interpolated linearly and its rotation
-//! along the shortest arc. An attached particle has a place in the handle's frame. With a compliance of 0 it is there
+//! along the shortest arc. An attached particle has an anchor in the handle's frame. With a compliance of 0 it is there
 //! at the end of every substep, to the bit, whatever pulls on it: it moves as a fixed particle does, by itself only.
 //! With a compliance it is pulled there by a spring of rest length 0, `C = x - target` in all three directions at once.
 //!
@@ -16,16 +16,16 @@ use crate::particles::{PARALLEL_PARTICLES, Particles};
 use crate::substep::{Factors, Substep};
 use crate::{Float, Pose, XpbdError};
 
-/// The attachment of a particle to a handle.
+/// Attachment of a particle to a handle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AttachmentData {
     /// The particle.
     pub particle: u32,
     /// The number of the handle.
     pub handle: u32,
-    /// The place in the handle's frame in m.
-    pub place: DVec3,
-    /// In m/N; 0 is rigid.
+    /// Position in the handle's frame in m.
+    pub anchor: DVec3,
+    /// Compliance in m/N; 0 is rigid.
     pub compliance: f64,
     /// Damping time in s.
     pub damping: f64,
@@ -52,19 +52,19 @@ impl Handle {
     }
 }
 
-/// A particle's place on a handle.
+/// A particle's anchor on a handle.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(bound = ""))]
 pub(crate) struct Attachment<R: Float> {
     pub(crate) particle: u32,
     pub(crate) handle: u32,
-    /// The place in the handle's frame.
-    place: DVec3,
-    /// In m/N; 0 is rigid.
+    /// The anchor in the handle's frame.
+    anchor: DVec3,
+    /// Compliance in m/N; 0 is rigid.
     pub(crate) compliance: f64,
     pub(crate) damping: f64,
-    /// Where the place is in the world at the end of the substep, and at its start.
+    /// The anchor in the world at the end of the substep and at its start.
     pub(crate) target: R::Vector,
     pub(crate) before: R::Vector,
     /// 0 at the start of every substep.
@@ -120,7 +120,7 @@ impl<R: Float> Attachments<R> {
         self.list.iter().map(|attachment| AttachmentData {
             particle: attachment.particle,
             handle: attachment.handle,
-            place: attachment.place,
+            anchor: attachment.anchor,
             compliance: attachment.compliance,
             damping: attachment.damping,
         })
@@ -146,7 +146,7 @@ impl<R: Float> Attachments<R> {
         };
         if a.handle == b.handle {
             let attachment = Attachment {
-                place: a.place.lerp(b.place, parameter),
+                anchor: a.anchor.lerp(b.anchor, parameter),
                 compliance: a.compliance.max(b.compliance),
                 damping: a.damping.max(b.damping),
                 target: a.target + (b.target - a.target) * R::from_f64(parameter),
@@ -222,7 +222,7 @@ impl<R: Float> Attachments<R> {
         let attachment = Attachment {
             particle: number(particle),
             handle,
-            place: pose.rotation.conjugate() * (world - pose.position),
+            anchor: pose.rotation.conjugate() * (world - pose.position),
             compliance,
             damping,
             target: x,
@@ -257,7 +257,7 @@ impl<R: Float> Attachments<R> {
             attachment.before = attachment.target;
             attachment.multiplier = R::Vector::default();
             let pose = &handles[attachment.handle as usize].now;
-            let target = R::from_dvec3(pose.apply(attachment.place) - particles.origin);
+            let target = R::from_dvec3(pose.apply(attachment.anchor) - particles.origin);
             if !finite::<R>(target) {
                 lost += 1;
                 continue;

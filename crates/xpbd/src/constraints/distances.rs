@@ -8,21 +8,21 @@ use super::scalar::{ScalarConstraint, ScalarConstraints};
 use crate::direction::direction;
 use crate::{Float, XpbdError};
 
-/// Keeps two particles at a distance. See [`crate::Solver::set_distances`].
+/// Distance constraint between two particles: a spring, a rod or a thread. See [`crate::Solver::set_distances`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DistanceConstraint {
     /// The two particles.
     pub particles: [u32; 2],
-    /// Their distance at rest in m, at least 0.
+    /// Distance at rest in m, at least 0.
     pub length: f64,
     /// One over the stiffness in m/N, at least 0; 0 is a rod.
     pub compliance: f64,
-    /// Damping time in s, at least 0: the rate of change is resisted by this times the stiffness. A rod's own rate is
-    /// already held at 0, so there it does nothing.
+    /// Damping time in s, at least 0: the rate of change is resisted by this times the stiffness. No effect on a rod,
+    /// whose rate of change is 0.
     pub damping: f64,
     /// Whether it acts only while the particles are farther apart than `length`, as a thread does.
-    pub only_when_longer: bool,
+    pub tension_only: bool,
 }
 
 impl DistanceConstraint {
@@ -46,19 +46,19 @@ impl DistanceConstraint {
     }
 }
 
-/// A distance constraint as a kernel wants it.
+/// A distance constraint as plain numbers for a kernel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DistanceData<R> {
     /// Its particles.
     pub particles: [u32; 2],
-    /// Their distance at rest in m.
+    /// Distance at rest in m.
     pub length: R,
-    /// In m/N.
+    /// Compliance in m/N.
     pub compliance: R,
     /// Damping time in s.
     pub damping: R,
     /// Whether it acts only while the particles are farther apart.
-    pub only_when_longer: bool,
+    pub tension_only: bool,
 }
 
 /// All distance constraints.
@@ -72,7 +72,7 @@ pub(crate) struct Distance<R> {
     length: R,
     compliance: R,
     damping: R,
-    only_when_longer: bool,
+    tension_only: bool,
 }
 
 impl<R: Float> Distance<R> {
@@ -82,7 +82,7 @@ impl<R: Float> Distance<R> {
             length: R::from_f64(constraint.length),
             compliance: R::from_f64(constraint.compliance),
             damping: R::from_f64(constraint.damping),
-            only_when_longer: constraint.only_when_longer,
+            tension_only: constraint.tension_only,
         }
     }
 
@@ -93,7 +93,7 @@ impl<R: Float> Distance<R> {
             length: self.length,
             compliance: self.compliance,
             damping: self.damping,
-            only_when_longer: self.only_when_longer,
+            tension_only: self.tension_only,
         }
     }
 
@@ -110,7 +110,7 @@ impl<R: Float> Distance<R> {
             length: self.length.to_f64(),
             compliance: self.compliance.to_f64(),
             damping: self.damping.to_f64(),
-            only_when_longer: self.only_when_longer,
+            tension_only: self.tension_only,
         }
     }
 }
@@ -140,6 +140,6 @@ impl<R: Float> ScalarConstraint<R, 2> for Distance<R> {
 
     #[inline]
     fn one_sided(&self) -> bool {
-        self.only_when_longer
+        self.tension_only
     }
 }

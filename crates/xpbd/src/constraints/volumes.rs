@@ -13,13 +13,13 @@ use glam::DVec3;
 use super::scalar::{ScalarConstraint, ScalarConstraints};
 use crate::{Float, XpbdError};
 
-/// Keeps the volume that four particles span. See [`crate::Solver::set_volumes`].
+/// Volume constraint of the tet that four particles span. See [`crate::Solver::set_volumes`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VolumeConstraint {
     /// The corners, as those of a tet.
     pub particles: [u32; 4],
-    /// The volume at rest in m³. One that is not positive or too small to be represented takes no part, as the
-    /// slivers that cuts leave.
+    /// Volume at rest in m³. A constraint whose rest volume is not positive or too small to be represented, as for
+    /// slivers of cuts, takes no part.
     pub rest_volume: f64,
     /// One over the bulk modulus, in 1/Pa, at least 0; 0 is incompressible.
     pub compliance: f64,
@@ -28,7 +28,7 @@ pub struct VolumeConstraint {
 }
 
 impl VolumeConstraint {
-    /// The constraint of a tet with its corners at rest at `rest`.
+    /// Creates the constraint of a tet with its corners at rest at `rest`.
     #[must_use]
     pub fn of_tet(particles: [u32; 4], rest: [DVec3; 4], compliance: f64) -> Self {
         let [a, b, c, d] = rest;
@@ -62,7 +62,7 @@ impl VolumeConstraint {
     }
 }
 
-/// A volume constraint as a kernel wants it.
+/// A volume constraint as plain numbers for a kernel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VolumeData<R> {
     /// Its particles.

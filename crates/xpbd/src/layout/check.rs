@@ -1,4 +1,4 @@
-//! The proof that a layout is what its schedule and its tets say, to the bit.
+//! Checks that a layout agrees bit for bit with its schedule and tets.
 
 use incise_graph::{ClusterId, Schedule};
 

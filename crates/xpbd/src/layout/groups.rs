@@ -1,6 +1,6 @@
-//! [`Groups`]: which blocks each group of lanes has, and how well those of a color are used.
+//! [`Groups`]: the blocks of each group of lanes, and the utilization of a color's blocks.
 //!
-//! Groups keep their blocks; one without clusters waits for another of its depth. Cost: O(1) an edit, amortized.
+//! Groups keep their blocks; a group without clusters is reused for one of its depth. Cost: O(1) an edit, amortized.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! [`Layout`]: the tets in the order and the grouping in which a processor solves them, several at a time.
+//! [`Layout`]: the tets in the order and grouping of the SIMD kernels.
 //!
 //! Clusters of one color share no particle, so as many of them as a processor has lanes are solved side by side: lane
 //! by lane the first tet of each, then the second. A *group* is such a set of clusters (`groups.rs`), a *block* one tet

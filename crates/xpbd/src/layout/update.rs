@@ -1,12 +1,12 @@
-//! How a layout is built and updated with its schedule.
+//! Builds a layout and updates it with its schedule.
 //!
-//! New groups take the clusters of a color by size, so that few lanes wait. Later a changed cluster stays in its lane
-//! if its color is the same and its group has blocks enough; else it goes to the group of its color that was opened
-//! last, or opens one.
+//! New groups take the clusters of a color by size, so that few lanes are idle. Later a changed cluster stays in its
+//! lane if its color is the same and its group has enough blocks. Otherwise it goes to the group of its color that was
+//! opened last, or opens one.
 //!
-//! Bounds: a color whose blocks exceed three halves of what rebuilding it can need is rebuilt; if groups without
-//! clusters come to have half of all blocks, all is rebuilt. Both undo at least as much as they cost, up to a factor of
-//! the lanes times the size of a cluster.
+//! Bounds: a color is rebuilt if its blocks exceed three halves of what a rebuilt one can need; all is rebuilt if
+//! groups without clusters have half of all blocks. Both rebuilds cost at most what caused them, up to a factor of the
+//! lanes times the size of a cluster.
 
 use std::cmp::Reverse;
 

@@ -1,4 +1,4 @@
-//! Between the lanes of a processor and memory: corners of tets and multipliers, gathered and put back.
+//! Transfers between SIMD lanes and memory: corners of tets and multipliers.
 //!
 //! Cost: for each corner of each tet two moves from the particle to a buffer and two back in single precision, and a
 //! transposition of the buffer by lanes.

@@ -28,7 +28,7 @@ impl<R: Float> Solver<R> {
         self.constraints.attachments.move_handle(handle, pose);
     }
 
-    /// Puts a handle at a pose at once. Particles attached to it go there in the next substep.
+    /// Sets the pose of a handle at once. Attached particles move there in the next substep.
     ///
     /// # Panics
     /// If the handle does not exist, the pose is not finite or its rotation not of length 1.
@@ -37,7 +37,7 @@ impl<R: Float> Solver<R> {
         self.constraints.attachments.set_handle(handle, pose);
     }
 
-    /// The present pose of a handle.
+    /// Returns the present pose of a handle.
     ///
     /// # Panics
     /// If the handle does not exist.
@@ -46,18 +46,18 @@ impl<R: Float> Solver<R> {
         self.constraints.attachments.pose(handle)
     }
 
-    /// Attaches a particle, from where it is now, to a handle as that is now. A particle has one attachment: another
-    /// one replaces the first.
+    /// Attaches a particle to a handle at the present positions of both. A particle has one attachment; another one
+    /// replaces the first.
     ///
-    /// `compliance` is one over the stiffness in m/N, 0 is rigid; `damping` is a time in s, by which the motion
-    /// relative to the handle is resisted times the stiffness (nothing with a compliance of 0). A fixed particle stays
-    /// fixed. A cut attaches copies like their originals, and a particle between two others if both are attached to the
-    /// same handle; with a compliance, each has a spring of its own.
+    /// `compliance` is one over the stiffness in m/N, 0 is rigid. `damping` is a time in s: the motion relative to the
+    /// handle is resisted by it times the stiffness (no effect with a compliance of 0). A fixed particle stays fixed.
+    /// Copies of particles by a cut are attached like their originals, and a particle on an edge if both ends are
+    /// attached to the same handle; with a compliance, each has its own spring.
     ///
     /// O(log n + attachments of higher particles).
     ///
     /// # Errors
-    /// A negative or infinite compliance or damping.
+    /// If compliance or damping is negative or infinite.
     ///
     /// # Panics
     /// If the particle or the handle does not exist.
@@ -99,10 +99,10 @@ impl<R: Float> Solver<R> {
         Ok(())
     }
 
-    /// Sets the compliance of all particles on a handle in m/N, wherever they are now; 0 is rigid. O(attachments).
+    /// Sets the compliance of all particles of a handle in m/N at their present positions; 0 is rigid. O(attachments).
     ///
     /// # Errors
-    /// A negative or infinite compliance.
+    /// If the compliance is negative or infinite.
     pub fn set_compliance(&mut self, handle: u32, compliance: f64) -> Result<(), XpbdError> {
         let attachments = &mut self.constraints.attachments;
         for particle in attachments.set_compliance(handle, compliance)? {
@@ -123,27 +123,26 @@ impl<R: Float> Solver<R> {
         self.set_weight(particle);
     }
 
-    /// The handle that a particle is attached to.
+    /// Returns the handle that a particle is attached to.
     #[must_use]
     pub fn handle_of(&self, particle: usize) -> Option<u32> {
         self.constraints.attachments.get(particle).map(|a| a.handle)
     }
 
-    /// All attachments, ascending by particle.
+    /// Returns all attachments, ascending by particle.
     pub fn attachments(&self) -> impl ExactSizeIterator<Item = AttachmentData> + '_ {
         self.constraints.attachments.list()
     }
 
-    /// The poses of all handles at a fraction of the frame.
+    /// Returns the poses of all handles at a fraction of the frame.
     pub fn handle_poses(&self, fraction: f64) -> impl ExactSizeIterator<Item = Pose> + '_ {
         self.constraints.attachments.poses(fraction)
     }
 
-    /// Replaces all distance constraints; none at all takes neither memory nor time. They are solved after the tets of
-    /// each iteration, in the order of their own `schedule`, which a coloring of any kind may have made.
-    /// O(constraints).
+    /// Replaces all distance constraints; an empty list costs no memory and no time. They are solved after the tets of
+    /// each iteration, in the order of their own `schedule`, from any coloring. O(constraints).
     ///
-    /// A cut leaves them on their particles: a copy of a particle has none of them.
+    /// A cut leaves them on their particles; copies of particles have none.
     ///
     /// # Errors
     /// A value outside its range, a particle that does not exist, or a schedule that is not that of these constraints
@@ -153,7 +152,7 @@ impl<R: Float> Solver<R> {
     /// Bit-identical for any number of threads.
     ///
     /// # Example
-    /// A kilogram on a spring of 10 N/m stretches it by `m g` times the compliance.
+    /// A mass of 1 kg stretches a spring of 10 N/m by `m g` times the compliance.
     /// ```
     /// use glam::DVec3;
     /// use incise_graph::{Clustering, ColorId, Coloring, Schedule};
@@ -166,7 +165,7 @@ impl<R: Float> Solver<R> {
     ///     length: 1.0,
     ///     compliance: 0.1,
     ///     damping: 0.2,
-    ///     only_when_longer: false,
+    ///     tension_only: false,
     /// };
     /// let order = Schedule::new(&Clustering::none(1), &Coloring::new(vec![ColorId(0)]));
     /// solver.set_distances(&[spring], order)?;
@@ -192,13 +191,13 @@ impl<R: Float> Solver<R> {
         Ok(())
     }
 
-    /// Number of distance constraints.
+    /// Returns the number of distance constraints.
     #[must_use]
     pub fn distance_count(&self) -> usize {
         self.constraints.distances.list.len()
     }
 
-    /// A distance constraint as a kernel wants it.
+    /// Returns a distance constraint as plain numbers for a kernel.
     ///
     /// # Panics
     /// If the constraint does not exist.
@@ -207,15 +206,15 @@ impl<R: Float> Solver<R> {
         self.constraints.distances.list[constraint as usize].data()
     }
 
-    /// The order in which distance constraints are solved, if there are any.
+    /// Returns the order in which distance constraints are solved, if there are any.
     #[must_use]
     pub fn distance_schedule(&self) -> Option<&Schedule> {
         self.constraints.distances.schedule()
     }
 
-    /// Replaces all volume constraints; none at all takes neither memory nor time. They are solved after the tets of
-    /// each iteration, in the order of their own `schedule`; where constraint `i` is that of tet `i`, the schedule of
-    /// the tets fits. O(constraints).
+    /// Replaces all volume constraints; an empty list costs no memory and no time. They are solved after the tets of
+    /// each iteration, in the order of their own `schedule`. If constraint `i` is that of tet `i`, use the schedule of
+    /// the tets. O(constraints).
     ///
     /// # Errors
     /// A value outside its range, a particle that does not exist, or a schedule that is not that of these constraints
@@ -225,7 +224,7 @@ impl<R: Float> Solver<R> {
     /// Bit-identical for any number of threads.
     ///
     /// # Example
-    /// A flattened tet gets its volume back.
+    /// A flattened tet recovers its volume.
     /// ```
     /// use glam::{DVec3, dvec3};
     /// use incise_graph::{Clustering, ColorId, Coloring, Schedule};
@@ -257,17 +256,17 @@ impl<R: Float> Solver<R> {
         Ok(())
     }
 
-    /// Number of volume constraints.
+    /// Returns the number of volume constraints.
     #[must_use]
     pub fn volume_count(&self) -> usize {
         self.constraints.volumes.list.len()
     }
 
-    /// Replaces the volume constraint of an index, or appends one at the index after the last. The schedule has to be
-    /// updated: see [`Solver::reschedule_volumes`].
+    /// Replaces the volume constraint of an index, or appends one at the index after the last. Update the schedule
+    /// afterwards: see [`Solver::reschedule_volumes`].
     ///
     /// # Errors
-    /// A value outside its range; nothing has changed then.
+    /// If a value lies outside its range; nothing has changed then.
     ///
     /// # Panics
     /// If there are no volume constraints, the index or a particle does not exist.
@@ -288,7 +287,7 @@ impl<R: Float> Solver<R> {
         Ok(())
     }
 
-    /// Replaces the particles of a volume constraint by others that are copies of its own.
+    /// Replaces the particles of a volume constraint by copies of them.
     ///
     /// # Panics
     /// If the constraint or a particle does not exist.
@@ -298,8 +297,8 @@ impl<R: Float> Solver<R> {
         self.note(|changes| changes.volumes = true);
     }
 
-    /// Takes over the order of solving after edits; without volume constraints nothing happens. As with that of the
-    /// tets, no two constraints of a color may share a particle ([`Schedule::check`]). O(constraints).
+    /// Sets the order of solving after edits; without volume constraints nothing happens. As for tets, no two
+    /// constraints of a color may share a particle ([`Schedule::check`]). O(constraints).
     ///
     /// # Panics
     /// If the schedule names a constraint that does not exist.
@@ -317,7 +316,7 @@ impl<R: Float> Solver<R> {
         self.note(|changes| changes.volumes = true);
     }
 
-    /// A volume constraint as a kernel wants it.
+    /// Returns a volume constraint as plain numbers for a kernel.
     ///
     /// # Panics
     /// If the constraint does not exist.
@@ -326,7 +325,7 @@ impl<R: Float> Solver<R> {
         self.constraints.volumes.list[constraint as usize].data()
     }
 
-    /// The order in which volume constraints are solved, if there are any.
+    /// Returns the order in which volume constraints are solved, if there are any.
     #[must_use]
     pub fn volume_schedule(&self) -> Option<&Schedule> {
         self.constraints.volumes.schedule()

@@ -1,12 +1,12 @@
 //! [`Solver`]: owns the particles, tets and other constraints of a simulation, and applies the edits of a cut.
 //!
-//! Constraints keep the numbers of the mesh's tets; the order of solving is that of a [`Schedule`], which each step is
-//! given. Topology changes arrive as single edits (a new particle between two others, a copy, a tet replaced), each in
-//! constant time, and mark what the next step has to look at, so that a cut costs what it touches.
+//! Constraints keep the numbers of the mesh's tets; each step gets the order of solving as a [`Schedule`]. Topology
+//! changes are single edits (a new particle on an edge, a copy, a replaced tet), each in constant time. They mark the
+//! data that the next step must update, so the cost of a cut follows the cut.
 //!
-//! A clone has all that decides what the next steps compute, to the bit: particles, tets, materials, constraints, what
-//! was kept for residuals. It leaves out what a step makes by itself: the layout, which is the largest part and follows
-//! from tets and schedule, and working memory. The first step of a clone lays the tets out, O(tets).
+//! A clone has all data that decides the results of the next steps: particles, tets, materials, constraints, data for
+//! residuals. It leaves out data that a step derives: the layout, which is the largest part, and working memory. The
+//! first step of a clone rebuilds the layout, O(tets).
 
 mod constraints;
 
@@ -24,7 +24,7 @@ use crate::stepper::Stepper;
 use crate::tets::TetSet;
 use crate::{Changes, Float, KappaLimit, Material, StepReport, StepSettings, XpbdError};
 
-/// The state of a simulation in one precision.
+/// A solver with its state in one precision: particles, tets, materials, constraints.
 ///
 /// # Example
 /// A tet falls freely for one frame.
@@ -60,7 +60,7 @@ pub struct Solver<R: Float> {
     pub(crate) changes: Option<Changes>,
 }
 
-/// A copy whose next steps are bit-identical to those of the original. Its changes are not tracked yet: see
+/// Makes a copy whose next steps are bit-identical to those of the original. The copy does not track changes: see
 /// [`Solver::track_changes`].
 ///
 /// ```
@@ -89,10 +89,10 @@ impl<R: Float> Clone for Solver<R> {
 }
 
 impl<R: Float> Solver<R> {
-    /// Particles at rest at `positions`, without mass and without constraints.
+    /// Creates a solver with particles at rest at `positions`, without mass and constraints.
     ///
-    /// Positions are kept relative to [`Solver::origin`], which is chosen from them: the precision is that of a body at
-    /// the origin of the world.
+    /// Positions are kept relative to [`Solver::origin`], which is chosen from them, so the precision does not depend
+    /// on the distance from the origin of the world.
     ///
     /// # Panics
     /// If a position is not finite in this precision.
@@ -114,13 +114,13 @@ impl<R: Float> Solver<R> {
         solver
     }
 
-    /// Number of particles.
+    /// Returns the number of particles.
     #[must_use]
     pub fn particle_count(&self) -> usize {
         self.particles.len()
     }
 
-    /// Number of tets.
+    /// Returns the number of tets.
     #[must_use]
     pub fn tet_count(&self) -> usize {
         self.tets.len()
@@ -151,7 +151,7 @@ impl<R: Float> Solver<R> {
         self.note_tet(tet);
     }
 
-    /// Replaces a tet by another one of the same material.
+    /// Replaces a tet by one of the same material.
     ///
     /// # Panics
     /// If the tet or a particle does not exist.
@@ -161,7 +161,7 @@ impl<R: Float> Solver<R> {
         self.note_tet(tet);
     }
 
-    /// Replaces the particles of a tet by others that are copies of its own.
+    /// Replaces the particles of a tet by copies of them.
     ///
     /// # Panics
     /// If the tet or a particle does not exist.
@@ -171,21 +171,21 @@ impl<R: Float> Solver<R> {
         self.note_tet(tet);
     }
 
-    /// Copies a tet with its material over another one; the copied tet stays, to be removed by
-    /// [`Solver::truncate_tets`] or replaced. O(1).
+    /// Copies a tet with its material over another one. The copied tet remains; remove it by [`Solver::truncate_tets`]
+    /// or replace it. O(1).
     ///
     /// # Panics
-    /// If one of them does not exist.
+    /// If one of the tets does not exist.
     pub fn move_tet(&mut self, from: usize, to: usize) {
         self.tets.copy_to(from, to);
         self.note_tet(to);
     }
 
-    /// Removes the last tets until there are `count`; nothing happens if there are no more. Schedules must not name
-    /// them any more. O(tets removed).
+    /// Removes the last tets until there are `count`; nothing happens if there are fewer. Schedules must not name the
+    /// removed tets. O(tets removed).
     ///
     /// # Example
-    /// Tets are kept dense: the last one takes the place of one that is deleted.
+    /// Tets are kept dense: the last one moves to the index of a deleted one.
     /// ```
     /// # use glam::DVec3;
     /// # use incise_xpbd::{Material, Solver};
@@ -208,8 +208,8 @@ impl<R: Float> Solver<R> {
         self.tets.truncate(count);
     }
 
-    /// Removes the last particles until there are `count`, with their attachments; nothing happens if there are no
-    /// more. No tet and no other constraint may name them when the next step begins. O(particles removed).
+    /// Removes the last particles until there are `count`, with their attachments; nothing happens if there are fewer.
+    /// Tets and other constraints must not use them when the next step begins. O(particles removed).
     pub fn truncate_particles(&mut self, count: usize) {
         self.particles.truncate(count);
         self.constraints.attachments.truncate(count);
@@ -221,19 +221,19 @@ impl<R: Float> Solver<R> {
         assert!(particles.iter().all(exists), "the particles of a tet exist");
     }
 
-    /// Whether the solver computes in single precision.
+    /// Returns whether the solver computes in single precision.
     #[must_use]
     pub fn is_single(&self) -> bool {
         size_of::<R>() == size_of::<f32>()
     }
 
-    /// The materials, by number.
+    /// Returns the materials by number.
     #[must_use]
     pub fn materials(&self) -> &[Material] {
         &self.tets.materials
     }
 
-    /// The material of a number.
+    /// Returns the material of a number.
     ///
     /// # Panics
     /// If the material does not exist.
@@ -242,7 +242,7 @@ impl<R: Float> Solver<R> {
         &self.tets.materials[usize::from(material)]
     }
 
-    /// The material of a tet.
+    /// Returns the number of a tet's material.
     ///
     /// # Panics
     /// If the tet does not exist.
@@ -251,7 +251,7 @@ impl<R: Float> Solver<R> {
         self.tets.material_of[tet]
     }
 
-    /// The mass density at rest of a tet's material in kg/m³.
+    /// Returns the mass density at rest of a tet's material in kg/m³.
     ///
     /// # Panics
     /// If the tet does not exist.
@@ -260,7 +260,7 @@ impl<R: Float> Solver<R> {
         self.tets.material(tet).density
     }
 
-    /// The particles of a tet.
+    /// Returns the particles of a tet.
     ///
     /// # Panics
     /// If the tet does not exist.
@@ -269,11 +269,11 @@ impl<R: Float> Solver<R> {
         self.tets.list[tet].particles
     }
 
-    /// Appends a particle on the edge from `a` to `b`: position and velocity are interpolated, and it is fixed if both
-    /// ends are, attached if both are attached to the same handle. It has no mass yet.
+    /// Appends a particle on the edge from `a` to `b`, without mass. Position and velocity are interpolated. The
+    /// particle is fixed if both ends are, and attached if both are attached to the same handle.
     ///
     /// # Panics
-    /// If an end does not exist or the parameter puts the particle nowhere finite.
+    /// If an end does not exist or the position is not finite.
     pub fn push_particle_between(&mut self, a: usize, b: usize, parameter: f64) {
         let t = R::from_f64(parameter);
         let Self {
@@ -290,7 +290,7 @@ impl<R: Float> Solver<R> {
         self.note(|changes| changes.attachments = true);
     }
 
-    /// Appends a particle in the state of another one, attached to what that is attached to. It has no mass yet.
+    /// Appends a copy of a particle with its state and attachment, without mass.
     ///
     /// # Panics
     /// If the particle does not exist.
@@ -303,8 +303,8 @@ impl<R: Float> Solver<R> {
         self.note(|changes| changes.attachments = true);
     }
 
-    /// Sets the mass of a particle in kg. A particle without mass does not move. The next step goes through all tets,
-    /// since those of the particle are not known: see [`Solver::set_mass_in_star`].
+    /// Sets the mass of a particle in kg. A particle without mass does not move. The next step looks at all tets;
+    /// [`Solver::set_mass_in_star`] avoids this.
     ///
     /// # Panics
     /// If the particle does not exist or the mass is negative or not finite.
@@ -313,9 +313,9 @@ impl<R: Float> Solver<R> {
         self.set_weight(particle);
     }
 
-    /// Sets the mass of a particle whose star is known, the tets that it is a corner of, so that the next step has to
-    /// look at no others. Tets named without need do no harm; one that is left out is solved with the old mass, which
-    /// [`Solver::check_layout`] finds. O(tets of the star).
+    /// Sets the mass of a particle in kg, given its star: the tets that it is a corner of. The next step then looks
+    /// only at these tets. Additional tets do no harm; a missing one is solved with the old mass, which
+    /// [`Solver::check_layout`] detects. O(tets of the star).
     ///
     /// # Panics
     /// If the particle does not exist or the mass is negative or not finite.
@@ -339,7 +339,7 @@ impl<R: Float> Solver<R> {
         self.particles.masses[particle] = mass;
     }
 
-    /// Fixes a particle where it is, or releases it.
+    /// Fixes a particle at its position, or releases it.
     ///
     /// # Panics
     /// If the particle does not exist.
@@ -366,7 +366,7 @@ impl<R: Float> Solver<R> {
         self.particles.update_weight(particle, attached)
     }
 
-    /// Whether a particle is fixed.
+    /// Returns whether a particle is fixed.
     ///
     /// # Panics
     /// If the particle does not exist.
@@ -375,7 +375,7 @@ impl<R: Float> Solver<R> {
         self.particles.fixed[particle]
     }
 
-    /// Whether forces move a particle: it is neither fixed nor rigidly attached, and has a mass.
+    /// Returns whether forces move a particle: it is neither fixed nor rigidly attached, and has a mass.
     ///
     /// # Panics
     /// If the particle does not exist.
@@ -384,7 +384,7 @@ impl<R: Float> Solver<R> {
         self.particles.is_free(particle)
     }
 
-    /// The mass of a particle in kg.
+    /// Returns the mass of a particle in kg.
     ///
     /// # Panics
     /// If the particle does not exist.
@@ -393,7 +393,7 @@ impl<R: Float> Solver<R> {
         self.particles.masses[particle]
     }
 
-    /// The position of a particle in the world in m.
+    /// Returns the position of a particle in the world in m.
     ///
     /// # Panics
     /// If the particle does not exist.
@@ -413,7 +413,7 @@ impl<R: Float> Solver<R> {
         self.note_particle(particle);
     }
 
-    /// The velocity of a particle in m/s.
+    /// Returns the velocity of a particle in m/s.
     ///
     /// # Panics
     /// If the particle does not exist.
@@ -439,14 +439,14 @@ impl<R: Float> Solver<R> {
         out.extend((0..self.particles.len()).map(|p| self.position(p)));
     }
 
-    /// The point in m that the solver keeps positions relative to, in its own precision. [`crate::Solver::step`] moves
-    /// it when the body has moved on by more than twice its size.
+    /// Returns the point in m that positions are kept relative to, in the solver's precision. [`crate::Solver::step`]
+    /// moves it when the body has moved by more than twice its size.
     #[must_use]
     pub fn origin(&self) -> DVec3 {
         self.particles.origin
     }
 
-    /// Bytes of the arrays that a clone has: those of particles, tets, attachments and other constraints, without their
+    /// Returns the bytes of the arrays of a clone: particles, tets, attachments and other constraints, without their
     /// schedules. O(1).
     #[must_use]
     pub fn bytes(&self) -> usize {
@@ -474,17 +474,17 @@ impl<R: Float> Solver<R> {
         self.note(|changes| changes.particles.push(number(particle)));
     }
 
-    /// Softens every new tet whose [`Solver::kappa`] at `substep_time` would exceed `kappa`, so that it just meets it;
+    /// Softens every new tet whose [`Solver::kappa`] at `substep_time` exceeds `kappa`, so that it equals the limit;
     /// `None` ends this.
     ///
-    /// Cutting leaves tets so small that no affordable substep follows their vibrations; unsoftened, they do not
-    /// vibrate but collapse and throw their neighbors about. What was softened: [`Solver::softened`].
+    /// For the block and sequential forms: cuts leave tets too small for any affordable substep, which would collapse
+    /// and move their neighbors. [`Solver::softened`] counts the softened tets.
     pub fn limit_kappa(&mut self, limit: Option<KappaLimit>) {
         self.tets.kappa_limit = limit;
     }
 
-    /// Proves that what the next step with this schedule would solve is what schedule, tets and masses say, to the bit.
-    /// A step carries over only what has changed since the last one; this finds what was forgotten, above all by
+    /// Checks that the layout of the next step with this schedule agrees bit for bit with schedule, tets and masses.
+    /// A step updates the layout only by changes; this check finds missing ones, in particular of
     /// [`Solver::set_mass_in_star`]. O(tets); for tests and on request.
     ///
     /// # Errors

@@ -1,8 +1,8 @@
-//! Aggregates: particles gathered into connected lumps, for the coarse part of a correction.
+//! Aggregates: connected groups of particles for the coarse part of a correction.
 //!
-//! Lumps grow one after the other, breadth first over the edges of the mesh, each from a particle next to what is taken
-//! already. Nothing but an edge connects, so a cut that copies particles separates lumps as well, and growing them
-//! again is cheap enough to do after every cut. What remains too small joins a neighbor. Cost: O(edges).
+//! Aggregates grow one after the other, breadth first over the edges of the mesh, each from a particle next to the
+//! previous ones. Only edges connect, so a cut that copies particles separates aggregates as well, and regrowing them
+//! after every cut is cheap. Aggregates that remain too small join a neighbor. Cost: O(edges).
 
 /// The aggregate of each row of a graph, numbered from 0 without gaps, and how many there are.
 ///

@@ -1,4 +1,4 @@
-//! 3×3 matrices, as the blocks of a larger one and as that of a single particle, and how a symmetric one is solved.
+//! 3×3 matrices, as blocks of a larger matrix and for a single particle, and the solution of a symmetric one.
 
 use crate::Float;
 

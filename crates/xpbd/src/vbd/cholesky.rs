@@ -17,7 +17,7 @@ const LANES: usize = 8;
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Cholesky {
-    /// The columns that each row stores, and its place in `factor`.
+    /// The columns that each row stores, and its offset in `factor`.
     rows: Vec<(Range<usize>, usize)>,
     /// The lower triangle by rows; the diagonal holds the inverse, 0 for what is left out.
     factor: Vec<f64>,
@@ -36,46 +36,46 @@ impl Cholesky {
     /// diagonal; what is right of it does not count.
     pub(super) fn reset(&mut self, columns: impl Iterator<Item = Range<usize>>) {
         self.rows.clear();
-        let mut place = 0;
+        let mut offset = 0;
         for columns in columns {
             let stored = columns.start / LANES * LANES..columns.end;
             let width = stored.len();
-            self.rows.push((stored, place));
-            place += width;
+            self.rows.push((stored, offset));
+            offset += width;
         }
         self.factor.clear();
-        self.factor.resize(place, 0.0);
+        self.factor.resize(offset, 0.0);
     }
 
     /// The entries from a column on of a row, as far as it has any; only those up to the diagonal count.
     #[inline]
     pub(super) fn row_mut(&mut self, row: usize, column: usize) -> &mut [f64] {
-        let (columns, place) = &self.rows[row];
-        &mut self.factor[place + column - columns.start..place + columns.len()]
+        let (columns, offset) = &self.rows[row];
+        &mut self.factor[offset + column - columns.start..offset + columns.len()]
     }
 
     /// The first column of a row, and its entries left of the diagonal.
     fn row(&self, row: usize) -> (usize, &[f64]) {
-        let (columns, place) = &self.rows[row];
+        let (columns, offset) = &self.rows[row];
         let first = columns.start;
-        (first, &self.factor[*place..place + row - first])
+        (first, &self.factor[*offset..offset + row - first])
     }
 
     /// The entry on the diagonal.
     fn diagonal(&self, row: usize) -> f64 {
-        let (columns, place) = &self.rows[row];
-        self.factor[place + row - columns.start]
+        let (columns, offset) = &self.rows[row];
+        self.factor[offset + row - columns.start]
     }
 
     /// Replaces the matrix by its factor.
     pub(super) fn factor(&mut self) {
-        for (i, (columns, place)) in self.rows.iter().enumerate() {
+        for (i, (columns, offset)) in self.rows.iter().enumerate() {
             let first = columns.start;
-            let (above, rest) = self.factor.split_at_mut(*place);
+            let (above, rest) = self.factor.split_at_mut(*offset);
             let row = &mut rest[..columns.len()];
             for j in first..i {
-                let (others, place) = &self.rows[j];
-                let other = &above[*place..place + others.len()];
+                let (others, offset) = &self.rows[j];
+                let other = &above[*offset..offset + others.len()];
                 let from = first.max(others.start);
                 let product = dot(
                     &row[from - first..j - first],

@@ -5,11 +5,10 @@
 //! of the body are made. A block of A between two particles contributes itself times the products of their r: no more
 //! than 16 scaled copies. The matrix of a connected piece is dense, because its aggregates are few.
 //!
-//! The factor is kept from one correction to the next until conjugate gradients converge at less than [`AGED`] of the
-//! rate that they had when it was new: a preconditioner need not be that of the present matrix, only symmetric and
-//! positive. Affine motions also stay what they are when the body turns. A cut changes neither aggregates nor factor:
-//! new particles join the aggregates of their neighbors, and all aggregates are grown again once the factor has aged.
-//! Cost: 36 operations a block, then a factorization of 12 unknowns an aggregate, only where the factor has aged.
+//! The factor is kept from one correction to the next until conjugate gradients converge at less than [`AGED`] of their
+//! rate with the new factor: a preconditioner need not be that of the present matrix, only symmetric and positive.
+//! Affine motions also remain valid when the body rotates. A cut changes neither aggregates nor factor: new particles
+//! join the aggregates of their neighbors, and all aggregates are grown again once the factor has aged.
 
 use super::cholesky::Cholesky;
 use super::matrix::Blocks;
@@ -44,7 +43,7 @@ pub(super) struct Coarse {
     values: Vec<f64>,
     age: Age,
     /// Whether the mesh has changed since the aggregates were grown.
-    worn: bool,
+    outdated: bool,
 }
 
 /// How well the factor still does.
@@ -77,19 +76,19 @@ impl Coarse {
             cholesky: Cholesky::default(),
             values: Vec::new(),
             age: Age::default(),
-            worn: false,
+            outdated: false,
         }
     }
 
     /// Whether the mesh has changed since the aggregates were grown.
-    pub(super) fn is_worn(&self) -> bool {
-        self.worn
+    pub(super) fn is_outdated(&self) -> bool {
+        self.outdated
     }
 
     /// Follows another order of the particles, of which some are new: these join aggregates of their neighbors, with
     /// the mean of their motions. O(blocks).
     pub(super) fn sync<R: Float>(&mut self, old: &[u32], new: &[u32], matrix: &Blocks<R>) {
-        self.worn = true;
+        self.outdated = true;
         let mut before = vec![(NONE, [0.0; VECTORS]); new.len()];
         for ((&p, &a), &weight) in old.iter().zip(&self.of).zip(&self.weights) {
             before[p as usize] = (a, weight);

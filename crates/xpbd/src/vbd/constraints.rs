@@ -53,7 +53,7 @@ pub(super) struct ConstraintTerms<R: Float> {
     /// Where the terms of each particle of the order end, a 0 before the first.
     offsets: Vec<usize>,
     terms: Vec<Term>,
-    /// The place of each particle in the order.
+    /// Particle -> its position in the order.
     pub(super) row_of: Vec<u32>,
     /// The stiffness in N/m of the tets around each particle.
     elastic: Vec<f64>,
@@ -292,7 +292,7 @@ impl<R: Float> ConstraintTerms<R> {
         self.springs.is_empty() && self.anchors.is_empty()
     }
 
-    /// The particles that share a distance or volume with the particle at a place of the order, with repetitions.
+    /// The particles that share a distance or volume with the particle at a position of the order, with repetitions.
     pub(super) fn neighbors(&self, row: usize) -> impl Iterator<Item = u32> + '_ {
         self.terms(row).iter().flat_map(|term| term.others)
     }
@@ -499,20 +499,20 @@ impl<R: Float> ConstraintTerms<R> {
         }
     }
 
-    /// The step of the particle at a place of the order, now at `x`, that lowers the energy of its star. `tets` is what
+    /// The step of the particle at a position of the order, now at `x`, that lowers the energy of its star. `tets` is what
     /// inertia and tets say at `x`. Also force and matrix at `x`.
     pub(super) fn minimize(
         &self,
         solver: &Solver<R>,
         order: &[u32],
-        place: usize,
+        row: usize,
         tets: &Local<R>,
         relaxation: R,
     ) -> (R::Vector, Local<R>) {
-        let p = order[place] as usize;
+        let p = order[row] as usize;
         let x = load::<R>(&solver.particles.cells[p]);
         let mut start = *tets;
-        let curved = self.add(solver, place, p, x, Curvature::Newton, &mut start);
+        let curved = self.add(solver, row, p, x, Curvature::Newton, &mut start);
         let mut step = start.solve();
         if !curved {
             return (step * relaxation, start);
@@ -520,12 +520,12 @@ impl<R: Float> ConstraintTerms<R> {
         for _ in 1..NEWTON_STEPS {
             let mut local = *tets;
             local.force = tets.force - tets.apply(step);
-            self.add(solver, place, p, x + step, Curvature::Newton, &mut local);
+            self.add(solver, row, p, x + step, Curvature::Newton, &mut local);
             step += local.solve();
         }
-        let before = self.energy_of(solver, place, x);
+        let before = self.energy_of(solver, row, x);
         let falls = |step: R::Vector| {
-            let after = self.energy_of(solver, place, x + step);
+            let after = self.energy_of(solver, row, x + step);
             let tets = R::dot(step, tets.apply(step) * R::from_f64(0.5) - tets.force);
             after - before + tets.to_f64() <= R::EPSILON.to_f64() * (before + after)
         };
@@ -535,8 +535,8 @@ impl<R: Float> ConstraintTerms<R> {
             }
         }
         let mut bound = *tets;
-        self.add(solver, place, p, x, Curvature::Bound, &mut bound);
-        let tension = self.tension_at_zero_length(solver, place, x);
+        self.add(solver, row, p, x, Curvature::Bound, &mut bound);
+        let tension = self.tension_at_zero_length(solver, row, x);
         let step = if tension > R::ZERO {
             bound.solve_against(tension)
         } else {
@@ -545,11 +545,11 @@ impl<R: Float> ConstraintTerms<R> {
         (step * relaxation, start)
     }
 
-    /// The tension of those distances of the particle at a place of the order, now at `x`, whose particles coincide. It
+    /// The tension of those distances of the particle at a position of the order, now at `x`, whose particles coincide. It
     /// resists a step in any direction.
-    fn tension_at_zero_length(&self, solver: &Solver<R>, place: usize, x: R::Vector) -> R {
+    fn tension_at_zero_length(&self, solver: &Solver<R>, row: usize, x: R::Vector) -> R {
         let mut sum = R::ZERO;
-        for term in self.terms(place) {
+        for term in self.terms(row) {
             let index = term.constraint as usize;
             if index >= self.distance_count {
                 continue;
@@ -593,14 +593,14 @@ impl<R: Float> ConstraintTerms<R> {
     fn add(
         &self,
         solver: &Solver<R>,
-        place: usize,
+        row: usize,
         p: usize,
         x: R::Vector,
         curvature: Curvature,
         local: &mut Local<R>,
     ) -> bool {
         let mut curved = false;
-        for term in self.terms(place) {
+        for term in self.terms(row) {
             let index = term.constraint as usize;
             let spring = &self.springs[index];
             let own = term.corner as usize;
@@ -659,10 +659,10 @@ impl<R: Float> ConstraintTerms<R> {
     }
 
     /// The energy of the distances, volumes and the anchor of a particle that is at `x`.
-    fn energy_of(&self, solver: &Solver<R>, place: usize, x: R::Vector) -> f64 {
+    fn energy_of(&self, solver: &Solver<R>, row: usize, x: R::Vector) -> f64 {
         let mut sum = 0.0;
         let mut own = NONE;
-        for term in self.terms(place) {
+        for term in self.terms(row) {
             let index = term.constraint as usize;
             own = self.particles(solver, index)[term.corner as usize];
             let position = |p: u32| {
@@ -683,20 +683,20 @@ impl<R: Float> ConstraintTerms<R> {
         sum
     }
 
-    /// The force of the constraints on the particle at a place of the order.
-    pub(super) fn force(&self, solver: &Solver<R>, order: &[u32], place: usize) -> R::Vector {
-        let p = order[place] as usize;
+    /// The force of the constraints on the particle at a position of the order.
+    pub(super) fn force(&self, solver: &Solver<R>, order: &[u32], row: usize) -> R::Vector {
+        let p = order[row] as usize;
         let x = load::<R>(&solver.particles.cells[p]);
         let mut local = Local {
             isotropic: R::ZERO,
             h: [R::ZERO; 6],
             force: R::Vector::default(),
         };
-        self.add(solver, place, p, x, Curvature::Newton, &mut local);
+        self.add(solver, row, p, x, Curvature::Newton, &mut local);
         local.force
     }
 
-    /// Adds force and blocks of the constraints of the particle at a place of the order; `columns` are those of its
+    /// Adds force and blocks of the constraints of the particle at a position of the order; `columns` are those of its
     /// row, the diagonal first.
     pub(super) fn add_row(
         &self,
@@ -709,8 +709,8 @@ impl<R: Float> ConstraintTerms<R> {
     ) {
         let p = order[row] as usize;
         let x = load::<R>(&solver.particles.cells[p]);
-        let place_of = |q: u32| match columns[1..].binary_search(&self.row_of[q as usize]) {
-            Ok(place) => place + 1,
+        let block_of = |q: u32| match columns[1..].binary_search(&self.row_of[q as usize]) {
+            Ok(block) => block + 1,
             // Not beside the diagonal, so on it.
             Err(_) => 0,
         };
@@ -732,7 +732,7 @@ impl<R: Float> ConstraintTerms<R> {
                     if excess == R::ZERO && spring.one_sided {
                         continue;
                     }
-                    let other = place_of(distance(solver, index).particles()[1 - own]);
+                    let other = block_of(distance(solver, index).particles()[1 - own]);
                     let outer = along * (spring.stiffness * (R::ONE - part));
                     let isotropic = spring.stiffness * part;
                     add_outer::<R>(&mut blocks[0], outer, along);
@@ -749,8 +749,8 @@ impl<R: Float> ConstraintTerms<R> {
                     let scaled = gradients[own] * spring.stiffness;
                     *force += scaled * -spring.excess(value);
                     for (q, gradient) in volume.particles().into_iter().zip(gradients) {
-                        let place = if q as usize == p { 0 } else { place_of(q) };
-                        add_outer::<R>(&mut blocks[place], scaled, gradient);
+                        let block = if q as usize == p { 0 } else { block_of(q) };
+                        add_outer::<R>(&mut blocks[block], scaled, gradient);
                     }
                 }
             }

@@ -1,4 +1,4 @@
-//! [`CornerTerm`]: what one particle sees of one of its tets.
+//! [`CornerTerm`]: the energy of a tet as a function of one of its corners.
 //!
 //! With the other corners a, b, c relative to the particle's position and `n = (b - a) × (c - a)`, the determinant of F
 //! is `n · a / 6V`, and the pull of `|F|²` is a weighted sum of a, b and c. So a particle needs eight numbers of a tet,

@@ -1,15 +1,16 @@
 //! [`CoarseCorrection`]: a truncated Newton step for the whole body, preconditioned by aggregates.
 //!
-//! What sweeps leave over varies slowly over the body. A correction solves `A d = f` with the semidefinite second
-//! derivatives A (`hessian`) and the forces f left over, by conjugate gradients, and goes along d as far as the
+//! The error that sweeps leave varies slowly over the body. A correction solves `A d = f` with the semidefinite second
+//! derivatives A (`hessian`) and the residual forces f by conjugate gradients, and moves along d as far as the
 //! potential falls. The preconditioner is a symmetric Gauss-Seidel sweep over the blocks in the colors of the stars,
-//! with the affine motions of aggregates in between (`coarse`): a two-level cycle. Nothing of the mesh is
-//! factored, only the aggregates, so after a cut a new pattern is all that has to be made.
+//! with the affine motions of aggregates in between (`coarse`): a two-level cycle. Only the aggregates are factored,
+//! not the mesh, so a cut only needs a new pattern.
 //!
-//! Where an accuracy is asked for, the matrix is kept as long as steps with it gain what it predicts: a body that moves
-//! smoothly needs a new one only now and then.
+//! With an accuracy the matrix is kept as long as steps gain the predicted energy: a body that moves smoothly needs a
+//! new one only from time to time.
 //!
-//! From a violent start, with many solutions at hand, it may settle in a worse one than sweeps would: sweep first.
+//! From a start far from rest, with many solutions, it may converge to one of higher energy than sweeps would: sweep
+//! first.
 //!
 //! Source: truncated Newton after Nash 2000; aggregates after Vaněk, Mandel, Brezina 1996, without smoothing.
 //! Cost: filling is 3 sweeps, factoring 2 to 5, an iteration of conjugate gradients half of one.
@@ -24,16 +25,16 @@ use super::{ImplicitStep, VbdReport, VbdSettings, VertexStars};
 use crate::float::{finite, load, store, weight};
 use crate::{Float, Solver, XpbdError};
 
-/// How thorough a correction is.
+/// Settings of a coarse correction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CoarseCorrectionSettings {
-    /// Iterations of conjugate gradients, at most.
+    /// Largest number of iterations of conjugate gradients.
     pub iterations: u32,
-    /// Ends them once the distance to the solution of the linear system, in the norm of the energy, is estimated to
-    /// have fallen to this part.
+    /// Ends the iterations once the distance to the solution of the linear system, in the norm of the energy, is
+    /// estimated to have fallen to this fraction.
     pub reduction: f64,
-    /// Particles of an aggregate before all cuts, about: see [`CoarseCorrection::new`].
+    /// Approximate number of particles of an aggregate before all cuts: see [`CoarseCorrection::new`].
     pub aggregate: usize,
 }
 
@@ -47,17 +48,16 @@ impl Default for CoarseCorrectionSettings {
     }
 }
 
-/// What a correction did.
+/// Report of a coarse correction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CoarseCorrectionReport {
-    /// Iterations of conjugate gradients.
+    /// Number of iterations of conjugate gradients.
     pub iterations: u32,
-    /// The part of the direction that was taken; 0 if no part of it lowers the potential.
+    /// Fraction of the direction that was taken; 0 if no fraction lowers the potential.
     pub taken: f64,
-    /// The distance to the solution after the correction, as a part of the state's own energy: the root of the energy
-    /// that is estimated to be left to gain over that of the tets and 3e-5 of that of the motion. Infinite for a state
-    /// without energy that is no solution.
+    /// Estimated relative error after the correction: the root of the energy left to gain over the sum of the tets'
+    /// energy and 3e-5 of the kinetic energy. Infinite for a state without energy that is no solution.
     pub error: f64,
 }
 
@@ -85,7 +85,7 @@ impl Search {
 /// the steps to come.
 const MOTION: f64 = 3e-5;
 
-/// Matrix, aggregates and vectors of a correction. It belongs to the stars it was made of.
+/// Matrix, aggregates and vectors of a coarse correction, for the stars that it was created from.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(bound = ""))]
@@ -121,7 +121,7 @@ const HALVINGS: usize = 8;
 const IDLE_ROUNDS: u32 = 2;
 
 impl<R: Float> CoarseCorrection<R> {
-    /// Bytes of all arrays. O(1).
+    /// Returns the bytes of all arrays. O(1).
     #[must_use]
     pub fn bytes(&self) -> usize {
         self.matrix.bytes()
@@ -134,14 +134,15 @@ impl<R: Float> CoarseCorrection<R> {
             + self.filled.as_ref().map_or(0, |(_, rows)| rows.len())
     }
 
-    /// Prepares corrections for some stars. O(pairs).
+    /// Creates the correction for some stars. O(pairs).
     ///
     /// Large aggregates are cheap to factor but need more iterations of conjugate gradients. The factor costs
-    /// `(12 · aggregates)³ / 6` multiplications, so let aggregates grow with the body: some tens of them are enough.
+    /// `(12 · aggregates)³ / 6` multiplications, so let the size of aggregates grow with the body: some tens of
+    /// aggregates are enough.
     ///
     /// # Errors
-    /// [`XpbdError::Setting`] if there are no iterations, the reduction is not between 0 and 1 or an aggregate has no
-    /// particle.
+    /// [`XpbdError::Setting`] if the number of iterations or the size of aggregates is 0, or the reduction is not
+    /// between 0 and 1.
     pub fn new(
         stars: &VertexStars<R>,
         settings: CoarseCorrectionSettings,
@@ -172,9 +173,9 @@ impl<R: Float> CoarseCorrection<R> {
         })
     }
 
-    /// Follows stars that were rebuilt, after a cut for example. Particles keep their aggregates, new ones join those
-    /// around them, and the factor stays in use. When it has aged, aggregates are grown again, as many in all: larger
-    /// ones where cuts have made more particles. O(pairs).
+    /// Updates the correction after its stars were rebuilt, for example after a cut. Particles keep their aggregates,
+    /// new ones join those around them, and the factor stays in use. When it has aged, as many aggregates are grown
+    /// again, larger ones if cuts have added particles. O(pairs).
     pub fn sync(&mut self, stars: &VertexStars<R>) {
         let old = std::mem::replace(&mut self.order, stars.order.clone());
         self.matrix.sync(stars);
@@ -182,7 +183,7 @@ impl<R: Float> CoarseCorrection<R> {
         self.filled = None;
     }
 
-    /// Number of aggregates.
+    /// Returns the number of aggregates.
     #[must_use]
     pub fn aggregate_count(&self) -> usize {
         self.coarse.count()
@@ -209,12 +210,12 @@ impl<R: Float> Solver<R> {
 }
 
 impl<R: Float> ImplicitStep<'_, R> {
-    /// Moves the whole body along a Newton direction, as far as the potential falls.
+    /// Moves the whole body along a Newton direction as far as the potential falls.
     ///
-    /// Particles that touch a collider are held meanwhile; sweeps lift them off.
+    /// Particles that touch a collider do not move; sweeps lift them off.
     ///
     /// # Panics
-    /// If the correction is that of other stars.
+    /// If the correction was created for other stars.
     pub fn correct(&mut self, correction: &mut CoarseCorrection<R>) -> CoarseCorrectionReport {
         let CoarseCorrection {
             settings,
@@ -254,7 +255,7 @@ impl<R: Float> ImplicitStep<'_, R> {
             *filled = Some((self.time, held.clone()));
         }
         if coarse.is_stale() {
-            if coarse.is_worn() {
+            if coarse.is_outdated() {
                 // The factor grows with the cube of their number, so aggregates grow with the body.
                 let size = settings.aggregate * rows / (*first_rows).max(1);
                 let size = size.max(settings.aggregate);

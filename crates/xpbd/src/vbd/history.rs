@@ -1,4 +1,4 @@
-//! [`History`]: what BDF2 remembers of each particle, and how it turns a substep into one of implicit Euler.
+//! [`History`]: the history of each particle for BDF2, and the reduction of its substep to implicit Euler.
 //!
 //! BDF2 asks for `3 x₁ - 4 x₀ + x₋₁ = 2 Δt v₁` and the like for v. With `τ = 2 Δt / 3`, `w = (x₀ - x₋₁) / Δt` and
 //! `x' = x₀ + w Δt / 3`, `v' = v₀ + (v₀ - v₋₁) / 3` that is `x₁ = x' + τ v₁` and `v₁ = v' + τ a₁`: an implicit Euler

@@ -31,8 +31,8 @@ pub(super) struct Blocks<R: Float> {
     /// The column of each block; the diagonal comes first in its row, the others ascend.
     pub(super) columns: Vec<u32>,
     pub(super) blocks: Vec<Block<R>>,
-    /// For each term, the place of its three blocks within its row.
-    pub(super) places: Vec<[u32; 3]>,
+    /// For each term, the indices of its three blocks within their row.
+    pub(super) block_indices: Vec<[u32; 3]>,
     /// The held excess of each tet.
     excess: Vec<R>,
 }
@@ -45,7 +45,7 @@ impl<R: Float> Blocks<R> {
             + size_of_val(&*self.mirrors)
             + size_of_val(&*self.columns)
             + size_of_val(&*self.blocks)
-            + size_of_val(&*self.places)
+            + size_of_val(&*self.block_indices)
             + size_of_val(&*self.excess)
     }
 
@@ -57,7 +57,7 @@ impl<R: Float> Blocks<R> {
             mirrors: Vec::new(),
             columns: Vec::new(),
             blocks: Vec::new(),
-            places: Vec::new(),
+            block_indices: Vec::new(),
             excess: Vec::new(),
         };
         blocks.sync(stars);
@@ -72,7 +72,7 @@ impl<R: Float> Blocks<R> {
             mirrors,
             columns,
             blocks,
-            places,
+            block_indices,
             ..
         } = self;
         let rows = stars.order.len();
@@ -84,7 +84,7 @@ impl<R: Float> Blocks<R> {
         offsets.push(0);
         upper.clear();
         columns.clear();
-        places.clear();
+        block_indices.clear();
         // Which row has seen a column last, and where the column's block is in that row.
         let mut seen = vec![(u32::MAX, 0u32); rows];
         for (row, diagonal) in (0..rows).zip(0u32..) {
@@ -103,11 +103,11 @@ impl<R: Float> Blocks<R> {
             let beside = &mut columns[first + 1..];
             beside.sort_unstable();
             upper.push(first + 1 + beside.partition_point(|&column| column < diagonal));
-            for (place, &column) in (1u32..).zip(&*beside) {
-                seen[column as usize].1 = place;
+            for (block, &column) in (1u32..).zip(&*beside) {
+                seen[column as usize].1 = block;
             }
             let terms = stars.of(row).iter();
-            places
+            block_indices
                 .extend(terms.map(|term| term.others.map(|p| seen[row_of[p as usize] as usize].1)));
             offsets.push(columns.len());
         }
@@ -118,9 +118,9 @@ impl<R: Float> Blocks<R> {
         mirrors.clear();
         for (row, &from) in upper.iter().enumerate() {
             for &column in &columns[from..offsets[row + 1]] {
-                let place = &mut next[column as usize];
-                mirrors.push(u32::try_from(*place).expect("blocks are numbered in 32 bits"));
-                *place += 1;
+                let block = &mut next[column as usize];
+                mirrors.push(u32::try_from(*block).expect("blocks are numbered in 32 bits"));
+                *block += 1;
             }
         }
     }
@@ -149,7 +149,7 @@ impl<R: Float> Blocks<R> {
             upper,
             columns,
             blocks,
-            places,
+            block_indices,
             excess,
             ..
         } = self;
@@ -192,12 +192,12 @@ impl<R: Float> Blocks<R> {
                     let held = term.slope * excess[stars.tets[pair] as usize];
                     add_outer::<R>(&mut blocks[0], slope, slope);
                     let around = [(a, b, c, wa), (b, c, a, wb), (c, a, b, wc)];
-                    for ((_, b, c, pull), place) in around.into_iter().zip(places[pair]) {
-                        if place as usize >= lower {
+                    for ((_, b, c, pull), block) in around.into_iter().zip(block_indices[pair]) {
+                        if block as usize >= lower {
                             continue;
                         }
                         let gradient = R::cross(b, c) * term.slope;
-                        let block = &mut blocks[place as usize];
+                        let block = &mut blocks[block as usize];
                         add_outer::<R>(block, -slope, gradient);
                         add_isotropic::<R>(block, pull);
                         // The second derivative of det F by this particle and a is that of -n / 6V.
@@ -319,7 +319,7 @@ impl<R: Float> Blocks<R> {
 
     /// Whether this is the pattern of as many rows and pairs.
     pub(super) fn belongs_to(&self, stars: &VertexStars<R>) -> bool {
-        self.offsets.len() == stars.order.len() + 1 && self.places.len() == stars.terms.len()
+        self.offsets.len() == stars.order.len() + 1 && self.block_indices.len() == stars.terms.len()
     }
 
     /// The columns and blocks of a row.
@@ -389,7 +389,7 @@ mod tests {
             length: 0.5,
             compliance,
             damping: 0.05,
-            only_when_longer: false,
+            tension_only: false,
         });
         let order = Coloring::new(vec![ColorId(0), ColorId(1)]);
         let order = Schedule::new(&Clustering::none(2), &order);

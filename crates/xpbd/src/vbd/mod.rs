@@ -1,4 +1,4 @@
-//! A primal method beside XPBD: block VBD, particle by particle, on the potential of a backward Euler step.
+//! Vertex block descent (VBD), a primal method: particle by particle, on the potential of a backward Euler step.
 //!
 //! A step of backward Euler is the minimum of the incremental potential
 //! `E(x) = ‖x - x̃‖²_M / (2 Δt²) + U(x)`, with `x̃` where the particles would be if they were free and `U` the Stable
@@ -12,9 +12,9 @@
 //! no line search is needed: nothing can overshoot. With over-relaxation by ω from 0 to 2 the same holds, because a
 //! quadratic falls by `ω (2 - ω)` of the most it can.
 //!
-//! Sweeps damp what varies from tet to tet and hardly touch what varies over the body, the more so the stiffer
-//! it is. [`CoarseCorrection`] adds a truncated Newton step for the whole body, preconditioned by aggregates of
-//! particles.
+//! Sweeps reduce errors that vary from tet to tet, but hardly those that vary over the body, in
+//! particular if it is stiff.
+//! [`CoarseCorrection`] adds a truncated Newton step for the whole body, preconditioned by aggregates of particles.
 //!
 //! Source: Chen, Liu, Yang, Yuksel 2024 (vertex block VBD). Cost: see [`VertexStars`] and [`ImplicitStep::sweep`].
 

@@ -1,29 +1,29 @@
-//! [`VbdSettings`]: how a frame of VBD is computed.
+//! [`VbdSettings`]: settings of a frame of VBD.
 
 use crate::{StepSettings, XpbdError};
 
-/// Where the iterations of a substep start. It changes how many are needed, not where they lead.
+/// Initial guess of a substep. It changes the number of iterations needed, not the solution.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Guess {
-    /// Where the particles would be if they were free: exact in free fall. In an impact that is inside of a collider, and
-    /// too few iterations leave a stiff body with energy that it did not have.
+    /// Free motion of the particles: exact in free fall. In an impact this lies inside a collider, and too few
+    /// iterations add energy to a stiff body.
     #[default]
     Inertia,
-    /// Where free particles would be if gravity were what it seemed to be in the last substep, between none of it and
-    /// all: a body that lies or hangs starts where it is. Keeps the velocities of a substep.
+    /// Free motion under the gravity that acted effectively in the last substep, between none and all of it: a body at
+    /// rest starts at its position. Keeps the velocities of a substep.
     ///
-    /// Each connected part of the body then starts on the line from a safe start to that guess, where its potential is
-    /// at most that of the safe start: where the part was, or moved rigidly with its momentum if nothing holds it.
+    /// Each connected part of the body starts on the line from a safe start to that guess, where its potential is at
+    /// most that of the safe start: its last position, or for a free part its rigid motion.
     ///
-    /// With an accuracy, parts of a body that something holds also start nearer to where they were, as far as that
-    /// lowers the potential, if the energy of their motion is below the error allowed: what a substep leaves over would
-    /// otherwise come back twice as large in the next one.
+    /// With an accuracy, held parts also start nearer to their last position as far as that lowers the potential, if
+    /// their kinetic energy is below the allowed error: an error left by a substep would otherwise come back twice as
+    /// large in the next one.
     ///
     /// Source: Chen et al. 2024, section 3.7, for gravity.
     Adaptive,
 }
 
-/// The rule by which a substep advances in time.
+/// Time integration of a substep.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Integrator {
@@ -33,24 +33,24 @@ pub enum Integrator {
     /// The backward differentiation formula of two steps (BDF2), second order and as stable: the factor is
     /// `exp(-4 π⁴ (Δt / T)³)`. Keeps three vectors a particle; costs a pass over the particles.
     ///
-    /// The first substep, and each that has another length than the one before, is one of implicit Euler. A particle
-    /// whose velocity was changed from outside or that touches a collider is taken to have moved steadily before.
+    /// The first substep, and each with another length than the one before, is one of implicit Euler. For a particle
+    /// whose velocity was set or that touches a collider, constant velocity is assumed before.
     ///
     /// Source: Curtiss and Hirschfelder 1952; Hairer, Wanner 1996, section III.3.
     Bdf2,
 }
 
-/// How one frame of VBD is computed.
+/// Settings of one frame of VBD.
 ///
-/// Unlike XPBD, VBD converges with `step.iterations` to the solution of the implicit substep, at any
-/// stiffness; `step.substeps` then buy accuracy in time. `step.relaxation` above 1 is over-relaxation.
+/// Unlike XPBD, VBD converges with `step.iterations` to the solution of the implicit substep, at any stiffness;
+/// `step.substeps` then improve the accuracy in time. `step.relaxation` above 1 is over-relaxation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VbdSettings {
     /// Time, substeps, iterations (sweeps, or rounds of a sweep and a correction), relaxation, forces.
     pub step: StepSettings,
-    /// How a substep advances in time.
+    /// Time integration of a substep.
     pub integrator: Integrator,
-    /// Where the iterations start.
+    /// Initial guess of the iterations.
     pub guess: Guess,
     /// Ends a substep before its last iteration once the force residual has fallen to this fraction of its value at
     /// the free motion. Costs [`crate::ImplicitStep::residual`] each iteration.
@@ -58,13 +58,13 @@ pub struct VbdSettings {
     /// Ends a substep of [`crate::Solver::step_vbd_two_level`] before its last iteration once the estimated error
     /// ([`crate::CoarseCorrectionReport::error`]) is at most this.
     pub accuracy: Option<f64>,
-    /// Whether to report what the last iterate of the frame is worth. Costs [`crate::ImplicitStep::residual`] and
-    /// [`crate::ImplicitStep::potential`] once a frame.
+    /// Whether to report residual force and potential of the frame's last iterate. Costs
+    /// [`crate::ImplicitStep::residual`] and [`crate::ImplicitStep::potential`] once a frame.
     pub measure: bool,
 }
 
 impl VbdSettings {
-    /// One substep of `iterations` by implicit Euler, no forces.
+    /// Returns settings with one substep of `iterations` by implicit Euler, without forces.
     #[must_use]
     pub fn new(time_step: f64, iterations: u32) -> Self {
         Self {

@@ -15,11 +15,11 @@ use super::viscosity::Viscosity;
 use crate::constraints::ScalarConstraint;
 use crate::{Float, Solver};
 
-/// What VBD needs of the tets, sorted by the particles of a schedule.
+/// The tets around each particle, sorted by the particles of a schedule, for VBD.
 ///
-/// It belongs to the tets, distances and volume constraints that the solver had when it was made: after a cut, or any
-/// other change of these, update it with [`VertexStars::rebuild`]. Positions, velocities, masses, attachments and what
-/// is fixed may change at any time.
+/// Valid for the tets, distances and volume constraints of the solver when it was created. After a cut, or any other
+/// change of these, update it with [`VertexStars::rebuild`]. Positions, velocities, masses, attachments and fixed
+/// particles may change at any time.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(bound = ""))]
@@ -77,8 +77,8 @@ impl<R: Float> VertexStars<R> {
         Ok(stars)
     }
 
-    /// Rebuilds the stars in place after tets have changed, given the [`Solver::star_incidence`] of the present tets;
-    /// memory is used again. O(tets).
+    /// Rebuilds the stars in place after tets have changed, given the [`Solver::star_incidence`] of the present tets,
+    /// and reuses memory. O(tets).
     ///
     /// # Errors
     /// Those of [`VertexStars::new`]; nothing has changed then.
@@ -128,7 +128,7 @@ impl<R: Float> VertexStars<R> {
         Ok(())
     }
 
-    /// Bytes of all arrays. O(1).
+    /// Returns the bytes of all arrays. O(1).
     #[must_use]
     pub fn bytes(&self) -> usize {
         size_of_val(&*self.order)
@@ -143,13 +143,13 @@ impl<R: Float> VertexStars<R> {
             + self.viscosity.as_ref().map_or(0, |v| v.bytes())
     }
 
-    /// Number of colors.
+    /// Returns the number of colors.
     #[must_use]
     pub fn color_count(&self) -> usize {
         self.colors.len() - 1
     }
 
-    /// Number of pairs of a particle and one of its tets: what a sweep costs is this times 10 to 20 ns.
+    /// Returns the number of pairs of a particle and one of its tets, to which the cost of a sweep is proportional.
     #[must_use]
     pub fn pair_count(&self) -> usize {
         self.terms.len()
@@ -204,8 +204,8 @@ impl<R: Float> VertexStars<R> {
 }
 
 impl<R: Float> Solver<R> {
-    /// The tets, distances and volume constraints that each particle belongs to. Particle p is constraint p of the
-    /// result; its particles are the tets, then the distances, then the volume constraints. Color and schedule this for
+    /// Returns the tets, distances and volume constraints of each particle. Particle p is constraint p of the result;
+    /// its particles are the tets, then the distances, then the volume constraints. Color and schedule this for
     /// [`VertexStars`]: particles of one color share none of them. O(tets + constraints).
     ///
     /// # Panics

@@ -1,4 +1,4 @@
-//! [`Guess::Adaptive`](super::Guess::Adaptive): where the sweeps of a substep start.
+//! [`Guess::Adaptive`](super::Guess::Adaptive): the initial guess of a substep.
 //!
 //! Sweeps that do not converge keep much of what they start with, so the start decides how a stiff body moves. The
 //! inertial guess `x + Δt v` can hold any energy: with slivers it inverts tets by multiples of their height, and

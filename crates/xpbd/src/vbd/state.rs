@@ -1,4 +1,4 @@
-//! What an iterate is worth: the incremental potential and the force residual, in double precision.
+//! Incremental potential and force residual of an iterate, in double precision.
 //!
 //! Summed in fixed parts and orders, so the numbers do not depend on the number of threads. Cost: a pass over the tets,
 //! for the residual on one thread.
@@ -15,8 +15,8 @@ use crate::neo_hookean::TetConstraint;
 const PARALLEL_TETS: usize = 2048;
 
 impl<R: Float> ImplicitStep<'_, R> {
-    /// The incremental potential in J: inertia, tets, damping and constraints. Its elastic part is 0 at rest. Hard
-    /// constraints are in it with their present multipliers, see [`ImplicitStep::update_multipliers`].
+    /// Returns the incremental potential in J: inertia, tets, damping and constraints. Its elastic part is 0 at rest.
+    /// Hard constraints contribute with their present multipliers, see [`ImplicitStep::update_multipliers`].
     #[must_use]
     pub fn potential(&self) -> f64 {
         self.potentials().total
@@ -125,14 +125,14 @@ impl<R: Float> ImplicitStep<'_, R> {
         0.5 * per_time_squared * each.sum::<f64>()
     }
 
-    /// The forces in N that are left over, `M (x̃ - x) / Δt² - ∇U(x)` with the energy U of tets, damping and
-    /// constraints; zero in the solution. Those on particles that do not move, and what a collider bears that a
-    /// particle touches, are zero as well.
+    /// Writes the residual forces in N, `M (x̃ - x) / Δt² - ∇U(x)` with the energy U of tets, damping and constraints,
+    /// to `out`; zero in the solution. Forces on particles that do not move, and forces that a collider bears, are set
+    /// to zero.
     pub fn forces(&self, out: &mut Vec<DVec3>) {
         self.forces_at(&|p| self.solver.particles.local(p), out);
     }
 
-    /// The norm of [`ImplicitStep::forces`] over all particles, in N.
+    /// Returns the norm of [`ImplicitStep::forces`] over all particles in N.
     #[must_use]
     pub fn residual(&self) -> f64 {
         let mut forces = Vec::new();
@@ -263,12 +263,12 @@ mod tests {
             let colors = (0u32..).take(constraints).map(ColorId).collect();
             Schedule::new(&Clustering::none(constraints), &Coloring::new(colors))
         };
-        let distance = |particles, compliance, damping, only_when_longer| DistanceConstraint {
+        let distance = |particles, compliance, damping, tension_only| DistanceConstraint {
             particles,
             length: 0.5,
             compliance,
             damping,
-            only_when_longer,
+            tension_only,
         };
         let distances = [
             distance([0, 4], 1e-3, 0.1, false),

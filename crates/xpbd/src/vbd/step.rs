@@ -1,26 +1,26 @@
-//! [`Solver::step_vbd`] and [`ImplicitStep`]: a frame, and one substep of it opened up.
+//! [`Solver::step_vbd`] and [`ImplicitStep`]: a frame of VBD, and a single substep in parts.
 
 use super::constraints::SWEEP_PENALTY;
 use super::{Guess, Integrator, VbdSettings, VertexStars};
 use crate::constraints::Constraints;
 use crate::{Float, Solver, StepReport, StepSettings, XpbdError};
 
-/// The report of a frame of VBD.
+/// Report of a frame of VBD.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct VbdReport {
-    /// Particles put back where they were, see [`StepReport::repaired`].
+    /// Number of particles that were put back, see [`StepReport::repaired`].
     pub repaired: usize,
-    /// Iterations made, over all substeps.
+    /// Number of iterations over all substeps.
     pub iterations: u32,
-    /// With a tolerance: the force residual at the end of the last substep, as a fraction of that at the free motion.
+    /// Force residual at the end of the last substep as a fraction of that at the free motion; only with a tolerance.
     pub residual: Option<f64>,
-    /// With coarse corrections: the largest error that the last one of a substep left over, see
-    /// [`crate::CoarseCorrectionReport::error`].
+    /// Largest error after the last correction of a substep, see [`crate::CoarseCorrectionReport::error`]; only with
+    /// coarse corrections.
     pub error: Option<f64>,
-    /// If measured: [`ImplicitStep::residual`] in N at the end of the frame.
+    /// [`ImplicitStep::residual`] in N at the end of the frame, if measured.
     pub force: Option<f64>,
-    /// If measured: [`ImplicitStep::potential`] in J at the end of the frame.
+    /// [`ImplicitStep::potential`] in J at the end of the frame, if measured.
     pub potential: Option<f64>,
 }
 
@@ -88,11 +88,10 @@ pub(super) struct Substep {
     is_startup: bool,
 }
 
-/// One substep of VBD between its prediction and its end, for callers that choose what to do in it or look at it while
-/// it converges.
+/// One substep of VBD between its prediction and its end, for callers that control or observe its convergence.
 ///
-/// The positions of the solver are the iterate. Velocities follow only in [`ImplicitStep::finish`]: a step dropped
-/// before that leaves the solver with velocities that do not belong to its positions.
+/// The positions of the solver are the iterate. Velocities are updated only by [`ImplicitStep::finish`]; a step dropped
+/// before that leaves velocities that do not belong to the positions.
 #[derive(Debug)]
 #[must_use = "velocities follow in `finish`"]
 pub struct ImplicitStep<'a, R: Float> {
@@ -113,13 +112,13 @@ pub struct ImplicitStep<'a, R: Float> {
 }
 
 impl<'a, R: Float> ImplicitStep<'a, R> {
-    /// Begins the last substep of a frame: moves the particles to the initial guess, and handles to where they go.
+    /// Begins the last substep of a frame: moves the particles to the initial guess, and handles to their target poses.
     ///
     /// # Errors
     /// If the settings do not pass [`VbdSettings::check`]; nothing has moved then.
     ///
     /// # Panics
-    /// If the stars are those of another number of particles, tets or constraints.
+    /// If the stars have another number of particles, tets or constraints.
     pub fn new(
         solver: &'a mut Solver<R>,
         stars: &'a mut VertexStars<R>,
@@ -234,14 +233,14 @@ impl<'a, R: Float> ImplicitStep<'a, R> {
         }
     }
 
-    /// Brings the multipliers of hard constraints to the forces that these exert at the present positions, as
-    /// [`Solver::step_vbd`] does after each iteration; nothing happens without hard constraints. It changes the
-    /// potential and the forces, which are zero only where the constraints are met as well.
+    /// Updates the multipliers of hard constraints to their forces at the present positions, as [`Solver::step_vbd`]
+    /// does after each iteration; no effect without hard constraints. It changes potential and forces, which are zero
+    /// only where the constraints are met as well.
     pub fn update_multipliers(&mut self) {
         self.stars.constraints.update_multipliers(self.solver);
     }
 
-    /// Ends the substep: velocities from the motion.
+    /// Ends the substep: computes velocities from the motion.
     pub fn finish(self) -> StepReport {
         let per_time = R::ONE / self.time;
         let Solver {

@@ -1,4 +1,4 @@
-//! [`ImplicitStep::sweep`]: every particle once into the minimum of the potential over its position.
+//! [`ImplicitStep::sweep`]: moves every particle once to the minimum of the potential over its position.
 
 use rayon::prelude::*;
 
@@ -25,7 +25,7 @@ struct Sweep<R> {
 }
 
 impl<R: Float> ImplicitStep<'_, R> {
-    /// Moves every free particle once, color after color, and out of colliders.
+    /// Moves every free particle once, color by color, and out of colliders.
     ///
     /// Without colliders the potential does not rise, up to rounding. Cost: about 60 operations a pair of particle and
     /// tet, and three divisions a particle; [`VertexStars::pair_count`].
@@ -39,15 +39,15 @@ impl<R: Float> ImplicitStep<'_, R> {
         let threads = rayon::current_num_threads();
         let (solver, stars) = (&*self.solver, &*self.stars);
         for color in 0..stars.color_count() {
-            let places = stars.colors[color]..stars.colors[color + 1];
-            let pairs = stars.offsets[places.end] - stars.offsets[places.start];
+            let rows = stars.colors[color]..stars.colors[color + 1];
+            let pairs = stars.offsets[rows.end] - stars.offsets[rows.start];
             if threads == 1 || pairs < PARALLEL_PAIRS {
-                places.for_each(|place| sweep.step_vbd(solver, stars, place));
+                rows.for_each(|row| sweep.step_vbd(solver, stars, row));
             } else {
                 (0..threads).into_par_iter().for_each(|thread| {
-                    let share = |part| places.start + places.len() * part / threads;
-                    for place in share(thread)..share(thread + 1) {
-                        sweep.step_vbd(solver, stars, place);
+                    let share = |part| rows.start + rows.len() * part / threads;
+                    for row in share(thread)..share(thread + 1) {
+                        sweep.step_vbd(solver, stars, row);
                     }
                 });
             }
@@ -58,14 +58,14 @@ impl<R: Float> ImplicitStep<'_, R> {
 impl<R: Float> Sweep<R> {
     /// Moves one particle into its minimum.
     #[inline]
-    fn step_vbd(&self, solver: &Solver<R>, stars: &VertexStars<R>, place: usize) {
+    fn step_vbd(&self, solver: &Solver<R>, stars: &VertexStars<R>, row: usize) {
         let Solver {
             particles,
             constraints,
             ..
         } = solver;
         let obstacles = &*constraints.colliders.obstacles;
-        let p = stars.order[place] as usize;
+        let p = stars.order[row] as usize;
         let particle = &particles.cells[p];
         let inverse_mass = weight::<R>(particle);
         if inverse_mass <= R::ZERO {
@@ -78,7 +78,7 @@ impl<R: Float> Sweep<R> {
         let mut force = (free - x) * inertia;
         let mut isotropic = inertia;
         let mut h = [R::ZERO; 6];
-        for term in stars.of(place) {
+        for term in stars.of(row) {
             let corner = term.at(particles, x);
             force += corner.force;
             let [wa, wb, wc] = term.pulls;
@@ -91,11 +91,11 @@ impl<R: Float> Sweep<R> {
             h[4] += v * w;
             h[5] += w * w;
         }
-        let collapsed = h[0] + h[3] + h[5] == R::ZERO && !stars.of(place).is_empty();
+        let collapsed = h[0] + h[3] + h[5] == R::ZERO && !stars.of(row).is_empty();
         if let Some(viscosity) = &stars.viscosity {
             let motion = |p: usize| load::<R>(&particles.cells[p]) - particles.previous[p];
-            force += viscosity.force(place, &stars.order, motion);
-            viscosity.add_diagonal(place, &mut h);
+            force += viscosity.force(row, &stars.order, motion);
+            viscosity.add_diagonal(row, &mut h);
         }
         let mut step = if stars.constraints.is_empty() {
             solve(isotropic, h, force) * self.relaxation
@@ -108,7 +108,7 @@ impl<R: Float> Sweep<R> {
             let (step, local) =
                 stars
                     .constraints
-                    .minimize(solver, &stars.order, place, &tets, self.relaxation);
+                    .minimize(solver, &stars.order, row, &tets, self.relaxation);
             (isotropic, h) = (local.isotropic, local.h);
             step
         };

@@ -112,7 +112,7 @@ impl<R: Float> Viscosity<R> {
         let Blocks {
             offsets,
             blocks,
-            places,
+            block_indices,
             ..
         } = &mut self.matrix;
         let tets = &self.tets;
@@ -125,7 +125,7 @@ impl<R: Float> Viscosity<R> {
                     blocks.fill([R::Vector::default(); 3]);
                     let p = stars.order[row];
                     let pairs = stars.offsets[row]..stars.offsets[row + 1];
-                    for (pair, places) in pairs.clone().zip(&places[pairs]) {
+                    for (pair, block_indices) in pairs.clone().zip(&block_indices[pairs]) {
                         let t = stars.tets[pair] as usize;
                         let corners = solver.tets.list[t].particles;
                         let Some(own) = corners.iter().position(|&corner| corner == p) else {
@@ -143,7 +143,7 @@ impl<R: Float> Viscosity<R> {
                         };
                         add(0, own, -(wa + wb + wc));
                         for (k, pull) in [wa, wb, wc].into_iter().enumerate() {
-                            add(places[k], OTHERS[own][k], pull);
+                            add(block_indices[k], OTHERS[own][k], pull);
                         }
                     }
                 }

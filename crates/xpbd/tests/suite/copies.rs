@@ -28,7 +28,7 @@ fn everything<R: Real>() -> (Solver<R>, Schedule) {
         length: 0.1,
         compliance: 1e-5,
         damping: 0.0,
-        only_when_longer: true,
+        tension_only: true,
     };
     let one = Schedule::new(&Clustering::none(1), &Coloring::new(vec![ColorId(0)]));
     solver.set_distances(&[link], one).unwrap();

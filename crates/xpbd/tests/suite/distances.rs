@@ -15,7 +15,7 @@ fn distance(particles: [u32; 2], length: f64, compliance: f64) -> DistanceConstr
         length,
         compliance,
         damping: 0.0,
-        only_when_longer: false,
+        tension_only: false,
     }
 }
 
@@ -182,7 +182,7 @@ fn a_thread_pulls_but_does_not_push() {
     let mut solver = Solver::<f64>::new(&[DVec3::ZERO, dvec3(0.0, 0.0, -0.5)]);
     solver.set_mass(1, 1.0);
     let thread = DistanceConstraint {
-        only_when_longer: true,
+        tension_only: true,
         damping: 0.01,
         ..distance([0, 1], 1.0, 1e-6)
     };
@@ -268,7 +268,7 @@ fn cloth<R: Real>(threads: usize, iterations: u32) -> Vec<DVec3> {
             if p % n + right < n && p / n + up < n {
                 springs.push(DistanceConstraint {
                     damping: 1e-3,
-                    only_when_longer: noise.scalar() > 0.0,
+                    tension_only: noise.scalar() > 0.0,
                     ..distance([p, p + right + up * n], 0.009, 1e-4 * noise.scalar().abs())
                 });
             }
@@ -397,7 +397,7 @@ proptest! {
                 length: if what & 1 == 0 { 0.0 } else { 10f64.powi(length) },
                 compliance: if what & 2 == 0 { 0.0 } else { 10f64.powi(compliance) },
                 damping: if what & 2 == 0 { 0.0 } else { 10f64.powi(damping) },
-                only_when_longer: what & 4 == 0,
+                tension_only: what & 4 == 0,
             })
             .collect();
         finite::<f32>(&at, &particles, &constraints, iterations)?;

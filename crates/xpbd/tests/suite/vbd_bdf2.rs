@@ -61,7 +61,7 @@ fn a_spring_decays_as_derived() {
             length: 1.0,
             compliance,
             damping: 0.0,
-            only_when_longer: false,
+            tension_only: false,
         };
         let one = |count| {
             let colors = Coloring::new((0..count).map(ColorId).collect());

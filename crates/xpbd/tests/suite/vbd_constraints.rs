@@ -26,7 +26,7 @@ pub(crate) fn distance(
         length,
         compliance,
         damping,
-        only_when_longer: false,
+        tension_only: false,
     }
 }
 
@@ -196,7 +196,7 @@ fn a_thread_pulls_but_does_not_push() {
     let mut solver = Solver::<f64>::new(&[DVec3::ZERO, dvec3(0.0, 0.0, -0.5)]);
     solver.set_mass(1, 1.0);
     let thread = DistanceConstraint {
-        only_when_longer: true,
+        tension_only: true,
         ..distance([0, 1], 1.0, 1e-6, 0.01)
     };
     link(&mut solver, &[thread]);
@@ -297,7 +297,7 @@ fn linked<R: Real>(material: Material, hard: bool) -> Solver<R> {
         distance([end[2], count + 2], 0.2, if hard { 0.0 } else { 1e-4 }, 0.0),
         distance([count + 1, count + 2], 0.3, 1e-3, 0.01),
     ];
-    springs[3].only_when_longer = true;
+    springs[3].tension_only = true;
     link(&mut solver, &springs);
     let handle = solver.add_handle(Pose::at(DVec3::ZERO));
     solver.attach(end[3] as usize, handle, 1e-3, 0.02).unwrap();
@@ -403,7 +403,7 @@ fn state<R: Real>(threads: usize, two_level: bool) -> u64 {
             let [a, b] = [p, p + 1].map(|p| mesh.positions[p as usize]);
             let compliance = if p % 7 == 0 { 0.0 } else { 1e-4 };
             DistanceConstraint {
-                only_when_longer: p % 3 == 0,
+                tension_only: p % 3 == 0,
                 ..distance([p, p + 1], 0.9 * a.distance(b), compliance, 1e-3)
             }
         })
@@ -487,7 +487,7 @@ proptest! {
         let list: Vec<_> = springs.iter().map(|&(p, other, length, compliance, what)| {
             let [a, b] = [p % count, (p % count + 1 + other % (count - 1)) % count];
             DistanceConstraint {
-                only_when_longer: what & 1 == 0,
+                tension_only: what & 1 == 0,
                 ..distance([a, b], length, if what & 2 == 0 { 0.0 } else { 10f64.powi(compliance) }, if what & 4 == 0 { 0.0 } else { 0.05 })
             }
         }).collect();
@@ -540,7 +540,7 @@ proptest! {
                 length: if what & 1 == 0 { 0.0 } else { 10f64.powi(length) },
                 compliance: if what & 2 == 0 { 0.0 } else { 10f64.powi(compliance) },
                 damping: if what & 2 == 0 { 0.0 } else { 10f64.powi(damping) },
-                only_when_longer: what & 4 == 0,
+                tension_only: what & 4 == 0,
             })
             .collect();
         let volume = VolumeConstraint {

@@ -1,18 +1,18 @@
-//! The knobs that trade speed for accuracy: a form over [`SolverSpec`].
+//! Solver settings that trade speed for accuracy: a form over [`SolverSpec`].
 //!
-//! Each turn is taken over at once by the running body; a turn that a scene does not allow is refused with its reason,
-//! and the knob goes back. Changing the method takes the defaults that go with it.
+//! A change takes effect in the next frame. A change that the scene does not allow is refused with its reason, and the
+//! setting keeps its value. Another method brings its own defaults.
 
 use eframe::egui::{ComboBox, DragValue, Slider, SliderClamping, Ui};
 use incise::scene::{Backend, Method, SolverSpec, Substeps};
 
-/// A knob that was turned.
+/// A changed setting.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SettingChange {
-    pub(crate) knob: &'static str,
+    pub(crate) setting: &'static str,
     pub(crate) from: String,
     pub(crate) to: String,
-    /// The section with the turn made.
+    /// The solver section with the change.
     pub(crate) spec: SolverSpec,
 }
 
@@ -32,16 +32,16 @@ fn method_name(method: Method) -> &'static str {
         Method::GaussSeidel => "Gauss-Seidel",
         Method::Jacobi => "Jacobi",
         Method::Chebyshev => "Chebyshev",
-        Method::Vbd => "vbd",
+        Method::Vbd => "VBD",
         _ => "other",
     }
 }
 
 fn backend_name(backend: Backend) -> &'static str {
     match backend {
-        Backend::Cpu => "processor",
+        Backend::Cpu => "CPU",
         Backend::Gpu => "GPU",
-        Backend::Auto => "either",
+        Backend::Auto => "Auto",
     }
 }
 
@@ -53,19 +53,19 @@ fn substeps_name(substeps: Substeps) -> String {
 }
 
 /// The kind of a clustering and its size: `serial:10` is `("serial", 10)`.
-fn parts(clustering: &str) -> (&str, u32) {
+fn split_clustering(clustering: &str) -> (&str, u32) {
     let (kind, size) = clustering.split_once(':').unwrap_or((clustering, ""));
     (kind, size.parse().unwrap_or(10))
 }
 
-fn joined(kind: &str, size: u32) -> String {
+fn clustering_name(kind: &str, size: u32) -> String {
     match kind {
         "none" => kind.to_owned(),
         _ => format!("{kind}:{size}"),
     }
 }
 
-/// Shows the knobs as `spec` has them; returns the one that was turned. `has_gpu` tells whether a GPU can be chosen,
+/// Shows the settings of `spec`; returns the one that was changed. `has_gpu` tells whether a GPU can be chosen,
 /// `on_gpu` whether one computes.
 pub(crate) fn show(
     ui: &mut Ui,
@@ -73,17 +73,17 @@ pub(crate) fn show(
     has_gpu: bool,
     on_gpu: bool,
 ) -> Option<SettingChange> {
-    let mut turn = None;
+    let mut change = None;
     // `Auto` is shown as the backend that was chosen.
     let present = match spec.backend {
         Backend::Auto if on_gpu => Backend::Gpu,
         Backend::Auto => Backend::Cpu,
         chosen => chosen,
     };
-    let mut turned = |knob, from: String, to: String, spec: SolverSpec| {
+    let mut changed = |setting, from: String, to: String, spec: SolverSpec| {
         if from != to {
-            turn = Some(SettingChange {
-                knob,
+            change = Some(SettingChange {
+                setting,
                 from,
                 to,
                 spec,
@@ -91,7 +91,7 @@ pub(crate) fn show(
         }
     };
 
-    ComboBox::from_label("method")
+    ComboBox::from_label("Method")
         .selected_text(method_name(spec.method))
         .show_ui(ui, |ui| {
             for method in METHODS {
@@ -101,7 +101,7 @@ pub(crate) fn show(
                     .clicked()
                 {
                     let (from, to) = (method_name(spec.method), method_name(method));
-                    turned("method", from.into(), to.into(), with_method(spec, method));
+                    changed("Method", from.into(), to.into(), with_method(spec, method));
                 }
             }
         });
@@ -115,8 +115,8 @@ pub(crate) fn show(
         let slider = Slider::new(&mut count, 1..=spec.max_substeps.max(2))
             .logarithmic(true)
             .clamping(SliderClamping::Edits);
-        let moved = ui.add_enabled(!auto, slider.text("substeps")).changed();
-        if ui.checkbox(&mut auto, "auto").changed() || moved {
+        let moved = ui.add_enabled(!auto, slider.text("Substeps")).changed();
+        if ui.checkbox(&mut auto, "Auto").changed() || moved {
             let substeps = if auto {
                 Substeps::Auto
             } else {
@@ -127,7 +127,7 @@ pub(crate) fn show(
                 ..spec.clone()
             };
             let (from, to) = (substeps_name(spec.substeps), substeps_name(substeps));
-            turned("substeps", from, to, spec_after);
+            changed("Substeps", from, to, spec_after);
         }
     });
 
@@ -135,20 +135,20 @@ pub(crate) fn show(
     let slider = Slider::new(&mut iterations, 1..=200)
         .logarithmic(true)
         .clamping(SliderClamping::Edits);
-    if ui.add(slider.text("iterations")).changed() {
+    if ui.add(slider.text("Iterations")).changed() {
         let spec_after = SolverSpec {
             iterations,
             ..spec.clone()
         };
         let (from, to) = (spec.iterations.to_string(), iterations.to_string());
-        turned("iterations", from, to, spec_after);
+        changed("Iterations", from, to, spec_after);
     }
 
     let mut relaxation = spec.relaxation;
     let slider = Slider::new(&mut relaxation, 0.05..=1.9)
         .max_decimals(2)
         .clamping(SliderClamping::Edits);
-    if ui.add(slider.text("relaxation")).changed() {
+    if ui.add(slider.text("Relaxation")).changed() {
         let spec_after = SolverSpec {
             relaxation,
             ..spec.clone()
@@ -157,17 +157,17 @@ pub(crate) fn show(
             format!("{:.2}", spec.relaxation),
             format!("{relaxation:.2}"),
         );
-        turned("relaxation", from, to, spec_after);
+        changed("Relaxation", from, to, spec_after);
     }
 
-    let (kind, size) = parts(&spec.clustering);
+    let (kind, size) = split_clustering(&spec.clustering);
     ui.horizontal(|ui| {
         let mut clustering = spec.clustering.clone();
         ComboBox::from_id_salt("clusters")
             .selected_text(kind)
             .show_ui(ui, |ui| {
                 for other in CLUSTERINGS {
-                    ui.selectable_value(&mut clustering, joined(other, size), other);
+                    ui.selectable_value(&mut clustering, clustering_name(other, size), other);
                 }
             });
         if kind != "none" {
@@ -178,21 +178,26 @@ pub(crate) fn show(
                 .clamp_existing_to_range(false)
                 .speed(0.1);
             if ui.add(value).changed() {
-                clustering = joined(kind, size);
+                clustering = clustering_name(kind, size);
             }
         }
-        ui.label("clusters");
+        ui.label("Clustering");
         if clustering != spec.clustering {
             let spec_after = SolverSpec {
                 clustering: clustering.clone(),
                 ..spec.clone()
             };
-            turned("clusters", spec.clustering.clone(), clustering, spec_after);
+            changed(
+                "Clustering",
+                spec.clustering.clone(),
+                clustering,
+                spec_after,
+            );
         }
     });
 
     ui.add_enabled_ui(has_gpu, |ui| {
-        ComboBox::from_label("computed by")
+        ComboBox::from_label("Backend")
             .selected_text(backend_name(present))
             .show_ui(ui, |ui| {
                 for backend in [Backend::Cpu, Backend::Gpu] {
@@ -204,15 +209,15 @@ pub(crate) fn show(
                             backend,
                             ..spec.clone()
                         };
-                        turned("computed by", from.into(), to.into(), spec_after);
+                        changed("Backend", from.into(), to.into(), spec_after);
                     }
                 }
             });
     });
-    turn
+    change
 }
 
-/// The section with another method and what goes with that.
+/// The solver section with another method and its defaults.
 fn with_method(spec: &SolverSpec, method: Method) -> SolverSpec {
     let SolverSpec {
         iterations,
@@ -235,10 +240,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_of_clusterings_come_apart_and_together() {
+    fn clustering_names_are_split_and_joined() {
         for name in ["none", "serial:10", "greedy-k:7", "pressure:32"] {
-            let (kind, size) = parts(name);
-            assert_eq!(joined(kind, size), name);
+            let (kind, size) = split_clustering(name);
+            assert_eq!(clustering_name(kind, size), name);
             assert!(name.parse::<incise::clustering::Method>().is_ok(), "{name}");
         }
     }

@@ -1,11 +1,11 @@
-//! [`Handles`]: what hangs on moving handles, on the device.
+//! [`Attachments`]: what hangs on moving handles, on the device.
 //!
-//! What is held rigidly and what hangs by a compliance are two lists, since they are moved at different times; a list
+//! What is rigid rigidly and what hangs by a compliance are two lists, since they are moved at different times; a list
 //! that is empty costs no dispatch. The host says where the handles are at the end of each substep and the device moves
-//! their places: rotations and sums in single precision, so places are taken relative to the middle of all places on a
+//! their anchors: rotations and sums in single precision, so anchors are taken relative to the middle of all anchors on a
 //! handle, which the host moves in double precision.
 //!
-//! Twin: `constraints/attachments.rs` of incise-xpbd, to a few roundings. The place at the start of a frame is that of the handle
+//! Twin: `constraints/attachments.rs` of incise-xpbd, to a few roundings. The anchor at the start of a frame is that of the handle
 //! there. Cost: 32 bytes an attachment, sent when some have changed; 48 bytes a handle and substep, sent when they
 //! differ from those before.
 
@@ -23,14 +23,14 @@ use crate::{GpuContext, GpuError};
 /// Three rows of a rotation with what is added to each.
 type Rows = [[f32; 4]; 3];
 
-/// Handles with what hangs on them.
+/// Attachments with what hangs on them.
 #[derive(Debug)]
-pub(crate) struct Handles {
+pub(crate) struct Attachments {
     /// What is where its handle says.
-    held: List,
+    rigid: List,
     /// What is pulled there.
-    hanging: List,
-    /// Handle -> the middle of the places on it.
+    soft: List,
+    /// Handle -> the middle of the anchors on it.
     middles: Vec<DVec3>,
     /// All at the start of a frame, then all at the end of each substep.
     poses: Array<Rows>,
@@ -67,11 +67,11 @@ impl List {
     }
 }
 
-impl Handles {
+impl Attachments {
     fn new(gpu: &GpuContext) -> Result<Self, GpuError> {
         Ok(Self {
-            held: List::new(gpu, "particles held by handles")?,
-            hanging: List::new(gpu, "particles hanging on handles")?,
+            rigid: List::new(gpu, "particles rigid by handles")?,
+            soft: List::new(gpu, "particles soft on handles")?,
             middles: Vec::new(),
             poses: Array::zeros(gpu, "poses of handles", 0)?,
             sent: Vec::new(),
@@ -99,17 +99,17 @@ impl Handles {
             None => this.insert(Self::new(gpu)?),
         };
         handles.middles = middles(solver);
-        let (mut held, mut hanging) = (Vec::new(), Vec::new());
+        let (mut rigid, mut soft) = (Vec::new(), Vec::new());
         for data in solver.attachments() {
             let attachment = attachment(&data, handles.middles[data.handle as usize]);
             if data.compliance > 0.0 {
-                hanging.push(attachment);
+                soft.push(attachment);
             } else if !solver.is_fixed(data.particle as usize) {
-                held.push(attachment);
+                rigid.push(attachment);
             }
         }
-        handles.held.set(gpu, held)?;
-        handles.hanging.set(gpu, hanging)
+        handles.rigid.set(gpu, rigid)?;
+        handles.soft.set(gpu, soft)
     }
 
     /// Sends where the handles are in a frame, unless that is there.
@@ -120,7 +120,7 @@ impl Handles {
         settings: &StepSettings,
     ) -> Result<(), GpuError> {
         if settings.iterations > 1 {
-            self.multipliers.resize(gpu, self.hanging.host.len())?;
+            self.multipliers.resize(gpu, self.soft.host.len())?;
         }
         let mut poses = Vec::with_capacity(self.sent.len());
         for substep in 0..=settings.substeps {
@@ -147,12 +147,12 @@ impl Handles {
         self.middles.len()
     }
 
-    pub(crate) fn held_count(&self) -> usize {
-        self.held.host.len()
+    pub(crate) fn rigid_count(&self) -> usize {
+        self.rigid.host.len()
     }
 
-    pub(crate) fn hanging_count(&self) -> usize {
-        self.hanging.host.len()
+    pub(crate) fn soft_count(&self) -> usize {
+        self.soft.host.len()
     }
 
     /// The kernels for what there is.
@@ -163,16 +163,16 @@ impl Handles {
         shared: &Shared<'_>,
         keeps: bool,
     ) -> Result<AttachmentKernels, GpuError> {
-        let (held, hanging) = (self.held.array.buffer(), self.hanging.array.buffer());
+        let (rigid, soft) = (self.rigid.array.buffer(), self.soft.array.buffer());
         let poses = self.poses.buffer();
         let mut passes = AttachmentKernels::default();
-        if self.held_count() > 0 {
-            let (plain, groups) = (Variant::default(), self.held.groups());
+        if self.rigid_count() > 0 {
+            let (plain, groups) = (Variant::default(), self.rigid.groups());
             let buffers = [
                 shared.settings,
                 shared.uniforms,
                 shared.particles,
-                held,
+                rigid,
                 poses,
                 shared.repaired,
             ];
@@ -182,12 +182,12 @@ impl Handles {
                 shared.particles,
                 shared.previous,
                 shared.velocities,
-                held,
+                rigid,
             ];
             let update = kernels.bind(gpu, &UPDATE_HELD, plain, &buffers)?;
-            passes.held = Some((moving, update, groups));
+            passes.rigid = Some((moving, update, groups));
         }
-        if self.hanging_count() > 0 {
+        if self.soft_count() > 0 {
             let variant = Variant {
                 keeps,
                 ..Variant::default()
@@ -197,12 +197,12 @@ impl Handles {
                 shared.uniforms,
                 shared.particles,
                 shared.previous,
-                hanging,
+                soft,
                 poses,
                 self.multipliers.buffer(),
             ];
             let solve = kernels.bind(gpu, &SOLVE_ATTACHMENTS, variant, &buffers)?;
-            passes.hanging = Some((solve, self.hanging.groups()));
+            passes.soft = Some((solve, self.soft.groups()));
         }
         Ok(passes)
     }
@@ -210,8 +210,8 @@ impl Handles {
     /// Bytes on the device.
     pub(crate) fn bytes(&self) -> u64 {
         let buffers = [
-            self.held.array.buffer(),
-            self.hanging.array.buffer(),
+            self.rigid.array.buffer(),
+            self.soft.array.buffer(),
             self.poses.buffer(),
             self.multipliers.buffer(),
         ];
@@ -222,39 +222,39 @@ impl Handles {
 /// The kernels for what hangs on handles, with their workgroups.
 #[derive(Debug, Default)]
 pub(crate) struct AttachmentKernels {
-    held: Option<(BoundKernel, BoundKernel, usize)>,
-    hanging: Option<(BoundKernel, usize)>,
+    rigid: Option<(BoundKernel, BoundKernel, usize)>,
+    soft: Option<(BoundKernel, usize)>,
 }
 
 impl AttachmentKernels {
     /// At the start of a substep; `uniform` is where its uniform is.
     pub(crate) fn move_held(&self, pass: &mut Recorder<'_>, uniform: u32) {
-        if let Some((moving, _, groups)) = &self.held {
+        if let Some((moving, _, groups)) = &self.rigid {
             moving.run(pass, &[uniform], *groups);
         }
     }
 
     /// In an iteration, after the tets.
     pub(crate) fn solve(&self, pass: &mut Recorder<'_>, uniform: u32) {
-        if let Some((solve, groups)) = &self.hanging {
+        if let Some((solve, groups)) = &self.soft {
             solve.run(pass, &[uniform], *groups);
         }
     }
 
     /// At the end of a substep.
     pub(crate) fn update_held(&self, pass: &mut Recorder<'_>) {
-        if let Some((_, update, groups)) = &self.held {
+        if let Some((_, update, groups)) = &self.rigid {
             update.run(pass, &[], *groups);
         }
     }
 }
 
-/// The middle of the places on each handle; 0 without any.
+/// The middle of the anchors on each handle; 0 without any.
 fn middles(solver: &Solver<f32>) -> Vec<DVec3> {
     let mut sums = vec![(DVec3::ZERO, 0.0); solver.handle_poses(0.0).len()];
     for data in solver.attachments() {
         let (sum, number) = &mut sums[data.handle as usize];
-        *sum += data.place;
+        *sum += data.anchor;
         *number += 1.0;
     }
     let middle = |(sum, number): (DVec3, f64)| sum / number.max(1.0);
@@ -267,7 +267,7 @@ fn middles(solver: &Solver<f32>) -> Vec<DVec3> {
 )]
 fn attachment(data: &AttachmentData, middle: DVec3) -> Attachment {
     Attachment {
-        place: (data.place - middle).as_vec3().to_array(),
+        anchor: (data.anchor - middle).as_vec3().to_array(),
         particle: data.particle,
         handle: data.handle,
         compliance: data.compliance as f32,

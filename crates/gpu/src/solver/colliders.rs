@@ -1,4 +1,4 @@
-//! [`Obstacles`]: the colliders of all substeps of a frame on the device.
+//! [`Colliders`]: the colliders of all substeps of a frame on the device.
 //!
 //! The host says where they are at the end of each substep, in its own precision; the kernel only asks what is nearest.
 //! They are sent in one piece, and only when they are others than those that are there: colliders at rest once. Cost: 80
@@ -13,14 +13,14 @@ use crate::{GpuContext, GpuError};
 
 /// The colliders of a frame.
 #[derive(Debug)]
-pub(crate) struct Obstacles {
+pub(crate) struct Colliders {
     array: Array<[f32; 20]>,
-    /// What the device has, and a place to put together what it should have.
+    /// The values on the device, and scratch memory for new ones.
     sent: Vec<[f32; 20]>,
     next: Vec<[f32; 20]>,
 }
 
-impl Obstacles {
+impl Colliders {
     /// Sends the colliders of a frame unless they are there; nothing is kept for none.
     pub(crate) fn sync(
         this: &mut Option<Self>,
@@ -32,23 +32,23 @@ impl Obstacles {
             *this = None;
             return Ok(());
         }
-        let obstacles = match this {
-            Some(obstacles) => obstacles,
+        let colliders = match this {
+            Some(colliders) => colliders,
             None => this.insert(Self {
                 array: Array::zeros(gpu, "colliders", 0)?,
                 sent: Vec::new(),
                 next: Vec::new(),
             }),
         };
-        obstacles.next.clear();
+        colliders.next.clear();
         for substep in 1..=settings.substeps {
             let elapsed = f64::from(substep) * settings.substep_time();
             let data = host.obstacle_data(settings, elapsed);
-            obstacles.next.extend(data);
+            colliders.next.extend(data);
         }
-        if obstacles.next != obstacles.sent {
-            obstacles.array.replace(gpu, &obstacles.next)?;
-            std::mem::swap(&mut obstacles.next, &mut obstacles.sent);
+        if colliders.next != colliders.sent {
+            colliders.array.replace(gpu, &colliders.next)?;
+            std::mem::swap(&mut colliders.next, &mut colliders.sent);
         }
         Ok(())
     }
