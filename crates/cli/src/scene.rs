@@ -242,8 +242,18 @@ fn section(page: &mut String, heading: &str, schema: &Value, definitions: &Value
     page.push('\n');
 }
 
-/// The tables of a scene file: heading, name of the definition and whether there may be several.
-fn tables(schema: &Value) -> Vec<(&str, &str, bool)> {
+/// A table of a scene file.
+struct Table<'a> {
+    name: &'a str,
+    definition: &'a str,
+    /// Whether there may be several.
+    is_list: bool,
+    /// Whether its presence means something.
+    is_optional: bool,
+}
+
+/// The tables of a scene file.
+fn tables(schema: &Value) -> Vec<Table<'_>> {
     let tables = keys(schema).into_iter();
     tables
         .filter_map(|key| {
@@ -253,7 +263,12 @@ fn tables(schema: &Value) -> Vec<(&str, &str, bool)> {
             } else {
                 key.schema
             };
-            Some((key.name, referred(item)?, is_list))
+            Some(Table {
+                name: key.name,
+                definition: referred(item)?,
+                is_list,
+                is_optional: key.schema["optional"] == true,
+            })
         })
         .collect()
 }
@@ -268,8 +283,9 @@ fn reference(schema: &Value) -> String {
         commented scene with every default, and `incise scene --check FILE` validates a scene.\n",
     );
     let tables = tables(schema);
-    for &(name, definition, is_list) in &tables {
-        let heading = if is_list {
+    for table in &tables {
+        let (name, definition) = (table.name, table.definition);
+        let heading = if table.is_list {
             format!("`[[{name}]]`")
         } else {
             format!("`[{name}]`")
@@ -278,7 +294,7 @@ fn reference(schema: &Value) -> String {
     }
     page.push_str("\n# Types\n");
     for (name, definition) in definitions.as_object().into_iter().flatten() {
-        let is_table = tables.iter().any(|table| table.1 == name);
+        let is_table = tables.iter().any(|table| table.definition == name);
         if is_table || definition["anyOf"].is_array() {
             continue;
         }
@@ -353,10 +369,11 @@ fn defaults(schema: &Value) -> String {
         "# Every key of a scene with its default. Keys without a default and optional tables are comments.\n\
          # Regions, shapes and rotations are described by: incise scene --reference\n",
     );
-    for (name, definition, is_list) in tables(schema) {
-        let definition = &definitions[definition];
+    for table in tables(schema) {
+        let (name, is_list) = (table.name, table.is_list);
+        let definition = &definitions[table.definition];
         let is_body = name == "body";
-        let is_used = !is_list || is_body;
+        let is_used = (!is_list && !table.is_optional) || is_body;
         let mark = if is_used { "" } else { "# " };
         let heading = if is_list {
             format!("[[{name}]]")

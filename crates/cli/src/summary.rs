@@ -7,11 +7,12 @@ use incise::report::{BodyReport, Milliseconds, Shortfall, SoftenedReport};
 
 /// Name and time of each stage that has one.
 type Stage = (&'static str, fn(&Milliseconds) -> f64);
-const STAGES: [Stage; 7] = [
+const STAGES: [Stage; 8] = [
     ("cut", |ms| ms.cut),
     ("cluster", |ms| ms.cluster),
     ("color", |ms| ms.color),
     ("schedule", |ms| ms.schedule),
+    ("contact", |ms| ms.contact),
     ("solve", |ms| ms.solve),
     ("other", |ms| ms.other),
     ("total", |ms| ms.total),

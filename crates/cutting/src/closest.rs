@@ -5,13 +5,13 @@
 //! weighted by the angles they take up there, which is right for every closed surface that does not cross itself.
 //! Beyond the rim of an open one, the surface counts as continued straight on.
 //!
-//! Source: J. A. Bærentzen and H. Aanæs 2005 (the weights); C. Ericson 2005 (the closest point). Cost: O(log m + k) for
+//! Source: J. A. Bærentzen and H. Aanæs 2005 (the weights). Cost: O(log m + k) for
 //! m triangles, k of them as close as the edges of the mesh are long.
 
 use std::f64::consts::PI;
 
 use glam::DVec3;
-use incise_mesh::Bounds;
+use incise_mesh::{Bounds, TrianglePart, closest_on_triangle};
 
 use crate::tree::BoxTree;
 
@@ -20,34 +20,17 @@ const SAME_POINT: f64 = 1e-6;
 
 /// The point of a triangle closest to `x`, and the angle that the triangle takes up around it: a full turn inside, half
 /// of one on a side.
-fn closest([a, b, c]: [DVec3; 3], x: DVec3) -> (DVec3, f64) {
-    let (ab, ac) = (b - a, c - a);
-    let along = |from: DVec3| (ab.dot(x - from), ac.dot(x - from));
-    let ((a1, a2), (b1, b2), (c1, c2)) = (along(a), along(b), along(c));
-    if a1 <= 0.0 && a2 <= 0.0 {
-        return (a, ab.angle_between(ac));
-    }
-    if b1 >= 0.0 && b2 <= b1 {
-        return (b, (-ab).angle_between(c - b));
-    }
-    if c2 >= 0.0 && c1 <= c2 {
-        return (c, (-ac).angle_between(b - c));
-    }
-    let on_ab = a1 * b2 - b1 * a2;
-    if on_ab <= 0.0 && a1 >= 0.0 && b1 <= 0.0 {
-        return (a + ab * (a1 / (a1 - b1)), PI);
-    }
-    let on_ac = c1 * a2 - a1 * c2;
-    if on_ac <= 0.0 && a2 >= 0.0 && c2 <= 0.0 {
-        return (a + ac * (a2 / (a2 - c2)), PI);
-    }
-    let on_bc = b1 * c2 - c1 * b2;
-    let (from_b, from_c) = (b2 - b1, c1 - c2);
-    if on_bc <= 0.0 && from_b >= 0.0 && from_c >= 0.0 {
-        return (b + (c - b) * (from_b / (from_b + from_c)), PI);
-    }
-    let whole = on_ab + on_ac + on_bc;
-    (a + ab * (on_ac / whole) + ac * (on_ab / whole), 2.0 * PI)
+fn closest(corners: [DVec3; 3], x: DVec3) -> (DVec3, f64) {
+    let closest = closest_on_triangle(corners, x);
+    let angle = match closest.part {
+        TrianglePart::Face => 2.0 * PI,
+        TrianglePart::Side(_) => PI,
+        TrianglePart::Corner(corner) => {
+            let [at, next, last] = [0, 1, 2].map(|k| corners[(usize::from(corner) + k) % 3]);
+            (next - at).angle_between(last - at)
+        }
+    };
+    (closest.point, angle)
 }
 
 /// The closest point of a surface.

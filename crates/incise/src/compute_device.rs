@@ -118,6 +118,9 @@ impl ComputeDevice {
 /// Returns an error if the GPU path does not support a setting of the scene.
 pub(crate) fn check(scene: &Scene) -> Result<(), Error> {
     let solver = &scene.solver;
+    if scene.contact.is_some() {
+        return Err(value("contact", "declared", "absent on a GPU"));
+    }
     if solver.precision == Precision::F64 {
         return Err(value("solver.precision", "f64", "f32 on a GPU"));
     }

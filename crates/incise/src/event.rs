@@ -20,4 +20,18 @@ pub enum Event {
         /// Number of the stroke.
         stroke: u32,
     },
+    /// Two pieces have begun to press on each other, in a scene with contact.
+    ContactBegan {
+        /// Their numbers, as in [`Simulation::pieces`](crate::Simulation::pieces).
+        pieces: [u32; 2],
+        /// The numbers of their bodies in the scene.
+        bodies: [usize; 2],
+    },
+    /// Two pieces that touched press no more and have parted by 2% of a mean edge.
+    ContactEnded {
+        /// Their numbers, as in [`Simulation::pieces`](crate::Simulation::pieces).
+        pieces: [u32; 2],
+        /// The numbers of their bodies in the scene.
+        bodies: [usize; 2],
+    },
 }

@@ -17,6 +17,7 @@ use crate::accuracy::{DEFAULT_ACCURACY, OutsideVolume, largest_kappas};
 use crate::attachment::{Attachment, AttachmentHandle};
 use crate::backend::{AnySolver, each, each_mut};
 use crate::compute_device::ComputeDevice;
+use crate::contacts::Contacts;
 use crate::distance::Distances;
 use crate::grab::{Grab, Grabs};
 use crate::island_builder::{IslandBuilder, demands, substeps};
@@ -58,6 +59,8 @@ pub(crate) struct Island {
     /// Frames of removed attachments in the solver, for new ones.
     spare_frames: Vec<u32>,
     pub(crate) distances: Distances,
+    /// In a scene with contact.
+    pub(crate) contacts: Option<Box<Contacts>>,
     /// The interactive grabs.
     pub(crate) grabs: Grabs,
     volumes: Option<Volumes>,
@@ -196,12 +199,7 @@ impl Island {
         let mut solver = joined.solver(precision, &cuttable)?;
         let (substeps, choice) = joined.substeps(scene, &solver, &cuttable);
         settings.substeps = substeps;
-        let is_open = leaves_open(
-            &scene.solver,
-            &joined.substeps,
-            &settings,
-            compute_device.is_gpu(),
-        );
+        let is_open = leaves_open(scene, &joined.substeps, &settings, compute_device.is_gpu());
         let (spec, choice) = resolve(&scene.solver, choice, is_open);
         if scene.solver.method == Method::Auto {
             adopt(&mut settings, &spec);
@@ -214,6 +212,13 @@ impl Island {
         if !joined.distances.is_empty() {
             joined.distances.hand_to(&mut solver)?;
         }
+        let contacts = match &scene.contact {
+            Some(spec) => {
+                let bodies = std::mem::take(&mut joined.body_of_particle);
+                Some(Box::new(Contacts::new(spec, &cuttable, bodies)?))
+            }
+            None => None,
+        };
         let partition = Partition::new(scene, cuttable.mesh())?;
         let volumes = joined.volumes();
         if let Some(volumes) = &volumes {
@@ -230,6 +235,7 @@ impl Island {
             attachments: joined.attachments,
             spare_frames: Vec::new(),
             distances: joined.distances,
+            contacts,
             grabs: Grabs::default(),
             volumes,
             positions: Vec::new(),
@@ -466,17 +472,22 @@ impl Island {
         }
         // Its body was removed; its colliders are those of all islands and move on.
         if self.cuttable.mesh().tets.is_empty() {
+            if let Some(contacts) = &mut self.contacts {
+                contacts.end(&mut self.solver)?;
+            }
             collider::advance(&mut self.settings);
             return Ok(StepReport::default());
         }
         for attachment in &self.attachments {
             attachment.advance(frame, &mut self.solver);
         }
-        let (schedule, settings) = (&self.partition.schedule, &self.settings);
-        let step = self
-            .solver
-            .backend_mut()
-            .step(schedule, settings, keeping_residuals)?;
+        let step = if self.contacts.is_some() {
+            self.step_with_contact(keeping_residuals)?
+        } else {
+            let (schedule, settings) = (&self.partition.schedule, &self.settings);
+            let backend = self.solver.backend_mut();
+            backend.step(schedule, settings, keeping_residuals)?
+        };
         self.judge_step();
         collider::advance(&mut self.settings);
         self.grabs.arrive();
@@ -496,6 +507,43 @@ impl Island {
             }
         }
         Ok(step)
+    }
+
+    /// A frame in parts, before each of which contacts are found.
+    fn step_with_contact(&mut self, keeping_residuals: bool) -> Result<StepReport, Error> {
+        let Self {
+            contacts,
+            solver,
+            cuttable,
+            pieces,
+            partition,
+            settings,
+            ..
+        } = self;
+        let mut report = StepReport::default();
+        let Some(contacts) = contacts else {
+            return Ok(report);
+        };
+        let (time, substeps) = (settings.time_step, settings.substeps);
+        let parts = contacts.begin_frame(solver, time, substeps);
+        let end = |part: u32| {
+            let end = u64::from(substeps) * u64::from(part) / u64::from(parts);
+            u32::try_from(end).unwrap_or(substeps)
+        };
+        for part in 0..parts {
+            contacts.update(solver, cuttable, pieces, time / f64::from(parts))?;
+            let schedule = &partition.schedule;
+            let step = each_mut!(solver, solver => {
+                let range = end(part)..end(part + 1);
+                let step = solver.step_part(schedule, settings, range, keeping_residuals);
+                step.map_err(|source| Error::Xpbd { field: "solver".into(), source })?
+            });
+            report.repaired += step.repaired;
+            report.unfolded += step.unfolded;
+            contacts.note(solver, cuttable, pieces);
+        }
+        contacts.end_frame();
+        Ok(report)
     }
 
     /// Warns when VBD begins to miss the accuracy wanted.
@@ -735,6 +783,9 @@ impl Island {
             noted.new_tets = noted.new_tets.max(stiffest);
         }
         let events = self.pieces.apply_delta(&self.cuttable, delta);
+        if let Some(contacts) = &mut self.contacts {
+            contacts.apply_delta(&self.cuttable, delta);
+        }
         self.partition.apply_delta(delta, &self.cuttable, ms)?;
         if let Some(recluster) = &mut self.recluster {
             recluster.note(delta);
@@ -818,6 +869,9 @@ impl Island {
         self.solver
             .check(&self.cuttable, &self.partition.schedule)?;
         self.grabs.check(&self.solver)?;
+        if let Some(contacts) = &self.contacts {
+            contacts.check(&self.cuttable)?;
+        }
         self.partition.check(mesh)?;
         self.pieces
             .check(&self.cuttable)

@@ -37,6 +37,8 @@ pub(crate) struct IslandBuilder {
     /// For each tet the number of its material.
     pub(crate) material_of: Vec<u16>,
     pub(crate) fixed: Vec<bool>,
+    /// For each particle the number of its body in the scene.
+    pub(crate) body_of_particle: Vec<u32>,
     /// See [`Body::empty_regions`].
     pub(crate) empty_regions: Vec<String>,
     pub(crate) attachments: Vec<Attachment>,
@@ -125,6 +127,8 @@ impl IslandBuilder {
             self.substeps.push(body.substeps);
         }
         self.bodies.push(number);
+        let id = u32::try_from(number).map_err(|_| value("body", "too many", TOO_MANY))?;
+        self.body_of_particle.resize(self.mesh.positions.len(), id);
         self.fixed.extend(body.fixed);
         self.empty_regions.extend(body.empty_regions);
         Ok(())

@@ -29,6 +29,7 @@ mod body;
 mod budget;
 mod collider;
 mod compute_device;
+mod contacts;
 #[cfg(feature = "gpu")]
 mod device;
 mod distance;
@@ -71,6 +72,7 @@ pub use event::Event;
 pub use grab::Grab;
 pub use incise_clustering as clustering;
 pub use incise_coloring as coloring;
+pub use incise_contact as contact;
 pub use incise_cutting as cutting;
 #[cfg(feature = "gpu")]
 pub use incise_gpu as gpu;

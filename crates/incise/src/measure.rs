@@ -9,9 +9,22 @@ use incise_xpbd::Volume;
 use crate::Error;
 use crate::backend::each;
 use crate::island::Island;
-use crate::report::{BodyReport, ChosenMethod, EnergyReport, ResidualReport, SoftenedReport};
+use crate::report::{
+    BodyReport, ChosenMethod, ContactReport, EnergyReport, ResidualReport, SoftenedReport,
+};
 use crate::scene::{Method, Quantity};
 use crate::solver_backend::{LastSubstep, Measures};
+
+/// The contacts of all islands; `None` without contact.
+pub(crate) fn contact(islands: &[Island]) -> Option<ContactReport> {
+    let mut depths = Vec::new();
+    let counts = islands.iter().filter_map(|island| {
+        let contacts = island.contacts.as_ref()?;
+        Some(contacts.count(&island.solver, &mut depths))
+    });
+    let counts: Vec<_> = counts.collect();
+    (!counts.is_empty()).then(|| ContactReport::new(counts.into_iter(), depths))
+}
 
 /// Whether a quantity is one of those.
 pub(crate) fn is_of_state(quantity: &Quantity) -> bool {

@@ -62,6 +62,10 @@ pub(crate) fn settings(scene: &Scene) -> Result<StepSettings, Error> {
         colliders: collider::colliders(scene)?,
     };
     let checked = match solver.method {
+        Method::Jacobi | Method::Chebyshev | Method::Vbd if scene.contact.is_some() => {
+            let range = "auto or gauss-seidel in a scene with contact";
+            Err(value("solver.method", method_name(solver.method), range))
+        }
         Method::Vbd => check_vbd(scene).map(|()| vbd(&settings).check()),
         _ if solver.two_level => Err(refused("solver.two_level", true, "false unless")),
         _ => Ok(settings.check()),
@@ -103,19 +107,32 @@ pub(crate) fn resolve(
     }
 }
 
-/// Whether VBD may be taken for bodies that ask for these substeps: settings leave the method open and name nothing that
-/// only Gauss-Seidel has, no device solves and there are no colliders.
+/// The name of a method in a scene.
+fn method_name(method: Method) -> &'static str {
+    match method {
+        Method::Auto => "auto",
+        Method::GaussSeidel => "gauss-seidel",
+        Method::Jacobi => "jacobi",
+        Method::Chebyshev => "chebyshev",
+        Method::Vbd => "vbd",
+    }
+}
+
+/// Whether VBD may be taken for bodies of a scene that ask for these substeps: settings leave the method open and name
+/// nothing that only Gauss-Seidel has, no device solves, and there are neither colliders nor contacts.
 pub(crate) fn leaves_open(
-    spec: &SolverSpec,
+    scene: &Scene,
     asked: &[Substeps],
     settings: &StepSettings,
     on_device: bool,
 ) -> bool {
+    let spec = &scene.solver;
     let defaults = SolverSpec::default();
     spec.method == Method::Auto
         && asked.iter().all(|s| *s == Substeps::Auto)
         && settings.colliders.is_empty()
         && !on_device
+        && scene.contact.is_none()
         && (spec.iterations, spec.relaxation, spec.tet_solve)
             == (defaults.iterations, defaults.relaxation, defaults.tet_solve)
         && !spec.kappa_limit.is_finite()

@@ -121,6 +121,12 @@ impl PieceNumbers {
         }
     }
 
+    /// The number in the scene of a piece of an island of a number, and that of its body.
+    pub(crate) fn of_scene(&self, number: usize, piece: u32) -> (u32, usize) {
+        let id = self.of_island[number].0[piece as usize];
+        (id, self.pieces[id as usize].body)
+    }
+
     /// All pieces that exist, in the order of their numbers.
     pub(crate) fn report(&self, islands: &[Island]) -> Vec<PieceReport> {
         let densities: Vec<_> = islands.iter().map(Island::density).collect();

@@ -4,10 +4,12 @@
 
 use std::time::Duration;
 
+use glam::DVec3;
 use incise_cutting::CutDelta;
 use incise_xpbd::Softened;
 use serde::Serialize;
 
+use crate::contacts::ContactCounts;
 use crate::scene::{Method, SolverSpec};
 pub use crate::substeps::{Choice, Shortfall};
 use crate::warning::Warning;
@@ -68,6 +70,9 @@ pub struct FrameReport {
     /// bodies may sleep, otherwise where kappa is reported.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub bodies: Vec<BodyReport>,
+    /// Contacts, in a scene that declares contact.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contact: Option<ContactReport>,
     /// Number of particles that were put back because they would have become Inf or NaN; absent if none. From a device
     /// it is known only in frames that read data back (for a blade or a reported quantity), for all frames since the
     /// last one.
@@ -92,6 +97,10 @@ impl FrameReport {
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
     }
+}
+
+fn is_none(milliseconds: &f64) -> bool {
+    *milliseconds == 0.0
 }
 
 fn is_zero(count: &usize) -> bool {
@@ -267,6 +276,9 @@ pub struct Milliseconds {
     /// Solving. On a device: submitting the frame, after waiting for the frame before the last one; the device
     /// continues asynchronously.
     pub solve: f64,
+    /// Finding contacts and coloring them, where contact is declared: that of the island of bodies which took longest.
+    #[serde(skip_serializing_if = "is_none")]
+    pub contact: f64,
     /// Waiting for a device and reading back, if a blade or a reported quantity needs it.
     pub readback: f64,
     /// Everything else: positions and reported quantities.
@@ -299,6 +311,61 @@ pub struct ResidualReport {
     pub force_relative: Option<f64>,
     /// Potential in J that the implicit step minimizes.
     pub potential: f64,
+}
+
+/// What is made of tets and touches. Depths are in mean edges of the surface at rest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct ContactReport {
+    /// Contacts that could press in the frame: vertices near triangles, and pairs across fresh cuts.
+    pub candidates: usize,
+    /// Those that pressed, in a frame that was divided those that did in its last part.
+    pub active: usize,
+    /// Colors that they are solved in: of pairs and of vertices together, those of the island of bodies with the most.
+    pub colors: usize,
+    /// How deep the deepest is at the end of the frame; 0 if none overlaps.
+    pub max_depth: f64,
+    /// What 99% of those that press or overlap do not exceed.
+    pub depth_p99: f64,
+    /// Vertices deep in another body or piece from which no way out was found. They are not pushed out.
+    pub buried: usize,
+}
+
+impl ContactReport {
+    /// Of counts of islands and all depths of those that press or overlap.
+    pub(crate) fn new(counts: impl Iterator<Item = ContactCounts>, mut depths: Vec<f64>) -> Self {
+        depths.sort_unstable_by(f64::total_cmp);
+        let mut report = Self {
+            max_depth: depths.last().copied().unwrap_or(0.0),
+            // The smallest that at least 99 of 100 do not exceed.
+            depth_p99: match (99 * depths.len()).div_ceil(100) {
+                0 => 0.0,
+                rank => depths[rank - 1],
+            },
+            ..Self::default()
+        };
+        for counts in counts {
+            report.candidates += counts.candidates;
+            report.active += counts.active;
+            report.colors = report.colors.max(counts.colors);
+            report.buried += counts.buried;
+        }
+        report
+    }
+}
+
+/// The force between two pieces that touch: [`Simulation::contacts`](crate::Simulation::contacts).
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct ContactForce {
+    /// The numbers of the pieces.
+    pub pieces: [u32; 2],
+    /// The numbers of their bodies in the scene.
+    pub bodies: [usize; 2],
+    /// The force in N on the second piece with friction, the mean of the last frame. The first has its opposite.
+    pub force: DVec3,
+    /// The torque of that force about the origin of the world in N·m.
+    pub torque: DVec3,
 }
 
 /// Energies in J.

@@ -14,6 +14,7 @@ use crate::Error;
 mod attachment;
 mod check;
 mod collider;
+mod contact;
 mod distance;
 mod lines;
 mod method;
@@ -27,6 +28,7 @@ mod substeps;
 pub use attachment::{AttachmentSpec, PathRotationSpec};
 pub(crate) use check::check;
 pub use collider::{ColliderSpec, RotationSpec};
+pub use contact::{ContactPairs, ContactSpec};
 pub use distance::{DistanceSpec, EndSpec};
 pub use lines::{line_of, location};
 pub use method::{Integrator, Method, TetSolve};
@@ -72,6 +74,10 @@ pub struct Scene {
     /// The bodies.
     #[serde(default)]
     pub body: Vec<BodySpec>,
+    /// Contact of what is made of tets; absent: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("optional" = true))]
+    pub contact: Option<ContactSpec>,
     /// Obstacles.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub collider: Vec<ColliderSpec>,

@@ -40,7 +40,7 @@ use crate::scene::{Precision, Quantity, StrokeSpec};
 use crate::strokes::Timeline;
 use crate::validate::value;
 use crate::warning::{Warning, WarningCode};
-use crate::{Error, Event, Scene, collider, distance};
+use crate::{Error, Event, Scene, collider, contacts, distance};
 
 pub use builder::{Body, BodyHandle, SimulationBuilder};
 pub use snapshot::Snapshot;
@@ -139,7 +139,9 @@ impl Simulation {
         }
         crate::scene::check(scene)?;
         let bodies = body::Body::all(scene, meshes)?;
-        let island_of = island_of_bodies(bodies.len(), &distance::pairs(scene, bodies.len())?);
+        let mut joined = distance::pairs(scene, bodies.len())?;
+        joined.extend(contacts::pairs(scene, bodies.len())?);
+        let island_of = island_of_bodies(bodies.len(), &joined);
         let several = island_of.iter().any(|&island| island > 0);
         let merged = several.then(|| MergedMesh::new(&bodies, &island_of));
         let joined = IslandBuilder::all(scene, bodies, &island_of)?;
@@ -313,6 +315,7 @@ impl Simulation {
         }
         repaired += solved?;
         ms.solve = milliseconds(before_solve.elapsed());
+        self.collect_contacts(&mut ms);
         self.state.residuals_kept = residual;
 
         // A device measures what it has; residuals need positions and multipliers of all.
@@ -333,10 +336,41 @@ impl Simulation {
         self.collect_warnings();
         ms.total = milliseconds(start.elapsed());
         ms.other = ms.total
-            - (ms.cut + ms.cluster + ms.color + ms.schedule + ms.upload + ms.solve + ms.readback);
+            - (ms.cut
+                + ms.cluster
+                + ms.color
+                + ms.schedule
+                + ms.upload
+                + ms.contact
+                + ms.solve
+                + ms.readback);
         self.state.report.ms = ms;
         self.state.clock.next_frame += 1;
         Ok(())
+    }
+
+    /// Takes over what contacts of all islands took, and which began and ended.
+    fn collect_contacts(&mut self, ms: &mut Milliseconds) {
+        let State {
+            islands, pieces, ..
+        } = &mut self.state;
+        for (number, island) in islands.iter_mut().enumerate() {
+            let Some(contacts) = &mut island.contacts else {
+                continue;
+            };
+            ms.contact = ms.contact.max(contacts.take_milliseconds());
+            for change in contacts.take_changes() {
+                let of_scene = change.pieces.map(|piece| pieces.of_scene(number, piece));
+                let (pieces, bodies) = (of_scene.map(|(id, _)| id), of_scene.map(|(_, body)| body));
+                self.events.push(if change.begins {
+                    Event::ContactBegan { pieces, bodies }
+                } else {
+                    Event::ContactEnded { pieces, bodies }
+                });
+            }
+        }
+        ms.contact = ms.contact.min(ms.solve);
+        ms.solve -= ms.contact;
     }
 
     /// Lets islands that were cut choose substeps again where that is due.
@@ -477,7 +511,8 @@ impl Simulation {
         self.mesh().surface()
     }
 
-    /// Returns the events of the last frame: cuts that began, pieces that were detached, cuts that ended.
+    /// Returns the events of the last frame: cuts that began, pieces that were detached, cuts that ended; then contacts
+    /// that began and ended.
     #[must_use]
     pub fn events(&self) -> &[Event] {
         &self.events

@@ -34,6 +34,7 @@
 
 mod bounds;
 mod check;
+mod closest_point;
 mod disjoint_sets;
 mod error;
 mod faces;
@@ -51,6 +52,7 @@ mod tet_mesh;
 mod triangle_surface;
 
 pub use bounds::Bounds;
+pub use closest_point::{ClosestPoint, TrianglePart, closest_on_triangle};
 pub use disjoint_sets::DisjointSets;
 pub use error::MeshError;
 pub use faces::{FaceSide, Faces};

@@ -13,8 +13,9 @@ const FRAMES: usize = 240;
 type Stage = fn(&Milliseconds) -> f64;
 
 /// The stages from the bottom up, with their colors.
-const STAGES: [(&str, Color32, Stage); 8] = [
+const STAGES: [(&str, Color32, Stage); 9] = [
     ("solve", Color32::from_rgb(86, 142, 190), |ms| ms.solve),
+    ("contact", Color32::from_rgb(96, 178, 178), |ms| ms.contact),
     ("cut", Color32::from_rgb(203, 84, 75), |ms| ms.cut),
     ("cluster", Color32::from_rgb(226, 158, 74), |ms| ms.cluster),
     ("color", Color32::from_rgb(240, 205, 92), |ms| ms.color),

@@ -46,6 +46,14 @@ pub enum XpbdError {
         /// Number of the item.
         number: usize,
     },
+    /// Contacts were set and the method does not solve them.
+    #[error(
+        "method {method} does not solve contacts: use colored Gauss-Seidel, or clear the contacts"
+    )]
+    ContactMethod {
+        /// The name of the method.
+        method: &'static str,
+    },
     /// Constraints on particles that do not exist, or a schedule of other constraints.
     #[error("{what} constraints: {source}")]
     Schedule {

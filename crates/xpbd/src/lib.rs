@@ -71,7 +71,8 @@ mod vbd;
 pub use changes::Changes;
 pub use collider::{Collider, ColliderShape};
 pub use constraints::{
-    AttachmentData, DistanceConstraint, DistanceData, VolumeConstraint, VolumeData,
+    AttachmentData, ContactLaw, ContactState, DistanceConstraint, DistanceData, FaceContact,
+    PairContact, VolumeConstraint, VolumeData,
 };
 pub use device::TetData;
 pub use error::XpbdError;

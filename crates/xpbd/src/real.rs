@@ -3,6 +3,8 @@
 //! The large algorithms are called through this trait, so they are compiled once for each precision, with this crate;
 //! called directly they would be compiled again in every crate that steps a solver.
 
+use std::ops::Range;
+
 use incise_graph::Schedule;
 
 use crate::{
@@ -12,12 +14,13 @@ use crate::{
 
 /// A precision of solvers that can advance: `f32` or `f64`.
 pub trait Real: Float {
-    /// Advances a solver by one frame of XPBD.
+    /// Advances a solver by some substeps of a frame of XPBD.
     #[doc(hidden)]
     fn step(
         solver: &mut Solver<Self>,
         schedule: &Schedule,
         settings: &StepSettings,
+        part: Range<u32>,
         keep_residuals: bool,
     ) -> Result<StepReport, XpbdError>;
 
@@ -43,9 +46,10 @@ macro_rules! real {
                 solver: &mut Solver<Self>,
                 schedule: &Schedule,
                 settings: &StepSettings,
+                part: Range<u32>,
                 keep_residuals: bool,
             ) -> Result<StepReport, XpbdError> {
-                solver.frame(schedule, settings, keep_residuals)
+                solver.frame(schedule, settings, part, keep_residuals)
             }
             #[inline(never)]
             fn step_vbd(
@@ -85,7 +89,7 @@ impl<R: Real> Solver<R> {
         schedule: &Schedule,
         settings: &StepSettings,
     ) -> Result<StepReport, XpbdError> {
-        R::step(self, schedule, settings, false)
+        R::step(self, schedule, settings, 0..settings.substeps, false)
     }
 
     /// Advances by one frame and keeps the data of the last substep for [`Solver::residuals`].
@@ -100,7 +104,46 @@ impl<R: Real> Solver<R> {
         schedule: &Schedule,
         settings: &StepSettings,
     ) -> Result<StepReport, XpbdError> {
-        R::step(self, schedule, settings, true)
+        R::step(self, schedule, settings, 0..settings.substeps, true)
+    }
+
+    /// Advances by some of the substeps of a frame, numbered from 0, so that contacts can be set again within the frame.
+    /// All parts of a frame in their order are, to the bit, that frame, as long as nothing changes in between. With
+    /// `keep_residuals` the part that ends the frame keeps what [`Solver::residuals`] needs.
+    ///
+    /// # Errors
+    /// If the settings do not pass [`StepSettings::check`], or the part ends before it begins or beyond the frame;
+    /// nothing has moved then.
+    ///
+    /// # Panics
+    /// If the schedule names a tet that does not exist.
+    ///
+    /// # Example
+    /// ```
+    /// use glam::DVec3;
+    /// use incise_graph::Schedule;
+    /// use incise_xpbd::{Solver, StepSettings};
+    ///
+    /// let mut whole = Solver::<f64>::new(&[DVec3::ZERO]);
+    /// whole.set_mass(0, 1.0);
+    /// let mut parts = whole.clone();
+    /// let gravity = Some(DVec3::NEG_Z * 9.81);
+    /// let settings = StepSettings { substeps: 7, gravity, ..StepSettings::new(0.016) };
+    /// whole.step(&Schedule::default(), &settings)?;
+    /// for part in [0..3, 3..7] {
+    ///     parts.step_part(&Schedule::default(), &settings, part, false)?;
+    /// }
+    /// assert_eq!(whole.position(0), parts.position(0));
+    /// # Ok::<(), incise_xpbd::XpbdError>(())
+    /// ```
+    pub fn step_part(
+        &mut self,
+        schedule: &Schedule,
+        settings: &StepSettings,
+        part: Range<u32>,
+        keep_residuals: bool,
+    ) -> Result<StepReport, XpbdError> {
+        R::step(self, schedule, settings, part, keep_residuals)
     }
 
     /// Updates the layout of the tets for a schedule, as a step does first. To measure the cost of a cut, call this

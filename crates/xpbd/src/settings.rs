@@ -84,6 +84,18 @@ pub enum TetSolve {
     Sequential,
 }
 
+impl Method {
+    /// Refuses the methods that do not solve contacts.
+    pub(crate) fn check_contacts(self) -> Result<(), XpbdError> {
+        let method = match self {
+            Self::GaussSeidel => return Ok(()),
+            Self::Jacobi => "jacobi",
+            Self::Chebyshev { .. } => "chebyshev",
+        };
+        Err(XpbdError::ContactMethod { method })
+    }
+}
+
 impl StepSettings {
     /// Returns settings with one substep of one iteration, without forces.
     #[must_use]

@@ -8,6 +8,8 @@
 //! Source: Macklin, Müller, Chentanez 2016; substeps after Macklin et al. 2019; paper section 3 and 4.1.
 //! Cost: `substeps · iterations` passes over all tets.
 
+use std::ops::Range;
+
 use fearless_simd::Level;
 
 use crate::constraints::Constraints;
@@ -107,23 +109,27 @@ impl<R: Float> Stepper<R> {
         gauss_seidel::lanes::<R>(self.level)
     }
 
-    /// Advances by one frame; returns how many particles had to be put back. The layout of the tets is up to date.
+    /// Advances by some substeps of a frame; returns how many particles had to be put back. The layout of the tets is up
+    /// to date.
     pub(crate) fn frame(
         &mut self,
         particles: &mut Particles<R>,
         tets: &TetSet<R>,
         constraints: &mut Constraints<R>,
         settings: &StepSettings,
+        part: Range<u32>,
         keep: bool,
     ) -> usize {
         self.last.clear();
-        let mut repaired = 0;
-        for number in 0..settings.substeps {
+        let (mut repaired, ends) = (0, part.end == settings.substeps);
+        for number in part {
             let keep = keep && number + 1 == settings.substeps;
             let substep = Substep::new(settings, number, keep);
             repaired += self.substep(particles, tets, constraints, &substep, keep);
         }
-        constraints.end_frame();
+        if ends {
+            constraints.end_frame();
+        }
         repaired
     }
 

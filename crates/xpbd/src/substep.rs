@@ -17,6 +17,8 @@ pub(crate) struct Factors<R> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Substep<'a, R> {
     pub(crate) settings: &'a StepSettings,
+    /// Its number in the frame, from 0 on.
+    pub(crate) number: u32,
     /// The part of the frame that has passed at its end.
     pub(crate) fraction: f64,
     /// The time in s from the start of the frame to its end.
@@ -33,6 +35,7 @@ impl<'a, R: Float> Substep<'a, R> {
         let ended = f64::from(number + 1);
         Self {
             settings,
+            number,
             fraction: ended / f64::from(settings.substeps),
             elapsed: ended * time,
             has_multipliers: keep || settings.iterations > 1,

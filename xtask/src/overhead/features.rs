@@ -6,9 +6,9 @@
 
 use incise::Scene;
 use incise::scene::{
-    AttachmentSpec, BodySpec, ColliderSpec, DistanceSpec, EndSpec, GroundSpec, Method, Precision,
-    Quantity, ReclusterSpec, Region, ReportSpec, ShapeSpec, SleepSpec, StrokeSpec, Substeps,
-    TetSolve,
+    AttachmentSpec, BodySpec, ColliderSpec, ContactSpec, DistanceSpec, EndSpec, GroundSpec, Method,
+    Precision, Quantity, ReclusterSpec, Region, ReportSpec, ShapeSpec, SleepSpec, StrokeSpec,
+    Substeps, TetSolve,
 };
 
 /// What of a feature a scene has.
@@ -241,6 +241,18 @@ pub(crate) fn cases() -> Vec<Case> {
         case("distance", Used, "a rod", |s| {
             s.distance.push(link(false, None));
         }),
+        case("contact", Idle, "a beam that touches nothing", |s| {
+            s.contact = Some(ContactSpec::default());
+        }),
+        with(
+            "two linked bodies",
+            case("contact", Used, "two beams that press on each other", |s| {
+                let mut second = s.body[0].clone();
+                second.position = [0.0, 0.0, 0.2495];
+                s.body.push(second);
+                s.contact = Some(ContactSpec::default());
+            }),
+        ),
         case("volume constraints", Used, "one a tet", |s| {
             s.body[0].volume_compliance = Some(1e-7);
         }),

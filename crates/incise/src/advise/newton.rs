@@ -47,6 +47,7 @@ pub(super) fn obstacle(scene: &Scene) -> Option<&'static str> {
     [
         (scene.world.ground.is_some(), "a ground"),
         (!scene.collider.is_empty(), "colliders"),
+        (scene.contact.is_some(), "contact"),
         (scene.stroke.iter().any(later), "strokes after frame 0"),
         (scene.body.iter().any(|b| b.damping > 0.0), "damping"),
         (

@@ -15,8 +15,8 @@ use crate::collider::ColliderHandle;
 use crate::compute_device::{ComputeDevice, OpenDevice};
 use crate::distance::DistanceHandle;
 use crate::scene::{
-    AttachmentSpec, BodySpec, ColliderSpec, DistanceSpec, GroundSpec, MaterialSpec, Region,
-    ReportSpec, SolverSpec, StrokeSpec,
+    AttachmentSpec, BodySpec, ColliderSpec, ContactSpec, DistanceSpec, GroundSpec, MaterialSpec,
+    Region, ReportSpec, SolverSpec, StrokeSpec,
 };
 use crate::validate::value;
 use crate::{Error, Scene, Simulation};
@@ -178,6 +178,12 @@ impl SimulationBuilder {
     /// Adds a horizontal floor at a height in m, with a coefficient of friction.
     pub fn ground(&mut self, height: f64, friction: f64) -> &mut Self {
         self.scene.world.ground = Some(GroundSpec { height, friction });
+        self
+    }
+
+    /// Lets what is made of tets touch: bodies, their pieces, the sides of cuts, a body and itself.
+    pub fn contact(&mut self, contact: ContactSpec) -> &mut Self {
+        self.scene.contact = Some(contact);
         self
     }
 

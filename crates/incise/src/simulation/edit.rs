@@ -20,9 +20,9 @@ use crate::island_builder::IslandBuilder;
 use crate::merged_mesh::MergedMesh;
 use crate::method::settings;
 use crate::ray::{RayHit, first_hit};
-use crate::scene::{AttachmentSpec, ColliderSpec, DistanceSpec};
+use crate::scene::{AttachmentSpec, ColliderSpec, ContactPairs, ContactSpec, DistanceSpec};
 use crate::validate::{LARGEST_COORDINATE, coordinates, value, within};
-use crate::{Error, Scene, body, budget};
+use crate::{Error, Scene, body, budget, contacts};
 
 impl Simulation {
     /// Sets the acceleration of gravity in m/s² from the next frame on; `None` is no gravity. Wakes all bodies.
@@ -143,6 +143,53 @@ impl Simulation {
     fn collider_index(&self, handle: ColliderHandle) -> Result<usize, Error> {
         let index = self.state.colliders.index(handle);
         index.ok_or_else(|| removed("collider", handle))
+    }
+
+    /// Changes friction, thickness, recovery time and self-contact of what is made of tets from the next frame on, and
+    /// wakes what sleeps. O(bodies); the next frame searches for contacts.
+    ///
+    /// # Errors
+    /// If a value lies outside its range, the scene was set up without contact or with other pairs of bodies, which are
+    /// solved together for good; nothing has changed then.
+    ///
+    /// # Example
+    /// ```
+    /// use incise::scene::ContactSpec;
+    /// use incise::{Scene, Simulation};
+    ///
+    /// let scene = Scene::from_toml("[contact]\n[[body]]\nshape = { kind = \"box\", tets = 200 }")?;
+    /// let mut simulation = Simulation::new(&scene)?;
+    /// simulation.step()?;
+    /// simulation.set_contact(&ContactSpec { friction: 0.0, ..ContactSpec::default() })?;
+    /// simulation.step()?;
+    /// # Ok::<(), incise::Error>(())
+    /// ```
+    pub fn set_contact(&mut self, contact: &ContactSpec) -> Result<(), Error> {
+        contacts::check(contact)?;
+        let pairs = self
+            .state
+            .scene
+            .contact
+            .as_ref()
+            .map(|before| &before.pairs);
+        if pairs != Some(&contact.pairs) {
+            let range = "the pairs that the simulation was set up with";
+            return Err(value(
+                "contact.pairs",
+                format!("{:?}", contact.pairs),
+                range,
+            ));
+        }
+        for island in &mut self.state.islands {
+            if let Some(contacts) = &mut island.contacts {
+                contacts.set(contact)?;
+            }
+            island.wake();
+        }
+        let mut scene = (*self.state.scene).clone();
+        scene.contact = Some(contact.clone());
+        self.state.scene = Arc::new(scene);
+        Ok(())
     }
 
     /// Attaches part of a body from the next frame on: the particles that lie at rest in the regions of the attachment.
@@ -317,7 +364,8 @@ impl Simulation {
     /// Renderers must rebuild their skin from [`Simulation::boundary`]. On a device the positions are read back.
     ///
     /// # Errors
-    /// If a value lies outside its range, the mesh is broken, or the device is lost; nothing has changed then.
+    /// If a value lies outside its range, the mesh is broken, the device is lost, or contact is declared for all pairs of
+    /// bodies; nothing has changed then.
     ///
     /// # Example
     /// ```
@@ -341,6 +389,12 @@ impl Simulation {
         self.read_back()?;
         let state = &self.state;
         let number = state.scene.body.len();
+        if let Some(contact) = &state.scene.contact
+            && contact.pairs == ContactPairs::All
+        {
+            let range = "a list of pairs where bodies are added: a body that is added is solved alone and touches itself only";
+            return Err(value("contact.pairs", "all", range));
+        }
         let field = format!("body[{number}]");
         let made = body::Body::new(&field, &body.spec, Some(&body.mesh), state.solver.substeps)?;
         let joined = IslandBuilder::of_one(number, made)?;

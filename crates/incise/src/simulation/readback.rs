@@ -11,9 +11,10 @@ use incise_mesh::ParticleId;
 use super::Simulation;
 use crate::Error;
 use crate::measure::{
-    by_body, energy, kappa, max_speed, residual, residuals_of_tets, softened, states, volume,
+    by_body, contact, energy, kappa, max_speed, residual, residuals_of_tets, softened, states,
+    volume,
 };
-use crate::report::{FrameReport, Milliseconds, milliseconds};
+use crate::report::{ContactForce, FrameReport, Milliseconds, milliseconds};
 use crate::scene::Quantity;
 
 impl Simulation {
@@ -31,6 +32,7 @@ impl Simulation {
         {
             return Ok(());
         }
+        self.state.report.contact = contact(&self.state.islands);
         let start = Instant::now();
         let states = states(
             &mut self.state.islands,
@@ -201,6 +203,60 @@ impl Simulation {
             .islands
             .iter()
             .filter_map(|island| island.solver.device())
+    }
+
+    /// The forces between pieces that touched in the last frame, in a scene with contact, ascending by island and pieces.
+    /// A piece that touches itself is not listed. O(pieces that touch).
+    ///
+    /// ```
+    /// use incise::{Scene, Simulation};
+    ///
+    /// // A box lies on another one.
+    /// let scene = Scene::from_toml(
+    ///     r#"
+    ///     [world]
+    ///     gravity = [0.0, 0.0, -9.81]
+    ///     ground = { height = 0.0 }
+    ///     [contact]
+    ///     [[body]]
+    ///     shape = { kind = "box", tets = 100 }
+    ///     position = [0.0, 0.0, 0.3]
+    ///     damping = 0.02
+    ///     [[body]]
+    ///     shape = { kind = "box", tets = 100 }
+    ///     position = [0.0, 0.0, 0.9]
+    ///     damping = 0.02
+    ///     "#,
+    /// )?;
+    /// let mut simulation = Simulation::new(&scene)?;
+    /// for _ in 0..5 {
+    ///     simulation.step()?;
+    /// }
+    /// println!("{:?}", simulation.contacts());
+    /// # Ok::<(), incise::Error>(())
+    /// ```
+    #[must_use]
+    pub fn contacts(&self) -> Vec<ContactForce> {
+        let islands = self.state.islands.iter().enumerate();
+        let all = islands.flat_map(|(number, island)| {
+            let touches = island
+                .contacts
+                .iter()
+                .flat_map(|contacts| contacts.touches());
+            touches.map(move |touch| (number, touch))
+        });
+        all.map(|(number, touch)| {
+            let of_scene = touch
+                .pieces
+                .map(|piece| self.state.pieces.of_scene(number, piece));
+            ContactForce {
+                pieces: of_scene.map(|(id, _)| id),
+                bodies: of_scene.map(|(_, body)| body),
+                force: touch.force,
+                torque: touch.torque,
+            }
+        })
+        .collect()
     }
 
     /// Returns the residual of each tet of [`Simulation::mesh`] in the last substep: the norm of `C + α̃ λ` over its

@@ -257,7 +257,7 @@ impl ChangedSolver {
         if chosen_anew {
             (settings.substeps, choice) = substeps(&asked, after, &island.solver, mesh);
         }
-        let is_open = leaves_open(after, &asked, &settings, compute_device.is_gpu());
+        let is_open = leaves_open(scene, &asked, &settings, compute_device.is_gpu());
         let (own, choice) = match after.method {
             Method::Auto if chosen_anew => resolve(after, choice, is_open),
             // What was chosen stays, with everything else that differs.

@@ -110,7 +110,12 @@ impl Island {
         let (particles, tets) = (mesh.positions.len(), mesh.tets.len());
         let pending = self.recluster.as_ref().is_some_and(Recluster::is_pending);
         let partitions = 1 + usize::from(pending);
+        let contacts = self
+            .contacts
+            .as_ref()
+            .map_or(0, |contacts| contacts.bytes());
         self.solver.backend().bytes()
+            + contacts
             + tets * (CUTTING + PIECES + partitions * PARTITION)
             + particles * (CUTTING_PARTICLE + POSITION)
     }

@@ -9,6 +9,7 @@ mod bodies;
 mod builder;
 mod conservation;
 mod constraints;
+mod contact;
 mod cutting;
 mod determinism;
 mod edits;

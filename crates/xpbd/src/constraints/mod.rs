@@ -6,6 +6,7 @@
 
 mod attachments;
 mod colliders;
+mod contacts;
 mod distances;
 mod scalar;
 mod volumes;
@@ -17,6 +18,8 @@ use crate::substep::Substep;
 pub use attachments::AttachmentData;
 pub(crate) use attachments::Attachments;
 pub(crate) use colliders::{Colliders, Obstacle, outside};
+pub(crate) use contacts::Contacts;
+pub use contacts::{ContactLaw, ContactState, FaceContact, PairContact};
 pub(crate) use distances::{Distance, Distances};
 pub use distances::{DistanceConstraint, DistanceData};
 pub(crate) use scalar::ScalarConstraint;
@@ -74,6 +77,7 @@ kinds! {
     attachments: Attachments,
     distances: Distances,
     volumes: Volumes,
+    contacts: Contacts,
     colliders: Colliders,
 }
 

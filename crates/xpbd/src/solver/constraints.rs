@@ -1,12 +1,12 @@
-//! The constraints of a [`Solver`] besides its tets: attachments to handles, distances and volumes.
+//! The constraints of a [`Solver`] besides its tets: attachments to handles, distances, volumes and contacts.
 
-use incise_graph::Schedule;
+use incise_graph::{Coloring, Schedule};
 
 use super::Solver;
 use crate::constraints::{Distance, Distances, TetVolume, Volumes};
 use crate::{
-    AttachmentData, DistanceConstraint, DistanceData, Float, Pose, VolumeConstraint, VolumeData,
-    XpbdError,
+    AttachmentData, ContactLaw, ContactState, DistanceConstraint, DistanceData, FaceContact, Float,
+    PairContact, Pose, VolumeConstraint, VolumeData, XpbdError,
 };
 
 impl<R: Float> Solver<R> {
@@ -65,7 +65,7 @@ impl<R: Float> Solver<R> {
     /// # Example
     /// ```
     /// use glam::{DQuat, DVec3};
-    /// use incise_graph::Schedule;
+    /// use incise_graph::{Coloring, Schedule};
     /// use incise_xpbd::{Pose, Solver, StepSettings};
     ///
     /// let mut solver = Solver::<f64>::new(&[DVec3::X]);
@@ -329,5 +329,84 @@ impl<R: Float> Solver<R> {
     #[must_use]
     pub fn volume_schedule(&self) -> Option<&Schedule> {
         self.constraints.volumes.schedule()
+    }
+
+    /// Replaces all contacts: `pairs` of particles that were one before a cut, and vertices against triangles, `faces`.
+    /// Each list comes with a color for each of its contacts; contacts of one color share no particle, except for colors
+    /// from 16 on, which one thread solves together. They are solved after all other constraints but the colliders,
+    /// pairs before faces; [`StepSettings::relaxation`](crate::StepSettings) does not scale them. Only
+    /// [`Method::GaussSeidel`](crate::Method) solves contacts: a step by another method is an error from now on, until
+    /// [`Solver::clear_contacts`].
+    ///
+    /// Contacts are detected by the caller, mostly once a frame: a step moves the particles of the contacts that it is
+    /// given, and finds none itself. O(particles + contacts), and no allocation once the lists have grown.
+    ///
+    /// # Errors
+    /// A value outside its range, a particle that does not exist, or colors that are not those of the contacts or let
+    /// two of them meet on a particle; there are no contacts then.
+    ///
+    /// # Determinism
+    /// Bit-identical for any number of threads.
+    ///
+    /// # Example
+    /// A particle falls on a triangle, which carries its weight.
+    /// ```
+    /// use glam::{DVec3, dvec3};
+    /// use incise_graph::{ColorId, Coloring, Schedule};
+    /// use incise_xpbd::{ContactLaw, FaceContact, Solver, StepSettings};
+    ///
+    /// let at = [dvec3(0.2, 0.2, 0.1), DVec3::ZERO, DVec3::X, DVec3::Y];
+    /// let mut solver = Solver::<f64>::new(&at);
+    /// solver.set_mass(0, 2.0); // the corners have none and stay
+    /// let contact = FaceContact { particles: [0, 1, 2, 3], beyond: None, thickness: 0.0 };
+    /// let law = ContactLaw { friction: 0.3, recovery_time: 0.02 };
+    /// let (none, one) = (Coloring::new(vec![]), Coloring::new(vec![ColorId(0)]));
+    /// let settings = StepSettings { substeps: 10, gravity: Some(DVec3::NEG_Z * 9.81), ..StepSettings::new(0.016) };
+    /// for _ in 0..60 {
+    ///     solver.set_contacts(&law, (&[], &none), (&[contact], &one))?;
+    ///     solver.step(&Schedule::default(), &settings)?;
+    /// }
+    /// let lying = solver.contacts().next().expect("a contact");
+    /// assert!(lying.depth.abs() < 1e-12);
+    /// assert!((lying.pressure - 2.0 * 9.81).abs() < 1e-9);
+    /// # Ok::<(), incise_xpbd::XpbdError>(())
+    /// ```
+    pub fn set_contacts(
+        &mut self,
+        law: &ContactLaw,
+        pairs: (&[PairContact], &Coloring),
+        faces: (&[FaceContact], &Coloring),
+    ) -> Result<(), XpbdError> {
+        let count = self.particle_count();
+        self.constraints.contacts.set(count, law, pairs, faces)
+    }
+
+    /// Removes all contacts and their memory; any method may step again.
+    pub fn clear_contacts(&mut self) {
+        self.constraints.contacts.clear();
+    }
+
+    /// Whether contacts were set, even if there are none at present.
+    #[must_use]
+    pub fn has_contacts(&self) -> bool {
+        self.constraints.contacts.is_declared()
+    }
+
+    /// Number of pairs and number of faces.
+    #[must_use]
+    pub fn contact_counts(&self) -> [usize; 2] {
+        self.constraints.contacts.counts()
+    }
+
+    /// Number of colors of pairs and of faces together.
+    #[must_use]
+    pub fn contact_color_count(&self) -> usize {
+        self.constraints.contacts.color_count()
+    }
+
+    /// All contacts at the present positions with the forces of the last step since they were set, in solving order,
+    /// pairs first. O(contacts).
+    pub fn contacts(&self) -> impl Iterator<Item = ContactState> + '_ {
+        self.constraints.contacts.states(&self.particles)
     }
 }

@@ -10,6 +10,8 @@
 
 mod constraints;
 
+use std::ops::Range;
+
 use glam::DVec3;
 use incise_graph::Schedule;
 
@@ -515,17 +517,28 @@ impl<R: Float> Solver<R> {
         jitter(&self.particles, &self.tets)
     }
 
-    /// One frame of XPBD.
+    /// Some substeps of a frame of XPBD.
     pub(crate) fn frame(
         &mut self,
         schedule: &Schedule,
         settings: &StepSettings,
+        part: Range<u32>,
         keep: bool,
     ) -> Result<StepReport, XpbdError> {
         let _span = tracing::debug_span!("xpbd::step").entered();
         settings.check()?;
+        if part.start > part.end || part.end > settings.substeps {
+            return Err(XpbdError::Setting {
+                what: "end of the part",
+                value: f64::from(part.end),
+                range: "at least its start and at most the substeps",
+            });
+        }
+        if self.constraints.contacts.is_declared() {
+            settings.method.check_contacts()?;
+        }
         self.update_layout(schedule);
-        let unfolded = self.prepare();
+        let unfolded = if part.start == 0 { self.prepare() } else { 0 };
         let Self {
             particles,
             tets,
@@ -533,11 +546,11 @@ impl<R: Float> Solver<R> {
             stepper,
             ..
         } = self;
-        let repaired = stepper.frame(particles, tets, constraints, settings, keep);
+        let repaired = stepper.frame(particles, tets, constraints, settings, part, keep);
         Ok(StepReport { repaired, unfolded })
     }
 }
 
-fn number(index: usize) -> u32 {
+pub(crate) fn number(index: usize) -> u32 {
     u32::try_from(index).expect("particles and tets are numbered by 32 bits")
 }

@@ -46,6 +46,9 @@ impl<R: Float> Solver<R> {
         mut iterate: impl FnMut(&mut ImplicitStep<'_, R>) -> bool,
     ) -> Result<VbdReport, XpbdError> {
         settings.check()?;
+        if self.constraints.contacts.is_declared() {
+            return Err(XpbdError::ContactMethod { method: "vbd" });
+        }
         self.recenter();
         let mut report = VbdReport::default();
         let (count, time) = (settings.step.substeps, settings.step.substep_time());

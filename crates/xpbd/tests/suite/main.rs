@@ -12,6 +12,7 @@ mod body;
 mod closed_forms;
 mod colliders;
 mod conservation;
+mod contacts;
 mod convergence;
 mod copies;
 mod damping;

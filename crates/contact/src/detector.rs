@@ -1,0 +1,724 @@
+//! [`ContactDetector`]: finds what touches, frame by frame, while bodies move and are cut.
+//!
+//! Once a frame, [`ContactDetector::update`] lists the contacts that the frame may meet. The candidates of the search
+//! are kept as long as surfaces have moved towards each other by less than a skin; the pairs of fresh cuts, which need
+//! no search, are evaluated each frame. The solver takes the plain records and decides in each substep which of them
+//! act.
+//!
+//! The decision to search again depends on positions, velocities and frame time only, so results are the same for any
+//! number of threads. The shape of the search tree does not matter either: candidates are sorted by vertex, then by
+//! distance and face.
+//!
+//! Cost: an update without a search is a pass over the surface vertices, the candidates and the twins; a search is a
+//! refit of the tree and a query for each surface vertex, on all threads; a delta costs what the boundary lost and
+//! gained. The first search also looks for vertices that start inside of other parts, among all tets. The search after a
+//! cut builds a tree over the new triangles, and over all of them once these are more than a
+//! quarter.
+
+use glam::DVec3;
+use incise_cutting::{CutDelta, CuttableMesh};
+use incise_mesh::{Bounds, ParticleId, TetId};
+use rayon::prelude::*;
+
+use crate::ContactError;
+use crate::index::{NONE, index};
+use crate::normals::Shape;
+use crate::pairs::{FreshPairs, PairContact};
+use crate::query::{FaceContact, Found, Query};
+use crate::settings::ContactSettings;
+use crate::state::ContactState;
+use crate::surface::{ContactSurface, SurfaceChange};
+use crate::tree::{Box32, TriangleTree};
+use crate::walk::Barycentric;
+
+/// New triangles as a fraction of those in the main tree beyond which that is built again.
+const FRESH: usize = 4;
+/// Triangles or vertices that are not worth another thread.
+const PARALLEL: usize = 512;
+/// A candidate whose vertex has moved along its triangle by this in barycentric coordinates is searched for again.
+const SLID: f64 = 0.5;
+/// A vertex inside that has gone deeper by this fraction of the reach is searched for again, before it gets out of reach.
+const DEEPER: f64 = 0.25;
+/// A candidate whose vertex lies beneath a point this far beyond its triangle is searched for again.
+const BEYOND: f64 = 0.25;
+
+/// What an update changed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ContactUpdate {
+    /// Whether candidates were searched for.
+    pub searched: bool,
+    /// Whether [`ContactDetector::pairs`] has other particles than before; normals change all the time.
+    pub pairs_changed: bool,
+    /// Whether [`ContactDetector::faces`] has other particles than before.
+    pub faces_changed: bool,
+}
+
+/// A candidate beside its record: where it was found.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct Sighting {
+    /// The barycentric coordinates of the vertex in the plane of the triangle, the second and the third.
+    weights: [f64; 2],
+    /// How far apart they were.
+    gap: f64,
+}
+
+/// Finds contacts between bodies, pieces and the sides of cuts.
+///
+/// # Example
+/// ```
+/// use glam::DVec3;
+/// use incise_contact::{ContactDetector, ContactSettings, ContactState};
+/// use incise_cutting::{CutOptions, CuttableMesh, PieceTracker, Plane, cut_plane};
+/// use incise_mesh::kuhn_box;
+///
+/// let mut body = CuttableMesh::new(kuhn_box([4, 2, 2], DVec3::new(2.0, 1.0, 1.0)))?;
+/// let mut pieces = PieceTracker::new(&body);
+/// let body_of = vec![0; body.mesh().positions.len()];
+/// let mut contacts = ContactDetector::new(&body, body_of, ContactSettings::default())?;
+///
+/// let mut positions = body.mesh().positions.clone();
+/// let plane = Plane { point: DVec3::splat(0.8), normal: DVec3::X };
+/// let delta = cut_plane(&mut body, &positions, &plane, &CutOptions::default())?;
+/// delta.extend_particles(&mut positions);
+/// pieces.apply_delta(&body, &delta);
+/// contacts.apply_delta(&body, &delta);
+///
+/// let velocities = vec![DVec3::ZERO; positions.len()];
+/// let state = ContactState {
+///     mesh: &body,
+///     pieces: &pieces,
+///     positions: &positions,
+///     velocities: &velocities,
+///     frame_time: 1.0 / 60.0,
+/// };
+/// contacts.update(&state);
+/// // The two sides of the cut touch, at a gap of exactly 0.
+/// assert_eq!(contacts.pairs().len(), delta.copies.len());
+/// assert!(contacts.pairs().iter().all(|pair| pair.gap(&positions) == 0.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ContactDetector {
+    settings: ContactSettings,
+    surface: ContactSurface,
+    fresh_pairs: FreshPairs,
+    /// By particle.
+    body_of: Vec<u32>,
+    /// The mean edge of the surface at rest.
+    mean_edge: f64,
+    /// Over the first slots of the surface.
+    main: TriangleTree,
+    /// Over the slots from the end of the main tree on.
+    fresh: TriangleTree,
+    fresh_is_due: bool,
+    /// Slots that the main tree was built over.
+    main_slots: usize,
+    pairs: Vec<PairContact>,
+    faces: Vec<FaceContact>,
+    sightings: Vec<Sighting>,
+    /// The vertices inside another part, ascending, each with the tet that contains it.
+    inside: Vec<(ParticleId, TetId)>,
+    deep: usize,
+    buried: usize,
+    /// The surface vertices, ascending.
+    vertices: Vec<u32>,
+    /// Where they were at the last search.
+    searched_at: Vec<DVec3>,
+    /// How far the last search reached in m.
+    reach: f64,
+    /// Whether the next update has to search.
+    search_is_due: bool,
+    /// Whether the next search has to look for vertices inside of other parts everywhere. Later ones know which they
+    /// are: a vertex gets inside through the outer tets, which the search looks at.
+    location_is_due: bool,
+    #[cfg_attr(feature = "serde", serde(skip))]
+    room: Room,
+}
+
+/// Memory of a search that is used again by the next one. Nothing in it outlives a search.
+#[derive(Clone, Debug, Default)]
+struct Room {
+    boxes: Vec<Box32>,
+    normals: Vec<DVec3>,
+    found: Vec<Found>,
+    last_faces: Vec<FaceContact>,
+    last_pairs: Vec<PairContact>,
+    last_inside: Vec<(ParticleId, TetId)>,
+    /// By body the box around it.
+    bodies: Vec<Bounds>,
+    /// By body whether the box of another one that it may touch is near.
+    is_near: Vec<bool>,
+    change: SurfaceChange,
+}
+
+impl ContactDetector {
+    /// A detector for a mesh; `body_of` gives the body of each particle, numbered as [`ContactSettings::bodies`] does.
+    /// O(n log n).
+    ///
+    /// # Errors
+    /// [`ContactError::Setting`] or [`ContactError::Bodies`].
+    pub fn new(
+        mesh: &CuttableMesh,
+        body_of: Vec<u32>,
+        settings: ContactSettings,
+    ) -> Result<Self, ContactError> {
+        settings.check()?;
+        let mut detector = Self {
+            settings,
+            surface: ContactSurface::default(),
+            fresh_pairs: FreshPairs::default(),
+            body_of: Vec::new(),
+            mean_edge: 0.0,
+            main: TriangleTree::default(),
+            fresh: TriangleTree::default(),
+            fresh_is_due: false,
+            main_slots: 0,
+            pairs: Vec::new(),
+            faces: Vec::new(),
+            sightings: Vec::new(),
+            inside: Vec::new(),
+            deep: 0,
+            buried: 0,
+            vertices: Vec::new(),
+            searched_at: Vec::new(),
+            reach: 0.0,
+            search_is_due: true,
+            location_is_due: true,
+            room: Room::default(),
+        };
+        detector.rebuild(mesh, body_of)?;
+        Ok(detector)
+    }
+
+    /// Starts over with another mesh, as after bodies were added or removed; fresh pairs are forgotten, so that the
+    /// search takes care of their particles. O(n log n).
+    ///
+    /// # Errors
+    /// [`ContactError::Bodies`] if `body_of` has another length than the mesh has particles; nothing is changed then.
+    pub fn rebuild(&mut self, mesh: &CuttableMesh, body_of: Vec<u32>) -> Result<(), ContactError> {
+        let (given, particles) = (body_of.len(), mesh.mesh().positions.len());
+        if given != particles {
+            return Err(ContactError::Bodies { given, particles });
+        }
+        self.body_of = body_of;
+        self.surface.rebuild(mesh);
+        self.fresh_pairs.clear();
+        self.mean_edge = self.surface.mean_edge(&mesh.mesh().positions);
+        self.forget();
+        Ok(())
+    }
+
+    /// Drops what refers to the surface of before.
+    fn forget(&mut self) {
+        self.main.build(std::iter::empty(), &[]);
+        self.fresh.build(std::iter::empty(), &[]);
+        self.main_slots = 0;
+        self.fresh_is_due = true;
+        self.search_is_due = true;
+        self.location_is_due = true;
+        self.inside.clear();
+        self.faces.clear();
+        self.sightings.clear();
+        self.pairs.clear();
+    }
+
+    /// Changes the settings between frames. The next update searches.
+    ///
+    /// # Errors
+    /// [`ContactError::Setting`]; nothing is changed then.
+    pub fn set_settings(&mut self, settings: ContactSettings) -> Result<(), ContactError> {
+        settings.check()?;
+        self.settings = settings;
+        self.search_is_due = true;
+        Ok(())
+    }
+
+    /// The settings.
+    #[must_use]
+    pub fn settings(&self) -> &ContactSettings {
+        &self.settings
+    }
+
+    /// Follows a cut or a removal; `mesh` is the one after it. New particles belong to the bodies of those they were made
+    /// of. Costs what the boundary lost and gained; the next update searches.
+    ///
+    /// # Panics
+    /// If the delta does not follow the last one.
+    pub fn apply_delta(&mut self, mesh: &CuttableMesh, delta: &CutDelta) {
+        let change = &mut self.room.change;
+        self.surface.follow(mesh, delta, change);
+        self.fresh_pairs.follow(mesh, &self.surface, delta, change);
+        for point in &delta.points {
+            self.body_of.push(self.body_of[point.ends[0].index()]);
+        }
+        for source in &delta.copies {
+            self.body_of.push(self.body_of[source.index()]);
+        }
+        let is_deleted = |tet: TetId| delta.deleted.binary_search_by_key(&tet, |d| d.tet).is_ok();
+        self.inside.retain(|(_, tet)| !is_deleted(*tet));
+        for (_, tet) in &mut self.inside {
+            *tet = delta.slot_after(*tet);
+        }
+        self.fresh_is_due = true;
+        self.search_is_due = true;
+    }
+
+    /// Takes the last cut or removal back; `mesh` is the one before it. Pairs that it ended do not come back, those that
+    /// it made are gone. Costs what the boundary lost and gained; the next update searches.
+    ///
+    /// # Panics
+    /// If the delta was not the last one.
+    pub fn undo(&mut self, mesh: &CuttableMesh, delta: &CutDelta) {
+        let change = &mut self.room.change;
+        self.surface.follow_back(mesh, delta, change);
+        self.fresh_pairs
+            .follow_back(mesh, &self.surface, delta, change);
+        self.body_of.truncate(delta.particles_before);
+        let before = |tet: TetId| {
+            let moved = delta.moved.binary_search_by_key(&tet, |moved| moved.to);
+            moved.map_or(tet, |i| delta.moved[i].from)
+        };
+        self.inside.retain_mut(|(particle, tet)| {
+            *tet = before(*tet);
+            particle.index() < delta.particles_before && tet.index() < delta.tets_before
+        });
+        self.fresh_is_due = true;
+        self.search_is_due = true;
+    }
+
+    /// Lists the contacts that the next `frame_time` may meet. Asks for no memory once it has as much as it needs.
+    ///
+    /// # Panics
+    /// If positions or velocities are not as many as the particles of the mesh, or a delta was left out.
+    ///
+    /// # Determinism
+    /// The same bits for any number of threads.
+    pub fn update(&mut self, state: &ContactState<'_>) -> ContactUpdate {
+        let particles = state.mesh.mesh().positions.len();
+        assert_eq!(
+            state.positions.len(),
+            particles,
+            "a position for each particle"
+        );
+        assert_eq!(
+            state.velocities.len(),
+            particles,
+            "a velocity for each particle"
+        );
+        assert_eq!(self.body_of.len(), particles, "all deltas were followed");
+
+        if self.search_is_due {
+            self.vertices.clear();
+            self.vertices.extend(self.surface.vertices().map(|p| p.0));
+        }
+        let approach = self.approach(state);
+        let margin = approach.min(self.settings.reach * self.mean_edge);
+        let skin = self.settings.skin * self.mean_edge;
+        let reach = skin + margin + self.settings.thickness;
+
+        std::mem::swap(&mut self.pairs, &mut self.room.last_pairs);
+        let evaluated =
+            self.fresh_pairs
+                .evaluate(&self.surface, state.positions, reach, &mut self.pairs);
+        let searched = self.search_is_due
+            || evaluated.retired
+            || self.has_moved(state, approach)
+            || self.has_slid(state);
+        let mut update = ContactUpdate {
+            searched,
+            ..ContactUpdate::default()
+        };
+        if searched {
+            self.reach = reach;
+            self.search(state);
+            update.faces_changed = differ(&self.faces, &self.room.last_faces, |c| c.particles);
+        }
+        update.pairs_changed = differ(&self.pairs, &self.room.last_pairs, |c| c.particles);
+        update
+    }
+
+    /// Into how many equal parts a frame should be divided, each with an update of its own: 1, 2 or 4. More than 1 if
+    /// surfaces may approach each other in the frame by more than the search looks ahead.
+    ///
+    /// # Panics
+    /// If there are fewer velocities than particles.
+    #[must_use]
+    pub fn intervals(&self, velocities: &[DVec3], frame_time: f64) -> u32 {
+        let ahead = (self.settings.reach + self.settings.skin) * self.mean_edge;
+        let vertices = self.surface.vertices();
+        let speed = Bounds::around(vertices.map(|p| velocities[p.index()]));
+        match diagonal(&speed) * frame_time {
+            approach if approach <= ahead => 1,
+            approach if approach <= 2.0 * ahead => 2,
+            _ => 4,
+        }
+    }
+
+    /// A bound on how much closer any two surface points can come in the frame: no two velocities differ by more than
+    /// the diagonal of their box.
+    fn approach(&self, state: &ContactState<'_>) -> f64 {
+        let vertices = self.vertices.iter();
+        let velocities = vertices.map(|&p| state.velocities[p as usize]);
+        diagonal(&Bounds::around(velocities)) * state.frame_time
+    }
+
+    /// Whether something may come into contact that the last search did not reach.
+    fn has_moved(&self, state: &ContactState<'_>, approach: f64) -> bool {
+        let vertices = self.vertices.iter().zip(&self.searched_at);
+        let moved = vertices.map(|(&p, before)| state.positions[p as usize] - *before);
+        let moved = diagonal(&Bounds::around(moved));
+        let needed = moved + approach + self.settings.thickness;
+        needed > self.reach || needed.is_nan()
+    }
+
+    /// Whether a vertex in contact is about to leave its triangle or has gone deeper.
+    fn has_slid(&self, state: &ContactState<'_>) -> bool {
+        let close = 0.5 * self.settings.skin * self.mean_edge + self.settings.thickness;
+        let mut candidates = self.faces.iter().zip(&self.sightings);
+        candidates.any(|(contact, sighting)| {
+            let [_, second, third] = beneath(contact, state.positions);
+            let [before2, before3] = sighting.weights;
+            let first = 1.0 - second - third;
+            let slid = [
+                second - before2,
+                third - before3,
+                before2 + before3 - second - third,
+            ];
+            let has_slid = slid.iter().any(|by| by.abs() > SLID);
+            // One that was found beyond its triangle, at an edge, may stay there.
+            let beyond = |now: f64, before: f64| now < -BEYOND && before >= -BEYOND;
+            let is_beyond = beyond(first, 1.0 - before2 - before3)
+                || beyond(second, before2)
+                || beyond(third, before3);
+            let gap = contact.gap(state.positions);
+            let is_deeper = gap < 0.0 && gap < sighting.gap - DEEPER * self.reach;
+            is_deeper || (has_slid || is_beyond) && gap < close
+        })
+    }
+
+    /// Finds all candidates.
+    fn search(&mut self, state: &ContactState<'_>) {
+        self.prepare_slots(state);
+        self.sync_trees(state);
+        self.prepare_bodies(state.positions);
+        self.query(state);
+        self.collect(state);
+        self.search_is_due = false;
+    }
+
+    /// Boxes and normals of the triangles at the present positions.
+    fn prepare_slots(&mut self, state: &ContactState<'_>) {
+        let Room { boxes, normals, .. } = &mut self.room;
+        let count = self.surface.slot_count();
+        boxes.resize(count, Box32::EMPTY);
+        normals.resize(count, DVec3::ZERO);
+        let surface = &self.surface;
+        let prepare = |(slot, (bounds, normal)): (usize, (&mut Box32, &mut DVec3))| {
+            (*bounds, *normal) = prepared(surface, state, index(slot));
+        };
+        if count < 2 * PARALLEL {
+            let slots = boxes.iter_mut().zip(normals).enumerate();
+            slots.for_each(prepare);
+        } else {
+            let slots = boxes.par_iter_mut().zip(normals).enumerate();
+            slots.with_min_len(PARALLEL).for_each(prepare);
+        }
+    }
+
+    /// Brings the trees up to date: refits, and builds what new triangles ask for.
+    fn sync_trees(&mut self, state: &ContactState<'_>) {
+        let slots = self.surface.slot_count();
+        if slots - self.main_slots > self.main_slots / FRESH {
+            let numbers = self.surface.compact(state.mesh);
+            self.fresh_pairs.renumber(&self.surface, &numbers);
+            self.mean_edge = self.surface.mean_edge(&state.mesh.mesh().positions);
+            self.prepare_slots(state);
+            self.main_slots = self.surface.slot_count();
+            self.main.build(0..index(self.main_slots), &self.room.boxes);
+            self.fresh.build(std::iter::empty(), &[]);
+            self.fresh_is_due = false;
+            return;
+        }
+        self.main.refit(&self.room.boxes);
+        if self.fresh_is_due {
+            let new = index(self.main_slots)..index(slots);
+            let alive = new.filter(|&slot| self.surface.is_alive(slot));
+            self.fresh.build(alive, &self.room.boxes);
+            self.fresh_is_due = false;
+        } else {
+            self.fresh.refit(&self.room.boxes);
+        }
+    }
+
+    /// Which bodies have another one near that they may touch.
+    fn prepare_bodies(&mut self, positions: &[DVec3]) {
+        let Room {
+            bodies, is_near, ..
+        } = &mut self.room;
+        bodies.clear();
+        for &vertex in &self.vertices {
+            let body = self.body_of[vertex as usize] as usize;
+            if bodies.len() <= body {
+                bodies.resize(body + 1, Bounds::EMPTY);
+            }
+            let point = Bounds::around([positions[vertex as usize]]);
+            bodies[body] = bodies[body].union(point);
+        }
+        is_near.clear();
+        is_near.resize(bodies.len(), false);
+        for one in 0..bodies.len() {
+            let around = bodies[one].widened(self.reach);
+            for other in one + 1..bodies.len() {
+                let allowed = self.settings.bodies.allow(index(one), index(other));
+                if allowed && around.overlaps(&bodies[other]) {
+                    (is_near[one], is_near[other]) = (true, true);
+                }
+            }
+        }
+    }
+
+    /// Searches for each vertex.
+    fn query(&mut self, state: &ContactState<'_>) {
+        let Room {
+            normals,
+            found,
+            is_near,
+            ..
+        } = &mut self.room;
+        let normals = &*normals;
+        let query = Query {
+            state,
+            settings: &self.settings,
+            shape: Shape {
+                surface: &self.surface,
+                positions: state.positions,
+                normals,
+            },
+            trees: [&self.main, &self.fresh],
+            pairs: &self.fresh_pairs,
+            body_of: &self.body_of,
+            reach: self.reach,
+            mean_edge: self.mean_edge,
+        };
+        // A body touches itself, or its pieces each other, whichever bodies are near.
+        let touches_itself = self.settings.self_contact || state.pieces.count() > is_near.len();
+        let is_asked = |vertex: u32| {
+            let body = self.body_of[vertex as usize] as usize;
+            touches_itself || is_near[body]
+        };
+        if self.location_is_due {
+            self.inside.clear();
+            let asked = self.vertices.iter().filter(|&&vertex| is_asked(vertex));
+            let mut asked = asked.map(|&vertex| ParticleId(vertex)).peekable();
+            if asked.peek().is_some() {
+                let tets = tree_of_tets(state);
+                let located = asked.filter_map(|p| Some((p, query.locate(p, &tets)?)));
+                self.inside.extend(located);
+            }
+            self.location_is_due = false;
+        }
+        let inside = &self.inside;
+        let ask = |(&vertex, found): (&u32, &mut Found)| {
+            *found = if is_asked(vertex) {
+                let vertex = ParticleId(vertex);
+                let was_inside = inside.binary_search_by_key(&vertex, |known| known.0);
+                query.vertex(vertex, was_inside.ok().map(|i| inside[i].1))
+            } else {
+                Found::NOTHING
+            };
+        };
+        found.resize(self.vertices.len(), Found::NOTHING);
+        if found.len() < PARALLEL {
+            self.vertices.iter().zip(found).for_each(ask);
+        } else {
+            let vertices = self.vertices.par_iter().zip(found);
+            vertices.with_min_len(PARALLEL / 4).for_each(ask);
+        }
+    }
+
+    /// Makes lists of what was found for the vertices.
+    fn collect(&mut self, state: &ContactState<'_>) {
+        let Room {
+            found,
+            last_faces,
+            last_inside,
+            ..
+        } = &mut self.room;
+        std::mem::swap(&mut self.faces, last_faces);
+        std::mem::swap(&mut self.inside, last_inside);
+        self.faces.clear();
+        self.inside.clear();
+        self.sightings.clear();
+        self.searched_at.clear();
+        (self.deep, self.buried) = (0, 0);
+        for (&vertex, found) in self.vertices.iter().zip(found) {
+            self.searched_at.push(state.positions[vertex as usize]);
+            self.faces.extend_from_slice(found.contacts());
+            if found.inside != NONE {
+                self.inside.push((ParticleId(vertex), TetId(found.inside)));
+            }
+            self.deep += usize::from(found.is_deep);
+            self.buried += usize::from(found.is_buried);
+        }
+        for contact in &self.faces {
+            let [_, second, third] = beneath(contact, state.positions);
+            self.sightings.push(Sighting {
+                weights: [second, third],
+                gap: contact.gap(state.positions),
+            });
+        }
+    }
+
+    /// The contacts across fresh cuts whose sides are near each other.
+    #[must_use]
+    pub fn pairs(&self) -> &[PairContact] {
+        &self.pairs
+    }
+
+    /// The candidates of the search: a vertex and a triangle each, ascending by vertex; at most four for a vertex.
+    #[must_use]
+    pub fn faces(&self) -> &[FaceContact] {
+        &self.faces
+    }
+
+    /// How many vertices lie inside another body or piece, beyond half of its thickness or without a triangle near
+    /// them, at the last search.
+    #[must_use]
+    pub fn deep(&self) -> usize {
+        self.deep
+    }
+
+    /// How many of the deep vertices have no way out within reach of the search, so that nothing pushes them out: a
+    /// piece that was swallowed as a whole.
+    #[must_use]
+    pub fn buried(&self) -> usize {
+        self.buried
+    }
+
+    /// The mean edge of the surface at rest in m, as it was when the search tree was built over all triangles.
+    #[must_use]
+    pub fn mean_edge(&self) -> f64 {
+        self.mean_edge
+    }
+
+    /// How far the last search reached in m.
+    #[must_use]
+    pub fn reach(&self) -> f64 {
+        self.reach
+    }
+
+    /// The surface.
+    #[must_use]
+    pub fn surface(&self) -> &ContactSurface {
+        &self.surface
+    }
+
+    /// The pairs of fresh cuts, those that sleep included.
+    #[must_use]
+    pub fn fresh_pairs(&self) -> &FreshPairs {
+        &self.fresh_pairs
+    }
+
+    /// The body of each particle.
+    #[must_use]
+    pub fn body_of(&self) -> &[u32] {
+        &self.body_of
+    }
+
+    /// Recomputes the surface and the lists of pairs and compares. O(n log n); for tests and on request.
+    ///
+    /// # Errors
+    /// [`ContactError::Differs`] names the first difference.
+    pub fn check(&self, mesh: &CuttableMesh) -> Result<(), ContactError> {
+        self.surface.check(mesh)?;
+        self.fresh_pairs.check(&self.surface)?;
+        if self.body_of.len() != mesh.mesh().positions.len() {
+            let known = self.body_of.len();
+            return Err(ContactError::Differs(format!(
+                "{known} particles are known"
+            )));
+        }
+        for triangle in self.surface.triangles() {
+            let [a, b, c] = triangle.particles.map(|p| self.body_of[p.index()]);
+            if a != b || a != c {
+                let what = format!("{triangle:?} belongs to several bodies");
+                return Err(ContactError::Differs(what));
+            }
+        }
+        let built = self.main_slots + self.fresh.len();
+        if !self.fresh_is_due && self.main.len() + self.fresh.len() != built {
+            return Err(ContactError::Differs("the trees miss triangles".to_owned()));
+        }
+        Ok(())
+    }
+}
+
+/// The box and the unit normal of a triangle; the empty box and no normal if it must not be touched. The box is that of
+/// the tet behind it, so that the search also says which tets may contain a vertex.
+fn prepared(surface: &ContactSurface, state: &ContactState<'_>, slot: u32) -> (Box32, DVec3) {
+    const NOTHING: (Box32, DVec3) = (Box32::EMPTY, DVec3::ZERO);
+    if !surface.is_alive(slot) {
+        return NOTHING;
+    }
+    let tet = surface.triangle(slot).tet;
+    let corners = state.mesh.mesh().tets[tet.index()].map(|p| state.positions[p.index()]);
+    if Barycentric::new(corners).is_none() {
+        return NOTHING;
+    }
+    let area = surface.area(slot, state.positions);
+    let squared = area.length_squared();
+    if surface.is_collapsed(slot, squared) {
+        return NOTHING;
+    }
+    let bounds = Bounds::around(corners);
+    (Box32::around(&bounds), area / squared.sqrt())
+}
+
+/// A tree over all tets that are not flat or inverted, by their numbers. O(n log n).
+fn tree_of_tets(state: &ContactState<'_>) -> TriangleTree {
+    let tets = state.mesh.mesh().tets.iter();
+    let boxes = tets.map(|corners| {
+        let corners = corners.map(|p| state.positions[p.index()]);
+        match Barycentric::new(corners) {
+            Some(_) => Box32::around(&Bounds::around(corners)),
+            None => Box32::EMPTY,
+        }
+    });
+    let boxes: Vec<Box32> = boxes.collect();
+    let mut tree = TriangleTree::default();
+    tree.build(0..index(boxes.len()), &boxes);
+    tree
+}
+
+/// The barycentric coordinates of the point beneath a vertex in the plane of its triangle; of the first corner where
+/// the triangle has no area.
+fn beneath(contact: &FaceContact, positions: &[DVec3]) -> [f64; 3] {
+    let [x, x1, x2, x3] = contact.particles.map(|p| positions[p as usize]);
+    let (e1, e2) = (x2 - x1, x3 - x1);
+    let across = e1.cross(e2);
+    let squared = across.length_squared();
+    let from = x - x1;
+    let second = from.cross(e2).dot(across) / squared;
+    let third = e1.cross(from).dot(across) / squared;
+    if second.is_finite() && third.is_finite() {
+        [1.0 - second - third, second, third]
+    } else {
+        [1.0, 0.0, 0.0]
+    }
+}
+
+/// The length of the diagonal of a box, 0 for an empty one.
+fn diagonal(bounds: &Bounds) -> f64 {
+    bounds.size().max(DVec3::ZERO).length()
+}
+
+/// Whether two lists have other particles.
+fn differ<T, const N: usize>(now: &[T], before: &[T], particles: impl Fn(&T) -> [u32; N]) -> bool {
+    now.len() != before.len()
+        || now
+            .iter()
+            .zip(before)
+            .any(|(one, other)| particles(one) != particles(other))
+}

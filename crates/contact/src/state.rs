@@ -1,0 +1,19 @@
+//! [`ContactState`]: where everything is when contacts are looked for.
+
+use glam::DVec3;
+use incise_cutting::{CuttableMesh, PieceTracker};
+
+/// What the detector looks at.
+#[derive(Clone, Copy, Debug)]
+pub struct ContactState<'a> {
+    /// The bodies that are solved together as one mesh, with all cuts made so far.
+    pub mesh: &'a CuttableMesh,
+    /// The pieces of that mesh.
+    pub pieces: &'a PieceTracker,
+    /// The present positions of the particles in m, finite.
+    pub positions: &'a [DVec3],
+    /// Their velocities in m/s.
+    pub velocities: &'a [DVec3],
+    /// How long the list will be used: the time of a frame in s, or of a part of it.
+    pub frame_time: f64,
+}

@@ -1,0 +1,255 @@
+//! [`TriangleTree`]: boxes of triangles in a binary tree that is refitted as they move.
+//!
+//! Built by halving at the median center along the longest axis, four triangles a leaf, nodes in the order of a walk
+//! with the node to skip to. A search needs no stack. Boxes are in single precision, rounded outward, so that half the
+//! memory is read and nothing is missed. Its results are a set: their order is the tree's own.
+//!
+//! Cost: O(n log n) to build, O(n) to refit, O(log n + found) a search.
+
+use glam::DVec3;
+use incise_mesh::Bounds;
+
+use crate::index::index;
+
+/// Triangles a leaf holds at most.
+const LEAF: usize = 4;
+
+/// A box in single precision around one in double precision; empty where `low` exceeds `high`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct Box32 {
+    pub(crate) low: [f32; 3],
+    pub(crate) high: [f32; 3],
+}
+
+impl Box32 {
+    /// The box without a point. Finite, so that it can be written in any format.
+    pub(crate) const EMPTY: Self = Self {
+        low: [f32::MAX; 3],
+        high: [f32::MIN; 3],
+    };
+
+    /// The smallest box of this kind around a box.
+    #[inline]
+    pub(crate) fn around(bounds: &Bounds) -> Self {
+        Self {
+            low: bounds.low.to_array().map(rounded_down),
+            high: bounds.high.to_array().map(rounded_up),
+        }
+    }
+
+    #[inline]
+    fn union(self, other: Self) -> Self {
+        let mut union = self;
+        for k in 0..3 {
+            union.low[k] = union.low[k].min(other.low[k]);
+            union.high[k] = union.high[k].max(other.high[k]);
+        }
+        union
+    }
+
+    #[inline]
+    pub(crate) fn overlaps(&self, other: &Self) -> bool {
+        let along = |k: usize| self.low[k] <= other.high[k] && other.low[k] <= self.high[k];
+        along(0) & along(1) & along(2)
+    }
+
+    #[inline]
+    pub(crate) fn contains(&self, x: DVec3) -> bool {
+        let x = x.to_array();
+        let along = |k: usize| f64::from(self.low[k]) <= x[k] && x[k] <= f64::from(self.high[k]);
+        along(0) & along(1) & along(2)
+    }
+
+    /// The sum of both ends along an axis: orders boxes as their centers do.
+    fn center(&self, axis: usize) -> f64 {
+        f64::from(self.low[axis]) + f64::from(self.high[axis])
+    }
+}
+
+/// The largest number of single precision not above `x`.
+#[inline]
+fn rounded_down(x: f64) -> f32 {
+    #[expect(clippy::cast_possible_truncation, reason = "rounds to the nearest")]
+    let near = x as f32;
+    if f64::from(near) > x {
+        near.next_down()
+    } else {
+        near
+    }
+}
+
+/// The smallest number of single precision not below `x`.
+#[inline]
+fn rounded_up(x: f64) -> f32 {
+    -rounded_down(-x)
+}
+
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct Node {
+    bounds: Box32,
+    /// The node after all those below it.
+    next: u32,
+    /// Of a leaf, the place of its first triangle.
+    first: u32,
+    /// Of a leaf, the number of its triangles; 0 for other nodes.
+    count: u32,
+}
+
+/// A tree over numbered triangles.
+#[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct TriangleTree {
+    nodes: Vec<Node>,
+    order: Vec<u32>,
+    /// In the order of `order`.
+    boxes: Vec<Box32>,
+}
+
+impl TriangleTree {
+    /// Builds it over the triangles whose numbers are given, in the memory it has. `boxes` are by number.
+    pub(crate) fn build(&mut self, numbers: impl Iterator<Item = u32>, boxes: &[Box32]) {
+        self.order.clear();
+        self.order.extend(numbers);
+        self.nodes.clear();
+        if !self.order.is_empty() {
+            self.split(0, self.order.len(), boxes);
+        }
+        self.boxes.clear();
+        let places = self.order.iter();
+        self.boxes
+            .extend(places.map(|&number| boxes[number as usize]));
+    }
+
+    fn split(&mut self, first: usize, end: usize, boxes: &[Box32]) {
+        let items = &mut self.order[first..end];
+        let of = |number: u32| boxes[number as usize];
+        let bounds = items
+            .iter()
+            .fold(Box32::EMPTY, |all, &number| all.union(of(number)));
+        let is_leaf = items.len() <= LEAF;
+        let node = self.nodes.len();
+        self.nodes.push(Node {
+            bounds,
+            next: 0,
+            first: index(first),
+            count: if is_leaf { index(items.len()) } else { 0 },
+        });
+        if !is_leaf {
+            let size = [0, 1, 2].map(|k| f64::from(bounds.high[k]) - f64::from(bounds.low[k]));
+            let axis = DVec3::from_array(size).max_position();
+            let half = items.len() / 2;
+            items.select_nth_unstable_by(half, |&i, &j| {
+                let centers = (of(i).center(axis), of(j).center(axis));
+                centers.0.total_cmp(&centers.1).then(i.cmp(&j))
+            });
+            self.split(first, first + half, boxes);
+            self.split(first + half, end, boxes);
+        }
+        self.nodes[node].next = index(self.nodes.len());
+    }
+
+    /// Takes over the present boxes, those of removed triangles empty.
+    pub(crate) fn refit(&mut self, boxes: &[Box32]) {
+        for (place, &number) in self.order.iter().enumerate() {
+            self.boxes[place] = boxes[number as usize];
+        }
+        for i in (0..self.nodes.len()).rev() {
+            let node = self.nodes[i];
+            self.nodes[i].bounds = if node.count > 0 {
+                let triangles = node.first as usize..(node.first + node.count) as usize;
+                let boxes = self.boxes[triangles].iter();
+                boxes.fold(Box32::EMPTY, |all, one| all.union(*one))
+            } else {
+                let left = &self.nodes[i + 1];
+                left.bounds.union(self.nodes[left.next as usize].bounds)
+            };
+        }
+    }
+
+    /// How many triangles it was built over.
+    pub(crate) fn len(&self) -> usize {
+        self.order.len()
+    }
+
+    /// Calls `visit` with the number and the box of each triangle whose box overlaps `wanted`.
+    #[inline]
+    pub(crate) fn search(&self, wanted: &Box32, mut visit: impl FnMut(u32, &Box32)) {
+        let mut here = 0;
+        while let Some(node) = self.nodes.get(here) {
+            if !node.bounds.overlaps(wanted) {
+                here = node.next as usize;
+                continue;
+            }
+            let triangles = node.first as usize..(node.first + node.count) as usize;
+            for place in triangles {
+                if self.boxes[place].overlaps(wanted) {
+                    visit(self.order[place], &self.boxes[place]);
+                }
+            }
+            here += 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn boxes(count: usize, seed: usize, size: f64) -> Vec<Box32> {
+        let at = |i: usize, k: usize| ((i * 7919 + k * 104_729 + seed) % 97) as f64 + 0.1;
+        (0..count)
+            .map(|i| {
+                let low = DVec3::new(at(i / 2, 1), at(i / 2, 2), at(i / 2, 3));
+                let high = low + DVec3::new(1.0, 2.0, 3.0) * size;
+                Box32::around(&Bounds::around([low, high]))
+            })
+            .collect()
+    }
+
+    fn found(tree: &TriangleTree, wanted: &Box32) -> Vec<u32> {
+        let mut found = Vec::new();
+        tree.search(wanted, |number, _| found.push(number));
+        found.sort_unstable();
+        found
+    }
+
+    /// Against all boxes, from none to many, with equal and with empty ones among them, before and after a refit.
+    #[test]
+    fn finds_what_overlaps() {
+        let mut tree = TriangleTree::default();
+        for count in [0_usize, 1, 4, 5, 9, 200] {
+            let mut now = boxes(count, 0, 4.0);
+            tree.build(0..index(count), &now);
+            for round in 0..3 {
+                for wanted in boxes(50, 1234, 8.0) {
+                    let expected: Vec<u32> = (0..index(count))
+                        .filter(|&i| now[i as usize].overlaps(&wanted))
+                        .collect();
+                    assert_eq!(found(&tree, &wanted), expected);
+                }
+                now = boxes(count, 31 * (round + 1), 4.0);
+                for empty in now.iter_mut().step_by(3) {
+                    *empty = Box32::EMPTY;
+                }
+                tree.refit(&now);
+            }
+        }
+    }
+
+    #[test]
+    fn boxes_are_rounded_outward() {
+        for i in 0..2000 {
+            let x = (f64::from(i) - 1000.0) / 3.0 * 1.1_f64.powi(i % 60 - 30);
+            let (low, high) = (rounded_down(x), rounded_up(x));
+            assert!(f64::from(low) <= x && x <= f64::from(high));
+            assert!(low == high || low.next_up() == high);
+        }
+        assert_eq!(
+            (rounded_down(1e300), rounded_up(1e300)),
+            (f32::MAX, f32::INFINITY)
+        );
+        assert_eq!(rounded_down(-0.5), -0.5);
+    }
+}

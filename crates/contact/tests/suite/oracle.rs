@@ -1,0 +1,355 @@
+//! The slow search: each vertex against each triangle, without a tree, fans or walks.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+
+use glam::DVec3;
+use incise_contact::ContactState;
+use incise_cutting::{BoundaryTriangle, FaceTag};
+use incise_mesh::{ParticleId, TetId, TrianglePart, closest_on_triangle, signed_volume};
+
+use crate::scene::Scene;
+
+/// A vertex and the corners of a triangle.
+pub(crate) type Key = [u32; 4];
+
+/// What the slow search finds.
+#[derive(Default)]
+pub(crate) struct Expected {
+    pub(crate) contacts: BTreeSet<Key>,
+    /// Vertices inside a tet of another part, or nearly so, without a valid triangle near them, for which the
+    /// detector may have one contact more.
+    pub(crate) deep: BTreeSet<u32>,
+    /// Vertices inside of a triangle with a valid way to them.
+    pub(crate) inside: BTreeSet<u32>,
+}
+
+struct Slow<'a> {
+    scene: &'a Scene,
+    state: ContactState<'a>,
+    triangles: Vec<BoundaryTriangle>,
+    normals: Vec<DVec3>,
+    /// By particle the places of its triangles.
+    fans: Vec<Vec<usize>>,
+    partners: BTreeMap<u32, BTreeSet<u32>>,
+}
+
+/// All candidates at the present positions.
+pub(crate) fn expected(scene: &Scene) -> Expected {
+    let state = ContactState {
+        mesh: &scene.body,
+        pieces: &scene.pieces,
+        positions: &scene.positions,
+        velocities: &scene.velocities,
+        frame_time: scene.frame_time,
+    };
+    let mut partners: BTreeMap<u32, BTreeSet<u32>> = BTreeMap::new();
+    for [a, b] in scene.contacts.fresh_pairs().iter() {
+        partners.entry(a.0).or_default().insert(b.0);
+        partners.entry(b.0).or_default().insert(a.0);
+    }
+    let mut slow = Slow {
+        scene,
+        state,
+        triangles: Vec::new(),
+        normals: Vec::new(),
+        fans: vec![Vec::new(); scene.positions.len()],
+        partners,
+    };
+    slow.triangles = scene.body.boundary().filter(|t| slow.is_sound(t)).collect();
+    slow.triangles.sort_by_key(|t| (t.tet, t.opposite));
+    slow.normals = slow
+        .triangles
+        .iter()
+        .map(|t| slow.area(t).normalize())
+        .collect();
+    for (i, triangle) in slow.triangles.iter().enumerate() {
+        for p in triangle.particles {
+            slow.fans[p.index()].push(i);
+        }
+    }
+    let all: Vec<BoundaryTriangle> = scene.body.boundary().collect();
+    let mut vertices: BTreeMap<u32, Vec<BoundaryTriangle>> = BTreeMap::new();
+    for triangle in &all {
+        for p in triangle.particles {
+            vertices.entry(p.0).or_default().push(*triangle);
+        }
+    }
+    let mut expected = Expected::default();
+    for (vertex, fan) in vertices {
+        slow.vertex(vertex, &fan, &mut expected);
+    }
+    expected
+}
+
+impl Slow<'_> {
+    fn at(&self, p: ParticleId) -> DVec3 {
+        self.state.positions[p.index()]
+    }
+
+    fn corners(&self, triangle: &BoundaryTriangle) -> [DVec3; 3] {
+        triangle.particles.map(|p| self.at(p))
+    }
+
+    fn area(&self, triangle: &BoundaryTriangle) -> DVec3 {
+        let [a, b, c] = self.corners(triangle);
+        (b - a).cross(c - a)
+    }
+
+    fn tet(&self, tet: TetId) -> [DVec3; 4] {
+        self.scene.body.mesh().tets[tet.index()].map(|p| self.at(p))
+    }
+
+    fn is_sound(&self, triangle: &BoundaryTriangle) -> bool {
+        let rest = triangle
+            .particles
+            .map(|p| self.scene.body.mesh().positions[p.index()]);
+        let [a, b, c] = rest;
+        let at_rest = (b - a).cross(c - a).length();
+        self.area(triangle).length() > 1e-3 * at_rest && signed_volume(self.tet(triangle.tet)) > 0.0
+    }
+
+    fn may_touch(&self, vertex: u32, own: TetId, tet: TetId) -> bool {
+        let body = |p: ParticleId| self.scene.contacts.body_of()[p.index()];
+        let other = body(self.scene.body.mesh().tets[tet.index()][0]);
+        let settings = self.scene.contacts.settings();
+        if body(ParticleId(vertex)) == other {
+            let pieces = &self.scene.pieces;
+            settings.self_contact || pieces.piece_of(own) != pieces.piece_of(tet)
+        } else {
+            settings.bodies.allow(body(ParticleId(vertex)), other)
+        }
+    }
+
+    fn vertex(&self, vertex: u32, fan: &[BoundaryTriangle], expected: &mut Expected) {
+        let x = self.at(ParticleId(vertex));
+        let reach = self.scene.contacts.reach();
+        let mut by_tag: BTreeMap<FaceTag, DVec3> = BTreeMap::new();
+        for triangle in fan {
+            *by_tag.entry(triangle.tag).or_default() += self.area(triangle);
+        }
+        let by_tag: Vec<DVec3> = by_tag.values().map(|n| n.normalize_or_zero()).collect();
+        let facing = |i: usize| {
+            let dots = by_tag.iter().map(|n| n.dot(self.normals[i]));
+            dots.fold(f64::INFINITY, f64::min)
+        };
+        let own = fan.iter().min_by_key(|t| (t.tet, t.opposite)).unwrap().tet;
+        let eligible = |triangle: &BoundaryTriangle| {
+            !triangle.particles.contains(&ParticleId(vertex))
+                && self.may_touch(vertex, own, triangle.tet)
+        };
+        let (mut outside, mut inside) = (Vec::new(), Vec::new());
+        for (i, triangle) in self.triangles.iter().enumerate() {
+            if facing(i) >= 0.2 || !eligible(triangle) {
+                continue;
+            }
+            let closest = closest_on_triangle(self.corners(triangle), x);
+            let distance = closest.point.distance(x);
+            if distance > reach {
+                continue;
+            }
+            let p = triangle.particles;
+            let feature: Vec<ParticleId> = match closest.part {
+                TrianglePart::Face => p.to_vec(),
+                TrianglePart::Side(k) => vec![p[usize::from(k)], p[usize::from(k + 1) % 3]],
+                TrianglePart::Corner(k) => vec![p[usize::from(k)]],
+            };
+            let shares = |i: &usize| {
+                let particles = self.triangles[*i].particles;
+                feature.iter().all(|p| particles.contains(p))
+            };
+            let around: Vec<usize> = match closest.part {
+                TrianglePart::Face => vec![i],
+                _ => self.fans[feature[0].index()]
+                    .iter()
+                    .copied()
+                    .filter(shares)
+                    .collect(),
+            };
+            let distances = around.iter().map(|&i| {
+                let corners = self.corners(&self.triangles[i]);
+                closest_on_triangle(corners, x).point.distance(x)
+            });
+            let nearest = distances.fold(f64::INFINITY, f64::min);
+            if nearest < distance - 1e-9 * self.scene.contacts.mean_edge() {
+                continue;
+            }
+            let eligible = around.iter().filter(|i| eligible(&self.triangles[**i]));
+            // In one plane they face alike but for rounding.
+            let rank = |i: usize| (1e6 * facing(i)).round();
+            let first =
+                eligible.min_by(|&&i, &&j| rank(i).partial_cmp(&rank(j)).unwrap().then(i.cmp(&j)));
+            if first != Some(&i) {
+                continue;
+            }
+            let partners = self.partners.get(&vertex);
+            if partners.is_some_and(|held| p.iter().any(|p| held.contains(&p.0))) {
+                continue;
+            }
+            let weighted = around.iter().map(|&i| {
+                let particles = self.triangles[i].particles;
+                let k = particles.iter().position(|q| *q == feature[0]).unwrap();
+                let corners = self.corners(&self.triangles[i]);
+                let [a, b, c] = [0, 1, 2].map(|i| corners[(k + i) % 3]);
+                let is_corner = matches!(closest.part, TrianglePart::Corner(_));
+                let angle = (b - a).angle_between(c - a);
+                self.normals[i] * if is_corner { angle } else { 1.0 }
+            });
+            let side: DVec3 = weighted.sum();
+            if side.dot(x - closest.point) < 0.0 {
+                inside.push((distance, i, closest, around));
+            } else {
+                outside.push((distance, i));
+            }
+        }
+        let key = |i: usize| {
+            let [a, b, c] = self.triangles[i].particles.map(|p| p.0);
+            [vertex, a, b, c]
+        };
+        outside.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
+        expected
+            .contacts
+            .extend(outside.iter().take(3).map(|o| key(o.1)));
+
+        inside.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
+        let touching = 0.01 * self.scene.contacts.mean_edge();
+        let valid = inside
+            .iter()
+            .take(8)
+            .find(|(distance, i, closest, around)| {
+                let normal = if closest.part == TrianglePart::Face || *distance <= touching {
+                    self.normals[*i]
+                } else {
+                    (closest.point - x) / distance
+                };
+                let depth = normal.dot(closest.point - x);
+                let twice = closest.point - normal * (2.0 * depth);
+                let ends = |to: DVec3| {
+                    let starts = around.iter().map(|&i| self.triangles[i].tet);
+                    let ends = starts.flat_map(|tet| self.reached(tet, closest.point, to));
+                    ends.collect::<Vec<TetId>>()
+                };
+                let is_own = |tet: &TetId| {
+                    self.scene.body.mesh().tets[tet.index()].contains(&ParticleId(vertex))
+                };
+                !ends(twice).is_empty() && ends(x).iter().any(|tet| !is_own(tet))
+            });
+        if let Some((_, i, ..)) = valid {
+            expected.contacts.insert(key(*i));
+            expected.inside.insert(vertex);
+            return;
+        }
+        let tets = self.scene.body.mesh().tets.iter().enumerate();
+        let others = tets.filter(|(_, corners)| !corners.contains(&ParticleId(vertex)));
+        let mut others = others.map(|(t, _)| TetId::new(t));
+        let contains = |tet: TetId| {
+            let inside = || {
+                let coordinates = barycentric(self.tet(tet), x);
+                coordinates.into_iter().all(|b| b > -1e-2)
+            };
+            self.may_touch(vertex, own, tet) && signed_volume(self.tet(tet)) > 0.0 && inside()
+        };
+        if others.any(contains) {
+            expected.deep.insert(vertex);
+        }
+    }
+
+    /// The tets that contain the end of a segment and are reached from a tet along it: each tet that the segment passes
+    /// through is entered from a neighbor that it passes through at the same place.
+    fn reached(&self, start: TetId, from: DVec3, to: DVec3) -> Vec<TetId> {
+        let passed = |tet: TetId| -> Option<[f64; 2]> {
+            if signed_volume(self.tet(tet)) <= 0.0 {
+                return None;
+            }
+            let [first, last] = [from, to].map(|x| barycentric(self.tet(tet), x));
+            let mut range = [0.0_f64, 1.0_f64];
+            for (a, b) in first.into_iter().zip(last) {
+                // Not outside of this face.
+                let (a, b) = (a + 1e-9, b + 1e-9);
+                if a < 0.0 && b < 0.0 {
+                    return None;
+                }
+                if a < 0.0 {
+                    range[0] = range[0].max(a / (a - b));
+                } else if b < 0.0 {
+                    range[1] = range[1].min(a / (a - b));
+                }
+            }
+            (range[0] <= range[1]).then_some(range)
+        };
+        let mut seen = BTreeSet::from([start]);
+        let mut due = VecDeque::from([start]);
+        let mut ends = Vec::new();
+        while let Some(tet) = due.pop_front() {
+            let Some(range) = passed(tet) else { continue };
+            if barycentric(self.tet(tet), to)
+                .into_iter()
+                .all(|b| b >= -1e-9)
+            {
+                ends.push(tet);
+            }
+            // Only by a face that the way leaves this tet by: tets that are folded over each other share places, too.
+            let last = from + (to - from) * range[1];
+            let [leaving, beyond] = [last, to].map(|x| barycentric(self.tet(tet), x));
+            for (k, next) in self.scene.body.neighbors(tet).into_iter().enumerate() {
+                let is_left = leaving[k] < 1e-8 && beyond[k] < -1e-9;
+                let Some(next) = next.filter(|_| is_left) else {
+                    continue;
+                };
+                let Some(other) = passed(next) else { continue };
+                let meet = other[0] - 1e-6 <= range[1] && range[1] <= other[1] + 1e-6;
+                if meet && seen.insert(next) {
+                    due.push_back(next);
+                }
+            }
+        }
+        ends
+    }
+}
+
+fn barycentric(corners: [DVec3; 4], x: DVec3) -> [f64; 4] {
+    let whole = signed_volume(corners);
+    [0, 1, 2, 3].map(|k| {
+        let mut part = corners;
+        part[k] = x;
+        signed_volume(part) / whole
+    })
+}
+
+/// The candidates of the detector.
+pub(crate) fn found(scene: &Scene) -> BTreeSet<Key> {
+    let contacts = scene.contacts.faces().iter();
+    let found: BTreeSet<Key> = contacts.map(|contact| contact.particles).collect();
+    assert_eq!(found.len(), scene.contacts.faces().len(), "each once");
+    found
+}
+
+/// Compares with the slow search after an update that searched; returns what that found.
+pub(crate) fn compare(scene: &Scene) -> Expected {
+    let (found, expected) = (found(scene), expected(scene));
+    let missing: Vec<&Key> = expected.contacts.difference(&found).collect();
+    assert!(
+        missing.is_empty(),
+        "not found: {}",
+        described(scene, &missing)
+    );
+    let mut more: BTreeSet<u32> = BTreeSet::new();
+    for key in found.difference(&expected.contacts) {
+        let vertex = key[0];
+        let is_deep = expected.deep.contains(&vertex);
+        assert!(is_deep, "no contact: {}", described(scene, &[key]));
+        assert!(more.insert(vertex), "{vertex} has several ways out");
+    }
+    expected
+}
+
+/// Where the vertices are to their triangles, for messages.
+fn described(scene: &Scene, keys: &[&Key]) -> String {
+    let describe = |key: &&Key| {
+        let [x, a, b, c] = key.map(|p| scene.positions[p as usize]);
+        let closest = closest_on_triangle([a, b, c], x);
+        let height = (b - a).cross(c - a).normalize().dot(x - closest.point);
+        let distance = closest.point.distance(x);
+        format!("{key:?} {:?} at {distance}, height {height}", closest.part)
+    };
+    keys.iter().map(describe).collect::<Vec<_>>().join("; ")
+}

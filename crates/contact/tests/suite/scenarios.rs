@@ -1,0 +1,504 @@
+//! Named cases: thin walls, overlap, swallowed pieces, sides that slide past each other; what a frame costs and keeps.
+
+use glam::{DQuat, DVec3};
+use incise_contact::{BodyPairs, ContactDetector, ContactError, ContactSettings, FaceContact};
+use incise_mesh::{ParticleId, TetMesh, kuhn_box};
+
+use crate::oracle::compare;
+use crate::scene::{FRAME, Scene, jittered_box};
+
+fn moved(mut mesh: TetMesh, by: DVec3) -> TetMesh {
+    for x in &mut mesh.positions {
+        *x += by;
+    }
+    mesh
+}
+
+/// A plate one tet thick, rolled up to a tube that is open by `gap` or overlaps itself by as much.
+fn rolled(scene: &mut Scene, length: f64, gap: f64) {
+    let radius = (length + gap) / std::f64::consts::TAU;
+    for (x, rest) in scene.positions.iter_mut().zip(&scene.body.mesh().positions) {
+        let angle = rest.x / radius;
+        let r = radius + rest.z;
+        *x = DVec3::new(r * angle.cos(), rest.y, r * angle.sin());
+    }
+}
+
+/// A flat, a bent and a squeezed plate of one layer of tets touches itself nowhere, although front and back are closer
+/// to each other than the search reaches.
+#[test]
+fn a_thin_wall_does_not_touch_itself() {
+    let plate = kuhn_box([12, 4, 1], DVec3::new(1.2, 0.4, 0.02));
+    let mut scene = Scene::new(&[plate], ContactSettings::default());
+    scene.update();
+    assert!(scene.contacts.reach() > 0.02);
+    assert!(scene.contacts.faces().is_empty());
+    for squeeze in [0.9, 0.5, 0.1] {
+        for (x, rest) in scene.positions.iter_mut().zip(&scene.body.mesh().positions) {
+            *x = *rest * DVec3::new(1.0, 1.0, squeeze);
+        }
+        scene.search();
+        assert!(scene.contacts.faces().is_empty(), "squeezed to {squeeze}");
+        assert_eq!((scene.contacts.deep(), scene.contacts.buried()), (0, 0));
+    }
+    rolled(&mut scene, 1.2, 0.3);
+    scene.update();
+    assert!(scene.contacts.faces().is_empty(), "rolled up but open");
+    assert_eq!(scene.contacts.deep(), 0);
+}
+
+/// A plate folded onto itself: what touches are the two inner faces, and nothing through a wall.
+#[test]
+fn a_folded_plate() {
+    let plate = kuhn_box([16, 4, 1], DVec3::new(1.6, 0.4, 0.02));
+    let mut scene = Scene::new(&[plate], ContactSettings::default());
+    for gap in [0.01, 0.0, -0.004] {
+        // Two flat halves, the second turned over, joined by half a turn around the fold.
+        let radius = 0.15;
+        let fold = std::f64::consts::PI * radius;
+        let straight = 0.5 * (1.6 - fold);
+        for (x, rest) in scene.positions.iter_mut().zip(&scene.body.mesh().positions) {
+            let s = rest.x - straight;
+            *x = if s <= 0.0 {
+                DVec3::new(s, rest.y, rest.z)
+            } else if s < fold {
+                let angle = s / radius;
+                let r = radius - rest.z;
+                DVec3::new(r * angle.sin(), rest.y, radius - r * angle.cos())
+            } else {
+                DVec3::new(fold - s, rest.y, 2.0 * radius - rest.z)
+            };
+            // The upper half comes down.
+            if x.z > radius {
+                let share = (-x.x / (0.4 * straight)).clamp(0.0, 1.0);
+                let lowered = x.z - (2.0 * radius - 0.04 - gap);
+                x.z += (lowered - x.z) * share;
+            }
+        }
+        scene.search();
+        compare(&scene);
+        let rest = &scene.body.mesh().positions;
+        assert!(scene.contacts.faces().len() > 10, "gap {gap}");
+        for contact in scene.contacts.faces() {
+            let [vertex, triangle @ ..] = contact.particles;
+            let inner = |p: u32| (rest[p as usize].z - 0.02).abs() < 1e-9;
+            let rim = |p: u32| {
+                let x = rest[p as usize];
+                x.x < 1e-9 || x.x > 1.6 - 1e-9 || x.y < 1e-9 || x.y > 0.4 - 1e-9
+            };
+            assert!(inner(vertex) || rim(vertex), "gap {gap}: {contact:?}");
+            assert!(
+                triangle.into_iter().all(|p| inner(p) || rim(p)),
+                "{contact:?}"
+            );
+            let along = rest[vertex as usize].x - rest[triangle[0] as usize].x;
+            assert!(
+                along.abs() > 0.4,
+                "gap {gap}: the other half, not its own wall"
+            );
+        }
+        assert_eq!(scene.contacts.buried(), 0);
+    }
+}
+
+/// A block pressed into another one, by up to nearly a layer of tets, leaves by the face it came in by.
+#[test]
+fn pushed_into_another_body() {
+    let lower = kuhn_box([4; 3], DVec3::ONE);
+    let upper = moved(
+        kuhn_box([2; 3], DVec3::splat(0.4)),
+        DVec3::new(0.33, 0.31, 1.0),
+    );
+    for depth in [0.02, 0.1, 0.2] {
+        let mut scene = Scene::new(&[lower.clone(), upper.clone()], ContactSettings::default());
+        let steps = 10;
+        for step in 0..=steps {
+            if step > 0 {
+                scene.shift(1, DVec3::new(0.0, 0.0, -depth / f64::from(steps)));
+            }
+            scene.update();
+        }
+        let bottom = |contact: &&FaceContact| {
+            let vertex = contact.particles[0] as usize;
+            vertex >= 125 && (scene.positions[vertex].z - (1.0 - depth)).abs() < 1e-9
+        };
+        let bottoms: Vec<_> = scene.contacts.faces().iter().filter(bottom).collect();
+        assert_eq!(bottoms.len(), 9, "at depth {depth}");
+        for contact in bottoms {
+            let normal = contact.normal_at(&scene.positions);
+            assert!(normal.z > 0.999, "at depth {depth}: {normal}");
+            assert!((contact.gap(&scene.positions) + depth).abs() < 1e-9);
+        }
+        assert_eq!(scene.contacts.buried(), 0, "at depth {depth}");
+    }
+}
+
+/// A small block that starts in the middle of a large one is counted, and so is one that gets there.
+#[test]
+fn swallowed() {
+    let large = kuhn_box([10; 3], DVec3::ONE);
+    let small = kuhn_box([1; 3], DVec3::splat(0.05));
+    let inside = moved(small.clone(), DVec3::splat(0.47));
+    let mut scene = Scene::new(&[large.clone(), inside], ContactSettings::default());
+    scene.update();
+    assert_eq!((scene.contacts.deep(), scene.contacts.buried()), (8, 8));
+    assert!(scene.contacts.faces().is_empty(), "nothing pushes it out");
+
+    let above = moved(small, DVec3::new(0.47, 0.47, 1.01));
+    let mut scene = Scene::new(&[large, above], ContactSettings::default());
+    let mut most_deep = 0;
+    for _ in 0..60 {
+        scene.update();
+        most_deep = most_deep.max(scene.contacts.deep());
+        scene.shift(1, DVec3::new(0.0, 0.0, -0.01));
+    }
+    scene.update();
+    assert_eq!(
+        (
+            most_deep.min(8),
+            scene.contacts.deep(),
+            scene.contacts.buried()
+        ),
+        (8, 8, 8)
+    );
+    // It comes back out.
+    for _ in 0..80 {
+        scene.shift(1, DVec3::new(0.0, 0.0, 0.01));
+        scene.update();
+    }
+    assert_eq!((scene.contacts.deep(), scene.contacts.buried()), (0, 0));
+}
+
+/// Halves of a cut that slide past each other by several edges: each vertex of a cut face that lies over the other side
+/// is held by its pair or by candidates, in every frame, never by both and never by neither.
+#[test]
+fn sliding_past() {
+    for (seed, self_contact) in [(1, true), (2, false)] {
+        let settings = ContactSettings {
+            self_contact,
+            ..ContactSettings::default()
+        };
+        let mut scene = Scene::new(&[jittered_box(6, 0.15, seed)], settings);
+        let options = incise_cutting::CutOptions {
+            snap: 0.0,
+            ..Default::default()
+        };
+        let normal = DVec3::new(0.0, 0.1, 1.0).normalize();
+        scene.cut_with(&options, DVec3::splat(0.52), normal);
+        let slide = normal.cross(DVec3::Y).normalize();
+        let velocity = slide * 1.5;
+        for p in scene.particles_of(1) {
+            scene.velocities[p] = velocity;
+        }
+        let side: Vec<u32> = (0..scene.positions.len())
+            .map(|p| {
+                scene
+                    .pieces
+                    .piece_of(scene.body.around(ParticleId::new(p)).next().unwrap())
+            })
+            .collect();
+        let is_cut = |scene: &Scene, p: usize| {
+            let mut fan = scene.contacts.surface().fan(ParticleId::new(p));
+            fan.any(|t| t.tag == incise_cutting::FaceTag::Cut(0))
+        };
+        let on_cut: Vec<usize> = (0..scene.positions.len())
+            .filter(|&p| is_cut(&scene, p))
+            .collect();
+        let (mut by_pair, mut by_face) = (0, 0);
+        for _ in 0..24 {
+            scene.update();
+            let offset = slide.dot(scene.positions[on_cut[0]])
+                - slide.dot(scene.body.mesh().positions[on_cut[0]]);
+            let offset = if side[on_cut[0]] == 1 {
+                offset
+            } else {
+                let other = on_cut.iter().find(|&&p| side[p] == 1).unwrap();
+                slide.dot(scene.positions[*other] - scene.body.mesh().positions[*other])
+            };
+            for &p in &on_cut {
+                // Well over the other side's face, which spans the unit box moved along.
+                let relative = if side[p] == 1 { offset } else { -offset };
+                let over = scene.body.mesh().positions[p] + slide * relative;
+                let margin = 0.02;
+                let inside = over.x > margin
+                    && over.x < 1.0 - margin
+                    && over.y > margin
+                    && over.y < 1.0 - margin;
+                if !inside {
+                    continue;
+                }
+                let pairs = scene.contacts.pairs().iter();
+                let pairs = pairs
+                    .filter(|pair| pair.particles.contains(&u32::try_from(p).unwrap()))
+                    .count();
+                let faces = scene.contacts.faces().iter();
+                let faces = faces.filter(|contact| {
+                    contact.particles[0] as usize == p
+                        && side[contact.particles[1] as usize] != side[p]
+                        && contact.gap(&scene.positions).abs() < 1e-6
+                });
+                let faces = faces.count();
+                assert!(
+                    (pairs > 0) != (faces > 0),
+                    "{p}: {pairs} pairs, {faces} candidates at {offset}"
+                );
+                by_pair += pairs;
+                by_face += faces;
+            }
+            for (x, v) in scene.positions.iter_mut().zip(&scene.velocities) {
+                *x += *v * FRAME;
+            }
+        }
+        assert!(by_pair > 20 && by_face > 500);
+        assert_eq!(scene.contacts.buried(), 0);
+    }
+}
+
+/// Two halves drawn apart, turned a little and pushed together again: the vertices that are inside the other half are
+/// pushed back to their own side.
+#[test]
+fn pushed_together_again() {
+    let options = incise_cutting::CutOptions {
+        snap: 0.0,
+        ..Default::default()
+    };
+    for shift in [0.0, 1.0 / 3.0, 0.5] {
+        let mut scene = Scene::new(&[jittered_box(4, 0.15, 5)], ContactSettings::default());
+        scene.cut_with(&options, DVec3::splat(0.45), DVec3::Z);
+        scene.update();
+        let up = scene.positions[scene.particles_of(1)[0]].z > 0.45;
+        let away = if up { DVec3::Z } else { -DVec3::Z };
+        for p in scene.particles_of(1) {
+            let x = &mut scene.positions[p];
+            *x = DQuat::from_rotation_z(0.05) * *x + away * 0.3 + DVec3::X * (shift * 0.25);
+        }
+        scene.update();
+        let particles = scene.particles_of(1);
+        for _ in 0..32 {
+            particles
+                .iter()
+                .for_each(|&p| scene.positions[p] -= away * 0.01);
+            scene.update();
+        }
+        compare(&scene);
+        let mut held = 0;
+        for contact in scene.contacts.faces() {
+            let gap = contact.gap(&scene.positions);
+            if (gap + 0.02).abs() < 1e-9 {
+                held += 1;
+                let normal = contact.normal_at(&scene.positions);
+                let own = particles.contains(&(contact.particles[0] as usize));
+                assert!(normal.dot(away) * if own { 1.0 } else { -1.0 } > 0.999);
+            }
+        }
+        assert!(held > 20, "{held} at shift {shift}");
+        assert_eq!(scene.contacts.buried(), 0);
+    }
+}
+
+fn same(one: &ContactDetector, other: &ContactDetector) -> bool {
+    one.faces() == other.faces() && one.pairs() == other.pairs() && one.deep() == other.deep()
+}
+
+/// Results have the same bits for any number of threads.
+#[test]
+fn on_several_threads() {
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| {
+            let bodies = [
+                jittered_box(8, 0.2, 1),
+                moved(jittered_box(8, 0.2, 2), DVec3::new(0.1, 0.05, 0.98)),
+            ];
+            let mut scene = Scene::new(&bodies, ContactSettings::default());
+            let mut seen = Vec::new();
+            for frame in 0..4 {
+                if frame == 1 {
+                    scene.cut(0, DVec3::splat(0.5), DVec3::new(1.0, 0.1, 0.2));
+                }
+                scene.update();
+                seen.push(scene.contacts.clone());
+                let up = scene.positions.iter_mut().filter(|x| x.z > 1.0);
+                up.for_each(|x| *x += DVec3::new(0.02, 0.0, -0.02));
+            }
+            seen
+        })
+    };
+    let one = run(1);
+    assert!(one.iter().all(|contacts| contacts.faces().len() > 50));
+    for threads in [2, 3] {
+        let many = run(threads);
+        assert!(one.iter().zip(&many).all(|(one, other)| same(one, other)));
+    }
+}
+
+/// Once the memory is there, a frame with a search and one without ask for none.
+#[test]
+fn a_frame_asks_for_no_memory() {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .unwrap();
+    pool.install(|| {
+        let bodies = [
+            jittered_box(5, 0.2, 1),
+            moved(jittered_box(5, 0.2, 2), DVec3::new(0.1, 0.05, 0.99)),
+        ];
+        let mut scene = Scene::new(&bodies, ContactSettings::default());
+        scene.cut(0, DVec3::splat(0.5), DVec3::X);
+        let rest = scene.positions.clone();
+        let sway = |scene: &mut Scene, frame: u32| {
+            let by = 0.1 * f64::from(frame % 4);
+            for (x, rest) in scene.positions.iter_mut().zip(&rest) {
+                x.x = if rest.z > 0.985 { rest.x + by } else { rest.x };
+            }
+        };
+        let (mut searched, mut kept) = (0, 0);
+        for frame in 0..16 {
+            sway(&mut scene, frame);
+            for again in 0..2 {
+                let measured = allocation_counter::measure(|| {
+                    let update = scene.update();
+                    (searched, kept) = match update.searched {
+                        true => (searched + 1, kept),
+                        false => (searched, kept + 1),
+                    };
+                });
+                assert!(
+                    frame < 8 || measured.count_total == 0,
+                    "frame {frame}, {again}"
+                );
+            }
+        }
+        assert!(searched >= 12 && kept >= 12, "{searched} and {kept}");
+        assert!(scene.contacts.faces().len() > 50 && !scene.contacts.pairs().is_empty());
+    });
+}
+
+/// The list is kept while nothing comes closer than the search has looked, however the whole moves.
+#[test]
+fn when_a_search_is_due() {
+    let bodies = [
+        kuhn_box([3; 3], DVec3::ONE),
+        moved(kuhn_box([3; 3], DVec3::ONE), DVec3::new(0.0, 0.0, 1.02)),
+    ];
+    let mut scene = Scene::new(&bodies, ContactSettings::default());
+    assert!(scene.update().searched);
+    let first = scene.update();
+    assert!(!first.searched && !first.faces_changed && !first.pairs_changed);
+    // Falling together is no approach.
+    scene.velocities.fill(DVec3::new(0.0, 0.0, -50.0));
+    for _ in 0..5 {
+        scene.positions.iter_mut().for_each(|x| x.z -= 50.0 * FRAME);
+        assert!(!scene.update().searched);
+    }
+    assert_eq!(scene.contacts.intervals(&scene.velocities, FRAME), 1);
+    // Coming closer is.
+    scene.shift(1, DVec3::new(0.3, 0.0, 0.0));
+    assert!(scene.update().searched);
+    scene.update();
+    // A fast body is looked for further away, and asks for shorter frames.
+    let reach = scene.contacts.reach();
+    for p in scene.particles_of(1) {
+        scene.velocities[p].z -= 0.2 * scene.contacts.mean_edge() / FRAME;
+    }
+    assert!(scene.update().searched);
+    assert!(scene.contacts.reach() > reach);
+    assert_eq!(scene.contacts.intervals(&scene.velocities, FRAME), 1);
+    for (speed, intervals) in [(1.0, 2), (3.0, 4), (30.0, 4)] {
+        for p in scene.particles_of(1) {
+            scene.velocities[p] =
+                DVec3::new(0.0, 0.0, -50.0 - speed * scene.contacts.mean_edge() / FRAME);
+        }
+        assert_eq!(
+            scene.contacts.intervals(&scene.velocities, FRAME),
+            intervals
+        );
+    }
+}
+
+/// What degenerates is not touched and does no harm.
+#[test]
+fn collapsed_and_inverted() {
+    let bodies = [
+        kuhn_box([3; 3], DVec3::ONE),
+        moved(kuhn_box([3; 3], DVec3::ONE), DVec3::new(0.01, 0.01, 1.001)),
+    ];
+    let mut scene = Scene::new(&bodies, ContactSettings::default());
+    scene.update();
+    let all = scene.contacts.faces().len();
+    // The upper body is turned inside out, then flattened, then becomes a point.
+    let rest = scene.positions.clone();
+    for scale in [-1.0, 0.0] {
+        for (x, rest) in scene.positions.iter_mut().zip(&rest).skip(64) {
+            let raised = DVec3::Z * (2.5 - 1.5 * f64::abs(scale));
+            *x = *rest * DVec3::new(1.0, 1.0, scale) + raised;
+        }
+        scene.search();
+        for contact in scene.contacts.faces() {
+            assert!(contact.particles[1] < 64, "no triangle of it is touched");
+            assert!(contact.gap(&scene.positions).is_finite());
+            assert!(contact.normal.iter().all(|c| c.is_finite()));
+        }
+    }
+    scene.positions[64..].fill(DVec3::new(0.5, 0.5, 1.0));
+    scene.search();
+    assert!(
+        scene
+            .contacts
+            .faces()
+            .iter()
+            .all(|contact| contact.particles[1] < 64)
+    );
+    scene.positions.clone_from(&rest);
+    scene.search();
+    assert_eq!(scene.contacts.faces().len(), all);
+}
+
+#[test]
+fn what_is_refused() {
+    let body = incise_cutting::CuttableMesh::new(kuhn_box([1; 3], DVec3::ONE)).unwrap();
+    let error = ContactDetector::new(&body, vec![0; 3], ContactSettings::default());
+    let bodies = ContactError::Bodies {
+        given: 3,
+        particles: 8,
+    };
+    assert_eq!(error.unwrap_err(), bodies);
+    let plain = ContactSettings::default;
+    for settings in [
+        ContactSettings {
+            thickness: -1.0,
+            ..plain()
+        },
+        ContactSettings {
+            thickness: f64::NAN,
+            ..plain()
+        },
+        ContactSettings {
+            skin: 0.0,
+            ..plain()
+        },
+        ContactSettings {
+            skin: 1.5,
+            ..plain()
+        },
+        ContactSettings {
+            reach: -0.1,
+            ..plain()
+        },
+        ContactSettings {
+            reach: f64::INFINITY,
+            ..plain()
+        },
+    ] {
+        let error = ContactDetector::new(&body, vec![0; 8], settings.clone());
+        assert!(
+            matches!(error, Err(ContactError::Setting { .. })),
+            "{settings:?}"
+        );
+    }
+    assert!(BodyPairs::Only(vec![[1, 2]]).allow(2, 1));
+}

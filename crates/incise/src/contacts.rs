@@ -1,0 +1,501 @@
+//! [`Contacts`]: what of an island touches, found between its substeps and handed to its solver.
+//!
+//! A detector (`incise-contact`) follows the cuts of the island's mesh and lists what may touch in the frame to come:
+//! pairs of particles across fresh cuts, and vertices near triangles. The lists are colored when their particles
+//! change and handed to the solver before the substeps, in which it decides which of them press. In a frame in which
+//! surfaces approach each other by more than the search looks ahead, the frame is divided and contacts are found again.
+//! What pressed is summed up by pairs of pieces after the frame, for forces and for the events of contacts that begin
+//! and end.
+//!
+//! Bodies that may touch are one island, since what touches is solved together.
+//!
+//! Source: `incise-contact` and `incise-xpbd`. Cost: that of a detector, about 40 ns a contact to color when the list
+//! changes, and a pass over the contacts after the frame.
+
+use std::time::Instant;
+
+use glam::DVec3;
+use incise_coloring::{Order, greedy};
+use incise_contact::{BodyPairs, ContactDetector, ContactSettings, ContactState, ContactSurface};
+use incise_cutting::{CutDelta, CuttableMesh, PieceTracker};
+use incise_graph::{Coloring, Incidence};
+use incise_mesh::{ParticleId, closest_on_triangle};
+use incise_xpbd::{ContactLaw, FaceContact, PairContact};
+
+use crate::backend::{AnySolver, each, each_mut};
+use crate::report::milliseconds;
+use crate::scene::{ContactPairs, ContactSpec};
+use crate::validate::{existing, value, within};
+use crate::{Error, Scene};
+
+/// Bytes of a particle in a detector: its body, the head of its list of triangles, where it was when contacts were searched.
+const PARTICLE: usize = 4 + 4 + 24;
+/// Bytes of a triangle there: corners and tet, its places in the lists of its corners, and its part of the search tree.
+const TRIANGLE: usize = 24 + 24 + 32;
+/// Pieces that have touched do so until their gap is this part of a mean edge.
+const TOUCHING: f64 = 0.02;
+/// The sine of the angle between two triangles from which the edge between them counts as convex.
+const FLAT: f64 = 1e-3;
+/// The cosine between the normals of two triangles below which they face each other, and that above which they do not.
+const FACES: f64 = -0.3;
+const FACES_NOT: f64 = -0.1;
+/// A place in the list of contacts.
+const NO_CONTACT: FaceContact = FaceContact {
+    particles: [0; 4],
+    beyond: None,
+    thickness: 0.0,
+};
+
+/// The pairs of bodies that contact joins into islands, if all that the scene says about it is in its range.
+pub(crate) fn pairs(scene: &Scene, bodies: usize) -> Result<Vec<[usize; 2]>, Error> {
+    let Some(contact) = &scene.contact else {
+        return Ok(Vec::new());
+    };
+    check(contact)?;
+    match &contact.pairs {
+        ContactPairs::All => Ok((1..bodies).map(|body| [0, body]).collect()),
+        ContactPairs::Only(pairs) => {
+            for (i, pair) in pairs.iter().enumerate() {
+                let field = format!("contact.pairs[{i}]");
+                existing(&field, pair[0], bodies)?;
+                existing(&field, pair[1], bodies)?;
+                if pair[0] == pair[1] {
+                    let range = "a pair of different bodies: self_contact is about one body";
+                    return Err(value(field, format!("{pair:?}"), range));
+                }
+            }
+            Ok(pairs.clone())
+        }
+    }
+}
+
+/// Refuses numbers outside their ranges.
+pub(crate) fn check(contact: &ContactSpec) -> Result<(), Error> {
+    within("contact.friction", contact.friction, 0.0, 1e3)?;
+    within("contact.recovery_time", contact.recovery_time, 0.0, 1e3)?;
+    within("contact.thickness", contact.thickness, 0.0, 1e9)?;
+    Ok(())
+}
+
+/// Two pieces that touched in the last frame, by their numbers in an island or in a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct Touch {
+    /// Ascending.
+    pub(crate) pieces: [u32; 2],
+    /// On the second piece in N, the mean of the frame.
+    pub(crate) force: DVec3,
+    /// The torque of the force about the origin in N·m.
+    pub(crate) torque: DVec3,
+}
+
+/// Two pieces that began to touch, or ended it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct TouchChange {
+    /// Ascending.
+    pub(crate) pieces: [u32; 2],
+    pub(crate) begins: bool,
+}
+
+/// Counts and depths of the contacts of an island after a frame.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ContactCounts {
+    pub(crate) candidates: usize,
+    pub(crate) active: usize,
+    pub(crate) colors: usize,
+    pub(crate) buried: usize,
+}
+
+/// What of an island touches.
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct Contacts {
+    detector: ContactDetector,
+    law: ContactLaw,
+    thickness: f64,
+    pair_colors: Coloring,
+    face_colors: Coloring,
+    /// The contacts of vertices as the solver takes them, from the last search.
+    faces: Vec<FaceContact>,
+    /// Ascending by pieces.
+    touches: Vec<Touch>,
+    /// Those of the frame before.
+    #[cfg_attr(feature = "save", serde(skip))]
+    before: Vec<Touch>,
+    /// Pieces that began to touch or ended it in the last frame, until they are asked for.
+    #[cfg_attr(feature = "save", serde(skip))]
+    changes: Vec<TouchChange>,
+    /// What the search and the coloring of the last frame took, until it is asked for.
+    #[cfg_attr(feature = "save", serde(skip))]
+    milliseconds: f64,
+    #[cfg_attr(feature = "save", serde(skip))]
+    room: Room,
+}
+
+/// Memory that each frame uses again. Nothing in it outlives a frame.
+#[derive(Clone, Debug, Default)]
+struct Room {
+    positions: Vec<DVec3>,
+    velocities: Vec<DVec3>,
+    pairs: Vec<PairContact>,
+    /// The touches of the present frame, one a contact.
+    touches: Vec<Touch>,
+}
+
+/// An error of the detector: it comes with wrong input from this crate only, since the scene was checked.
+fn inconsistent(error: incise_contact::ContactError) -> Error {
+    Error::Inconsistent(error.to_string())
+}
+
+fn detector_settings(spec: &ContactSpec) -> ContactSettings {
+    ContactSettings {
+        bodies: match &spec.pairs {
+            ContactPairs::All => BodyPairs::All,
+            ContactPairs::Only(pairs) => {
+                let number = |body: usize| u32::try_from(body).unwrap_or(u32::MAX);
+                BodyPairs::Only(pairs.iter().map(|pair| pair.map(number)).collect())
+            }
+        },
+        self_contact: spec.self_contact,
+        thickness: spec.thickness,
+        ..ContactSettings::default()
+    }
+}
+
+fn law(spec: &ContactSpec) -> ContactLaw {
+    ContactLaw {
+        friction: spec.friction,
+        recovery_time: spec.recovery_time,
+    }
+}
+
+impl Contacts {
+    /// Contact of an island that has not moved; `body_of` has the number in the scene of the body of each particle.
+    pub(crate) fn new(
+        spec: &ContactSpec,
+        mesh: &CuttableMesh,
+        body_of: Vec<u32>,
+    ) -> Result<Self, Error> {
+        let detector = ContactDetector::new(mesh, body_of, detector_settings(spec));
+        Ok(Self {
+            detector: detector.map_err(inconsistent)?,
+            law: law(spec),
+            thickness: spec.thickness,
+            pair_colors: Coloring::default(),
+            face_colors: Coloring::default(),
+            faces: Vec::new(),
+            touches: Vec::new(),
+            before: Vec::new(),
+            changes: Vec::new(),
+            milliseconds: 0.0,
+            room: Room::default(),
+        })
+    }
+
+    /// Takes over other settings from the next frame on.
+    pub(crate) fn set(&mut self, spec: &ContactSpec) -> Result<(), Error> {
+        let settings = detector_settings(spec);
+        self.detector.set_settings(settings).map_err(inconsistent)?;
+        (self.law, self.thickness) = (law(spec), spec.thickness);
+        Ok(())
+    }
+
+    /// Follows a cut or a removal of tets; `mesh` is the one after it.
+    pub(crate) fn apply_delta(&mut self, mesh: &CuttableMesh, delta: &CutDelta) {
+        self.detector.apply_delta(mesh, delta);
+    }
+
+    /// Into how many parts the frame to come is divided.
+    pub(crate) fn begin_frame(&mut self, solver: &AnySolver, time: f64, substeps: u32) -> u32 {
+        let start = Instant::now();
+        self.read(solver);
+        let parts = self.detector.intervals(&self.room.velocities, time);
+        self.room.touches.clear();
+        self.milliseconds = milliseconds(start.elapsed());
+        parts.min(substeps)
+    }
+
+    fn read(&mut self, solver: &AnySolver) {
+        let Room {
+            positions,
+            velocities,
+            ..
+        } = &mut self.room;
+        each!(solver, solver => {
+            solver.positions(positions);
+            velocities.clear();
+            velocities.extend((0..solver.particle_count()).map(|p| solver.velocity(p)));
+        });
+    }
+
+    /// Finds what may touch in the next `time` s, and hands it to the solver.
+    pub(crate) fn update(
+        &mut self,
+        solver: &mut AnySolver,
+        mesh: &CuttableMesh,
+        pieces: &PieceTracker,
+        time: f64,
+    ) -> Result<(), Error> {
+        let start = Instant::now();
+        self.read(solver);
+        let update = self.detector.update(&ContactState {
+            mesh,
+            pieces,
+            positions: &self.room.positions,
+            velocities: &self.room.velocities,
+            frame_time: time,
+        });
+        let particles = self.room.positions.len();
+        let (pairs, faces) = (self.detector.pairs(), self.detector.faces());
+        if update.pairs_changed || pairs.len() != self.pair_colors.vertex_count() {
+            let all = pairs.iter().map(|contact| contact.particles);
+            self.pair_colors = colors(particles, all)?;
+        }
+        if update.searched || faces.len() != self.faces.len() {
+            let (bodies, rest) = (self.detector.body_of(), &mesh.mesh().positions);
+            let thickness = |particles: [u32; 4]| {
+                let [vertex, corner, ..] = particles.map(|p| bodies[p as usize]);
+                if self.thickness > 0.0 && vertex == corner {
+                    let [x, a, b, c] = particles.map(|p| rest[p as usize]);
+                    self.thickness
+                        .min(x.distance(closest_on_triangle([a, b, c], x).point))
+                } else {
+                    self.thickness
+                }
+            };
+            let (surface, positions) = (self.detector.surface(), &self.room.positions);
+            let mut changed = faces.len() != self.face_colors.vertex_count();
+            self.faces.resize(faces.len(), NO_CONTACT);
+            for (contact, out) in faces.iter().zip(&mut self.faces) {
+                let (particles, beyond) = planes(surface, positions, contact.particles);
+                changed |= particles != out.particles;
+                *out = FaceContact {
+                    particles,
+                    beyond,
+                    thickness: thickness(particles),
+                };
+            }
+            if changed {
+                let all = self.faces.iter().map(|contact| contact.particles);
+                self.face_colors = colors(particles, all)?;
+            }
+        }
+        let room = &mut self.room;
+        room.pairs.clear();
+        room.pairs.extend(pairs.iter().map(|contact| PairContact {
+            particles: contact.particles,
+            normal: contact.normal,
+        }));
+        each_mut!(solver, solver => {
+            let pairs = (&room.pairs[..], &self.pair_colors);
+            let faces = (&self.faces[..], &self.face_colors);
+            let set = solver.set_contacts(&self.law, pairs, faces);
+            set.map_err(|source| Error::Xpbd { field: "contact".into(), source })?;
+        });
+        self.milliseconds += milliseconds(start.elapsed());
+        Ok(())
+    }
+
+    /// Notes what pressed in the part of the frame that has ended.
+    pub(crate) fn note(&mut self, solver: &AnySolver, mesh: &CuttableMesh, pieces: &PieceTracker) {
+        let piece_of = |particle: u32| {
+            let mut around = mesh.around(ParticleId(particle));
+            around.next().map(|tet| pieces.piece_of(tet))
+        };
+        let (near, touches) = (TOUCHING * self.detector.mean_edge(), &self.touches);
+        let touched =
+            |pieces: &[u32; 2]| touches.binary_search_by_key(pieces, |t| t.pieces).is_ok();
+        let out = &mut self.room.touches;
+        each!(solver, solver => {
+            for contact in solver.contacts() {
+                let presses = contact.pressure > 0.0;
+                if !presses && contact.depth < -near {
+                    continue;
+                }
+                let of = [contact.against, contact.vertex].map(piece_of);
+                let [Some(against), Some(vertex)] = of else { continue };
+                let key = [against.min(vertex), against.max(vertex)];
+                // A piece that touches itself is not an event, and its forces add up to nothing.
+                if against == vertex || !(presses || touched(&key)) {
+                    continue;
+                }
+                let force = if vertex > against { contact.force } else { -contact.force };
+                let point = solver.position(contact.vertex as usize);
+                out.push(Touch { pieces: key, force, torque: point.cross(force) });
+            }
+        });
+    }
+
+    /// Sums up what was noted, by pieces.
+    pub(crate) fn end_frame(&mut self) {
+        std::mem::swap(&mut self.before, &mut self.touches);
+        self.touches.clear();
+        // Stable, so that sums are taken in the order of solving.
+        self.room.touches.sort_by_key(|touch| touch.pieces);
+        for touch in &self.room.touches {
+            match self.touches.last_mut() {
+                Some(last) if last.pieces == touch.pieces => {
+                    last.force += touch.force;
+                    last.torque += touch.torque;
+                }
+                _ => self.touches.push(*touch),
+            }
+        }
+        let (before, now) = (&self.before, &self.touches);
+        for (these, others, begins) in [(now, before, true), (before, now, false)] {
+            let all = these.iter().map(|touch| touch.pieces);
+            let is_new =
+                |pieces: &[u32; 2]| others.binary_search_by_key(pieces, |t| t.pieces).is_err();
+            let new = all.filter(is_new);
+            self.changes
+                .extend(new.map(|pieces| TouchChange { pieces, begins }));
+        }
+    }
+
+    /// Lets go of all contacts, where there is nothing left that could touch.
+    pub(crate) fn end(&mut self, solver: &mut AnySolver) -> Result<(), Error> {
+        self.room.touches.clear();
+        self.end_frame();
+        (self.pair_colors, self.face_colors) = (Coloring::default(), Coloring::default());
+        self.faces.clear();
+        let none = Coloring::default();
+        each_mut!(solver, solver => {
+            let set = solver.set_contacts(&self.law, (&[], &none), (&[], &none));
+            set.map_err(|source| Error::Xpbd { field: "contact".into(), source })
+        })
+    }
+
+    /// Pieces that touched in the last frame, ascending.
+    pub(crate) fn touches(&self) -> &[Touch] {
+        &self.touches
+    }
+
+    /// Takes the pieces that began to touch in the last frame, then those that ended it, each ascending.
+    pub(crate) fn take_changes(&mut self) -> Vec<TouchChange> {
+        std::mem::take(&mut self.changes)
+    }
+
+    /// Takes the milliseconds that finding and coloring took in the last frame.
+    pub(crate) fn take_milliseconds(&mut self) -> f64 {
+        std::mem::take(&mut self.milliseconds)
+    }
+
+    /// Counts, and appends to `depths` how deep each contact is that pressed or overlaps, in mean edges.
+    pub(crate) fn count(&self, solver: &AnySolver, depths: &mut Vec<f64>) -> ContactCounts {
+        let edge = self.detector.mean_edge();
+        let mut counts = ContactCounts {
+            buried: self.detector.buried(),
+            ..ContactCounts::default()
+        };
+        each!(solver, solver => {
+            counts.colors = solver.contact_color_count();
+            counts.candidates = solver.contact_counts().iter().sum();
+            for contact in solver.contacts() {
+                let presses = contact.pressure > 0.0;
+                counts.active += usize::from(presses);
+                if presses || contact.depth > 0.0 {
+                    depths.push(contact.depth.max(0.0) / edge);
+                }
+            }
+        });
+        counts
+    }
+
+    /// About the bytes of a copy.
+    pub(crate) fn bytes(&self) -> usize {
+        let particles = self.detector.body_of().len();
+        let triangles = self.detector.surface().triangle_count();
+        particles * PARTICLE
+            + triangles * TRIANGLE
+            + size_of_val(&*self.faces)
+            + size_of_val(self.detector.faces())
+            + size_of_val(self.detector.pairs())
+    }
+
+    /// Recomputes what follows from the mesh and compares.
+    pub(crate) fn check(&self, mesh: &CuttableMesh) -> Result<(), Error> {
+        self.detector.check(mesh).map_err(inconsistent)
+    }
+}
+
+/// Colors by first fit in the order of the list, which is that of its keys.
+fn colors<const K: usize>(
+    particles: usize,
+    contacts: impl Iterator<Item = [u32; K]>,
+) -> Result<Coloring, Error> {
+    let incidence = Incidence::from_constraints(particles, contacts)?;
+    Ok(greedy(&incidence, Order::Natural))
+}
+
+/// A vertex and a triangle, turned so that the edge nearest to the vertex runs from the first corner to the second, and,
+/// if that edge is convex, the normal of the surface beyond it in the basis of the triangle.
+///
+/// Of the two surfaces, one that no triangle around the vertex faces cannot be what it meets, if the other one is faced:
+/// at the rim of a cut the vertices of one side meet the cut face of the other side and not its outer surface. Then the
+/// contact is with the other surface alone.
+fn planes(
+    surface: &ContactSurface,
+    positions: &[DVec3],
+    contact: [u32; 4],
+) -> ([u32; 4], Option<[f64; 3]>) {
+    let at = |p: u32| positions[p as usize];
+    let [vertex, corners @ ..] = contact;
+    let [a, b, c] = corners.map(at);
+    let area = (b - a).cross(c - a);
+    // Of the edge opposite to each corner: the area of the triangle that it makes with the foot of the vertex.
+    let weight = |k: usize| {
+        let [from, to] = [1, 2].map(|step| at(corners[(k + step) % 3]));
+        (to - from).cross(at(vertex) - from).dot(area)
+    };
+    let weights = [0, 1, 2].map(weight);
+    let least = |least: usize, k: usize| {
+        if weights[k] < weights[least] {
+            k
+        } else {
+            least
+        }
+    };
+    let opposite = (1..3).fold(0, least);
+    let [p, q, r] = [1, 2, 3].map(|step| corners[(opposite + step) % 3]);
+    let turned = [vertex, p, q, r];
+    let mut others = surface.fan(ParticleId(p)).filter_map(|triangle| {
+        let numbers = triangle.particles.map(|p| p.0);
+        // Neighbors run along a common edge in opposite directions.
+        let k = (0..3).find(|&k| numbers[k] == q && numbers[(k + 1) % 3] == p)?;
+        Some(numbers[(k + 2) % 3])
+    });
+    let Some(other) = others.next() else {
+        return (turned, None);
+    };
+    let (x, e1, e2) = (at(p), at(q) - at(p), at(r) - at(p));
+    let way = at(other) - x;
+    // Convex: the other triangle bends away from the plane of this one.
+    let is_convex = area.dot(way) < -FLAT * area.length() * way.length();
+    let normals = [area.try_normalize(), way.cross(e1).try_normalize()];
+    let [Some(own), Some(normal)] = normals else {
+        return (turned, None);
+    };
+    if !is_convex {
+        return (turned, None);
+    }
+    let around = surface.fan(ParticleId(vertex)).filter_map(|triangle| {
+        let [a, b, c] = triangle.particles.map(|p| positions[p.index()]);
+        (b - a).cross(c - a).try_normalize()
+    });
+    let (mut to_own, mut to_other) = (1.0_f64, 1.0_f64);
+    for around in around {
+        to_own = to_own.min(around.dot(own));
+        to_other = to_other.min(around.dot(normal));
+    }
+    if to_own < FACES && to_other > FACES_NOT {
+        return (turned, None);
+    }
+    if to_other < FACES && to_own > FACES_NOT && other != vertex {
+        return ([vertex, q, p, other], None);
+    }
+    // In the basis: the part along the area, and the rest by the normal equations of both edges.
+    let square = area.length_squared();
+    let second = e1.cross(normal).dot(area) / square;
+    let first = normal.cross(e2).dot(area) / square;
+    (turned, Some([first, second, normal.dot(area) / square]))
+}
