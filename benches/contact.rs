@@ -16,13 +16,21 @@ fn main() {
     incise_benches::run("contact", |bench| {
         let mut body = CuttableMesh::new(bench.case.mesh.clone()).unwrap();
         let body_of = vec![0; body.mesh().positions.len()];
-        let before = ContactDetector::new(&body, body_of, ContactSettings::default()).unwrap();
+        let mut before = ContactDetector::new(&body, body_of, ContactSettings::default()).unwrap();
         let mut pieces = PieceTracker::new(&body);
         let plane = Plane {
             point: bench.case.at([0.48, 0.5, 0.5]),
             normal: DVec3::new(1.0, 0.03, 0.02),
         };
         let positions = body.mesh().positions.clone();
+        // With a tree over the body as it was.
+        before.update(&ContactState {
+            mesh: &body,
+            pieces: &pieces,
+            positions: &positions,
+            velocities: &vec![DVec3::ZERO; positions.len()],
+            frame_time: 1.0 / 60.0,
+        });
         let delta = cut_plane(&mut body, &positions, &plane, &CutOptions::default()).unwrap();
         pieces.apply_delta(&body, &delta);
         measure(bench, &body, &pieces, &delta, &before);
@@ -55,7 +63,6 @@ fn measure(
         );
     });
     let mut contacts = before.clone();
-    update(&mut contacts, &positions[..]);
     contacts.apply_delta(body, delta);
     let followed = contacts.clone();
     bench.measure_per("search-after-cut", delta.removed.len(), |b| {

@@ -294,7 +294,7 @@ impl ContactDetector {
     /// If positions or velocities are not as many as the particles of the mesh, or a delta was left out.
     ///
     /// # Determinism
-    /// The same bits for any number of threads.
+    /// Equal input gives the same bits for any number of threads.
     pub fn update(&mut self, state: &ContactState<'_>) -> ContactUpdate {
         let particles = state.mesh.mesh().positions.len();
         assert_eq!(

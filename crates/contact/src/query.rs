@@ -462,12 +462,15 @@ impl Query<'_> {
     }
 
     fn is_inside(&self, tet: TetId, vertex: &Vertex<'_>) -> bool {
+        // Cheap, and true of most tets around a vertex that touches nothing.
+        if self.is_own(tet, vertex) {
+            return false;
+        }
         let barycentric = Barycentric::new(self.tet_corners(tet));
-        let inside = barycentric.is_some_and(|coordinates| {
+        barycentric.is_some_and(|coordinates| {
             let coordinates = coordinates.of(vertex.behind);
             coordinates.iter().all(|&b| b >= 0.0)
-        });
-        inside && !self.is_own(tet, vertex)
+        })
     }
 
     /// The tet that contains a vertex that was in `tet` at the last search.
