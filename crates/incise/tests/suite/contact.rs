@@ -576,7 +576,7 @@ fn only_pairs_that_are_named_touch() {
     let particles = simulation.positions().len() / 3;
     let [first, second, third] = [0, 1, 2].map(|b| {
         simulation
-            .place_of(incise::mesh::ParticleId::new(b * particles))
+            .location_of(incise::mesh::ParticleId::new(b * particles))
             .0
     });
     assert!(first == second && third != first);
