@@ -17,10 +17,10 @@ struct Settings {
     particles: u32,
     // Places that a thread has for tets.
     depth: u32,
-    // Colliders, handles, and what hangs on those rigidly or by a compliance.
+    // Numbers of colliders, handles, and rigid and soft attachments.
     colliders: u32,
     handles: u32,
-    held: u32,
+    rigid: u32,
     soft: u32,
     // l/mu, gamma and the damping time, where there is but one material; then 0, which compilers must not know.
     material: vec4<f32>,

@@ -11,7 +11,7 @@ use incise_mesh_io::MeshIoError;
 use incise_meshing::{MeshingError, Shape};
 use incise_xpbd::XpbdError;
 
-use crate::scene::suggestion;
+use crate::names::suggestion;
 
 /// Why a scene could not be read or run.
 #[derive(Debug, thiserror::Error)]

@@ -43,6 +43,7 @@ mod live_blade;
 mod measure;
 mod merged_mesh;
 mod method;
+mod names;
 mod partition;
 mod pieces;
 mod ray;

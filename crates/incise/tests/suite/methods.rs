@@ -113,9 +113,9 @@ fn chebyshev_without_extrapolation_is_jacobi() {
         simulation.positions().to_vec()
     };
     let jacobi = run("method = \"jacobi\"");
-    assert!(jacobi == run("method = \"chebyshev\"\ndelay = 20"));
+    assert!(jacobi == run("method = \"chebyshev\"\nchebyshev_start = 20"));
     assert!(jacobi == run("method = \"chebyshev\"\nspectral_radius = 0.0"));
-    assert!(jacobi != run("method = \"chebyshev\"\ndelay = 5"));
+    assert!(jacobi != run("method = \"chebyshev\"\nchebyshev_start = 5"));
     assert!(run("method = \"chebyshev\"\nspectral_radius = 0.5") != run("method = \"chebyshev\""));
 }
 

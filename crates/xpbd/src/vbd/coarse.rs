@@ -18,6 +18,9 @@ use crate::Float;
 /// new.
 const AGED: f64 = 0.75;
 
+/// In a frame with a cut, which has a new matrix to fill, a factor is stale only below this part of its first rate.
+const AGED_IN_CUT: f64 = 0.5;
+
 /// Iterations from which the rate of convergence of a solution is judged: fewer say nothing about the factor.
 const RATED_ITERATIONS: u32 = 8;
 
@@ -54,7 +57,9 @@ struct Age {
     first: Option<f64>,
     /// Solutions with it.
     solutions: u32,
-    /// Whether there is a factor that has not become too old.
+    /// The rate of the last solution over the first one.
+    relative: f64,
+    /// Whether there is a factor and every row has an aggregate.
     usable: bool,
 }
 
@@ -137,18 +142,24 @@ impl Coarse {
         self.count
     }
 
-    /// Whether motions and factor are rebuilt for the next solution.
-    pub(super) fn is_stale(&self) -> bool {
-        !self.age.usable
+    /// Whether motions and factor are rebuilt for the next solution. In a frame with a cut they wait, unless they have
+    /// become much worse.
+    pub(super) fn is_stale(&self, is_cut: bool) -> bool {
+        if !self.age.usable {
+            return true;
+        }
+        match is_cut {
+            true => self.age.relative < AGED_IN_CUT,
+            false => self.age.relative < AGED || self.age.solutions >= OLDEST,
+        }
     }
 
     /// Notes that a solution with this factor took `iterations` to bring the energy that is left to the part `left`.
     pub(super) fn note(&mut self, iterations: u32, left: f64) {
         self.age.solutions += 1;
-        self.age.usable = self.age.solutions < OLDEST;
         if iterations >= RATED_ITERATIONS && left > 0.0 {
             let rate = -left.ln() / f64::from(iterations);
-            self.age.usable &= rate >= AGED * *self.age.first.get_or_insert(rate);
+            self.age.relative = rate / *self.age.first.get_or_insert(rate);
         }
     }
 
@@ -235,6 +246,7 @@ impl Coarse {
         self.cholesky.factor();
         self.age = Age {
             usable: true,
+            relative: 1.0,
             ..Age::default()
         };
     }

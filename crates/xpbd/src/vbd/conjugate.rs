@@ -15,9 +15,10 @@ use std::ops::Range;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::PARALLEL_ROWS;
 use super::block::{Block, apply, solve};
 use super::coarse::Coarse;
-use super::matrix::{Blocks, PARALLEL_ROWS};
+use super::matrix::Blocks;
 use crate::Float;
 use crate::float::finite;
 

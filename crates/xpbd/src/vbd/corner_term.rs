@@ -52,7 +52,7 @@ impl<R: Float> CornerTerm<R> {
 
     /// What a corner sees of a tet, computed in double precision and rounded once; `None` if the tet takes no part.
     pub(super) fn new(tet: &TetConstraint<f64>, corner: usize) -> Option<Self> {
-        if tet.stiffness <= 0.0 {
+        if !takes_part(tet) {
             return None;
         }
         let q = rows(tet);
@@ -65,6 +65,11 @@ impl<R: Float> CornerTerm<R> {
             target: R::from_f64(volume[1]),
         })
     }
+}
+
+/// Whether a tet has elastic energy: removed tets have none.
+pub(super) fn takes_part<R: Float>(tet: &TetConstraint<R>) -> bool {
+    tet.stiffness > R::ZERO
 }
 
 /// The gradients of the four barycentric coordinates of a tet at rest.

@@ -103,6 +103,8 @@ pub struct CoarseCorrection<R: Float> {
     base: Vec<R::Vector>,
     /// The substep time and held rows that the matrix was filled for, while it may be kept.
     filled: Option<(R, Vec<bool>)>,
+    /// Whether the stars have changed since the last frame.
+    is_cut: bool,
 }
 
 /// The part of the accuracy wanted that conjugate gradients may use up.
@@ -157,12 +159,12 @@ impl<R: Float> CoarseCorrection<R> {
         if settings.aggregate == 0 {
             return refuse("aggregate", 0.0, "at least 1");
         }
-        let matrix = Blocks::new(stars);
+        let matrix = Blocks::new(&stars.data);
         let (of, count) = aggregates(&matrix.offsets, &matrix.columns, settings.aggregate);
         Ok(Self {
             settings,
-            first_rows: stars.order.len(),
-            order: stars.order.clone(),
+            first_rows: stars.data.order.len(),
+            order: stars.data.order.clone(),
             matrix,
             coarse: Coarse::new(of, count),
             conjugate: Conjugate::default(),
@@ -170,6 +172,7 @@ impl<R: Float> CoarseCorrection<R> {
             force: Vec::new(),
             base: Vec::new(),
             filled: None,
+            is_cut: false,
         })
     }
 
@@ -177,10 +180,11 @@ impl<R: Float> CoarseCorrection<R> {
     /// new ones join those around them, and the factor stays in use. When it has aged, as many aggregates are grown
     /// again, larger ones if cuts have added particles. O(pairs).
     pub fn sync(&mut self, stars: &VertexStars<R>) {
-        let old = std::mem::replace(&mut self.order, stars.order.clone());
-        self.matrix.sync(stars);
+        let old = std::mem::replace(&mut self.order, stars.data.order.clone());
+        self.matrix.sync(&stars.data);
         self.coarse.sync(&old, &self.order, &self.matrix);
         self.filled = None;
+        self.is_cut = true;
     }
 
     /// Returns the number of aggregates.
@@ -199,13 +203,15 @@ impl<R: Float> Solver<R> {
         settings: &VbdSettings,
     ) -> Result<VbdReport, XpbdError> {
         let mut idle = 0;
-        self.frame_of_vbd(stars, settings, CORRECTION_PENALTY, |step| {
+        let report = self.frame_of_vbd(stars, settings, CORRECTION_PENALTY, |step| {
             step.sweep();
             let report = step.correct(correction);
             idle = if report.taken > 0.0 { 0 } else { idle + 1 };
             step.error = Some(report.error);
             idle < IDLE_ROUNDS && step.accuracy.is_none_or(|accuracy| report.error > accuracy)
-        })
+        });
+        correction.is_cut = false;
+        report
     }
 }
 
@@ -227,16 +233,17 @@ impl<R: Float> ImplicitStep<'_, R> {
             force,
             base,
             filled,
+            is_cut,
             ..
         } = correction;
-        let rows = self.stars.order.len();
+        let rows = self.stars.data.order.len();
         assert!(
-            matrix.belongs_to(self.stars),
+            matrix.belongs_to(&self.stars.data),
             "the correction belongs to these stars"
         );
         held.clear();
         base.clear();
-        for &p in &self.stars.order {
+        for &p in &self.stars.data.order {
             let particle = &self.solver.particles.cells[p as usize];
             let x = load::<R>(particle);
             let touching = self.solver.constraints.colliders.touches(x);
@@ -254,7 +261,7 @@ impl<R: Float> ImplicitStep<'_, R> {
             conjugate.prepare(matrix, held);
             *filled = Some((self.time, held.clone()));
         }
-        if coarse.is_stale() {
+        if coarse.is_stale(*is_cut) {
             if coarse.is_outdated() {
                 // The factor grows with the cube of their number, so aggregates grow with the body.
                 let size = settings.aggregate * rows / (*first_rows).max(1);
@@ -275,7 +282,7 @@ impl<R: Float> ImplicitStep<'_, R> {
             reduction: settings.reduction,
             energy: |gain: f64| accuracy * accuracy * energy(gain),
         };
-        let colors = &self.stars.colors;
+        let colors = &self.stars.data.colors;
         let mut solved = conjugate.solve(matrix, coarse, colors, force, held, &limits);
         let is_violent = |slope: f64| 0.5 * slope > CALM * energy(0.5 * slope);
         if is_kept && is_violent(solved.slope) {
@@ -343,7 +350,7 @@ impl<R: Float> ImplicitStep<'_, R> {
     fn take_back_risen_parts(&self, before: &[f64], rounding: f64, base: &[R::Vector]) {
         let mut after = vec![0.0; before.len()];
         self.add_potentials(&mut after);
-        for (&p, &x) in self.stars.order.iter().zip(base) {
+        for (&p, &x) in self.stars.data.order.iter().zip(base) {
             let part = self.stars.parts[p as usize] as usize;
             // What is no number has not fallen.
             let is_sound = after[part] - before[part] <= rounding;
@@ -371,7 +378,7 @@ impl<R: Float> ImplicitStep<'_, R> {
         let place = |part: f64| {
             let part = R::from_f64(part);
             let mut sound = true;
-            for ((&p, &x), &d) in self.stars.order.iter().zip(base).zip(direction) {
+            for ((&p, &x), &d) in self.stars.data.order.iter().zip(base).zip(direction) {
                 let moved = x + d * part;
                 sound &= finite::<R>(moved);
                 store::<R>(

@@ -29,15 +29,20 @@ mod correction;
 mod hessian;
 mod history;
 mod matrix;
+mod newton_matrix;
 mod settings;
 mod stars;
 mod start;
 mod state;
 mod step;
 mod sweep;
+mod vertex_stars;
 mod viscosity;
+
+/// Rows a thread takes at a time.
+const PARALLEL_ROWS: usize = 512;
 
 pub use correction::{CoarseCorrection, CoarseCorrectionReport, CoarseCorrectionSettings};
 pub use settings::{Guess, Integrator, VbdSettings};
-pub use stars::VertexStars;
 pub use step::{ImplicitStep, VbdReport};
+pub use vertex_stars::VertexStars;

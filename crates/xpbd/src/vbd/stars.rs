@@ -1,4 +1,4 @@
-//! [`VertexStars`]: the tets around each particle, in the order in which VBD visits them.
+//! [`StarData`]: the tets and constraints of each particle, in the order in which VBD visits particles.
 //!
 //! Particles that share a tet must not move at the same time. So particles play the part that constraints play in
 //! XPBD: each is a constraint on its tets ([`Solver::star_incidence`]), any coloring algorithm colors them, and a
@@ -7,58 +7,38 @@
 //! a sweep from front to back.
 
 use incise_graph::{DisjointSets, GraphError, Incidence, Schedule};
+use rayon::prelude::*;
 
+use super::PARALLEL_ROWS;
 use super::constraints::ConstraintTerms;
-use super::corner_term::CornerTerm;
-use super::history::History;
-use super::viscosity::Viscosity;
+use super::corner_term::{CornerTerm, takes_part};
 use crate::constraints::ScalarConstraint;
 use crate::{Float, Solver};
 
-/// The tets around each particle, sorted by the particles of a schedule, for VBD.
-///
-/// Valid for the tets, distances and volume constraints of the solver when it was created. After a cut, or any other
-/// change of these, update it with [`VertexStars::rebuild`]. Positions, velocities, masses, attachments and fixed
-/// particles may change at any time.
+/// The tets and constraints of each particle, sorted by the particles of a schedule.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(bound = ""))]
-pub struct VertexStars<R: Float> {
+pub(super) struct StarData<R: Float> {
     /// Particles in solving order.
     pub(super) order: Vec<u32>,
-    /// Where each color ends in `order`, a 0 before the first.
+    /// The end of each color in `order`, after a 0.
     pub(super) colors: Vec<usize>,
-    /// Where the terms of each particle of `order` end, a 0 before the first.
+    /// The end of the terms of each particle of `order`, after a 0.
     pub(super) offsets: Vec<usize>,
     pub(super) terms: Vec<CornerTerm<R>>,
     /// The tet of each term.
     pub(super) tets: Vec<u32>,
-    pub(super) tet_count: usize,
-    /// The edge of a cube that holds the mean tet at rest, in m: what is small beside it is nothing.
+    tet_count: usize,
+    /// The edge of a cube with the mean rest volume of a tet, in m: the scale of negligible lengths.
     pub(super) size: f64,
-    /// Velocities a substep ago, kept only for [`super::Guess::Adaptive`].
-    pub(super) earlier: Vec<R::Vector>,
-    /// Whether a start nearer to the last positions may save work: since a step was not calm, until such a start does
-    /// not help.
-    pub(super) try_start: bool,
-    /// The smallest particle of each particle's connected part of the body, if known.
-    pub(super) parts: Vec<u32>,
-    /// Kept only for [`super::Integrator::Bdf2`].
-    pub(super) history: History<R>,
     /// Distances, volumes and attachments.
     pub(super) constraints: ConstraintTerms<R>,
-    /// Made by the first substep in which a material is damped.
-    pub(super) viscosity: Option<Box<Viscosity<R>>>,
 }
 
-impl<R: Float> VertexStars<R> {
-    /// Sorts the tets of a solver by the particles of a schedule. O(tets).
-    ///
-    /// # Errors
-    /// If the schedule does not list every particle once, or has particles of one tet in one color
-    /// ([`Schedule::check`] on [`Solver::star_incidence`]).
-    pub fn new(solver: &Solver<R>, schedule: &Schedule) -> Result<Self, GraphError> {
-        let mut stars = Self {
+impl<R: Float> Default for StarData<R> {
+    fn default() -> Self {
+        Self {
             order: Vec::new(),
             colors: Vec::new(),
             offsets: Vec::new(),
@@ -66,23 +46,18 @@ impl<R: Float> VertexStars<R> {
             tets: Vec::new(),
             tet_count: 0,
             size: 0.0,
-            earlier: Vec::new(),
-            try_start: true,
-            parts: Vec::new(),
-            history: History::default(),
             constraints: ConstraintTerms::default(),
-            viscosity: None,
-        };
-        stars.rebuild(solver, &solver.star_incidence(), schedule)?;
-        Ok(stars)
+        }
     }
+}
 
+impl<R: Float> StarData<R> {
     /// Rebuilds the stars in place after tets have changed, given the [`Solver::star_incidence`] of the present tets,
     /// and reuses memory. O(tets).
     ///
     /// # Errors
-    /// Those of [`VertexStars::new`]; nothing has changed then.
-    pub fn rebuild(
+    /// Those of [`Schedule::check`]; nothing has changed then.
+    pub(super) fn rebuild(
         &mut self,
         solver: &Solver<R>,
         incidence: &Incidence,
@@ -101,112 +76,84 @@ impl<R: Float> VertexStars<R> {
         self.offsets.push(0);
         self.terms.clear();
         self.tets.clear();
-        for p in schedule.order() {
-            for &t in incidence.particles_of(p as usize) {
-                // What comes after the tets are distances and volumes.
-                let Some(tet) = solver.tets.list.get(t as usize) else {
-                    break;
-                };
-                let tet = tet.to_f64();
-                let corner = tet.particles.iter().position(|&corner| corner == p);
-                if let Some(term) = corner.and_then(|corner| CornerTerm::new(&tet, corner)) {
-                    self.terms.push(term);
-                    self.tets.push(t);
-                }
-            }
-            self.offsets.push(self.terms.len());
+        let list = &solver.tets.list;
+        // What comes after the tets are distances and volumes.
+        let tets_of = |p: u32| {
+            let elements = incidence.particles_of(p as usize).iter();
+            elements.map_while(|&t| Some((t, list.get(t as usize)?)))
+        };
+        let mut end = 0;
+        for &p in &self.order {
+            end += tets_of(p).filter(|(_, tet)| takes_part(tet)).count();
+            self.offsets.push(end);
         }
+        let terms = self.order.par_iter().with_min_len(PARALLEL_ROWS);
+        let terms = terms.flat_map_iter(|&p| {
+            tets_of(p).filter_map(move |(t, tet)| {
+                let corner = tet.particles.iter().position(|&corner| corner == p)?;
+                Some((CornerTerm::new(&tet.to_f64(), corner)?, t))
+            })
+        });
+        let mut lists = (
+            std::mem::take(&mut self.terms),
+            std::mem::take(&mut self.tets),
+        );
+        lists.par_extend(terms);
+        (self.terms, self.tets) = lists;
         self.tet_count = solver.tet_count();
         let volume = solver.tets.rest_volumes.iter().sum::<f64>();
         self.size = (6.0 * volume / self.tet_count.max(1) as f64)
             .max(0.0)
             .cbrt();
-        self.parts.clear();
-        self.try_start = true;
         self.constraints.rebuild(solver, &self.order, incidence);
-        self.viscosity = None;
         Ok(())
     }
 
-    /// Returns the bytes of all arrays. O(1).
-    #[must_use]
-    pub fn bytes(&self) -> usize {
+    /// Bytes of all arrays.
+    pub(super) fn bytes(&self) -> usize {
         size_of_val(&*self.order)
             + size_of_val(&*self.colors)
             + size_of_val(&*self.offsets)
             + size_of_val(&*self.terms)
             + size_of_val(&*self.tets)
-            + size_of_val(&*self.earlier)
-            + size_of_val(&*self.parts)
-            + self.history.bytes()
             + self.constraints.bytes()
-            + self.viscosity.as_ref().map_or(0, |v| v.bytes())
     }
 
-    /// Returns the number of colors.
-    #[must_use]
-    pub fn color_count(&self) -> usize {
-        self.colors.len() - 1
-    }
-
-    /// Returns the number of pairs of a particle and one of its tets, to which the cost of a sweep is proportional.
-    #[must_use]
-    pub fn pair_count(&self) -> usize {
-        self.terms.len()
-    }
-
-    /// The terms of the particle at a place in the order.
+    /// The terms of the particle at a position in the order.
     #[inline]
-    pub(super) fn of(&self, place: usize) -> &[CornerTerm<R>] {
-        &self.terms[self.offsets[place]..self.offsets[place + 1]]
+    pub(super) fn of(&self, row: usize) -> &[CornerTerm<R>] {
+        &self.terms[self.offsets[row]..self.offsets[row + 1]]
     }
 
-    /// The smallest particle of each particle's connected part of the body. O(tets), but nothing while the stars stay
-    /// the same.
-    pub(super) fn parts(&mut self, solver: &Solver<R>) -> &[u32] {
-        if self.parts.len() != self.order.len() {
-            let mut sets = DisjointSets::new(self.order.len());
-            for tet in &solver.tets.list {
-                let [a, others @ ..] = tet.particles;
-                for b in others {
-                    sets.unite(a, b);
-                }
+    /// The smallest particle of each particle's connected part of the body. O(tets).
+    pub(super) fn parts(&self, solver: &Solver<R>) -> Vec<u32> {
+        let mut sets = DisjointSets::new(self.order.len());
+        for tet in &solver.tets.list {
+            let [a, others @ ..] = tet.particles;
+            for b in others {
+                sets.unite(a, b);
             }
-            for (row, &p) in self.order.iter().enumerate() {
-                for q in self.constraints.neighbors(row) {
-                    sets.unite(p, q);
-                }
-            }
-            self.parts = sets.roots();
         }
-        &self.parts
+        for (row, &p) in self.order.iter().enumerate() {
+            for q in self.constraints.neighbors(row) {
+                sets.unite(p, q);
+            }
+        }
+        sets.roots()
     }
 
-    /// Whether these are the stars of as many particles, tets and constraints.
+    /// Tests whether the numbers of particles, tets and constraints are those of a solver.
     pub(super) fn fits(&self, solver: &Solver<R>) -> bool {
         self.order.len() == solver.particle_count()
             && self.tet_count == solver.tet_count()
             && self.constraints.fits(solver)
-    }
-
-    /// Prepares what is constant in a substep: constraints and viscosity.
-    pub(super) fn begin(&mut self, solver: &Solver<R>, time: f64, penalty: f64) {
-        self.constraints.begin(solver, time, penalty);
-        if !solver.tets.is_damped() {
-            self.viscosity = None;
-            return;
-        }
-        let viscosity = self.viscosity.take();
-        let mut viscosity = viscosity.unwrap_or_else(|| Box::new(Viscosity::new(self)));
-        viscosity.fill(solver, self, time);
-        self.viscosity = Some(viscosity);
     }
 }
 
 impl<R: Float> Solver<R> {
     /// Returns the tets, distances and volume constraints of each particle. Particle p is constraint p of the result;
     /// its particles are the tets, then the distances, then the volume constraints. Color and schedule this for
-    /// [`VertexStars`]: particles of one color share none of them. O(tets + constraints).
+    /// [`VertexStars`](crate::VertexStars): particles of one color share none of them. O(tets + constraints).
     ///
     /// # Panics
     /// With more than 2^30 tets.

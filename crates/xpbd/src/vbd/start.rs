@@ -209,8 +209,8 @@ impl<R: Float> ImplicitStep<'_, R> {
             }
         }
         if 0 < known && known < count {
-            for (row, &p) in self.stars.order.iter().enumerate() {
-                let around = self.stars.of(row).iter().flat_map(|term| term.others);
+            for (row, &p) in self.stars.data.order.iter().enumerate() {
+                let around = self.stars.data.of(row).iter().flat_map(|term| term.others);
                 let around = around.filter(|&q| (q as usize) < known);
                 if (p as usize) < known
                     || weight::<R>(&self.solver.particles.cells[p as usize]) <= R::ZERO

@@ -45,7 +45,7 @@ impl<R: Float> ImplicitStep<'_, R> {
         let elastic = parts.iter().sum();
         parts.extend((0..solver.particle_count()).map(|p| self.inertia(p)));
         parts.extend(self.dissipated());
-        let constraints = &self.stars.constraints;
+        let constraints = &self.stars.data.constraints;
         if !constraints.is_empty() {
             parts.push(constraints.energy(solver, &|p| solver.particles.local(p as usize)));
         }
@@ -80,11 +80,11 @@ impl<R: Float> ImplicitStep<'_, R> {
         for (p, &part) in parts.iter().enumerate() {
             sums[part as usize] += self.inertia(p);
         }
-        for (&p, energy) in self.stars.order.iter().zip(self.dissipated()) {
+        for (&p, energy) in self.stars.data.order.iter().zip(self.dissipated()) {
             sums[of(p)] += energy;
         }
         let position = |p: u32| solver.particles.local(p as usize);
-        for (p, energy) in self.stars.constraints.energies(solver, &position) {
+        for (p, energy) in self.stars.data.constraints.energies(solver, &position) {
             sums[of(p)] += energy;
         }
     }
@@ -105,7 +105,7 @@ impl<R: Float> ImplicitStep<'_, R> {
         };
         let particles = &self.solver.particles;
         let motion = |p: usize| particles.local(p) - R::to_dvec3(particles.previous[p]);
-        let order = &self.stars.order;
+        let order = &self.stars.data.order;
         let rows = (0..order.len()).into_par_iter().with_min_len(PARALLEL_TETS);
         rows.map(|row| {
             let force = viscosity.exact_force(row, order, &motion);
@@ -170,11 +170,11 @@ impl<R: Float> ImplicitStep<'_, R> {
         }
         if let Some(viscosity) = &self.stars.viscosity {
             let motion = |p: usize| position(p) - R::to_dvec3(solver.particles.previous[p]);
-            for (row, &p) in self.stars.order.iter().enumerate() {
-                out[p as usize] += viscosity.exact_force(row, &self.stars.order, &motion);
+            for (row, &p) in self.stars.data.order.iter().enumerate() {
+                out[p as usize] += viscosity.exact_force(row, &self.stars.data.order, &motion);
             }
         }
-        let constraints = &self.stars.constraints;
+        let constraints = &self.stars.data.constraints;
         if !constraints.is_empty() {
             constraints.add_forces(solver, &|p| position(p as usize), out);
         }

@@ -152,7 +152,7 @@ impl<'a, R: Float> ImplicitStep<'a, R> {
         substep: Substep,
     ) -> Self {
         assert!(
-            stars.fits(solver),
+            stars.data.fits(solver),
             "the stars belong to these particles, tets and constraints"
         );
         let own = StepSettings {
@@ -237,7 +237,7 @@ impl<'a, R: Float> ImplicitStep<'a, R> {
     /// does after each iteration; no effect without hard constraints. It changes potential and forces, which are zero
     /// only where the constraints are met as well.
     pub fn update_multipliers(&mut self) {
-        self.stars.constraints.update_multipliers(self.solver);
+        self.stars.data.constraints.update_multipliers(self.solver);
     }
 
     /// Ends the substep: computes velocities from the motion.

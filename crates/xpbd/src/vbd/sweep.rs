@@ -34,13 +34,13 @@ impl<R: Float> ImplicitStep<'_, R> {
             time: self.time,
             per_time_squared: R::ONE / (self.time * self.time),
             relaxation: R::from_f64(self.settings.relaxation),
-            nudge: R::from_f64(NUDGE * self.stars.size),
+            nudge: R::from_f64(NUDGE * self.stars.data.size),
         };
         let threads = rayon::current_num_threads();
         let (solver, stars) = (&*self.solver, &*self.stars);
         for color in 0..stars.color_count() {
-            let rows = stars.colors[color]..stars.colors[color + 1];
-            let pairs = stars.offsets[rows.end] - stars.offsets[rows.start];
+            let rows = stars.data.colors[color]..stars.data.colors[color + 1];
+            let pairs = stars.data.offsets[rows.end] - stars.data.offsets[rows.start];
             if threads == 1 || pairs < PARALLEL_PAIRS {
                 rows.for_each(|row| sweep.step_vbd(solver, stars, row));
             } else {
@@ -65,7 +65,7 @@ impl<R: Float> Sweep<R> {
             ..
         } = solver;
         let obstacles = &*constraints.colliders.obstacles;
-        let p = stars.order[row] as usize;
+        let p = stars.data.order[row] as usize;
         let particle = &particles.cells[p];
         let inverse_mass = weight::<R>(particle);
         if inverse_mass <= R::ZERO {
@@ -78,7 +78,7 @@ impl<R: Float> Sweep<R> {
         let mut force = (free - x) * inertia;
         let mut isotropic = inertia;
         let mut h = [R::ZERO; 6];
-        for term in stars.of(row) {
+        for term in stars.data.of(row) {
             let corner = term.at(particles, x);
             force += corner.force;
             let [wa, wb, wc] = term.pulls;
@@ -91,13 +91,13 @@ impl<R: Float> Sweep<R> {
             h[4] += v * w;
             h[5] += w * w;
         }
-        let collapsed = h[0] + h[3] + h[5] == R::ZERO && !stars.of(row).is_empty();
+        let collapsed = h[0] + h[3] + h[5] == R::ZERO && !stars.data.of(row).is_empty();
         if let Some(viscosity) = &stars.viscosity {
             let motion = |p: usize| load::<R>(&particles.cells[p]) - particles.previous[p];
-            force += viscosity.force(row, &stars.order, motion);
+            force += viscosity.force(row, &stars.data.order, motion);
             viscosity.add_diagonal(row, &mut h);
         }
-        let mut step = if stars.constraints.is_empty() {
+        let mut step = if stars.data.constraints.is_empty() {
             solve(isotropic, h, force) * self.relaxation
         } else {
             let tets = Local {
@@ -105,10 +105,13 @@ impl<R: Float> Sweep<R> {
                 h,
                 force,
             };
-            let (step, local) =
-                stars
-                    .constraints
-                    .minimize(solver, &stars.order, row, &tets, self.relaxation);
+            let (step, local) = stars.data.constraints.minimize(
+                solver,
+                &stars.data.order,
+                row,
+                &tets,
+                self.relaxation,
+            );
             (isotropic, h) = (local.isotropic, local.h);
             step
         };

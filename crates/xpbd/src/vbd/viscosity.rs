@@ -18,10 +18,11 @@
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use super::VertexStars;
+use super::PARALLEL_ROWS;
 use super::block::{add_outer, add_symmetric, apply};
 use super::corner_term::{OTHERS, rows};
-use super::matrix::{Blocks, PARALLEL_ROWS, row_slices};
+use super::matrix::{Blocks, row_slices};
+use super::stars::StarData;
 use crate::float::finite;
 use crate::neo_hookean::TetConstraint;
 use crate::{Float, Solver};
@@ -84,7 +85,7 @@ impl<R: Float> ViscousTet<R> {
 
 impl<R: Float> Viscosity<R> {
     /// The pattern of some stars; no values yet.
-    pub(super) fn new(stars: &VertexStars<R>) -> Self {
+    pub(super) fn new(stars: &StarData<R>) -> Self {
         Self {
             matrix: Blocks::new(stars),
             tets: Vec::new(),
@@ -97,7 +98,7 @@ impl<R: Float> Viscosity<R> {
     }
 
     /// Assembles the matrix of a substep from the positions at its start.
-    pub(super) fn fill(&mut self, solver: &Solver<R>, stars: &VertexStars<R>, time: f64) {
+    pub(super) fn fill(&mut self, solver: &Solver<R>, stars: &StarData<R>, time: f64) {
         let tets = solver.tets.list.par_iter().with_min_len(PARALLEL_ROWS);
         tets.zip(&solver.tets.material_of)
             .map(|(tet, &material)| {
