@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub enum Method {
     /// Gauss-Seidel, or two-level VBD for a body whose accuracy needs more than `max_substeps`. VBD is chosen only where
     /// `substeps`, `iterations`, `relaxation`, `tet_solve` and `kappa_limit` have their defaults, not on a GPU, and not in
-    /// scenes with colliders, where an impact of a stiff body does not converge within a frame.
+    /// scenes with contact or colliders, where an impact of a stiff body does not converge within a frame.
     #[default]
     Auto,
     /// XPBD by colored Gauss-Seidel: each constraint uses the corrections of those before it.
