@@ -9,6 +9,8 @@ use crate::surface::Tangent;
 /// A meeting within this fraction of the edge's length from the tangent plane of an end is that same surface again,
 /// bent to its particles; one further away is another sheet of a stroke that came back.
 pub(crate) const SAME_SHEET: f64 = 0.25;
+/// Surfaces whose normals have at least this cosine run the same way.
+pub(crate) const ALIGNED: f64 = 0.9;
 /// How much further from the surface than before a particle that it was bent to may be and stay on it: rounding between
 /// two runs of the same stroke, and a body that moved a little in between.
 pub(crate) const AGAIN: f64 = 1.01;
@@ -42,6 +44,16 @@ pub(crate) struct CrossedEdge {
     pub(crate) tangent: Tangent,
     /// On which side the ends were seen.
     pub(crate) sides: [Option<bool>; 2],
+    /// The segment of the blade.
+    pub(crate) segment: usize,
     /// Number of hits.
     pub(crate) meetings: usize,
+}
+
+impl CrossedEdge {
+    /// Swaps the sides of the surface.
+    pub(crate) fn turn(&mut self) {
+        self.tangent.normal = -self.tangent.normal;
+        self.sides = self.sides.map(|side| side.map(|side| !side));
+    }
 }

@@ -45,6 +45,8 @@ pub(crate) struct EdgeHit {
     pub(crate) upwards: bool,
     /// On which side of the surface the two ends are, as far as this says.
     pub(crate) sides: [Option<bool>; 2],
+    /// The segment of the blade, from 0.
+    pub(crate) segment: usize,
 }
 
 /// The meetings of an edge with a blade segment during a frame, in order of time; at most three.
@@ -74,6 +76,7 @@ pub(crate) fn meetings(
             normal,
             upwards,
             sides: [Some(!upwards), Some(upwards)],
+            segment: 0,
         })
     })
 }

@@ -31,8 +31,11 @@ impl Blade for MovingBlade {
         edge: &MovingSegment,
         keep: impl Fn(&EdgeHit) -> bool,
     ) -> Option<(EdgeHit, usize)> {
-        let near = self.0.iter().filter(|swept| !swept.misses(edge));
-        let all = near.flat_map(|swept| meetings(edge, &swept.segment));
+        let near = self.0.iter().enumerate();
+        let near = near.filter(|(_, swept)| !swept.misses(edge));
+        let all = near.flat_map(|(segment, swept)| {
+            meetings(edge, &swept.segment).map(move |m| EdgeHit { segment, ..m })
+        });
         let first = all.filter(keep).min_by(|m, n| m.time.total_cmp(&n.time))?;
         Some((first, 1))
     }

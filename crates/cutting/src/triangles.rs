@@ -137,6 +137,7 @@ impl TriangleSurface {
             normal: self.normals[triangle],
             upwards: at_a < at_b,
             sides: [None; 2],
+            segment: 0,
         })
     }
 

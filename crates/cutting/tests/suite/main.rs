@@ -6,6 +6,7 @@ mod bodies;
 mod deltas;
 mod joins;
 mod level_sets;
+mod passes;
 mod pieces;
 mod planes;
 mod programs;
