@@ -30,8 +30,9 @@ pub(crate) trait Blade: Sync {
     /// How often one edge can be met.
     fn most_meetings(&self) -> usize;
 
-    /// On which side of it a point lies, if it stands and can tell. `reach` is a guess at the distance.
-    fn side(&self, x: DVec3, reach: f64) -> Option<bool>;
+    /// On which side of it a point lies, if it can tell. `reach` is a guess at the distance, `drift` how the material
+    /// there has moved in the frame.
+    fn side(&self, x: DVec3, reach: f64, drift: DVec3) -> Option<bool>;
 
     /// Its normal, of any length, at a point that it touches while it stands. `length` is that of the longest edge
     /// there.

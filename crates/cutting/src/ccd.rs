@@ -21,12 +21,12 @@ pub(crate) struct MovingSegment {
 }
 
 impl MovingSegment {
-    fn at(&self, time: f64) -> [DVec3; 2] {
+    pub(crate) fn at(&self, time: f64) -> [DVec3; 2] {
         // Exact at both ends of the frame, unlike `a + (b - a) * t`.
         [0, 1].map(|i| self.before[i] * (1.0 - time) + self.now[i] * time)
     }
 
-    fn velocity(&self, parameter: f64) -> DVec3 {
+    pub(crate) fn velocity(&self, parameter: f64) -> DVec3 {
         let [a, b] = [0, 1].map(|i| self.now[i] - self.before[i]);
         a + (b - a) * parameter
     }

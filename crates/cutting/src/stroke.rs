@@ -29,7 +29,7 @@ use crate::blade::{ALIGNED, Blade, CrossedEdge, SAME_SHEET};
 use crate::ccd::{EdgeHit, MovingSegment};
 use crate::operation::{Crossing, Operation, SplitError};
 use crate::parallel;
-use crate::side_labels::{GivenSides, Sides, standing_side};
+use crate::side_labels::{GivenSides, Sides, side_by_blade};
 use crate::sign_split::linear;
 use crate::stroke_registry::StrokeRegistry;
 use crate::surface::{CutSurface, Tangent};
@@ -169,9 +169,10 @@ impl Stroke {
         let seeds = self.seeds(operation.cuttable, &fresh);
         let along = operation.cuttable.tets_around(&seeds);
         let mesh = &operation.cuttable.mesh;
-        let standing =
-            |corners: [ParticleId; 4]| standing_side(&self.surface, blade, corners, &motion.now);
-        let sides = Sides::new(mesh, &self.surface, &mut self.given, &along, standing);
+        let by_blade = |corners: [ParticleId; 4]| {
+            side_by_blade(&self.surface, blade, self.turned, corners, motion)
+        };
+        let sides = Sides::new(mesh, &self.surface, &mut self.given, &along, by_blade);
         let on = |p| self.surface.contains(p);
         operation.separate(&seeds, on, |face| sides.differ(face.tets));
         let delta = operation.finish(|rest, c| self.surface.side(rest, c));
