@@ -4,6 +4,7 @@
 
 mod bends;
 mod bodies;
+mod crumbs;
 mod deltas;
 mod joins;
 mod level_sets;
