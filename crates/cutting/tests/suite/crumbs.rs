@@ -246,6 +246,35 @@ fn many_short_strokes() {
     }
 }
 
+/// Cuts that cross at the largest snap distance leave no pieces of a single tet.
+#[test]
+fn single_tets_at_the_largest_snap_distance() {
+    let mut single = [0, 0];
+    for seed in 0..40_u64 {
+        let mesh = jittered_box(6, 0.1, seed);
+        let direction = |k: usize| DVec3::from_array([0, 1, 2].map(|j| noise(seed, 3 * k + j)));
+        for (single, options) in single
+            .iter_mut()
+            .zip([without_crumbs_kept(0.25), options(0.25)])
+        {
+            let mut body = CuttableMesh::new(mesh.clone()).unwrap();
+            for i in 0..4 {
+                let before = body.mesh().clone();
+                let plane = Plane {
+                    point: DVec3::splat(0.5) + 0.05 * direction(i),
+                    normal: direction(i),
+                };
+                let delta = cut_plane(&mut body, &before.positions, &plane, &options).unwrap();
+                check_cut(&before, &body, &delta);
+            }
+            let sizes = body.mesh().pieces().sizes();
+            *single += sizes.iter().filter(|size| **size == 1).count();
+        }
+    }
+    let [loose, kept] = single;
+    assert!(loose > 0 && kept == 0, "{kept} of {loose}");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 

@@ -15,6 +15,7 @@ mod programs;
 mod removal;
 mod scenarios;
 mod separation;
+mod soak;
 mod surfaces;
 mod sweeps;
 mod symmetry;
