@@ -9,6 +9,8 @@ use crate::surface::Tangent;
 /// A meeting within this fraction of the edge's length from the tangent plane of an end is that same surface again,
 /// bent to its particles; one further away is another sheet of a stroke that came back.
 pub(crate) const SAME_SHEET: f64 = 0.25;
+/// Surfaces whose normals have at least this cosine run the same way.
+pub(crate) const ALIGNED: f64 = 0.9;
 /// How much further from the surface than before a particle that it was bent to may be and stay on it: rounding between
 /// two runs of the same stroke, and a body that moved a little in between.
 pub(crate) const AGAIN: f64 = 1.01;
@@ -28,8 +30,9 @@ pub(crate) trait Blade: Sync {
     /// How often one edge can be met.
     fn most_meetings(&self) -> usize;
 
-    /// On which side of it a point lies, if it stands and can tell. `reach` is a guess at the distance.
-    fn side(&self, x: DVec3, reach: f64) -> Option<bool>;
+    /// On which side of it a point lies, if it can tell. `reach` is a guess at the distance, `drift` how the material
+    /// there has moved in the frame.
+    fn side(&self, x: DVec3, reach: f64, drift: DVec3) -> Option<bool>;
 
     /// Its normal, of any length, at a point that it touches while it stands. `length` is that of the longest edge
     /// there.
@@ -42,6 +45,16 @@ pub(crate) struct CrossedEdge {
     pub(crate) tangent: Tangent,
     /// On which side the ends were seen.
     pub(crate) sides: [Option<bool>; 2],
+    /// The segment of the blade.
+    pub(crate) segment: usize,
     /// Number of hits.
     pub(crate) meetings: usize,
+}
+
+impl CrossedEdge {
+    /// Swaps the sides of the surface.
+    pub(crate) fn turn(&mut self) {
+        self.tangent.normal = -self.tangent.normal;
+        self.sides = self.sides.map(|side| side.map(|side| !side));
+    }
 }

@@ -21,12 +21,12 @@ pub(crate) struct MovingSegment {
 }
 
 impl MovingSegment {
-    fn at(&self, time: f64) -> [DVec3; 2] {
+    pub(crate) fn at(&self, time: f64) -> [DVec3; 2] {
         // Exact at both ends of the frame, unlike `a + (b - a) * t`.
         [0, 1].map(|i| self.before[i] * (1.0 - time) + self.now[i] * time)
     }
 
-    fn velocity(&self, parameter: f64) -> DVec3 {
+    pub(crate) fn velocity(&self, parameter: f64) -> DVec3 {
         let [a, b] = [0, 1].map(|i| self.now[i] - self.before[i]);
         a + (b - a) * parameter
     }
@@ -45,6 +45,8 @@ pub(crate) struct EdgeHit {
     pub(crate) upwards: bool,
     /// On which side of the surface the two ends are, as far as this says.
     pub(crate) sides: [Option<bool>; 2],
+    /// The segment of the blade, from 0.
+    pub(crate) segment: usize,
 }
 
 /// The meetings of an edge with a blade segment during a frame, in order of time; at most three.
@@ -74,6 +76,7 @@ pub(crate) fn meetings(
             normal,
             upwards,
             sides: [Some(!upwards), Some(upwards)],
+            segment: 0,
         })
     })
 }

@@ -21,6 +21,8 @@ pub struct CuttableMesh {
     pub(crate) faces: Faces,
     /// How far planes and level sets were bent to particles. Never iterated.
     pub(crate) bent: HashMap<ParticleId, f64, FixedState>,
+    /// The mean volume of the tets that the mesh was made of, in m³.
+    pub(crate) mean_volume: f64,
 }
 
 impl CuttableMesh {
@@ -32,7 +34,9 @@ impl CuttableMesh {
         mesh.check()?;
         let stars = VertexStars::new(&mesh);
         let faces = Faces::new(&mesh);
+        let mean_volume = mesh.total_volume() / mesh.tets.len().max(1) as f64;
         Ok(Self {
+            mean_volume,
             mesh,
             stars,
             faces,

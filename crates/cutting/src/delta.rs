@@ -133,6 +133,11 @@ pub struct CutDelta {
     pub surface_added: Vec<BoundaryTriangle>,
     /// Number of particles that the surface was snapped to.
     pub snapped: usize,
+    /// Parts too small to come off, which stayed with the other side of the cut. A moving blade may find one in several
+    /// frames.
+    pub crumbs: usize,
+    /// Rest volume of the crumbs in m³.
+    pub crumb_volume: f64,
     /// Snapped particles of a plane or level set that no earlier cut had snapped to, kept for undo.
     pub bent: Vec<ParticleId>,
     /// The smallest volume of a child as a fraction of its parent's (1 if none was cut).

@@ -61,6 +61,12 @@ pub enum CutError {
         /// The value given.
         value: f64,
     },
+    /// Size of crumbs outside its range.
+    #[error("crumbs is {value}: it must lie between 0 and 100 mean tets")]
+    Crumbs {
+        /// The value given.
+        value: f64,
+    },
     /// A cut would make too many tets.
     #[error(
         "the cut would leave {tets} tets and {limit} are allowed: cut less at once, use a coarser mesh or raise the limit"

@@ -32,6 +32,7 @@ mod broad_phase;
 mod ccd;
 mod closest;
 mod component_search;
+mod crumbs;
 mod cuttable;
 mod delta;
 mod error;

@@ -66,6 +66,8 @@ pub(crate) struct Operation<'a> {
     pub(crate) delta: CutDelta,
     tag: FaceTag,
     max_tets: usize,
+    /// Parts of a smaller volume do not come off, in m³.
+    pub(crate) crumb_limit: f64,
     first: BTreeMap<TetId, Original>,
     /// For each new slot the slot of the tet it was a part of before the operation.
     ancestors: Vec<TetId>,
@@ -79,9 +81,11 @@ impl<'a> Operation<'a> {
             worst_volume_ratio: 1.0,
             ..CutDelta::default()
         };
+        let crumb_limit = options.crumbs * cuttable.mean_volume;
         Self {
             cuttable,
             delta,
+            crumb_limit,
             tag: FaceTag::Cut(options.tag),
             max_tets: options.max_tets,
             first: BTreeMap::new(),

@@ -38,6 +38,9 @@ pub struct CutOptions {
     /// alone does not guarantee it, crossings snap from farther away. A tet whose edges are crossed in several steps of
     /// one frame counts as several parents.
     pub min_volume_ratio: f64,
+    /// Size of a crumb, from 0 (off) to 100: a part that would come off and has less than this times the mean volume of
+    /// the original tets stays with the other side of the cut ([`crate::CutDelta::crumbs`] counts them).
+    pub crumbs: f64,
     /// Criterion by which the body separates.
     pub separation: Separation,
     /// Number that opened faces are tagged with ([`crate::FaceTag::Cut`]).
@@ -47,12 +50,13 @@ pub struct CutOptions {
 }
 
 impl Default for CutOptions {
-    /// Snap 0.1, tolerance 1e-9, no further guard, separation by cut faces, tag 0, at most 2²⁶ tets.
+    /// Snap 0.1, tolerance 1e-9, no further guard, crumbs below half a tet, separation by cut faces, tag 0, at most 2²⁶ tets.
     fn default() -> Self {
         Self {
             snap: 0.1,
             tolerance: 1e-9,
             min_volume_ratio: 0.0,
+            crumbs: 0.5,
             separation: Separation::CutFaces,
             tag: 0,
             max_tets: 1 << 26,
@@ -64,7 +68,7 @@ impl CutOptions {
     /// Checks the ranges of the values.
     ///
     /// # Errors
-    /// [`CutError::Snap`], [`CutError::Tolerance`] or [`CutError::Guard`] if one lies outside its range.
+    /// [`CutError::Snap`], [`CutError::Tolerance`], [`CutError::Guard`] or [`CutError::Crumbs`] if one lies outside its range.
     pub fn check(&self) -> Result<(), CutError> {
         if !(0.0..=0.25).contains(&self.snap) {
             return Err(CutError::Snap { value: self.snap });
@@ -78,6 +82,9 @@ impl CutOptions {
             return Err(CutError::Guard {
                 value: self.min_volume_ratio,
             });
+        }
+        if !(0.0..=100.0).contains(&self.crumbs) {
+            return Err(CutError::Crumbs { value: self.crumbs });
         }
         Ok(())
     }

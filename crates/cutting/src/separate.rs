@@ -14,6 +14,7 @@
 
 use incise_mesh::{DisjointSets, ParticleId, TetId};
 
+use crate::crumbs::Crumbs;
 use crate::faces::{Behind, Face};
 use crate::index::index;
 use crate::operation::Operation;
@@ -43,7 +44,7 @@ impl Star {
 
 impl Operation<'_> {
     /// Takes the star of each of `seeds` (ascending, all on the surface) apart along the faces that are cut: those with
-    /// all particles `on` the surface whose tets it `parts`.
+    /// all particles `on` the surface whose tets it `parts`, unless a crumb keeps them.
     ///
     /// Both are asked about particles and faces as they were before separation.
     pub(crate) fn separate(
@@ -52,23 +53,31 @@ impl Operation<'_> {
         on: impl Fn(ParticleId) -> bool,
         parts: impl Fn(&SharedFace) -> bool,
     ) {
+        let is_cut = |operation: &Operation<'_>, face: Face| {
+            let Behind::Twin(twin) = operation.cuttable.faces.behind(face) else {
+                return true;
+            };
+            let mesh = &operation.cuttable.mesh;
+            let mut particles = face.particles(mesh).into_iter();
+            particles.all(|p| on(operation.source(p))) && {
+                let tets = [face.tet(), twin.tet()];
+                let corners = tets.map(|t| mesh.tets[t.index()].map(|p| operation.source(p)));
+                parts(&SharedFace { tets, corners })
+            }
+        };
+        let mut crumbs = Crumbs::new(self.crumb_limit);
         self.separate_with(seeds, |operation, star| {
             for i in 0..star.tets.len() {
                 for (face, other) in operation.inner_faces(star, i) {
-                    let particles = face.particles(&operation.cuttable.mesh);
-                    let mut others = particles.into_iter().filter(|&p| p != star.particle);
-                    let is_cut = others.all(|p| on(operation.source(p))) && {
-                        let tets = [star.tets[i], star.tets[other]];
-                        let corners = tets.map(|t| operation.cuttable.mesh.tets[t.index()]);
-                        let corners = corners.map(|tet| tet.map(|p| operation.source(p)));
-                        parts(&SharedFace { tets, corners })
-                    };
-                    if !is_cut {
+                    if !is_cut(operation, face) || crumbs.keep(operation, face, &is_cut) {
                         star.join(i, other);
                     }
                 }
             }
         });
+        let (count, volume) = crumbs.kept(self);
+        self.delta.crumbs += count;
+        self.delta.crumb_volume += volume;
     }
 
     /// Separates by the paper's criterion: tets of a star stay together if they share another particle that `ties`.

@@ -15,6 +15,7 @@ use incise_mesh::{DisjointSets, ParticleId, TetId, TetMesh};
 use crate::CutDelta;
 use crate::blade::Blade;
 use crate::index::index;
+use crate::stroke::Motion;
 use crate::surface::CutSurface;
 
 /// The sides given to tets with all particles on the surface, for as long as they are not split.
@@ -57,36 +58,52 @@ pub(crate) struct Sides {
 }
 
 impl Sides {
-    /// Finds the sides of `tets`, which ascend. `standing` tells the side of a tet, if the blade can still be asked.
+    /// Finds the sides of `tets`, which ascend. `by_blade` tells the side of a tet, if the blade can be asked, and whether
+    /// that is only the side to prefer among those of its neighbors.
     pub(crate) fn new(
         mesh: &TetMesh,
         surface: &CutSurface,
         given: &mut GivenSides,
         tets: &[TetId],
-        standing: impl Fn([ParticleId; 4]) -> Option<bool>,
+        by_blade: impl Fn([ParticleId; 4]) -> Option<BladeSide>,
     ) -> Self {
         let told = |tet: &TetId| {
             let corners = mesh.tets[tet.index()];
-            if let Some(side) = standing(corners) {
-                return Some(side);
-            }
+            let preferred = match by_blade(corners) {
+                Some(BladeSide::Known(side)) => return (Some(side), None),
+                Some(BladeSide::Preferred(side)) => Some(side),
+                None => None,
+            };
             let whole = corners.iter().all(|&p| surface.contains(p));
-            if whole {
+            let side = if whole {
                 given.0.get(tet).copied()
             } else {
                 Some(surface.side(&mesh.positions, corners))
-            }
+            };
+            (side, preferred)
         };
-        let mut side: Vec<Option<bool>> = tets.iter().map(told).collect();
+        let (mut side, preferred): (Vec<Option<bool>>, Vec<_>) = tets.iter().map(told).unzip();
         let open: Vec<usize> = (0..tets.len()).filter(|&i| side[i].is_none()).collect();
         if !open.is_empty() {
             let mut sets = DisjointSets::new(tets.len());
-            for (_, one, other) in shared_faces(mesh, surface, tets) {
-                let (a, b) = (sets.root(one), sets.root(other));
-                let [of_a, of_b] = [a, b].map(|set| side[set as usize]);
-                if a != b && (of_a.is_none() || of_b.is_none()) {
-                    sets.unite(a, b);
-                    side[a.min(b) as usize] = of_a.or(of_b);
+            let shared = shared_faces(mesh, surface, tets);
+            // First across faces where it leads to the side preferred.
+            let passes = if open.iter().any(|&i| preferred[i].is_some()) {
+                [true, false].as_slice()
+            } else {
+                &[false]
+            };
+            for &only_preferred in passes {
+                for &(_, one, other) in &shared {
+                    let (a, b) = (sets.root(one), sets.root(other));
+                    let [of_a, of_b] = [a, b].map(|set| side[set as usize]);
+                    let [for_a, for_b] =
+                        [(a, of_a), (b, of_b)].map(|(set, side)| side.or(preferred[set as usize]));
+                    let leads = !only_preferred || (for_a.is_some() && for_a == for_b);
+                    if a != b && leads && (of_a.is_none() || of_b.is_none()) {
+                        sets.unite(a, b);
+                        side[a.min(b) as usize] = of_a.or(of_b);
+                    }
                 }
             }
             for i in open {
@@ -109,32 +126,59 @@ impl Sides {
     }
 }
 
-/// The side of a tet from where the blade stands: the one that its particles off the surface are on if they agree, else
-/// the one its center is on. `None` where the blade moves, or joins another whose place is not known.
-pub(crate) fn standing_side(
+/// The side of a tet from where the blade is.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum BladeSide {
+    Known(bool),
+    /// If a neighbor has it, too.
+    Preferred(bool),
+}
+
+/// The side of a tet from where the blade is: the one that its particles off the surface are on if they agree, else the
+/// one its center is on. `None` where the blade cannot tell, or joins another whose place is not known.
+///
+/// Of tets with all particles on the surface a moving blade is not sure: what it meets next may put their neighbors on
+/// another side, and they would be chips.
+///
+/// `turned` says whether the sides of the surface are the other way around than those of the blade.
+pub(crate) fn side_by_blade<B: Blade>(
     surface: &CutSurface,
-    blade: &impl Blade,
+    blade: &B,
+    turned: bool,
     corners: [ParticleId; 4],
-    now: &[DVec3],
-) -> Option<bool> {
+    motion: &Motion,
+) -> Option<BladeSide> {
     if corners.iter().any(|&p| surface.is_adopted(p)) {
         return None;
     }
-    let at = corners.map(|p| now[p.index()]);
+    let at = corners.map(|p| motion.now[p.index()]);
     let center = at.iter().sum::<DVec3>() * 0.25;
+    let before = corners.map(|p| motion.before[p.index()]);
+    let drift = center - before.iter().sum::<DVec3>() * 0.25;
     let reach = at.iter().map(|x| x.distance(center)).fold(0.0, f64::max);
+    let side = |x: DVec3, reach: f64| {
+        let natural = blade.side(x, reach, drift)?;
+        Some(natural != turned)
+    };
     let mut agreed = None;
     for (particle, x) in corners.into_iter().zip(at) {
         if surface.contains(particle) {
             continue;
         }
         let seen = surface.seen(particle);
-        let side = seen.or_else(|| blade.side(x, 2.0 * reach))?;
-        if *agreed.get_or_insert(side) != side {
-            return blade.side(center, reach);
+        let of_corner = seen.or_else(|| side(x, 2.0 * reach))?;
+        if *agreed.get_or_insert(of_corner) != of_corner {
+            agreed = None;
+            break;
         }
     }
-    agreed.or_else(|| blade.side(center, reach))
+    let whole = corners.iter().all(|&p| surface.contains(p));
+    let side = agreed.or_else(|| side(center, reach))?;
+    Some(if B::IS_SWEPT && whole {
+        BladeSide::Preferred(side)
+    } else {
+        BladeSide::Known(side)
+    })
 }
 
 /// Pairs of tets with a common face, by ascending alignment of the face with the surface.

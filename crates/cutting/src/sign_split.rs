@@ -8,9 +8,14 @@
 use incise_mesh::ParticleId;
 
 use crate::blade::AGAIN;
+use crate::delta::FaceTag;
+use crate::faces::{Behind, Face};
 use crate::operation::{Crossing, Operation, SplitError};
 use crate::parallel;
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh, Separation};
+
+/// How many times thicker than the snap distance what is left of a slice that is mostly thinner may be.
+const TATTER: f64 = 2.0;
 
 /// Cuts where `values`, one a particle, change their sign. `what` they are is named if one is not finite.
 ///
@@ -38,7 +43,7 @@ pub(crate) fn cut_by_signs(
         });
     }
     let mut snapped = snap(&crossings, &values, options, &mut on_surface);
-    snapped += keep_bent(cuttable, &crossings, &values, &mut on_surface);
+    snapped += swallow(cuttable, &crossings, &values, options, &mut on_surface);
     let particles = values.len();
     let mut operation = Operation::begin(cuttable, options);
     let mut flagged = crossings;
@@ -148,50 +153,109 @@ fn snap(
     snapped
 }
 
-/// Puts particles back on the surface that an earlier cut was bent to, where this one would only cut off what lies
-/// between the two. Returns how many.
+/// Puts the particles of parts on the surface that are thinner than the snap distance throughout, so that what lies
+/// between the surface and an earlier cut is not cut off at all. Returns how many.
 ///
-/// A particle is snapped because of one of its edges. After the cut that edge may belong to a copy, and nothing would
-/// tell the other copies: the same cut again would take chips off. So particles that are no further from this surface
-/// than from the one bent to them stay on it, if all their neighbors on the same side do as well.
-fn keep_bent(
+/// A part is what the particles of one side that are not on the surface hold together. Deciding particle by particle
+/// would leave a thin slice in tatters: where an earlier cut was bent away from its particles, or edges are short, bits
+/// of it would come off. A part that borders on particles snapped on its side is such a bit, and may be thicker by
+/// [`TATTER`]. It also makes a cut repeated change nothing: after the cut, the edge that a particle was
+/// snapped for may belong to a copy, and nothing would tell the other copies.
+///
+/// Cost: the tets around the particles of such parts; each particle is looked at once.
+fn swallow(
     cuttable: &CuttableMesh,
     crossings: &[Crossing],
     values: &[f64],
+    options: &CutOptions,
     on_surface: &mut [bool],
 ) -> usize {
-    let ends = crossings.iter().flat_map(|crossing| crossing.ends);
-    let close = |p: &ParticleId| {
-        let bend = cuttable.bent.get(p);
-        bend.is_some_and(|bend| values[p.index()].abs() <= AGAIN * bend)
-    };
-    let mut kept: Vec<ParticleId> = ends
-        .filter(close)
-        .filter(|p| !on_surface[p.index()])
-        .collect();
-    kept.sort_unstable();
-    kept.dedup();
-    loop {
-        let alone = |p: &ParticleId| {
-            let tets = cuttable.stars.around(*p);
-            let mut others = tets.flat_map(|tet| cuttable.mesh.tets[tet.index()]);
-            let side = values[p.index()] > 0.0;
-            others.all(|q| {
-                let value = values[q.index()];
-                on_surface[q.index()]
-                    || value == 0.0
-                    || (value > 0.0) != side
-                    || kept.binary_search(&q).is_ok()
-            })
-        };
-        let next: Vec<ParticleId> = kept.iter().copied().filter(alone).collect();
-        if next.len() == kept.len() {
-            break;
+    let mut part_of = vec![0_u32; values.len()];
+    let mut part: Vec<ParticleId> = Vec::new();
+    let (mut number, mut swallowed) = (0, 0);
+    for start in crossings.iter().flat_map(|crossing| crossing.ends) {
+        if on_surface[start.index()] || part_of[start.index()] > 0 {
+            continue;
         }
-        kept = next;
+        number += 1;
+        part_of[start.index()] = number;
+        part.clear();
+        part.push(start);
+        let (mut next, mut is_thin, mut is_torn) = (0, true, false);
+        let mut most = Surroundings::default();
+        while let Some(&particle) = part.get(next).filter(|_| is_thin) {
+            next += 1;
+            most.add(cuttable, particle, values);
+            is_thin = most.edges <= TATTER * options.snap;
+            let around = cuttable.stars.around(particle);
+            for other in around.flat_map(|tet| cuttable.mesh.tets[tet.index()]) {
+                if values[other.index()] * values[particle.index()] <= 0.0 {
+                    continue;
+                }
+                if on_surface[other.index()] {
+                    is_torn = true;
+                    continue;
+                }
+                match std::mem::replace(&mut part_of[other.index()], number) {
+                    0 => part.push(other),
+                    // Of a part that was found to be thicker.
+                    known => is_thin &= known == number,
+                }
+            }
+        }
+        // What is as thick as the rest of the body is no slice of it: both sides would be swallowed.
+        is_thin &= is_torn || most.edges <= options.snap;
+        let is_slice = most.meets_cut || most.thickness == 0.0;
+        if is_thin && is_slice && most.thickness <= 0.5 * most.beyond {
+            swallowed += part.len();
+            for p in &part {
+                on_surface[p.index()] = true;
+            }
+        }
     }
-    for p in &kept {
-        on_surface[p.index()] = true;
+    swallowed
+}
+
+/// What a part extends to on both sides of the surface, the most of all its particles.
+#[derive(Default)]
+struct Surroundings {
+    /// How far it reaches from the surface, further than an earlier cut was bent to its particles.
+    thickness: f64,
+    /// That as a fraction of what a value changes by over the longest edge around.
+    edges: f64,
+    /// The largest distance from the surface on the other side.
+    beyond: f64,
+    /// Whether a face of an earlier cut bounds it.
+    meets_cut: bool,
+}
+
+impl Surroundings {
+    fn add(&mut self, cuttable: &CuttableMesh, particle: ParticleId, values: &[f64]) {
+        let (mesh, value) = (&cuttable.mesh, values[particle.index()]);
+        // Over an edge of any direction a value changes by at most the product.
+        let (mut longest, mut steepest): (f64, f64) = (0.0, 0.0);
+        for tet in cuttable.stars.around(particle) {
+            let corners = mesh.tets[tet.index()];
+            for (i, a) in corners.into_iter().enumerate() {
+                if values[a.index()] * value < 0.0 {
+                    self.beyond = self.beyond.max(values[a.index()].abs());
+                }
+                for b in corners.into_iter().skip(i + 1) {
+                    let length = mesh.positions[a.index()].distance(mesh.positions[b.index()]);
+                    longest = longest.max(length);
+                    steepest = steepest.max((values[a.index()] - values[b.index()]).abs() / length);
+                }
+            }
+        }
+        let around = cuttable.stars.around(particle);
+        let faces = around.flat_map(|tet| Face::of(tet).map(|face| cuttable.faces.behind(face)));
+        let mut cut = faces.filter(|behind| matches!(behind, Behind::Nothing(FaceTag::Cut(_))));
+        self.meets_cut |= cut.next().is_some();
+        let bend = cuttable.bent.get(&particle).copied().unwrap_or(0.0);
+        let thickness = (value.abs() - AGAIN * bend).max(0.0);
+        self.thickness = self.thickness.max(thickness);
+        if thickness > 0.0 {
+            self.edges = self.edges.max(thickness / (longest * steepest));
+        }
     }
-    kept.len()
 }

@@ -10,6 +10,10 @@
 //! body moves, a later meeting may come closer to the particle than foreseen; the new particle then keeps the snap
 //! distance, which bends the surface as snapping does, the other way.
 //!
+//! A blade that comes back over what it has cut sweeps the same surface with its normal the other way around. The sides
+//! of a surface must stay what they were, so hits beside it, or after hits of the opposite direction, are turned over:
+//! a stroke in rows, or to and fro, keeps one orientation wherever its passes overlap.
+//!
 //! With a [`StrokeRegistry`] the stroke takes over what earlier strokes of the same surface left beside the edges it meets,
 //! and continues as if it were one of them.
 //!
@@ -21,11 +25,11 @@ mod snap;
 use glam::{DMat3, DVec3};
 use incise_mesh::{ParticleId, TetId, TetMesh};
 
-use crate::blade::{Blade, CrossedEdge, SAME_SHEET};
+use crate::blade::{ALIGNED, Blade, CrossedEdge, SAME_SHEET};
 use crate::ccd::{EdgeHit, MovingSegment};
 use crate::operation::{Crossing, Operation, SplitError};
 use crate::parallel;
-use crate::side_labels::{GivenSides, Sides, standing_side};
+use crate::side_labels::{GivenSides, Sides, side_by_blade};
 use crate::sign_split::linear;
 use crate::stroke_registry::StrokeRegistry;
 use crate::surface::{CutSurface, Tangent};
@@ -66,6 +70,11 @@ pub(crate) struct Stroke {
     forgotten: Vec<(TetId, bool)>,
     /// The number that the registry knows it by.
     number: Option<u32>,
+    /// Whether the positive side is where the blade's own normal does not point to: the blade goes back over what it
+    /// has cut, and the surface keeps its orientation.
+    turned: bool,
+    /// For each segment of the blade the mean normal of its last hits at rest, zero before the first.
+    heading: Vec<DVec3>,
 }
 
 impl Stroke {
@@ -76,6 +85,8 @@ impl Stroke {
             given: GivenSides::default(),
             forgotten: Vec::new(),
             number: None,
+            turned: false,
+            heading: Vec::new(),
         }
     }
 
@@ -90,6 +101,7 @@ impl Stroke {
         mut registry: Option<&mut StrokeRegistry>,
     ) -> Result<CutDelta, CutError> {
         let particles = motion.now.len();
+        let heading = (self.turned, self.heading.clone());
         let mut fresh: Vec<ParticleId> = Vec::new();
         self.surface.begin();
         self.forgotten.clear();
@@ -101,6 +113,10 @@ impl Stroke {
         while round < rounds {
             let edges = edges_of(&operation.cuttable.mesh, &near);
             let mut hits = self.hits(operation.cuttable, &edges, motion, blade);
+            if B::IS_SWEPT && self.runs_against(operation.cuttable, &hits) {
+                self.turned = !self.turned;
+                hits.iter_mut().for_each(CrossedEdge::turn);
+            }
             if let Some(registry) = &mut registry {
                 let number = *self.number.get_or_insert_with(|| registry.next_stroke());
                 self.surface.keep_news();
@@ -111,6 +127,9 @@ impl Stroke {
             }
             if hits.is_empty() {
                 break;
+            }
+            if B::IS_SWEPT {
+                self.note_heading(&hits);
             }
             if round == 0 && !B::IS_SWEPT {
                 rounds = hits.iter().map(|hit| hit.meetings).max().unwrap_or(0);
@@ -124,7 +143,10 @@ impl Stroke {
             let snapped = self.snap(&mut operation, &hits, touched, B::IS_SWEPT);
             near = match self.open(&mut operation, motion, hits, &snapped, &mut fresh) {
                 Ok(touched) => touched,
-                Err(error) => return Err(self.give_up(operation, motion, particles, error)),
+                Err(error) => {
+                    (self.turned, self.heading) = heading;
+                    return Err(self.give_up(operation, motion, particles, error));
+                }
             };
         }
 
@@ -139,6 +161,7 @@ impl Stroke {
             }
             let snapped = self.snap(&mut operation, &gaps, Vec::new(), false);
             if let Err(error) = self.open(&mut operation, motion, gaps, &snapped, &mut fresh) {
+                (self.turned, self.heading) = heading;
                 return Err(self.give_up(operation, motion, particles, error));
             }
         }
@@ -146,9 +169,10 @@ impl Stroke {
         let seeds = self.seeds(operation.cuttable, &fresh);
         let along = operation.cuttable.tets_around(&seeds);
         let mesh = &operation.cuttable.mesh;
-        let standing =
-            |corners: [ParticleId; 4]| standing_side(&self.surface, blade, corners, &motion.now);
-        let sides = Sides::new(mesh, &self.surface, &mut self.given, &along, standing);
+        let by_blade = |corners: [ParticleId; 4]| {
+            side_by_blade(&self.surface, blade, self.turned, corners, motion)
+        };
+        let sides = Sides::new(mesh, &self.surface, &mut self.given, &along, by_blade);
         let on = |p| self.surface.contains(p);
         operation.separate(&seeds, on, |face| sides.differ(face.tets));
         let delta = operation.finish(|rest, c| self.surface.side(rest, c));
@@ -269,6 +293,7 @@ impl Stroke {
                         .normalize_or_zero(),
                 },
                 sides: [Some(!upwards), Some(upwards)],
+                segment: 0,
                 meetings: 1,
             });
         }
@@ -309,11 +334,63 @@ impl Stroke {
                 })
             };
             let (meeting, meetings) = blade.first_meeting(&motion.edge(ends), |m| !old(m))?;
-            Some(CrossedEdge {
+            let mut crossed = CrossedEdge {
                 meetings,
                 ..hit(cuttable, &motion.now, ends, &meeting)
-            })
+            };
+            if self.turned {
+                crossed.turn();
+            }
+            Some(crossed)
         })
+    }
+
+    /// Whether the edges met continue what this stroke has cut, with their normals the other way around: the blade goes
+    /// back over its own surface.
+    ///
+    /// Counts the particles on the surface in the tets around each edge, those where it runs the same way and closely.
+    /// Away from all of them the last hits tell.
+    fn runs_against(&self, cuttable: &CuttableMesh, hits: &[CrossedEdge]) -> bool {
+        let mesh = &cuttable.mesh;
+        let vote = |ours: DVec3, theirs: DVec3| {
+            let cosine = ours.dot(theirs);
+            i64::from(cosine >= ALIGNED) - i64::from(cosine <= -ALIGNED)
+        };
+        let votes = parallel::map(hits, |hit| {
+            let [a, b] = hit.crossing.ends;
+            let close = SAME_SHEET * mesh.positions[a.index()].distance(mesh.positions[b.index()]);
+            let around = cuttable.around(a).map(|tet| mesh.tets[tet.index()]);
+            let corners = around.filter(|tet| tet.contains(&b)).flatten();
+            let tangents = corners.filter_map(|corner| self.surface.tangent(corner));
+            let beside = tangents.filter(|theirs| {
+                hit.tangent.distance(theirs.point).abs() <= close
+                    && theirs.distance(hit.tangent.point).abs() <= close
+            });
+            let votes = beside.map(|theirs| vote(hit.tangent.normal, theirs.normal));
+            votes.sum::<i64>()
+        });
+        let beside: i64 = votes.into_iter().sum();
+        if beside != 0 {
+            return beside < 0;
+        }
+        let last = hits.iter().filter_map(|hit| {
+            let heading = self.heading.get(hit.segment)?;
+            Some(vote(hit.tangent.normal, *heading))
+        });
+        last.sum::<i64>() < 0
+    }
+
+    /// Notes the mean normals of hits.
+    fn note_heading(&mut self, hits: &[CrossedEdge]) {
+        let segments = hits.iter().map(|hit| hit.segment + 1).max().unwrap_or(0);
+        let mut sums = vec![DVec3::ZERO; segments.max(self.heading.len())];
+        self.heading.resize(sums.len(), DVec3::ZERO);
+        for hit in hits {
+            sums[hit.segment] += hit.tangent.normal;
+        }
+        for (heading, sum) in self.heading.iter_mut().zip(sums) {
+            *heading = sum.normalize_or(*heading);
+        }
     }
 
     /// The particles whose stars can separate: the fresh ones and those on the surface beside them. Ascending.
@@ -424,6 +501,7 @@ fn hit(
         },
         tangent,
         sides: meeting.sides,
+        segment: meeting.segment,
         meetings: 1,
     }
 }

@@ -14,12 +14,9 @@ use std::collections::HashMap;
 use foldhash::fast::FixedState;
 use incise_mesh::ParticleId;
 
-use crate::blade::{CrossedEdge, SAME_SHEET};
+use crate::blade::{ALIGNED, CrossedEdge, SAME_SHEET};
 use crate::surface::{CutSurface, Mark};
 use crate::{CutDelta, CutOptions, CuttableMesh};
-
-/// Surfaces whose normals have at least this cosine run the same way.
-const ALIGNED: f64 = 0.9;
 
 /// Surfaces of earlier strokes, which later strokes can continue. The caller keeps it from stroke to stroke.
 ///

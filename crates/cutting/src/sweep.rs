@@ -5,6 +5,10 @@
 //! less than one tet, and a stroke may stop anywhere. The blade is followed in the material's own time (see the module
 //! `ccd`), so a body that moves or deforms between frames leaves no gap.
 //!
+//! A bent blade traces a surface with a bend. An edge that runs through it close to the bend may meet one segment and end
+//! beyond the other, so the sides of its ends, and of the tets there, are those of the whole surface that the blade would
+//! trace if it moved on as it does.
+//!
 //! Source: paper section 4.3, with the moving front as described here. Cost: a pass over particles and tets at the
 //! start; in each frame a copy of the positions, the boxes of the boundary triangles (see the module `broad_phase`) and the
 //! cut.
@@ -19,9 +23,57 @@ use crate::stroke::{Motion, Stroke};
 use crate::stroke_registry::StrokeRegistry;
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
+/// Points of two segments this close to each other, against the distance to them, are the bend between them.
+const SAME_POINT: f64 = 1e-9;
+
 /// A blade on its way from one pose to the next.
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct MovingBlade(Vec<SweptSegment>);
+
+impl MovingBlade {
+    /// On which side of the whole blade a point lies, if the blade moves on as it does at a time. The material there
+    /// moves with `drift`.
+    ///
+    /// Of the surface that the blade would trace, the closest part decides: where it is bent, the sum of the normals on
+    /// both sides of the bend.
+    fn side_at(&self, time: f64, x: DVec3, drift: DVec3) -> Option<bool> {
+        let closest_on = |[p, q]: [DVec3; 2]| {
+            let along = q - p;
+            let at = ((x - p).dot(along) / along.length_squared()).clamp(0.0, 1.0);
+            (if at.is_nan() { 0.0 } else { at }, x - p)
+        };
+        let nearest = self.0.iter().map(|swept| {
+            let ends = swept.segment.at(time);
+            let (at, from_start) = closest_on(ends);
+            let squared = (from_start - (ends[1] - ends[0]) * at).length_squared();
+            (squared, swept.segment.velocity(at))
+        });
+        let (_, velocity) = nearest.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let motion = velocity - drift;
+        let across = |v: DVec3| v - motion * (v.dot(motion) / motion.length_squared());
+        let (mut closest, mut above) = (f64::INFINITY, 0.0);
+        for swept in &self.0 {
+            let [p, q] = swept.segment.at(time);
+            let (along, from_start) = (across(q - p), across(x - p));
+            let Some(normal) = along.cross(motion).try_normalize() else {
+                continue;
+            };
+            let at = (from_start.dot(along) / along.length_squared()).clamp(0.0, 1.0);
+            let offset = from_start - along * at;
+            let (distance, height) = (offset.length(), normal.dot(offset));
+            if distance < closest * (1.0 - SAME_POINT) {
+                (closest, above) = (distance, height);
+            } else if distance <= closest * (1.0 + SAME_POINT) {
+                above += height;
+            }
+        }
+        (above != 0.0 && above.is_finite()).then_some(above > 0.0)
+    }
+
+    fn is_bent(&self) -> bool {
+        self.0.len() > 1
+    }
+}
 
 impl Blade for MovingBlade {
     const IS_SWEPT: bool = true;
@@ -31,9 +83,19 @@ impl Blade for MovingBlade {
         edge: &MovingSegment,
         keep: impl Fn(&EdgeHit) -> bool,
     ) -> Option<(EdgeHit, usize)> {
-        let near = self.0.iter().filter(|swept| !swept.misses(edge));
-        let all = near.flat_map(|swept| meetings(edge, &swept.segment));
-        let first = all.filter(keep).min_by(|m, n| m.time.total_cmp(&n.time))?;
+        let near = self.0.iter().enumerate();
+        let near = near.filter(|(_, swept)| !swept.misses(edge));
+        let all = near.flat_map(|(segment, swept)| {
+            meetings(edge, &swept.segment).map(move |m| EdgeHit { segment, ..m })
+        });
+        let mut first = all.filter(keep).min_by(|m, n| m.time.total_cmp(&n.time))?;
+        if self.is_bent() {
+            // Past a bend an end may be on another side than the segment that was met says.
+            let drift = edge.velocity(first.parameter);
+            for (side, end) in first.sides.iter_mut().zip(edge.at(first.time)) {
+                *side = self.side_at(first.time, end, drift).or(*side);
+            }
+        }
         Some((first, 1))
     }
 
@@ -42,9 +104,11 @@ impl Blade for MovingBlade {
         3 * self.0.len()
     }
 
-    /// It has moved on: the particles remember.
-    fn side(&self, _: DVec3, _: f64) -> Option<bool> {
-        None
+    /// Where it is straight, the particles remember.
+    fn side(&self, x: DVec3, _: f64, drift: DVec3) -> Option<bool> {
+        self.is_bent()
+            .then(|| self.side_at(1.0, x, drift))
+            .flatten()
     }
 
     fn touches(&self, _: DVec3, _: f64) -> Option<DVec3> {

@@ -138,6 +138,7 @@ impl TriangleSurface {
             normal: self.normals[triangle],
             upwards: at_a < at_b,
             sides: [None; 2],
+            segment: 0,
         })
     }
 
@@ -228,7 +229,7 @@ impl Blade for StandingBlade<'_> {
         self.surface.triangles.len()
     }
 
-    fn side(&self, x: DVec3, reach: f64) -> Option<bool> {
+    fn side(&self, x: DVec3, reach: f64, _: DVec3) -> Option<bool> {
         self.surface.closest(x, reach)?.side()
     }
 
@@ -255,7 +256,7 @@ impl StandingBlade<'_> {
                 let beside = |step: f64| {
                     let at = first.parameter + step;
                     let inside = self.tolerance < at && at < 1.0 - self.tolerance;
-                    let side = || self.side(a.lerp(b, at), BESIDE * a.distance(b));
+                    let side = || self.side(a.lerp(b, at), BESIDE * a.distance(b), DVec3::ZERO);
                     inside.then(side).flatten()
                 };
                 let upwards = match (beside(-BESIDE), beside(BESIDE)) {

@@ -60,6 +60,7 @@ impl CutDelta {
             stars,
             faces,
             bent,
+            mean_volume: _,
         } = cuttable;
         let new = (self.particles_before..self.particles_after()).map(ParticleId::new);
         for particle in new.chain(self.bent.iter().copied()) {

@@ -167,6 +167,8 @@ impl MergedMesh {
             surface_removed: delta.surface_removed.iter().map(triangle).collect(),
             surface_added: Vec::new(),
             snapped: delta.snapped,
+            crumbs: delta.crumbs,
+            crumb_volume: delta.crumb_volume,
             bent: delta.bent.iter().map(|&p| particle(p)).collect(),
             worst_volume_ratio: delta.worst_volume_ratio,
             dihedral: delta.dihedral,

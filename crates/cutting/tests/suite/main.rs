@@ -2,16 +2,20 @@
 
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 
+mod bends;
 mod bodies;
+mod crumbs;
 mod deltas;
 mod joins;
 mod level_sets;
+mod passes;
 mod pieces;
 mod planes;
 mod programs;
 mod removal;
 mod scenarios;
 mod separation;
+mod soak;
 mod surfaces;
 mod sweeps;
 mod symmetry;

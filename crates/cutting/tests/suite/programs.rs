@@ -61,6 +61,7 @@ impl Bytes<'_> {
             snap: [0.0, 0.05, 0.1, 0.2, 0.25][usize::from(byte % 5)],
             tolerance: [1e-9, 1e-5][usize::from(byte / 5 % 2)],
             min_volume_ratio: [0.0, 0.0, 1e-4, 1e-2][usize::from(byte / 10 % 4)],
+            crumbs: [0.0, 0.5, 5.0][usize::from(byte / 40 % 3)],
             separation: Separation::CutFaces,
             tag,
             max_tets: LARGEST,
