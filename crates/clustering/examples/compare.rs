@@ -1,4 +1,4 @@
-//! All clustering methods side by side on meshes: clusters, bound, colors, time.
+//! Compares all clustering methods on meshes: clusters, bound, colors, time.
 //!
 //! ```text
 //! cargo run --release -p incise-clustering --example compare -- 5,10 liver.vtk kuhn:24

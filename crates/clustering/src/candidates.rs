@@ -1,8 +1,8 @@
-//! The constraints that may join the cluster being grown, best first.
+//! [`Candidates`]: the constraints that may join the growing cluster, best first.
 //!
-//! Scores only rise while a cluster grows, so a heap with an entry per rise serves: the entry with
-//! the present score of a constraint is its valid one, older ones are dropped when they come up.
-//! What was touched is listed, so that starting over costs no more than the growth did. Cost: O(log
+//! Scores only rise while a cluster grows, so a heap with an entry per rise is enough: the entry
+//! with the present score of a constraint is valid, older ones are dropped when they reach the top.
+//! Touched constraints are listed, so clearing costs no more than the growth did. Cost: O(log
 //! entries) per entry.
 
 use std::cmp::Reverse;
@@ -11,11 +11,11 @@ use std::collections::BinaryHeap;
 /// Scores of the constraints around one cluster.
 #[derive(Debug)]
 pub(crate) struct Candidates {
-    /// The score of every constraint; 0 for those that are no candidates.
+    /// The score of every constraint; 0 for constraints that are not candidates.
     scores: Vec<u64>,
-    /// Constraints with a score above 0, each once, in the order they came.
+    /// Constraints with a score above 0, each once, in the order of their first raise.
     touched: Vec<u32>,
-    /// Constraints whose score rose since the heap was last asked, perhaps several times.
+    /// Constraints whose score rose since the last query, possibly repeated.
     raised: Vec<u32>,
     heap: BinaryHeap<(u64, Reverse<u32>)>,
 }
@@ -41,7 +41,7 @@ impl Candidates {
         self.raised.push(c);
     }
 
-    /// The candidate of highest score for which `is_free` holds, of equal ones the smallest number.
+    /// The candidate of highest score for which `is_free` holds; ties go to the smallest number.
     ///
     /// A candidate that is not free must not become free before [`clear`](Self::clear).
     pub(crate) fn best(&mut self, is_free: impl Fn(u32) -> bool) -> Option<u32> {
@@ -56,13 +56,13 @@ impl Candidates {
         None
     }
 
-    /// All constraints that have been candidates since the last [`clear`](Self::clear), in the order
-    /// they came.
+    /// All constraints that have been candidates since the last [`clear`](Self::clear), in the
+    /// order of their first raise.
     pub(crate) fn touched(&self) -> &[u32] {
         &self.touched
     }
 
-    /// Back to no candidates.
+    /// Removes all candidates.
     pub(crate) fn clear(&mut self) {
         for c in self.touched.drain(..) {
             self.scores[c as usize] = 0;

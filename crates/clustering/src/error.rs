@@ -1,6 +1,6 @@
-//! What can be wrong with a request to cluster or with an edit.
+//! [`ClusteringError`]: errors of method names and of edits.
 
-/// A method that does not exist, or an edit that does not fit the clustering.
+/// An unknown method, or an edit that does not fit the clustering.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ClusteringError {
@@ -9,15 +9,15 @@ pub enum ClusteringError {
         "unknown clustering '{text}'; write none, serial:K, serial-loose:K, greedy-k:K or pressure:K with a cluster size K, as serial:10"
     )]
     UnknownMethod {
-        /// What was written.
+        /// The text that was parsed.
         text: String,
     },
-    /// A method whose cluster size is missing or no positive whole number.
+    /// A method whose cluster size is missing or not a positive whole number.
     #[error(
         "clustering '{text}' needs a largest cluster size of at least 1 after a colon, as serial:10"
     )]
     BadSize {
-        /// What was written.
+        /// The text that was parsed.
         text: String,
     },
     /// A constraint to remove that is in no cluster, or listed twice.
@@ -34,7 +34,7 @@ pub enum ClusteringError {
         /// The constraint.
         constraint: u32,
     },
-    /// Offsets of groups that do not start at 0, go down or end elsewhere than at the number of new
+    /// Offsets of groups that do not start at 0, decrease or do not end at the number of new
     /// constraints.
     #[error(
         "group offsets must start with 0, must not decrease and must end with {values}, the number of constraints"

@@ -1,14 +1,15 @@
-//! Greedy K-neighbor clustering: clusters grow by the constraint that shares most with them.
+//! Greedy K-neighbor clustering: clusters grow by the constraint that shares most particles with
+//! them.
 //!
-//! The method the paper compares with (Ton-That, Kry and Andrews 2023). This is a reconstruction:
-//! it follows descriptions of the method, not its source. A cluster takes, one after the other, the
-//! free constraint with the largest sum, over the members, of the number of particles it shares
-//! with the member. The next cluster starts beside the ones before it: at the oldest free
-//! constraint of a queue of those that were candidates and not taken.
+//! This is the method to which the paper compares its own (Ton-That, Kry and Andrews 2023),
+//! reconstructed from descriptions, not from its source. A cluster repeatedly takes the free
+//! constraint with the largest sum, over the members, of the number of particles shared with the
+//! member. The next cluster starts next to the previous ones: at the oldest free constraint of a
+//! queue of former candidates.
 //!
-//! Scores are never counted again: when `c` joins, every other constraint on each of its particles
-//! gains one. Cost: O(K * arity * valence) score updates per cluster, each with the logarithm of a
-//! heap.
+//! Scores are updated incrementally: when `c` joins, every other constraint on each of its
+//! particles gains one. Cost: O(K * arity * valence) score updates per cluster, each with the
+//! logarithm of a heap.
 
 use std::collections::VecDeque;
 use std::num::NonZeroUsize;
@@ -20,21 +21,20 @@ use crate::candidates::Candidates;
 /// Clusters of up to `max_size` constraints that share as many particles as possible.
 ///
 /// Every constraint is in one cluster. A cluster is connected: each member but the first shares a
-/// particle with an earlier one. It has fewer than `max_size` members only if no free constraint was
-/// left around it.
+/// particle with an earlier one. It has fewer than `max_size` members only if no adjacent
+/// constraint was free.
 ///
-/// Ties go to the smallest number. Leftovers queue up in the order in which they became candidates:
-/// by the member whose joining made them so, then by the place of the shared particle in that
+/// Ties go to the smallest number. Former candidates are queued in the order in which they became
+/// candidates: by the member that caused it, then by the position of the shared particle in that
 /// member, then by number. If the queue is empty, the smallest free number starts. Deterministic.
-/// O(sum over particles of valence squared, times log), whatever `max_size` is.
+/// O(sum over particles of valence squared, times log), independent of `max_size`.
 ///
 /// ```
 /// use std::num::NonZeroUsize;
 ///
 /// use incise_clustering::greedy_k_neighbor;
 /// use incise_graph::{ClusterId, Incidence};
-///
-/// // Four tetrahedra: 0 and 2 share a triangle, 0 and 1 only a particle; 3 sits on 1.
+/// // Four tetrahedra: 0 and 2 share a triangle, so do 1 and 3; 0 and 1 share a particle.
 /// let tets = [[0u32, 1, 2, 3], [3, 5, 6, 7], [1, 2, 3, 4], [5, 6, 7, 8]];
 /// let incidence = Incidence::from_constraints(9, tets)?;
 /// let clustering = greedy_k_neighbor(&incidence, NonZeroUsize::MIN.saturating_add(1));

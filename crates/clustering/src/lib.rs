@@ -1,14 +1,15 @@
-//! Clusterings of constraint graphs: which constraints are solved one after the other as one block.
+//! Clustering of constraints into blocks whose members are solved one after the other.
 //!
 //! Colors run one after the other, so their number limits how parallel a solver is. Merging
 //! neighboring constraints into clusters and coloring the clusters needs fewer colors, converges
 //! better (Gauss-Seidel inside a cluster) and leaves a smaller graph to color. [`serial_neighbor`]
-//! is the paper's clustering (Algorithm 2), [`greedy_k_neighbor`] the one it compares with, and
+//! is the paper's clustering (Algorithm 2), [`greedy_k_neighbor`] the one to which the paper
+//! compares it, and
 //! [`pressure`] one that aims at few colors; [`update_local`] changes only what a cut has touched
 //! (section 4.3), and [`merge_small`] joins what the cut left small with its neighbors.
 //!
-//! The algorithms take an [`Incidence`](incise_graph::Incidence) of anything; they know nothing of
-//! meshes. A graph alone is enough for [`serial_neighbor`].
+//! The algorithms take an [`Incidence`](incise_graph::Incidence) of any constraints and do not
+//! depend on meshes. [`serial_neighbor`] needs only a graph.
 //!
 //! ```
 //! use std::num::NonZeroUsize;
@@ -21,7 +22,7 @@
 //!
 //! let pairs = pressure(&springs, NonZeroUsize::MIN.saturating_add(1));
 //! assert_eq!(pairs.occupied(), 4);
-//! // One row per pair: what a coloring has to keep apart.
+//! // One row per pair: rows that share a particle need different colors.
 //! let clusters = springs.quotient(&pairs);
 //! assert_eq!(clusters.clique_bound(), 2);
 //! # Ok::<(), incise_graph::GraphError>(())

@@ -1,22 +1,26 @@
-//! Clusters after a cut: what is loose joins small clusters or grows new ones, and what stays small merges.
+//! Repair of clusters after a cut: loose constraints join small clusters or form new ones, and small clusters merge.
 //!
-//! A cut takes members out of clusters and brings new constraints that are in none yet. Three passes over the index of
-//! the cut, all along links between constraints (of tets: across faces), so that nothing grows across a cut:
+//! A cut removes members from clusters and adds constraints that are in none yet (*loose*). Three passes work on the
+//! changed constraints, all along links between constraints (for tets, shared faces), so that no cluster grows across a
+//! cut:
 //!
-//! 1. Small clusters that a loose constraint or a seed is linked to, those that fill at most half of the size limit,
-//!    grow into what is loose.
-//! 2. What is still loose grows new clusters, each from where the last one stopped.
-//! 3. Those of these clusters that are small merge with a neighbor that has room, the smallest first, and again as long
-//!    as the result is small itself. Of two clusters that fit into one, one fills at most half of it, so no pair among
-//!    them is overlooked.
+//! 1. Clusters that fill at most half of the size limit and are linked to a loose constraint or a seed grow into the
+//!    loose constraints.
 //!
-//! A growing cluster takes the constraint that has fewest loose neighbors left, which would be left alone otherwise; of
-//! these the one with most links into the cluster. Where a cut left a cluster in parts that are not linked any more,
-//! each part goes its own way.
+//! 2. Remaining loose constraints form new clusters, each starting where the last one stopped.
 //!
-//! The paper makes one cluster of the children of each cut element (section 4.3) and leaves open how clusters of that
-//! kind stay large (figure 8, where colors grow from cut to cut). Cost: O(m k) for m loose constraints and small
-//! clusters, with k = `max_size` times the links of a constraint, whatever the size of the rest.
+//! 3. Those of these clusters that are small merge with a neighbor that has room, the smallest first, repeatedly while
+//!    the result is small. Of two clusters that fit into one, one fills at most half of it, so every such pair is
+//!    found.
+//!
+//! A growing cluster takes the constraint with the fewest loose neighbors, which would otherwise end up alone; ties go
+//! to the one with most links into the cluster. If a cut left a cluster in parts without a link, each part is handled
+//! separately.
+//!
+//! The paper makes one cluster of the children of each cut element (section 4.3) and does not describe how such
+//! clusters stay large (figure 8, where the number of colors grows from cut to cut). Cost: O(m k) for m loose
+//! constraints and small clusters, with k = `max_size` times the links of a constraint, independent of the size of the
+//! mesh.
 
 use std::cmp::Reverse;
 use std::num::NonZeroUsize;
@@ -28,20 +32,20 @@ use incise_graph::{ClusterId, Clustering};
 pub struct Moved {
     /// The constraint.
     pub constraint: u32,
-    /// Its cluster before; perhaps vacant now.
+    /// Its previous cluster, which may be vacant now.
     pub from: ClusterId,
 }
 
-/// Lists that [`merge_small`] works with, kept from call to call so that it need not allocate.
+/// Working memory of [`merge_small`], kept between calls to avoid allocations.
 #[derive(Clone, Debug, Default)]
 pub struct MergeLists {
-    /// What a growing cluster may take next.
+    /// Candidates for the growing cluster.
     front: Vec<Candidate>,
-    /// A member of each cluster that grew, or could not: they may be small.
+    /// One member of each cluster that grew or could not grow; these clusters may be small.
     grown: Vec<u32>,
-    /// The members found last that hang together.
+    /// The members of the connected part found last.
     part: Vec<u32>,
-    /// Other clusters with room, the number of links to each.
+    /// Other clusters with room, and the number of links to each.
     near: Vec<(ClusterId, u32)>,
     placed: Vec<u32>,
     /// `placed` in ascending order.
@@ -55,24 +59,23 @@ struct Candidate {
     constraint: u32,
     /// Links to loose constraints.
     loose: u32,
-    /// Links into the cluster.
+    /// Links to members of the cluster.
     links: u32,
 }
 
 /// Puts loose constraints into clusters and merges the small clusters around them.
 ///
-/// Small is a cluster of at most half of `max_size` constraints. Afterwards each loose constraint is in a cluster, no
-/// cluster is larger than `max_size`, and where clusters hang together, none of those looked at that is small has a
-/// neighbor that it fits into. Nothing but clusters of seeds and clusters linked to them or to what was loose changes.
+/// A cluster is small if it has at most half of `max_size` constraints. Afterwards each loose constraint is in a
+/// cluster, no cluster is larger than `max_size`, and no small cluster that was visited fits into a linked neighbor.
+/// Only clusters of seeds and clusters linked to them or to loose constraints change.
 ///
 /// # Arguments
-/// `loose` are constraints that are in no cluster, or past the end of the clustering; others that are linked to them and
-/// in no cluster count as loose, too. `seeds` are constraints whose clusters are to be looked at beside those linked to
-/// what is loose; those that are in none are skipped. `neighbors_of` gives the constraints that one is linked to; links
-/// go both ways.
+/// `loose` are constraints that are in no cluster, or past the end of the clustering; others that are linked to them
+/// and in no cluster count as loose, too. `seeds` are constraints whose clusters are visited as well; seeds in no
+/// cluster are skipped. `neighbors_of` returns the constraints linked to one; links are symmetric.
 ///
-/// What was done is in `lists` afterwards. Deterministic: the same lists in the same order give the same clusters. For the
-/// cost see the module's source.
+/// The changes are in `lists` afterwards. Deterministic: equal lists in equal order give equal clusters. The source of
+/// the module documents the cost.
 ///
 /// ```
 /// use std::num::NonZeroUsize;
@@ -93,7 +96,7 @@ struct Candidate {
 ///     NonZeroUsize::MIN.saturating_add(3),
 ///     |spring| (spring.saturating_sub(1)..=(spring + 1).min(7)).filter(move |&other| other != spring),
 /// );
-/// // Spring 6 grew to four, so 7 is too much for it.
+/// // The cluster of spring 6 has grown to four, so 7 does not fit.
 /// assert_eq!(clustering.labels(), [a, a, a, b, b, b, b, c]);
 /// assert_eq!((lists.placed(), lists.moved()), (&[5, 4, 3][..], &[][..]));
 /// # Ok::<(), incise_graph::GraphError>(())
@@ -140,13 +143,13 @@ pub fn merge_small<N: IntoIterator<Item = u32>>(
     lists.finish(clustering);
 }
 
-/// The work of merging.
+/// State of a call of [`merge_small`].
 struct Merging<'a, F> {
     lists: &'a mut MergeLists,
     clustering: &'a mut Clustering,
     neighbors_of: F,
     max_size: usize,
-    /// The size of the largest small cluster.
+    /// Largest size of a small cluster.
     small: usize,
 }
 
@@ -157,7 +160,7 @@ impl<N: IntoIterator<Item = u32>, F: Fn(u32) -> N> Merging<'_, F> {
         label.copied().unwrap_or(ClusterId::NONE)
     }
 
-    /// Grows the cluster of a constraint, if it is in one that is small.
+    /// Grows the cluster of a constraint if it is small.
     fn grow_if_small(&mut self, c: u32) {
         let cluster = self.label(c);
         if cluster != ClusterId::NONE && self.clustering.size(cluster) <= self.small {
@@ -165,7 +168,7 @@ impl<N: IntoIterator<Item = u32>, F: Fn(u32) -> N> Merging<'_, F> {
         }
     }
 
-    /// Lets the cluster of a constraint take loose ones until it is full or finds none.
+    /// Adds loose constraints to the cluster of a constraint until it is full or none is linked to it.
     fn grow(&mut self, seed: u32) {
         let cluster = self.label(seed);
         self.lists.grown.push(seed);
@@ -183,7 +186,7 @@ impl<N: IntoIterator<Item = u32>, F: Fn(u32) -> N> Merging<'_, F> {
         }
     }
 
-    /// Takes the best candidate from the front.
+    /// Removes and returns the best candidate of the front.
     fn pick(&mut self) -> Option<Candidate> {
         let front = &mut self.lists.front;
         let rank = |candidate: &Candidate| {
@@ -199,7 +202,7 @@ impl<N: IntoIterator<Item = u32>, F: Fn(u32) -> N> Merging<'_, F> {
         Some(front.swap_remove(best))
     }
 
-    /// Takes note of the loose neighbors of a new member.
+    /// Adds the loose neighbors of a new member to the front.
     fn look_around(&mut self, member: u32, cluster: ClusterId) {
         for c in (self.neighbors_of)(member) {
             if self.label(c) != ClusterId::NONE {
@@ -225,7 +228,7 @@ impl<N: IntoIterator<Item = u32>, F: Fn(u32) -> N> Merging<'_, F> {
         }
     }
 
-    /// Finds the constraints of the seed's cluster that hang together with it.
+    /// Finds the constraints of the seed's cluster that are connected to it.
     fn find_part(&mut self, seed: u32) {
         let own = self.label(seed);
         let size = self.clustering.size(own);
@@ -242,21 +245,21 @@ impl<N: IntoIterator<Item = u32>, F: Fn(u32) -> N> Merging<'_, F> {
         }
     }
 
-    /// Merges the small ones of the clusters that grew, the smallest first.
+    /// Merges the small clusters among those that grew, the smallest first.
     fn merge(&mut self) {
         let mut grown = std::mem::take(&mut self.lists.grown);
         let size = |merging: &Self, seed: u32| merging.clustering.size(merging.label(seed));
         grown.retain(|&seed| size(self, seed) <= self.small);
         for step in 1..=self.small {
             let mut next = 0;
-            // A cluster whose other part has left may be smaller than the step.
+            // A cluster whose other part has moved may be smaller than the step.
             while let Some(&seed) = grown.get(next) {
                 if size(self, seed) > step {
                     next += 1;
                     continue;
                 }
                 grown.swap_remove(next);
-                // What is still small after a merger comes once more.
+                // A cluster that is still small after a merge is queued again.
                 if let Some(merged) = self.join_best(seed)
                     && merged <= self.small
                 {
@@ -267,9 +270,9 @@ impl<N: IntoIterator<Item = u32>, F: Fn(u32) -> N> Merging<'_, F> {
         self.lists.grown = grown;
     }
 
-    /// Moves the part that holds the seed into the neighbor that it has most links to, of equal ones the smaller, of
-    /// these the one with the smaller number, among those with room. Returns the size of the result, or nothing if none
-    /// has room.
+    /// Moves the part that contains the seed into the neighbor with most links to it among those with room; ties go to
+    /// the smaller neighbor, then to the smaller number. Returns the size of the result; `None` if no neighbor has
+    /// room.
     fn join_best(&mut self, seed: u32) -> Option<usize> {
         self.find_part(seed);
         let own = self.label(seed);
@@ -305,19 +308,20 @@ impl<N: IntoIterator<Item = u32>, F: Fn(u32) -> N> Merging<'_, F> {
 }
 
 impl MergeLists {
-    /// What was loose in the last call, in the order in which it found clusters: members of one mostly follow another.
+    /// The loose constraints of the last call, in the order of their assignment; members of one cluster are mostly
+    /// consecutive.
     #[must_use]
     pub fn placed(&self) -> &[u32] {
         &self.placed
     }
 
-    /// The constraints that were in a cluster before the last call and are in another one now, ascending.
+    /// The constraints whose cluster was changed by the last call, ascending.
     #[must_use]
     pub fn moved(&self) -> &[Moved] {
         &self.moved
     }
 
-    /// Leaves the constraints that moved, each with the cluster it was in at first.
+    /// Keeps one entry per moved constraint, with its first cluster.
     fn finish(&mut self, clustering: &Clustering) {
         let Self {
             moved,
@@ -328,7 +332,7 @@ impl MergeLists {
         if moved.is_empty() {
             return;
         }
-        // Stable: of several moves the first stays.
+        // The sort is stable: of several moves the first is kept.
         moved.sort_by_key(|moved| moved.constraint);
         moved.dedup_by_key(|moved| moved.constraint);
         sorted.clone_from(placed);

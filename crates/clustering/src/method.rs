@@ -1,4 +1,4 @@
-//! The methods by name, for command lines and scene files.
+//! [`Method`]: the clustering methods by name, for command lines and scene files.
 
 use std::fmt;
 use std::num::NonZeroUsize;
@@ -8,7 +8,8 @@ use incise_graph::{Clustering, Incidence};
 
 use crate::{ClusteringError, greedy_k_neighbor, pressure, serial_neighbor_incidence};
 
-/// A clustering method, chosen at run time; written `none`, or a name and a size as in `serial:10`.
+/// A clustering method selected at run time; written `none`, or a name and a size as in
+/// `serial:10`.
 ///
 /// ```
 /// use incise_clustering::{Method, cluster};
@@ -24,13 +25,13 @@ use crate::{ClusteringError, greedy_k_neighbor, pressure, serial_neighbor_incide
 #[non_exhaustive]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Method {
-    /// Every constraint alone: `none`.
+    /// Every constraint is a cluster of its own: `none`.
     #[default]
     None,
     /// [`serial_neighbor`](crate::serial_neighbor) with this largest cluster size: `serial:K`.
     Serial(NonZeroUsize),
     /// [`serial_neighbor`](crate::serial_neighbor) with up to this many constraints beside the
-    /// seed, so one more in all: `serial-loose:K`, the reading of the paper's counts.
+    /// seed, so one more in total: `serial-loose:K`, the reading that matches the paper's counts.
     SerialLoose(NonZeroUsize),
     /// [`greedy_k_neighbor`] with this largest cluster size: `greedy-k:K`.
     GreedyK(NonZeroUsize),
@@ -59,7 +60,7 @@ impl Method {
 }
 
 impl Method {
-    /// The names that [`from_str`](Self::from_str) knows, without the cluster size.
+    /// The names accepted by [`from_str`](Self::from_str), without the cluster size.
     pub const NAMES: [&str; 5] = ["none", "serial", "serial-loose", "greedy-k", "pressure"];
 }
 
@@ -104,8 +105,7 @@ impl fmt::Display for Method {
 
 /// Clusters the constraints of `incidence` by the given method. Deterministic.
 ///
-/// A graph that came without incidence can be clustered by
-/// [`serial_neighbor`](crate::serial_neighbor).
+/// A graph without incidence can be clustered by [`serial_neighbor`](crate::serial_neighbor).
 #[must_use]
 pub fn cluster(method: Method, incidence: &Incidence) -> Clustering {
     let max_size = method.max_size();

@@ -1,14 +1,13 @@
-//! A clustering under construction: the members of clusters, and the pressure on every particle.
+//! [`Parts`]: a clustering under construction: the members of clusters, and the pressure on every
+//! particle.
 //!
-//! The *pressure* of a particle is the number of clusters that meet at it plus the number of its
-//! constraints that are still free. Before the first cluster it is the valence; each constraint
-//! that joins a cluster which is at the particle already takes one off; at the end it is the number
-//! of clusters that meet there.
+//! The *pressure* of a particle is the number of clusters at it plus the number of its free
+//! constraints. It starts as the valence, decreases by one when a constraint joins a cluster that
+//! is at the particle already, and ends as the number of clusters at the particle.
 //!
-//! Members of a cluster are a linked list through all constraints, so clusters come and go without
-//! a list each. One cluster at a time is *open*: only it can be joined, and the particles it is at
-//! are marked. Cost: O(arity) per constraint that joins or is freed, O(members * arity) to open a
-//! cluster again.
+//! The members of a cluster are a linked list through all constraints, so clusters need no list of
+//! their own. One cluster at a time is *open*: only it can be joined, and its particles are marked.
+//! Cost: O(arity) per constraint that joins or is freed, O(members * arity) to reopen a cluster.
 
 use incise_graph::{ClusterId, Clustering, Incidence};
 
@@ -20,24 +19,24 @@ const NONE: u32 = u32::MAX;
 pub(crate) struct Parts<'a> {
     pub(crate) incidence: &'a Incidence,
     labels: Vec<u32>,
-    /// Cluster -> the member that joined last.
+    /// Cluster -> its latest member.
     last: Vec<u32>,
     /// Constraint -> the member that joined before it.
     previous: Vec<u32>,
     sizes: Vec<usize>,
     /// Numbers of clusters without members.
     vacant: Vec<u32>,
-    /// Particle -> clusters and free constraints there.
+    /// Particle -> number of clusters and free constraints at it.
     pressure: Vec<u32>,
-    /// Particle -> free constraints there.
+    /// Particle -> number of free constraints at it.
     free: Vec<u32>,
-    /// Particle -> the opening in which it was last found at the open cluster.
+    /// Particle -> the last opening in which it was a particle of the open cluster.
     mark: Vec<u64>,
     openings: u64,
 }
 
 impl<'a> Parts<'a> {
-    /// Every constraint free. O(constraints + particles).
+    /// A state with all constraints free. O(constraints + particles).
     pub(crate) fn new(incidence: &'a Incidence) -> Self {
         let constraints = incidence.constraint_count();
         let mut valence = vec![0; incidence.particle_count()];
@@ -62,7 +61,7 @@ impl<'a> Parts<'a> {
         self.labels[c as usize] == NONE
     }
 
-    /// The cluster of `c`, which is in one.
+    /// The cluster of `c`, which must not be free.
     pub(crate) fn cluster_of(&self, c: u32) -> u32 {
         self.labels[c as usize]
     }
@@ -71,7 +70,7 @@ impl<'a> Parts<'a> {
         self.pressure[p as usize]
     }
 
-    /// The largest pressure anywhere.
+    /// The largest pressure of any particle.
     pub(crate) fn max_pressure(&self) -> u32 {
         self.pressure.iter().copied().max().unwrap_or(0)
     }
@@ -80,7 +79,7 @@ impl<'a> Parts<'a> {
         self.free[p as usize] > 0
     }
 
-    /// The number of clusters numbered so far, vacant ones included.
+    /// The number of cluster numbers in use, including vacant ones.
     pub(crate) fn cluster_count(&self) -> u32 {
         (0..)
             .zip(&self.sizes)
@@ -122,12 +121,12 @@ impl<'a> Parts<'a> {
         }
     }
 
-    /// Whether the open cluster is at `p`.
+    /// True if `p` is a particle of the open cluster.
     pub(crate) fn is_open_at(&self, p: u32) -> bool {
         self.mark[p as usize] == self.openings
     }
 
-    /// Puts the free constraint `c` into the open cluster, which is `cluster`.
+    /// Adds the free constraint `c` to the open cluster, which is `cluster`.
     pub(crate) fn join(&mut self, c: u32, cluster: u32) {
         self.labels[c as usize] = cluster;
         self.previous[c as usize] = self.last[cluster as usize];
@@ -143,7 +142,7 @@ impl<'a> Parts<'a> {
         }
     }
 
-    /// Frees the member that joined last, of at least two.
+    /// Frees the latest member of a cluster of at least two.
     pub(crate) fn free_last(&mut self, cluster: u32) {
         let c = self.last[cluster as usize];
         self.labels[c as usize] = NONE;
@@ -159,7 +158,7 @@ impl<'a> Parts<'a> {
         }
     }
 
-    /// Frees all members of a cluster. Its number is the next that [`start`](Self::start) gives.
+    /// Frees all members of a cluster. [`start`](Self::start) reuses its number next.
     pub(crate) fn dissolve(&mut self, cluster: u32) {
         self.openings += 1;
         let mut member = self.last[cluster as usize];
@@ -201,7 +200,7 @@ impl<'a> Parts<'a> {
 mod tests {
     use super::*;
 
-    /// Compares the pressures and free counts with counting.
+    /// Compares pressures and free counts with a recount.
     fn check(parts: &Parts<'_>) {
         for p in (0..).take(parts.incidence.particle_count()) {
             let constraints = parts.incidence.constraints_of(p as usize);

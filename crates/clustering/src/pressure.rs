@@ -1,29 +1,25 @@
-//! Pressure clustering: clusters grow where most constraints meet, so that few clusters meet
-//! anywhere.
+//! Pressure clustering: clusters that minimize the number of clusters at any particle.
 //!
-//! All clusters that meet at a particle need different colors, so the colors of the clustered graph
-//! are bounded below by the largest number of clusters at a particle, and on irregular meshes
-//! coloring comes close to that bound. So this is what to lower. The pressure of a particle, its
-//! clusters plus its free constraints, goes down by one whenever a constraint joins a cluster that
-//! is at the particle already. The method is our own, in three steps:
+//! All clusters at a particle need different colors, so the largest number of clusters at a particle is a lower bound
+//! of the colors of the clustered graph, and on irregular meshes colorings come close to it. The method therefore
+//! lowers this bound. The pressure of a particle, its clusters plus its free constraints, decreases by one whenever a
+//! constraint joins a cluster that is at the particle already. The method is our own and has three steps:
 //!
 //! 1. **Grow.** Start at the particle of highest pressure; then add, again and again, the free
 //!    constraint whose particles shared with the cluster have the largest sum of pressures, plus a
 //!    constant each. Sharing a particle under pressure counts for more.
-//! 2. **Absorb.** Growth leaves pockets. From a size limit of 16 on, clusters first grow to 15/16
-//!    of it only; then each that is smaller than that is spread over its neighbors, if all its
-//!    members find room there.
-//! 3. **Regrow.** For the worst particles, all clusters there and those around that have room are
-//!    dissolved and regrown, with the particle apparently under more pressure than it is. The
-//!    result is kept if the sum over the particles of 2^pressure went down, or the number of
-//!    clusters at the same sum; otherwise the old clusters are restored (ruin and recreate, Schrimpf
-//!    and others 2000). There are at most two passes over the worst particles, and no attempt begins after as
-//!    many constraints have been dissolved as there are.
+//! 2. **Absorb.** Growth leaves pockets. From a size limit of 16 on, clusters first grow to only 15/16 of it; then the
+//!    members of each smaller cluster are distributed over its neighbors, if all of them find room.
+//! 3. **Regrow.** At the particles of highest pressure, all clusters there and adjacent ones with room are dissolved
+//!    and regrown with increased apparent pressure of the particle. The result is kept if the sum over the particles of
+//!    2^pressure decreased, or the number of clusters at an equal sum; otherwise the old clusters are restored (ruin
+//!    and recreate, Schrimpf and others 2000). There are at most two passes over these particles, and no attempt begins
+//!    after as many constraints have been dissolved as there are.
 //!
-//! Clusters larger than a particle has constraints relieve it anyhow. There the number of clusters
-//! around a cluster decides, which compactness keeps low: from a size limit of 32 on, growth counts
-//! the particles shared with each member, every one the same, and there is no third step. Both
-//! numbers and the constant were chosen by measuring on tetrahedral meshes.
+//! Clusters larger than the valence of a particle lower its pressure in any case. There the number of clusters adjacent
+//! to a cluster matters, which compactness keeps low: from a size limit of 32 on, growth counts the particles shared
+//! with each member with equal weights, and there is no third step. Both limits and the constant were tuned on
+//! tetrahedral meshes.
 //!
 //! Cost: O(sum over particles of valence squared) score updates, each with the logarithm of a heap,
 //! for growing, and at most a few times that for regrowing.
@@ -37,23 +33,23 @@ use incise_graph::{Clustering, Incidence};
 use crate::candidates::Candidates;
 use crate::parts::Parts;
 
-/// From this size on a part of each cluster, one over this, is kept for pockets.
+/// Smallest size limit at which growth reserves a share of each cluster for pockets, one over this.
 const RESERVE: usize = 16;
-/// From this size on compactness counts for more than pressure.
+/// Smallest size limit at which growth uses compactness instead of pressure.
 const COMPACT: usize = 32;
-/// What sharing a particle is worth beside its pressure.
+/// Weight of a shared particle in addition to its pressure.
 const STEADY: u64 = 20;
-/// How much a particle gains in apparent pressure each time growth around it is repeated.
+/// Increase of a particle's apparent pressure for each repetition of the growth around it.
 const BOOST: u32 = 2;
-/// How often the worst particles are gone through at most.
+/// Largest number of passes over the particles of highest pressure.
 const PASSES: usize = 2;
 
 /// Clusters of up to `max_size` constraints such that few clusters meet at any particle.
 ///
-/// Every constraint is in one cluster. A cluster is connected: its members can be put in an order
-/// in which each but the first shares a particle with an earlier one. Clusters are numbered by
-/// their smallest member. Ties go to the smallest number; the arithmetic is in integers.
-/// Deterministic. O(sum over particles of valence squared, times log), whatever `max_size` is.
+/// Every constraint is in one cluster. A cluster is connected: its members have an order in which each but the first
+/// shares a particle with an earlier one. Clusters are numbered by their smallest member. Ties go to the smallest
+/// number; the arithmetic is in integers. Deterministic. O(sum over particles of valence squared, times log),
+/// independent of `max_size`.
 ///
 /// ```
 /// use std::num::NonZeroUsize;
@@ -86,7 +82,7 @@ pub fn pressure(incidence: &Incidence, max_size: NonZeroUsize) -> Clustering {
         target,
     );
     for c in (0..).take(constraints) {
-        // Nothing but a constraint without particles is left.
+        // Only constraints without particles are left.
         if growth.parts.is_free(c) {
             let cluster = growth.parts.start();
             growth.parts.join(c, cluster);
@@ -99,30 +95,30 @@ pub fn pressure(incidence: &Incidence, max_size: NonZeroUsize) -> Clustering {
     growth.parts.finish()
 }
 
-/// Clusters being grown, dissolved and grown again.
+/// Clusters that are grown, dissolved and regrown.
 struct Growth<'a> {
     parts: Parts<'a>,
-    /// Whether growth goes by the number of shared particles alone.
+    /// True if growth uses only the number of shared particles.
     compact: bool,
     candidates: Candidates,
-    /// Particle -> apparent pressure beyond its own.
+    /// Particle -> apparent pressure in addition to its own.
     boost: Vec<u32>,
     /// The clusters grown by the last call of `grow_around`.
     started: Vec<u32>,
 }
 
 impl Growth<'_> {
-    /// The pressure that growth believes in.
+    /// The apparent pressure of a particle.
     fn weight(&self, p: u32) -> u32 {
         self.parts
             .pressure(p)
             .saturating_add(self.boost[p as usize])
     }
 
-    /// Puts all free constraints on the given particles, and what comes with them, into clusters.
+    /// Adds all free constraints on the given particles, and others around them, to clusters.
     fn grow_around(&mut self, particles: impl Iterator<Item = u32>, size: usize) {
         self.started.clear();
-        // Pressure goes down only, so an outdated entry goes back with its present one.
+        // Pressure only decreases, so an outdated entry is pushed again with the present value.
         let mut worst: BinaryHeap<(u32, Reverse<u32>)> = particles
             .filter(|&p| self.parts.has_free(p))
             .map(|p| (self.weight(p), Reverse(p)))
@@ -139,7 +135,7 @@ impl Growth<'_> {
         }
     }
 
-    /// Grows a cluster from the free constraint on `p` that is under most pressure.
+    /// Grows a cluster from the free constraint on `p` with the highest pressure.
     fn grow(&mut self, p: u32, size: usize) {
         let incidence = self.parts.incidence;
         let load = |c: u32| -> u64 {
@@ -163,8 +159,7 @@ impl Growth<'_> {
         self.candidates.clear();
     }
 
-    /// Lets the constraints on those particles of `c` that the open cluster is not at yet know that
-    /// it soon will be.
+    /// Raises the scores of the constraints on those particles of `c` that are not yet particles of the open cluster.
     fn raise_around(&mut self, c: u32) {
         let incidence = self.parts.incidence;
         for &p in incidence.particles_of(c as usize) {
@@ -183,7 +178,7 @@ impl Growth<'_> {
         }
     }
 
-    /// Spreads clusters smaller than `target`, the smallest first, over their neighbors.
+    /// Distributes clusters smaller than `target` over their neighbors, the smallest first.
     fn absorb(&mut self, target: usize, max_size: usize) {
         let clusters = 0..self.parts.cluster_count();
         let mut small: Vec<(usize, u32)> = clusters
@@ -192,14 +187,14 @@ impl Growth<'_> {
             .collect();
         small.sort_unstable();
         for (_, cluster) in small {
-            // It may have absorbed others in the meantime.
+            // It may have absorbed others meanwhile.
             if self.parts.size(cluster) < target {
                 self.spread(cluster, max_size);
             }
         }
     }
 
-    /// Spreads one cluster over its neighbors, or leaves it as it is.
+    /// Distributes one cluster over its neighbors, or leaves it unchanged.
     fn spread(&mut self, cluster: u32, max_size: usize) {
         let mut members: Vec<u32> = self.parts.members(cluster).collect();
         members.reverse();
@@ -230,7 +225,7 @@ impl Growth<'_> {
         self.restore(&members);
     }
 
-    /// The cluster with room that shares most pressure with the free constraint `c`.
+    /// The cluster with room that shares the highest pressure with the free constraint `c`.
     fn host(&mut self, c: u32, max_size: usize) -> Option<u32> {
         let incidence = self.parts.incidence;
         let mut near = Vec::new();
@@ -242,7 +237,7 @@ impl Growth<'_> {
             let clusters = clustered.map(|&d| (self.parts.cluster_of(d), weight));
             near.extend(clusters.filter(|&(k, _)| self.parts.size(k) < max_size));
             near[start..].sort_unstable();
-            // Each cluster once per particle.
+            // Each cluster counts once per particle.
             let mut last = None;
             let mut kept = start;
             for i in start..near.len() {
@@ -261,7 +256,7 @@ impl Growth<'_> {
             .map(|(_, Reverse(cluster))| cluster)
     }
 
-    /// Makes a cluster of constraints that were one before.
+    /// Restores a cluster with these members.
     fn restore(&mut self, members: &[u32]) {
         let cluster = self.parts.start();
         for &c in members {
@@ -269,12 +264,12 @@ impl Growth<'_> {
         }
     }
 
-    /// Regrows the clusters around the worst particles, pass after pass.
+    /// Regrows the clusters around the particles of highest pressure, pass after pass.
     fn regrow_worst(&mut self, max_size: usize) {
         let constraints = self.parts.incidence.constraint_count();
         let mut effort = constraints;
         for _ in 0..PASSES {
-            // Those with the largest pressure and with one less: the next to be the worst.
+            // Particles with the largest pressure and with one less, which would be the largest next.
             let bound = self.parts.max_pressure();
             let particles = (0..).take(self.parts.incidence.particle_count());
             let mut worst: Vec<(Reverse<u32>, u32)> = particles
@@ -299,7 +294,7 @@ impl Growth<'_> {
         }
     }
 
-    /// Regrows the clusters at `p` and those around that have room; returns whether that was better.
+    /// Regrows the clusters at `p` and adjacent ones with room; returns true if the result was better.
     fn regrow(&mut self, p: u32, max_size: usize, bound: u32, effort: &mut usize) -> bool {
         let clusters = self.clusters_around(p, max_size);
         let mut members = Vec::new();
@@ -310,7 +305,7 @@ impl Growth<'_> {
         }
         *effort = effort.saturating_sub(members.len());
         let particles = self.particles_of(&members);
-        // In terms of 2^64 for the largest pressure; those far below it count alike.
+        // The largest pressure counts 2^64; pressures far below it all count equally.
         let cost = |parts: &Parts<'_>| -> u128 {
             let exponents = particles
                 .iter()
@@ -336,7 +331,7 @@ impl Growth<'_> {
         false
     }
 
-    /// The clusters at `p`, and those with room at any particle of these, ascending.
+    /// The clusters at `p` and those with room at any of their particles, ascending.
     fn clusters_around(&self, p: u32, max_size: usize) -> Vec<u32> {
         let incidence = self.parts.incidence;
         let on = |p: u32| {
@@ -358,7 +353,7 @@ impl Growth<'_> {
         clusters
     }
 
-    /// The particles of some constraints, ascending, each once.
+    /// The distinct particles of some constraints, ascending.
     fn particles_of(&self, constraints: &[u32]) -> Vec<u32> {
         let rows = constraints.iter();
         let mut particles: Vec<u32> = rows

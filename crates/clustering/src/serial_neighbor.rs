@@ -1,22 +1,21 @@
 //! Serial neighbor clustering: each constraint not yet in a cluster starts one with its free
 //! neighbors (paper section 4.2, Algorithm 2).
 //!
-//! One pass over the vertices in index order, no search beyond the neighbors of the seed. The paper
-//! leaves two things open. Which free neighbors are selected (line 8): here the first ones in index
-//! order, so that the result is determined. And whether Ks counts the seed: the algorithm selects
-//! "up to (Ks-1)" neighbors beside it, so here a cluster never has more than Ks members, seed
-//! included. The counts of the paper's Table 1 imply the looser reading, Ks neighbors beside the
-//! seed (1972 clusters of Ks = 5 hold 11,367 tets); that is this function with Ks + 1, and
-//! `serial-loose:Ks` by name.
+//! One pass over the vertices in index order, without a search beyond the neighbors of the seed.
+//! The paper leaves two points open. The choice of free neighbors (line 8) is here the first ones
+//! in index order, so that the result is determined. The limit Ks here includes the seed: the
+//! algorithm selects "up to (Ks-1)" neighbors beside it. The counts of the paper's Table 1 imply
+//! the looser reading, Ks neighbors beside the seed (1972 clusters of Ks = 5 hold 11,367 tets);
+//! that is this function with Ks + 1, and `serial-loose:Ks` by name.
 //!
-//! Every cluster lies within its seed and the neighbors of its seed. How good the clusters are
-//! depends on the numbering of the constraints: neighbors should have close numbers.
+//! Every cluster consists of its seed and neighbors of its seed. The quality depends on the
+//! numbering of the constraints: neighbors should have close numbers.
 //!
-//! Building the graph costs far more than clustering it, so there is the same algorithm
-//! [straight from incidence](serial_neighbor_incidence). The free constraints on a particle ascend,
-//! so its first Ks - 1 are all that a seed can want from it, and because seeds ascend too, the
-//! clustered ones in front of a list are passed over once and for all. Cost: O(vertices + edges)
-//! from a graph, far less than that from incidence.
+//! Building the graph costs far more than clustering it, so the algorithm also runs [directly on
+//! incidence](serial_neighbor_incidence). The free constraints on a particle ascend, so a seed
+//! needs at most the first Ks - 1 of them, and because seeds ascend too, the clustered ones at the
+//! front of a list are skipped permanently. Cost: O(vertices + edges) from a graph, far less from
+//! incidence.
 
 use std::num::NonZeroUsize;
 
@@ -24,8 +23,8 @@ use incise_graph::{ClusterId, Clustering, ConstraintGraph, Incidence};
 
 /// Clusters of a vertex and up to `max_size - 1` of its free neighbors, vertex after vertex.
 ///
-/// `max_size` is the paper's Ks, a strict limit; with 1 every vertex stays alone. The number of a
-/// cluster is the order in which its seed comes up. Deterministic, O(vertices + edges).
+/// `max_size` is the paper's Ks, a strict limit; with 1 every vertex stays alone. Clusters are
+/// numbered in the order of their seeds. Deterministic, O(vertices + edges).
 ///
 /// ```
 /// use std::num::NonZeroUsize;
@@ -72,8 +71,8 @@ pub fn serial_neighbor(graph: &ConstraintGraph, max_size: NonZeroUsize) -> Clust
     Clustering::from_labels(labels).expect("there are at most as many clusters as vertices")
 }
 
-/// [`serial_neighbor`] of the constraint graph of `incidence`, label for label, without building
-/// the graph.
+/// [`serial_neighbor`] of the constraint graph of `incidence`, with identical labels, without
+/// building the graph.
 ///
 /// Deterministic. At most O(sum over particles of valence squared), in practice near O(entries *
 /// `max_size`).
@@ -98,7 +97,7 @@ pub fn serial_neighbor(graph: &ConstraintGraph, max_size: NonZeroUsize) -> Clust
 pub fn serial_neighbor_incidence(incidence: &Incidence, max_size: NonZeroUsize) -> Clustering {
     let room = max_size.get() - 1;
     let mut labels = vec![ClusterId::NONE; incidence.constraint_count()];
-    // How many constraints at the front of each particle's list are known to be clustered.
+    // The number of leading constraints of each particle's list that are clustered.
     let mut passed = vec![0; incidence.particle_count()];
     let mut free = Vec::new();
     let mut clusters = 0;

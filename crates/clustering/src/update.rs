@@ -1,12 +1,11 @@
-//! The local update after a cut: removed constraints leave their clusters, new ones form clusters
-//! of their own (paper section 4.3).
+//! The local update after a cut: removed constraints leave their clusters, new ones form new
+//! clusters (paper section 4.3).
 //!
-//! Where the paper turns the elements that replace one cut element into one new cluster, a group
-//! here becomes as many clusters as the size limit asks for, of sizes that differ by at most one:
-//! clusters of one color run side by side, so the longest of them is what a color waits for. All
-//! other clusters keep members and numbers, except for members that left. The edit is checked
-//! before anything changes. Cost: O(e log e) for e constraints in the edit, whatever the size of
-//! the rest.
+//! The paper turns the elements that replace one cut element into one new cluster. Here a group
+//! becomes as many clusters as the size limit requires, of sizes that differ by at most one,
+//! because the time of a color is that of its largest cluster. All other clusters keep members and
+//! numbers, except for members that left. The edit is checked before any change. Cost: O(e log e)
+//! for e constraints in the edit, independent of the size of the mesh.
 
 use std::num::NonZeroUsize;
 
@@ -14,18 +13,18 @@ use incise_graph::{ClusterId, Clustering};
 
 use crate::ClusteringError;
 
-/// Takes `removed` out of their clusters and puts each group of new constraints into clusters of
-/// their own.
+/// Removes the constraints `removed` from their clusters and puts each group of new constraints
+/// into new clusters.
 ///
-/// Group `g` is `values[offsets[g]..offsets[g + 1]]`; it is cut, in the given order, into the
-/// smallest number of clusters of at most `max_size` constraints. A new constraint may use a
-/// removed number again or lie past the end. Returns the new clusters in order; they use the
-/// numbers that became vacant, the latest first, before new ones. Deterministic; O(e log e) for an
-/// edit of e constraints.
+/// Group `g` is `values[offsets[g]..offsets[g + 1]]`; it is split, in the given order, into the
+/// smallest number of clusters of at most `max_size` constraints. A new constraint may reuse a
+/// removed number or be past the end. Returns the new clusters in order; they reuse vacated
+/// numbers, the latest first, before new ones. Deterministic; O(e log e) for an edit of e
+/// constraints.
 ///
 /// # Errors
-/// A removed constraint that is in no cluster, a new one that is in one, either listed twice, or
-/// offsets that do not fit. The clustering is then unchanged.
+/// A removed constraint that is in no cluster, a new one that is in one, a repeated one in either
+/// list, or invalid offsets. The clustering is then unchanged.
 ///
 /// ```
 /// use std::num::NonZeroUsize;
@@ -56,7 +55,7 @@ pub fn update_local(
     let mut new = Vec::with_capacity(offsets.len() - 1);
     for pair in offsets.windows(2) {
         let mut group = &values[pair[0] as usize..pair[1] as usize];
-        // Even parts: each takes its share of what is left.
+        // Equal parts: each takes its share of the rest.
         for parts in (1..=group.len().div_ceil(max_size.get())).rev() {
             let (part, rest) = group.split_at(group.len().div_ceil(parts));
             let cluster = clustering.new_cluster(part[0] as usize);
@@ -70,7 +69,7 @@ pub fn update_local(
     Ok(new)
 }
 
-/// Does the edit fit?
+/// An error unless the edit fits the clustering.
 fn check(
     clustering: &Clustering,
     removed: &[u32],
@@ -101,7 +100,7 @@ fn check(
     }
 }
 
-/// A sorted copy, or the first constraint that is listed twice.
+/// A sorted copy, or the first constraint that is repeated.
 fn sorted(list: &[u32]) -> Result<Vec<u32>, u32> {
     let mut sorted = list.to_vec();
     sorted.sort_unstable();

@@ -1,4 +1,4 @@
-//! Greedy K-neighbor clustering, held bit for bit to counting everything again at every step.
+//! Greedy K-neighbor clustering equals a version that recounts at every step, bit for bit.
 
 use std::num::NonZeroUsize;
 
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 
 use crate::inputs::{awkward, incidences};
 
-/// The number of particles two constraints share.
+/// The number of particles that two constraints share.
 fn shared(incidence: &Incidence, c: usize, d: usize) -> usize {
     let others = incidence.particles_of(d);
     incidence
@@ -18,7 +18,7 @@ fn shared(incidence: &Incidence, c: usize, d: usize) -> usize {
         .count()
 }
 
-/// The description, with a recount for every decision.
+/// The method with a recount for every decision.
 fn recounted(incidence: &Incidence, k: usize) -> Vec<ClusterId> {
     let constraints = incidence.constraint_count();
     let mut labels = vec![ClusterId::NONE; constraints];
@@ -44,7 +44,7 @@ fn recounted(incidence: &Incidence, k: usize) -> Vec<ClusterId> {
             labels[next] = cluster;
             members.push(next);
         }
-        // Leftovers in the order in which they became candidates.
+        // Former candidates in the order in which they became candidates.
         for &c in &members {
             for &p in incidence.particles_of(c) {
                 let on_p = (0..constraints)

@@ -1,4 +1,4 @@
-//! Random constraints, and some that are known to be awkward.
+//! Random constraints and degenerate cases.
 
 use incise_graph::Incidence;
 use proptest::collection::{btree_set, vec};
@@ -12,8 +12,8 @@ pub(crate) fn incidences() -> impl Strategy<Value = Incidence> {
     })
 }
 
-/// Nothing, nothing touched, one particle with all constraints, many components, a long row, and
-/// the tets of a box of cubes.
+/// No constraints, constraints without particles, one particle with all constraints, many
+/// components, a long row, and the tets of a box of cubes.
 pub(crate) fn awkward() -> Vec<Incidence> {
     let build = |particles: usize, rows: Vec<Vec<u32>>| {
         Incidence::from_constraints(particles, rows).unwrap()
@@ -36,7 +36,7 @@ pub(crate) fn awkward() -> Vec<Incidence> {
     ]
 }
 
-/// `n` x `n` x `n` cubes of five tets each, mirrored from cube to cube so that they fit together.
+/// `n` x `n` x `n` cubes of five tets each, mirrored from cube to cube to match.
 fn boxes(n: u32) -> Incidence {
     let number = |x: u32, y: u32, z: u32| (z * (n + 1) + y) * (n + 1) + x;
     let tets = [

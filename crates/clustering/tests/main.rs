@@ -1,5 +1,5 @@
-//! Clusterings against a slow reading of the paper's algorithm, local updates and mergers against
-//! recounting everything.
+//! Clusterings compared with a slow version of the paper's algorithm; local updates and mergers
+//! compared with a recount.
 
 #![expect(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 

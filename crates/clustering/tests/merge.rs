@@ -1,4 +1,4 @@
-//! Merging keeps the books, the limit and what is far away, and leaves no pair that would fit.
+//! Merging keeps counts, the size limit and distant clusters, and leaves no pair that would fit.
 
 use std::collections::BTreeSet;
 use std::num::NonZeroUsize;
@@ -9,7 +9,7 @@ use proptest::prelude::*;
 
 use crate::inputs::{awkward, incidences};
 
-/// The constraints that share a particle with one.
+/// The constraints that share a particle with `c`.
 fn neighbors(incidence: &Incidence, c: u32) -> BTreeSet<u32> {
     let particles = incidence.particles_of(c as usize).iter();
     let mut near: BTreeSet<u32> = particles
@@ -20,7 +20,7 @@ fn neighbors(incidence: &Incidence, c: u32) -> BTreeSet<u32> {
     near
 }
 
-/// Merges, where constraints are linked that share a particle.
+/// Merges with constraints linked if they share a particle.
 fn merge(
     clustering: &mut Clustering,
     incidence: &Incidence,
@@ -36,7 +36,7 @@ fn merge(
     lists
 }
 
-/// The constraints that hang together with `c` within its cluster, by brute force.
+/// The constraints connected to `c` within its cluster, by brute force.
 fn part(clustering: &Clustering, incidence: &Incidence, c: u32) -> BTreeSet<u32> {
     let mut part = BTreeSet::from([c]);
     loop {
@@ -75,7 +75,7 @@ proptest! {
         let loose: Vec<u32> = (0..).zip(&labels).filter(|(_, k)| **k == ClusterId::NONE).map(|(c, _)| c).collect();
         let mut before = Clustering::from_labels(labels).unwrap();
         if past_the_end {
-            // Loose ones at the end need not be known.
+            // Loose constraints at the end may be past the end of the clustering.
             let known = before.labels().iter().rposition(|&k| k != ClusterId::NONE);
             before.truncate(known.map_or(0, |c| c + 1));
         }
@@ -103,7 +103,7 @@ proptest! {
         placed.sort_unstable();
         prop_assert_eq!(&placed, &loose);
 
-        // Used lists are as good as new ones.
+        // Reused lists give the result of new ones.
         let (mut again, mut lists) = (before.clone(), lists);
         let limit = NonZeroUsize::new(ks).unwrap();
         merge_small(&mut lists, &mut again, &loose, &seeds, limit, |c| neighbors(&incidence, c));
@@ -130,8 +130,8 @@ proptest! {
 }
 
 proptest! {
-    /// Where every cluster hangs together, nothing loose and no seed is left in a small cluster beside one that has room
-    /// for it.
+    /// If every cluster is connected, no loose constraint and no seed ends up in a small cluster that fits into a
+    /// linked one.
     #[test]
     fn whatever_fits_is_merged(
         incidence in incidences(),
@@ -146,7 +146,7 @@ proptest! {
             (0..).take(count).filter(|&c| list.contains(&(c as usize))).collect()
         };
         let (mut seeds, mut loose) = (of(&chosen), of(&single));
-        // Whole clusters become loose, so that the others still hang together.
+        // Whole clusters become loose, so that the others stay connected.
         let gone: BTreeSet<_> = loose.iter().filter_map(|&c| clustering.cluster_of(c as usize)).collect();
         loose = (0..).take(count).filter(|&c| {
             clustering.cluster_of(c as usize).is_some_and(|k| gone.contains(&k))
@@ -180,7 +180,7 @@ fn loose_constraints_become_full_clusters_or_nearly_so() {
             merge(&mut clustering, &incidence, &loose, &[], ks);
             clustering.check().unwrap();
             assert!(clustering.max_size() <= ks);
-            // Each cluster is one part: merging never joins what is not linked.
+            // Each cluster is one part: merging never joins unlinked constraints.
             for c in loose {
                 let own = clustering.cluster_of(c as usize).unwrap();
                 assert_eq!(part(&clustering, &incidence, c).len(), clustering.size(own));
@@ -189,7 +189,7 @@ fn loose_constraints_become_full_clusters_or_nearly_so() {
     }
     let row = Incidence::from_constraints(301, (0u32..300).map(|i| [i, i + 1])).unwrap();
     let mut clustering = Clustering::default();
-    // From one end or from both: what is left over is at most the last cluster.
+    // From one end or from both: at most the last cluster is a remainder.
     for loose in [(0..300).collect::<Vec<u32>>(), (0..300).rev().collect()] {
         clustering.clone_from(&Clustering::default());
         merge(&mut clustering, &row, &loose, &[], 10);
@@ -197,7 +197,7 @@ fn loose_constraints_become_full_clusters_or_nearly_so() {
     }
 }
 
-/// Two triangles side by side; a cut has parted the left one from the right ones.
+/// Two adjacent triangles; a cut has separated the left one from the right ones.
 #[test]
 fn nothing_grows_or_is_merged_across_a_cut() {
     let incidence = Incidence::from_constraints(7, [[0u32, 1, 2], [3, 4, 5], [3, 4, 6]]).unwrap();
@@ -215,7 +215,7 @@ fn nothing_grows_or_is_merged_across_a_cut() {
     assert_eq!(clustering.sizes(), [1, 0, 2]);
 }
 
-/// A cluster of four that a cut brought apart: each half joins its own side.
+/// A cluster of four that a cut has separated: each half joins its own side.
 #[test]
 fn parts_of_a_cluster_go_their_own_ways() {
     let rows = [
@@ -245,7 +245,7 @@ fn parts_of_a_cluster_go_their_own_ways() {
     assert_eq!(clustering.occupied(), 2);
 }
 
-/// A remnant grows into what is loose before that makes clusters of its own.
+/// A remnant grows into loose constraints before these form clusters of their own.
 #[test]
 fn small_clusters_grow_first() {
     let row = Incidence::from_constraints(11, (0u32..10).map(|i| [i, i + 1])).unwrap();

@@ -1,5 +1,5 @@
-//! What every method promises: a partition, the size limit, connected clusters, the same result
-//! again; and what pressure clustering is for.
+//! Guarantees of every method: a partition, the size limit, connected clusters, a deterministic
+//! result; and the purpose of pressure clustering.
 
 use std::num::NonZeroUsize;
 
@@ -19,7 +19,7 @@ fn all(size: usize) -> [Method; 4] {
     ]
 }
 
-/// Does every cluster hang together through shared particles?
+/// True if every cluster is connected through shared particles.
 fn is_connected(incidence: &Incidence, clustering: &Clustering) -> bool {
     clustering.members().iter().all(|members| {
         let mut reached = vec![members[0]];
@@ -81,14 +81,14 @@ proptest! {
         }
     }
 
-    /// Constraints without a common particle never share a cluster, so a limit above everything
-    /// gives the components, but for serial clusters, which end at the neighbors of the seed.
+    /// Constraints without a common particle never share a cluster, so an unlimited size gives the
+    /// components, except for serial clusters, which end at the neighbors of the seed.
     #[test]
     fn a_limit_that_is_none_gives_the_components(incidence in incidences()) {
         let greedy = cluster(Method::GreedyK(NonZeroUsize::MAX), &incidence);
         let quotient = incidence.quotient(&greedy);
         prop_assert!(quotient.clique_bound() <= 1);
-        // Far above, but not so far that the part kept for pockets matters.
+        // Far above, but not so far that the share reserved for pockets matters.
         let pressure = cluster("pressure:100".parse().unwrap(), &incidence);
         prop_assert_eq!(pressure.occupied(), greedy.occupied());
     }
@@ -119,7 +119,7 @@ fn fans_are_cut_evenly_enough() {
     }
 }
 
-/// Tets around hubs are what it is made for.
+/// Tets around hubs: the case for which pressure clustering is designed.
 #[test]
 fn pressure_has_the_lowest_bound_among_hubs() {
     let tets = stacked(3000);
@@ -134,7 +134,7 @@ fn pressure_has_the_lowest_bound_among_hubs() {
 }
 
 /// A tet split into four around a new particle, then one of all tets again, and so on: old
-/// particles have very many.
+/// particles get a very high valence.
 fn stacked(splits: u32) -> Incidence {
     let mut tets = vec![[0u32, 1, 2, 3]];
     let mut random = 1u32;

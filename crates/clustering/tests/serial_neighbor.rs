@@ -1,4 +1,4 @@
-//! Algorithm 2, held to a word-by-word version of it and to what it promises.
+//! Algorithm 2 compared with a literal version of it, and its guarantees.
 
 use std::num::NonZeroUsize;
 
@@ -9,7 +9,7 @@ use proptest::prelude::*;
 
 use crate::inputs::incidences;
 
-/// The algorithm as printed, with sets for sets.
+/// The algorithm as printed, with sets.
 fn as_printed(graph: &ConstraintGraph, ks: usize) -> Vec<Vec<u32>> {
     let mut unclustered: Vec<u32> = (0..).take(graph.vertex_count()).collect(); // Line 1.
     let mut clusters = Vec::new(); // Line 2.

@@ -1,4 +1,4 @@
-//! Local updates keep the books, the limit and everything they were not asked to touch.
+//! Local updates keep counts, the size limit and all unrelated clusters.
 
 use std::num::NonZeroUsize;
 
@@ -25,8 +25,7 @@ proptest! {
         let mut clustering = serial_neighbor(&ConstraintGraph::from_incidence(&incidence), limit);
         let before = clustering.clone();
         let removed: Vec<u32> = removed.into_iter().collect();
-        // Each removed constraint is replaced by a group; its number is used again by the first of
-        // the group.
+        // Each removed constraint is replaced by a group; the first of the group reuses its number.
         let (mut offsets, mut values, mut next) = (vec![0], Vec::new(), 40);
         for (&c, &count) in removed.iter().zip(&pieces) {
             for piece in 0..count {
@@ -57,7 +56,7 @@ proptest! {
         }
     }
 
-    /// The whole chain after a cut: edit, quotient, recolor the new clusters only, schedule.
+    /// All steps after a cut: edit, quotient, recolor the new clusters only, schedule.
     #[test]
     fn a_cut_spring_row_stays_solvable(cut in 0u32..40, ks in 1usize..6) {
         let limit = NonZeroUsize::new(ks).unwrap();

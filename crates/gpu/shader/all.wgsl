@@ -1,4 +1,4 @@
-// Before the first round: no vertex has a color and all are on the list.
+// Initialization before the first round: no vertex has a color and all are on the list.
 
 @group(0) @binding(2) var<storage, read_write> colors: array<u32>;
 

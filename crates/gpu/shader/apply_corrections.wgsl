@@ -1,15 +1,15 @@
-// Ends a Jacobi pass: adds the gathered corrections and, with Chebyshev, leaps ahead along the line through the iterate
-// before last. Twin: `Jacobi::apply` and `Jacobi::extrapolate` of incise-xpbd.
+// Ends a Jacobi pass: adds the gathered corrections and, with Chebyshev, extrapolates along the line through the
+// iterate before last. Twin: `Jacobi::apply` and `Jacobi::extrapolate` of incise-xpbd.
 //
-// A Jacobi pass leaves the particles as they were when the iteration began, so that iterate is still at hand.
+// A Jacobi pass does not change the particles, so the iterate at the start of the iteration is still available.
 
-// Whether iterates are kept.
+// True if iterates are kept.
 override KEEPS: bool = false;
 
 @group(0) @binding(0) var<uniform> settings: Settings;
 @group(0) @binding(2) var<storage, read_write> particles: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read_write> corrections: array<vec4<f32>>;
-// Where the previous iteration began.
+// Positions at the start of the previous iteration.
 @group(0) @binding(4) var<storage, read_write> before: array<vec4<f32>>;
 
 @compute @workgroup_size(64)

@@ -1,7 +1,7 @@
 // Attached particles and their anchors on handles.
 
 struct Attachment {
-    // The anchor in the handle's frame, relative to the center of all anchors there.
+    // The anchor in the handle's frame, relative to the center of all anchors of the handle.
     anchor: vec3<f32>,
     particle: u32,
     handle: u32,
@@ -12,7 +12,7 @@ struct Attachment {
     unused: u32,
 }
 
-// Three rows of a rotation with what is added to each.
+// Three rows of a rotation, each with its component of the translation.
 struct Pose {
     x: vec4<f32>,
     y: vec4<f32>,

@@ -1,4 +1,4 @@
-// Makes all numbers of a buffer 0.
+// Fills a buffer with zeros.
 
 @group(0) @binding(0) var<storage, read_write> numbers: array<u32>;
 

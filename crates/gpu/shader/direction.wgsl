@@ -1,12 +1,12 @@
-// Length and direction of a vector, for every vector that has one. Twin: `direction` of incise-xpbd.
+// Length and direction of a vector, 0 if it has none. Twin: `direction` of incise-xpbd.
 //
-// Squares of lengths leave the range of single precision beyond 1e19 m and below 1e-19 m. Divided by its largest
-// component first, a vector keeps its direction however long or short it is.
+// Squares of lengths leave the range of single precision beyond 1e19 m and below 1e-19 m. The vector is therefore
+// divided by its largest component first.
 
-// The smallest number that every device tells from 0.
+// The smallest number that every device distinguishes from 0.
 const SMALLEST: f32 = 1.17549435e-38;
 
-// The vector of length 1, and the length; that is 0 if there is no direction.
+// The unit vector and the length, which is 0 if there is no direction.
 fn direction(v: vec3<f32>) -> vec4<f32> {
     let a = abs(v);
     let largest = max(max(a.x, a.y), a.z);

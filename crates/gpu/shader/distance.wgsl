@@ -5,7 +5,7 @@ fn solve_constraint(index: u32) {
     let a = particles[corner.x];
     let b = particles[corner.y];
     let away = direction(a.xyz - b.xyz);
-    // Without a direction it waits for others to part the two.
+    // Coincident particles have no direction; other constraints must separate them first.
     if !(away.w > 0.0) {
         return;
     }

@@ -1,9 +1,9 @@
-// A pass of the first half of ECL-GC (Alabandi, Powers and Burtscher 2020): vertices of 32 neighbors and more.
+// A pass of the first half of ECL-GC (Alabandi, Powers and Burtscher 2020): vertices with at least 32 neighbors.
 //
-// Neighbors see of a palette its smallest color and, as it never changes, its largest: shortcut 1 is "my best color
-// lies outside of your interval". A vertex whose best color changed in a pass waits for the next. Smallest color and
-// final color are one word, so that a neighbor is either; the palette itself is its owner's alone. A vertex that sees
-// an old smallest color sees a larger interval and waits. Cost: all edges of the undecided vertices.
+// Neighbors see the smallest color of a palette and its largest, which never changes; shortcut 1 applies if a vertex's
+// best color lies outside of this interval. A vertex whose best color changed in a pass waits for the next one.
+// Smallest color and final color share a word; only its owner accesses the palette itself. A vertex that sees an old
+// smallest color sees a larger interval and waits. Cost: all edges of the undecided vertices.
 
 @group(0) @binding(2) var<storage, read> offsets: array<u32>;
 @group(0) @binding(3) var<storage, read> higher: array<u32>;
@@ -11,7 +11,7 @@
 @group(0) @binding(5) var<storage, read_write> palettes: array<atomic<u32>>;
 @group(0) @binding(6) var<storage, read_write> colors: array<atomic<u32>>;
 
-// Colors v if it can be; says whether.
+// Colors v if possible; returns true if it did.
 fn decides(v: u32) -> bool {
     let begin = offsets[v];
     let end = begin + searches[v].left;

@@ -1,4 +1,5 @@
-// Before the first half of ECL-GC: no vertex has a color, and vertices of 32 neighbors and more are on the list.
+// Initialization of the first half of ECL-GC: no vertex has a color, and vertices with at least 32
+// neighbors are on the list.
 
 const LARGE: u32 = 32u;
 

@@ -1,9 +1,9 @@
-// A pass of the second half of ECL-GC (Alabandi, Powers and Burtscher 2020): vertices of less than 32 neighbors.
+// A pass of the second half of ECL-GC (Alabandi, Powers and Burtscher 2020): vertices with fewer than 32 neighbors.
 //
-// Shortcut 2 drops the edge to a neighbor with which no color is shared, and with it the largest color left; shortcut 1
-// colors a vertex whose best color no neighbor waited for can take. A palette is one word, which its owner alone
-// writes, and has one color more than there are neighbors to wait for, so the last of them leaves one color. A vertex
-// that sees an old palette sees too many colors and waits. Cost: the edges that are waited for.
+// Shortcut 2 drops the edge to a neighbor that shares no color, and with it the largest color left; shortcut 1 colors a
+// vertex whose best color no pending neighbor can take. A palette is one word that only its owner writes. It has one
+// color more than there are pending neighbors, so one color always remains. A vertex that sees an old palette sees too
+// many colors and waits. Cost: the edges to pending neighbors.
 
 @group(0) @binding(2) var<storage, read> offsets: array<u32>;
 @group(0) @binding(3) var<storage, read> higher: array<u32>;
@@ -11,12 +11,12 @@
 @group(0) @binding(5) var<storage, read_write> waiting: array<u32>;
 @group(0) @binding(6) var<storage, read_write> colors: array<u32>;
 
-// Colors v if it can be; says whether.
+// Colors v if possible; returns true if it did.
 fn decides(v: u32) -> bool {
     let begin = offsets[v];
     var palette = atomicLoad(&words[v]);
     var left = waiting[v];
-    // What the neighbors may still get.
+    // The colors that the neighbors may still get.
     var around = 0u;
     for (var rest = left; rest != 0u; rest &= rest - 1u) {
         let index = countTrailingZeros(rest);

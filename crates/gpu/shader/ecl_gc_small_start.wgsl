@@ -1,7 +1,7 @@
-// Between the halves of ECL-GC: vertices of less than 32 neighbors go on the list, with a palette in one word each.
+// Between the halves of ECL-GC: vertices with fewer than 32 neighbors go on the list, with a palette of one word each.
 //
-// The palette of a decided vertex is its color; colors from 32 on are out of the reach of small vertices, so those of
-// large vertices that have one are empty.
+// The palette of a colored vertex is its color. Small vertices never reach colors from 32 on, so the palettes of large
+// vertices with such a color are empty.
 
 const LARGE: u32 = 32u;
 
@@ -9,7 +9,7 @@ const LARGE: u32 = 32u;
 @group(0) @binding(3) var<storage, read> searches: array<Search>;
 @group(0) @binding(4) var<storage, read> colors: array<u32>;
 @group(0) @binding(5) var<storage, read_write> words: array<u32>;
-// The higher neighbors that a small vertex waits for, a bit for each index in its list.
+// The higher neighbors on which a small vertex waits, a bit for each index in its list.
 @group(0) @binding(6) var<storage, read_write> waiting: array<u32>;
 
 @compute @workgroup_size(THREADS)

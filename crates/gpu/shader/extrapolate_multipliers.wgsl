@@ -1,7 +1,7 @@
-// Chebyshev's leap of the multipliers. Twin: `Jacobi::extrapolate` of incise-xpbd.
+// Chebyshev extrapolation of the multipliers. Twin: `Jacobi::extrapolate` of incise-xpbd.
 
 @group(0) @binding(0) var<storage, read_write> multipliers: array<vec2<f32>>;
-// Slot -> the multipliers when this iteration began, and those when the previous one did.
+// Slot -> multipliers at the start of this iteration and at the start of the previous one.
 @group(0) @binding(2) var<storage, read_write> history: array<vec4<f32>>;
 
 @compute @workgroup_size(64)
@@ -15,7 +15,7 @@ fn main(
         return;
     }
     var multiplier = multipliers[slot];
-    // A substep begins without multipliers.
+    // A substep begins with multipliers of 0.
     var start = vec4(0.0);
     if current.iteration > 0u {
         start = history[slot];
@@ -24,6 +24,6 @@ fn main(
         multiplier = start.zw + (multiplier - start.zw) * current.weight;
         multipliers[slot] = multiplier;
     }
-    // Nothing but the tets changes them: the next iteration begins with these.
+    // Only the tets change them, so the next iteration begins with these.
     history[slot] = vec4(multiplier, start.xy);
 }

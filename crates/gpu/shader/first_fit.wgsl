@@ -1,7 +1,8 @@
-// The smallest color that none of a row of neighbors has.
+// The smallest color that no neighbor in a row has.
 //
-// Looks for it in windows of 64 colors, so there is no limit to their number and nothing is stored. The including
-// shader defines `color_around`. Cost: one walk over the row per window, mostly one.
+// Searches in windows of 64 colors, which needs no storage and does not limit the number of colors.
+// The including shader defines `color_around`. Cost: one walk over the row per window, mostly one
+// window.
 
 fn first_fit(begin: u32, end: u32) -> u32 {
     var base = 0u;

@@ -1,9 +1,10 @@
-// Workgroups for so many threads, as a grid that no device refuses.
+// A grid of workgroups for a number of threads, within the limits of every device.
 
-// Most workgroups along one axis.
+// Largest number of workgroups along one axis.
 const WIDEST: u32 = 65535u;
 
-// Rows of equal length, like in the host's grid, so the last one may be longer than asked for.
+// Rows have equal length, like those of the host's grid, so the last one may have surplus
+// workgroups.
 fn grid(threads: u32) -> array<u32, 3> {
     let groups = threads / THREADS + u32(threads % THREADS > 0u);
     let rows = max((groups + WIDEST - 1u) / WIDEST, 1u);

@@ -1,7 +1,7 @@
 // Solves one group of clusters, which share no particle: a thread for each cluster, tet by tet (paper section 4.1). Twin:
 // `solve_block` in `simd_kernel.rs` of incise-xpbd.
 
-// Whether corrections are summed in a buffer and particles stay unchanged.
+// True if corrections are summed in a buffer and particles stay unchanged.
 override JACOBI: bool = false;
 
 @group(0) @binding(8) var<storage, read_write> corrections: array<vec4<f32>>;

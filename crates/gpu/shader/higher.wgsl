@@ -1,8 +1,8 @@
-// For each vertex its neighbors of higher priority, and a color for each of them and one more.
+// Builds for each vertex the list of its neighbors of higher priority and a palette of one color more than these.
 //
-// The list takes the front of the vertex's row in an array of its own, so no prefix sum is needed. In front is the
-// neighbor of lowest priority, which most likely is the last to be colored, hence the one to look at first. Cost: one
-// walk over all neighbors.
+// The list is stored at the front of the vertex's row in a separate array, so no prefix sum is needed. It begins with
+// the neighbor of lowest priority, which most likely is colored last and is therefore checked first. Cost: one walk
+// over all neighbors.
 
 @group(0) @binding(2) var<storage, read> offsets: array<u32>;
 @group(0) @binding(3) var<storage, read> neighbors: array<u32>;

@@ -1,6 +1,8 @@
-// Which constraints conflict, told by particles: those that share one.
+// The constraints around each particle and the particles of each constraint: constraints that share
+// a particle conflict.
 //
-// Rows of both directions, each in one array: offsets, then values, and the offsets count from the front of the array.
+// Each direction is one array of offsets, then values. The offsets count from the front of the
+// array.
 
 @group(0) @binding(2) var<storage, read> particles_of: array<u32>;
 @group(0) @binding(3) var<storage, read> constraints_of: array<u32>;

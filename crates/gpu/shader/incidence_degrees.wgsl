@@ -1,11 +1,11 @@
-// The number of constraints that each constraint is in the way of.
+// Counts the constraints that conflict with each constraint.
 //
-// One that shares several particles is counted at the first of them. Cost: the constraints around each particle, times
-// the particles before it, times the logarithm of their valence.
+// A constraint that shares several particles is counted at the first of them. Cost: the constraints
+// around each particle, times the particles before it, times the logarithm of their valence.
 
 @group(0) @binding(4) var<storage, read_write> degrees: array<u32>;
 
-// Is u among the constraints of p, which ascend?
+// True if u is among the constraints of p, which are in ascending order.
 fn is_on(u: u32, p: u32) -> bool {
     var low = constraints_of[p];
     var high = constraints_of[p + 1u];

@@ -1,10 +1,10 @@
-// Where in a frame an iteration is, for kernels that need to know.
+// Uniform of an iteration: its position in the frame and its extrapolation.
 
 struct IterationUniform {
-    // Both from 0 on.
+    // Both start at 0.
     substep: u32,
     iteration: u32,
-    // How far Chebyshev's leap goes; 0 is no leap.
+    // Weight of the Chebyshev extrapolation; 0 is none.
     weight: f32,
     unused: u32,
 }

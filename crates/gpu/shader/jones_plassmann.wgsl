@@ -1,21 +1,21 @@
-// A round of Jones and Plassmann (1993), largest degree first: a vertex that waits for none takes the smallest color
-// left.
+// A round of Jones and Plassmann (1993), largest degree first: a vertex without pending neighbors takes the smallest
+// free color.
 //
-// A color is final once it is seen, and a vertex remembers how far down its row it has waited, so each neighbor is
-// waited for once in all rounds together. Colors are atomics because others are deciding at the same time; whether
-// one sees them in this round or in the next changes the number of rounds and not the colors. Cost: each edge twice.
+// Colors are final, and a vertex stores how many entries of its row are already colored, so each neighbor is awaited
+// once over all rounds. Colors are atomics because other vertices are decided at the same time. A vertex sees them in
+// this round or in the next, which changes the number of rounds but not the colors. Cost: each edge twice.
 
 @group(0) @binding(2) var<storage, read> offsets: array<u32>;
 @group(0) @binding(3) var<storage, read> neighbors: array<u32>;
 @group(0) @binding(4) var<storage, read_write> colors: array<atomic<u32>>;
-// How many neighbors of a row are known not to stop its vertex.
+// The number of leading neighbors of a row that no longer block its vertex.
 @group(0) @binding(5) var<storage, read_write> passed: array<u32>;
 
 fn color_around(i: u32) -> u32 {
     return atomicLoad(&colors[neighbors[i]]);
 }
 
-// Colors v if it can be; says whether.
+// Colors v if possible; returns true if it did.
 fn decides(v: u32) -> bool {
     let begin = offsets[v];
     let end = offsets[v + 1u];

@@ -1,9 +1,9 @@
-// Colors whose gaps are to be closed.
+// Colors in use, and their new numbers without gaps.
 
 struct Names {
-    // The largest color plus one; then the number of colors that are used.
+    // The largest color plus one; then the number of colors in use.
     count: atomic<u32>,
-    // For each color whether it is used, then its new name.
+    // For each color 1 if it is used, then its new number.
     names: array<atomic<u32>>,
 }
 

@@ -1,4 +1,4 @@
-// Which colors are used.
+// Marks the colors in use.
 
 @group(0) @binding(2) var<storage, read> colors: array<u32>;
 

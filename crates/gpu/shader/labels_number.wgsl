@@ -1,6 +1,6 @@
-// Numbers the colors that are used, in their order: one workgroup, each thread a part of the colors.
+// Numbers the colors in use in ascending order: one workgroup, each thread a range of colors.
 //
-// Colors are few (no more than the largest degree and one), so this is short. Cost: O(colors / 64).
+// The number of colors is at most the largest degree plus one. Cost: O(colors / 64).
 
 var<workgroup> used: array<u32, THREADS>;
 

@@ -1,4 +1,4 @@
-// Gives all vertices the new names of their colors.
+// Replaces the color of each vertex by its new number.
 
 @group(0) @binding(2) var<storage, read_write> colors: array<u32>;
 

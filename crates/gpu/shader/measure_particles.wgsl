@@ -13,7 +13,7 @@ struct ParticleSums {
 @group(0) @binding(0) var<uniform> settings: Settings;
 @group(0) @binding(1) var<storage, read> particles: array<vec4<f32>>;
 @group(0) @binding(2) var<storage, read> velocities: array<vec4<f32>>;
-// In units of the mean mass; that of what is held, too.
+// In units of the mean mass; includes rigidly attached particles.
 @group(0) @binding(3) var<storage, read> masses: array<f32>;
 @group(0) @binding(4) var<storage, read_write> particle_sums: array<ParticleSums>;
 

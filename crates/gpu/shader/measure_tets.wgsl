@@ -1,26 +1,26 @@
 // Elastic energy, change of volume, least ratio and inverted tets, summed up by workgroups. Twin: `Solver::energy` and
 // `Solver::volume` of incise-xpbd.
 //
-// At rest both terms of the energy are large and cancel. So it is written in the strain A = F^T F - 1, which is small
-// where the tet is merely turned: with d = det F - 1 and m the second and third invariant of A,
+// At rest both terms of the energy are large and cancel. It is therefore written in the strain A = F^T F - 1, which is
+// small for a rotated tet: with d = det F - 1 and m the second and third invariant of A,
 // d (d + 2) = tr A + m and |F|^2 - 3 = tr A, and the energy in units of half the stiffness is
-// d^2 - m + ratio d^2 + 2 slope d, in which slope = 1 + ratio (1 - gamma) is what rounding left of zero.
+// d^2 - m + ratio d^2 + 2 slope d, where slope = 1 + ratio (1 - gamma) is 0 up to rounding.
 
 override UNIFORM: bool = true;
-// Whether corners are numbered within tiles.
+// True if corners are numbered within tiles.
 override TILED: bool = false;
 
 const NUMBERS: u32 = 16u;
-// Sizes of a tile, the same as in `tiles.wgsl`.
+// Sizes of a tile, equal to those in `tiles.wgsl`.
 override TILE_TETS: u32 = 64u;
 override TILE_NUMBERS: u32 = 2u + 5u * TILE_TETS;
 
 struct Units {
-    // Places for tets.
+    // Slots for tets.
     tet_slots: u32,
     // The cube root of a tet's mean volume at rest in m.
     length: f32,
-    // Where there is but one material.
+    // Material constants if there is a single material.
     slope: f32,
     unused: u32,
 }
@@ -88,7 +88,7 @@ fn measure(slot: u32, corner: vec4<u32>) -> TetSums {
         first = d * d - (second + third);
     }
     let energy = 0.5 * stiffness * (first + ratio * d * d + 2.0 * slope * d);
-    // One over six volumes at rest; 0 where the tet is too flat to take part.
+    // One over six volumes at rest; 0 for a tet that is too flat to be solved.
     let per_volumes = dot(q1 * units.length, cross(q2 * units.length, q3 * units.length));
     var change = 0.0;
     if per_volumes > 0.0 {
@@ -107,7 +107,7 @@ fn main(
     for (var slot = id.x * THREADS + lane; slot < units.tet_slots; slot += count.x * THREADS) {
         var corner = corners[slot];
         if corner.x == corner.y {
-            // There is no tet.
+            // The slot is empty.
             continue;
         }
         if TILED {

@@ -1,11 +1,12 @@
-// Puts what handles hold rigidly where the handles are at the end of a substep. Twin: `Solver::move_held` of incise-xpbd.
+// Moves rigidly attached particles to their handles at the end of a substep. Twin:
+// `Solver::move_held` of incise-xpbd.
 
 @group(0) @binding(0) var<uniform> settings: Settings;
 @group(0) @binding(2) var<storage, read_write> particles: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read> attachments: array<Attachment>;
-// Those at the start of the frame, then those at the end of each substep.
+// Poses at the start of the frame, then at the end of each substep.
 @group(0) @binding(4) var<storage, read> poses: array<Pose>;
-// Particles that could not follow out of the range of numbers.
+// The number of particles whose anchor was out of the range of numbers.
 @group(0) @binding(5) var<storage, read_write> repaired: atomic<u32>;
 
 @compute @workgroup_size(64)

@@ -1,7 +1,7 @@
-// Between two rounds: how many workgroups the next one takes, and an empty list for it to fill.
+// Between two rounds: computes the workgroups of the next one and empties the list that it fills.
 //
-// The arguments of an indirect dispatch cannot be bound by the dispatch that reads them, so this is a kernel of its
-// own, of one thread.
+// The arguments of an indirect dispatch cannot be bound by the dispatch that reads them, so this is
+// a separate kernel of one thread.
 
 @group(0) @binding(2) var<storage, read_write> arguments: array<u32, 3>;
 

@@ -1,4 +1,4 @@
-// Puts particles that a cut or an edit has made or changed where they belong.
+// Scatters added and changed particles of a cut or an edit.
 
 struct ParticlePatch {
     particle: vec4<f32>,

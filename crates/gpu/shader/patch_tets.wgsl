@@ -1,4 +1,4 @@
-// Puts tets into their slots after a cut.
+// Scatters tets to their slots after a cut.
 
 struct TetPatch {
     slot: u32,

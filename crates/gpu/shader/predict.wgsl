@@ -1,7 +1,7 @@
 // Moves every free particle by its velocity. Twin: `Solver::predict` of incise-xpbd.
 //
-// The prediction is computed once more in `update_velocities.wgsl`, to the same bits: hence the explicit `fma`, which a
-// compiler rounds in the same way in both.
+// `update_velocities.wgsl` recomputes the prediction with the same bits. The explicit `fma` is
+// rounded identically by all compilers.
 
 @group(0) @binding(0) var<uniform> settings: Settings;
 @group(0) @binding(1) var<storage, read_write> particles: array<vec4<f32>>;

@@ -1,15 +1,15 @@
-// Puts the particles inside of colliders on their surface, with Coulomb friction. Twin: `collider.rs` and
-// `collider/solid.rs` of incise-xpbd, which explain it; the order of operations is the same.
+// Projects particles inside of colliders to their surface, with Coulomb friction. Twin: `collider.rs` and
+// `collider/solid.rs` of incise-xpbd, which explain it; the order of operations is equal.
 
 @group(0) @binding(0) var<uniform> settings: Settings;
 @group(0) @binding(2) var<storage, read_write> particles: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read> previous: array<vec4<f32>>;
-// The colliders of one substep after those of another; what each number is, `Solver::obstacle_data` says.
+// The colliders of all substeps, one substep after the other; `Solver::obstacle_data` documents the numbers.
 @group(0) @binding(4) var<storage, read> colliders: array<f32>;
 
-// Numbers of an collider.
+// Numbers of a collider.
 const NUMBERS: u32 = 20u;
-// How often a particle inside several colliders is handed around among them.
+// Passes over the colliders for a particle that is inside of several.
 const ROUNDS: u32 = 32u;
 
 const PLANE: f32 = 0.0;
@@ -29,7 +29,7 @@ fn nearest_on_plane(at: u32, x: vec3<f32>) -> Nearest {
     let normal = vector(at + 8u);
     let offset = colliders[at + 2u];
     let along = dot(normal, x);
-    // Not `x` plus the depth: like this it lies on a level surface to the bit.
+    // Not `x` plus the depth, so that the particle lies exactly on a level surface.
     return Nearest(normal, along - offset, x - normal * along + normal * offset);
 }
 
@@ -90,7 +90,7 @@ fn nearest(at: u32, x: vec3<f32>) -> Nearest {
     return nearest_on_box(at, x);
 }
 
-// Holds a particle on the surface back by at most the friction's share of the depth it was pushed out of.
+// Reduces the motion along the surface by at most the depth of the correction times the friction coefficient.
 fn rub(at: u32, surface: Nearest, before: vec3<f32>, x: vec3<f32>) -> vec3<f32> {
     let way = x - before - vector(at + 4u);
     let slide = way - surface.normal * dot(surface.normal, way);
@@ -114,7 +114,7 @@ fn main(
         return;
     }
     let particle = particles[p];
-    // What is no number is put back when velocities are updated.
+    // Updating velocities resets NaN.
     if !(particle.w > 0.0) || !are_finite(particle.xyz) {
         return;
     }
@@ -123,7 +123,7 @@ fn main(
     let first = current.substep * number;
     var x = particle.xyz;
     var moved = false;
-    // Colliders in a row that the particle is not inside of.
+    // Consecutive colliders that do not contain the particle.
     var clear = 0u;
     for (var k = 0u; k < ROUNDS * number; k++) {
         let at = (first + k % number) * NUMBERS;

@@ -1,5 +1,5 @@
-// Random numbers without a state: a counter of 64 bits, scrambled (the output of SplitMix64; Steele, Lea and Flood
-// 2014), in words of 32, the low one first.
+// Stateless random numbers: a counter of 64 bits, scrambled (the output of SplitMix64; Steele, Lea
+// and Flood 2014), as two words of 32 bits, the low one first.
 
 // The high half of a product.
 fn product_high(a: u32, b: u32) -> u32 {
@@ -12,7 +12,7 @@ fn product_high(a: u32, b: u32) -> u32 {
     return a1 * b1 + (middle >> 16u) + (other >> 16u);
 }
 
-// A product, of which the upper 64 bits are lost.
+// The lower 64 bits of a product.
 fn product(a: vec2<u32>, b: vec2<u32>) -> vec2<u32> {
     return vec2<u32>(a.x * b.x, product_high(a.x, b.x) + a.x * b.y + a.y * b.x);
 }
@@ -22,7 +22,7 @@ fn folded(x: vec2<u32>, bits: u32) -> vec2<u32> {
     return x ^ vec2<u32>((x.x >> bits) | (x.y << (32u - bits)), x.y >> bits);
 }
 
-// A bijection that looks random.
+// A bijection that scrambles all bits.
 fn scramble(x: vec2<u32>) -> vec2<u32> {
     let y = product(folded(x, 30u), vec2<u32>(0x1ce4e5b9u, 0xbf58476du));
     let z = product(folded(y, 27u), vec2<u32>(0x133111ebu, 0x94d049bbu));

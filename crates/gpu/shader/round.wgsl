@@ -1,8 +1,8 @@
-// What all kernels of a coloring see.
+// Uniform shared by all kernels of a coloring.
 
 struct Round {
     vertices: u32,
-    // Which of the two worklists is read.
+    // The worklist that is read, 0 or 1.
     parity: u32,
 }
 

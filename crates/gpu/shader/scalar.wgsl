@@ -1,25 +1,26 @@
-// Constraints of one number on a few particles, in the order of their own schedule: a thread solves a cluster, constraint
-// after constraint. Twin: `scalar.rs` of incise-xpbd, which explains the equations; the order of operations is the same.
+// Scalar constraints on a few particles, in the order of their own schedule: a thread solves a cluster, constraint
+// after constraint. Twin: `scalar.rs` of incise-xpbd, which explains the equations; the order of operations is equal.
 
 override DAMPED: bool = false;
-// Whether multipliers are kept from one iteration to the next.
+// True if multipliers are kept from one iteration to the next.
 override KEEPS: bool = false;
 
 @group(0) @binding(0) var<uniform> settings: Settings;
 @group(0) @binding(1) var<uniform> dispatch_range: DispatchRange;
 @group(0) @binding(2) var<storage, read_write> particles: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read> previous: array<vec4<f32>>;
-// Constraint -> particles, and for a distance of two whether it acts only when it is longer.
+// Constraint -> particles; a distance uses the third number as a flag for tension only.
 @group(0) @binding(4) var<storage, read> corners: array<vec4<u32>>;
 // Constraint -> length or one over six volumes, compliance, damping time.
 @group(0) @binding(5) var<storage, read> numbers: array<vec4<f32>>;
-// Cluster -> its first constraint, and the one behind its last.
+// Cluster -> its first constraint, and the end of its range.
 @group(0) @binding(6) var<storage, read> ranges: array<vec2<u32>>;
 @group(0) @binding(7) var<storage, read_write> multipliers: array<f32>;
 // The groups of 64 clusters of the colors.
 @group(0) @binding(8) var<storage, read> lists: array<u32>;
 
-// What moves the particles along the gradients; 0 moves nothing. `rate` is the change since the start of the substep.
+// The change of the multiplier, which moves the particles along the gradients. `rate` is the change since the start of
+// the substep.
 fn solve(index: u32, value: f32, rate: f32, steepness: f32, one_sided: bool) -> f32 {
     let constraint = numbers[index];
     var before = 0.0;
@@ -35,13 +36,13 @@ fn solve(index: u32, value: f32, rate: f32, steepness: f32, one_sided: bool) -> 
         resistance *= settings.one + damping;
     }
     resistance += compliance;
-    // Nothing that could move it.
+    // All particles are fixed.
     if !(resistance > 0.0) {
         return 0.0;
     }
     var change = -(residual / resistance) * settings.relaxation;
     if one_sided {
-        // Slack it does not pull, not even to damp; and in all it never pushes.
+        // A slack tension-only constraint neither pulls nor damps; its multiplier in total never pushes.
         if value <= 0.0 && change < 0.0 {
             return 0.0;
         }

@@ -1,17 +1,17 @@
 // A round of shortcut graph coloring (paper section 4.1, Algorithm 1) with all three shortcuts.
 //
 // v takes the smallest color of its palette if every neighbor u of higher priority has another color, or has a larger
-// smallest color (shortcut 3), or does not have that color in its palette (shortcut 1). If the palettes share nothing
+// smallest color (shortcut 3), or does not have that color in its palette (shortcut 1). If the palettes are disjoint
 // the edge is dropped, and with it the largest color of v (shortcut 2).
 //
-// Others decide in the same dispatch, and nothing says in which order one sees what they write. That is sound, since
-// each test needs one word of u only and stays true whatever happens later: a color is final, palettes shrink,
-// smallest colors grow. A decided vertex keeps its color in its palette, so that a vertex that takes it for undecided
-// does not take its color. v takes away the colors of those it sees decided itself, before it counts those it still
-// waits for: their own telling may not have arrived. Hence the colors are those of the sequential algorithm and only
-// the number of rounds depends on the device.
+// Other vertices are decided in the same dispatch, in no guaranteed order. That is sound, since each test needs one
+// word of u only and stays true under all later writes: a color is final, palettes shrink, smallest colors grow. A
+// decided vertex keeps its color in its palette, so a vertex that still sees it as undecided does not take its color. v
+// removes the colors of decided neighbors from its palette itself before it counts the pending ones, because their own
+// removals may not be visible yet. Hence the colors are those of the sequential algorithm and only the number of rounds
+// depends on the device.
 //
-// Cost: each edge twice for the telling, and once for each smallest color that its lower vertex gets past.
+// Cost: each edge twice for the removals, and once for each smallest color that its lower vertex passes over.
 
 @group(0) @binding(2) var<storage, read> offsets: array<u32>;
 @group(0) @binding(3) var<storage, read> neighbors: array<u32>;
@@ -20,7 +20,7 @@
 @group(0) @binding(6) var<storage, read_write> palettes: array<atomic<u32>>;
 @group(0) @binding(7) var<storage, read_write> colors: array<atomic<u32>>;
 
-// Have u and v no color in common?
+// True if u and v have no color in common.
 fn disjoint(u: u32, v: u32) -> bool {
     let a = palette_begin(u);
     let b = palette_begin(v);
@@ -33,7 +33,7 @@ fn disjoint(u: u32, v: u32) -> bool {
     return true;
 }
 
-// Takes from v all but its smallest colors.
+// Reduces the palette of v to its smallest colors.
 fn keep_smallest(v: u32, size: u32) {
     var left = size;
     for (var word = palette_begin(v); word < palette_begin(v + 1u); word++) {
@@ -44,7 +44,7 @@ fn keep_smallest(v: u32, size: u32) {
             dropped |= 1u << (31u - countLeadingZeros(bits & ~dropped));
         }
         if dropped != 0u {
-            // Not a store: others may be taking colors away.
+            // An atomic operation, because other threads may remove colors at the same time.
             atomicAnd(&palettes[word], ~dropped);
         }
         left -= min(left, held);
@@ -57,13 +57,13 @@ fn exchange(a: u32, b: u32) {
     higher[b] = entry;
 }
 
-// Colors v if it can be; says whether.
+// Colors v if possible; returns true if it did.
 fn decides(v: u32) -> bool {
     let begin = offsets[v];
     var search = searches[v];
     var best = palette_first(v, atomicLoad(&colors[v]) & ~PENDING);
     if search.passed_for != best {
-        // The neighbor that stopped v most likely still does, so it is looked at first.
+        // The neighbor that blocked v most likely still does, so it is checked first.
         if search.passed < search.left {
             exchange(begin, begin + search.passed);
         }
@@ -76,7 +76,7 @@ fn decides(v: u32) -> bool {
         let u = higher[begin + search.passed];
         let held = atomicLoad(&colors[u]);
         if held < PENDING {
-            // Decided: not to be waited for any more.
+            // A decided neighbor is no longer pending.
             palette_remove(v, held);
             search.left -= 1u;
             exchange(begin + search.passed, begin + search.left);
@@ -100,7 +100,7 @@ fn decides(v: u32) -> bool {
     }
     if stopped {
         if dropped {
-            // Each neighbor still waited for can take one color away, so one more than those is enough.
+            // Each pending neighbor can remove one color, so one more than their number is enough.
             keep_smallest(v, search.left + 1u);
         }
         searches[v] = search;
@@ -109,7 +109,7 @@ fn decides(v: u32) -> bool {
     }
     atomicStore(&colors[v], best);
     note_color(best);
-    // Neighbors of higher priority cannot get this color, so telling them changes nothing.
+    // Neighbors of higher priority cannot get this color, so it is not removed from theirs.
     for (var i = begin; i < offsets[v + 1u]; i++) {
         palette_remove(neighbors[i], best);
     }

@@ -1,15 +1,15 @@
-// A round of shortcut graph coloring (paper section 4.1, Algorithm 1) that never sees an edge.
+// A round of shortcut graph coloring (paper section 4.1, Algorithm 1) without a list of edges.
 //
-// Constraints on one particle all differ, so a particle has a bit per color for "taken here", and what a constraint
-// may get is what none of its particles has taken: a few words instead of all neighbors. To be without a limit on
-// colors and with two words a particle, this works in windows of 64 colors: a constraint that finds none in the first
-// window waits for the second. That gives the colors of one pass with all colors, since whether a constraint fits into
-// a window depends only on those that got a color in it.
+// Constraints on one particle have distinct colors, so a particle stores a bit per used color, and a constraint may get
+// the colors that none of its particles has used: a few words instead of all neighbors. The colors are processed in
+// windows of 64, which takes two words per particle without a limit on colors: a constraint without a color in the
+// first window waits for the second. This gives the colors of one pass with all colors, since only constraints with a
+// color in a window affect it.
 //
-// Neighbors of higher priority are waited for as in `scgc.wgsl`, with shortcuts 1 and 3, and for the reasons given
-// there the colors do not depend on what a constraint sees of the others in a round. Shortcut 2 drops edges, and there
-// are none. A neighbor that shares several particles is looked at several times. Cost: a round walks the neighbors of
-// the constraints whose last obstacle is gone, and looks at one word for all others.
+// Pending neighbors of higher priority are handled as in `scgc.wgsl`, with shortcuts 1 and 3; the colors do not depend
+// on the order within a round, for the reasons given there. Shortcut 2 drops edges and does not apply. A neighbor that
+// shares several particles is visited several times. Cost: a round walks the neighbors of the constraints whose last
+// blocking neighbor is colored, and reads one word for all others.
 
 @group(0) @binding(4) var<storage, read> degrees: array<u32>;
 @group(0) @binding(5) var<storage, read_write> colors: array<atomic<u32>>;
@@ -17,7 +17,7 @@
 // Two words per particle.
 @group(0) @binding(7) var<storage, read_write> taken: array<atomic<u32>>;
 
-// The colors of the window that v cannot get.
+// The colors of the window that are unavailable to v.
 fn taken_around(v: u32) -> vec2<u32> {
     var around = vec2<u32>(0u, 0u);
     for (var i = particles_of[v]; i < particles_of[v + 1u]; i++) {
@@ -28,11 +28,11 @@ fn taken_around(v: u32) -> vec2<u32> {
     return around;
 }
 
-// Does u keep a constraint of lower priority from taking `best`, color `bit` of the window?
+// True if u prevents a constraint of lower priority from taking `best`, color `bit` of the window.
 fn stops(u: u32, best: u32, bit: u32) -> bool {
     let held = atomicLoad(&colors[u]);
     if held < PENDING {
-        // If it is the same, u has told so after v looked.
+        // An equal color of u was marked after v read the marks.
         return held == best;
     }
     if best < (held & ~PENDING) {
@@ -41,7 +41,7 @@ fn stops(u: u32, best: u32, bit: u32) -> bool {
     return ((atomicLoad(&waits[u].taken[bit >> 5u]) >> (bit & 31u)) & 1u) == 0u;
 }
 
-// Colors v if it can be; says whether v stays on the list.
+// Colors v if possible; returns true if v stays on the list.
 fn stays_after(v: u32) -> bool {
     let around = taken_around(v);
     atomicStore(&waits[v].taken[0], around.x);
@@ -50,7 +50,7 @@ fn stays_after(v: u32) -> bool {
     if around.x == 0xffffffffu {
         bit = 32u + countTrailingZeros(~around.y);
         if around.y == 0xffffffffu {
-            // Nothing in this window.
+            // No color of this window is left.
             atomicStore(&colors[v], PENDING | (work.window + 64u));
             atomicAdd(&work.rest, 1u);
             return false;

@@ -1,4 +1,5 @@
-// Between two windows of 64 colors: constraints without a color are listed again, with nothing taken.
+// Between two windows of 64 colors: lists the constraints without a color again and clears the
+// marks.
 
 @group(0) @binding(2) var<storage, read> colors: array<u32>;
 @group(0) @binding(3) var<storage, read_write> waits: array<Wait>;

@@ -1,9 +1,9 @@
-// Where the search of one undecided vertex stands.
+// Search state of one undecided vertex.
 
 struct Search {
-    // Entries of its list of higher neighbors still to wait for.
+    // Entries of its list of higher neighbors that are pending.
     left: u32,
-    // Leading entries known not to stop it from taking `passed_for`.
+    // Leading entries that do not block it from taking `passed_for`.
     passed: u32,
     passed_for: u32,
 }

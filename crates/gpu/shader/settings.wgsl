@@ -1,7 +1,7 @@
-// What the settings of a step are to all kernels of the solver.
+// Settings of a step for all kernels of the solver.
 
 struct Settings {
-    // What gravity adds to a velocity in a substep, in m/s.
+    // Velocity added by gravity in a substep, in m/s.
     gravity: vec3<f32>,
     // The time of a substep in s, its square, and one over it.
     time: f32,
@@ -9,20 +9,20 @@ struct Settings {
     per_time: f32,
     // Factor on each correction.
     relaxation: f32,
-    // The numbers 1 and 1/2, and the norm of the derivative of det F above which volume terms are scaled down. Not written
-    // as literals: some compilers reorder sums that contain literals.
+    // The numbers 1 and 1/2, and the norm of the derivative of det F above which volume terms are scaled down. They are
+    // not literals, because some compilers reorder sums that contain literals.
     one: f32,
     half: f32,
     max_cofactor_norm: f32,
     particles: u32,
-    // Places that a thread has for tets.
+    // Tet slots per thread.
     depth: u32,
     // Numbers of colliders, handles, and rigid and soft attachments.
     colliders: u32,
     handles: u32,
     rigid: u32,
     soft: u32,
-    // l/mu, gamma and the damping time, where there is but one material; then 0, which compilers must not know.
+    // l/mu, gamma and the damping time of a single material; then 0, passed as a value to hide it from compilers.
     material: vec4<f32>,
 }
 
@@ -32,7 +32,7 @@ struct DispatchRange {
     count: u32,
 }
 
-// By bits, since a compiler may assume that nothing is infinite.
+// Tests bits, since a compiler may assume that no value is infinite.
 fn is_finite(x: f32) -> bool {
     return (bitcast<u32>(x) & 0x7f800000u) != 0x7f800000u;
 }

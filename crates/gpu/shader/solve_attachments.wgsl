@@ -1,13 +1,14 @@
-// Pulls particles to their handles that hang on them by a compliance. Twin: `Solver::solve_attachments` of incise-xpbd.
+// Pulls particles of compliant attachments to their handles. Twin: `Solver::solve_attachments` of
+// incise-xpbd.
 
-// Whether multipliers are kept from one iteration to the next.
+// True if multipliers are kept from one iteration to the next.
 override KEEPS: bool = false;
 
 @group(0) @binding(0) var<uniform> settings: Settings;
 @group(0) @binding(2) var<storage, read_write> particles: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read> previous: array<vec4<f32>>;
 @group(0) @binding(4) var<storage, read> attachments: array<Attachment>;
-// Those at the start of the frame, then those at the end of each substep.
+// Poses at the start of the frame, then at the end of each substep.
 @group(0) @binding(5) var<storage, read> poses: array<Pose>;
 @group(0) @binding(6) var<storage, read_write> multipliers: array<vec4<f32>>;
 

@@ -1,5 +1,5 @@
-// Several colors of one group each, one after the other, in a single workgroup: a barrier inside of it is cheaper than a
-// dispatch.
+// Several colors of one group each, one after the other, in a single workgroup: a barrier within a
+// workgroup costs less than a dispatch.
 
 @compute @workgroup_size(64)
 fn main(@builtin(local_invocation_index) lane: u32) {

@@ -1,6 +1,6 @@
 // A tet: deformation gradient, Cholesky factor of the metric and volume term.
 // Shared by the kernels that solve tets and the one that damps them.
-// Twin: `simd_kernel.rs` of incise-xpbd, which explains the equations; the order of operations is the same.
+// Twin: `simd_kernel.rs` of incise-xpbd, which explains the equations; the order of operations is equal.
 
 struct Tet {
     // Gradients of the barycentric coordinates of corners 1 to 3.

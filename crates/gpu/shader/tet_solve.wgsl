@@ -1,16 +1,16 @@
 // The three forms of solving a tet. Each moves the corners and changes both multipliers. Twin: `simd_kernel.rs` of
 // incise-xpbd, which explains the equations; the order of operations is the same.
 //
-// The energy of the split form is written in two ways, so that nothing cancels near rest nor far from it.
+// The energy of the split form is written in two ways to avoid cancellation both near rest and far from it.
 
 const SPLIT: u32 = 0u;
 const BLOCK: u32 = 1u;
 const SEQUENTIAL: u32 = 2u;
 
 override TET_SOLVE: u32 = SPLIT;
-// Whether a substep has several iterations, for the split form.
+// True if a substep has several iterations, for the split form.
 override ITERATED: bool = false;
-// Whether multipliers are kept.
+// True if multipliers are kept.
 override KEEPS: bool = false;
 
 @group(0) @binding(6) var<storage, read_write> particles: array<vec4<f32>>;
@@ -24,7 +24,7 @@ struct Change {
 
 // The trace of E beyond which the energy of shear is computed from it.
 const LARGE_STRAIN: f32 = 2.0;
-// How often a step that raises the energy of its tet is shortened.
+// Largest number of halvings of a step that raises the energy of its tet.
 const SHORTENINGS: u32 = 3u;
 
 // The parts of the energy of the split form.
@@ -37,7 +37,7 @@ struct Energies {
     cofactor: Columns,
     // det F - 1.
     bulge: f32,
-    // Whether a step may raise the energy.
+    // True if a step may raise the energy.
     far: bool,
 }
 
@@ -82,7 +82,7 @@ fn energy_of(tet: Tet, energies: Energies) -> f32 {
     return energies.shear + lame * settings.half * energies.bulge * energies.bulge;
 }
 
-// The part of a step that is taken where all of it would raise the energy of a tet that is far from rest; else 1.
+// The fraction of a step to take: below 1 where the full step would raise the energy of a tet that is far from rest.
 fn descent(tet: Tet, x: Corners, f: Columns, energies: Energies, change: Columns) -> f32 {
     let push = (tet.ratio - settings.one) * energies.bulge;
     let moved = deformation(tet, move_corners(tet, x, change));
@@ -197,7 +197,7 @@ fn pinned(x: f32) -> f32 {
 // The block form: both constraints as one system.
 fn solve_block(tet: Tet, x: Corners, f: Columns, multipliers: ptr<function, vec2<f32>>) -> Corners {
     let norm = sqrt(product(f, f));
-    // At F = 0 the gradient has no direction, and the tet waits for its neighbors.
+    // At F = 0 the gradient has no direction; the tet stays until its neighbors move it.
     let directed = norm > 0.0;
     let scale = settings.one / select(settings.one, norm, directed);
     let v = volume(tet, f);

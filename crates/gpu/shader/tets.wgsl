@@ -1,14 +1,14 @@
 // The tets on the device, and the bindings that solving and damping share.
 //
-// A slot holds the numbers of a tet. Those of 64 slots lie side by side, number by number, so that adjacent threads
-// read adjacent words.
+// A slot holds the numbers of a tet. Those of 64 slots are interleaved number by number, so that
+// adjacent threads read adjacent words.
 
-// Whether the body has a single material.
+// True if the body has a single material.
 override UNIFORM: bool = true;
 
 @group(0) @binding(0) var<uniform> settings: Settings;
 @group(0) @binding(1) var<uniform> dispatch_range: DispatchRange;
-// Slot -> corners; all 0 where there is no tet.
+// Slot -> corners; all 0 for an empty slot.
 @group(0) @binding(2) var<storage, read> corners: array<vec4<u32>>;
 @group(0) @binding(3) var<storage, read> rest: array<f32>;
 @group(0) @binding(4) var<storage, read> constants: array<vec4<f32>>;

@@ -1,4 +1,5 @@
-// Gives what handles hold rigidly the velocity of its motion in a substep. Twin: `Solver::update_held` of incise-xpbd.
+// Sets the velocity of rigidly attached particles to that of their handle in a substep. Twin:
+// `Solver::update_held` of incise-xpbd.
 
 @group(0) @binding(0) var<uniform> settings: Settings;
 @group(0) @binding(1) var<storage, read> particles: array<vec4<f32>>;

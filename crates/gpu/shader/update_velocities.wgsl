@@ -1,11 +1,11 @@
-// Adds what the corrections moved to the velocities, and puts back what left the range of numbers. Twin:
-// `Solver::update_velocities` of incise-xpbd, whose documentation says why it is not the motion over the time.
+// Adds the corrections of positions to the velocities, and resets particles that left the range of numbers. Twin:
+// `Solver::update_velocities` of incise-xpbd, whose documentation explains why velocities are not motion over time.
 
 @group(0) @binding(0) var<uniform> settings: Settings;
 @group(0) @binding(1) var<storage, read_write> particles: array<vec4<f32>>;
 @group(0) @binding(2) var<storage, read> previous: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read_write> velocities: array<vec4<f32>>;
-// Particles that had to be put back.
+// The number of reset particles.
 @group(0) @binding(4) var<storage, read_write> repaired: atomic<u32>;
 
 @compute @workgroup_size(64)

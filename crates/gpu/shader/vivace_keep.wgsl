@@ -1,8 +1,8 @@
-// Second part of a round of Vivace: which vertices keep what they picked.
+// Second part of a round of Vivace: marks the vertices that keep their pick.
 //
-// A vertex keeps its color against uncolored neighbors that picked the same if it has the highest number among them;
-// by the weaker rule, if it has the highest number among all its uncolored neighbors. Marks of this round are made
-// while others look, so a vertex marked with this round counts as uncolored.
+// A vertex keeps its pick if it has the highest number among the uncolored neighbors with an equal pick; by the weaker
+// rule, if it has the highest number among all its uncolored neighbors. Marks of this round are written while others
+// read, so a vertex marked with this round counts as uncolored.
 
 @group(0) @binding(2) var<uniform> settings: VivaceSettings;
 @group(0) @binding(3) var<storage, read> offsets: array<u32>;

@@ -1,13 +1,13 @@
-// What Vivace is asked for, and the marks it keeps.
+// Options and marks of Vivace.
 
 struct VivaceSettings {
     seed_low: u32,
     seed_high: u32,
     // A palette starts with degree / shrinking + 1 colors.
     shrinking: u32,
-    // Whether only the highest of all uncolored neighbors keeps what others picked, too.
+    // True if a pick is kept only by the highest of all uncolored neighbors.
     highest_of_all: u32,
 }
 
-// Nothing picked.
+// The pick of a vertex without one.
 const NONE: u32 = 0xffffffffu;

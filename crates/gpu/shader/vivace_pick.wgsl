@@ -1,14 +1,14 @@
 // First part of a round of Vivace (Fratarcangeli, Tibaldo and Pellacini 2016): every uncolored vertex picks a
 // color at random.
 //
-// The random number is a hash of seed, vertex and round, so it is the same on any device.
+// The random number is a hash of seed, vertex and round, so it is equal on all devices.
 
 @group(0) @binding(2) var<uniform> settings: VivaceSettings;
 @group(0) @binding(3) var<storage, read> offsets: array<u32>;
 @group(0) @binding(4) var<storage, read_write> palettes: array<atomic<u32>>;
 @group(0) @binding(5) var<storage, read_write> picked: array<u32>;
 
-// The color of v that has `rank` smaller ones before it; there is one.
+// The color of v with `rank` smaller ones before it, which must exist.
 fn nth(v: u32, rank: u32) -> u32 {
     var left = rank;
     let begin = palette_begin(v);

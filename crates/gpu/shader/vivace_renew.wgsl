@@ -1,7 +1,7 @@
-// Third part of a round of Vivace: the others lose the colors that their neighbors now have.
+// Third part of a round of Vivace: the other vertices lose the new colors of their neighbors.
 //
-// A vertex that is out of colors is fed: it gets the smallest that no neighbor has. All colors below it are taken, so
-// it is not larger than the degree.
+// A vertex with an empty palette gets the smallest color that no neighbor has. All colors below it
+// are taken, so it is not larger than the degree.
 
 @group(0) @binding(2) var<storage, read> offsets: array<u32>;
 @group(0) @binding(3) var<storage, read> neighbors: array<u32>;
@@ -14,7 +14,7 @@ fn color_around(i: u32) -> u32 {
     return select(NONE, picked[u], colored[u] != 0u);
 }
 
-// Says whether v stays on the list.
+// Returns true if v stays on the list.
 fn renew(v: u32) -> bool {
     if colored[v] != 0u {
         return false;
@@ -22,7 +22,7 @@ fn renew(v: u32) -> bool {
     let round = work.rounds + 1u;
     for (var i = offsets[v]; i < offsets[v + 1u]; i++) {
         let u = neighbors[i];
-        // Those of earlier rounds have been told.
+        // Colors of earlier rounds have been removed before.
         if colored[u] == round {
             palette_remove(v, picked[u]);
         }

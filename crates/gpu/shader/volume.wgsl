@@ -13,7 +13,8 @@ fn solve_constraint(index: u32) {
     let e1 = b.xyz - a.xyz;
     let e2 = c.xyz - a.xyz;
     let e3 = d.xyz - a.xyz;
-    // Scaled before they are multiplied, so that tets of micrometers stay in the range of single precision.
+    // Edges are scaled before they are multiplied, so that tets of micrometers stay in the range of
+    // single precision.
     let g1 = cross(e2 * scale, e3);
     let g2 = cross(e3 * scale, e1);
     let g3 = cross(e1 * scale, e2);

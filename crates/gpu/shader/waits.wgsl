@@ -1,8 +1,8 @@
-// What a constraint without a color remembers from round to round.
+// State of an uncolored constraint between rounds.
 
 struct Wait {
-    // The colors of the window that it cannot get, a bit each.
+    // The colors of the window that are unavailable, a bit each.
     taken: array<atomic<u32>, 2>,
-    // The neighbor that stopped it last, plus one.
+    // The neighbor that blocked it last, plus one.
     stopped_by: u32,
 }

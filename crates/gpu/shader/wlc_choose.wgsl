@@ -1,6 +1,6 @@
 // First part of a step of WLC (Chen, Li and Yang 2017): a chunk of the worklist takes the smallest colors left.
 //
-// All choose from what was there before, so neighbors may choose the same.
+// All choose from the state before the step, so neighbors may choose equal colors.
 
 @group(0) @binding(1) var<storage, read> work: WlcWork;
 @group(0) @binding(2) var<storage, read> offsets: array<u32>;

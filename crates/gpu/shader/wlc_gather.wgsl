@@ -1,8 +1,8 @@
-// Third part of a step of WLC: winners get their color, losers go to the next worklist, in order, and the next chunk
-// is set.
+// Third part of a step of WLC: winners get their color, losers go to the next worklist in order, and the next chunk is
+// set.
 //
-// One workgroup, each thread a part of the chunk: the order of the list decides which vertices share a chunk, so it has
-// to be kept. After a round that more than half of the list lost, chunks are halved. Cost: O(chunk / 64).
+// One workgroup, each thread a range of the chunk: the order of the list determines which vertices share a chunk and
+// must be kept. Chunks are halved after a round in which more than half of the list lost. Cost: O(chunk / 64).
 
 @group(0) @binding(1) var<storage, read_write> work: WlcWork;
 @group(0) @binding(2) var<storage, read_write> arguments: array<u32, 3>;
@@ -39,7 +39,7 @@ fn main(@builtin(local_invocation_index) thread: u32) {
         }
         picked[v] = NONE;
     }
-    // The last thread knows how many lost; all have read by then what it changes.
+    // The last thread has the number of losers; by now all threads have read the values that it changes.
     storageBarrier();
     workgroupBarrier();
     if thread == THREADS - 1u && length > 0u {

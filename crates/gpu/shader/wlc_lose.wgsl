@@ -1,4 +1,4 @@
-// Second part of a step of WLC: of two neighbors that chose the same, the one with the lower number loses.
+// Second part of a step of WLC: of two neighbors with equal choices, the one with the lower number loses.
 //
 // Vertices outside of the chunk have picked nothing, and no vertex chose the color of a colored neighbor.
 
@@ -6,7 +6,7 @@
 @group(0) @binding(2) var<storage, read> offsets: array<u32>;
 @group(0) @binding(3) var<storage, read> neighbors: array<u32>;
 @group(0) @binding(4) var<storage, read> picked: array<u32>;
-// For each entry of the chunk whether it lost.
+// For each entry of the chunk, true if it lost.
 @group(0) @binding(5) var<storage, read_write> lost: array<u32>;
 
 fn loses(v: u32) -> u32 {

@@ -1,17 +1,17 @@
-// The worklist of WLC, in the order of the vertices, and how far the chunks have come.
+// The worklist of WLC in the order of the vertices, and the position of the chunk.
 
 struct WlcWork {
-    // Where the list starts, at 0 or in the other half, and its length.
+    // Start of the list, 0 or the other half, and its length.
     begin: u32,
     count: u32,
-    // Entries done in this round, and how many of them have lost.
+    // Entries processed in this round, and the number of losers among them.
     done: u32,
     lost: u32,
-    // How many choose at the same time.
+    // Largest number of vertices in a chunk.
     chunk: u32,
     rounds: u32,
     list: array<u32>,
 }
 
-// No color yet, or none picked.
+// The color of a vertex without one, or the pick of a vertex without one.
 const NONE: u32 = 0xffffffffu;

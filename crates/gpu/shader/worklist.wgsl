@@ -1,18 +1,18 @@
 // The vertices without a color: two lists, of which a round reads one and fills the other.
 //
-// A list has no order that matters. A workgroup asks for room once and not once a vertex: one addition that all
-// workgroups wait for instead of 64.
+// The order of a list does not matter. A workgroup reserves space once instead of once per vertex: one atomic addition
+// instead of 64.
 
-// The mark of a vertex without a color; below it is the smallest color that it may still get.
+// The mark of an uncolored vertex; the bits below it are the smallest color that it may still get.
 const PENDING: u32 = 0x80000000u;
 
 struct Work {
     counts: array<atomic<u32>, 2>,
-    // Rounds that had something to do.
+    // Rounds with a non-empty list.
     rounds: u32,
     // The largest color plus one.
     colors: atomic<u32>,
-    // Vertices that found no color in the window.
+    // Vertices without a color in the window.
     rest: atomic<u32>,
     // The first color of the window.
     window: u32,
@@ -29,12 +29,12 @@ fn listed_count() -> u32 {
     return atomicLoad(&work.counts[current.parity]);
 }
 
-// An entry of it.
+// An entry of this round's list.
 fn listed(i: u32) -> u32 {
     return work.list[current.parity * current.vertices + i];
 }
 
-// Puts a vertex on the next round's list, if it is to stay. All threads of a workgroup have to come here, once.
+// Puts a vertex on the next round's list if it stays. All threads of a workgroup have to call this exactly once.
 fn keep(stays: bool, v: u32, thread: u32) {
     var position = 0u;
     if stays {
@@ -51,7 +51,7 @@ fn keep(stays: bool, v: u32, thread: u32) {
     }
 }
 
-// Notes that a color is in use.
+// Records that a color is in use.
 fn note_color(color: u32) {
     if atomicLoad(&work.colors) <= color {
         atomicMax(&work.colors, color + 1u);

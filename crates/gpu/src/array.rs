@@ -1,7 +1,7 @@
-//! [`Array`]: numbers of one type in device memory, which grow, are patched and are read back.
+//! [`Array`]: numbers of one type in device memory that can grow, be patched and be read back.
 //!
-//! Device memory is asked for in powers of three halves, so growth costs a copy on the device now and then and no
-//! upload. Every byte that moves is counted. Cost: O(what is written or read).
+//! Capacity grows by factors of three halves, so growth sometimes costs a copy on the device and never an upload. All
+//! transferred bytes are counted. Cost: O(values written or read).
 
 use std::marker::PhantomData;
 use std::sync::mpsc;
@@ -15,7 +15,7 @@ use crate::{GpuContext, GpuError};
 /// Bytes of the smallest buffer: a binding must not be empty.
 const SMALLEST: u64 = 256;
 
-/// A row of numbers on the device.
+/// An array of numbers on the device.
 #[derive(Debug)]
 pub(crate) struct Array<T> {
     what: &'static str,
@@ -53,7 +53,7 @@ impl<T: NoUninit + AnyBitPattern> Array<T> {
         })
     }
 
-    /// These values.
+    /// An array of these values.
     pub(crate) fn new(
         gpu: &GpuContext,
         what: &'static str,
@@ -72,10 +72,10 @@ impl<T: NoUninit + AnyBitPattern> Array<T> {
         &self.buffer
     }
 
-    /// Overwrites values from a place on, before the next submit.
+    /// Overwrites values from the index `start` on, before the next submit.
     ///
     /// # Panics
-    /// Past the end.
+    /// If the values reach past the end.
     pub(crate) fn write(&self, gpu: &GpuContext, start: usize, values: &[T]) {
         assert!(
             start + values.len() <= self.len,
@@ -91,7 +91,7 @@ impl<T: NoUninit + AnyBitPattern> Array<T> {
         count(&gpu.counters().uploaded_bytes, data.len() as u64);
     }
 
-    /// Changes the length; what is there stays, and what is new is zero or anything that was cut off before.
+    /// Changes the length; existing values stay, added ones are zeros or values that were cut off before.
     pub(crate) fn resize(&mut self, gpu: &GpuContext, len: usize) -> Result<(), GpuError> {
         let needed = bytes::<T>(len);
         if needed > self.buffer.size() {
@@ -140,7 +140,7 @@ impl<T: NoUninit + AnyBitPattern> Array<T> {
         Ok(copy.handed_over(&gpu.submit(encoder)?))
     }
 
-    /// Records such a copy, so that several can be handed over together.
+    /// Records such a copy without submitting it, so that several can be submitted together.
     pub(crate) fn copy_out(
         &self,
         gpu: &GpuContext,
@@ -164,7 +164,7 @@ impl<T: NoUninit + AnyBitPattern> Array<T> {
     }
 }
 
-/// A copy that was recorded.
+/// A recorded copy that is not submitted yet.
 #[derive(Debug)]
 pub(crate) struct Copy<T> {
     buffer: Buffer,
@@ -173,7 +173,7 @@ pub(crate) struct Copy<T> {
 }
 
 impl<T: NoUninit + AnyBitPattern> Copy<T> {
-    /// From now on it is on its way, with the commands of this submission.
+    /// Marks the copy as part of this submission.
     pub(crate) fn handed_over(self, submission: &SubmissionIndex) -> Staging<T> {
         let (sender, receiver) = mpsc::channel();
         let wanted = ..aligned::<T>(self.len);
@@ -192,7 +192,7 @@ impl<T: NoUninit + AnyBitPattern> Copy<T> {
     }
 }
 
-/// A copy on its way to the host.
+/// A submitted copy to the host.
 #[derive(Debug)]
 pub(crate) struct Staging<T> {
     buffer: Buffer,
@@ -203,7 +203,7 @@ pub(crate) struct Staging<T> {
 }
 
 impl<T: NoUninit + AnyBitPattern> Staging<T> {
-    /// Waits for it.
+    /// Waits for the copy and returns its values.
     pub(crate) fn collect(self, gpu: &GpuContext) -> Result<Vec<T>, GpuError> {
         gpu.wait_for(self.submission.clone())?;
         let mapped = self.receiver.recv();
@@ -235,7 +235,7 @@ fn lost(error: &dyn std::error::Error) -> GpuError {
     }
 }
 
-/// Bytes that a copy has.
+/// Bytes to copy for `len` values: a multiple of the alignment of copies.
 fn aligned<T>(len: usize) -> u64 {
     bytes::<T>(len).next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT)
 }
@@ -244,7 +244,7 @@ fn bytes<T>(len: usize) -> u64 {
     (len * size_of::<T>()) as u64
 }
 
-/// Makes a buffer, or says why not.
+/// Creates a buffer, or returns the error of the device.
 fn buffer(
     gpu: &GpuContext,
     what: &'static str,

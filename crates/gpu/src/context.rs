@@ -1,8 +1,8 @@
-//! [`GpuContext`]: a device, its queue, and what went over the wire.
+//! [`GpuContext`]: a device, its queue, and the count of transfers.
 //!
-//! One of them serves a process: kernels, solvers and renderers share it. The adapter is chosen here and not by wgpu's
-//! helpers, which panic when a wish cannot be met. Errors that a driver reports later (device lost, a refused command)
-//! are kept and returned by the next call that can return one; nothing panics.
+//! One context serves a process: kernels, solvers and renderers share it. The adapter is chosen here instead of by
+//! wgpu's helpers, which panic when a requirement cannot be met. Errors that a driver reports later (device lost,
+//! rejected command) are kept and returned by the next call that can return an error; none of them panics.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -14,18 +14,19 @@ use wgpu::{
 use crate::GpuError;
 use crate::traffic::{Counters, Traffic, count};
 
-/// Which adapter to take.
+/// Options for the choice of an adapter.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct GpuOptions {
-    /// A part of its name, in any case; `None` takes the first in the order discrete, integrated, virtual, software.
+    /// A part of the adapter's name, in any case; `None` takes the first in the order discrete, integrated, virtual,
+    /// software.
     pub adapter: Option<String>,
-    /// The interfaces to ask; `None` asks Vulkan, Metal and Direct3D 12, as far as they are compiled in.
+    /// The interfaces to search; `None` searches those of Vulkan, Metal and Direct3D 12 that are compiled in.
     pub backends: Option<Backends>,
 }
 
 impl GpuOptions {
-    /// What the environment wishes: `WGPU_ADAPTER_NAME` and `WGPU_BACKEND` (`vulkan`, `metal`, `dx12`, `gl`, separated by
-    /// commas).
+    /// Options from the environment: `WGPU_ADAPTER_NAME` and `WGPU_BACKEND` (`vulkan`, `metal`, `dx12`, `gl`, separated
+    /// by commas).
     #[must_use]
     pub fn from_env() -> Self {
         let adapter = std::env::var("WGPU_ADAPTER_NAME").ok();
@@ -36,17 +37,17 @@ impl GpuOptions {
     }
 }
 
-/// What is known of an adapter.
+/// Name, interface and driver of an adapter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct AdapterDescription {
-    /// Its name, as the driver gives it.
+    /// The name reported by the driver.
     pub name: String,
     /// The interface: `vulkan`, `metal`, `dx12`, `gl`.
     pub backend: String,
     /// The driver and its version.
     pub driver: String,
-    /// Whether it is a processor that plays a GPU.
+    /// True for a software renderer that runs on the CPU.
     pub software: bool,
 }
 
@@ -74,20 +75,22 @@ pub struct GpuContext {
     description: AdapterDescription,
     report: Report,
     counters: Counters,
-    /// Buffers that copies to the host have gone through: making one takes a driver longer than a copy.
+    /// Staging buffers kept for reuse, since creating one may take a driver longer than a copy.
     spares: Mutex<Vec<wgpu::Buffer>>,
 }
 
-/// Most buffers that are kept.
+/// Largest number of staging buffers kept.
 const SPARES: usize = 16;
 
 impl GpuContext {
-    /// Opens the adapter that answers the options best.
+    /// Opens the adapter that matches the options best.
     ///
-    /// Kernels keep to WebGPU's default limits, but for the size of buffers, of which all that there is is asked for.
+    /// Kernels stay within WebGPU's default limits except for the size of buffers, of which the device's maximum is
+    /// requested.
     ///
     /// # Errors
-    /// [`GpuError::NoAdapter`] names the adapters that there are; [`GpuError::Refused`] what the driver said.
+    ///
+    /// [`GpuError::NoAdapter`] with the adapters found; [`GpuError::Refused`] with the driver's message.
     ///
     /// # Example
     /// ```
@@ -111,8 +114,8 @@ impl GpuContext {
         Ok(Self::from_device(device, queue))
     }
 
-    /// What to ask an adapter for that is to compute, for renderers that open the device: WebGPU's default limits, buffers
-    /// as large as there are, timestamps if there are any.
+    /// The device descriptor required for computing, for renderers that open the device: WebGPU's default limits, the
+    /// largest buffers available, and timestamps if available.
     #[must_use]
     pub fn descriptor(adapter: &Adapter) -> wgpu::DeviceDescriptor<'static> {
         let present = adapter.limits();
@@ -129,8 +132,8 @@ impl GpuContext {
         }
     }
 
-    /// Takes a device that other code has opened, typically a renderer: what is computed here can be drawn there
-    /// without a copy. It must allow WebGPU's default limits, see [`GpuContext::descriptor`].
+    /// Wraps a device that other code has opened, typically a renderer, so that results can be drawn without a copy.
+    /// The device must allow WebGPU's default limits, see [`GpuContext::descriptor`].
     #[must_use]
     pub fn from_device(device: Device, queue: Queue) -> Self {
         let report = Report::default();
@@ -154,7 +157,7 @@ impl GpuContext {
         }
     }
 
-    /// The adapters that there are, in the order in which they are preferred.
+    /// The available adapters, in order of preference.
     #[must_use]
     pub fn adapters(options: &GpuOptions) -> Vec<AdapterDescription> {
         let adapters = enumerate(options);
@@ -164,7 +167,7 @@ impl GpuContext {
             .collect()
     }
 
-    /// The adapter behind the device.
+    /// Name, interface and driver of the adapter behind the device.
     #[must_use]
     pub fn adapter(&self) -> &AdapterDescription {
         &self.description
@@ -182,13 +185,13 @@ impl GpuContext {
         &self.queue
     }
 
-    /// Whether stages can be timed on the device.
+    /// True if stages can be timed on the device.
     #[must_use]
     pub fn has_timestamps(&self) -> bool {
         self.device.features().contains(Features::TIMESTAMP_QUERY)
     }
 
-    /// The most bytes that a kernel can see of one buffer.
+    /// The largest number of bytes of one buffer that a kernel can access.
     #[must_use]
     pub fn buffer_limit(&self) -> u64 {
         let limits = self.device.limits();
@@ -197,7 +200,7 @@ impl GpuContext {
             .min(limits.max_buffer_size)
     }
 
-    /// What went to the device and came back since it was opened.
+    /// The transfers and dispatches since the device was opened.
     #[must_use]
     pub fn traffic(&self) -> Traffic {
         self.counters.read()
@@ -207,7 +210,7 @@ impl GpuContext {
         &self.counters
     }
 
-    /// What the driver has reported since, if it did: the device is not to be trusted from then on.
+    /// Returns an error that the driver has reported since; from then on, results of the device are undefined.
     ///
     /// # Errors
     /// The first report.
@@ -216,7 +219,7 @@ impl GpuContext {
         report.clone().map_or(Ok(()), Err)
     }
 
-    /// Hands commands over; returns what to wait for.
+    /// Submits commands; returns the index to wait for.
     pub(crate) fn submit(
         &self,
         encoder: wgpu::CommandEncoder,
@@ -226,7 +229,7 @@ impl GpuContext {
         self.check().map(|()| index)
     }
 
-    /// A buffer to copy so many bytes to the host through, if one is kept that is not far too large.
+    /// A kept staging buffer for this many bytes, if one has a suitable size.
     pub(crate) fn spare(&self, bytes: u64) -> Option<wgpu::Buffer> {
         let mut spares = self.spares.lock().unwrap_or_else(PoisonError::into_inner);
         let fits = |buffer: &wgpu::Buffer| (bytes..=4 * bytes.max(1024)).contains(&buffer.size());
@@ -234,7 +237,7 @@ impl GpuContext {
         Some(spares.swap_remove(found))
     }
 
-    /// Keeps such a buffer, unmapped, for the next copy.
+    /// Keeps an unmapped staging buffer for the next copy.
     pub(crate) fn keep(&self, buffer: wgpu::Buffer) {
         let mut spares = self.spares.lock().unwrap_or_else(PoisonError::into_inner);
         if spares.len() == SPARES {
@@ -248,7 +251,7 @@ impl GpuContext {
         self.device.create_command_encoder(&descriptor)
     }
 
-    /// Waits until the device has done all that it was told.
+    /// Waits until the device has done all submitted work.
     ///
     /// # Errors
     /// If the device is lost.
@@ -256,7 +259,7 @@ impl GpuContext {
         self.poll(PollType::wait_indefinitely())
     }
 
-    /// Waits until the device has done what was handed over with this, and all before it.
+    /// Waits until the device has done this submission and all before it.
     pub(crate) fn wait_for(&self, submission: SubmissionIndex) -> Result<(), GpuError> {
         self.poll(PollType::Wait {
             submission_index: Some(submission),
@@ -273,10 +276,10 @@ impl GpuContext {
     }
 }
 
-/// Keeps the first report: what follows mostly is its consequence.
+/// Keeps the first report, since later ones are mostly its consequences.
 fn note(report: &Report, error: GpuError) {
     let mut report = report.lock().unwrap_or_else(PoisonError::into_inner);
-    // A lost device makes everything else fail, so that is what is told.
+    // A lost device makes everything else fail, so this error replaces others.
     let replace = report.is_none() || matches!(error, GpuError::Lost { .. });
     if replace {
         *report = Some(error);
@@ -290,15 +293,15 @@ fn enumerate(options: &GpuOptions) -> Vec<Adapter> {
         .unwrap_or(Backends::VULKAN | Backends::METAL | Backends::DX12);
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
         backends,
-        // The sizes of indirect dispatches come from our own kernels, which keep them within limits; looking at each
-        // of them costs a dispatch more.
+        // The sizes of indirect dispatches come from our own kernels, which keep them within limits; validating each
+        // costs another dispatch.
         flags: wgpu::InstanceFlags::default()
             .difference(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL)
             .with_env(),
         ..wgpu::InstanceDescriptor::new_without_display_handle()
     });
     let mut adapters = block_on(instance.enumerate_adapters(backends));
-    // Stable, so that two of a kind stay in the driver's order.
+    // The sort is stable, so adapters of one kind stay in the driver's order.
     adapters.sort_by_key(|adapter| match adapter.get_info().device_type {
         DeviceType::DiscreteGpu => 0,
         DeviceType::IntegratedGpu => 1,

@@ -1,17 +1,17 @@
-//! [`GpuError`]: what can go wrong with a device, and what to do about it.
+//! [`GpuError`]: errors of devices.
 
 use thiserror::Error;
 
-/// Why something could not be done on a GPU.
+/// An error of a GPU or of the driver.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum GpuError {
-    /// No adapter was found, or none that answers the wish.
+    /// No adapter was found, or none that matches the options.
     #[error("no GPU: {reason}; found: {found}")]
     NoAdapter {
-        /// What was looked for.
+        /// The options that were searched for.
         reason: String,
-        /// The adapters that there are.
+        /// The available adapters.
         found: String,
     },
     /// The adapter refused to open a device.
@@ -19,7 +19,7 @@ pub enum GpuError {
     Refused {
         /// The adapter's name.
         adapter: String,
-        /// What it said.
+        /// The message of the driver.
         message: String,
     },
     /// A buffer would be larger than the device allows.
@@ -27,7 +27,7 @@ pub enum GpuError {
         "{what} need {bytes} bytes on the GPU, and one buffer holds {limit}: take a smaller body or another device"
     )]
     TooLarge {
-        /// What was to be stored.
+        /// The name of the data.
         what: &'static str,
         /// The size in bytes.
         bytes: u64,
@@ -37,27 +37,27 @@ pub enum GpuError {
     /// The device has no memory left.
     #[error("the GPU has no memory left for {what} ({bytes} bytes)")]
     OutOfMemory {
-        /// What was to be stored.
+        /// The name of the data.
         what: &'static str,
         /// The size in bytes.
         bytes: u64,
     },
-    /// The device is gone: driver crash, timeout, or explicit destruction. What it held is lost.
+    /// The device is lost: driver crash, timeout, or explicit destruction. Its data are lost, too.
     #[error("the GPU is lost: {message}")]
     Lost {
-        /// What the driver said.
+        /// The message of the driver.
         message: String,
     },
-    /// The device refused a command; a defect of this crate or of a driver.
+    /// The device rejected a command: a defect of this crate or of a driver.
     #[error("the GPU refused a command: {message}")]
     Command {
-        /// What was said.
+        /// The message of the driver.
         message: String,
     },
-    /// Something that the GPU path does not do.
+    /// The GPU path does not support something.
     #[error("the GPU path does not do {what}: use the CPU")]
     Unsupported {
-        /// What was asked for.
+        /// The unsupported feature.
         what: &'static str,
     },
     /// The device has no clock for its stages.
@@ -68,25 +68,26 @@ pub enum GpuError {
         "cluster {cluster} has {tets} tets and a block holds {limit}: cluster with a smaller size"
     )]
     Block {
-        /// The cluster.
+        /// The number of the cluster.
         cluster: u32,
-        /// Its tets.
+        /// The number of its tets.
         tets: usize,
-        /// The most tets of a block.
+        /// The largest number of tets of a block.
         limit: usize,
     },
-    /// The device does not have what the host says: a defect of this crate or of a driver.
+    /// The device's copy of the data differs from the host's: a defect of this crate or of a
+    /// driver.
     #[error("internal check failed: on the GPU, {what} differs")]
     Inconsistent {
-        /// What differs.
+        /// The data that differ.
         what: String,
     },
-    /// An algorithm gave up; a defect, since all of them end.
+    /// An algorithm did not end within its bound of rounds, which is a defect.
     #[error("{algorithm} did not end after {rounds} rounds")]
     Stalled {
         /// The name of the algorithm.
         algorithm: &'static str,
-        /// Rounds made.
+        /// The number of rounds made.
         rounds: usize,
     },
     /// The settings of a step are out of range.

@@ -1,8 +1,8 @@
 //! [`Kernel`]: a compute shader with its bindings, and [`Recorder`]: the pass that dispatches kernels.
 //!
-//! All buffers of a kernel are in one group, in the order in which its shader numbers them; a list says how each is used,
-//! because layouts derived from shaders know no dynamic offsets. Dispatches of one pass see what those before them
-//! wrote: wgpu puts a barrier between any two. Cost: a third of a microsecond to record a dispatch.
+//! All buffers of a kernel are in one bind group, in the order of the shader's binding numbers. Their kinds are listed
+//! explicitly, because layouts derived from shaders do not have dynamic offsets. A dispatch of a pass sees the writes
+//! of those before it: wgpu inserts barriers. Cost: well below a microsecond to record a dispatch.
 
 use wgpu::{BindGroup, Buffer, ComputePass, ComputePipeline};
 
@@ -12,23 +12,23 @@ use crate::{GpuContext, GpuError};
 /// The kind of a buffer binding of a kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum BindingKind {
-    /// Storage that is read.
+    /// Storage that is only read.
     Read,
     /// Storage that is read and written.
     Write,
-    /// Numbers that are the same for all threads.
+    /// Values common to all threads.
     Uniform,
     /// A uniform buffer of which each dispatch sees this many bytes at a dynamic offset; see [`STRIDE`].
     DynamicUniform(u64),
 }
 
-/// Distance in bytes between the parts that dispatches see: WebGPU's largest alignment.
+/// Distance in bytes between the ranges that dispatches see: WebGPU's largest alignment.
 pub(crate) const STRIDE: u32 = 256;
 
-/// Most workgroups along one axis.
+/// Largest number of workgroups along one axis.
 const WIDEST: u32 = 65_535;
 
-/// A compute shader, compiled.
+/// A compiled compute shader.
 #[derive(Debug)]
 pub(crate) struct Kernel {
     pipeline: ComputePipeline,
@@ -37,11 +37,11 @@ pub(crate) struct Kernel {
 }
 
 impl Kernel {
-    /// Compiles a shader whose entry point is `main`. `parts` are put together as one text; `constants` are the values of
-    /// its overrides.
+    /// Compiles a shader whose entry point is `main`. The texts of `parts` are concatenated; `constants` are the values
+    /// of its overrides.
     ///
     /// # Errors
-    /// If the device refuses it.
+    /// If the device rejects it.
     pub(crate) fn new(
         gpu: &GpuContext,
         name: &str,
@@ -96,10 +96,10 @@ impl Kernel {
         }
     }
 
-    /// Binds buffers in the order of the shader's numbers.
+    /// Binds buffers in the order of the shader's binding numbers.
     ///
     /// # Panics
-    /// If there are not as many as the kernel uses.
+    /// If the number of buffers is not the number of bindings.
     pub(crate) fn bind(&self, gpu: &GpuContext, buffers: &[&Buffer]) -> BindGroup {
         assert_eq!(buffers.len(), self.uses.len(), "a buffer for each use");
         let entries: Vec<_> = (0..)
@@ -160,7 +160,7 @@ pub(crate) struct Recorder<'a> {
 }
 
 impl<'a> Recorder<'a> {
-    /// Begins a pass, which must be dropped before anything else is recorded.
+    /// Begins a pass; it must be dropped before other commands are recorded.
     pub(crate) fn new(
         gpu: &'a GpuContext,
         encoder: &mut wgpu::CommandEncoder,
@@ -176,11 +176,11 @@ impl<'a> Recorder<'a> {
         Self { gpu, pass }
     }
 
-    /// Runs a kernel in so many workgroups; none is nothing. `offsets` are in bytes, one for each
+    /// Runs a kernel in this many workgroups; 0 records nothing. `offsets` are in bytes, one for each
     /// [`BindingKind::DynamicUniform`].
     ///
     /// More than 65,535 workgroups become a grid: `workgroup_index` in the shaders' common part numbers them, and the
-    /// last row may be longer than asked for.
+    /// last row may have surplus workgroups.
     pub(crate) fn dispatch(
         &mut self,
         kernel: &Kernel,
@@ -200,7 +200,7 @@ impl<'a> Recorder<'a> {
         count(&self.gpu.counters().dispatches, 1);
     }
 
-    /// Runs a kernel in as many workgroups as a buffer says.
+    /// Runs a kernel in the number of workgroups that a buffer holds.
     pub(crate) fn dispatch_indirect(
         &mut self,
         kernel: &Kernel,

@@ -1,4 +1,4 @@
-//! [`shaders`]: the text of every kernel, for other compilers to check, and what its structs are on the host.
+//! [`shaders`]: the text of every kernel, for other compilers to check, and the host's layout of their structs.
 
 use std::mem::offset_of;
 
@@ -9,13 +9,13 @@ use crate::solver::{
 };
 use crate::{coloring, solver};
 
-/// A kernel as it is given to the driver; its entry point is `main`.
+/// A kernel as it is passed to the driver; its entry point is `main`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Shader {
-    /// The name, which is that of its file.
+    /// The name of the kernel and of its file.
     pub name: &'static str,
-    /// WGSL, with the parts that it shares with others in front.
+    /// WGSL, including the shared parts in front.
     pub source: String,
 }
 
@@ -39,16 +39,16 @@ pub fn shaders() -> Vec<Shader> {
     colorings.chain(solver).map(shader).collect()
 }
 
-/// What the host takes a struct of its kernels for.
+/// The host's layout of a struct that kernels use.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct SharedStruct {
-    /// Its name, the same in all kernels that have it.
+    /// The name of the struct in all kernels that have it.
     pub name: &'static str,
-    /// All fields with their offsets in bytes, but for a list of any length at the end; none if the host only makes room
-    /// for it.
+    /// All fields with their offsets in bytes, without an unsized list at the end; empty if the host only allocates the
+    /// struct.
     pub fields: Vec<(&'static str, usize)>,
-    /// The size in bytes, without such a list.
+    /// The size in bytes, without an unsized list at the end.
     pub size: usize,
 }
 

@@ -1,13 +1,13 @@
-//! [`Traffic`]: what went to a device and came back, counted.
+//! [`Traffic`]: counters of transfers and commands of a device.
 //!
-//! Uploads, readbacks and passes are what makes a GPU path slow, and results do not show them. So they are
-//! counted where they happen, and tests hold them to what they should be. Cost: an atomic addition each.
+//! Uploads, readbacks and passes make a GPU path slow without changing results. They are therefore counted where they
+//! happen, and tests bound them. Cost: one atomic addition each.
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-/// What a device was told and asked, since it was opened.
+/// Transfers and commands of a device since it was opened.
 ///
-/// Differences of two of them tell what a frame did.
+/// Use the difference of two values for the cost of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Traffic {
@@ -15,7 +15,7 @@ pub struct Traffic {
     pub uploaded_bytes: u64,
     /// Bytes read from buffers.
     pub read_bytes: u64,
-    /// How often something was read, each a wait for the device.
+    /// Readbacks, each of which waits for the device.
     pub readbacks: u64,
     /// Dispatches of kernels.
     pub dispatches: u64,
@@ -23,12 +23,12 @@ pub struct Traffic {
     pub passes: u64,
     /// Submits of commands.
     pub submits: u64,
-    /// Buffers made.
+    /// Buffers created.
     pub buffers: u64,
 }
 
 impl Traffic {
-    /// What came after an earlier count.
+    /// The traffic since an earlier count.
     #[must_use]
     pub fn since(self, earlier: Self) -> Self {
         Self {

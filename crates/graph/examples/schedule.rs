@@ -1,4 +1,5 @@
-//! From constraints to the order in which a parallel solver runs them: a net of springs, colored by hand.
+//! Computes the solving order of a parallel solver from constraints: a net of springs with a
+//! coloring by hand.
 //!
 //! `cargo run -p incise-graph --example schedule`
 

@@ -12,7 +12,7 @@ pub struct Classes {
 }
 
 impl Classes {
-    /// Sorts positions by label; labels from `count` on belong nowhere.
+    /// Groups positions by label; labels from `count` on are left out.
     pub(crate) fn group(count: usize, labels: impl Iterator<Item = u32> + Clone) -> Self {
         Self {
             csr: Csr::group(count, labels),

@@ -1,10 +1,9 @@
-//! Which constraints are solved together, one after the other, as one block.
+//! [`Clustering`]: the partition of constraints into blocks whose members are solved one after the other.
 //!
-//! A clustering is a label per constraint. Cutting edits it locally: the constraint of a removed
-//! element leaves its cluster, the constraints of the new elements form new clusters, everything
-//! else stays (paper section 4.3). Each such edit is O(1). The number of a cluster that lost its
-//! last member is handed out again, the latest first, so that numbers stay dense however long a
-//! scene is cut and per-cluster arrays do not grow without need.
+//! A clustering is a label per constraint. Cutting edits it locally: the constraint of a removed element leaves its
+//! cluster, the constraints of the new elements form new clusters, all other clusters stay (paper section 4.3). Each
+//! such edit is O(1). The number of a cluster that lost its last member is reused, the latest first, so that numbers
+//! stay dense in long scenes and per-cluster arrays stay small.
 
 use crate::csr::offset;
 use crate::{Classes, ClusterId, GraphError};
@@ -12,8 +11,8 @@ use crate::{Classes, ClusterId, GraphError};
 /// A partition of the constraints `0..constraint_count()` into clusters, minus those that were
 /// removed.
 ///
-/// Invariant: a cluster number is *vacant* (waits to be used again) exactly if its cluster has no
-/// member, so there are never more numbers than there were constraints at once.
+/// Invariant: a cluster number is *vacant* (available for reuse) exactly if its cluster has no member, so there are
+/// never more numbers than there were constraints at once.
 ///
 /// ```
 /// use incise_graph::Clustering;
@@ -38,7 +37,7 @@ pub struct Clustering {
 }
 
 impl Clustering {
-    /// Every one of `constraints` constraints alone in the cluster of its own number.
+    /// A clustering in which each of `constraints` constraints is alone in the cluster of its own number.
     /// O(constraints).
     ///
     /// # Panics
@@ -55,7 +54,7 @@ impl Clustering {
     /// The clustering with the given label per constraint; [`ClusterId::NONE`] for one in no
     /// cluster.
     ///
-    /// Numbers below the largest label that no constraint has are vacant; the smallest is used first.
+    /// Numbers below the largest label that no constraint has are vacant; the smallest is reused first.
     /// O(labels).
     ///
     /// # Errors
@@ -128,7 +127,7 @@ impl Clustering {
         self.sizes[cluster.index()] as usize
     }
 
-    /// The size of every cluster by number: the weights of the clusters.
+    /// The size of every cluster by number, for use as weights.
     #[must_use]
     pub fn sizes(&self) -> &[u32] {
         &self.sizes
@@ -152,8 +151,7 @@ impl Clustering {
         Classes::group(self.cluster_count(), self.labels.iter().map(|k| k.0))
     }
 
-    /// Takes constraint `c` out of its cluster and returns which that was; `None` if it was in
-    /// none. O(1).
+    /// Removes constraint `c` from its cluster and returns that cluster, `None` if `c` was in none. O(1).
     ///
     /// A cluster that loses its last member becomes vacant.
     ///
@@ -170,12 +168,11 @@ impl Clustering {
         Some(cluster)
     }
 
-    /// Starts a cluster with the one member `c` and returns its number: the one vacated last, else
-    /// a new one. Amortized O(1).
+    /// Starts a cluster with the single member `c` and returns its number: the one vacated last, or else a new one.
+    /// Amortized O(1).
     ///
     /// # Panics
-    /// If `c` is in a cluster already ([`remove`](Self::remove) it first), or if the numbers are used
-    /// up.
+    /// If `c` is in a cluster already ([`remove`](Self::remove) it first), or if no number is left.
     pub fn new_cluster(&mut self, c: usize) -> ClusterId {
         self.place(c);
         let cluster = self.vacant.pop().unwrap_or_else(|| {
@@ -189,8 +186,7 @@ impl Clustering {
 
     /// Puts constraint `c`, which is in no cluster, into `cluster`. Amortized O(1).
     ///
-    /// `c` may be past the end: the clustering grows, and numbers skipped on the way are in no
-    /// cluster.
+    /// `c` may be past the end: the clustering grows, and the numbers in between are in no cluster.
     ///
     /// # Panics
     /// If `c` is in a cluster already ([`remove`](Self::remove) it first), or if `cluster` is
@@ -206,7 +202,7 @@ impl Clustering {
         self.sizes[cluster.index()] += 1;
     }
 
-    /// Gives constraint `from` the number `to`, which is in no cluster; `from` is in no cluster then. O(1).
+    /// Renumbers constraint `from` to `to`, which must be in no cluster; `from` is in no cluster afterwards. O(1).
     ///
     /// Its cluster keeps number and size.
     ///
@@ -216,7 +212,7 @@ impl Clustering {
     /// ```
     /// use incise_graph::{ClusterId, Clustering};
     ///
-    /// // Constraint 0 goes, and the last one takes over its number.
+    /// // Constraint 0 is removed, and the last one takes over its number.
     /// let mut clustering = Clustering::none(3);
     /// clustering.remove(0);
     /// clustering.renumber(2, 0);
@@ -230,7 +226,7 @@ impl Clustering {
         self.labels[to] = std::mem::replace(&mut self.labels[from], ClusterId::NONE);
     }
 
-    /// Forgets the constraint numbers from `constraints` on; O(1) for each. Cluster numbers stay as they are.
+    /// Removes the constraint numbers from `constraints` on; O(1) for each. Cluster numbers stay.
     ///
     /// # Panics
     /// If one of them is in a cluster.
@@ -257,7 +253,7 @@ impl Clustering {
         );
     }
 
-    /// Counts everything again and compares. O(constraints + clusters).
+    /// Recounts sizes and vacant numbers and compares them. O(constraints + clusters).
     ///
     /// # Errors
     /// A label out of range, a recorded size that is wrong, or a vacant list that is not the set of
@@ -373,7 +369,7 @@ mod tests {
             clustering.labels(),
             [ClusterId(3), ClusterId::NONE, ClusterId(2)]
         );
-        // Shorter than its cluster numbers: they are still right, and used again.
+        // Truncated below the number of clusters: cluster numbers stay valid and are reused.
         clustering.renumber(2, 1);
         clustering.truncate(2);
         clustering.check().unwrap();

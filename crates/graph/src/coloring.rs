@@ -1,17 +1,16 @@
-//! When each vertex runs: a color per vertex, and the proof that the coloring is proper.
+//! [`Coloring`]: a color per vertex, and two checks that the coloring is proper.
 //!
 //! Vertices of one color run at the same time, colors one after the other. A coloring is *proper*
-//! if adjacent vertices differ. The two proofs here look at the result only and share nothing with
-//! any algorithm that colors: one walks the edges of a graph, the other never sees a graph and
-//! walks particle by particle. Both cost one pass over their input.
+//! if adjacent vertices differ. The two checks look at the result only and share no code with any
+//! coloring algorithm: one walks the edges of a graph, the other needs no graph and walks particle
+//! by particle. Each costs one pass over its input.
 
 use crate::{Classes, ColorId, ConstraintGraph, GraphError, Incidence};
 
 /// A color for every vertex `0..vertex_count()`.
 ///
-/// Colors are labels from 0; an algorithm normally uses each one up to the largest, local
-/// recoloring may leave gaps. Nothing here assumes that the coloring is proper: call
-/// [`verify`](Self::verify).
+/// Colors are labels from 0. Algorithms normally use each label up to the largest; local recoloring
+/// may leave gaps. The coloring need not be proper: call [`verify`](Self::verify).
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Coloring {
@@ -19,7 +18,7 @@ pub struct Coloring {
 }
 
 impl Coloring {
-    /// Vertex `v` has color `colors[v]`.
+    /// A coloring in which vertex `v` has color `colors[v]`.
     #[must_use]
     pub fn new(colors: Vec<ColorId>) -> Self {
         Self { colors }
@@ -56,8 +55,8 @@ impl Coloring {
             .map_or(0, |color| color.index() + 1)
     }
 
-    /// The number of labels that some vertex has; less than [`color_count`](Self::color_count) if
-    /// there are gaps. O(vertices + colors).
+    /// The number of labels in use; less than [`color_count`](Self::color_count) if there are gaps.
+    /// O(vertices + colors).
     #[must_use]
     pub fn distinct_colors(&self) -> usize {
         let mut used = vec![false; self.color_count()];
@@ -67,7 +66,7 @@ impl Coloring {
         used.into_iter().filter(|&used| used).count()
     }
 
-    /// Gives vertex `v` another color. O(1).
+    /// Changes the color of vertex `v`. O(1).
     ///
     /// # Panics
     /// If there is no vertex `v`.
@@ -80,7 +79,8 @@ impl Coloring {
         self.colors.push(color);
     }
 
-    /// Closes gaps: renames the colors, in order, to `0..distinct_colors()`. O(vertices + colors).
+    /// Closes gaps: renumbers the colors, in order, to `0..distinct_colors()`. O(vertices +
+    /// colors).
     ///
     /// ```
     /// use incise_graph::{ColorId, Coloring};
@@ -109,7 +109,7 @@ impl Coloring {
         Classes::group(self.color_count(), self.colors.iter().map(|color| color.0))
     }
 
-    /// Proves that adjacent vertices of `graph` differ. O(vertices + edges).
+    /// Checks that adjacent vertices of `graph` differ. O(vertices + edges).
     ///
     /// # Errors
     /// The first offending edge (smallest first vertex, then smallest second one), or a wrong
@@ -139,7 +139,7 @@ impl Coloring {
         Ok(())
     }
 
-    /// Proves that constraints of one color share no particle, without a graph. O(entries +
+    /// Checks that constraints of one color share no particle, without a graph. O(entries +
     /// colors).
     ///
     /// For a coloring of clusters, pass the [`quotient`](Incidence::quotient) incidence.
@@ -149,7 +149,8 @@ impl Coloring {
     /// constraints.
     pub fn verify_incidence(&self, incidence: &Incidence) -> Result<(), GraphError> {
         self.expect_vertices(incidence.constraint_count())?;
-        // For each color the last particle it was seen at, and the constraint that had it there.
+        // For each color the last particle at which it was seen, and the constraint that had it
+        // there.
         let mut seen = vec![(u32::MAX, 0); self.color_count()];
         for (particle, p) in (0..).zip(0..incidence.particle_count()) {
             for &second in incidence.constraints_of(p) {

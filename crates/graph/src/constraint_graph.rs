@@ -1,13 +1,13 @@
 //! Conflicts between constraints or clusters: an undirected graph in flat arrays.
 //!
 //! A vertex is a constraint or a cluster; an edge joins two that share a particle. Rows are
-//! symmetric, ascending and free of loops and repeats, which every algorithm relies on, so only
-//! this module makes graphs.
+//! symmetric, ascending and free of loops and repeats. All algorithms rely on this, so only this
+//! module builds graphs.
 //!
-//! All constructors end in the same step: given for every vertex its *smaller* neighbors in any
-//! order, one transposition lists the larger neighbors in ascending order, and a second one the
-//! smaller ones; a row is the two lists one after the other. No row is ever sorted and no hash map
-//! is used: O(vertices + edges) after the edges are known.
+//! All constructors end in one step: given the *smaller* neighbors of every vertex in any order,
+//! one transposition lists the larger neighbors in ascending order, and a second one the smaller
+//! ones; a row is the concatenation of both. No row is sorted and no hash map is used: O(vertices +
+//! edges) after the edges are known.
 
 use std::cmp::Ordering;
 
@@ -111,9 +111,9 @@ impl ConstraintGraph {
     /// Takes a graph in CSR form: vertex `v` is adjacent to `values[offsets[v]..offsets[v + 1]]`.
     ///
     /// A row may list its neighbors in any order and name one several times; rows are sorted and
-    /// repeats count once. Both directions of an edge must be there. O(vertices + values), by two
-    /// transpositions: the first says which vertices list a vertex, the second sorts the rows, and a
-    /// graph is symmetric if they agree.
+    /// repeats count once. Both directions of an edge are required. O(vertices + values), by two
+    /// transpositions: the first finds for each vertex the rows that list it, the second sorts the
+    /// rows, and the graph is symmetric if both agree.
     ///
     /// # Errors
     /// Offsets that do not start at 0, go down or end elsewhere than at `values.len()`; a neighbor
@@ -192,7 +192,7 @@ impl ConstraintGraph {
     /// member of the other. Vacant clusters become vertices without neighbors. O(vertices + edges).
     ///
     /// # Panics
-    /// If `clustering` is about another number of vertices.
+    /// If `clustering` has another number of constraints than the graph has vertices.
     ///
     /// ```
     /// use incise_graph::{ClusterId, Clustering, ConstraintGraph};
@@ -286,7 +286,7 @@ impl ConstraintGraph {
     }
 }
 
-/// The values of a sorted row, once each.
+/// The distinct values of a sorted row.
 fn distinct(row: &[u32]) -> impl Iterator<Item = u32> {
     row.chunk_by(|a, b| a == b).map(|run| run[0])
 }
@@ -378,7 +378,7 @@ mod tests {
             refuse(&[0, 1, 2], &[1, 1]),
             GraphError::SelfLoop { edge: 1, vertex: 1 }
         );
-        // 1 -> 0 and 2 -> 3 have no answer; then the same with the larger end listing.
+        // The edges 1 -> 0 and 2 -> 3 have no reverse; then the mirrored case.
         assert_eq!(
             refuse(&[0, 1, 3, 5, 6], &[2, 0, 2, 1, 3, 2]),
             GraphError::OneSided { from: 1, to: 0 }

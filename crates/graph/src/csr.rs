@@ -1,8 +1,8 @@
 //! Ragged arrays: all rows one after the other, and the offset of each.
 //!
-//! The storage of every list of lists in the crate. The one algorithm here is transposition by
-//! counting sort, which also sorts: walking the rows in ascending order leaves every transposed row
-//! ascending. Cost: O(rows + values).
+//! This is the storage of all constant lists of lists in the crate. Its only algorithm is
+//! transposition by counting sort, which also sorts: rows are walked in ascending order, so every
+//! transposed row is ascending. Cost: O(rows + values).
 
 use crate::GraphError;
 
@@ -14,12 +14,12 @@ pub(crate) struct Csr {
     pub(crate) values: Vec<u32>,
 }
 
-/// `count` as an offset; the callers document the limit.
+/// Converts `count` to an offset; the callers document the limit.
 pub(crate) fn offset(count: usize) -> u32 {
     u32::try_from(count).expect("a ragged array holds at most 2^32 - 1 entries")
 }
 
-/// An error unless `count` of `what` can be numbered in 32 bits.
+/// An error unless `count` items can be numbered in 32 bits; `what` names the items.
 pub(crate) fn fits(what: &'static str, count: usize) -> Result<(), GraphError> {
     match u32::try_from(count) {
         Ok(_) => Ok(()),
@@ -37,7 +37,7 @@ pub(crate) fn accumulate(counts: &mut [u32]) {
 }
 
 impl Csr {
-    /// Takes rows from outside, whose values may be anything. O(rows).
+    /// Checks and takes rows with arbitrary values. O(rows).
     ///
     /// # Errors
     /// Offsets that do not start at 0, go down or end elsewhere than at `values.len()`.
@@ -64,7 +64,7 @@ impl Csr {
         Ok(Self { offsets, values })
     }
 
-    /// No rows yet, room for `rows`.
+    /// No rows, with capacity for `rows`.
     pub(crate) fn with_rows(rows: usize) -> Self {
         let mut offsets = Vec::with_capacity(rows + 1);
         offsets.push(0);
@@ -74,7 +74,7 @@ impl Csr {
         }
     }
 
-    /// Ends the current row: what was pushed to `values` since the last call.
+    /// Ends the current row, which has the values pushed since the last call.
     pub(crate) fn end_row(&mut self) {
         self.offsets.push(offset(self.values.len()));
     }

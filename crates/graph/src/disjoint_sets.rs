@@ -1,9 +1,9 @@
-//! [`DisjointSets`]: which numbers belong together.
+//! [`DisjointSets`]: union-find over numbers.
 //!
-//! A forest whose roots stand for the sets; paths are halved when they are walked. The root is the smallest number of its
-//! set, so results depend on which pairs were united but not on their order.
+//! A forest whose roots represent the sets; find halves the paths. The root is the smallest number of its set, so
+//! results depend on the united pairs but not on their order.
 //!
-//! Source: Tarjan, van Leeuwen 1984. Cost: about O(1) a call, O(log n) at worst on average over all calls.
+//! Source: Tarjan, van Leeuwen 1984. Cost: amortized O(log n) per call, in practice nearly O(1).
 
 /// Disjoint sets of the numbers from 0 on.
 ///
@@ -22,7 +22,7 @@ pub struct DisjointSets {
 }
 
 impl DisjointSets {
-    /// Each of `count` numbers alone. O(count).
+    /// Sets of one number each, for the numbers below `count`. O(count).
     ///
     /// # Panics
     /// With more than 2^32 - 1 numbers.
@@ -34,7 +34,7 @@ impl DisjointSets {
         }
     }
 
-    /// The smallest number of the set of a number.
+    /// The root of a number: the smallest number of its set.
     ///
     /// # Panics
     /// If there is no such number.
@@ -48,7 +48,7 @@ impl DisjointSets {
         at
     }
 
-    /// Puts the sets of two numbers together; says whether they were apart.
+    /// Merges the sets of two numbers; returns true if they were different sets.
     ///
     /// # Panics
     /// If there is no such number.
@@ -62,7 +62,7 @@ impl DisjointSets {
     #[must_use]
     pub fn roots(mut self) -> Vec<u32> {
         for at in 0..self.parents.len() {
-            // A parent is not above its child, so it has been replaced by its root already.
+            // A parent is smaller than its child, so it has been replaced by its root already.
             self.parents[at] = self.parents[self.parents[at] as usize];
         }
         self.parents

@@ -1,33 +1,33 @@
-//! What can be wrong with an input or a result, one variant per mistake.
+//! [`GraphError`]: errors of inputs and failed checks, one variant per mistake.
 //!
-//! Every variant names the place by number, so that the message points at the line of a file or the
-//! entry of an array that has to change.
+//! Every variant has the number of the item, so that the message points at the line of a file or
+//! the entry of an array that has to change.
 
 use crate::{ClusterId, ColorId};
 
-/// An inconsistent input, or a result that a check refuses.
+/// An inconsistent input or a failed check.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GraphError {
     /// More entries than 32-bit offsets can address.
     #[error("{count} {what} are too many: at most 4294967295 fit; split the problem")]
     TooMany {
-        /// What there is too much of.
+        /// The name of the items.
         what: &'static str,
-        /// How many there are.
+        /// The number of items.
         count: usize,
     },
-    /// CSR offsets that do not start at 0, or an empty offsets array.
+    /// CSR offsets that do not start at 0, or an empty array of offsets.
     #[error("offsets must start with 0 and hold one entry more than there are rows")]
     OffsetsStart,
-    /// CSR offsets that go down.
+    /// CSR offsets that decrease.
     #[error("offsets go down from {before} to {after} at row {row}; they must not decrease")]
     OffsetsDecrease {
         /// The row that would have a negative length.
         row: usize,
-        /// Its first offset.
+        /// The first offset of the row.
         before: u32,
-        /// Its second, smaller offset.
+        /// The second, smaller offset of the row.
         after: u32,
     },
     /// CSR offsets that do not end at the number of values.
@@ -45,7 +45,7 @@ pub enum GraphError {
     ParticleOutOfRange {
         /// The constraint.
         constraint: usize,
-        /// The particle it names.
+        /// The particle that does not exist.
         particle: u32,
         /// The number of particles.
         particles: usize,
@@ -55,7 +55,7 @@ pub enum GraphError {
     RepeatedParticle {
         /// The constraint.
         constraint: usize,
-        /// The particle named twice.
+        /// The repeated particle.
         particle: u32,
     },
     /// An edge to a vertex that does not exist.
@@ -63,7 +63,7 @@ pub enum GraphError {
     VertexOutOfRange {
         /// The position of the edge in the input; for CSR input, in the values.
         edge: usize,
-        /// The vertex it names.
+        /// The vertex that does not exist.
         vertex: u32,
         /// The number of vertices.
         vertices: usize,
@@ -88,25 +88,25 @@ pub enum GraphError {
         /// The vertex whose row lacks it.
         to: u32,
     },
-    /// A file whose content is not what its format says.
+    /// A file that violates its format.
     #[error("line {line}: {message}")]
     Malformed {
         /// The line, counted from 1; the last one if something is missing at the end.
         line: usize,
-        /// What was found and what was expected.
+        /// The text that was found and the expected one.
         message: String,
     },
-    /// A source that failed while it was read.
+    /// An error of the source during reading.
     #[error("cannot read line {line}: {message}")]
     Unreadable {
         /// The line, counted from 1.
         line: usize,
         /// The kind of failure.
         kind: std::io::ErrorKind,
-        /// The answer of the source.
+        /// The message of the source.
         message: String,
     },
-    /// A label that is no cluster number of a clustering of this size.
+    /// A label that is not a cluster number of a clustering of this size.
     #[error(
         "constraint {constraint} is labeled {cluster}, but cluster numbers must be below {constraints}"
     )]
@@ -136,14 +136,14 @@ pub enum GraphError {
         /// The cluster.
         cluster: ClusterId,
     },
-    /// Two things of different length that describe the same items.
+    /// Two arrays of different length that describe the same items.
     #[error("{what}: expected {expected} entries, found {found}")]
     Length {
-        /// What was compared.
+        /// The name of the array.
         what: &'static str,
-        /// How many entries were needed.
+        /// The required number of entries.
         expected: usize,
-        /// How many there are.
+        /// The actual number of entries.
         found: usize,
     },
     /// Two adjacent vertices of one color.
@@ -167,39 +167,39 @@ pub enum GraphError {
         second: u32,
         /// Their color.
         color: ColorId,
-        /// The particle both touch.
+        /// The particle shared by both.
         particle: u32,
     },
-    /// A constraint that a schedule leaves out.
+    /// A constraint that is missing in a schedule.
     #[error("constraint {constraint} is not in the schedule")]
     Unscheduled {
         /// The constraint.
         constraint: usize,
     },
-    /// A constraint that a schedule would solve twice.
+    /// A constraint that appears in a schedule more than once.
     #[error("constraint {constraint} is in the schedule more than once")]
     ScheduledTwice {
         /// The constraint.
         constraint: u32,
     },
-    /// A cluster that a schedule has not followed.
+    /// A cluster whose members or color in a schedule are outdated.
     #[error("the schedule has other members or another color for cluster {cluster}")]
     Misplaced {
         /// The cluster.
         cluster: ClusterId,
     },
-    /// Two clusters that a schedule would solve at the same time although they share a particle.
+    /// Two clusters that share a particle but have one color in a schedule.
     #[error(
         "clusters {first} and {second} run together in color {color} but share particle {particle}"
     )]
     ClustersCollide {
-        /// The cluster met first.
+        /// The cluster found first.
         first: ClusterId,
-        /// The cluster met second.
+        /// The cluster found second.
         second: ClusterId,
-        /// The color both run in.
+        /// The color of both.
         color: ColorId,
-        /// The particle both touch.
+        /// The particle shared by both.
         particle: u32,
     },
 }

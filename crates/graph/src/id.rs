@@ -1,7 +1,7 @@
 //! Typed results: the number of a cluster and the number of a color.
 //!
-//! Both are transparent `u32`s, so that an array of them is an array of `u32` for a solver or a GPU
-//! buffer, while the compiler still tells a cluster from a color and both from a constraint.
+//! Both are transparent `u32`s, so an array of them is an array of `u32` for a solver or a GPU
+//! buffer, while the compiler distinguishes clusters, colors and constraints.
 
 use std::fmt;
 
@@ -11,8 +11,8 @@ use std::fmt;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ClusterId(pub u32);
 
-/// The number of a color, from 0. Colors are never limited to a machine word or to 8 bits: one
-/// particle with 600 constraints needs 600 of them.
+/// The number of a color, from 0. Colors are not limited to the bits of a machine word: a particle
+/// with 600 constraints needs 600 colors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(transparent)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -1,9 +1,8 @@
-//! Which particles a constraint touches, and which constraints touch a particle.
+//! [`Incidence`]: the particles of each constraint, and the constraints on each particle.
 //!
-//! The input of everything else. Both directions are kept as flat arrays, because building the
+//! This is the input of all other stages. Both directions are flat arrays, because building the
 //! constraint graph and checking a schedule walk constraint -> particle -> constraint. Conflicts
-//! are defined here and nowhere else: two constraints are in each other's way if and only if they
-//! share a particle.
+//! are defined only here: two constraints conflict if and only if they share a particle.
 //!
 //! Cost of construction: O(particles + entries), two counting passes and a stamp array.
 
@@ -12,7 +11,7 @@ use crate::{Clustering, GraphError};
 
 /// Constraints as lists of particles, with the reverse lists.
 ///
-/// A constraint may have any arity, also none (the slot of a removed constraint). Equality compares
+/// A constraint may have any arity, also 0 (the slot of a removed constraint). Equality compares
 /// both lists.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Incidence {
@@ -72,7 +71,7 @@ impl Incidence {
         })
     }
 
-    /// Takes constraints as anything that yields lists of particle numbers. O(particles + entries).
+    /// Builds an incidence from an iterator over lists of particle numbers. O(particles + entries).
     ///
     /// # Errors
     /// A particle not below `particles`; a constraint that names a particle twice; more than
@@ -109,7 +108,7 @@ impl Incidence {
         self.particles_of.row_count()
     }
 
-    /// The number of particles, those without a constraint included.
+    /// The number of particles, including those without a constraint.
     #[must_use]
     pub fn particle_count(&self) -> usize {
         self.constraints_of.row_count()
@@ -135,8 +134,8 @@ impl Incidence {
 
     /// The largest number of constraints on one particle.
     ///
-    /// They are all in each other's way (a clique), so no coloring of the unclustered graph has
-    /// fewer colors. O(particles).
+    /// These constraints all conflict (a clique), so no coloring of the unclustered graph has fewer
+    /// colors. O(particles).
     #[must_use]
     pub fn clique_bound(&self) -> usize {
         self.constraints_of
@@ -155,7 +154,7 @@ impl Incidence {
     /// O(entries log arity).
     ///
     /// # Panics
-    /// If `clustering` is about another number of constraints.
+    /// If `clustering` has another number of constraints.
     #[must_use]
     pub fn quotient(&self, clustering: &Clustering) -> Self {
         assert_eq!(

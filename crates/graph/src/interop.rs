@@ -1,4 +1,4 @@
-//! Graphs from and to `petgraph`, for whatever this workspace does not compute itself.
+//! Conversion of graphs from and to `petgraph`, for algorithms that this workspace does not have.
 //!
 //! Node `i` is vertex `i` in both directions. Cost: O(vertices + edges), plus the edge sort of
 //! [`ConstraintGraph::from_edges`] on the way in.
@@ -9,7 +9,7 @@ use petgraph::visit::EdgeRef;
 use crate::{ConstraintGraph, GraphError};
 
 impl From<&ConstraintGraph> for UnGraph<(), ()> {
-    /// Node `i` is vertex `i`; edges ascend.
+    /// Builds a `petgraph` graph; node `i` is vertex `i`, and edges ascend.
     ///
     /// ```
     /// use incise_graph::ConstraintGraph;
@@ -36,7 +36,8 @@ impl From<&ConstraintGraph> for UnGraph<(), ()> {
 impl<N, E> TryFrom<&UnGraph<N, E>> for ConstraintGraph {
     type Error = GraphError;
 
-    /// Vertex `i` is node `i`; weights are ignored and parallel edges merged.
+    /// Builds a graph from a `petgraph` graph; vertex `i` is node `i`, weights are ignored and
+    /// parallel edges merged.
     ///
     /// # Errors
     /// An edge from a node to itself; too many edges.

@@ -1,19 +1,19 @@
-//! [`Lanes`]: which cluster is solved in which lane, for processors that solve several clusters of a color at once.
+//! [`Lanes`]: the assignment of clusters to lanes, for processors that solve several clusters of a color at once.
 //!
-//! A *group* is so many lanes that work together on clusters of one color: the lanes of a SIMD instruction, or the threads
-//! of a GPU's workgroup. A cluster keeps its lane while its color stays, so that what a cut does not touch does not
-//! move. A group whose lanes are all empty goes to whatever color needs one of its depth next. Cost: O(1) an edit,
-//! amortized; 4 bytes a cluster and 24 a group.
+//! A *group* is a fixed number of lanes that work together on clusters of one color: the lanes of a SIMD instruction,
+//! or the threads of a GPU's workgroup. A cluster keeps its lane while its color stays, so a cut moves only the
+//! clusters that it changes. A group whose lanes are all empty is reused by the next color that needs a group of its
+//! depth. Cost: amortized O(1) per edit; 4 bytes per cluster and 24 per group.
 
 use crate::{ClusterId, Rows};
 
-/// No slot, no color.
+/// Marks a missing slot or color.
 const NONE: u32 = u32::MAX;
 
 /// Groups of lanes by color, and the lane of each cluster.
 ///
-/// A cluster's *slot* is the number of its group times the width plus its lane. Who keeps data by slot finds each
-/// cluster's again after an edit, and needs to move only those of clusters that were assigned or released.
+/// A cluster's *slot* is the number of its group times the width plus its lane. Data stored by slot stay valid after an
+/// edit, except for clusters that were assigned or released.
 ///
 /// ```
 /// use incise_graph::{ClusterId, Lanes};
@@ -27,7 +27,7 @@ const NONE: u32 = u32::MAX;
 /// assert!(!lanes.has_room(group));
 /// assert_eq!(lanes.slot(ClusterId(8)), Some((group, 1)));
 ///
-/// // Without clusters the group is free for another color.
+/// // Without clusters the group is available to another color.
 /// assert_eq!(lanes.release(ClusterId(7)), None);
 /// assert_eq!(lanes.release(ClusterId(8)), Some(group));
 /// assert!(lanes.groups().row(0).is_empty());
@@ -39,27 +39,28 @@ pub struct Lanes {
     /// Color -> groups.
     colors: Rows<u32>,
     list: Vec<LaneGroup>,
-    /// Depth -> groups that have no cluster.
+    /// Depth -> groups without clusters.
     free: Rows<u32>,
     /// Cluster -> slot.
     slots: Vec<u32>,
 }
 
-/// Clusters that are solved side by side.
+/// A group of lanes for clusters of one color.
 #[derive(Clone, Copy, Debug)]
 pub struct LaneGroup {
-    /// What the group was opened with: the most constraints that a cluster in it may have, or 0 if that does not matter.
+    /// The depth passed to [`Lanes::open`]: the largest number of constraints per cluster in the group, or 0 if
+    /// unlimited.
     pub depth: u32,
-    /// The color of its clusters; that of the last ones while it has none.
+    /// The color of its clusters, or of the last ones if it has none.
     pub color: u32,
-    /// A bit for each lane that has a cluster.
+    /// A bit for each occupied lane.
     pub occupied: u64,
-    /// Its index among the groups of its color.
+    /// The index of the group within its color.
     index: u32,
 }
 
 impl Lanes {
-    /// No groups, and no colors.
+    /// No groups and no colors, with `width` lanes per group.
     ///
     /// # Panics
     /// If the width is not from 1 to 64.
@@ -75,7 +76,7 @@ impl Lanes {
         }
     }
 
-    /// Removes all groups and colors; memory is used again.
+    /// Removes all groups and colors; memory is reused.
     ///
     /// # Panics
     /// If the width is not from 1 to 64.
@@ -88,19 +89,19 @@ impl Lanes {
         self.slots.clear();
     }
 
-    /// Lanes of a group.
+    /// The number of lanes per group.
     #[must_use]
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Number of colors.
+    /// The number of colors.
     #[must_use]
     pub fn color_count(&self) -> usize {
         self.colors.row_count()
     }
 
-    /// Sets the number of colors; those that vanish have no groups.
+    /// Sets the number of colors; removed ones must not have groups.
     pub fn set_color_count(&mut self, colors: usize) {
         self.colors.set_row_count(colors);
     }
@@ -111,7 +112,7 @@ impl Lanes {
         &self.colors
     }
 
-    /// Number of groups, with those that have no cluster.
+    /// The number of groups, including those without clusters.
     #[must_use]
     pub fn group_count(&self) -> usize {
         self.list.len()
@@ -120,15 +121,15 @@ impl Lanes {
     /// A group.
     ///
     /// # Panics
-    /// If there is none of this number.
+    /// If there is no such group.
     #[inline]
     #[must_use]
     pub fn group(&self, number: usize) -> &LaneGroup {
         &self.list[number]
     }
 
-    /// Adds a group to a color: one without clusters that was opened with the same depth, or a new one, whose number is
-    /// the next. Returns its number and whether it is new.
+    /// Adds a group to a color: an empty one that was opened with the same depth, or else a new one with the next
+    /// number. Returns its number and true if it is new.
     ///
     /// # Panics
     /// If there is no such color, or the lanes do not fit into `u32`.
@@ -150,10 +151,10 @@ impl Lanes {
         (number, free.is_none())
     }
 
-    /// Whether a group has a lane without a cluster.
+    /// True if a group has an unoccupied lane.
     ///
     /// # Panics
-    /// If there is none of this number.
+    /// If there is no such group.
     #[must_use]
     pub fn has_room(&self, group: usize) -> bool {
         self.free_lane(group) < self.width
@@ -163,7 +164,7 @@ impl Lanes {
         self.list[group].occupied.trailing_ones() as usize
     }
 
-    /// Group and lane of a cluster, if it has been assigned one.
+    /// Group and lane of a cluster; `None` if it has none.
     #[inline]
     #[must_use]
     pub fn slot(&self, cluster: ClusterId) -> Option<(usize, usize)> {
@@ -172,7 +173,7 @@ impl Lanes {
         Some((slot / self.width, slot % self.width))
     }
 
-    /// Gives a cluster that has no lane the first free one of a group; returns its slot.
+    /// Assigns the first unoccupied lane of a group to a cluster without a lane; returns the slot.
     ///
     /// # Panics
     /// If the group has no room.
@@ -188,8 +189,8 @@ impl Lanes {
         slot
     }
 
-    /// Takes its lane from a cluster. Returns the number of the group if that has no other cluster: it belongs to no color
-    /// then, until it is opened again.
+    /// Releases the lane of a cluster. If the group becomes empty, it is returned; it belongs to no color until it is
+    /// opened again.
     ///
     /// # Panics
     /// If the cluster has no lane.
@@ -218,7 +219,7 @@ impl Lanes {
         Some(number)
     }
 
-    /// Moves rows together where edits have left gaps; numbers stay. O(groups) if there are many gaps, else O(1).
+    /// Closes gaps that edits have left in the rows; numbers stay. O(groups) if there are many gaps, else O(1).
     pub fn tidy(&mut self) {
         self.colors.tidy();
         self.free.tidy();
@@ -244,7 +245,7 @@ mod tests {
 
     use super::*;
 
-    /// An edit: a cluster goes to a color and a depth, or, without them, loses its lane.
+    /// An edit: a cluster is assigned to a color and a depth, or, without them, released.
     type Edit = (u32, Option<(usize, usize)>);
 
     fn check(lanes: &Lanes, expected: &BTreeMap<u32, (usize, usize)>) {
@@ -270,8 +271,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
 
-        /// Whatever is assigned and released, every cluster has a lane of its own in a group of its color and depth, and
-        /// no other one moves.
+        /// After any sequence of edits, every cluster has a distinct lane in a group of its color and depth, and
+        /// unchanged clusters keep their lanes.
         #[test]
         fn lanes_follow_edits(
             width in prop::sample::select(vec![1_usize, 2, 3, 16, 64]),

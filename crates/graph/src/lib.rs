@@ -1,12 +1,12 @@
-//! The vocabulary of parallel constraint scheduling.
+//! Data types for scheduling constraints in parallel.
 //!
 //! A Gauss-Seidel solver visits constraints one after the other, because two constraints on one
-//! particle must not move it at the same time. Constraints that share no particle may run together.
-//! This crate holds the values that say which: the particles that a constraint touches
+//! particle must not move it at the same time. Constraints that share no particle may run in
+//! parallel. The types of this crate describe this: the particles of each constraint
 //! ([`Incidence`]), the constraints that conflict ([`ConstraintGraph`]), the constraints solved as
-//! one block ([`Clustering`]), when each one runs ([`Coloring`]), and the flat order a solver walks
-//! ([`Schedule`]). It holds no algorithm that chooses among them; those are in `incise-coloring` and
-//! `incise-clustering`.
+//! one block ([`Clustering`]), the parallel steps ([`Coloring`]), and the flat order of a solver
+//! ([`Schedule`]). The algorithms that compute clusterings and colorings are in `incise-clustering`
+//! and `incise-coloring`.
 //!
 //! Constraints, particles and graph vertices are plain `u32` numbers from 0, so any constraint of
 //! any arity fits: a spring, a bending angle, a tetrahedron. Ragged arrays are stored as `offsets`

@@ -1,17 +1,16 @@
-//! How good a coloring is: how many colors, and how even.
+//! [`ColoringMetrics`]: the number of colors and the evenness of their classes.
 //!
-//! Few colors mean few steps; even colors mean that each step keeps the whole machine busy. The
-//! numbers are those of the paper's Table 2, with the formulas spelled out because the paper gives
-//! none for its chi-squared column, and the share of busy lanes on machines that run in groups.
-//! Cost: O(vertices + colors).
+//! Few colors mean few steps; even classes keep all cores busy in each step. The metrics are those
+//! of the paper's Table 2, with formulas spelled out because the paper gives none for its
+//! chi-squared column, and the share of busy lanes on machines that run in groups. Cost: O(vertices
+//! + colors).
 
 use crate::Coloring;
 
 /// The evenness of k color classes with sizes `n_c` that sum to N.
 ///
-/// Classes without a member count, since a solver steps through them too. A coloring without
-/// vertices has all fields 0, except `max_over_mean`, `lanes_32` and `lanes_256`, which are 1 when
-/// there is nothing to balance and no lane to keep busy.
+/// Empty classes count, since a solver steps through them too. A coloring without vertices has all
+/// fields 0, except `max_over_mean`, `lanes_32` and `lanes_256`, which are 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ColoringMetrics {
@@ -32,8 +31,8 @@ pub struct ColoringMetrics {
     /// Reduced chi-squared against equal sizes: `sum_c (n_c - N/k)^2 / (N/k) / (k - 1)`; 0 for k <
     /// 2.
     pub chi2: f64,
-    /// Largest class over mean: the slowdown against even classes when each runs at the speed of
-    /// its size.
+    /// Largest class over mean: the slowdown compared with even classes if the time of a class is
+    /// proportional to its size.
     pub max_over_mean: f64,
     /// Share of busy lanes when each class runs in groups of 32, the last one filled up with idle
     /// lanes: `N / sum_c (32 ceil(n_c / 32))`. 32 lanes are a warp of a GPU.
@@ -44,7 +43,7 @@ pub struct ColoringMetrics {
 }
 
 impl ColoringMetrics {
-    /// Every vertex counts 1. O(vertices + colors).
+    /// Metrics in which every vertex counts 1. O(vertices + colors).
     ///
     /// ```
     /// use incise_graph::{ColorId, Coloring, ColoringMetrics};
@@ -62,17 +61,17 @@ impl ColoringMetrics {
         Self::of_classes(&classes)
     }
 
-    /// Vertex `v` counts `weights[v]`, for example the number of constraints of cluster `v`
-    /// ([`Clustering::sizes`](crate::Clustering::sizes)), by which a vacant cluster counts nothing.
-    /// O(vertices + colors).
+    /// Metrics in which vertex `v` counts `weights[v]`, for example the number of constraints of
+    /// cluster `v` ([`Clustering::sizes`](crate::Clustering::sizes)); a vacant cluster then counts
+    /// 0. O(vertices + colors).
     ///
-    /// `n_c` is then the work of class c in items of equal cost. So `lanes_32` and `lanes_256` are
-    /// those of a solver that gives each item a lane of its own; one that gives each cluster a lane
-    /// and works through it item by item has those of [`by_vertices`](Self::by_vertices), and idles
-    /// further while it waits for the largest cluster of a group.
+    /// `n_c` is then the work of class c in items of equal cost. `lanes_32` and `lanes_256`
+    /// describe a solver that assigns a lane to each item. A solver that assigns a lane to each
+    /// cluster has the values of [`by_vertices`](Self::by_vertices), and its lanes also idle until
+    /// the largest cluster of a group is done.
     ///
     /// # Panics
-    /// If there is not one weight per vertex.
+    /// If the number of weights is not the number of vertices.
     #[must_use]
     pub fn by_weights(coloring: &Coloring, weights: &[u32]) -> Self {
         assert_eq!(
@@ -87,7 +86,7 @@ impl ColoringMetrics {
         Self::of_classes(&classes)
     }
 
-    /// Measures classes of these sizes.
+    /// Metrics of classes of these sizes.
     fn of_classes(classes: &[u64]) -> Self {
         let colors = classes.len();
         let total = classes.iter().sum();
@@ -150,7 +149,7 @@ mod tests {
         assert_eq!(metrics.chi2, 1.5);
     }
 
-    /// One class of each size: the lanes are counted here one by one.
+    /// Compares single classes of each size with a count of lanes one by one.
     #[test]
     fn lanes_fill_up_whole_groups() {
         for sizes in [

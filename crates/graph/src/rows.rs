@@ -1,15 +1,15 @@
 //! Ragged arrays that change: rows one after the other, each with some room to grow.
 //!
-//! All values lie in one array, like in CSR, but a row names its start, its length and its room, so
-//! a row that runs out of room moves to the end and leaves a hole. Rooms grow by a quarter and 4, and
-//! [`Rows::tidy`] closes the holes once more than two thirds of the array are holes and room, so
-//! memory stays within three times the values (and a constant), and each value pushed costs O(1)
-//! amortized: between two tidy-ups at least a number of values proportional to all is pushed or
-//! removed.
+//! All values are in one array, as in CSR, but a row has a start, a length and a capacity, so a row
+//! that exceeds its capacity moves to the end and leaves a hole. Capacities grow by a quarter and
+//! 4. [`Rows::tidy`] closes the holes once more than two thirds of the array are holes and spare
+//! capacity, so memory stays within three times the values (and a constant). Each value pushed
+//! costs amortized O(1): between two tidy-ups the number of values pushed or removed is
+//! proportional to their total.
 
 use crate::csr::offset;
 
-/// Values beyond three times the held ones that are not worth a tidy-up.
+/// Values beyond three times the held ones that do not trigger a tidy-up.
 const SPARE: usize = 64;
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -20,10 +20,10 @@ struct Span {
     room: u32,
 }
 
-/// Rows of values, each of which can grow and shrink by itself.
+/// Rows of values, each of which can grow and shrink.
 ///
-/// Deterministic: the order within a row is what the calls say. Methods that move values return how
-/// many, so that a caller can count its cost.
+/// Deterministic: the order within a row depends only on the calls. Methods that move values return
+/// their number, so that a caller can count the cost.
 ///
 /// ```
 /// use incise_graph::Rows;
@@ -40,7 +40,7 @@ struct Span {
 pub struct Rows<T> {
     spans: Vec<Span>,
     values: Vec<T>,
-    /// Values in rows.
+    /// The number of values in rows.
     held: usize,
 }
 
@@ -56,8 +56,8 @@ impl<T> Default for Rows<T> {
 }
 
 impl<T: Copy> Rows<T> {
-    /// Replaces everything by `rows` rows without room to grow, using the memory again. An entry is
-    /// a row and a value; the values of a row keep their order. O(rows + entries).
+    /// Replaces all rows by `rows` rows without spare capacity, reusing the memory. An entry is a
+    /// row and a value; the values of a row keep their order. O(rows + entries).
     ///
     /// # Panics
     /// If an entry names another row, or there are 2³² entries.
@@ -82,7 +82,7 @@ impl<T: Copy> Rows<T> {
         }
     }
 
-    /// The number of rows, empty ones included.
+    /// The number of rows, including empty ones.
     #[must_use]
     pub fn row_count(&self) -> usize {
         self.spans.len()
@@ -109,14 +109,14 @@ impl<T: Copy> Rows<T> {
         (0..self.row_count()).map(|row| self.row(row))
     }
 
-    /// Appends empty rows until there are `rows`, or takes the last ones away. O(rows changed).
+    /// Appends empty rows until there are `rows`, or removes the last ones. O(rows changed).
     pub fn set_row_count(&mut self, rows: usize) {
         let gone = self.spans.get(rows..).unwrap_or(&[]);
         self.held -= gone.iter().map(|span| span.length as usize).sum::<usize>();
         self.spans.resize(rows, Span::default());
     }
 
-    /// Appends a value to a row; returns how many values moved for it. Amortized O(1).
+    /// Appends a value to a row; returns the number of values moved for it. Amortized O(1).
     ///
     /// # Panics
     /// If there is no such row, or the array would hold 2³² values.
@@ -131,7 +131,7 @@ impl<T: Copy> Rows<T> {
             let old = start as usize..(start + length) as usize;
             let room = old.len() + old.len() / 4 + 4;
             let mut first = old.start;
-            // The last row grows where it is.
+            // The last row grows in its position.
             if old.end != self.values.len() {
                 moved = old.len();
                 first = self.values.len();
@@ -152,7 +152,7 @@ impl<T: Copy> Rows<T> {
         moved
     }
 
-    /// Inserts a value before the one at `at`; returns how many values moved for it. O(row).
+    /// Inserts a value before the one at `at`; returns the number of values moved for it. O(row).
     ///
     /// # Panics
     /// If there is no such row or `at` is past its end.
@@ -164,8 +164,8 @@ impl<T: Copy> Rows<T> {
         moved
     }
 
-    /// Removes the value at `at`, keeping the order of the others; returns how many values moved
-    /// for it. O(row).
+    /// Removes the value at `at`, keeping the order of the others; returns the number of values
+    /// moved for it. O(row).
     ///
     /// # Panics
     /// If there is no such row or value.
@@ -177,7 +177,7 @@ impl<T: Copy> Rows<T> {
         moved
     }
 
-    /// Removes and returns the value at `at`; the last of the row takes its place. O(1).
+    /// Removes and returns the value at `at`, which is replaced by the last of the row. O(1).
     ///
     /// # Panics
     /// If there is no such row or value.
@@ -189,7 +189,7 @@ impl<T: Copy> Rows<T> {
         removed
     }
 
-    /// Takes the last value from a row, if there is one. O(1).
+    /// Removes the last value of a row, if there is one. O(1).
     ///
     /// # Panics
     /// If there is no such row.
@@ -209,8 +209,8 @@ impl<T: Copy> Rows<T> {
         self.spans[row].length = 0;
     }
 
-    /// Closes all holes if they are too many; returns how many values moved. To be called after a
-    /// number of edits. Amortized O(1) for each of them.
+    /// Closes all holes if they exceed the limit; returns the number of values moved. Call it after
+    /// a number of edits. Amortized O(1) for each of them.
     pub fn tidy(&mut self) -> usize {
         if self.values.len() <= 3 * self.held + SPARE {
             return 0;

@@ -1,13 +1,11 @@
-//! The order a solver walks: color after color, in a color cluster beside cluster, in a cluster
-//! constraint after constraint.
+//! [`Schedule`]: the order in which a solver visits constraints: color after color, the clusters of a color in
+//! parallel, the constraints of a cluster one after the other.
 //!
-//! A schedule is two ragged arrays, color -> clusters and cluster -> constraints, made by two
-//! counting sorts. Both have [`Rows`] that can change by themselves, so that after a cut
-//! [`Schedule::update`] costs what the cut changed: a constraint leaves its cluster or enters one, a
-//! cluster leaves its color or enters one. A journal of the clusters that changed lets structures
-//! derived from the schedule be updated in turn. Cost: O(constraints + clusters + colors) for
-//! a new schedule, and no allocation once the arrays have grown; O(members of the changed clusters)
-//! amortized for an update.
+//! A schedule is two ragged arrays, color -> clusters and cluster -> constraints, built by two counting sorts. Both are
+//! [`Rows`], which can change in place, so that after a cut [`Schedule::update`] costs O(changes): a constraint leaves
+//! or enters a cluster, a cluster leaves or enters a color. A journal of the changed clusters lets structures derived
+//! from the schedule be updated in turn. Cost: O(constraints + clusters + colors) for a new schedule, without
+//! allocation once the arrays have grown; amortized O(members of the changed clusters) for an update.
 
 mod check;
 mod journal;
@@ -16,7 +14,7 @@ use crate::csr::offset;
 use crate::{ClusterId, Clustering, ColorId, Coloring, Rows};
 use journal::Journal;
 
-/// The color of a cluster that is in none.
+/// The color of a cluster without one.
 const NONE: u32 = u32::MAX;
 
 /// Color -> clusters -> constraints in solving order. The example is in the [crate
@@ -28,9 +26,9 @@ pub struct Schedule {
     colors: Rows<ClusterId>,
     /// Cluster -> constraints, ascending.
     members: Rows<u32>,
-    /// Constraint -> the cluster it is in here.
+    /// Constraint -> its cluster in this schedule.
     labels: Vec<ClusterId>,
-    /// Cluster -> its color here and its position among the clusters of that color.
+    /// Cluster -> its color in this schedule and its position among the clusters of that color.
     slots: Vec<Slot>,
     journal: Journal,
 }
@@ -49,8 +47,7 @@ impl Slot {
     };
 }
 
-/// Two schedules are equal if they solve the same constraints in the same order; what they were
-/// before does not count.
+/// Two schedules are equal if they solve the same constraints in the same order; their revisions do not count.
 impl PartialEq for Schedule {
     fn eq(&self, other: &Self) -> bool {
         self.colors.rows().eq(other.colors.rows())
@@ -66,15 +63,14 @@ impl PartialEq for Schedule {
 impl Eq for Schedule {}
 
 impl Schedule {
-    /// The schedule of a clustering whose clusters are colored; `coloring.color(k)` is the color of
+    /// Builds the schedule of a clustering with colored clusters; `coloring.color(k)` is the color of
     /// cluster `k`.
     ///
-    /// Without clusters, pass [`Clustering::none`]. Clusters of one color ascend, and so do the
-    /// constraints of a cluster. The coloring is taken as it is; [`check`](Self::check) proves the
-    /// result.
+    /// Without clusters, pass [`Clustering::none`]. Clusters of one color ascend, and so do the constraints of a
+    /// cluster. The coloring is not checked here; [`check`](Self::check) verifies the result.
     ///
     /// # Panics
-    /// If there is not one color per cluster number.
+    /// If the number of colors is not the number of cluster numbers.
     #[must_use]
     pub fn new(clustering: &Clustering, coloring: &Coloring) -> Self {
         let mut schedule = Self::default();
@@ -82,13 +78,13 @@ impl Schedule {
         schedule
     }
 
-    /// Replaces the schedule, using its arrays again. O(constraints + clusters + colors).
+    /// Replaces the schedule, reusing its arrays. O(constraints + clusters + colors).
     ///
     /// # Panics
-    /// If there is not one color per cluster number.
+    /// If the number of colors is not the number of cluster numbers.
     pub fn rebuild(&mut self, clustering: &Clustering, coloring: &Coloring) {
         expect_colors(clustering, coloring);
-        // Colors that only vacant clusters have are not counted.
+        // Colors of vacant clusters are not counted.
         let occupied = (0..)
             .map(ClusterId)
             .zip(coloring.colors())
@@ -114,19 +110,18 @@ impl Schedule {
         self.journal.restart();
     }
 
-    /// Follows an edit: afterwards each color has the same clusters, and each cluster the same
-    /// constraints, as in a [new](Self::new) schedule. Only the order of the clusters in a color
-    /// may differ; they run at the same time anyway. Returns how many numbers were looked at or
-    /// moved.
+    /// Applies an edit: afterwards each color has the same clusters, and each cluster the same constraints, as in a
+    /// [new](Self::new) schedule. Only the order of the clusters in a color may differ, which has no effect. Returns
+    /// the number of values read or moved.
     ///
-    /// `constraints` names every constraint whose cluster is another one now than when this was
-    /// last called, `clusters` every cluster whose color is; what is listed without need or more
-    /// than once does no harm. What is missing, [`check_plan`](Self::check_plan) finds.
+    /// `constraints` must list every constraint whose cluster has changed since the last call, `clusters` every cluster
+    /// whose color has changed; unchanged and repeated items are allowed. [`check_plan`](Self::check_plan) finds
+    /// missing ones.
     ///
-    /// Cost: O(members of the changed clusters), amortized: now and then the arrays are put in order.
+    /// Cost: amortized O(members of the changed clusters): the arrays are occasionally compacted.
     ///
     /// # Panics
-    /// If there is not one color per cluster number.
+    /// If the number of colors is not the number of cluster numbers.
     ///
     /// ```
     /// use incise_graph::{ClusterId, Clustering, ColorId, Coloring, Schedule};
@@ -180,7 +175,7 @@ impl Schedule {
         visited as u64
     }
 
-    /// Puts a constraint into the cluster that it is in now.
+    /// Moves a constraint to its present cluster.
     fn relabel(
         &mut self,
         constraint: u32,
@@ -213,7 +208,7 @@ impl Schedule {
         visited
     }
 
-    /// The color that a cluster is to have here; none if it has no members.
+    /// The color of a cluster in this schedule; `NONE` if it has no members.
     fn color_of(&self, cluster: ClusterId, coloring: &Coloring) -> u32 {
         match self.members.row(cluster.index()) {
             [] => NONE,
@@ -221,7 +216,7 @@ impl Schedule {
         }
     }
 
-    /// Puts a cluster into a color.
+    /// Moves a cluster to a color.
     fn reseat(&mut self, cluster: ClusterId, color: u32) -> usize {
         let old = self.slots[cluster.index()];
         if old.color == color {
@@ -246,17 +241,16 @@ impl Schedule {
         1 + self.colors.push(row, cluster)
     }
 
-    /// What this schedule is now: another number after every change, and never that of another
-    /// schedule, except that copies share it until they change and all empty
-    /// [default](Self::default) ones have 0.
+    /// The revision of this schedule, which changes with every edit. No other schedule has an equal one, except that
+    /// copies share it until they change and all empty [default](Self::default) schedules have 0.
     #[must_use]
     pub fn revision(&self) -> u64 {
         self.journal.revision()
     }
 
-    /// The clusters whose members or color have changed since this schedule had a revision, some of
-    /// them several times, vacated ones included; `None` if it never had it, has been rebuilt since,
-    /// or has forgotten: it remembers as many changes as there are clusters.
+    /// The clusters whose members or color have changed since a revision, possibly repeated, including vacated ones;
+    /// `None` if this schedule never had the revision, was rebuilt since, or no longer has the record: it keeps as many
+    /// changes as there are clusters.
     #[must_use]
     pub fn changes_since(&self, revision: u64) -> Option<&[ClusterId]> {
         self.journal.since(revision)
@@ -268,7 +262,7 @@ impl Schedule {
         self.colors.row_count()
     }
 
-    /// The number of clusters that have a constraint.
+    /// The number of clusters with at least one constraint.
     #[must_use]
     pub fn cluster_count(&self) -> usize {
         self.colors.value_count()
@@ -283,8 +277,8 @@ impl Schedule {
         self.colors.row(color)
     }
 
-    /// The constraints of a cluster, ascending, to be solved one after the other; none if it is
-    /// vacant or unknown.
+    /// The constraints of a cluster, ascending, to be solved one after the other; empty if the cluster is vacant or
+    /// unknown.
     #[must_use]
     pub fn constraints(&self, cluster: ClusterId) -> &[u32] {
         if cluster.index() < self.members.row_count() {
@@ -294,7 +288,7 @@ impl Schedule {
         }
     }
 
-    /// The color that a cluster runs in; `None` if it is vacant or unknown.
+    /// The color of a cluster; `None` if it is vacant or unknown.
     #[must_use]
     pub fn color(&self, cluster: ClusterId) -> Option<ColorId> {
         let slot = self.slots.get(cluster.index())?;

@@ -1,4 +1,4 @@
-//! Sets that grow together, against sets that are merged by hand.
+//! Disjoint sets compared with sets that are merged by relabeling.
 
 use incise_graph::DisjointSets;
 use proptest::prelude::*;

@@ -1,4 +1,5 @@
-//! The graph of an incidence is the relation "shares a particle", and quotients commute with it.
+//! The graph of an incidence equals the relation "shares a particle", and quotients commute with
+//! it.
 
 use std::collections::BTreeSet;
 
@@ -25,7 +26,7 @@ fn clustered() -> impl Strategy<Value = (Incidence, Clustering)> {
     })
 }
 
-/// Do two constraints share a particle?
+/// True if two constraints share a particle.
 fn share(incidence: &Incidence, a: usize, b: usize) -> bool {
     incidence
         .particles_of(a)
@@ -87,7 +88,7 @@ proptest! {
         rows in (1u32..9).prop_flat_map(|n| vec(vec(0..n, 0..6), n as usize)),
         symmetric in any::<bool>(),
     ) {
-        // No loops; both directions half of the time.
+        // No loops; half of the time each edge in both directions.
         let mut rows: Vec<Vec<u32>> = (0..)
             .zip(rows)
             .map(|(v, row)| row.into_iter().filter(|&u| u != v).collect())

@@ -1,4 +1,4 @@
-//! Properties of the vocabulary, against definitions too slow to ship.
+//! Properties of the data types, compared with slow definitions.
 
 #![expect(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 

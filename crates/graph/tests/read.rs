@@ -1,5 +1,5 @@
-//! Readers give the graph that was written, whatever liberties the format allows, and an error with
-//! a line for everything else, whatever the bytes.
+//! Readers return the graph that was written, in all variants of a format, and an error with a line
+//! for all other bytes.
 
 use std::fmt::Write;
 
@@ -25,7 +25,7 @@ fn edge_lists() -> impl Strategy<Value = (u32, Vec<(u32, u32)>)> {
     })
 }
 
-/// Reads any bytes; what comes out must be a graph in order or an error of the reader.
+/// Reads any bytes; the result must be a consistent graph or an error of the reader.
 fn survives(bytes: &[u8]) {
     for read in [(|bytes| read_dimacs(bytes)) as Reader, |bytes| {
         read_matrix_market(bytes)
@@ -61,7 +61,7 @@ proptest! {
             read_dimacs(text.as_bytes()),
             ConstraintGraph::from_edges(n as usize, &edges)
         );
-        // The end of the last line is not needed.
+        // The end of the last line is optional.
         prop_assert_eq!(
             read_dimacs(text.trim_end().as_bytes()),
             ConstraintGraph::from_edges(n as usize, &edges)
@@ -133,7 +133,7 @@ proptest! {
     }
 }
 
-/// Every mistake by itself, with its line and what the message has to say.
+/// Each mistake is refused with its line and message.
 fn refused(read: Reader, cases: &[(&[u8], usize, &str)]) {
     for &(bytes, line, part) in cases {
         let text = String::from_utf8_lossy(bytes);

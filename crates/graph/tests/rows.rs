@@ -1,4 +1,4 @@
-//! Ragged arrays that change, against lists of lists.
+//! Ragged arrays that change, compared with lists of lists.
 
 use incise_graph::Rows;
 use proptest::collection::vec;
@@ -85,14 +85,15 @@ proptest! {
     }
 }
 
-/// Counted: whatever the order of pushes and removals, a value costs a small number of moves.
+/// Counts moves: in any order of pushes and removals, a value costs a small number of moves.
 #[test]
 fn a_value_costs_a_constant() {
     for count in [1_000usize, 100_000] {
         let mut rows = Rows::default();
         rows.refill(count, (0..count).map(|row| (row, 0)));
         let mut moved = 0;
-        // The worst for rooms: each row grows by one, then shrinks by one, far from the last one.
+        // The worst case for capacities: each row grows by one, then shrinks by one, far from the
+        // last one.
         for i in 0..4 * count {
             let row = i * 7919 % count;
             moved += rows.push(row, i);

@@ -1,5 +1,5 @@
-//! A schedule holds every constraint once, in the order of the definition, and its check agrees
-//! with the coloring's; edits give what a new schedule would be, at a cost that follows the edit.
+//! A schedule contains every constraint once, in the order of the definition, and its check agrees
+//! with the coloring's; edits give the order of a new schedule, at a cost proportional to the edit.
 
 use incise_graph::{ClusterId, Clustering, ColorId, Coloring, GraphError, Incidence, Schedule};
 use proptest::collection::vec;
@@ -19,9 +19,9 @@ fn inputs() -> impl Strategy<Value = (Clustering, Coloring)> {
 /// One random change of a plan.
 #[derive(Clone, Debug)]
 enum Edit {
-    /// Takes constraint (number modulo their count) out of its cluster.
+    /// Removes constraint (number modulo their count) from its cluster.
     Remove(usize),
-    /// Puts a constraint that is in no cluster, maybe past the end, into a new one.
+    /// Puts a constraint without cluster, possibly past the end, into a new one.
     Start(usize),
     /// Puts it into the cluster of another constraint.
     Join(usize, usize),
@@ -39,7 +39,7 @@ fn edits() -> impl Strategy<Value = Vec<Edit>> {
     vec(edit, 1..12)
 }
 
-/// Clusters and colors, and what has changed since the schedule followed.
+/// Clusters and colors, and the changes since the last update of the schedule.
 struct Plan {
     clustering: Clustering,
     coloring: Coloring,
@@ -48,7 +48,7 @@ struct Plan {
 }
 
 impl Plan {
-    /// A constraint in no cluster: one of the present ones if there is such a one, else the next.
+    /// A constraint in no cluster: one of the present ones if possible, else the next number.
     fn loose(&self, start: usize) -> usize {
         let count = self.clustering.constraint_count();
         let mut all = (0..count).map(|i| (start + i) % count);
@@ -146,8 +146,8 @@ proptest! {
         schedule.check_plan(&second, &others).unwrap();
     }
 
-    /// After every batch of edits the schedule is the new one up to the order within a color, and
-    /// the journal names what differs from any earlier state.
+    /// After every batch of edits the schedule equals a new one up to the order within a color, and
+    /// the journal lists the differences from any earlier state.
     #[test]
     fn updates_give_what_a_new_schedule_is(
         (clustering, coloring) in inputs(),
@@ -181,7 +181,7 @@ proptest! {
     }
 }
 
-/// What is not told is found.
+/// Changes that were not reported are found.
 #[test]
 fn a_forgotten_edit_is_found() {
     let labels = [0, 0, 1, 1].map(ClusterId).to_vec();
@@ -202,7 +202,7 @@ fn a_forgotten_edit_is_found() {
     assert_eq!(schedule.check_plan(&clustering, &coloring), misplaced(0));
 }
 
-/// Copies that part have nothing to tell of each other.
+/// Copies that have diverged share no changes.
 #[test]
 fn revisions_tell_schedules_apart() {
     let clustering = Clustering::none(2);
@@ -229,7 +229,7 @@ fn revisions_tell_schedules_apart() {
     assert_eq!(Schedule::default().revision(), 0);
 }
 
-/// The journal forgets, but never what happened after the last state that a follower has seen.
+/// The journal drops old changes, but never those after the last revision of a derived structure.
 #[test]
 fn a_follower_of_every_change_is_never_left_behind() {
     let clustering = Clustering::none(5);
@@ -246,8 +246,8 @@ fn a_follower_of_every_change_is_never_left_behind() {
     assert_eq!(schedule.changes_since(first), None);
 }
 
-/// Counted, not timed: a cut's worth of edits in a large plan costs about the same whatever the
-/// rest is, and far less than the rest. 20 constraints are each replaced by four in two clusters.
+/// Counts instead of timing: the edits of a cut in a large plan cost about as much as in a small
+/// one, and far less than a rebuild. 20 constraints are each replaced by four in two clusters.
 #[test]
 fn the_cost_of_an_update_follows_the_edit() {
     for clusters in [2_000u32, 40_000] {
@@ -282,14 +282,15 @@ fn the_cost_of_an_update_follows_the_edit() {
         }
         schedule.check_plan(&clustering, &coloring).unwrap();
         // 120 constraints and 60 clusters change in a cut; each moves a few others. Once in the run
-        // every color moves to get room, which is the only part that knows the size of the plan.
+        // every color moves to get room, which is the only cost that depends on the size of the
+        // plan.
         let once = u64::from(clusters);
         let bound = u64::from(cuts) * 20 * 40 + once;
         assert!(total < bound, "{total} of {bound} for {clusters} clusters");
     }
 }
 
-/// The arrays do not grow under endless edits: what is vacated is used again.
+/// Arrays do not grow under endless edits: vacated numbers are reused.
 #[test]
 fn memory_stays_in_proportion() {
     let mut clustering = Clustering::none(100);
@@ -307,6 +308,6 @@ fn memory_stays_in_proportion() {
         visited += schedule.update(&clustering, &coloring, &[c], &[k]);
     }
     schedule.check_plan(&clustering, &coloring).unwrap();
-    // A round changes two numbers; clusters here grow to some dozens of members.
+    // A round changes two numbers; clusters here grow to a few dozen members.
     assert!(visited < 5_000 * 120, "{visited}");
 }

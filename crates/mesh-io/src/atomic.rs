@@ -1,8 +1,8 @@
-//! Writing a file so that its final name never shows half a file.
+//! [`write_atomically`]: writing of files whose final name never shows partial content.
 //!
-//! The content goes to a file with a temporary name in the same folder, which is renamed when complete and removed if
-//! anything fails, a panic included. Readers see the old file or the new one. The content is handed to the operating
-//! system, not forced onto the disk: after a power failure the file may be lost.
+//! The content goes to a file with a temporary name in the same folder, which is renamed when complete and removed
+//! after any error or panic. Readers see the old file or the new one. The content is passed to the operating system but
+//! not flushed to the disk: after a power failure the file may be lost.
 
 use std::fs::{self, OpenOptions};
 use std::io::{self, BufWriter, Write};
@@ -11,11 +11,11 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use crate::MeshIoError;
 
-/// Calls `content` with a buffered writer and puts what it writes under the name `path`, all or nothing.
+/// Calls `content` with a buffered writer and moves the result to `path` if it is complete.
 ///
 /// # Errors
-/// [`MeshIoError::Io`] with the error of `content` or of the file system. Nothing is left behind then, and a file that
-/// had the name before is untouched.
+/// [`MeshIoError::Io`] with the error of `content` or of the file system. No temporary file remains then, and an
+/// existing file at `path` is unchanged.
 ///
 /// # Example
 /// ```
@@ -54,7 +54,7 @@ pub fn write_atomically(
 
         let mut writer = BufWriter::new(file);
         content(&mut writer)?;
-        // Closed before it is renamed: not every system renames an open file.
+        // Closed before it is renamed, because some systems cannot rename an open file.
         drop(
             writer
                 .into_inner()
@@ -69,7 +69,7 @@ pub fn write_atomically(
     })
 }
 
-/// Removes a file when dropped before it got its name.
+/// Removes the temporary file when dropped before the rename.
 struct Remover(Option<PathBuf>);
 
 impl Remover {
@@ -85,7 +85,7 @@ impl Remover {
 impl Drop for Remover {
     fn drop(&mut self) {
         if let Some(temporary) = &self.0 {
-            // This error cannot be reported: another one is being reported already.
+            // This error cannot be reported, since another one is being returned.
             fs::remove_file(temporary).ok();
         }
     }

@@ -1,10 +1,10 @@
-//! Bytes as base64, for formats that are texts.
+//! Encoding of bytes as base64, for text formats.
 //!
 //! Source: RFC 4648, section 4. Linear.
 
 use std::io::{self, Write};
 
-/// Writes bytes as base64, filled up with `=`.
+/// Writes bytes as base64, padded with `=`.
 pub(crate) fn base64(out: &mut dyn Write, bytes: &[u8]) -> io::Result<()> {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     for group in bytes.chunks(3) {

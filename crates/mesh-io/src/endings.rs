@@ -1,10 +1,11 @@
-//! The endings of file names, and why one is refused.
+//! Endings of file names, and the errors of unsupported ones.
 
 use std::path::Path;
 
 use crate::MeshIoError;
 
-/// Why the ending of `path` is refused: its format is not among those that are `known`, or left out of this build.
+/// The error for an unsupported ending of `path`: unknown, with the `known` ones, or of a format
+/// left out of this build.
 pub(crate) fn refused(path: &Path, known: &'static str) -> MeshIoError {
     let path = path.to_owned();
     match feature(&ending(&path)) {
@@ -30,7 +31,7 @@ fn feature(ending: &str) -> Option<&'static str> {
     })
 }
 
-/// Whether the ending of `path` is in a list such as `.obj, .stl`.
+/// True if the ending of `path` is in a list such as `.obj, .stl`.
 pub(crate) fn is_among(path: &Path, known: &str) -> bool {
     let ending = ending(path);
     known.split(", ").any(|known| known[1..] == ending)

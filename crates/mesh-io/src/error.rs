@@ -1,55 +1,55 @@
-//! [`MeshIoError`]: why a file was not read or written.
+//! [`MeshIoError`]: errors of reading and writing files.
 
 use std::io;
 use std::path::PathBuf;
 
-/// Why a mesh or a surface could not be read or written.
+/// A mesh or surface that could not be read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshIoError {
-    /// A file without a single tet.
+    /// A file without tets.
     #[error("the mesh has no tetrahedra: give one with at least one")]
     Empty,
 
-    /// The operating system refused to read or write a file.
+    /// An error of the operating system while reading or writing a file.
     #[error("cannot {action} {}", path.display())]
     Io {
-        /// What was tried: `read` or `write`.
+        /// The action that failed: `read` or `write`.
         action: &'static str,
         /// The file.
         path: PathBuf,
-        /// The system's answer.
+        /// The error of the system.
         source: io::Error,
     },
 
-    /// A file whose content is not what its format says.
+    /// A text file that violates its format.
     #[error("{}:{line}: {message}", path.display())]
     Parse {
         /// The file.
         path: PathBuf,
         /// The line, counted from 1.
         line: usize,
-        /// What was found and what was expected.
+        /// The text that was found and the expected one.
         message: String,
     },
 
-    /// A file without lines whose content is not what its format says.
+    /// A binary file that violates its format.
     #[error("{} at byte {byte}: {message}", path.display())]
     ParseBytes {
         /// The file.
         path: PathBuf,
         /// The byte, counted from 0.
         byte: usize,
-        /// What was found and what was expected.
+        /// The content that was found and the expected one.
         message: String,
     },
 
-    /// A file whose ending names no format that can be read or written.
+    /// A file whose ending is not that of a supported format.
     #[error("cannot tell the format of {}: use one of the endings {known}", path.display())]
     UnknownFormat {
         /// The file.
         path: PathBuf,
-        /// The endings that work, separated by commas.
+        /// The supported endings, separated by commas.
         known: &'static str,
     },
 

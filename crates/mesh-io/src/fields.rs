@@ -1,10 +1,10 @@
-//! Named values per particle or per cell, to be written beside a mesh.
+//! Named values per particle or per cell, written along with a mesh.
 
 use glam::DVec3;
 
 use crate::MeshIoError;
 
-/// Values with a name, such as `velocity` in m/s. Values that are not finite are written as they are.
+/// Values with a name, such as `velocity` in m/s. Values that are not finite are written unchanged.
 #[derive(Clone, Copy, Debug)]
 pub struct Field<'a> {
     /// The name shown in viewers.
@@ -31,7 +31,8 @@ pub struct Fields<'a> {
     pub cells: &'a [Field<'a>],
 }
 
-/// A number as an integer of 32 bits if it is one; -0, which has a sign to lose, is none.
+/// Converts a number to an integer of 32 bits if it is one; -0 would lose its sign and is not
+/// converted.
 pub(super) fn whole(value: f64) -> Option<i32> {
     #[expect(
         clippy::cast_possible_truncation,
@@ -42,7 +43,7 @@ pub(super) fn whole(value: f64) -> Option<i32> {
 }
 
 impl Fields<'_> {
-    /// Refuses fields of the wrong length.
+    /// An error if a field has the wrong length.
     pub(super) fn check(&self, particles: usize, cells: usize) -> Result<(), MeshIoError> {
         for (fields, expected) in [(self.particles, particles), (self.cells, cells)] {
             for field in fields {

@@ -1,23 +1,23 @@
-//! [`MeshFile`]: a mesh with what its file says beside it.
+//! [`MeshFile`]: a mesh with the regions and fields of its file.
 //!
-//! Formats name values and number regions; a [`TetMesh`] knows neither. So what a reader finds is kept here, and a
-//! writer puts in what its format has a place for. Cost: O(values).
+//! Formats have named values and region numbers; a [`TetMesh`] has neither. A reader stores them
+//! here, and a writer stores those that its format supports. Cost: O(values).
 
 use glam::DVec3;
 use incise_mesh::{Repaired, TetMesh};
 
 use crate::{Field, Fields, MeshIoError, Values};
 
-/// What a file of a mesh has in it.
+/// The content of a mesh file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshFile {
     /// The mesh.
     pub mesh: TetMesh,
     /// A number for each tet, such as its material; empty if the file has none.
     pub regions: Vec<i32>,
-    /// Values with a name for each particle.
+    /// Named values of the particles.
     pub particles: Vec<NamedValues>,
-    /// Values with a name for each tet.
+    /// Named values of the tets.
     pub tets: Vec<NamedValues>,
 }
 
@@ -63,7 +63,7 @@ impl NamedValues {
 }
 
 impl NamedValues {
-    /// Those of some elements.
+    /// The values of some elements.
     fn picked(&self, numbers: &[usize]) -> Self {
         let values = match &self.values {
             OwnedValues::Scalars(all) => {
@@ -81,13 +81,13 @@ impl NamedValues {
 }
 
 impl MeshFile {
-    /// Whether there is nothing beside the mesh.
+    /// True if the file has neither regions nor values.
     #[must_use]
     pub fn is_plain(&self) -> bool {
         self.regions.is_empty() && self.particles.is_empty() && self.tets.is_empty()
     }
 
-    /// What is left of it after the repair of its mesh.
+    /// Selects and reorders regions and values after a repair of the mesh.
     ///
     /// # Panics
     /// If the repair was that of another mesh.
@@ -116,10 +116,11 @@ impl MeshFile {
         }
     }
 
-    /// Refuses values and regions of the wrong number.
+    /// Checks that regions and values have the right number.
     ///
     /// # Errors
-    /// [`MeshIoError::FieldLength`] names the first field that has not one value for each element.
+    /// [`MeshIoError::FieldLength`] with the first field whose length is not the number of
+    /// elements.
     pub fn check(&self) -> Result<(), MeshIoError> {
         let (particles, tets) = (self.mesh.positions.len(), self.mesh.tets.len());
         if !self.regions.is_empty() && self.regions.len() != tets {

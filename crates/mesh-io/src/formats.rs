@@ -1,6 +1,7 @@
-//! Meshes of tets by the ending of the file name: which format reads and writes a file.
+//! Tet meshes by the ending of the file name, which selects the format.
 //!
-//! A format that is left out of the build has no arm here; its endings are refused with the feature that adds it.
+//! Formats that are left out of the build are not matched here; the error of their endings names the feature that adds
+//! them.
 
 use std::path::Path;
 
@@ -22,11 +23,11 @@ use crate::{MeshFile, MeshIoError};
 /// The endings of mesh files that are read and written.
 const KNOWN: &str = ".vtk, .vtu, .msh, .node, .ele, .mesh, .meshb";
 
-/// Reads a mesh with what its file says beside it, in the format that the ending names; of a `.node`/`.ele` pair either
-/// name will do.
+/// Reads a mesh with its regions and values, in the format of the file's ending; for a `.node`/`.ele` pair either name
+/// is accepted.
 ///
-/// Particles that no tet uses are kept; cells that are no volumes are left out. The mesh has tets, existing corners and
-/// finite coordinates; whether it is sound in all other respects is for [`TetMesh::check`] to say.
+/// Particles that no tet uses are kept; cells other than volumes are skipped. The mesh has tets, existing corners and
+/// finite coordinates; [`TetMesh::check`] checks all other rules.
 ///
 /// # Errors
 /// [`MeshIoError::UnknownFormat`] for another ending, [`MeshIoError::FormatLeftOut`] for a format that this build
@@ -49,9 +50,8 @@ pub fn read_file(path: impl AsRef<Path>) -> Result<MeshFile, MeshIoError> {
     }
 }
 
-/// Reads a mesh that is in memory: the content of a file in an archive or from a network. The ending of `path` names
-/// the format, and errors name the path; it need not exist. For the two files of TetGen there is
-/// [`parse_tetgen`](crate::parse_tetgen).
+/// Parses a mesh in memory, for example from an archive or a network. The ending of `path` selects the format, and
+/// errors contain the path; it need not exist. For the two files of TetGen use [`parse_tetgen`](crate::parse_tetgen).
 ///
 /// # Errors
 /// The errors of [`read_file`] except [`MeshIoError::Io`]; [`MeshIoError::UnknownFormat`] for `.node` and `.ele`, too.
@@ -79,7 +79,7 @@ pub fn parse_file(path: impl AsRef<Path>, bytes: &[u8]) -> Result<MeshFile, Mesh
     }
 }
 
-/// The mesh alone of what [`read_file`] reads.
+/// Reads a mesh like [`read_file`], without regions and values.
 ///
 /// # Errors
 /// The errors of [`read_file`].
@@ -99,7 +99,7 @@ pub fn parse_file(path: impl AsRef<Path>, bytes: &[u8]) -> Result<MeshFile, Mesh
 pub fn read(path: impl AsRef<Path>) -> Result<TetMesh, MeshIoError> {
     let path = path.as_ref();
     match ending(path).as_str() {
-        // Without looking at what else is in there.
+        // Skips the data of points and cells.
         #[cfg(feature = "vtk")]
         "vtk" => read_vtk(path),
         #[cfg(feature = "tetgen")]
@@ -108,8 +108,8 @@ pub fn read(path: impl AsRef<Path>) -> Result<TetMesh, MeshIoError> {
     }
 }
 
-/// Writes a mesh with what is to be kept beside it, as far as the format has a place for it; of a `.node`/`.ele` pair
-/// either name will do. An existing file is replaced.
+/// Writes a mesh with those regions and values that the format supports; for a `.node`/`.ele` pair either name is
+/// accepted. An existing file is replaced.
 ///
 /// # Errors
 /// [`MeshIoError::UnknownFormat`] for another ending, [`MeshIoError::FormatLeftOut`] for a format that this build
@@ -134,7 +134,7 @@ pub fn write_file(path: impl AsRef<Path>, file: &MeshFile) -> Result<(), MeshIoE
     }
 }
 
-/// Writes a mesh with nothing beside it.
+/// Writes a mesh without regions and values.
 ///
 /// # Errors
 /// The errors of [`write_file`].
@@ -155,7 +155,7 @@ pub fn write(path: impl AsRef<Path>, mesh: &TetMesh) -> Result<(), MeshIoError> 
 mod tests {
     use super::*;
 
-    /// A build without any format refuses all by their features; other endings stay unknown.
+    /// In a build without formats the error of each ending names its feature; other endings stay unknown.
     #[test]
     fn formats_that_are_left_out_name_their_feature() {
         for known in KNOWN.split(", ") {

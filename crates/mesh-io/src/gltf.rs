@@ -2,10 +2,10 @@
 //!
 //! One mesh with positions, smooth normals (the mean over the triangles around a point, weighted by area) and 32-bit
 //! indices; points without triangles are left out. glTF stores floats: coordinates are rounded to 24 bits, 6e-8 of
-//! their size. Its second axis points up, ours is the third: a rotation of the node says so, and the numbers stay ours.
-//! Both forms are one file; `.gltf` has the numbers in base64 and is a third larger.
+//! their size. The second axis of glTF points up, ours is the third: a rotation of the node converts between them, so
+//! the numbers are unchanged. Both forms are one file; `.gltf` has the numbers in base64 and is a third larger.
 //!
-//! A writer of our own, because the whole file is one text with a dozen numbers; the crate `gltf-json` would bring
+//! The writer is our own, because the file is one text with a dozen numbers; the crate `gltf-json` would add
 //! `serde_json` and derived types for all of glTF. Source: "glTF 2.0 Specification" (Khronos). Linear.
 
 use std::io::{self, Write};
@@ -21,7 +21,7 @@ const MAGIC: &[u8; 4] = b"glTF";
 const JSON: &[u8; 4] = b"JSON";
 const BIN: &[u8; 4] = b"BIN\0";
 
-/// Writes the binary form: a header of 12 bytes, the text, the numbers, each of the two after its length and name.
+/// Writes the binary form: a header of 12 bytes, then the text and the numbers, each after its length and type.
 pub(super) fn write_glb(out: &mut dyn Write, surface: &TriangleSurface) -> io::Result<()> {
     let numbers = Numbers::new(surface)?;
     let mut text = Vec::new();
@@ -43,7 +43,7 @@ pub(super) fn write_glb(out: &mut dyn Write, surface: &TriangleSurface) -> io::R
     Ok(())
 }
 
-/// Writes the text form, with the numbers in it.
+/// Writes the text form, with the numbers in base64.
 pub(super) fn write_gltf(out: &mut dyn Write, surface: &TriangleSurface) -> io::Result<()> {
     let numbers = Numbers::new(surface)?;
     numbers.describe(out, |out| {
@@ -53,7 +53,7 @@ pub(super) fn write_gltf(out: &mut dyn Write, surface: &TriangleSurface) -> io::
     })
 }
 
-/// What is stored.
+/// The stored arrays.
 struct Numbers {
     positions: Vec<Vec3>,
     normals: Vec<Vec3>,
@@ -87,7 +87,7 @@ impl Numbers {
                 indices.push(index);
             }
         }
-        // Normals must have the length 1, those of points without a direction, too.
+        // Normals must have length 1, also at points without a direction.
         let unit = |sum: &DVec3| sum.normalize_or(DVec3::Z).as_vec3();
         Ok(Self {
             normals: sums.iter().map(unit).collect(),
@@ -120,7 +120,7 @@ impl Numbers {
             .iter()
             .copied()
             .fold(Vec3::NEG_INFINITY, Vec3::max);
-        // As doubles, whose shortest text is exact for a reader of doubles as well as one of floats.
+        // As doubles, whose shortest text is exact for readers of doubles and of floats.
         let [low, high] =
             [low, high].map(|corner| format!("{:?}", corner.to_array().map(f64::from)));
         write!(

@@ -1,6 +1,6 @@
-//! Files of meshes: tetrahedral meshes and triangle surfaces, read and written in the formats of other programs.
+//! Reads and writes files of tetrahedral meshes and triangle surfaces in common formats.
 //!
-//! The ending of a file name chooses the format:
+//! The ending of a file name selects the format:
 //!
 //! | ending | feature | format | read | written | kept beside the tets |
 //! |---|---|---|---|---|---|
@@ -21,43 +21,42 @@
 //! let folder = std::env::temp_dir().join(format!("incise-mesh-io-doc-{}", std::process::id()));
 //! std::fs::create_dir_all(&folder)?;
 //!
-//! // The mesh alone; coordinates survive bit for bit.
+//! // The mesh only; coordinates keep every bit.
 //! let mesh = kuhn_box([4, 2, 2], DVec3::new(2.0, 1.0, 1.0));
 //! io::write(folder.join("box.vtk"), &mesh)?;
 //! assert_eq!(io::read(folder.join("box.vtk"))?, mesh);
 //!
-//! // With what the file says beside it: regions, and values of particles and tets.
+//! // With regions, and values of particles and tets.
 //! let mut file = io::MeshFile::from(mesh);
 //! file.regions = vec![7; file.mesh.tets.len()];
 //! io::write_file(folder.join("box.msh"), &file)?;
 //! assert_eq!(io::read_file(folder.join("box.msh"))?, file);
 //!
-//! // Surfaces, and what is in memory already.
+//! // Surfaces, and content in memory.
 //! let surface = TriangleSurface::boundary_of(&file.mesh);
 //! io::write_surface(folder.join("box.stl"), &surface)?;
 //! let bytes = std::fs::read(folder.join("box.stl"))?;
 //! assert_eq!(io::parse_surface("box.stl", &bytes)?.triangles.len(), surface.triangles.len());
 //!
-//! // An error says where and what: file and line, or byte.
+//! // An error has the file, the line or byte, and the reason.
 //! let error = io::parse_file("box.mesh", b"MeshVersionFormatted 2\nDimension 2").unwrap_err();
 //! assert!(error.to_string().starts_with("box.mesh:2: "));
 //! # std::fs::remove_dir_all(folder).ok();
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Each format is a Cargo feature; all are on by default. A file of a format that is left out is refused with
+//! Each format is a Cargo feature; all are on by default. For a format that is left out the error is
 //! [`MeshIoError::FormatLeftOut`], which names the feature.
 //!
-//! Coordinates are written so that reading gives the same bits back. Readers trust no number in a file: they reserve no
-//! more memory than the file could fill, never panic, and name file and line of what is wrong. Every file is written
-//! beside its final name and renamed when complete. Time and memory are linear in the size of the file.
+//! Written coordinates keep every bit. Readers do not trust numbers in a file: they reserve no more memory than the
+//! file could fill, never panic, and report file and line of an error. A file is written under a temporary name and
+//! renamed when complete. Time and memory are linear in the size of the file.
 //!
-//! Reading takes at most ten times the size of a usual file as memory, and 20 times that of any file but for two
-//! kinds: 64 times for fields of single bits in VTK files, since each becomes a double; and for a compressed `.vtu`
-//! what its counts and its blocks agree upon and hold, where zlib can make 1032 bytes of one, and then five times that
-//! for doubles.
+//! Reading takes at most ten times the size of a usual file as memory, and 20 times that of any file, with two
+//! exceptions: 64 times for fields of single bits in VTK files, since each becomes a double; and for a compressed
+//! `.vtu` five times its decompressed size, which is bounded by its counts and can be 1032 times the compressed size.
 
-// With some formats only, not all that they share is used.
+// With some formats only, parts of the shared code are unused.
 #![cfg_attr(
     not(feature = "default"),
     allow(

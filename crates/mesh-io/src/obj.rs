@@ -1,7 +1,7 @@
 //! Wavefront `.obj`: `v` lines with positions and `f` lines with polygons.
 //!
-//! Corners count from 1, or backwards from the last point when negative; what follows a slash (texture, normal) is
-//! skipped, as are all other statements. A backslash continues a line. Source: "Object Files (.obj)", Advanced
+//! Corners count from 1, or backwards from the last point if negative; the part after a slash (texture, normal) is
+//! skipped, and so are all other statements. A backslash continues a line. Source: "Object Files (.obj)", Advanced
 //! Visualizer manual, appendix B1 (Wavefront). Linear.
 
 use std::io::{self, Write};
@@ -24,7 +24,7 @@ pub(super) fn write(out: &mut dyn Write, surface: &TriangleSurface) -> io::Resul
     Ok(())
 }
 
-/// What the line being read says; a line without words says nothing.
+/// The statement of the present line; a line without words has none.
 #[derive(Clone, Copy, PartialEq)]
 enum Statement {
     None,
@@ -40,7 +40,7 @@ pub(crate) fn parse_obj(bytes: &[u8], path: &Path) -> Result<TriangleSurface, Me
     let mut largest: Option<(ParticleId, usize)> = None;
     let mut statement = Statement::None;
     let mut coordinates = [0.0; 3];
-    // How many words the statement has after the keyword.
+    // The number of words of the statement after the keyword.
     let mut length = 0;
     let mut polygon = Vec::new();
     let mut last_line = 1;
@@ -114,7 +114,7 @@ pub(crate) fn parse_obj(bytes: &[u8], path: &Path) -> Result<TriangleSurface, Me
     }
 }
 
-/// The particle that a word like `3`, `3/1`, `3//2` or `-1/2/3` means after so many points.
+/// The particle of a word like `3`, `3/1`, `3//2` or `-1/2/3` after this many points.
 fn corner(word: Word<'_>, points: usize) -> Option<ParticleId> {
     let number = word.text.split(|&b| b == b'/').next()?;
     let number: i64 = str::from_utf8(number).ok()?.parse().ok()?;

@@ -1,8 +1,8 @@
 //! Geomview's `.off`: a keyword, the numbers of points and polygons, a line for each.
 //!
 //! Points may have normals, colors and texture coordinates after the position (`STCNOFF`), polygons colors after the
-//! corners: skipped. Comments start with `#`. Corners count from 0. Points in 4 or n dimensions and the binary form are
-//! refused. Source: Geomview manual, "OFF Files". Linear.
+//! corners; these are skipped. Comments start with `#`. Corners count from 0. Points in 4 or n dimensions and the
+//! binary form are errors. Source: Geomview manual, "OFF Files". Linear.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -39,7 +39,7 @@ pub(crate) fn parse_off(bytes: &[u8], path: &Path) -> Result<TriangleSurface, Me
     let mut next = |what: &str| rows.next().ok_or_else(|| text.ends_early(what));
 
     let mut header = next("OFF")?;
-    // The keyword may be missing, and the counts may follow it on its line.
+    // The keyword is optional, and the counts may be on its line.
     if header.content[0].is_ascii_alphabetic() {
         let keyword = header.word("OFF")?;
         let known = ["", "C", "N", "CN", "ST", "STC", "STN", "STCN"];

@@ -1,8 +1,8 @@
 //! Stereolithography `.stl`: triangles, each with its own three corners, as text or binary.
 //!
-//! Corners with equal coordinates, to the bit, become one point, in the order they are first met. Normals and
-//! attributes are skipped, and the triangles of several solids come together. Many binary files start with the word of
-//! text files, `solid`: a file that has exactly the size its count asks for is binary. Binary coordinates are `f32`.
+//! Bit-identical corners become one point, in the order of their first use. Normals and attributes are skipped, and the
+//! triangles of several solids are combined. Many binary files start with the first word of text files, `solid`; a file
+//! whose size matches its count is therefore read as binary. Binary coordinates are `f32`.
 //!
 //! Source: M. Burns, "Automated Fabrication" (1993), section 6.5. Linear in expectation, for the merging.
 
@@ -39,9 +39,10 @@ pub(super) fn write(out: &mut dyn Write, surface: &TriangleSurface) -> io::Resul
     writeln!(out, "endsolid surface")
 }
 
-/// Writes the binary form of `.stl`: a fifth of the text, but coordinates are rounded to `f32`.
+/// Writes the binary form of `.stl`: a fifth of the size of text, but coordinates are rounded to `f32`.
 ///
-/// Points closer than that become one when read. [`write_surface`](crate::write_surface) keeps every bit.
+/// Points that are rounded to equal coordinates become one when read. [`write_surface`](crate::write_surface) keeps
+/// every bit.
 ///
 /// # Errors
 /// [`MeshIoError::Io`] if the file cannot be written, or a coordinate is too large for an `f32`, or there are 2³²
@@ -58,7 +59,7 @@ pub fn write_stl_binary(
 
 pub(super) fn write_binary(out: &mut dyn Write, surface: &TriangleSurface) -> io::Result<()> {
     let count = u32::try_from(surface.triangles.len()).map_err(io::Error::other)?;
-    // Must not start with "solid".
+    // The header must not start with "solid".
     out.write_all(&[b' '; 80])?;
     out.write_all(&count.to_le_bytes())?;
     for triangle in &surface.triangles {
@@ -96,7 +97,7 @@ pub(crate) fn parse_stl(bytes: &[u8], path: &Path) -> Result<TriangleSurface, Me
         byte,
         message,
     };
-    // Some writers fill the file up at its end.
+    // Some writers add padding at the end.
     if size.is_none_or(|size| size > bytes.len()) {
         let message = format!(
             "the file ends early: {} triangles announced, and text would start with solid",
@@ -146,7 +147,7 @@ fn parse_text(text: &Text<'_>) -> Result<TriangleSurface, MeshIoError> {
         }
         expect(text, &mut words, "normal")?;
         for _ in 0..3 {
-            // Not used, and some writers put NaN where a triangle has none.
+            // Normals are not used, and some writers put NaN where a triangle has none.
             next(text, &mut words, "a normal")?;
         }
         expect(text, &mut words, "outer")?;
@@ -202,7 +203,7 @@ fn is(word: Word<'_>, keyword: &str) -> bool {
     word.text.eq_ignore_ascii_case(keyword.as_bytes())
 }
 
-/// Makes one point of equal corners.
+/// Merges equal corners to one point.
 #[derive(Default)]
 struct Merger {
     surface: TriangleSurface,

@@ -1,12 +1,12 @@
 //! Closed or open surfaces of triangles: `.obj`, `.stl`, `.ply`, `.off`, and for viewers `.glb` and `.gltf`.
 //!
-//! Readers of our own, because what a tetrahedralization needs is the same in all four: coordinates as doubles, corners
-//! within bounds, the line or byte of what is wrong, and memory bounded by the size of the file. Of the crates for
-//! these formats, `stl_io` keeps coordinates as `f32`, ASCII ones too; `tobj` names no line, splits a file into models
-//! with point numbers of their own, and has doubles as a feature of the whole build only; `ply-rs-bw` makes as many
-//! elements as a header announces when they have no properties, so that a file of 100 bytes fills the memory.
+//! The readers are our own, because tetrahedralization has equal requirements for all four: coordinates as doubles,
+//! corners within bounds, the line or byte of an error, and memory bounded by the size of the file. Of the crates for
+//! these formats, `stl_io` keeps coordinates as `f32`, also in ASCII files; `tobj` reports no line, splits a file into
+//! models with separate point numbers, and has doubles only as a feature of the whole build; `ply-rs-bw` creates as
+//! many elements as a header announces when they have no properties, so a file of 100 bytes can fill the memory.
 //!
-//! Polygons become fans of triangles around their first corner, right for convex ones. Linear.
+//! Polygons become fans of triangles around their first corner, which is correct for convex ones. Linear.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -30,9 +30,9 @@ use crate::{MeshIoError, write_atomically};
 const KNOWN: &str = ".obj, .stl, .ply, .off";
 const KNOWN_TO_WRITERS: &str = ".obj, .stl, .ply, .off, .glb, .gltf";
 
-/// Reads a surface, the format chosen by the ending of the file name. Every form of a format is understood.
+/// Reads a surface in the format of the file's ending. All variants of a format are supported.
 ///
-/// Points that no triangle uses are kept. STL has no points: equal corners, to the bit, become one.
+/// Points that no triangle uses are kept. STL has no points: bit-identical corners become one.
 ///
 /// # Errors
 /// [`MeshIoError::UnknownFormat`] for another ending, [`MeshIoError::FormatLeftOut`] for a format that this build
@@ -57,8 +57,8 @@ pub fn read_surface(path: impl AsRef<Path>) -> Result<TriangleSurface, MeshIoErr
     parse(&load(path)?, path)
 }
 
-/// Reads a surface that is in memory: the content of a file in an archive or from a network. The ending of `path` names
-/// the format, and errors name the path; it need not exist.
+/// Parses a surface in memory, for example from an archive or a network. The ending of `path` selects the format, and
+/// errors contain the path; it need not exist.
 ///
 /// # Errors
 /// The errors of [`read_surface`] except [`MeshIoError::Io`].
@@ -92,17 +92,17 @@ fn parser(path: &Path) -> Result<Parser, MeshIoError> {
     parser.ok_or_else(|| refused(path, KNOWN))
 }
 
-/// Whether the ending of a file name is that of a surface which [`write_surface`] writes.
+/// True if [`write_surface`] supports the ending of the file name.
 #[must_use]
 pub fn is_surface(path: &Path) -> bool {
     is_among(path, KNOWN_TO_WRITERS)
 }
 
-/// Writes a surface, the format chosen by the ending of the file name: `.obj`, `.off` and `.stl` as text, `.ply` as
-/// little-endian binary. All keep every bit of the coordinates, and all but `.stl` points without triangles.
+/// Writes a surface in the format of the file's ending: `.obj`, `.off` and `.stl` as text, `.ply` as little-endian
+/// binary. All keep every bit of the coordinates, and all but `.stl` keep points without triangles.
 ///
-/// For viewers there are `.glb` (binary) and `.gltf` (the same as text), which have normals, too, but are not read:
-/// their coordinates are rounded to floats.
+/// For viewers there are `.glb` (binary) and `.gltf` (text), which also have normals but cannot be read: their
+/// coordinates are rounded to floats.
 ///
 /// # Errors
 /// [`MeshIoError::UnknownFormat`] for another ending, [`MeshIoError::FormatLeftOut`] for a format that this build

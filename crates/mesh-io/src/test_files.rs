@@ -5,7 +5,7 @@ use incise_mesh::kuhn_box;
 
 use crate::{MeshFile, MeshIoError, NamedValues, OwnedValues};
 
-/// A small mesh with everything.
+/// A small mesh with regions and values.
 pub(super) fn sample() -> MeshFile {
     let mesh = kuhn_box([1, 1, 1], dvec3(0.1, 0.7, 1.3));
     let named = |name: &str, values| NamedValues {
@@ -23,8 +23,8 @@ pub(super) fn sample() -> MeshFile {
     }
 }
 
-/// Reads all parts of a file that start where it does. A part must be an error that names the place, or is `accepted`
-/// with its length.
+/// Reads all prefixes of a file. A prefix must give an error with a position, or be `accepted` with
+/// its length.
 #[track_caller]
 pub(super) fn cut<T>(
     whole: &[u8],

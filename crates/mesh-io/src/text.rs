@@ -1,6 +1,6 @@
-//! The words of a text file, with the line each stands on, and the numbers among them.
+//! [`Text`]: the words of a text file with their lines, and the numbers among them.
 //!
-//! Works on bytes, so that a title in some old encoding is no obstacle. Linear.
+//! Works on bytes, so titles may have any encoding. Linear.
 
 use std::fs;
 use std::path::Path;
@@ -22,17 +22,17 @@ pub(super) struct Text<'a> {
     bytes: &'a [u8],
 }
 
-/// A word and the line it stands on, counted from 1.
+/// A word and its line, counted from 1.
 #[derive(Clone, Copy)]
 pub(super) struct Word<'t> {
     pub(super) text: &'t [u8],
     pub(super) line: usize,
-    /// Whether it is the first word of its line.
+    /// True for the first word of a line.
     pub(super) first: bool,
 }
 
 impl<'t> Word<'t> {
-    /// A word of which it does not matter where on its line it stands.
+    /// A word whose position in the line does not matter.
     pub(super) fn new(text: &'t [u8], line: usize) -> Self {
         let first = false;
         Self { text, line, first }
@@ -44,7 +44,7 @@ impl<'a> Text<'a> {
         Self { path, bytes }
     }
 
-    /// The lines, with their numbers, from the given one on; line ends of all systems are understood.
+    /// The lines with their numbers, from the given one on; line ends of all systems are recognized.
     pub(super) fn lines(&self, from: usize) -> impl Iterator<Item = (usize, &[u8])> {
         let lines = self
             .bytes
@@ -67,7 +67,7 @@ impl<'a> Text<'a> {
         })
     }
 
-    /// How many elements to make room for: as many as announced, but no more than the file can hold.
+    /// The capacity to reserve: the announced number of elements, bounded by the size of the file.
     pub(super) fn room_for(&self, announced: usize, least_bytes_each: usize) -> usize {
         announced.min(self.bytes.len() / least_bytes_each)
     }
@@ -91,7 +91,7 @@ impl<'a> Text<'a> {
         )
     }
 
-    /// A word as a number from 0 on.
+    /// Parses a word as a number from 0 on.
     pub(super) fn count(&self, word: Word<'_>, what: &str) -> Result<usize, MeshIoError> {
         let number = str::from_utf8(word.text)
             .ok()
@@ -107,7 +107,7 @@ impl<'a> Text<'a> {
         })
     }
 
-    /// A word as a finite coordinate.
+    /// Parses a word as a finite coordinate.
     pub(super) fn coordinate(&self, word: Word<'_>) -> Result<f64, MeshIoError> {
         let number = str::from_utf8(word.text)
             .ok()
@@ -132,7 +132,7 @@ impl<'a> Text<'a> {
     }
 }
 
-/// A line up to its comment, which `#` starts.
+/// A line up to its comment, which begins with `#`.
 pub(super) fn without_comment(line: &[u8]) -> &[u8] {
     line.split(|&b| b == b'#').next().unwrap_or_default()
 }
@@ -143,7 +143,7 @@ pub(super) fn words_of(line: &[u8]) -> impl Iterator<Item = &[u8]> {
         .filter(|word| !word.is_empty())
 }
 
-/// A word for a message: readable, and cut when it is long.
+/// A word for a message: printable, and shortened if it is long.
 pub(super) fn show(word: &[u8]) -> String {
     String::from_utf8_lossy(&word[..word.len().min(40)]).into_owned()
 }

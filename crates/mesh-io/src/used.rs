@@ -1,8 +1,8 @@
-//! The particles that triangles use, for files that leave out the others. O(n log n).
+//! The particles that triangles use, for formats that leave out the others. O(n log n).
 
 use incise_mesh::ParticleId;
 
-/// The particles in ascending order, and the index of each among them (0 for those that are not).
+/// The used particles in ascending order, and the index of each among them (0 for unused ones).
 pub(super) struct Used {
     pub(super) particles: Vec<usize>,
     pub(super) indices: Vec<u32>,

@@ -1,8 +1,7 @@
-//! From an unstructured grid of VTK, with cells of any kind, to a mesh of tets.
+//! Conversion of a VTK unstructured grid, with cells of any kind, to a mesh of tets.
 //!
-//! The tets are taken, the cells of lower dimension left out (meshing tools put boundary triangles into the same list),
-//! and values of cells follow the tets. Volume cells of other kinds are refused: without them the mesh had holes.
-//! Linear.
+//! Tets are kept, cells of lower dimension dropped (meshing tools put boundary triangles into the same list), and so
+//! are their values. Volume cells of other kinds are an error, since dropping them would leave holes. Linear.
 //!
 //! Source: `vtkCellType.h` of the VTK library for the numbers of the kinds.
 
@@ -18,7 +17,7 @@ pub(crate) const TETRA: usize = 10;
 /// The name under which regions are written.
 pub(crate) const REGIONS: &str = "regions";
 
-/// Names of cell values that are numbers of regions: ours, and what meshio and Gmsh write.
+/// Names of cell values with region numbers: ours, and those of meshio and Gmsh.
 const REGION_NAMES: [&str; 5] = [
     REGIONS,
     "medit:ref",
@@ -27,7 +26,7 @@ const REGION_NAMES: [&str; 5] = [
     "CellEntityIds",
 ];
 
-/// An unstructured grid as it is in a file.
+/// The content of an unstructured grid.
 #[derive(Default)]
 pub(crate) struct Grid {
     pub(crate) positions: Vec<DVec3>,
@@ -41,11 +40,11 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    /// The tets. There is one type and one value for each cell and one value for each point.
+    /// The tets with their values. There must be one type and one value for each cell and one value for each point.
     ///
     /// # Errors
-    /// [`MeshIoError::Empty`] without cells, else what `error` makes of a cell, the number of points of the cells
-    /// before it and what is wrong with it.
+    /// [`MeshIoError::Empty`] without cells, or the result of `error` for a cell, the number of points of the cells
+    /// before it and a message.
     pub(crate) fn into_file(
         self,
         error: impl Fn(usize, usize, String) -> MeshIoError,
@@ -60,7 +59,7 @@ impl Grid {
         for (cell, &kind) in cells() {
             let points = &self.points[self.offsets[cell]..self.offsets[cell + 1]];
             match kind {
-                // A text that was cut may end in the type 1 for 10.
+                // A truncated text may end in the type 1 for 10.
                 1 if points.len() > 1 => {
                     let message = format!(
                         "the cell {cell} is a single point (cell type 1) but has {}, correct it",
@@ -127,7 +126,7 @@ fn tet(cell: usize, points: &[usize], particles: usize) -> Result<[ParticleId; 4
     Ok([a, b, c, d].map(ParticleId::new))
 }
 
-/// Takes the first values out that have the name of regions and are whole numbers of 32 bits.
+/// Removes and returns the first values that have a name of regions and are whole numbers of 32 bits.
 fn take_regions(fields: &mut Vec<NamedValues>) -> Vec<i32> {
     for i in 0..fields.len() {
         if let OwnedValues::Scalars(values) = &fields[i].values
@@ -163,7 +162,7 @@ fn volume_name(kind: usize) -> &'static str {
     }
 }
 
-/// Values by the number of components: scalars, vectors, or nothing for what a mesh file has no place for.
+/// Values by their number of components: scalars, vectors, or `None` for other numbers.
 pub(crate) fn named_values(
     name: String,
     components: usize,
@@ -177,7 +176,7 @@ pub(crate) fn named_values(
     Some(NamedValues { name, values })
 }
 
-/// Every three numbers as a vector.
+/// Groups of three numbers as vectors.
 pub(crate) fn positions(values: &[f64]) -> Vec<DVec3> {
     let (triples, _) = values.as_chunks::<3>();
     triples.iter().copied().map(DVec3::from).collect()

@@ -1,7 +1,7 @@
 //! The types of numbers in VTK files, legacy and XML.
 //!
-//! Both formats have the same types under different names. Values of fields become doubles: integers beyond 2^53 are
-//! rounded. Points of cells stay whole. Linear.
+//! Both formats have equal types under different names. Values of fields become doubles: integers beyond 2^53 are
+//! rounded. Points of cells stay integers. Linear.
 
 /// The type of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,7 +29,7 @@ impl Kind {
             b"unsigned_char" => Self::U8,
             b"short" => Self::I16,
             b"unsigned_short" => Self::U16,
-            // The library writes its ids with four bytes whatever they have in memory.
+            // The VTK library writes its ids with four bytes, independent of their size in memory.
             b"int" | b"vtkidtype" => Self::I32,
             b"unsigned_int" => Self::U32,
             b"long" | b"vtktypeint64" => Self::I64,
@@ -62,7 +62,7 @@ impl Kind {
         matches!(self, Self::F32 | Self::F64)
     }
 
-    /// The bytes that so many numbers take.
+    /// The number of bytes of this many numbers.
     pub(crate) fn bytes(self, count: usize) -> Option<usize> {
         match self {
             Self::Bit => Some(count.div_ceil(8)),
@@ -93,7 +93,7 @@ impl Kind {
     /// The first `count` numbers of the bytes as numbers from 0 on.
     ///
     /// # Errors
-    /// The place of the first one that is negative, too large or no integer by its type.
+    /// The index of the first number that is negative, too large or not of an integer type.
     pub(crate) fn indices(
         self,
         bytes: &[u8],
@@ -105,7 +105,7 @@ impl Kind {
             Self::F32 | Self::F64 => None,
             _ => usize::try_from(bits).ok(),
         };
-        // Not `collect`, which would start small and grow: the bytes are there, so there is room for all.
+        // Not `collect`, which would start small and grow: the size is known.
         let mut indices = Vec::with_capacity(count);
         for (i, bits) in self.numbers(bytes, count, big_endian).enumerate() {
             indices.push(index(bits).ok_or(i)?);
@@ -118,7 +118,7 @@ impl Kind {
         (bits << unused).cast_signed() >> unused
     }
 
-    /// The bits of each number, in the lowest places. There are bytes for all.
+    /// The bits of each number, in the lowest positions. The bytes must be enough.
     fn numbers(
         self,
         bytes: &[u8],

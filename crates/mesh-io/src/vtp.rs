@@ -1,4 +1,4 @@
-//! VTK XML poly data (`.vtp`): a surface with fields, the lightest file for one frame of an animation.
+//! VTK XML poly data (`.vtp`): a surface with fields, the smallest file for one frame of an animation.
 //!
 //! Only particles on the surface are written, in ascending order, with their values. Source: "VTK XML Formats"
 //! (Kitware). Linear.
@@ -13,7 +13,7 @@ use crate::{Fields, MeshIoError, write_atomically, xml};
 
 /// Writes a surface at the given (rest or deformed) positions of all particles in meters, with fields.
 ///
-/// Particle fields have one value for each position, used or not; cell fields one for each triangle.
+/// Particle fields have one value for each position, used or not; cell fields have one for each triangle.
 ///
 /// # Errors
 /// [`MeshIoError::FieldLength`] for a field of another length, [`MeshIoError::Io`] if the file cannot be written.

@@ -1,4 +1,4 @@
-//! The parts that the XML formats of VTK have in common: data arrays in base64, and escaped names.
+//! Shared parts of VTK's XML formats: data arrays in base64, and escaped names.
 //!
 //! Numbers are stored as little-endian binary, encoded in base64: exact, a third of the size of text, and valid XML.
 //!
@@ -113,7 +113,7 @@ fn array<const N: usize>(
     writeln!(out, "\n</DataArray>")
 }
 
-/// A text inside an XML attribute; control characters, which XML forbids, become spaces.
+/// A text inside an XML attribute; control characters, which XML forbids, are replaced by spaces.
 pub(super) struct Escaped<'a>(pub(super) &'a str);
 
 impl Display for Escaped<'_> {

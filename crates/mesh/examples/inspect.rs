@@ -1,4 +1,4 @@
-//! Breaks a mesh, shows what the checks say about it, and repairs it: `inspect`.
+//! Damages a mesh, prints the report of the checks, and repairs it: `inspect`.
 
 #![expect(clippy::print_stdout, reason = "prints what it found")]
 
@@ -9,7 +9,7 @@ fn main() -> Result<(), MeshError> {
     let mut mesh = kuhn_box([4, 2, 2], DVec3::new(2.0, 1.0, 1.0));
     show("a box", &mesh);
 
-    // An inverted tet, a tet twice, a flat one, and a particle that no tet uses.
+    // An inverted tet, a repeated tet, a flat one, and an unused particle.
     mesh.tets[7].swap(0, 1);
     mesh.tets.push(mesh.tets[3]);
     mesh.tets.push([0, 1, 2, 3].map(ParticleId));

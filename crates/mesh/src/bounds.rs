@@ -1,25 +1,25 @@
-//! [`Bounds`]: a box along the axes.
+//! [`Bounds`]: an axis-aligned box.
 
 use glam::DVec3;
 
-/// A box along the axes; empty where `low` exceeds `high`.
+/// An axis-aligned box; empty where `low` exceeds `high`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Bounds {
-    /// The low corner.
+    /// The corner with the smallest coordinates.
     pub low: DVec3,
-    /// The high corner.
+    /// The corner with the largest coordinates.
     pub high: DVec3,
 }
 
 impl Bounds {
-    /// The box without a point.
+    /// The empty box.
     pub const EMPTY: Self = Self {
         low: DVec3::INFINITY,
         high: DVec3::NEG_INFINITY,
     };
 
-    /// The smallest box around points.
+    /// The smallest box that contains the points.
     ///
     /// # Example
     /// ```
@@ -38,7 +38,7 @@ impl Bounds {
         })
     }
 
-    /// The smallest box around both.
+    /// The smallest box that contains both.
     #[must_use]
     #[inline]
     pub fn union(self, other: Self) -> Self {
@@ -48,7 +48,7 @@ impl Bounds {
         }
     }
 
-    /// The box and all within `distance`, along the axes, around it.
+    /// The box extended by `distance` on all sides.
     #[must_use]
     #[inline]
     pub fn widened(self, distance: f64) -> Self {
@@ -59,14 +59,14 @@ impl Bounds {
         }
     }
 
-    /// The sides.
+    /// The lengths of the sides.
     #[must_use]
     #[inline]
     pub fn size(&self) -> DVec3 {
         self.high - self.low
     }
 
-    /// Whether the boxes share a point.
+    /// True if the boxes share a point.
     #[must_use]
     #[inline]
     pub fn overlaps(&self, other: &Self) -> bool {

@@ -1,13 +1,13 @@
-//! Checks the rules that a sound mesh obeys; counts every breach and names the first.
+//! [`TetMesh::check`]: counts violations of the rules of a valid mesh and reports the first one.
 //!
-//! Three passes: coordinates, tets, faces. Tets whose corners are missing or repeated are counted and left out of the
-//! later rules, where they would only cause follow-up faults. The sign of a volume is exact ([`orientation`]), so that
-//! slivers left by a cut are judged rightly. Cost: O(n log n) for the faces, about 1 ms for 11,000 tets.
+//! Three passes: coordinates, tets, faces. Tets with missing or repeated corners are counted and skipped by later
+//! rules, where they would only cause further faults. The sign of a volume is exact ([`orientation`]), also for slivers
+//! left by a cut. Cost: O(n log n) for the faces.
 
 use crate::faces::outward_face;
 use crate::{CheckReport, Faces, Fault, MeshError, ParticleId, TetId, TetMesh, orientation};
 impl TetMesh {
-    /// Whether the mesh is sound: not empty, and without any fault that [`check_report`](Self::check_report) counts.
+    /// Checks that the mesh is valid: not empty and without any fault counted by [`check_report`](Self::check_report).
     ///
     /// Unused particles are allowed.
     ///
@@ -40,7 +40,7 @@ impl TetMesh {
         }
     }
 
-    /// Counts every breach of every rule. A mesh without tets breaks none.
+    /// Counts the violations of every rule. A mesh without tets has none.
     ///
     /// # Panics
     /// From 2³⁰ tets on.
@@ -85,7 +85,7 @@ impl TetMesh {
         report
     }
 
-    /// Notes the faults of one tet; false when its corners cannot be used any further.
+    /// Records the faults of one tet; false if its corners cannot be used by later rules.
     fn check_tet(&self, tet: TetId, report: &mut CheckReport) -> bool {
         let corners = self.tets[tet.index()];
         let particles = self.positions.len();
@@ -105,7 +105,7 @@ impl TetMesh {
             return false;
         }
         let positions = self.corners(tet);
-        // A corner that is not finite has been counted already and has no volume to judge.
+        // A corner that is not finite has been counted already, and the volume is then undefined.
         if positions.iter().all(|p| p.is_finite()) {
             let orientation = orientation(positions);
             if orientation.is_nan() || orientation <= 0.0 {
@@ -119,7 +119,7 @@ impl TetMesh {
     }
 }
 
-/// Whether a cyclic sequence of three different particles can be rotated into ascending order.
+/// True if a cyclic sequence of three distinct particles can be rotated into ascending order.
 fn is_ascending_cycle([a, b, c]: [ParticleId; 3]) -> bool {
     (a < b) as u8 + (b < c) as u8 + (c < a) as u8 == 2
 }

@@ -1,10 +1,10 @@
-//! [`DisjointSets`]: which numbers belong together.
+//! [`DisjointSets`]: union-find over numbers.
 //!
-//! Union-find with path halving; the smallest number of a set is its root, so that results depend on which pairs were
-//! united but not on their order.
+//! Find halves paths; the smallest number of a set is its root, so results depend on the united pairs but not on their
+//! order.
 //!
-//! Source: R. E. Tarjan and J. van Leeuwen, "Worst-case Analysis of Set Union Algorithms", 1984. Cost: about O(1) a
-//! call.
+//! Source: R. E. Tarjan and J. van Leeuwen, "Worst-case Analysis of Set Union Algorithms", 1984. Cost: amortized O(log
+//! n) per call, in practice nearly O(1).
 
 /// Disjoint sets of the numbers from 0 on.
 ///
@@ -22,7 +22,7 @@ pub struct DisjointSets {
 }
 
 impl DisjointSets {
-    /// Each of `count` numbers alone. O(count).
+    /// Sets of one number each, for the numbers below `count`. O(count).
     ///
     /// # Panics
     /// If `count` does not fit in 32 bits.
@@ -33,7 +33,7 @@ impl DisjointSets {
         sets
     }
 
-    /// Makes each of `count` numbers a set of its own, and keeps the memory. O(count).
+    /// Resets to `count` sets of one number each, reusing the memory. O(count).
     ///
     /// # Panics
     /// If `count` does not fit in 32 bits.
@@ -43,7 +43,7 @@ impl DisjointSets {
         self.parents.extend(0..count);
     }
 
-    /// The smallest number of the set of `number`.
+    /// The root of a number: the smallest number of its set.
     ///
     /// # Panics
     /// If there is no such number.
@@ -57,7 +57,7 @@ impl DisjointSets {
         number
     }
 
-    /// Joins the sets of two numbers.
+    /// Unites the sets of two numbers.
     ///
     /// # Panics
     /// If there is no such number.

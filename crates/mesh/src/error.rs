@@ -1,16 +1,16 @@
-//! [`MeshError`]: why a mesh was refused.
+//! [`MeshError`]: errors of mesh checks.
 
 use crate::CheckReport;
 
-/// Why a mesh was not accepted.
+/// A mesh that was rejected.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshError {
-    /// A mesh without a single tet.
+    /// A mesh without tets.
     #[error("the mesh has no tetrahedra: give one with at least one")]
     Empty,
 
-    /// A mesh that breaks a rule of [`TetMesh::check`](crate::TetMesh::check).
+    /// A mesh that violates a rule of [`TetMesh::check`](crate::TetMesh::check).
     #[error("the mesh is not sound: {0}")]
     Faulty(Box<CheckReport>),
 }

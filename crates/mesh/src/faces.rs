@@ -1,8 +1,8 @@
-//! All triangular faces of a set of tets, sorted so that the sides of one face are neighbors in the list.
+//! [`Faces`]: all triangular faces of a set of tets, sorted so that the sides of one face are adjacent in the list.
 //!
 //! A side is one face seen from one tet. Its three particles, in ascending order, and its index `4 * tet + local face`
-//! are packed into one `u128`, so that sorting needs no indirection. Sorting 4 n packed keys is the cost:
-//! O(n log n), on all cores; all keys differ, so that the order does not depend on their number.
+//! are packed into one `u128`, so sorting needs no indirection. Cost: O(n log n) for sorting 4 n packed keys on all
+//! cores; all keys are distinct, so the order does not depend on the number of cores.
 
 use rayon::slice::ParallelSliceMut;
 
@@ -24,13 +24,13 @@ impl FaceSide {
         Self(a << 96 | b << 64 | c << 32 | u128::from(index))
     }
 
-    /// The tet this side belongs to.
+    /// The tet of this side.
     #[must_use]
     pub fn tet(self) -> TetId {
         TetId(self.index() / 4)
     }
 
-    /// Which of the tet's four faces it is, in the order of [`Surface`](crate::Surface).
+    /// The local index of the face in the tet, in the order of [`Surface`](crate::Surface).
     #[must_use]
     pub fn local(self) -> usize {
         self.index() as usize % 4
@@ -65,7 +65,7 @@ pub(crate) fn outward_face(tet: [ParticleId; 4], local: usize) -> [ParticleId; 3
     LOCAL_FACES[local].map(|corner| tet[corner])
 }
 
-/// The faces of a mesh, sorted so that the sides of one face are neighbors.
+/// The faces of a mesh, sorted so that the sides of one face are adjacent.
 ///
 /// Sorting dominates the cost of the boundary and of the pieces connected by faces. [`TetMesh::surface_from`] and
 /// [`TetMesh::face_pieces_from`] share one sort.

@@ -1,7 +1,6 @@
-//! [`QualityHistograms`]: how the shapes of all tets are spread, not only the worst.
+//! [`QualityHistograms`]: distribution of the shapes of all tets.
 //!
-//! Classes have round, fixed limits, so that histograms of different meshes can be laid beside each other. Linear in
-//! the number of tets.
+//! Classes have fixed limits, so histograms of different meshes can be compared. Linear in the number of tets.
 
 use crate::quality::{dihedral_angles, tet_quality};
 use crate::{TetId, TetMesh};
@@ -9,7 +8,7 @@ use crate::{TetId, TetMesh};
 /// Width of a class of dihedral angles in degrees.
 const DEGREES: f64 = 10.0;
 
-/// How many tets, or angles of tets, are in each class.
+/// The number of tets, or of angles of tets, in each class.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct QualityHistograms {
     /// All six dihedral angles of each tet, in classes of 10 degrees from 0 to 180; a right angle belongs to the class
@@ -20,7 +19,7 @@ pub struct QualityHistograms {
 }
 
 impl TetMesh {
-    /// Sorts all tets into classes of shape.
+    /// Counts the tets in each class of shape.
     ///
     /// # Panics
     /// If a corner does not exist.
@@ -50,7 +49,7 @@ impl TetMesh {
     }
 }
 
-/// The class of a value in units of a class, of so many; what is not a number is in the first.
+/// The index of the class of a value in units of class widths, below `classes`; 0 for NaN.
 fn class(value: f64, classes: usize) -> usize {
     #[expect(
         clippy::cast_possible_truncation,
@@ -71,7 +70,7 @@ mod tests {
     #[test]
     fn histograms_agree_with_the_summary() {
         let mut mesh = kuhn_box([5, 6, 7], DVec3::new(1.0, 0.8, 1.1));
-        // Skewed and bent, so that all classes have members.
+        // A skewed and bent mesh, so that all classes have members.
         for p in &mut mesh.positions {
             *p += DVec3::new(0.7 * p.y * p.y, 0.5 * p.z, 0.9 * p.x * p.y);
         }

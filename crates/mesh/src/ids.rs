@@ -1,7 +1,8 @@
 //! The two index types of a mesh: [`ParticleId`] and [`TetId`].
 //!
-//! Both are transparent `u32`s: 4 billion elements are enough, and half the memory traffic of `usize`. Separate types
-//! because a tet index used as a particle index is the mistake that survives every other check.
+//! Both are transparent `u32`s: 4 billion elements are enough, and memory traffic is half that of
+//! `usize`. The types are distinct because no other check finds a tet index used as a particle
+//! index.
 
 use std::fmt;
 

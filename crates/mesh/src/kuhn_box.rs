@@ -1,8 +1,8 @@
 //! A box of cubical cells, each cut into six tets: exact geometry for physics tests.
 //!
 //! Every cell is split along the same main diagonal into one tet for each order in which the three axes can be walked
-//! from its low to its high corner, so that neighboring cells agree on the diagonals of their common faces. Linear in
-//! the number of cells.
+//! from its low to its high corner, so neighboring cells agree on the diagonals of their common faces. Linear in the
+//! number of cells.
 //!
 //! Source: H. W. Kuhn, "Some combinatorial lemmas in topology", 1960.
 
@@ -10,7 +10,7 @@ use glam::DVec3;
 
 use crate::{ParticleId, TetMesh};
 
-/// The orders of the axes; the odd ones give inverted tets until two corners are exchanged.
+/// The orders of the axes; two corners of the odd ones are swapped to get positive tets.
 const WALKS: [([usize; 3], bool); 6] = [
     ([0, 1, 2], true),
     ([0, 2, 1], false),
@@ -22,9 +22,9 @@ const WALKS: [([usize; 3], bool); 6] = [
 
 /// The axis-aligned box from the origin to `size` (meters) with `cells` cells along each axis, six tets per cell.
 ///
-/// Particles run along x first, then y, then z; cells likewise. The particle `(i, j, k)` has the index
-/// `i + (cells[0] + 1) * (j + (cells[1] + 1) * k)`, and those on the far sides lie exactly on `size`. No cells give a
-/// mesh without tets.
+/// Particles are numbered along x first, then y, then z; so are cells. The particle `(i, j, k)` has the index `i +
+/// (cells[0] + 1) * (j + (cells[1] + 1) * k)`, and particles on the far sides have exactly the coordinates of `size`.
+/// Without cells the mesh has no tets.
 ///
 /// # Panics
 /// If there are more than 2³² particles.

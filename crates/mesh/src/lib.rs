@@ -1,8 +1,8 @@
-//! Tetrahedral meshes: the value, checks, boundary surface, pieces, quality, repair.
+//! Tetrahedral meshes: data type, checks, boundary surface, pieces, quality, repair.
 //!
-//! A [`TetMesh`] is a plain value: positions, and four corners per tet. Everything else is computed from it when asked
-//! for, and nothing here knows of files, generators, materials, solvers or time. Files are read and written by
-//! `incise-mesh-io`, shapes and surfaces are filled with tets by `incise-meshing`.
+//! A [`TetMesh`] is a plain value: positions, and four corners per tet. All other data are computed from it by
+//! functions. The crate does not depend on files, generators, materials, solvers or time. `incise-mesh-io` reads and
+//! writes files, `incise-meshing` fills shapes and surfaces with tets.
 //!
 //! ```
 //! use incise_mesh::{RepairOptions, TetId, glam::DVec3, kuhn_box, repair};
@@ -10,10 +10,10 @@
 //! // A box of 4 x 2 x 2 cells, six tets each. Any positions and corners of your own will do.
 //! let mut mesh = kuhn_box([4, 2, 2], DVec3::new(2.0, 1.0, 1.0));
 //!
-//! // Sound? Counts every fault and names the first; the sign of a volume is exact.
+//! // Counts every fault and reports the first; the sign of a volume is exact.
 //! mesh.check()?;
 //!
-//! // What follows from it.
+//! // Derived data.
 //! let surface = mesh.surface();
 //! assert!(surface.is_manifold());
 //! assert_eq!(surface.euler_characteristic(), 2);
@@ -21,7 +21,7 @@
 //! assert!(mesh.quality().min_dihedral > 44.9);
 //! assert!(mesh.volume(TetId(0)) > 0.0);
 //!
-//! // An inverted tet is found, and turned on request.
+//! // An inverted tet is found, and flipped by `repair`.
 //! mesh.tets[7].swap(0, 1);
 //! assert!(mesh.check().unwrap_err().to_string().contains("first: tet 7 has the volume -"));
 //! let repaired = repair(&mesh, &RepairOptions::ALL);
@@ -30,7 +30,7 @@
 //! ```
 //!
 //! Conventions: meters; a tet `[a, b, c, d]` is positive when `(b - a) × (c - a) · (d - a) > 0`; orders are by index
-//! and never depend on hashing or threads, so that equal input gives equal output.
+//! and independent of hashing and threads, so equal input gives equal output.
 
 mod bounds;
 mod check;

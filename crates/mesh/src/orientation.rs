@@ -1,9 +1,9 @@
-//! The exact orientation of a tetrahedron, and turning inverted ones around.
+//! The exact orientation of a tetrahedron, and flipping of inverted ones.
 //!
 //! The sign of a volume computed in floating point is noise once a tet is flat to about 1e-16 of its size, and cutting
-//! makes such slivers. The sign is therefore taken from an adaptive-precision predicate, which costs a few more
-//! operations than the plain formula and is exact unless products of coordinates overflow or underflow (differences
-//! of coordinates between about 1e-90 and 1e90 are safe).
+//! makes such slivers. The sign is therefore taken from an adaptive-precision predicate. It costs a few more operations
+//! than the plain formula and is exact unless products of coordinates overflow or underflow (differences of coordinates
+//! between about 1e-90 and 1e90 are safe).
 //!
 //! Source: J. R. Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates", 1997,
 //! through the crate `robust`.
@@ -34,13 +34,12 @@ pub fn orientation([a, b, c, d]: [DVec3; 4]) -> f64 {
         y: p.y,
         z: p.z,
     });
-    // The predicate calls a tet positive whose last corner lies below the first three: the opposite of ours.
-    // Subtracting, not negating, never gives -0.
+    // The predicate has the opposite sign. Subtracting instead of negating never gives -0.
     0.0 - orient3d(a, b, c, d)
 }
 
 impl TetMesh {
-    /// Turns every negatively oriented tet around by exchanging its last two corners; returns how many there were.
+    /// Flips every negatively oriented tet by swapping its last two corners; returns their number.
     ///
     /// Flat tets stay as they are. Linear in the number of tets.
     ///

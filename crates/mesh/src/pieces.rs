@@ -1,12 +1,12 @@
-//! The connected pieces of a mesh, as things that hang together by particles or by faces.
+//! [`Pieces`]: the connected pieces of a mesh, by shared particles or by shared faces.
 //!
 //! [`DisjointSets`], then one pass that numbers the pieces in the order of their first tet. Almost linear over
 //! particles ([`TetMesh::pieces`]); O(n log n) over faces ([`TetMesh::face_pieces`]), which must be matched first. The
-//! result does not depend on anything but the mesh.
+//! result depends only on the mesh.
 
 use crate::{DisjointSets, Faces, TetId, TetMesh};
 
-/// The piece each tet belongs to.
+/// The piece of each tet.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Pieces {
     /// The piece of each tet, numbered from 0 in the order of their first tets.
@@ -16,7 +16,7 @@ pub struct Pieces {
 }
 
 impl TetMesh {
-    /// The pieces that move apart when nothing holds them: tets are connected when they share a particle.
+    /// The pieces that can move independently: tets are connected when they share a particle.
     ///
     /// # Panics
     /// If a corner does not exist.
@@ -45,9 +45,9 @@ impl TetMesh {
         )
     }
 
-    /// The pieces that are solid throughout: tets are connected when they share a face.
+    /// The pieces connected by material: tets are connected when they share a face.
     ///
-    /// Never fewer than [`pieces`](Self::pieces), and more where parts touch in a particle or an edge only.
+    /// Never fewer than [`pieces`](Self::pieces), and more where parts touch only in a particle or an edge.
     ///
     /// # Panics
     /// From 2³⁰ tets on.
@@ -56,7 +56,7 @@ impl TetMesh {
         self.face_pieces_from(&self.faces())
     }
 
-    /// [`face_pieces`](Self::face_pieces) from faces that are sorted already.
+    /// [`face_pieces`](Self::face_pieces) from sorted faces.
     ///
     /// # Panics
     /// If `faces` are those of a mesh with more tets.

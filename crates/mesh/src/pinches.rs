@@ -1,19 +1,18 @@
-//! Parts of a mesh that hang together at a single particle, taken apart.
+//! Splitting of particles at which parts of a mesh touch without a common face.
 //!
-//! Where two parts meet at a particle but in no face around it, the surface touches itself there, and a simulation
-//! would join the parts by a ball joint without any material. Each further part gets a particle of its own at the same
-//! place.
+//! At such a particle the surface touches itself, and a simulation would connect the parts by a ball joint without
+//! material. Each further part gets a copy of the particle.
 //!
 //! Cost: O(n log n) for n tets.
 
 use crate::{DisjointSets, ParticleId, TetMesh};
 
 impl TetMesh {
-    /// Gives each group of tets around a particle that share faces at it a particle of its own; the number of particles
-    /// added. They lie at the end, in the order of the particle and of the lowest tet of the group, whose first group
-    /// keeps the old one.
+    /// Splits each particle whose tets are in several groups that share no face at it, one copy for each further group;
+    /// returns the number of added particles. They are appended in the order of the particle and of the lowest tet of
+    /// the group; the first group keeps the old particle.
     ///
-    /// Parts that touch along an edge and are joined elsewhere at its ends still do.
+    /// Parts that touch along an edge and are connected elsewhere at its ends keep touching.
     ///
     /// # Example
     /// ```
@@ -30,13 +29,13 @@ impl TetMesh {
     /// ```
     pub fn split_pinches(&mut self) -> usize {
         let before = self.positions.len();
-        // A tet at a particle, for all particles.
+        // All pairs of a particle and a tet at it.
         let mut stars: Vec<(ParticleId, u32)> = (0_u32..)
             .zip(&self.tets)
             .flat_map(|(t, tet)| tet.map(|p| (p, t)))
             .collect();
         stars.sort_unstable();
-        // Both are taken from the mesh as it was, and no two changes concern the same corner.
+        // Both are taken from the original mesh, and no two changes affect one corner.
         let old = self.tets.clone();
         let mut faces: Vec<([ParticleId; 2], u32)> = Vec::new();
         let mut groups = DisjointSets::default();

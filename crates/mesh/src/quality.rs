@@ -1,7 +1,7 @@
-//! How well shaped tets are: altitudes, dihedral angles, radius ratio.
+//! Shape measures of tets: altitudes, dihedral angles, radius ratio.
 //!
 //! The altitude bounds the stable step of explicit methods and the conditioning of the rest shape; extreme dihedral
-//! angles cause interpolation and conditioning errors; the radius ratio sums both up in one number. Formulas after
+//! angles cause interpolation and conditioning errors; the radius ratio combines both in one number. Formulas after
 //! J. R. Shewchuk, "What Is a Good Linear Finite Element?", 2002. Angles use `atan2`, whose last bit may differ between
 //! platforms. Linear in the number of tets.
 
@@ -23,7 +23,7 @@ pub struct TetQuality {
     pub radius_ratio: f64,
 }
 
-/// The worst values over all tets, and the number of tets at the busiest particle.
+/// The worst values over all tets, and the largest number of tets at a particle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct QualitySummary {
     /// The smallest altitude in meters; infinite for a mesh without tets.
@@ -38,7 +38,7 @@ pub struct QualitySummary {
     pub max_tets_at_particle: usize,
 }
 
-/// Measures one tet; `corners` in meters. A tet with two corners in the same place has ratios and angles of 0 or NaN.
+/// Measures one tet; `corners` in meters. A tet with coincident corners has ratios and angles of 0 or NaN.
 ///
 /// # Example
 /// ```
@@ -82,7 +82,7 @@ pub fn tet_quality(corners: [DVec3; 4]) -> TetQuality {
     }
 }
 
-/// The six dihedral angles of a tet in degrees, 0 to 180; of an inverted one those of its mirror image.
+/// The six dihedral angles of a tet in degrees, 0 to 180; for an inverted tet those of its mirror image.
 #[must_use]
 pub fn dihedral_angles(corners: [DVec3; 4]) -> [f64; 6] {
     let normals = outward_normals(corners);
@@ -93,7 +93,7 @@ pub fn dihedral_angles(corners: [DVec3; 4]) -> [f64; 6] {
     })
 }
 
-/// The outward normals of the faces opposite each corner, as long as twice the area.
+/// The outward normals of the faces opposite each corner, with a length of twice the area.
 #[must_use]
 pub fn outward_normals([a, b, c, d]: [DVec3; 4]) -> [DVec3; 4] {
     [

@@ -1,36 +1,36 @@
-//! [`repair`]: repairs common faults of meshes of other programs, on request, and reports them item by item.
+//! [`repair`]: repairs common faults of meshes from other programs, as selected, and reports them item by item.
 //!
-//! Nothing is done that was not asked for, and everything that was done is counted. Steps are taken in an order in
-//! which each may need those before: particles at one place become one, which may leave tets without volume; those go;
-//! tets inside out are turned; tets that are there twice go but once; of several pieces the largest stays; what no tet
-//! uses goes. Overlapping bodies and holes are not repaired: [`TetMesh::check`] finds them.
+//! Only selected repairs are made, and each is counted. The order is such that later steps fix the consequences of
+//! earlier ones: coincident particles are merged, which may degenerate tets; degenerate tets are removed; inverted tets
+//! are flipped; repeated tets are removed but for the first; all pieces but the largest are removed; unused particles
+//! are removed. Overlapping bodies and holes are not repaired: [`TetMesh::check`] finds them.
 //!
-//! Particles are merged across a distance by a sweep along x with union-find, so chains of close particles become one.
+//! Particles within a distance are merged by a sweep along x with union-find, so chains of close particles become one.
 //! Cost: O(n log n), and O(n times the particles within the distance in x) to merge across a distance.
 
 use std::fmt;
 
 use crate::{DisjointSets, ParticleId, TetId, TetMesh, orientation};
 
-/// What to repair; nothing by default.
+/// The repairs to make; none by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RepairOptions {
-    /// Makes one particle of those that are at most this far apart, in m; 0 merges those at the very same place.
+    /// Merges particles that are at most this far apart, in m; 0 merges coincident ones.
     pub merge_within: Option<f64>,
-    /// Removes tets without volume, with a corner used twice, that does not exist or is not finite.
+    /// Removes tets without volume and tets with a corner that is repeated, missing or not finite.
     pub remove_degenerate: bool,
-    /// Turns tets that are inside out.
+    /// Flips inverted tets.
     pub flip_inverted: bool,
     /// Removes all but the first of tets with the same corners.
     pub remove_duplicates: bool,
-    /// Keeps the piece of the largest volume only; of equal ones the first.
+    /// Keeps only the piece of the largest volume; ties go to the first.
     pub keep_largest_piece: bool,
     /// Removes particles that no tet uses.
     pub drop_unused: bool,
 }
 
 impl RepairOptions {
-    /// Everything, with particles merged that are at the very same place.
+    /// All repairs, with coincident particles merged.
     pub const ALL: Self = Self {
         merge_within: Some(0.0),
         remove_degenerate: true,
@@ -41,28 +41,28 @@ impl RepairOptions {
     };
 }
 
-/// What was repaired.
+/// The numbers of repairs made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct RepairReport {
-    /// Particles that became one with another.
+    /// Particles merged into another.
     pub merged: usize,
     /// Tets removed because they have no volume.
     pub degenerate: usize,
-    /// Tets turned.
+    /// Tets flipped.
     pub flipped: usize,
-    /// Tets removed because they were there before.
+    /// Tets removed because an earlier one has the same corners.
     pub duplicates: usize,
     /// Pieces removed.
     pub pieces: usize,
-    /// The tets of those.
+    /// Tets of removed pieces.
     pub tets_of_pieces: usize,
-    /// Particles removed because no tet uses them, those that were merged not counted.
+    /// Particles removed because no tet uses them, without merged ones.
     pub unused: usize,
 }
 
 impl fmt::Display for RepairReport {
-    /// One item a line, without those of which there are none; `nothing` if there are none at all.
+    /// One line per item with a count above 0; `nothing` if all are 0.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let items = [
             (self.merged, "particles merged with another"),
@@ -89,19 +89,19 @@ impl fmt::Display for RepairReport {
 pub struct Repaired {
     /// The mesh.
     pub mesh: TetMesh,
-    /// What was done.
+    /// The repairs made.
     pub report: RepairReport,
-    /// The number that each particle had before.
+    /// Particle -> its number in the original mesh.
     pub particles: Vec<ParticleId>,
-    /// The number that each tet had before.
+    /// Tet -> its number in the original mesh.
     pub tets: Vec<TetId>,
 }
 
-/// Repairs a mesh. What is kept stays in its order.
+/// Repairs a mesh. Remaining items keep their order.
 ///
 /// # Panics
-/// If tets are to be turned or pieces to be counted while a tet has a corner that does not exist; removing degenerate
-/// tets removes those first. If the distance to merge within is NaN.
+/// If tets are to be flipped or pieces to be counted while a corner of a tet does not exist (removing degenerate tets
+/// removes such tets first), or if the distance to merge within is NaN.
 ///
 /// # Example
 /// ```
@@ -181,8 +181,7 @@ pub fn repair(mesh: &TetMesh, options: &RepairOptions) -> Repaired {
     }
 }
 
-/// Which particles stay: all, or those of tets; those merged with another never do, unless a tet could not be
-/// redirected.
+/// True for each particle that stays: all, or those of tets; merged particles are removed unless a tet still uses them.
 fn kept(
     mesh: &TetMesh,
     tets: &[(TetId, [ParticleId; 4])],
@@ -201,7 +200,7 @@ fn kept(
     keeps
 }
 
-/// The merged particles that are gone.
+/// The number of merged particles that are removed.
 fn gone(merged: &[bool], keeps: &[bool]) -> usize {
     let pairs = merged.iter().zip(keeps);
     pairs.filter(|&(&merged, &keeps)| merged && !keeps).count()
@@ -223,7 +222,7 @@ fn side(mesh: &TetMesh, corners: [ParticleId; 4]) -> Option<f64> {
     Some(orientation(positions))
 }
 
-/// For each particle the first of those that it becomes one with; itself if there is none.
+/// For each particle the first one with which it is merged; itself if there is none.
 fn stand_ins(mesh: &TetMesh, distance: f64) -> Vec<ParticleId> {
     assert!(
         !distance.is_nan(),
@@ -250,7 +249,7 @@ fn stand_ins(mesh: &TetMesh, distance: f64) -> Vec<ParticleId> {
         .collect()
 }
 
-/// Removes tets whose corners an earlier one has; returns how many.
+/// Removes tets with the corners of an earlier one; returns their number.
 fn remove_duplicates(tets: &mut Vec<(TetId, [ParticleId; 4])>) -> usize {
     let mut sorted: Vec<([ParticleId; 4], usize)> = tets
         .iter()
@@ -273,7 +272,7 @@ fn remove_duplicates(tets: &mut Vec<(TetId, [ParticleId; 4])>) -> usize {
     before - tets.len()
 }
 
-/// Removes all pieces but the largest; returns how many, and their tets.
+/// Removes all pieces but the largest; returns the numbers of pieces and of their tets.
 fn keep_largest_piece(mesh: &TetMesh, tets: &mut Vec<(TetId, [ParticleId; 4])>) -> (usize, usize) {
     let rest = TetMesh {
         positions: mesh.positions.clone(),
@@ -336,7 +335,7 @@ mod tests {
             soup.positions.len() - body.positions.len()
         );
         assert!(repaired.mesh.check().is_ok());
-        // Across a distance, after each corner went astray by less.
+        // Across a distance, after each corner was moved by less.
         let mut rough = soup.clone();
         for (p, x) in rough.positions.iter_mut().enumerate() {
             *x += DVec3::splat(1e-9 * (p % 7) as f64);
@@ -405,8 +404,8 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever is thrown in: what comes out is sound in what was asked for, a second time changes nothing, and the
-        /// sources say where everything came from.
+        /// For any input, the result satisfies the selected rules, a second repair changes nothing, and the returned
+        /// numbers match the original items.
         #[test]
         fn repairing_twice_is_repairing_once(
             coordinates in prop::collection::vec(prop::array::uniform3(0..3i32), 4..30),

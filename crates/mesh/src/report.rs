@@ -1,4 +1,4 @@
-//! [`CheckReport`] and [`Fault`]: which rules of a sound mesh are broken, as counts and as a sentence.
+//! [`CheckReport`] and [`Fault`]: violated rules of a valid mesh, as counts and as a sentence.
 
 use std::fmt;
 
@@ -6,10 +6,10 @@ use glam::DVec3;
 
 use crate::{ParticleId, TetId};
 
-/// How often a mesh breaks each rule, and the first breach.
+/// The number of violations of each rule, and the first violation.
 ///
-/// Shown as one sentence. `first` is of the first kind, in the order of the fields, that occurs at all, and is the
-/// breach with the lowest index (for faces: the lowest particles).
+/// Displayed as one sentence. `first` belongs to the first rule, in the order of the fields, that is violated, and has
+/// the lowest index (for faces, the lowest particles).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CheckReport {
     /// Particles with a coordinate that is NaN or infinite.
@@ -24,11 +24,11 @@ pub struct CheckReport {
     pub crowded: usize,
     /// Faces whose two tets lie on the same side.
     pub overlapping: usize,
-    /// The first breach.
+    /// The first violation.
     pub first: Option<Fault>,
 }
 
-/// One breach of one rule.
+/// One violation of a rule.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Fault {
@@ -52,7 +52,7 @@ pub enum Fault {
     Repeated {
         /// The tet.
         tet: TetId,
-        /// The particle used twice.
+        /// The repeated particle.
         particle: ParticleId,
     },
     /// A tet is flat or inverted.
@@ -79,7 +79,7 @@ pub enum Fault {
 }
 
 impl CheckReport {
-    /// Whether no rule is broken.
+    /// True if no rule is violated.
     #[must_use]
     pub const fn is_sound(&self) -> bool {
         self.first.is_none()

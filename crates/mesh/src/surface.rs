@@ -1,20 +1,20 @@
-//! The boundary surface of a mesh: the faces that belong to one tet only, turned outward.
+//! [`Surface`]: the boundary of a mesh, i.e. the faces that belong to a single tet, oriented outward.
 //!
-//! All faces are sorted by their particles; those that occur once are the boundary. Cost: O(n log n).
+//! All faces are sorted by their particles; those without a second side are the boundary. Cost: O(n log n).
 
 use glam::DVec3;
 
 use crate::faces::outward_face;
 use crate::{DisjointSets, Faces, ParticleId, TetId, TetMesh};
 
-/// Triangles, counterclockwise when seen from outside, and the tet behind each.
+/// Triangles, counterclockwise when seen from outside, and the tet of each.
 ///
 /// The order is by tet, then by local face, the faces of a tet `[a, b, c, d]` being `acb`, `abd`, `adc`, `bcd`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Surface {
     /// The corners of each triangle.
     pub triangles: Vec<[ParticleId; 3]>,
-    /// The tet each triangle is a face of.
+    /// The tet of each triangle.
     pub tets: Vec<TetId>,
 }
 
@@ -39,7 +39,7 @@ impl TetMesh {
         self.surface_from(&self.faces())
     }
 
-    /// [`surface`](Self::surface) from faces that are sorted already.
+    /// [`surface`](Self::surface) from sorted faces.
     ///
     /// # Panics
     /// If `faces` are those of a mesh with more tets.
@@ -68,7 +68,7 @@ impl Surface {
     /// If a corner has no position.
     #[must_use]
     pub fn volume(&self, positions: &[DVec3]) -> f64 {
-        // Seen from a point of the surface instead of a far origin, the terms do not cancel.
+        // Relative to a point of the surface, the terms do not cancel even far from the origin.
         let Some(origin) = self.triangles.first().map(|t| positions[t[0].index()]) else {
             return 0.0;
         };
@@ -80,7 +80,7 @@ impl Surface {
             / 6.0
     }
 
-    /// Whether every directed edge is matched by one in the opposite direction: the surface has no rim.
+    /// True if every directed edge is matched by one in the opposite direction: the surface is closed.
     #[must_use]
     pub fn is_closed(&self) -> bool {
         let mut forward = Vec::with_capacity(3 * self.triangles.len());
@@ -91,7 +91,7 @@ impl Surface {
         forward == backward
     }
 
-    /// Whether the surface is closed and has no edge or particle where it touches itself: each edge has two triangles,
+    /// True if the surface is closed and does not touch itself in an edge or a particle: each edge has two triangles,
     /// and the triangles at each particle form a single fan.
     ///
     /// # Panics
@@ -104,7 +104,7 @@ impl Surface {
         if !unique || !self.is_closed() {
             return false;
         }
-        // Around a particle, corner (p; a, b) is followed by the corner (p; b, c). One fan visits them all.
+        // Around a particle, the corner (p; b, c) follows the corner (p; a, b). One fan visits them all.
         let mut corners = Vec::with_capacity(3 * self.triangles.len());
         for &[a, b, c] in &self.triangles {
             corners.extend([(a, b, c), (b, c, a), (c, a, b)]);
@@ -127,8 +127,8 @@ impl Surface {
         })
     }
 
-    /// The number of handles of all its parts together: 0 for balls, also with voids, 1 for a torus. `None` unless
-    /// it is a manifold. O(n log n).
+    /// The number of handles of all parts in total: 0 for balls, also with voids, 1 for a torus. `None` unless the
+    /// surface is a manifold. O(n log n).
     ///
     /// # Example
     /// ```

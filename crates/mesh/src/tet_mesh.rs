@@ -1,7 +1,8 @@
-//! [`TetMesh`]: positions and four corners per tetrahedron, nothing derived.
+//! [`TetMesh`]: positions and four corners per tetrahedron, without derived data.
 //!
-//! A mesh is a plain value with public fields. Whatever follows from it (surface, pieces, quality) is computed by
-//! functions and stored elsewhere if needed for longer, so that nothing here can be out of date.
+//! A mesh is a plain value with public fields. Derived data (surface, pieces, quality) are computed
+//! by functions and stored elsewhere if they are needed for longer, so they cannot become outdated
+//! here.
 
 use glam::DVec3;
 

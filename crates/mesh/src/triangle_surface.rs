@@ -1,4 +1,5 @@
-//! [`TriangleSurface`]: positions and triangles, what a surface file holds and what a body is filled from.
+//! [`TriangleSurface`]: positions and triangles: the content of a surface file, and the input for
+//! filling a body with tets.
 
 use glam::DVec3;
 
@@ -7,7 +8,7 @@ use crate::{ParticleId, TetMesh};
 /// A surface of triangles with its own positions, closed or open.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleSurface {
-    /// Position of each particle, in meters, used by a triangle or not.
+    /// Position of each particle in meters, including unused ones.
     pub positions: Vec<DVec3>,
     /// The corners of each triangle, counterclockwise when seen from outside.
     pub triangles: Vec<[ParticleId; 3]>,

@@ -1,4 +1,4 @@
-//! Every fault a mesh can have is found, counted and named.
+//! Every fault of a mesh is found, counted and reported.
 
 use incise_mesh::glam::DVec3;
 use incise_mesh::{CheckReport, Fault, MeshError, ParticleId, TetId, TetMesh, kuhn_box};
@@ -80,7 +80,7 @@ fn flat_and_inverted() {
     assert_eq!(mesh.orient_positively(), 1);
     mesh.check().unwrap();
 
-    // In one plane, and off it by the smallest step there is.
+    // In one plane, and off it by the smallest representable step.
     let mut mesh = TetMesh {
         positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::new(0.3, 0.3, 0.0)],
         tets: vec![[0, 1, 2, 3].map(ParticleId)],

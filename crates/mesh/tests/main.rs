@@ -1,3 +1,3 @@
-//! Behavior of the crate as seen from outside; one binary, so that the tests link once.
+//! Tests of the public API in one binary, which links once.
 
 mod faults;

@@ -60,9 +60,9 @@ pub(crate) struct Viewer {
     has_help: bool,
     /// Text of the field for a file name.
     file: String,
-    /// Whether the tool is in use: the left button was pressed on the picture and is down.
+    /// True while the left button is down after it was pressed on the picture.
     tool_in_use: bool,
-    /// The line that is being drawn, in points of the window.
+    /// The line being drawn, in points of the window.
     line: Vec<Pos2>,
 }
 
@@ -161,7 +161,7 @@ impl Viewer {
                 (self.tool_in_use, self.line) = (false, Vec::new());
                 self.clock.pause();
             }
-            // The session that was open stays.
+            // The open session stays.
             Err(error) => self.error = Some(ErrorDialog::new(LOAD_ERROR, &error)),
         }
     }
@@ -180,7 +180,7 @@ impl Viewer {
             Action::Undo => {
                 let undone = self.session.as_mut().map_or(Ok(None), Session::undo);
                 match undone {
-                    // The stroke would begin again at once.
+                    // Without a pause the stroke would begin again at once.
                     Ok(Some(true)) => {
                         self.running = false;
                         self.clock.pause();
@@ -310,7 +310,7 @@ impl Viewer {
         let Some(session) = &mut self.session else {
             return;
         };
-        // Residuals that are shown have to be measured.
+        // Displayed residuals have to be measured.
         let measured = match self.style.color_by {
             ColorBy::Residual if !session.measures() => session.measure(true),
             _ => Ok(()),

@@ -1,7 +1,7 @@
 //! [`Canvas`]: the picture of the body in the window.
 //!
-//! On a device that can simulate the picture is drawn by it, from the buffers in which the solver computes, into a texture
-//! that the window shows. Elsewhere the processor draws, as for pictures of a run, and the window gets the pixels.
+//! On a device that can simulate, the device draws the picture from the solver's buffers into a texture that the window
+//! shows. Elsewhere the CPU draws, as for pictures of a run, and the window gets the pixels.
 
 use std::sync::Arc;
 
@@ -12,21 +12,21 @@ use incise_render::{GpuRenderer, Style, software_picture};
 
 use crate::session::Session;
 
-/// Where pictures are drawn: on the window's device or on the processor.
+/// The renderer of the picture: the window's device or the CPU.
 pub(crate) enum Canvas {
     /// The window's device.
     Device {
         state: RenderState,
         renderer: Box<GpuRenderer>,
-        /// What the window knows the texture as, and how large that is.
+        /// The window's id of the texture, and the texture's size.
         shown: Option<(TextureId, [u32; 2])>,
     },
-    /// The processor.
+    /// The CPU.
     Processor { texture: Option<TextureHandle> },
 }
 
 impl Canvas {
-    /// Draws on the window's device if it can, else the reason for not doing so is the second part.
+    /// Draws on the window's device if possible; otherwise the second part is the reason.
     pub(crate) fn new(
         state: Option<&RenderState>,
         gpu: Option<&Arc<GpuContext>>,

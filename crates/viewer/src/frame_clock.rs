@@ -14,12 +14,12 @@ const NEWEST: f64 = 0.05;
 /// The clock of a simulation.
 #[derive(Debug)]
 pub(crate) struct FrameClock {
-    /// Wanted simulated time for each second.
+    /// Target simulated time per second.
     pub(crate) speed: f64,
     last: Option<Instant>,
     /// Simulated time that is due in s.
     due: f64,
-    /// Mean simulated time for each second.
+    /// Mean simulated time per second.
     reached: f64,
 }
 
@@ -40,8 +40,7 @@ impl FrameClock {
         (self.last, self.due) = (None, 0.0);
     }
 
-    /// Calls `step` as often as time has passed for, each call for a frame of `time_step` seconds, until it returns
-    /// false.
+    /// Calls `step` for each frame of `time_step` seconds that has passed, until it returns false.
     pub(crate) fn run(&mut self, now: Instant, time_step: f64, mut step: impl FnMut() -> bool) {
         let passed = self.last.map(|last| (now - last).as_secs_f64());
         self.last = Some(now);
@@ -82,14 +81,14 @@ mod tests {
         let (mut clock, start) = (FrameClock::default(), Instant::now());
         let mut frames = 0;
         for tick in 0..=50 {
-            // In the future, so that no patience is lost.
+            // In the future, so that the limit of simulation time is never reached.
             let now = start + Duration::from_secs(1000) + Duration::from_millis(20 * tick);
             clock.run(now, 0.005, || {
                 frames += 1;
                 true
             });
         }
-        // The first tick has nothing to follow and makes one; then a second's worth, up to rounding.
+        // The first tick has no predecessor and runs one frame; later ones run a second's worth, up to rounding.
         assert!((200..=201).contains(&frames), "{frames}");
     }
 
@@ -99,7 +98,7 @@ mod tests {
         let past = start - Duration::from_millis(500);
         clock.run(past, 0.01, || true);
         let mut frames = 0;
-        // Half a second is due, and the clock says that patience is over.
+        // Half a second is due, but the limit of simulation time is reached.
         clock.run(past + Duration::from_millis(300), 0.01, || {
             frames += 1;
             true

@@ -1,8 +1,8 @@
 //! The window's device: one for drawing and, if it can, for simulating.
 //!
 //! An adapter with the limits that the kernels need gets a device that solver and renderer share, so that results are
-//! drawn without a copy. A lesser one (OpenGL of an old driver) only shows the window: the CPU then simulates and draws,
-//! and the panel says so.
+//! drawn without a copy. A less capable one (OpenGL of an old driver) only shows the window: the CPU then simulates and
+//! draws, and the panel shows a note.
 
 use std::sync::Arc;
 
@@ -48,7 +48,7 @@ pub(crate) fn share(state: &RenderState) -> Result<Arc<GpuContext>, String> {
 pub(crate) fn why_no_window(error: &eframe::Error) -> String {
     match error {
         eframe::Error::WinitEventLoop(error) => {
-            // What comes before the last colon is where in winit it came up.
+            // The text before the last colon is a location in winit.
             let error = error.to_string();
             let why = error.rsplit(": ").next().unwrap_or(&error);
             format!(

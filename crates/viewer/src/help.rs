@@ -1,4 +1,4 @@
-//! The keys, and the overlay that lists them.
+//! Key bindings, and the overlay that lists them.
 
 use eframe::egui::{Align2, Context, Event, Grid, Key, Modifiers, RichText, Window};
 use incise_render::ColorBy;
@@ -159,7 +159,7 @@ pub(crate) fn actions(context: &Context) -> Vec<Action> {
     })
 }
 
-/// The action of a key. Of keys that are held down, only the one for a single frame repeats.
+/// The action of a key. While a key is held down, only the action for a single frame repeats.
 fn action(key: Key, modifiers: Modifiers, repeats: bool) -> Option<Action> {
     let mut known = KEYS.iter();
     let found = known.find(|((with, of), ..)| *of == key && modifiers.matches_logically(*with));

@@ -7,14 +7,14 @@ use std::collections::VecDeque;
 
 use incise::{Grab, Snapshot};
 
-/// The most memory for snapshots, in bytes.
+/// Largest memory for snapshots, in bytes.
 const BUDGET: usize = 1 << 30;
 
 /// The state before a stroke.
 #[derive(Debug)]
 pub(crate) struct UndoPoint {
     pub(crate) snapshot: Snapshot,
-    /// Whether the stroke is part of the scene, so that it begins again.
+    /// True if the stroke is part of the scene, so that it begins again.
     pub(crate) scripted: bool,
     /// The stroke in progress at that time.
     pub(crate) stroke: Option<u32>,

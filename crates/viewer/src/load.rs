@@ -37,7 +37,7 @@ pub(crate) enum Source {
 impl Source {
     /// The source in a file, or the built-in scene.
     ///
-    /// A scene is read here, so that its errors are known at once; a mesh only has to exist.
+    /// A scene is read here, so that its errors are shown at once; a mesh file only has to exist.
     pub(crate) fn new(path: Option<&Path>, tets: u32) -> anyhow::Result<Self> {
         let Some(path) = path else {
             let name = "built-in liver".to_owned();
@@ -57,7 +57,7 @@ impl Source {
         Ok(Self::Mesh(path.to_owned(), tets))
     }
 
-    /// For the title.
+    /// The name for the title.
     pub(crate) fn name(&self) -> String {
         match self {
             Self::Scene(_, _, name) => name.clone(),
@@ -77,7 +77,7 @@ impl Source {
         }
     }
 
-    /// The scene, and a builder of its simulation on the processor.
+    /// The scene, and a builder of its simulation on the CPU.
     fn open(&self) -> anyhow::Result<(Scene, SimulationBuilder)> {
         match self {
             Self::Scene(scene, ..) => {
@@ -217,7 +217,7 @@ mod tests {
         let positions = loaded.simulation.positions();
         let high = positions.iter().fold(DVec3::NEG_INFINITY, |a, b| a.max(*b));
         let low = positions.iter().fold(DVec3::INFINITY, |a, b| a.min(*b));
-        // The solver's positions are single.
+        // The solver's positions are in single precision.
         assert!((high - low - DVec3::new(4.0, 2.0, 6.0) * SIZE / 6.0).length() < 1e-7);
         assert!(low.z.abs() < 1e-7 && (low.x + high.x).abs() < 1e-7);
         assert_eq!(loaded.name, "body.vtk");

@@ -1,4 +1,4 @@
-//! `incise-viewer`: a window to cut soft bodies in.
+//! `incise-viewer`: a window for cutting soft bodies.
 //!
 //! A scene is loaded in the background and simulated in real time. The mouse cuts, grabs and pulls; the panel shows stage
 //! times and solver settings with the measured effect of each change. This crate is input and display only: `incise`

@@ -20,7 +20,7 @@ pub(crate) struct Controls<'a> {
     pub(crate) tool: Tool,
     pub(crate) style: &'a mut Style,
     pub(crate) clock: &'a mut FrameClock,
-    /// Whether a GPU can be chosen.
+    /// True if a GPU can be chosen.
     pub(crate) has_gpu: bool,
     /// The text of the field for a file.
     pub(crate) file: &'a mut String,
@@ -256,7 +256,7 @@ fn counts(ui: &mut Ui, session: &mut Session, controls: &Controls<'_>, commands:
                 ui.end_row();
             }
         });
-    // Residuals that are shown have to be measured.
+    // Displayed residuals have to be measured.
     let free = controls.style.color_by != ColorBy::Residual;
     let mut measures = session.measures();
     let mark = Checkbox::new(&mut measures, "Measure the residual (slower)");

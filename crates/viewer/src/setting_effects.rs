@@ -169,7 +169,7 @@ mod tests {
         frames(&mut effects, 30, 2.0);
         effects.note_change("Substeps", "5", "10");
         assert_eq!(effects.changes().next().unwrap().time(), "measuring...");
-        // While it settles nothing counts, then one slow frame in ten does not.
+        // Frames while the body settles do not count; later, one slow frame in ten does not change the median.
         frames(&mut effects, SETTLE, 1000.0);
         for _ in 0..4 {
             frames(&mut effects, 9, 4.0);

@@ -1,7 +1,7 @@
 //! Solver settings that trade speed for accuracy: a form over [`SolverSpec`].
 //!
-//! A change takes effect in the next frame. A change that the scene does not allow is refused with its reason, and the
-//! setting keeps its value. Another method brings its own defaults.
+//! A change takes effect in the next frame. If the scene does not support a change, the reason is shown and the setting
+//! keeps its value. Another method brings its own defaults.
 
 use eframe::egui::{ComboBox, DragValue, Slider, SliderClamping, Ui};
 use incise::scene::{Backend, Method, SolverSpec, Substeps};
@@ -65,8 +65,8 @@ fn clustering_name(kind: &str, size: u32) -> String {
     }
 }
 
-/// Shows the settings of `spec`; returns the one that was changed. `has_gpu` tells whether a GPU can be chosen,
-/// `on_gpu` whether one computes.
+/// Shows the settings of `spec`; returns the one that was changed. `has_gpu` is true if a GPU can be chosen, `on_gpu`
+/// if the simulation runs on one.
 pub(crate) fn show(
     ui: &mut Ui,
     spec: &SolverSpec,

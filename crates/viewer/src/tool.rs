@@ -1,7 +1,7 @@
 //! Tools of the left mouse button: cut, grab, orbit.
 //!
-//! A blade is the part of the view ray under the pointer from in front of the body to a chosen depth below its surface, so
-//! a stroke is the drawn line swept along the view direction: seen from where it was drawn, it is that line.
+//! A blade is the part of the view ray under the pointer from in front of the body to a chosen depth below its surface.
+//! A stroke is therefore the drawn line swept along the view direction.
 
 use incise::mesh::glam::DVec3;
 use incise_render::Camera;
@@ -42,8 +42,8 @@ impl Default for ToolSettings {
     }
 }
 
-/// The blade under a pixel. `bounds` are those of the body, `surface` is the distance along the ray at which it meets the
-/// body, now or the last time it did, and `depth` how deep it goes below that, in m; absent: through.
+/// The blade under a pixel. `bounds` are those of the body, `surface` is the last known distance along the ray to the
+/// body, and `depth` the depth of the blade below that, in m; absent: through the body.
 pub(crate) fn blade(
     camera: &Camera,
     pixel: [f64; 2],
@@ -55,7 +55,7 @@ pub(crate) fn blade(
     let (origin, direction) = camera.ray(pixel, size);
     let [low, high] = bounds;
     let (middle, reach) = ((low + high) / 2.0, (high - low).length() / 2.0);
-    // Farther than any pose of the body while the stroke lasts, but not behind the eye.
+    // Beyond any pose of the body during the stroke, but not behind the eye.
     let along = (middle - origin).dot(direction);
     let near = (along - 1.5 * reach).max(0.02 * along.abs().max(reach));
     let through = along + 1.5 * reach;

@@ -12,8 +12,8 @@ use crate::{GpuContext, GpuError};
 /// `seed` chooses the random numbers of `vivace`.
 ///
 /// # Errors
-/// [`GpuError::Unsupported`] for algorithms other than `jones-plassmann`, `ecl-gc`, `scgc` with all shortcuts, `vivace` and
-/// `wlc`; whatever the device says.
+/// [`GpuError::Unsupported`] for algorithms other than `jones-plassmann`, `ecl-gc`, `scgc` with all
+/// shortcuts, `vivace` and `wlc`; errors of the device.
 ///
 /// ```
 /// use incise_gpu::coloring::{ColoringKernels, DeviceGraph, color};

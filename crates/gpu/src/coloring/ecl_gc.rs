@@ -1,8 +1,8 @@
-//! ECL-GC in rounds: vertices of many neighbors first, then the others (Alabandi, Powers and Burtscher 2020).
+//! ECL-GC in rounds: vertices with many neighbors first, then the others (Alabandi, Powers and Burtscher 2020).
 //!
-//! Twin of [`incise_coloring::ecl_gc`]. The original spins until all neighbors are done; here a pass is a round. The
-//! colors from 32 on, the many neighbors and the few go by the same rules as there. Cost: every pass looks at all edges
-//! of its undecided vertices.
+//! Twin of [`incise_coloring::ecl_gc`]. The original spins until all neighbors are colored; here a pass is a round. The
+//! rules for colors from 32 on and for vertices with many or few neighbors are those of the twin. Cost: each pass
+//! visits all edges of its undecided vertices.
 
 use super::kernels::{
     ColoringKernels, ECL_GC_LARGE, ECL_GC_LARGE_START, ECL_GC_SMALL, ECL_GC_SMALL_START, HIGHER,
@@ -15,7 +15,7 @@ use crate::{GpuContext, GpuError};
 
 /// Colors by ECL-GC.
 ///
-/// The coloring is that of [`incise_coloring::ecl_gc`], bit for bit, and so that of [`scgc`](super::scgc()).
+/// The coloring equals those of [`incise_coloring::ecl_gc`] and [`scgc`](super::scgc()), bit for bit.
 ///
 /// # Errors
 /// If the device is lost or has no room for the work arrays.

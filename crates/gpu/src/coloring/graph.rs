@@ -1,7 +1,7 @@
 //! [`DeviceGraph`]: a graph in device memory.
 //!
-//! The rows as they are on the host, offsets and neighbors. Degrees, priorities and everything else that a coloring
-//! needs is computed on the device, again for each coloring. Cost: one upload of 4 bytes per vertex and 8 per edge.
+//! Offsets and neighbors are stored as on the host. Degrees, priorities and all other inputs of a coloring are computed
+//! on the device for each coloring. Cost: one upload of 4 bytes per vertex and 8 per edge.
 
 use incise_graph::ConstraintGraph;
 
@@ -33,7 +33,7 @@ pub struct DeviceGraph {
     vertices: usize,
     pub(super) offsets: Array<u32>,
     pub(super) neighbors: Array<u32>,
-    /// What the rounds see beside the graph.
+    /// Uniforms of even and odd rounds.
     pub(super) parts: Array<u32>,
 }
 
@@ -57,7 +57,7 @@ impl DeviceGraph {
         self.vertices
     }
 
-    /// Words that palettes take: a bit per color, for degree + 1 colors each. See `palettes.wgsl`.
+    /// Words of the palettes: a bit per color, for degree + 1 colors per vertex. See `palettes.wgsl`.
     pub(super) fn palette_words(&self) -> usize {
         self.neighbors.len() / 32 + self.vertices + 1
     }

@@ -1,8 +1,8 @@
 //! [`DeviceIncidence`]: constraints and their particles in device memory.
 //!
-//! Both directions, each in one array: offsets, then values, and the offsets count from the front of the array, which
-//! leaves kernels more of the eight buffers that WebGPU grants. Cost: one upload of 8 bytes per constraint, particle
-//! and pair of them, at most.
+//! Each direction is one array of offsets, then values. The offsets count from the front of the array. One array
+//! instead of two leaves kernels more of the eight buffers that WebGPU guarantees. Cost: one upload of at most 8 bytes
+//! per constraint, particle and pair of them.
 
 use incise_graph::Incidence;
 
@@ -19,7 +19,7 @@ pub struct DeviceIncidence {
     particles: usize,
     pub(super) particles_of: Array<u32>,
     pub(super) constraints_of: Array<u32>,
-    /// What the rounds see beside the incidence.
+    /// Uniforms of even and odd rounds.
     pub(super) parts: Array<u32>,
 }
 
@@ -27,7 +27,7 @@ impl DeviceIncidence {
     /// Uploads an incidence. O(constraints + particles + pairs).
     ///
     /// # Errors
-    /// If the device has no room for it, or if offsets and values are more than 2^32 numbers.
+    /// If the device has no room for it, or if offsets and values are more than 2^32 numbers in total.
     pub fn new(gpu: &GpuContext, incidence: &Incidence) -> Result<Self, GpuError> {
         let (constraints, particles) = (incidence.constraint_count(), incidence.particle_count());
         let pairs = incidence.values().len();
@@ -48,7 +48,7 @@ impl DeviceIncidence {
         })
     }
 
-    /// The number of constraints, which are what is colored.
+    /// The number of constraints, which are the vertices of the coloring.
     #[must_use]
     pub fn constraint_count(&self) -> usize {
         self.constraints
@@ -61,14 +61,14 @@ impl DeviceIncidence {
     }
 }
 
-/// Offsets and values in one list, unless it is too long.
+/// Offsets and values in one list; `None` if it would be too long.
 fn rows<'a>(count: usize, pairs: usize, row: impl Fn(usize) -> &'a [u32]) -> Option<Vec<u32>> {
     let mut end = u32::try_from(count + 1).ok()?;
     u32::try_from(count + 1 + pairs).ok()?;
     let mut list = Vec::with_capacity(count + 1 + pairs);
     list.push(end);
     for i in 0..count {
-        // Shorter than all of them together.
+        // Each row is shorter than the whole list.
         end += u32::try_from(row(i).len()).ok()?;
         list.push(end);
     }

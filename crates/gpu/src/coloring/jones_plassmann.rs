@@ -1,7 +1,7 @@
 //! Jones-Plassmann without shortcuts, largest degree first (Jones and Plassmann 1993, with the priorities of ECL-GC).
 //!
-//! Twin of [`incise_coloring::jones_plassmann`]. Cost: each edge twice in all, and as many rounds as the longest chain
-//! of falling priorities has vertices.
+//! Twin of [`incise_coloring::jones_plassmann`]. Cost: each edge is visited twice; the number of rounds is the length
+//! of the longest chain of falling priorities.
 
 use super::kernels::{ALL, ColoringKernels, JONES_PLASSMANN};
 use super::rounds::{HEADER, Rounds, worklists};

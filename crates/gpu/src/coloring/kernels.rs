@@ -1,7 +1,7 @@
-//! [`ColoringKernels`]: what colorings keep from one to the next, and the list of all their shaders.
+//! [`ColoringKernels`]: compiled kernels and work arrays kept between colorings, and the list of all coloring shaders.
 //!
-//! Compiling a shader takes a driver up to a third of a second, so it happens once, when a kernel is first needed. Work
-//! arrays grow to the largest graph and stay.
+//! Compiling a shader is slow in most drivers, so a kernel is compiled once, when it is first needed. Work arrays grow
+//! to the size of the largest graph and are kept.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use crate::array::Array;
 use crate::kernel::{BindingKind, Kernel};
 use crate::{GpuContext, GpuError};
 
-/// `Round` of the shaders.
+/// `Round` in the shaders.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(crate) struct Round {
@@ -21,10 +21,10 @@ pub(crate) struct Round {
     pub(crate) parity: u32,
 }
 
-/// How rounds see it.
+/// The binding of a [`Round`] uniform.
 const PART: BindingKind = BindingKind::DynamicUniform(size_of::<Round>() as u64);
 
-/// The text of a kernel and how it uses its buffers.
+/// The text of a kernel and the kinds of its bindings.
 #[derive(Debug)]
 pub(crate) struct Source {
     pub(crate) name: &'static str,
@@ -34,9 +34,9 @@ pub(crate) struct Source {
 
 /// Compiled kernels and work arrays of all colorings, for one device.
 ///
-/// Keep it as long as the device: the first coloring of a kind compiles its kernels, all others find them. The arrays
-/// are as large as the largest input so far needs: for [`scgc`](super::scgc()) 24 bytes per vertex and a little more than 8
-/// per edge, for all algorithms together about 70 bytes per vertex.
+/// Keep it as long as the device: the first coloring with an algorithm compiles its kernels, later ones reuse them. The
+/// arrays are as large as the largest input so far needs: for [`scgc`](super::scgc()) 24 bytes per vertex and a little
+/// more than 8 per edge, for all algorithms together about 70 bytes per vertex.
 #[derive(Debug, Default)]
 pub struct ColoringKernels {
     compiled: BTreeMap<&'static str, Arc<Kernel>>,
@@ -51,7 +51,7 @@ pub(super) struct BoundKernel {
 }
 
 impl ColoringKernels {
-    /// The kernel of a source with its buffers, compiled if it is not.
+    /// Binds the kernel of a source to its buffers, and compiles it first if necessary.
     pub(super) fn bind(
         &mut self,
         gpu: &GpuContext,
@@ -123,7 +123,7 @@ macro_rules! text {
     };
 }
 
-/// A kernel: its name, the parts before its own text, and the uses of its buffers.
+/// A kernel: its name, the shared parts in front of its own text, and the kinds of its bindings.
 macro_rules! source {
     ($constant:ident, $name:literal, [$($part:literal),*], [$($usage:expr),*]) => {
         pub(super) const $constant: Source = Source {
@@ -298,7 +298,7 @@ source!(
     [PART, Write, Read, Write]
 );
 
-/// All of them.
+/// All coloring kernels.
 pub(crate) const SOURCES: &[Source] = &[
     NEXT,
     ALL,

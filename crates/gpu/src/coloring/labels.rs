@@ -1,7 +1,8 @@
-//! Closing gaps between colors, as [`Coloring::compact`](incise_graph::Coloring::compact) does.
+//! Compaction of colors on the device, with the result of
+//! [`Coloring::compact`](incise_graph::Coloring::compact).
 //!
-//! Algorithms that repair or draw colors may leave some unused. Cost: O(vertices + colors), and one wait to learn how
-//! many there are.
+//! Algorithms that repair or draw colors may leave some colors unused. Cost: O(vertices + colors),
+//! and one wait to read the number of colors.
 
 use super::kernels::{ColoringKernels, LABELS_MARK, LABELS_NUMBER, LABELS_RENAME};
 use super::rounds::THREADS;

@@ -1,23 +1,23 @@
-//! Graph coloring on the device, from data that is there already, with results that stay there.
+//! Graph coloring on the device, with input and result in device memory.
 //!
-//! The functions have the names of those of `incise-coloring`, which define what they give: [`jones_plassmann`],
+//! The functions have the names of those of `incise-coloring`, which define the results: [`jones_plassmann`],
 //! [`ecl_gc`], [`scgc`], [`vivace`] and [`wlc`] on a [`DeviceGraph`], and [`scgc_incidence`] on a [`DeviceIncidence`],
-//! which never lists an edge. Each coloring equals that of its CPU twin bit for bit, on any device. There is no limit
-//! to colors or degrees.
+//! without building a list of edges. Each coloring equals that of its CPU twin bit for bit, on any device. The numbers
+//! of colors and the degrees are not limited.
 //!
-//! **Rounds.** A GPU guarantees no order of threads, so no thread waits in a kernel. A round visits the vertices on
-//! a worklist, and those that cannot be colored yet go to the next one. A kernel of one thread writes the size of the
-//! next dispatch, so 32 rounds are handed over at once, and then the host reads a few words to learn whether vertices
-//! are left. Rounds beyond the last are dispatches of nothing. Every round colors at least one vertex; if not,
-//! [`GpuError::Stalled`](crate::GpuError::Stalled) says so.
+//! **Rounds.** A GPU does not guarantee an order of threads, so no thread waits in a kernel. A round visits the
+//! vertices on a worklist and puts those that cannot be colored yet on the next one. A kernel of one thread writes the
+//! size of the next dispatch. Therefore 32 rounds are submitted at once before the host reads the number of vertices
+//! left; surplus rounds dispatch no workgroups. Every round must color at least one vertex, otherwise the result is
+//! [`GpuError::Stalled`](crate::GpuError::Stalled).
 //!
-//! **Rounds may differ, colors may not.** Where a vertex decides while its neighbors do, whether it sees them in this
-//! round or in the next depends on the device; why the colors do not is told in the shaders. [`vivace`] and [`wlc`]
-//! depend on what a vertex sees of its neighbors, so there a round has several dispatches, and rounds are those of the
-//! CPU, too.
+//! **Rounds may differ between devices, colors may not.** If a vertex and its neighbor are decided in one round, the
+//! device determines whether the vertex sees the neighbor's color in this round or in the next. The shaders explain why
+//! the colors do not depend on it. In [`vivace`] and [`wlc`] they would, so there a round has several dispatches, and
+//! the number of rounds equals that of the CPU, too.
 //!
-//! **Traffic.** Nothing is uploaded, but 16 bytes with the options of [`vivace`] and [`wlc`]; what is read back is 24 bytes
-//! per 32 rounds.
+//! **Traffic.** Only the options of [`vivace`] and [`wlc`] are uploaded (16 bytes); 24 bytes are read back per 32
+//! rounds.
 
 mod algorithm;
 mod ecl_gc;

@@ -5,7 +5,7 @@ use incise_graph::{ColorId, Coloring};
 use crate::array::Array;
 use crate::{GpuContext, GpuError};
 
-/// A coloring that was made on the device and is still there.
+/// A coloring in device memory.
 #[derive(Debug)]
 pub struct DeviceColoring {
     pub(super) colors: Array<u32>,
@@ -29,19 +29,19 @@ impl DeviceColoring {
         self.colors.len()
     }
 
-    /// The number of colors; each of them has a vertex.
+    /// The number of colors, each of which is used.
     #[must_use]
     pub fn color_count(&self) -> usize {
         self.color_count
     }
 
-    /// The rounds it took on this device.
+    /// The number of rounds on this device.
     #[must_use]
     pub fn rounds(&self) -> usize {
         self.rounds
     }
 
-    /// The buffer of colors, a `u32` per vertex, for later kernels. May be larger than that.
+    /// The buffer of colors, a `u32` per vertex, for later kernels. It may be larger than needed.
     #[must_use]
     pub fn buffer(&self) -> &wgpu::Buffer {
         self.colors.buffer()

@@ -1,8 +1,8 @@
-//! Rounds over worklists: what all algorithms but one have in common.
+//! Rounds over worklists, shared by all algorithms except [`wlc`](super::wlc()).
 //!
-//! Recorded in chunks: each round is dispatched with as many workgroups as its worklist needs, which `next.wgsl` finds
-//! out on the device. After a chunk the host reads how many vertices are left. Cost: two dispatches a round and one
-//! wait per chunk.
+//! Rounds are recorded in chunks. Each round is dispatched with as many workgroups as its worklist needs; `next.wgsl`
+//! computes this number on the device. After a chunk the host reads the number of vertices left. Cost: two dispatches
+//! per round and one wait per chunk.
 
 use bytemuck::{Pod, Zeroable};
 use wgpu::{Buffer, BufferUsages};
@@ -16,10 +16,10 @@ use crate::{GpuContext, GpuError};
 /// Rounds per submit.
 const CHUNK: usize = 32;
 
-/// `THREADS` of the shaders.
+/// `THREADS` in the shaders.
 pub(super) const THREADS: usize = 64;
 
-/// `Work` of the shaders, up to the lists.
+/// `Work` in the shaders, up to the lists.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(crate) struct Work {
@@ -30,10 +30,10 @@ pub(crate) struct Work {
     pub(crate) window: u32,
 }
 
-/// Words in front of the lists, to be cleared before the first rounds.
+/// Words in front of the lists; they are cleared before the first round.
 pub(super) const HEADER: usize = size_of::<Work>() / size_of::<u32>();
 
-/// A [`Round`] for even rounds, and one for odd ones.
+/// The [`Round`] uniforms of even and odd rounds.
 pub(super) fn parts(gpu: &GpuContext, vertices: usize) -> Result<Array<u32>, GpuError> {
     let stride = STRIDE as usize / size_of::<u32>();
     let usage = BufferUsages::UNIFORM;
@@ -53,19 +53,19 @@ pub(super) fn parts(gpu: &GpuContext, vertices: usize) -> Result<Array<u32>, Gpu
 #[derive(Debug)]
 pub(super) struct Rounds<'a> {
     pub(super) algorithm: &'static str,
-    /// More than one, or there would be nothing to do.
+    /// The number of vertices, at least 2.
     pub(super) vertices: usize,
     /// Rounds after which vertices without a color are an error.
     pub(super) max_rounds: usize,
-    /// Arrays that start as zeros, and their words.
+    /// Arrays to fill with zeros first, and their lengths in words.
     pub(super) clear: Vec<(&'a Buffer, usize)>,
-    /// Kernels over all vertices that come first; the last of them fills the list.
+    /// Kernels over all vertices to run first; the last of them fills the list.
     pub(super) first: Vec<BoundKernel>,
     /// Kernels over the list; the last of them fills the next list.
     pub(super) round: Vec<BoundKernel>,
 }
 
-/// The worklists of a graph of so many vertices, as a work array.
+/// The worklists of a graph with this many vertices, as a work array.
 pub(super) fn worklists(
     gpu: &GpuContext,
     kernels: &mut ColoringKernels,
@@ -75,7 +75,7 @@ pub(super) fn worklists(
 }
 
 impl Rounds<'_> {
-    /// Runs them until all vertices have a color. `parts` are those of the input.
+    /// Runs the rounds until all vertices have a color. `parts` are the uniforms of the input.
     pub(super) fn run(
         self,
         gpu: &GpuContext,
@@ -98,7 +98,7 @@ impl Rounds<'_> {
             }
             let mut recorder = Recorder::new(gpu, &mut encoder, self.algorithm, None);
             if recorded == 0 {
-                // As if after an odd round, so that what is kept goes to the first list.
+                // The parity of an odd round, so that vertices put on the next list land on the first one.
                 for BoundKernel { kernel, group } in &self.first {
                     recorder.dispatch(kernel, group, &[STRIDE], groups);
                 }
@@ -120,7 +120,7 @@ impl Rounds<'_> {
             if left == 0 {
                 return Ok(work);
             }
-            // Every round takes a vertex from the list.
+            // Every round removes a vertex from the list.
             if recorded == self.max_rounds || left > self.vertices.saturating_sub(recorded) {
                 return Err(GpuError::Stalled {
                     algorithm: self.algorithm,
@@ -132,7 +132,7 @@ impl Rounds<'_> {
 }
 
 impl Work {
-    /// The result, of which the colors are known.
+    /// The coloring with these colors.
     pub(super) fn into_coloring(self, colors: Array<u32>) -> DeviceColoring {
         DeviceColoring {
             colors,

@@ -1,7 +1,7 @@
-//! Shortcut graph coloring (paper section 4.1, Algorithm 1), all three shortcuts.
+//! Shortcut graph coloring (paper section 4.1, Algorithm 1) with all three shortcuts.
 //!
-//! Twin of [`incise_coloring::scgc`]. Lists of higher neighbors and palettes are made on the device first, as on the
-//! CPU. Cost: each edge three times, and once for each smallest color that its lower vertex gets past.
+//! Twin of [`incise_coloring::scgc`]. Lists of higher neighbors and palettes are built on the device first. Cost: each
+//! edge is visited three times, and once more for each smallest color that its lower vertex passes over.
 
 use super::kernels::{ALL, ColoringKernels, HIGHER, SCGC};
 use super::rounds::{HEADER, Rounds, worklists};
@@ -12,7 +12,7 @@ use crate::{GpuContext, GpuError};
 /// Words of `Search` in the shaders.
 pub(crate) const SEARCH_WORDS: usize = 3;
 
-/// Colors with all shortcuts: a vertex goes as soon as no neighbor of higher priority can take its color.
+/// Colors with all shortcuts: a vertex is colored as soon as no neighbor of higher priority can take its color.
 ///
 /// The coloring is that of [`incise_coloring::scgc`], bit for bit.
 ///

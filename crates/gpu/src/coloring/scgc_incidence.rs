@@ -1,9 +1,9 @@
-//! Shortcut graph coloring from constraints and particles alone: no edge is ever listed.
+//! Shortcut graph coloring from constraints and particles, without a list of edges.
 //!
 //! Twin of [`incise_coloring::scgc`] on an [`Incidence`](incise_graph::Incidence). A tetrahedron has about 65 neighbors
-//! and four particles, so the graph costs more to build and to hold than this takes. Degrees are counted on the
-//! device first. Cost: a walk over the neighbors for the degrees, and one each time that a constraint loses the neighbor
-//! it waits for; memory of 24 bytes per constraint and 8 per particle beside input and result.
+//! but four particles, so building and storing the graph costs more than this coloring. Degrees are counted on the
+//! device first. Cost: a walk over the neighbors for the degrees, and one each time that the neighbor on which a
+//! constraint waits is colored; 24 bytes per constraint and 8 per particle beside input and result.
 
 use super::kernels::{
     ALL, ColoringKernels, INCIDENCE_DEGREES, SCGC_INCIDENCE, SCGC_INCIDENCE_WINDOW,
@@ -16,11 +16,11 @@ use crate::{GpuContext, GpuError};
 /// Words of `Wait` in the shaders.
 pub(crate) const WAIT_WORDS: usize = 3;
 
-/// Colors constraints so that those on one particle differ, with shortcuts 1 and 3.
+/// Colors constraints with shortcuts 1 and 3; constraints that share a particle get different colors.
 ///
-/// The coloring is that of [`incise_coloring::scgc`], bit for bit, whether from the incidence or from its graph. For
-/// clusters pass the [`quotient`](incise_graph::Incidence::quotient). Constraints of very many particles are slow: the
-/// count of neighbors takes time quadratic in that number.
+/// The coloring equals that of [`incise_coloring::scgc`] from the incidence or from its graph, bit for bit. For
+/// clusters, pass the [`quotient`](incise_graph::Incidence::quotient). Counting the neighbors of a constraint takes
+/// time quadratic in its number of particles, so constraints of very many particles are slow.
 ///
 /// # Errors
 /// If the device is lost or has no room for the work arrays.

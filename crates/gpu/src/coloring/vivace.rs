@@ -1,7 +1,7 @@
-//! Vivace: random colors, kept where no neighbor has the same (Fratarcangeli, Tibaldo and Pellacini 2016).
+//! Vivace: random colors, kept where no neighbor has an equal one (Fratarcangeli, Tibaldo and Pellacini 2016).
 //!
-//! Twin of [`incise_coloring::vivace`]: the random numbers are the same hash of seed, vertex and round. Cost: three
-//! dispatches a round, each over the edges of the uncolored vertices.
+//! Twin of [`incise_coloring::vivace`]: random numbers are the twin's hash of seed, vertex and round. Cost: three
+//! dispatches per round, each over the edges of the uncolored vertices.
 
 use bytemuck::{Pod, Zeroable};
 use incise_coloring::{Tie, VivaceOptions};
@@ -39,9 +39,9 @@ impl VivaceSettings {
     }
 }
 
-/// Colors at random.
+/// Colors by Vivace: every vertex draws random colors until none of its neighbors has drawn an equal one.
 ///
-/// The coloring is that of [`incise_coloring::vivace`], bit for bit, and so is the number of rounds.
+/// Coloring and number of rounds equal those of [`incise_coloring::vivace`], bit for bit.
 ///
 /// # Errors
 /// [`GpuError::Stalled`] if vertices are left without a color after the rounds allowed. If the device is lost or has no
@@ -80,7 +80,7 @@ pub fn vivace(
     if vertices == 0 {
         return DeviceColoring::empty(gpu);
     }
-    // What was picked last is what is kept.
+    // The result is the array of last picks.
     let array = Array::zeros(gpu, "colors", vertices)?;
     let words = size_of::<VivaceSettings>() / size_of::<u32>();
     let settings = kernels.array_for(gpu, "settings of vivace", words, BufferUsages::UNIFORM)?;

@@ -1,8 +1,9 @@
 //! WLC: color first, repair later, with worklists (Chen, Li and Yang 2017).
 //!
-//! Twin of [`incise_coloring::wlc`]. A round takes its worklist in chunks, one after the other, each of which sees what
-//! those before it chose; a step of three dispatches does one. The device keeps book of list and chunk itself, so steps
-//! of several rounds are handed over at once. Cost: O(edges of the worklist) a round, three dispatches a chunk.
+//! Twin of [`incise_coloring::wlc`]. A round processes its worklist in consecutive chunks, each of which sees the
+//! choices of those before it; a step of three dispatches processes one chunk. List and chunk are tracked on the
+//! device, so the steps of several rounds are submitted at once. Cost: O(edges of the worklist) per round, three
+//! dispatches per chunk.
 
 use std::num::NonZeroUsize;
 
@@ -17,7 +18,7 @@ use crate::array::Array;
 use crate::kernel::Recorder;
 use crate::{GpuContext, GpuError};
 
-/// Steps per submit: at least, and at most however many chunks a worklist has.
+/// Smallest and largest number of steps per submit; between them it is the number of chunks of the worklist.
 const STEPS: [usize; 2] = [32, 2048];
 
 /// Work state of a coloring, laid out like `WlcWork` in the shaders up to the list.
@@ -37,8 +38,8 @@ const HEADER: usize = size_of::<WlcWork>() / size_of::<u32>();
 
 /// Colors speculatively, `chunk` vertices at the same time.
 ///
-/// The coloring is that of [`incise_coloring::wlc`], bit for bit, and so is the number of rounds. A small chunk is slow
-/// here: each is three dispatches, which the next has to wait for.
+/// Coloring and number of rounds equal those of [`incise_coloring::wlc`], bit for bit. Small chunks are slow here: each
+/// takes three dispatches, one after the other.
 ///
 /// # Errors
 /// If the device is lost or has no room for the work arrays.
@@ -92,7 +93,7 @@ pub fn wlc(
     let buffers = [parts, &work, &arguments, &lost, &picked, colors];
     let gather = kernels.bind(gpu, &WLC_GATHER, &buffers)?;
 
-    // Each round halves the list or the chunk, and chunks of one lose no vertex.
+    // Each round halves the list or the chunk, and in chunks of one vertex there are no conflicts.
     let max_rounds = vertices.ilog2() + chunk.ilog2() + 3;
     let mut remaining = vertices.div_ceil(chunk);
     let mut before = None;
@@ -116,7 +117,7 @@ pub fn wlc(
         if state.count == 0 {
             return compacted(gpu, kernels, graph, array, rounds);
         }
-        // Every step takes a chunk of the list.
+        // Every step processes a chunk of the list.
         let now = Some((state.rounds, state.done));
         if state.rounds > max_rounds || before == now {
             return Err(GpuError::Stalled {

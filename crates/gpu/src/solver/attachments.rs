@@ -1,13 +1,13 @@
-//! [`Attachments`]: what hangs on moving handles, on the device.
+//! [`Attachments`]: attachments to moving handles on the device.
 //!
-//! What is rigid rigidly and what hangs by a compliance are two lists, since they are moved at different times; a list
-//! that is empty costs no dispatch. The host says where the handles are at the end of each substep and the device moves
-//! their anchors: rotations and sums in single precision, so anchors are taken relative to the middle of all anchors on a
-//! handle, which the host moves in double precision.
+//! Rigid and compliant attachments are two lists, since they are moved at different times; an empty list costs no
+//! dispatch. The host passes the poses of the handles at the end of each substep and the device moves the anchors.
+//! Rotations and sums are in single precision, so anchors are relative to the middle of all anchors on a handle, which
+//! the host moves in double precision.
 //!
-//! Twin: `constraints/attachments.rs` of incise-xpbd, to a few roundings. The anchor at the start of a frame is that of the handle
-//! there. Cost: 32 bytes an attachment, sent when some have changed; 48 bytes a handle and substep, sent when they
-//! differ from those before.
+//! Twin: `constraints/attachments.rs` of incise-xpbd, equal up to a few roundings. As in the twin, the anchor at the
+//! start of a frame is the handle's. Cost: 32 bytes per attachment, sent when some have changed; 48 bytes per handle
+//! and substep, sent when they have changed.
 
 use glam::{DMat3, DVec3, Vec3};
 use incise_xpbd::{AttachmentData, Changes, Solver, StepSettings};
@@ -20,22 +20,22 @@ use crate::array::Array;
 use crate::kernel::Recorder;
 use crate::{GpuContext, GpuError};
 
-/// Three rows of a rotation with what is added to each.
+/// Three rows of a rotation, each with its component of the translation.
 type Rows = [[f32; 4]; 3];
 
-/// Attachments with what hangs on them.
+/// The attachments of a body.
 #[derive(Debug)]
 pub(crate) struct Attachments {
-    /// What is where its handle says.
+    /// Particles that are moved to their anchors.
     rigid: List,
-    /// What is pulled there.
+    /// Particles that are pulled to their anchors by a compliant constraint.
     soft: List,
     /// Handle -> the middle of the anchors on it.
     middles: Vec<DVec3>,
-    /// All at the start of a frame, then all at the end of each substep.
+    /// Poses of all handles at the start of a frame, then at the end of each substep.
     poses: Array<Rows>,
     sent: Vec<Rows>,
-    /// Of what hangs; empty with one iteration.
+    /// Multipliers of compliant attachments; empty with one iteration.
     multipliers: Array<[f32; 4]>,
 }
 
@@ -79,14 +79,14 @@ impl Attachments {
         })
     }
 
-    /// Takes over what hangs on handles if it may have changed; nothing is kept for nothing.
+    /// Applies changes of attachments; without attachments no memory is kept.
     pub(crate) fn sync(
         this: &mut Option<Self>,
         gpu: &GpuContext,
         solver: &Solver<f32>,
         changes: &Changes,
     ) -> Result<(), GpuError> {
-        // A particle that was fixed or freed may be attached to a handle.
+        // A particle that was fixed or freed may have an attachment.
         if !changes.attachments && changes.particles.is_empty() {
             return Ok(());
         }
@@ -112,7 +112,7 @@ impl Attachments {
         handles.soft.set(gpu, soft)
     }
 
-    /// Sends where the handles are in a frame, unless that is there.
+    /// Sends the poses of the handles in a frame, unless the device has them.
     pub(crate) fn prepare(
         &mut self,
         gpu: &GpuContext,
@@ -155,7 +155,7 @@ impl Attachments {
         self.soft.host.len()
     }
 
-    /// The kernels for what there is.
+    /// Binds the kernels of the lists that are not empty.
     pub(crate) fn bind(
         &self,
         gpu: &GpuContext,
@@ -219,7 +219,7 @@ impl Attachments {
     }
 }
 
-/// The kernels for what hangs on handles, with their workgroups.
+/// The kernels of attachments, with their workgroups.
 #[derive(Debug, Default)]
 pub(crate) struct AttachmentKernels {
     rigid: Option<(BoundKernel, BoundKernel, usize)>,
@@ -227,21 +227,21 @@ pub(crate) struct AttachmentKernels {
 }
 
 impl AttachmentKernels {
-    /// At the start of a substep; `uniform` is where its uniform is.
+    /// Moves rigidly attached particles at the start of a substep; `uniform` is the offset of its uniform.
     pub(crate) fn move_held(&self, pass: &mut Recorder<'_>, uniform: u32) {
         if let Some((moving, _, groups)) = &self.rigid {
             moving.run(pass, &[uniform], *groups);
         }
     }
 
-    /// In an iteration, after the tets.
+    /// Solves compliant attachments in an iteration, after the tets.
     pub(crate) fn solve(&self, pass: &mut Recorder<'_>, uniform: u32) {
         if let Some((solve, groups)) = &self.soft {
             solve.run(pass, &[uniform], *groups);
         }
     }
 
-    /// At the end of a substep.
+    /// Updates rigidly attached particles at the end of a substep.
     pub(crate) fn update_held(&self, pass: &mut Recorder<'_>) {
         if let Some((_, update, groups)) = &self.rigid {
             update.run(pass, &[], *groups);

@@ -1,8 +1,8 @@
-//! [`Body`]: the arrays of a body on the device, and how they follow a solver on the host.
+//! [`Body`]: the arrays of a body on the device, and their synchronization with a solver on the host.
 //!
-//! What a cut changes arrives as patches, which a kernel puts where they belong: the tets of a slot lie number by number
-//! in 16 parts of an array. Nothing else is sent. Memory: 96 bytes a slot and 48 a particle; 16 a slot more with
-//! several materials, 8 where multipliers are kept, 16 a particle for Jacobi. Cost: O(what changed).
+//! Changes by a cut arrive as patches, which a kernel scatters: the numbers of a tet slot are in 16 parts of an array.
+//! Nothing else is sent. Memory: 96 bytes per slot and 48 per particle; 16 per slot more with several materials, 8
+//! where multipliers are kept, 16 per particle for Jacobi. Cost: O(changes).
 
 use incise_graph::Schedule;
 use incise_xpbd::{Changes, Solver};
@@ -18,7 +18,7 @@ use crate::array::Array;
 use crate::kernel::Recorder;
 use crate::{GpuContext, GpuError};
 
-/// Patches sent at once.
+/// Patches sent in one upload.
 const PATCHES: usize = 1 << 16;
 
 /// A body on the device.
@@ -28,20 +28,20 @@ pub(crate) struct Body {
     pub(crate) colors: Colors,
     /// Position relative to the host's origin, and inverse mass.
     pub(crate) particles: Array<[f32; 4]>,
-    /// At the start of the substep.
+    /// Positions at the start of the substep.
     pub(crate) previous: Array<[f32; 4]>,
     pub(crate) velocities: Array<[f32; 4]>,
     pub(crate) corners: Array<[u32; 4]>,
     pub(crate) rest: Array<f32>,
     pub(crate) constants: Array<[f32; 4]>,
     pub(crate) tiles: Array<u32>,
-    /// Empty unless a step keeps them.
+    /// Multipliers; empty unless a step keeps them.
     pub(crate) multipliers: Array<[f32; 2]>,
-    /// Empty until a step is Jacobi's; all 0 between its iterations.
+    /// Sums of Jacobi corrections; empty until the first Jacobi step, and all 0 between iterations.
     pub(crate) corrections: Array<[f32; 4]>,
-    /// If something hangs on handles.
+    /// Attachments, if there are any.
     pub(crate) attachments: Option<Attachments>,
-    /// If there are such constraints.
+    /// Distance constraints, if there are any.
     pub(crate) distances: Option<ScalarConstraints>,
     pub(crate) volumes: Option<ScalarConstraints>,
     tet_patches: Array<TetPatch>,
@@ -72,7 +72,7 @@ impl Body {
         })
     }
 
-    /// Sends what has changed.
+    /// Sends the changes since the last call.
     pub(crate) fn sync(
         &mut self,
         gpu: &GpuContext,

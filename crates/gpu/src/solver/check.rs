@@ -1,7 +1,7 @@
-//! [`GpuSolver::check`]: whether the device has what schedule, tets and masses say.
+//! [`GpuSolver::check`]: compares the device's data with schedule, tets and masses.
 //!
-//! Everything that is derived is read back and compared with what the host recomputes, tet by tet. Shares nothing with
-//! the code that sends patches but the numbers of a tet. Cost: reads all arrays, O(tets).
+//! All derived data are read back and compared with values that the host recomputes, tet by tet. Apart from the numbers
+//! of a tet, the check shares no code with the update by patches. Cost: reads all arrays, O(tets).
 
 use incise_graph::Schedule;
 
@@ -11,7 +11,7 @@ use super::layout::{ClusterMapping, THREADS};
 use super::tile::number_count;
 use crate::GpuError;
 
-/// What the device holds, read back.
+/// The data of the device, read back.
 struct Copy {
     particles: Vec<[f32; 4]>,
     corners: Vec<[u32; 4]>,
@@ -23,11 +23,11 @@ struct Copy {
 }
 
 impl GpuSolver {
-    /// Proves that what the next step with this schedule would solve is what schedule, tets and masses say, to the bit,
-    /// and that every cluster is solved once, in the order of its color. O(tets); for tests and on request.
+    /// Checks that the data of the next step with this schedule equal schedule, tets and masses, bit for bit, and that
+    /// every cluster is solved once, in the order of its color. O(tets); for tests and on request.
     ///
     /// # Errors
-    /// [`GpuError::Inconsistent`] with the first difference, also if something was not yet [sent](GpuSolver::send).
+    /// [`GpuError::Inconsistent`] with the first difference, also if a change was not yet [sent](GpuSolver::send).
     pub fn check(&self, schedule: &Schedule) -> Result<(), GpuError> {
         let (gpu, body) = (&*self.gpu, &self.body);
         let copy = Copy {
@@ -90,7 +90,7 @@ impl GpuSolver {
         Ok(())
     }
 
-    /// Goes through the dispatches as the device does and checks when each tet is solved.
+    /// Visits the dispatches in the order of the device and checks when each tet is solved.
     fn check_order(&self, schedule: &Schedule, copy: &Copy) -> Result<(), GpuError> {
         // Colors without clusters have no dispatch.
         let colors = (0..schedule.color_count()).filter(|&c| !schedule.clusters(c).is_empty());
@@ -121,7 +121,7 @@ impl GpuSolver {
         }
     }
 
-    /// The tet slots of a group that have a tet.
+    /// The slots of a group that have a tet.
     fn tet_slots(&self, group: u32, copy: &Copy) -> Vec<usize> {
         let group = group as usize;
         match self.cluster_mapping() {
@@ -144,7 +144,7 @@ impl GpuSolver {
         }
     }
 
-    /// Looks whether the tets of a step share a particle.
+    /// Checks that the tets of a step share no particle.
     fn check_steps(&self, copy: &Copy) -> Result<(), GpuError> {
         if self.cluster_mapping() == ClusterMapping::Threads {
             return Ok(());
@@ -152,7 +152,7 @@ impl GpuSolver {
         let slots = &self.body.layout.slots;
         let room = self.body.layout.depth();
         for tile in 0..slots.slot_count() {
-            // What is said of a tile without cluster is old.
+            // Data of a tile without cluster are outdated.
             if u32::try_from(tile).is_ok_and(|slot| slots.cluster(slot).is_none()) {
                 continue;
             }
@@ -174,7 +174,7 @@ impl GpuSolver {
     }
 }
 
-/// The number of steps of a tile, and where they end.
+/// The number of steps of a tile, and their ends.
 fn steps(tile: usize, room: usize, copy: &Copy) -> (usize, &[u32]) {
     let header = tile * number_count(room);
     let ends = &copy.tiles[header + 2..header + 2 + room];

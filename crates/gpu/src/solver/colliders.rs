@@ -1,8 +1,8 @@
 //! [`Colliders`]: the colliders of all substeps of a frame on the device.
 //!
-//! The host says where they are at the end of each substep, in its own precision; the kernel only asks what is nearest.
-//! They are sent in one piece, and only when they are others than those that are there: colliders at rest once. Cost: 80
-//! bytes a collider and substep.
+//! The host computes the poses at the end of each substep in its own precision; the kernel only computes nearest
+//! points. All colliders are sent together, and only if their values differ from those on the device: colliders at rest
+//! are sent once. Cost: 80 bytes per collider and substep.
 
 use incise_xpbd::{Solver, StepSettings};
 
@@ -21,7 +21,7 @@ pub(crate) struct Colliders {
 }
 
 impl Colliders {
-    /// Sends the colliders of a frame unless they are there; nothing is kept for none.
+    /// Sends the colliders of a frame unless the device has them; without colliders no memory is kept.
     pub(crate) fn sync(
         this: &mut Option<Self>,
         gpu: &GpuContext,
@@ -53,7 +53,7 @@ impl Colliders {
         Ok(())
     }
 
-    /// The kernel that puts particles on their surface.
+    /// The kernel that projects particles to the surfaces of the colliders.
     pub(crate) fn bind(
         &self,
         gpu: &GpuContext,

@@ -1,10 +1,10 @@
 //! [`Colors`]: the dispatches of a pass over the tets.
 //!
-//! A color is a dispatch of a workgroup for each of its groups. Colors of a single group that follow each other are one
-//! dispatch of one workgroup, which waits at a barrier between them: that is what the tail of a coloring is made of, and
-//! all of a small body. The lists leave every color room to grow, and only what differs from what the device has is sent.
+//! A color is a dispatch with a workgroup for each of its groups. Consecutive colors of a single group are one dispatch
+//! of one workgroup, with a barrier between colors. The tail of a coloring consists of such colors, and so does all of
+//! a small body. The lists leave every color room to grow, and only differences from the device's copy are sent.
 //!
-//! Cost: O(groups) on the host when they changed, uploads in pieces of 256 bytes.
+//! Cost: O(groups) on the host after a change, uploads in pieces of 256 bytes.
 
 use incise_graph::Rows;
 
@@ -15,17 +15,17 @@ use crate::{GpuContext, GpuError};
 use super::gpu_types::DispatchRange;
 use super::kernels::BoundKernel;
 
-/// Numbers that are compared and sent together.
+/// Numbers compared and sent together.
 const PIECE: usize = 64;
 
 /// One dispatch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Run {
-    /// Where its range is in the buffer of ranges, in bytes.
+    /// The offset of its range in the buffer of ranges, in bytes.
     pub(crate) offset: u32,
-    /// Workgroups, if it is one color; several colors have one.
+    /// The number of workgroups of one color; 1 for several colors.
     pub(crate) groups: usize,
-    /// Whether it is several colors.
+    /// True for several colors.
     pub(crate) tail: bool,
 }
 
@@ -35,9 +35,9 @@ pub(crate) struct Colors {
     pub(crate) runs: Vec<Run>,
     /// The groups, color by color, then those of tails.
     pub(crate) lists: SyncedArray,
-    /// What each run works on, [`STRIDE`] bytes each.
+    /// The range of each dispatch, [`STRIDE`] bytes each.
     pub(crate) ranges: SyncedArray,
-    /// Color -> room in the lists.
+    /// Color -> capacity in the lists.
     rooms: Vec<usize>,
 }
 
@@ -52,7 +52,7 @@ impl Colors {
         })
     }
 
-    /// Takes over the groups of all colors.
+    /// Applies the groups of all colors.
     pub(crate) fn sync(&mut self, gpu: &GpuContext, groups_of: &Rows<u32>) -> Result<(), GpuError> {
         let colors = groups_of.row_count();
         self.rooms.resize(colors, 0);
@@ -96,7 +96,7 @@ impl Colors {
         }
     }
 
-    /// Ends a row of colors of one group each.
+    /// Ends a run of colors of one group each.
     fn close(
         &mut self,
         alone: &mut Vec<u32>,
@@ -116,7 +116,7 @@ impl Colors {
     }
 }
 
-/// Appends a range; returns where it is, in bytes.
+/// Appends a range; returns its offset in bytes.
 fn range(ranges: &mut Vec<u32>, first: usize, count: usize) -> u32 {
     let offset = index(ranges.len() * size_of::<u32>());
     let range = DispatchRange {
@@ -132,7 +132,7 @@ fn index(value: usize) -> u32 {
     u32::try_from(value).expect("fewer than 2^32 groups")
 }
 
-/// Numbers on the device of which the host has a copy, so that only what differs is sent.
+/// Numbers on the device with a copy on the host, so that only differences are sent.
 #[derive(Debug)]
 pub(crate) struct SyncedArray {
     pub(crate) array: Array<u32>,

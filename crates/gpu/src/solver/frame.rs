@@ -1,7 +1,8 @@
 //! [`Frame`]: a step as one pass of dispatches.
 //!
-//! Everything that differs from substep to substep is in buffers before the pass begins, so it needs no break. Twin:
-//! `Solver::substep` of incise-xpbd. Cost: recording a third of a microsecond a dispatch.
+//! All values that differ between substeps are in buffers before the pass begins, so the pass is
+//! not interrupted. Twin: `Solver::substep` of incise-xpbd. Cost: well below a microsecond to
+//! record a dispatch.
 
 use incise_xpbd::{Solver, StepSettings, TetSolve};
 use wgpu::{Buffer, BufferUsages, SubmissionIndex};
@@ -22,26 +23,26 @@ use super::stages::{Clock, Stage::*, Track};
 use crate::array::{Array, Copy};
 use crate::{GpuContext, GpuError};
 
-/// What a step needs beside the body.
+/// Data of a step beside the body.
 #[derive(Debug)]
 pub(crate) struct Frame {
     settings: Array<Settings>,
     sent: Option<Settings>,
-    /// If something asks for its uniform.
+    /// Uniforms of iterations, if a kernel needs them.
     uniforms: Option<IterationUniforms>,
-    /// If there are colliders.
+    /// Colliders, if there are any.
     colliders: Option<Colliders>,
-    /// If iterations are Jacobi's.
+    /// Data of Jacobi iterations, if these are selected.
     jacobi: Option<Jacobi>,
     /// Positions before the constraints of the last substep; empty unless a step keeps them.
     predicted: Array<[f32; 4]>,
-    /// The form that solved the tets, if the last step kept what residuals need.
+    /// The form of the tet solve, if the last step kept the data for residuals.
     kept: Option<TetSolve>,
-    /// If stages are timed.
+    /// Timestamps, if stages are timed.
     clock: Option<Clock>,
 }
 
-/// What a step reads and writes beside that.
+/// Inputs and outputs of a step beside the frame.
 #[derive(Debug)]
 pub(crate) struct Scene<'a> {
     pub(crate) gpu: &'a GpuContext,
@@ -65,7 +66,7 @@ impl Frame {
         })
     }
 
-    /// Records a step and hands it over; returns what to wait for.
+    /// Records and submits a step; returns the index to wait for.
     pub(crate) fn record(
         &mut self,
         scene: Scene<'_>,
@@ -138,7 +139,7 @@ impl Frame {
         track.submit()
     }
 
-    /// Brings what the frame needs to the device, unless it is there.
+    /// Sends the data of the frame, unless the device has them.
     fn prepare(
         &mut self,
         gpu: &GpuContext,
@@ -165,7 +166,7 @@ impl Frame {
         IterationUniforms::sync(&mut self.uniforms, gpu, settings, asks)
     }
 
-    /// Sends the settings if they are others.
+    /// Sends the settings if they have changed.
     fn send_settings(
         &mut self,
         gpu: &GpuContext,
@@ -218,7 +219,7 @@ impl Frame {
         }
     }
 
-    /// What times stages, if that was requested.
+    /// The timestamps of stages; `None` unless requested.
     pub(crate) fn clock(&mut self) -> &mut Option<Clock> {
         &mut self.clock
     }
@@ -228,7 +229,7 @@ impl Frame {
         self.settings.buffer()
     }
 
-    /// Bytes of what the step needs.
+    /// Bytes of the frame's data on the device.
     pub(crate) fn bytes(&self) -> u64 {
         let uniforms = self
             .uniforms
@@ -241,7 +242,7 @@ impl Frame {
         always + uniforms + colliders + jacobi + clock
     }
 
-    /// Records copies of what residuals need, if the last step kept it.
+    /// Records copies of the data for residuals, if the last step kept them.
     pub(crate) fn copy_last_substep(
         &self,
         gpu: &GpuContext,
@@ -260,7 +261,7 @@ impl Frame {
     }
 }
 
-/// Copies of what residuals need of the last substep.
+/// Copies of the last substep's data for residuals.
 #[derive(Debug)]
 pub(crate) struct LastSubstep {
     pub(crate) predicted: Copy<[f32; 4]>,
@@ -269,21 +270,21 @@ pub(crate) struct LastSubstep {
     pub(crate) tet_solve: TetSolve,
 }
 
-/// The kernels of a step, in the order of a substep; those that it does not need are not there.
+/// The kernels of a step, in the order of a substep; unneeded ones are absent.
 #[derive(Debug)]
 struct StepContext<'a> {
     predict: BoundKernel,
-    /// Where multipliers are kept.
+    /// Clears multipliers, if they are kept.
     clear: Option<BoundKernel>,
-    /// For a color of tets, and for a row of small colors.
+    /// Kernels for one color of tets, and for several small colors.
     solve: [BoundKernel; 2],
     project: Option<BoundKernel>,
     update: BoundKernel,
-    /// If a material is damped.
+    /// Damping kernels, if a material is damped.
     damp: Option<[BoundKernel; 2]>,
     jacobi: Option<JacobiKernels>,
     handles: Option<AttachmentKernels>,
-    /// Distances before volumes.
+    /// Kernels of distances, then of volumes.
     scalars: Vec<ScalarKernels<'a>>,
 }
 

@@ -1,4 +1,4 @@
-//! What host and kernels share, number by number; tests compare it with the shaders.
+//! Structs shared by host and kernels; tests compare them with the shaders.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -92,7 +92,7 @@ pub(crate) struct ParticleSums {
 pub(crate) struct TetPatch {
     pub(crate) tet_slot: u32,
     pub(crate) unused: [u32; 3],
-    /// All 0 where there is no tet.
+    /// All 0 for an empty slot.
     pub(crate) corners: [u32; 4],
     pub(crate) rest: [f32; NUMBERS],
     pub(crate) constants: [f32; 4],

@@ -1,8 +1,8 @@
-//! [`IterationUniforms`]: the uniforms of an iteration beside the settings: its number, its substep and the weight of
-//! Chebyshev extrapolation.
+//! [`IterationUniforms`]: per-iteration values: number, substep and weight of Chebyshev extrapolation.
 //!
-//! They are all in one buffer before the frame begins, and a dispatch sees its own by a dynamic offset. Only scenes with
-//! colliders, handles or Jacobi iterations need them. Cost: 256 bytes an iteration of a frame, sent when settings change.
+//! All of them are in one buffer before the frame begins, and a dispatch sees its own by a dynamic offset. Only scenes
+//! with colliders, handles or Jacobi iterations need them. Cost: 256 bytes per iteration of a frame, sent when settings
+//! change.
 
 use incise_xpbd::{Method, StepSettings};
 use wgpu::{Buffer, BufferUsages};
@@ -19,7 +19,7 @@ pub(crate) struct IterationUniforms {
     sent: Option<(u32, u32, Method)>,
 }
 
-/// Uniforms that would fit where one is.
+/// Uniforms that fit into the space of one.
 const PER_STRIDE: usize = STRIDE as usize / size_of::<IterationUniform>();
 
 impl IterationUniforms {
@@ -27,7 +27,7 @@ impl IterationUniforms {
         self.array.buffer()
     }
 
-    /// Sends the uniforms of a frame unless they are there; keeps none unless the frame `asks` for them.
+    /// Sends the uniforms of a frame unless the device has them; keeps none unless the frame `asks` for them.
     pub(crate) fn sync(
         this: &mut Option<Self>,
         gpu: &GpuContext,
@@ -74,14 +74,14 @@ impl IterationUniforms {
     }
 }
 
-/// Where the uniform of an iteration is, in bytes.
+/// The offset of an iteration's uniform, in bytes.
 pub(crate) fn offset(settings: &StepSettings, substep: u32, iteration: u32) -> u32 {
     let number = u64::from(substep) * u64::from(settings.iterations) + u64::from(iteration);
-    // More than a buffer holds are refused when they are sent; without uniforms the offset is not used.
+    // Sending rejects more than fit into a buffer; without uniforms the offset is not used.
     u32::try_from(number * u64::from(STRIDE)).unwrap_or(u32::MAX)
 }
 
-/// How far each iteration of a substep leaps; 0 is not at all. Twin: `Jacobi::extrapolate` of incise-xpbd.
+/// The extrapolation weight of each iteration of a substep; 0 is none. Twin: `Jacobi::extrapolate` of incise-xpbd.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "the device computes in single precision"

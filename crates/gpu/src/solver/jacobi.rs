@@ -1,11 +1,13 @@
-//! [`Jacobi`]: what iterations need that correct all tets from the same positions, and their extrapolation.
+//! [`Jacobi`]: Jacobi iterations, which correct all tets from the same positions, and their extrapolation.
 //!
-//! The kernels of the tets gather corrections color by color, so that every sum has one order and no two threads add to
-//! one particle at once; a pass over the particles then adds them. Chebyshev keeps where the previous iteration began,
-//! of positions and of multipliers, and its weights are in the uniforms. Only threads gather: a tile has its particles in
-//! workgroup memory, where a correction would be seen at once. Twin: `jacobi.rs` of incise-xpbd.
+//! The kernels of the tets gather corrections color by color, so that every sum has a fixed order and no two threads
+//! add to one particle at a time; a pass over the particles then adds the sums. Chebyshev keeps positions and
+//! multipliers from the start of the previous iteration; its weights are in the uniforms. Only the thread mapping
+//! gathers: a tile has its particles in workgroup memory, where a correction would take effect at once. Twin:
+//! `jacobi.rs` of incise-xpbd.
 //!
-//! Cost: a dispatch an iteration, with Chebyshev two; 16 bytes a particle, with Chebyshev 16 more and 16 a tet slot.
+//! Cost: one dispatch per iteration, two with Chebyshev; 16 bytes per particle, with Chebyshev 16 more and 16 per tet
+//! slot.
 
 use incise_xpbd::{Method, StepSettings};
 use wgpu::Buffer;
@@ -18,18 +20,18 @@ use crate::array::Array;
 use crate::kernel::Recorder;
 use crate::{GpuContext, GpuError};
 
-/// Iterates that are kept.
+/// Previous iterates for extrapolation.
 #[derive(Debug)]
 pub(crate) struct Jacobi {
     extrapolating: bool,
-    /// Where the previous iteration began; empty without extrapolation.
+    /// Positions at the start of the previous iteration; empty without extrapolation.
     before: Array<[f32; 4]>,
     /// Tet slot -> multipliers at the start of this iteration and of the one before; empty without extrapolation.
     history: Array<[f32; 4]>,
 }
 
 impl Jacobi {
-    /// Makes room for what the settings ask for; nothing is kept for nothing.
+    /// Allocates memory for the settings; without Jacobi none is kept.
     pub(crate) fn prepare(
         this: &mut Option<Self>,
         gpu: &GpuContext,
@@ -108,12 +110,12 @@ impl Jacobi {
 #[derive(Debug)]
 pub(crate) struct JacobiKernels {
     apply: BoundKernel,
-    /// Where multipliers are kept and extrapolated.
+    /// Extrapolates multipliers, if they are kept.
     extrapolate: Option<(BoundKernel, usize)>,
 }
 
 impl JacobiKernels {
-    /// After the tets of the iteration whose uniform is at `uniform`; `particles` is how many workgroups these are.
+    /// Ends the iteration whose uniform is at `uniform`; `particles` is the number of workgroups over the particles.
     pub(crate) fn run(&self, pass: &mut Recorder<'_>, uniform: u32, particles: usize) {
         self.apply.run(pass, &[uniform], particles);
         if let Some((leap, groups)) = &self.extrapolate {

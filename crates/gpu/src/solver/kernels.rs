@@ -1,7 +1,7 @@
-//! The kernels of the solver, [`Variant`]: which of their branches are compiled, and [`BoundKernel`]: one with its buffers.
+//! The kernels of the solver, [`Variant`]: their compiled branches, and [`BoundKernel`]: a kernel with its buffers.
 //!
-//! Branches that a scene does not need (kept multipliers, several materials, damped constraints) are not compiled. A kernel
-//! is compiled when the first step needs it.
+//! Branches that a scene does not need (kept multipliers, several materials, damped constraints) are not compiled. A
+//! kernel is compiled when a step first needs it.
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -14,24 +14,24 @@ use super::layout::ClusterMapping;
 use crate::kernel::{BindingKind, Kernel, Recorder};
 use crate::{GpuContext, GpuError};
 
-/// What is constrained.
+/// The kind of a scalar constraint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Distance,
     Volume,
 }
 
-/// The text of a kernel and how it uses its buffers.
+/// The text of a kernel and the kinds of its bindings.
 #[derive(Debug)]
 pub(crate) struct Source {
     pub(crate) name: &'static str,
     pub(crate) parts: &'static [&'static str],
     pub(crate) uses: &'static [BindingKind],
-    /// The branches that it has.
+    /// The overrides that it has.
     flags: &'static [Flag],
 }
 
-/// What is fixed when a kernel is compiled: a branch that it has or not, or a size.
+/// A constant fixed when a kernel is compiled: a branch or a size.
 #[derive(Clone, Copy, Debug)]
 enum Flag {
     Damped,
@@ -50,7 +50,7 @@ macro_rules! text {
     };
 }
 
-/// Bytes of a dispatch range, and of a turn.
+/// Bytes of a dispatch range and of an iteration uniform.
 const DISPATCH_RANGE: u64 = 8;
 const ITERATION_UNIFORM: u64 = 16;
 
@@ -428,7 +428,7 @@ pub(crate) const MEASURE_PARTICLES: Source = Source {
     flags: &[],
 };
 
-/// What kernels that solve constraints of one number use.
+/// Bindings of the kernels that solve scalar constraints.
 const SCALARS: &[BindingKind] = &[
     BindingKind::Uniform,
     BindingKind::DynamicUniform(DISPATCH_RANGE),
@@ -518,7 +518,7 @@ pub(crate) const SOURCES: &[Source] = &[
     MEASURE_PARTICLES,
 ];
 
-/// The kernels that solve a color of tets, and a row of colors of one group each.
+/// The kernels that solve one color of tets, and several colors of one group each.
 pub(crate) fn solve_tets(mapping: ClusterMapping) -> [&'static Source; 2] {
     match mapping {
         ClusterMapping::Threads => [&SOLVE_THREADS, &SOLVE_THREADS_TAIL],
@@ -526,7 +526,7 @@ pub(crate) fn solve_tets(mapping: ClusterMapping) -> [&'static Source; 2] {
     }
 }
 
-/// The kernels that damp a color of tets, and a row of colors of one group each.
+/// The kernels that damp one color of tets, and several colors of one group each.
 pub(crate) fn damp_tets(mapping: ClusterMapping) -> [&'static Source; 2] {
     match mapping {
         ClusterMapping::Threads => [&DAMP_THREADS, &DAMP_THREADS_TAIL],
@@ -534,7 +534,7 @@ pub(crate) fn damp_tets(mapping: ClusterMapping) -> [&'static Source; 2] {
     }
 }
 
-/// The kernels that solve a color of constraints of one number, and a row of small colors.
+/// The kernels that solve one color of scalar constraints, and several small colors.
 pub(crate) fn solve_scalars(kind: Kind) -> [&'static Source; 2] {
     match kind {
         Kind::Distance => [&SOLVE_DISTANCES, &SOLVE_DISTANCES_TAIL],
@@ -542,18 +542,18 @@ pub(crate) fn solve_scalars(kind: Kind) -> [&'static Source; 2] {
     }
 }
 
-/// Which branches of a kernel are compiled.
+/// The branches of a kernel to compile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Variant {
-    /// Whether constraints of one number are damped.
+    /// True if scalar constraints are damped.
     pub(crate) damped: bool,
     /// A constant of `tet_solve.wgsl`; see [`Variant::with_tet_solve`].
     pub(crate) tet_solve: u32,
-    /// Whether the split form accumulates multipliers.
+    /// True if the split form accumulates multipliers.
     pub(crate) iterated: bool,
     pub(crate) keeps: bool,
     pub(crate) jacobi: bool,
-    /// Whether tets have materials of their own.
+    /// True if the tets have several materials.
     pub(crate) various: bool,
     /// Tets of a tile; 0 if corners are not numbered within tiles.
     pub(crate) tile: u32,
@@ -575,7 +575,7 @@ impl Variant {
         }
     }
 
-    /// The override that a flag is in shaders, with its value.
+    /// Name and value of the override of a flag.
     fn value(self, flag: Flag) -> (&'static str, f64) {
         let (name, on) = match flag {
             Flag::Damped => ("DAMPED", self.damped),
@@ -585,7 +585,7 @@ impl Variant {
             Flag::Jacobi => ("JACOBI", self.jacobi),
             Flag::Uniform => ("UNIFORM", !self.various),
             Flag::Tiled => ("TILED", self.tile > 0),
-            // Never 0: a compiler must not divide by that, even in code that does not run.
+            // Never 0: a compiler must not divide by 0, even in code that does not run.
             Flag::TileTets => return ("TILE_TETS", f64::from(self.tile.max(1))),
         };
         (name, f64::from(u8::from(on)))
@@ -599,7 +599,7 @@ pub(crate) struct Kernels {
 }
 
 impl Kernels {
-    /// Compiles a kernel, unless it is compiled.
+    /// Returns a kernel, compiled at the first call.
     pub(crate) fn get(
         &mut self,
         gpu: &GpuContext,
@@ -617,7 +617,7 @@ impl Kernels {
         Ok(Arc::clone(kernel))
     }
 
-    /// Compiles a kernel, unless it is compiled, and binds it.
+    /// Binds a kernel, compiled at the first call.
     pub(crate) fn bind(
         &mut self,
         gpu: &GpuContext,

@@ -1,11 +1,12 @@
 //! [`Layout`]: the slot of each tet on the device, and the patches to send after a change.
 //!
-//! Two forms of the same schedule. [`ClusterMapping::Threads`] is the paper's: a thread solves a cluster, tet after tet, 64
-//! clusters of a color a workgroup. [`ClusterMapping::Workgroups`] takes clusters of up to 128 tets: a workgroup solves one, with
-//! its particles in workgroup memory and its tets in steps that share no particle, so that a small body needs few colors
-//! and thus few dispatches. Either way a cluster has a slot (`slots.rs`), and its tets have the tet slots within it.
+//! There are two mappings of a schedule. [`ClusterMapping::Threads`] is the paper's: a thread solves a cluster, tet
+//! after tet, and 64 clusters of a color are a workgroup. [`ClusterMapping::Workgroups`] is for clusters of up to 256
+//! tets: a workgroup solves one cluster, with its particles in workgroup memory and its tets in steps that share no
+//! particle. A small body then needs few colors and thus few dispatches. In both a cluster has a slot (`slots.rs`), and
+//! its tets have the tet slots within it.
 //!
-//! Cost: O(tets of changed clusters and changed tets), O(tets) for another schedule or other masses.
+//! Cost: O(tets of changed clusters and changed tets); O(tets) for another schedule or other masses.
 
 use incise_graph::{ClusterId, Schedule};
 use incise_xpbd::{Changes, Solver};
@@ -15,10 +16,10 @@ use super::slots::{Moved, Slots};
 use super::tile::{self, Tile};
 use crate::GpuError;
 
-/// Threads of a workgroup, and tets whose numbers lie side by side.
+/// Threads of a workgroup, and tets whose numbers are adjacent in memory.
 pub(crate) const THREADS: usize = 64;
 
-/// Nowhere.
+/// The slot of a tet that has none.
 const NONE: u32 = u32::MAX;
 
 /// The unit of the device that solves a cluster.
@@ -27,16 +28,16 @@ pub enum ClusterMapping {
     /// A thread, tet after tet (paper section 4.1).
     #[default]
     Threads,
-    /// A workgroup, its tets in steps: for clusters of up to 256 tets, of which [`ClusterMapping::LARGE`] and more are worth it.
-    /// Tiles have room for 64, 128 or 256 tets, whatever the largest cluster needs.
+    /// A workgroup, its tets in steps: for clusters of up to 256 tets, worthwhile from [`ClusterMapping::LARGE`] tets
+    /// on. Tiles have room for 64, 128 or 256 tets, chosen by the largest cluster.
     Workgroups,
 }
 
 impl ClusterMapping {
-    /// The size of clusters, as a limit that a clustering was made with, from which on a workgroup is worth it.
+    /// The size limit of a clustering from which on workgroups are faster than threads.
     pub const LARGE: usize = 33;
 
-    /// The form for clusters of at most so many tets.
+    /// The mapping for clusters of at most this many tets.
     #[must_use]
     pub fn for_clusters_of(limit: usize) -> Self {
         if limit < Self::LARGE {
@@ -51,27 +52,27 @@ impl ClusterMapping {
 #[derive(Debug)]
 pub(crate) struct Layout {
     pub(crate) mapping: ClusterMapping,
-    /// Tet slots of a cluster slot.
+    /// Tet slots per cluster slot.
     depth: usize,
     pub(crate) slots: Slots,
-    /// Slot -> tets in it.
+    /// Slot -> number of its tets.
     filled: Vec<u32>,
     /// Tet -> tet slot.
     tet_slots: Vec<u32>,
-    /// Tet slot -> tet, in slots that have one.
+    /// Tet slot -> tet, in occupied slots.
     tets: Vec<u32>,
 }
 
-/// What has to be sent to the device.
+/// Changes to send to the device.
 #[derive(Debug, Default)]
 pub(crate) struct Patch {
-    /// Whether nothing on the device is of use any more.
+    /// True if all data on the device are outdated.
     pub(crate) is_rebuilt: bool,
-    /// Patches of different tet slots.
+    /// Patches of distinct tet slots.
     pub(crate) tets: Vec<TetPatch>,
     /// Tiles by number.
     pub(crate) tiles: Vec<(u32, Tile)>,
-    /// Whether colors have other groups.
+    /// True if the groups of colors have changed.
     pub(crate) regrouped: bool,
 }
 
@@ -91,7 +92,7 @@ impl Layout {
         }
     }
 
-    /// Places on the device.
+    /// Tet slots on the device.
     pub(crate) fn tet_slot_count(&self) -> usize {
         self.slots.slot_count() * self.depth
     }
@@ -101,12 +102,12 @@ impl Layout {
         self.filled.iter().map(|&tets| tets as usize).sum()
     }
 
-    /// Rows of 64 tet slots that a group has.
+    /// Rows of 64 tet slots per group.
     pub(crate) fn depth(&self) -> usize {
         self.depth
     }
 
-    /// Tets that a tile has room for; 0 without tiles.
+    /// Tets for which a tile has room; 0 without tiles.
     pub(crate) fn tile(&self) -> u32 {
         match self.mapping {
             ClusterMapping::Threads => 0,
@@ -122,12 +123,12 @@ impl Layout {
             .map(|tet_slot| tet_slot as usize)
     }
 
-    /// The tet in a tet slot that has one.
+    /// The tet in an occupied tet slot.
     pub(crate) fn tet(&self, tet_slot: usize) -> u32 {
         self.tets[tet_slot]
     }
 
-    /// Where the `k`-th tet of a slot is.
+    /// The tet slot of the `k`-th tet of a slot.
     fn tet_slot_of(&self, slot: u32, k: usize) -> usize {
         let slot = slot as usize;
         match self.mapping {
@@ -138,7 +139,7 @@ impl Layout {
         }
     }
 
-    /// Makes this the layout of a schedule over the tets of a solver, given what has changed there since.
+    /// Updates the layout to a schedule over the tets of a solver, given the changes since the last call.
     ///
     /// # Errors
     /// If a cluster is larger than a tile.
@@ -205,7 +206,7 @@ impl Layout {
         Ok(tets)
     }
 
-    /// Patches changed tets in their slots; a tile with one is rebuilt.
+    /// Patches changed tets in their slots; tiles with a changed tet are rebuilt.
     fn with_changed(
         &mut self,
         mut slots: Vec<u32>,
@@ -231,7 +232,7 @@ impl Layout {
                 continue;
             }
             match self.mapping {
-                // One that is gone is in no schedule, so its slot is among those.
+                // A removed tet is in no schedule, so its slot is among those already patched.
                 ClusterMapping::Threads => patch.tets.push(filled_in(tet_slot, tet, solver)),
                 ClusterMapping::Workgroups => slots.push(slot),
             }
@@ -241,7 +242,7 @@ impl Layout {
         slots
     }
 
-    /// Forgets where the tets of a slot were.
+    /// Removes the tets of a slot.
     fn empty(&mut self, slot: u32) {
         for k in 0..self.filled[slot as usize] as usize {
             let tet_slot = self.tet_slot_of(slot, k);
@@ -303,7 +304,7 @@ fn filled_in(tet_slot: usize, tet: u32, solver: &Solver<f32>) -> TetPatch {
     }
 }
 
-/// What rounding of ratio and γ left of the slope of the elastic energy at rest, for measurements of it.
+/// Slope of the elastic energy at rest that remains because ratio and γ are rounded, for measurements of the energy.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "the device computes in single precision"

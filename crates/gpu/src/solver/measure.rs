@@ -1,10 +1,10 @@
-//! [`GpuSolver::measure`]: energies, volume and speed of the state on the device, without fetching it.
+//! [`GpuSolver::measure`]: energies, volume and speed of the state, computed on the device.
 //!
-//! At most 256 workgroups go over tets and particles and sum up what they see in trees, in the same order every time; the
-//! host adds their sums in double precision. What is large and does not change stays on the host: volumes at rest and the
-//! origin's height. Twins: `Solver::energy`, `Solver::volume`, `Solver::max_speed` of incise-xpbd. Memory: 12 kB and 4
-//! bytes a particle from the first call on. Cost: two dispatches, a wait for the device, 12 kB read; 4 bytes a particle
-//! sent and O(tets) on the host after edits.
+//! At most 256 workgroups sum over tets and particles in trees of a fixed order; the host adds their sums in double
+//! precision. Large values that do not change stay on the host: volumes at rest and the origin's height. Twins:
+//! `Solver::energy`, `Solver::volume`, `Solver::max_speed` of incise-xpbd. Memory: 12 kB and 4 bytes per particle from
+//! the first call on. Cost: two dispatches, a wait for the device, 12 kB read; 4 bytes per particle sent and O(tets) on
+//! the host after edits.
 
 use glam::DVec3;
 use incise_xpbd::{Energy, Solver, Volume};
@@ -18,10 +18,10 @@ use crate::array::Array;
 use crate::kernel::Recorder;
 use crate::{GpuContext, GpuError};
 
-/// Most workgroups, each of which gives a sum.
+/// Largest number of workgroups, each of which writes a sum.
 const GROUPS: usize = 256;
 
-/// What a state is worth.
+/// Energies, volumes and largest speed of a state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measures {
     /// Energies in J.
@@ -33,7 +33,7 @@ pub struct Measures {
 }
 
 impl Measures {
-    /// Those of a solver on the host, in double precision.
+    /// Measures a solver on the host, in double precision.
     fn of(solver: &Solver<f32>, gravity: Option<DVec3>) -> Self {
         Self {
             energy: solver.energy(gravity),
@@ -53,29 +53,29 @@ impl Measures {
     }
 }
 
-/// What measuring needs beside the body.
+/// Data of measurements beside the body.
 #[derive(Debug)]
 pub(crate) struct Measuring {
-    /// Whether tets or particles have changed since.
+    /// True if tets or particles have changed since the last measurement.
     pub(crate) stale: bool,
     units: Array<Units>,
     sent: Option<Units>,
-    /// In units of the mean.
+    /// Masses of the particles, in units of the mean.
     masses: Array<f32>,
     tet_sums: Array<TetSums>,
     particle_sums: Array<ParticleSums>,
     constants: Constants,
 }
 
-/// What the host knows without the state.
+/// Constants that the host adds.
 #[derive(Clone, Copy, Debug, Default)]
 struct Constants {
-    /// In kg, of all particles.
+    /// Mass of all particles in kg.
     mass: f64,
     mean_mass: f64,
-    /// In m³, of all tets.
+    /// Volume of all tets in m³.
     volume: f64,
-    /// Of those that take part.
+    /// Volume at rest, in m³, of the tets that are measured.
     taking_part: f64,
     mean_volume: f64,
 }
@@ -93,7 +93,7 @@ impl Constants {
                 number += 1;
             }
         }
-        // Of nothing any unit will do.
+        // With no mass or volume the unit does not matter.
         let mean = |sum: f64, number: usize| match sum > 0.0 {
             true => sum / number as f64,
             false => 1.0,
@@ -126,7 +126,7 @@ impl Measuring {
         sums + self.masses.buffer().size() + self.units.buffer().size()
     }
 
-    /// Brings what kernels need to the device, unless it is there.
+    /// Sends the data of the kernels, unless the device has them.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "the device computes in single precision"
@@ -161,7 +161,7 @@ impl Measuring {
         Ok(())
     }
 
-    /// What the sums of all workgroups come to.
+    /// The total of the sums of all workgroups.
     fn total(
         &self,
         of_tets: &[TetSums],
@@ -201,18 +201,16 @@ impl Measuring {
 }
 
 impl GpuSolver {
-    /// Energies, volume and largest speed of the present state; waits for the device and reads some kB, whatever the size
-    /// of the body. [`GpuSolver::repaired`] is that of now, too.
+    /// Computes energies, volume and largest speed of the present state on the device; waits for it and reads some kB,
+    /// whatever the size of the body. Also updates [`GpuSolver::repaired`].
     ///
-    /// The device computes in single precision, relative to rest. Against [`Solver::energy`], [`Solver::volume`] and
-    /// [`Solver::max_speed`] of the same state, bodies of up to 20,000 tets on lavapipe differ by at most 1e-7 of kinetic
-    /// energy and speed, 3e-8 of the volume, 1e-7 of the least ratio, 5e-8 of mass times gravity times size for gravity, and
-    /// 3e-6 of the elastic energy at a strain of 4e-4, 1e-6 at a hundredth (a strain has an error of about 2e-8 on average;
-    /// in slivers more). For more precision, ask the solver of [`GpuSolver::host`]. A tet whose volume is within
-    /// rounding of zero may count as inverted here and not there. The host's numbers, with the state fetched, are given
-    /// where single precision overflows and where the schedule does not solve all tets; nothing is asked where the host
-    /// has the state.
-    ///
+    /// The device computes in single precision, relative to rest. Kinetic energy, speed, volume and smallest ratio
+    /// differ from [`Solver::energy`], [`Solver::volume`] and [`Solver::max_speed`] by about 1e-7, the elastic energy
+    /// by 3e-6 at a strain of 4e-4. Errors of small strains are largest in slivers, since a strain has a rounding error
+    /// of about 2e-8. For more precision, use the solver of [`GpuSolver::host`]. A tet whose volume is within rounding
+    /// of zero may count as inverted here but not on the host. Where single precision overflows and where the schedule
+    /// does not solve all tets, the state is fetched and the host's values are returned; without a step since the last
+    /// fetch, the device is not used.
     /// # Example
     /// A particle of 2 kg falls for a tenth of a second.
     /// ```

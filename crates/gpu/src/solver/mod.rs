@@ -1,15 +1,15 @@
 //! [`GpuSolver`]: XPBD on the device.
 //!
-//! A [`Solver`] on the host stays where tets, masses, materials and what holds particles are edited; the device has a
-//! copy of all of it and the state. A step is recorded as one pass and handed over in one submit: predict, put what is
-//! held to its handles, solve color by color, pull at attachments, solve distances and volumes, collide, update and damp
-//! velocities, substep by substep. What a scene does not have takes no memory and no dispatch. A step reads nothing
-//! back: results come from calls that wait for the device ([`GpuSolver::host`], [`GpuSolver::measure`]).
+//! Tets, masses, materials, attachments and colliders are edited in a [`Solver`] on the host; the device has a copy of
+//! them and the state. A step is recorded as one pass and submitted once: predict, move rigid attachments to their
+//! handles, solve color by color, solve compliant attachments, distances and volumes, project to colliders, update and
+//! damp velocities, substep by substep. Features that a scene does not use take no memory and no dispatch. A step reads
+//! nothing back: results come from calls that wait for the device ([`GpuSolver::host`], [`GpuSolver::measure`]).
 //!
-//! Twin: `Solver::step` of incise-xpbd, with the same schedule in the form [`ClusterMapping::Threads`]. Positions agree up to the
-//! rounding of sums, which compilers of shaders may take in another order or fuse.
-//! Cost: a dispatch a color and two or three a substep, with damping another one a color, one more for each other thing
-//! in the scene; uploads only of what edits changed and of handles and colliders that move.
+//! Twin: `Solver::step` of incise-xpbd, with the same schedule and [`ClusterMapping::Threads`]. Positions agree up to
+//! the rounding of sums, which shader compilers may reorder or fuse. Cost: one dispatch per color and two or three per
+//! substep, with damping another one per color, and one for each other feature of the scene; uploads only after edits
+//! and for handles and colliders that move.
 
 mod attachments;
 mod body;
@@ -55,7 +55,7 @@ use frame::{Frame, Scene};
 use kernels::Kernels;
 use measure::Measuring;
 
-/// Frames that the device may have to do when another one is recorded.
+/// Frames that may be unfinished on the device when another one is recorded.
 const FRAMES_IN_FLIGHT: usize = 2;
 
 /// A body that is solved on a device.
@@ -99,13 +99,13 @@ const FRAMES_IN_FLIGHT: usize = 2;
 pub struct GpuSolver {
     gpu: Arc<GpuContext>,
     host: Solver<f32>,
-    /// Whether the device has advanced since the host last had its state.
+    /// True if the device has advanced since the host last had its state.
     ahead: bool,
     kernels: Kernels,
     body: Body,
     frame: Frame,
     repaired: Array<u32>,
-    /// Particles that the device put back, as last reported to the host.
+    /// Particles reset by the device, as last reported to the host.
     known_repaired: u32,
     /// `Some` from the first measurement on.
     measuring: Option<Measuring>,
@@ -114,10 +114,10 @@ pub struct GpuSolver {
 }
 
 impl GpuSolver {
-    /// Takes a solver to the device; what it has is sent with the first step.
+    /// Moves a solver to the device; its data are sent with the first step.
     ///
     /// # Errors
-    /// If the device has no memory or refuses.
+    /// If the device has no memory or rejects a command.
     pub fn new(
         gpu: Arc<GpuContext>,
         mut solver: Solver<f32>,
@@ -150,15 +150,16 @@ impl GpuSolver {
         self.body.layout.mapping
     }
 
-    /// Advances by one frame of `settings.time_step`; returns when the commands are with the driver, not when they are
-    /// done. Waits first until the device is done with the frame before the last one, so that frames do not pile up.
+    /// Advances by one frame of `settings.time_step`; returns after the submit, before the device is done. Waits first
+    /// until the device is done with the frame before the last one, which limits the frames in flight.
     ///
-    /// A schedule that was [updated](Schedule::update) since the last step is followed at the cost of what changed, and
-    /// so are edits of the solver. Another schedule is laid out from scratch.
+    /// After an [update](Schedule::update) of the schedule or an edit of the solver, only the changes are sent. Another
+    /// schedule rebuilds the layout.
     ///
     /// # Errors
     /// If the settings do not pass [`StepSettings::check`]; if they ask for Jacobi or Chebyshev iterations in
-    /// [`ClusterMapping::Workgroups`]; if a cluster is larger than the form allows; if the device is lost or out of memory.
+    /// [`ClusterMapping::Workgroups`]; if a cluster is larger than the mapping allows; if the device is lost or out of
+    /// memory.
     ///
     /// # Panics
     /// If the schedule names a tet that does not exist.
@@ -169,8 +170,8 @@ impl GpuSolver {
         self.advance(schedule, settings, false)
     }
 
-    /// Advances by one frame like [`GpuSolver::step`] and keeps what [`Solver::residuals`] needs of the last substep;
-    /// [`GpuSolver::host`] then has it.
+    /// Advances by one frame like [`GpuSolver::step`] and keeps the data that [`Solver::residuals`] needs of the last
+    /// substep; [`GpuSolver::host`] then has them.
     ///
     /// # Errors
     /// Those of [`GpuSolver::step`].
@@ -193,7 +194,7 @@ impl GpuSolver {
     ) -> Result<(), GpuError> {
         let _span = tracing::debug_span!("gpu::step").entered();
         settings.check()?;
-        // A caller that is faster than the device waits here, before memory runs out.
+        // A caller that is faster than the device waits here; otherwise memory runs out.
         while self.in_flight.len() >= FRAMES_IN_FLIGHT {
             let oldest = self.in_flight.pop_front();
             oldest.map_or(Ok(()), |oldest| self.gpu.wait_for(oldest))?;
@@ -222,11 +223,11 @@ impl GpuSolver {
         Ok(())
     }
 
-    /// Sends what edits and the schedule have changed, as a step does first. To measure what a cut costs, call this
-    /// before the step.
+    /// Sends changes by edits and schedule, which a step does otherwise. To measure the cost of a cut, call this before
+    /// the step.
     ///
     /// # Errors
-    /// If a cluster is larger than the form allows; if the device is lost or out of memory.
+    /// If a cluster is larger than the mapping allows; if the device is lost or out of memory.
     ///
     /// # Panics
     /// If the schedule names a tet that does not exist.
@@ -246,14 +247,15 @@ impl GpuSolver {
             measuring.stale |= changes != Changes::default();
         }
         let synced = body.sync(gpu, kernels, host, schedule, &changes);
-        // After a failed update the state of the device is unknown. Edits wait for the device: it is not ahead of them.
+        // After a failed update the state of the device is undefined. Edits wait for the device, so it is not ahead of
+        // them.
         if synced.is_err() && !self.ahead {
             self.host.track_changes();
         }
         synced
     }
 
-    /// The solver with the state of the device, which is waited for if it has advanced.
+    /// The solver with the state of the device; waits for the device if it has advanced.
     ///
     /// # Errors
     /// If the device is lost.
@@ -262,7 +264,7 @@ impl GpuSolver {
         Ok(&self.host)
     }
 
-    /// The solver with the state of the device, to edit; the next step sends what was changed.
+    /// The solver with the state of the device, to edit; the next step sends the changes.
     ///
     /// # Errors
     /// If the device is lost.
@@ -271,26 +273,26 @@ impl GpuSolver {
         Ok(&mut self.host)
     }
 
-    /// Puts another solver in place of the host's; the device takes over all of it, with its state, in the next step.
-    /// Kernels and memory stay. The state of the device is lost: to keep it, or the count of repairs up to now, call
-    /// [`GpuSolver::host`] before. O(particles + tets) in the next step.
+    /// Replaces the host's solver; the next step sends all of it, including its state. Kernels and memory are kept. The
+    /// state of the device and its count of repairs are lost unless [`GpuSolver::host`] is called before. O(particles +
+    /// tets) in the next step.
     pub fn replace(&mut self, mut solver: Solver<f32>) {
         solver.track_changes();
         self.host = solver;
         self.ahead = false;
     }
 
-    /// Says where a handle is at the end of the next frame, as [`Solver::move_handle`] does, without waiting for the
+    /// Sets the pose of a handle at the end of the next frame, like [`Solver::move_handle`], without waiting for the
     /// device.
     ///
     /// # Panics
-    /// If the handle does not exist, the pose is not finite or its rotation not of length 1.
+    /// If the handle does not exist, the pose is not finite or its rotation is not of length 1.
     pub fn move_handle(&mut self, handle: u32, pose: Pose) {
         self.host.move_handle(handle, pose);
     }
 
-    /// The solver as the host last saw it: topology, masses and materials are those of now, the state is an old one
-    /// unless [`GpuSolver::host`] was called since the last step.
+    /// The host's copy of the solver: topology, masses and materials are up to date, the state only if
+    /// [`GpuSolver::host`] was called since the last step.
     #[must_use]
     pub fn cached_host(&self) -> &Solver<f32> {
         &self.host
@@ -336,15 +338,15 @@ impl GpuSolver {
         Ok(())
     }
 
-    /// Particles that would have become infinite or NaN and were put back instead, counted once for each substep since
-    /// the beginning, up to the last call of [`GpuSolver::host`] or [`GpuSolver::measure`].
+    /// The number of particles that would have become infinite or NaN and were reset instead, counted once for each
+    /// substep, up to the last call of [`GpuSolver::host`] or [`GpuSolver::measure`].
     #[must_use]
     pub fn repaired(&self) -> u32 {
         self.known_repaired
     }
 
-    /// The buffer of positions, for renderers: 16 bytes a particle, position relative to [`Solver::origin`] in m and
-    /// inverse mass. A cut may replace it by a larger one.
+    /// The buffer of positions, for renderers: 16 bytes per particle, position relative to [`Solver::origin`] in m and
+    /// inverse mass. A cut may replace the buffer by a larger one.
     #[must_use]
     pub fn positions(&self) -> &wgpu::Buffer {
         self.body.particles.buffer()

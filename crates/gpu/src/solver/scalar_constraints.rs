@@ -1,8 +1,8 @@
 //! [`ScalarConstraints`]: distance or volume constraints on the device.
 //!
-//! They lie in the order in which they are solved. Sixty-four clusters of a color are a group, as with tets, so the
-//! dispatches are made the same way: one for each color, small colors together. Whatever changes, all of them are sent
-//! again. Twin: `constraints/scalar.rs` of incise-xpbd. Cost: 32 bytes a constraint and 8 a cluster.
+//! Constraints are stored in solving order. As with tets, 64 clusters of a color are a group, with one dispatch for
+//! each color and one for several small colors. Any change sends all of them again. Twin: `constraints/scalar.rs` of
+//! incise-xpbd. Cost: 32 bytes per constraint and 8 per cluster.
 
 use incise_graph::{Rows, Schedule};
 use incise_xpbd::Solver;
@@ -22,10 +22,10 @@ pub(crate) struct ScalarConstraints {
     damped: bool,
     corners: Array<[u32; 4]>,
     numbers: Array<[f32; 4]>,
-    /// The constraints of each cluster; from one to before the other.
+    /// The constraints of each cluster: start and end of its range.
     ranges: Array<[u32; 2]>,
     colors: Colors,
-    /// Empty with one iteration.
+    /// Multipliers; empty with one iteration.
     multipliers: Array<f32>,
 }
 
@@ -42,7 +42,7 @@ impl ScalarConstraints {
         })
     }
 
-    /// Takes over the constraints of a kind; nothing is kept for none.
+    /// Applies changes of the constraints of a kind; without constraints no memory is kept.
     pub(crate) fn sync(
         this: &mut Option<Self>,
         gpu: &GpuContext,
@@ -98,7 +98,7 @@ impl ScalarConstraints {
         self.colors.sync(gpu, &rows)
     }
 
-    /// Makes room for multipliers.
+    /// Allocates multipliers.
     pub(crate) fn keep_multipliers(&mut self, gpu: &GpuContext) -> Result<(), GpuError> {
         self.multipliers.resize(gpu, self.corners.len())
     }
@@ -157,7 +157,7 @@ impl ScalarConstraints {
 }
 
 impl Kind {
-    /// Particles and numbers of a constraint as `scalar.wgsl` wants them.
+    /// Particles and numbers of a constraint in the layout of `scalar.wgsl`.
     fn data(self, solver: &Solver<f32>, constraint: u32) -> ([u32; 4], [f32; 4]) {
         match self {
             Self::Distance => {
@@ -181,19 +181,19 @@ pub(crate) struct ScalarKernels<'a> {
     colors: &'a Colors,
     one: BoundKernel,
     several: BoundKernel,
-    /// Where multipliers are kept.
+    /// Clears multipliers, if they are kept.
     clear: Option<(BoundKernel, usize)>,
 }
 
 impl ScalarKernels<'_> {
-    /// At the start of a substep.
+    /// Clears multipliers at the start of a substep.
     pub(crate) fn begin(&self, pass: &mut Recorder<'_>) {
         if let Some((clear, groups)) = &self.clear {
             clear.run(pass, &[], *groups);
         }
     }
 
-    /// In an iteration, after the attachments.
+    /// Solves the constraints in an iteration, after the attachments.
     pub(crate) fn solve(&self, pass: &mut Recorder<'_>) {
         self.colors.run(pass, &self.one, &self.several);
     }

@@ -2,7 +2,7 @@
 
 use wgpu::Buffer;
 
-/// The buffers that what is not a tet may need.
+/// Buffers for the kernels of attachments, colliders and scalar constraints.
 #[derive(Debug)]
 pub(crate) struct Shared<'a> {
     pub(crate) settings: &'a Buffer,

@@ -1,17 +1,17 @@
-//! [`Slots`]: which cluster is where on the device.
+//! [`Slots`]: the assignment of clusters to slots on the device.
 //!
-//! A workgroup solves a group of lanes. A cluster has a slot as long as it has tets, and keeps it while its color stays.
-//! Cost: O(changed clusters times groups of their colors / 64) for an update, O(clusters) to make.
+//! A workgroup solves a group of slots. A cluster has a slot while it has tets, and keeps it while its color stays.
+//! Cost: O(changed clusters times groups of their colors / 64) for an update, O(clusters) to build.
 
 use incise_graph::{ClusterId, Lanes, Rows, Schedule};
 
-/// No cluster.
+/// The cluster of an empty slot.
 const NONE: u32 = u32::MAX;
 
-/// Groups of a color that may be empty beside half of all slots before all clusters are assigned again.
+/// Empty groups per color, beside half of all slots, above which all clusters are assigned again.
 const SPARE: usize = 2;
 
-/// Which cluster is in which slot.
+/// The assignment of clusters to slots.
 #[derive(Debug)]
 pub(crate) struct Slots {
     lanes: Lanes,
@@ -22,17 +22,17 @@ pub(crate) struct Slots {
     assigned: usize,
 }
 
-/// What changed.
+/// The slots that an update has changed.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Moved {
-    /// Everything: whatever was known is void.
+    /// All slots were assigned again.
     All,
-    /// What is in these slots, ascending.
+    /// The contents of these slots, ascending.
     Slots(Vec<u32>),
 }
 
 impl Slots {
-    /// For groups of so many slots, at most 64.
+    /// Empty slots in groups of `width`, at most 64.
     pub(crate) fn new(width: usize) -> Self {
         Self {
             lanes: Lanes::new(width),
@@ -67,12 +67,12 @@ impl Slots {
         Some(index(group * self.lanes.width() + lane))
     }
 
-    /// From now on nothing here is to be trusted.
+    /// Marks all slots as outdated.
     pub(crate) fn forget(&mut self) {
         self.revision = None;
     }
 
-    /// Makes these the slots of a schedule.
+    /// Updates the slots to a schedule.
     pub(crate) fn sync(&mut self, schedule: &Schedule) -> Moved {
         let changes = self.revision.and_then(|r| schedule.changes_since(r));
         let moved = changes.map(|changes| self.update(schedule, changes));
@@ -111,7 +111,7 @@ impl Slots {
             let color = schedule.color(cluster).map(|color| color.index());
             color.filter(|_| !schedule.constraints(cluster).is_empty())
         };
-        // All clusters leave before any is assigned, so that emptied groups can be used again.
+        // All clusters are removed before any is assigned, so that emptied groups can be reused.
         for &cluster in &changed {
             let Some(slot) = self.slot(cluster) else {
                 continue;
@@ -137,7 +137,7 @@ impl Slots {
         touched
     }
 
-    /// Gives a cluster a slot.
+    /// Assigns a slot to a cluster.
     fn assign(&mut self, cluster: ClusterId, color: usize) -> u32 {
         let groups = self.groups().row(color).iter().rev();
         let roomy = groups
@@ -189,7 +189,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
 
-        /// Whatever happens to a schedule, every cluster has a slot in a group of its color, and no other one moves.
+        /// After any change of a schedule, every cluster has a slot in a group of its color, and unchanged clusters
+        /// keep theirs.
         #[test]
         fn slots_follow_a_schedule(
             width in prop::sample::select(vec![1usize, 2, 3, 64]),

@@ -1,8 +1,8 @@
-//! [`Track`]: the commands of a frame stage by stage, and [`StageTimes`]: what each stage took.
+//! [`Track`]: the commands of a frame stage by stage, and [`StageTimes`]: the time of each stage.
 //!
-//! Normally a frame is one pass. Where stages are timed, each change of the stage ends a pass, and the device writes the
-//! time at both ends of every pass into query sets, which grow with the frame. Cost: nothing while off; else a pass and
-//! 16 bytes for each change of the stage, four and more a substep, and what the device loses by not running on.
+//! Without timing a frame is one pass. With timing each change of the stage ends a pass, and the device writes the time
+//! at both ends of every pass into query sets, which grow with the frame. Cost: nothing while off; otherwise a pass and
+//! 16 bytes for each change of the stage, at least four per substep, and the idle time of the device between passes.
 
 use wgpu::{BufferUsages, CommandEncoder, ComputePassTimestampWrites, QuerySet, SubmissionIndex};
 
@@ -11,10 +11,10 @@ use crate::array::Array;
 use crate::kernel::Recorder;
 use crate::{GpuContext, GpuError};
 
-/// Passes of which a query set has both ends.
+/// Passes per query set, which holds both ends of each.
 const PASSES: usize = wgpu::QUERY_SET_MAX_QUERIES as usize / 2;
 
-/// What a dispatch belongs to.
+/// The stage of a dispatch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stage {
     Predict,
@@ -24,37 +24,37 @@ pub(crate) enum Stage {
     Damp,
 }
 
-/// What the stages of a frame took on the device, in ms, summed over its substeps.
+/// Times of the stages of a frame on the device, in ms, summed over its substeps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct StageTimes {
-    /// Moving particles by their velocities.
+    /// Prediction of positions from velocities.
     pub predict: f64,
     /// Solving tets.
     pub solve: f64,
-    /// Everything else: handles, distances, volumes, colliders, clearing multipliers.
+    /// Handles, distances, volumes, colliders and clearing of multipliers.
     pub other: f64,
-    /// Updating velocities.
+    /// Update of velocities.
     pub update: f64,
-    /// Damping velocities; 0 without a damped material.
+    /// Damping of velocities; 0 without a damped material.
     pub damp: f64,
 }
 
 impl StageTimes {
-    /// All together.
+    /// The sum of all stages.
     #[must_use]
     pub fn total(&self) -> f64 {
         self.predict + self.solve + self.other + self.update + self.damp
     }
 }
 
-/// What times stages.
+/// Query sets and results of timed stages.
 #[derive(Debug)]
 pub(crate) struct Clock {
     sets: Vec<QuerySet>,
     /// Start and end of each pass, in ticks.
     stamps: Array<u64>,
-    /// What each pass of the last frame was.
+    /// The stage of each pass of the last frame.
     stages: Vec<Stage>,
 }
 
@@ -67,13 +67,13 @@ impl Clock {
         })
     }
 
-    /// Bytes on the device, queries of 8 each.
+    /// Bytes on the device; a query has 8.
     pub(crate) fn bytes(&self) -> u64 {
         let set = u64::from(wgpu::QUERY_SET_MAX_QUERIES * wgpu::QUERY_SIZE);
         self.stamps.buffer().size() + set * self.sets.len() as u64
     }
 
-    /// Where the times of another pass go.
+    /// The queries for the next pass.
     fn next(&mut self, gpu: &GpuContext, stage: Stage) -> ComputePassTimestampWrites<'_> {
         let number = self.stages.len();
         self.stages.push(stage);
@@ -93,7 +93,7 @@ impl Clock {
         }
     }
 
-    /// Has the times of all passes written to the buffer.
+    /// Records commands that write the times of all passes to the buffer.
     fn resolve(&mut self, gpu: &GpuContext, encoder: &mut CommandEncoder) -> Result<(), GpuError> {
         let passes = self.stages.len();
         self.stamps.resize(gpu, 2 * passes)?;
@@ -105,7 +105,7 @@ impl Clock {
         Ok(())
     }
 
-    /// Waits for the device and adds up.
+    /// Waits for the device and sums the times by stage.
     fn times(&self, gpu: &GpuContext) -> Result<Option<StageTimes>, GpuError> {
         if self.stages.is_empty() {
             return Ok(None);
@@ -121,7 +121,7 @@ impl Clock {
                 Stage::Update => &mut times.update,
                 Stage::Damp => &mut times.damp,
             };
-            // A device may set its clock back.
+            // A device may reset its clock.
             *sum += ends[1].saturating_sub(ends[0]) as f64 * milliseconds;
         }
         Ok(Some(times))
@@ -137,7 +137,7 @@ fn queries(passes: usize) -> u32 {
 pub(crate) struct Track<'a> {
     gpu: &'a GpuContext,
     encoder: CommandEncoder,
-    /// The one that is open.
+    /// The open pass and its stage.
     pass: Option<(Stage, Recorder<'a>)>,
     clock: Option<&'a mut Clock>,
 }
@@ -155,7 +155,7 @@ impl<'a> Track<'a> {
         }
     }
 
-    /// The pass for dispatches of a stage: the one that is open, unless stages are timed and this is another one.
+    /// The pass for dispatches of a stage: the open one, unless stages are timed and the stage differs.
     pub(crate) fn at(&mut self, stage: Stage) -> &mut Recorder<'a> {
         let Self {
             gpu,
@@ -174,13 +174,13 @@ impl<'a> Track<'a> {
         recorder
     }
 
-    /// Ends the pass; for commands that belong in none.
+    /// Ends the pass and returns the encoder, for commands outside of passes.
     pub(crate) fn between_passes(&mut self) -> &mut CommandEncoder {
         self.pass = None;
         &mut self.encoder
     }
 
-    /// Hands the frame over.
+    /// Submits the frame.
     pub(crate) fn submit(mut self) -> Result<SubmissionIndex, GpuError> {
         self.pass = None;
         if let Some(clock) = self.clock {
@@ -191,10 +191,10 @@ impl<'a> Track<'a> {
 }
 
 impl GpuSolver {
-    /// From now on times the stages of each step on the device, or no longer does; off at first.
+    /// Turns timing of the stages of each step on the device on or off; off by default.
     ///
-    /// The results are the same to the bit. A timed frame is a pass for each change of the stage instead of a single one,
-    /// so its stages together may take longer than the frame does otherwise.
+    /// Results stay bit-identical. A timed frame has a pass for each change of the stage instead of a single one, so
+    /// the sum of its stages may exceed the time of an untimed frame.
     ///
     /// # Example
     /// ```
@@ -221,7 +221,7 @@ impl GpuSolver {
     /// ```
     ///
     /// # Errors
-    /// [`GpuError::NoTimestamps`] if the device cannot; if it has no memory.
+    /// [`GpuError::NoTimestamps`] if the device does not support it; if it has no memory.
     pub fn time_stages(&mut self, on: bool) -> Result<(), GpuError> {
         let clock = self.frame.clock();
         match (on, clock.is_some()) {
@@ -233,7 +233,7 @@ impl GpuSolver {
         Ok(())
     }
 
-    /// What the stages of the last step took, for which the device is waited; `None` unless it was
+    /// Waits for the device and returns the times of the last step's stages; `None` unless it was
     /// [timed](GpuSolver::time_stages).
     ///
     /// # Errors

@@ -1,16 +1,16 @@
-//! [`Tile`]: a cluster as a workgroup solves it, its particles numbered within and its tets in steps.
+//! [`Tile`]: a cluster solved by a workgroup, with local numbers of particles and its tets in steps.
 //!
-//! Tets of one step share no particle. First fit in ascending order, with a bit for each step at each particle: the same
-//! steps as `incise_coloring::color_within_clusters` gives. Cost: O(tets log tets).
+//! Tets of one step share no particle. Steps are assigned by first fit in ascending order, with a bit for each step at
+//! each particle, and equal those of `incise_coloring::color_within_clusters`. Cost: O(tets log tets).
 
-/// How many tets tiles may have room for. The particles of the largest, if its tets share none, fill the 16 KiB of
-/// workgroup memory that WebGPU promises.
+/// Capacities of tiles in tets. The particles of the largest, if its tets share none, fill the 16 KiB of workgroup
+/// memory that WebGPU guarantees.
 const ROOMS: [usize; 3] = [64, 128, 256];
 
-/// Most tets of a tile.
+/// Largest number of tets of a tile.
 pub(crate) const LARGEST: usize = ROOMS[2];
 
-/// The room of tiles for clusters of at most so many tets, at most [`LARGEST`].
+/// The capacity of tiles for clusters of at most this many tets, at most [`LARGEST`].
 pub(crate) fn room_for(tets: usize) -> usize {
     ROOMS
         .into_iter()
@@ -18,24 +18,24 @@ pub(crate) fn room_for(tets: usize) -> usize {
         .unwrap_or(LARGEST)
 }
 
-/// Numbers of a tile on the device: steps, particles, where each step ends, and the particles.
+/// Numbers of a tile on the device: steps, particles, the end of each step, and the particles.
 pub(crate) fn number_count(room: usize) -> usize {
     2 + room + 4 * room
 }
 
-/// A cluster as a workgroup solves it.
+/// The particles and tets of a cluster in solving order.
 #[derive(Debug)]
 pub(crate) struct Tile {
-    /// Ascending.
+    /// The particles, ascending.
     particles: Vec<u32>,
     /// Tets and their corners in `particles`, step after step.
     tets: Vec<(u32, [u32; 4])>,
-    /// Where each step ends.
+    /// The end of each step in `tets`.
     ends: Vec<u32>,
 }
 
 impl Tile {
-    /// The tile of at most [`LARGEST`] tets, ascending.
+    /// The tile of at most [`LARGEST`] tets, in ascending order.
     pub(crate) fn new(tets: &[u32], corners: impl Fn(u32) -> [u32; 4]) -> Self {
         debug_assert!(tets.len() <= LARGEST, "a tile holds the cluster");
         let mut particles: Vec<u32> = tets.iter().flat_map(|&tet| corners(tet)).collect();
@@ -45,7 +45,7 @@ impl Tile {
             let found = particles.binary_search(&p);
             index(found.expect("the particles of all tets are listed"))
         };
-        // Each tet keeps one step from its neighbors, so there are no more steps than tets: two words hold them.
+        // Each neighbor excludes one step, so there are at most as many steps as tets: two words hold them.
         let mut taken = vec![[0u128; LARGEST / 128]; particles.len()];
         let mut steps = Vec::with_capacity(tets.len());
         for &tet in tets {
@@ -82,12 +82,12 @@ impl Tile {
         }
     }
 
-    /// The tets with their corners in the tile, in solving order.
+    /// The tets with local corners, in solving order.
     pub(crate) fn tets(&self) -> impl Iterator<Item = (u32, [u32; 4])> + '_ {
         self.tets.iter().copied()
     }
 
-    /// What the device knows of it, in a tile with room for so many tets.
+    /// The numbers of the tile on the device, in a tile with capacity `room`.
     pub(crate) fn numbers(&self, room: usize) -> Vec<u32> {
         let mut numbers = vec![0; number_count(room)];
         numbers[0] = index(self.ends.len());

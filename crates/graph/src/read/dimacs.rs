@@ -1,9 +1,9 @@
-//! DIMACS graph format (Second DIMACS Challenge, "Clique and Coloring Problems Graph Format", 1993),
-//! the one of the classic coloring instances.
+//! DIMACS graph format (Second DIMACS Challenge, "Clique and Coloring Problems Graph Format", 1993), the format of the
+//! classic coloring instances.
 //!
-//! A letter says what a line is. Published instances differ from the description in two ways, both
-//! accepted here: many list each edge in both directions, and the number of edges in their header
-//! is that of lines, of edges, or neither. Cost: O(length of the file + edges log edges).
+//! The first letter of a line is its kind. Published instances differ from the description in two ways, both accepted
+//! here: many list each edge in both directions, and the number in their header counts lines, edges, or neither. Cost:
+//! O(length of the file + edges log edges).
 
 use std::io::BufRead;
 
@@ -12,21 +12,21 @@ use crate::{ConstraintGraph, GraphError};
 
 /// Reads a graph in DIMACS format (`.col`).
 ///
-/// A line that begins with `c` is a comment, in any encoding; `p edge VERTICES EDGES` (or `p col`)
-/// comes once and before the edges; `e U V` is an edge, with vertices from 1, in either or both directions, counted
-/// once. Lines of nodes and optional descriptors (`n`, `d`, `v`, `x`) and blank lines are passed
-/// over. The number of edges in the header is not compared: too many published files count
-/// otherwise. An edge from a vertex to itself is refused, since such a graph has no coloring.
+/// A line that begins with `c` is a comment, in any encoding; `p edge VERTICES EDGES` (or `p col`) appears once, before
+/// the edges; `e U V` is an edge, with vertices from 1, in either or both directions, counted once. Lines of nodes and
+/// optional descriptors (`n`, `d`, `v`, `x`) and blank lines are skipped. The number of edges in the header is ignored,
+/// because many published files count differently. An edge from a vertex to itself is an error, since such a graph has
+/// no coloring.
 ///
-/// No number in the file reserves memory; a graph of more than 2^20 vertices must have at least one
-/// edge for every 16 vertices above that.
+/// Counts in the file reserve no memory; a graph of more than 2^20 vertices must have at least one edge for every 16
+/// vertices above that.
 ///
-/// Deterministic. O(length of the file + edges log edges), memory of the order of the file.
+/// Deterministic. O(length of the file + edges log edges), memory proportional to the length of the file.
 ///
 /// # Errors
-/// [`GraphError::Malformed`] with the line: no or a second `p` line, an edge before it, another
-/// letter, a vertex that does not exist, a loop, words that are no numbers, too few or too many of
-/// them, lines of more than 65535 bytes. [`GraphError::Unreadable`] if the source fails,
+/// [`GraphError::Malformed`] with the line: no or a second `p` line, an edge before it, another letter, a vertex that
+/// does not exist, a loop, words that are not numbers, too few or too many words, lines of more than 65535 bytes.
+/// [`GraphError::Unreadable`] if the source fails,
 /// [`GraphError::TooMany`] for 2^31 edges or more.
 ///
 /// ```
@@ -43,7 +43,7 @@ use crate::{ConstraintGraph, GraphError};
 /// ```
 pub fn read_dimacs(source: impl BufRead) -> Result<ConstraintGraph, GraphError> {
     let mut lines = Lines::new(source);
-    // The line of the header and the number of vertices.
+    // The header's line number and the number of vertices.
     let mut header: Option<(usize, u32)> = None;
     let mut edges = Vec::new();
     while let Some(line) = lines.next()? {

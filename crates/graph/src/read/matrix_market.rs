@@ -1,7 +1,7 @@
 //! Matrix Market exchange format (Boisvert, Pozo, Remington 1996): the graph of a sparse matrix.
 //!
 //! A square matrix is a graph: row and column i are vertex i, an entry in row i and column j is an
-//! edge. The values play no part. Cost: O(length of the file + edges log edges).
+//! edge. The values are ignored. Cost: O(length of the file + edges log edges).
 
 use std::io::BufRead;
 
@@ -10,23 +10,23 @@ use crate::{ConstraintGraph, GraphError};
 
 /// Reads the graph of a sparse square matrix in Matrix Market coordinate format (`.mtx`).
 ///
-/// Every entry off the diagonal is an edge, also one whose stored value is 0. The diagonal is left
-/// out: a graph has no loops, and most symmetric matrices store one. All fields (`pattern`,
+/// Every entry off the diagonal is an edge, also one with a stored value of 0. The diagonal is
+/// skipped: a graph has no loops, and most symmetric matrices store one. All fields (`pattern`,
 /// `real`, `integer`, `complex`) and all symmetries (`general`, `symmetric`, `skew-symmetric`,
-/// `hermitian`) are read, in any letter case and combination. Of a `general` matrix both
-/// triangles make the graph, that is the structure of A + Aᵀ; of the others either triangle may be
-/// stored. Repeated entries count once. Blank lines and comments may stand anywhere after the
-/// header, comments in any encoding.
+/// `hermitian`) are read, in any letter case and combination. The graph of a `general` matrix is
+/// the structure of A + Aᵀ; other matrices may store either triangle. Repeated entries count once.
+/// Blank lines and comments may appear anywhere after the header, comments in any encoding.
 ///
-/// The number of entries in the header is binding. No number in the file reserves memory; a matrix
-/// of more than 2^20 rows must have at least one entry for every 16 rows above that.
+/// The file must have the number of entries in the header. Counts in the file reserve no memory; a
+/// matrix of more than 2^20 rows must have at least one entry for every 16 rows above that.
 ///
-/// Deterministic. O(length of the file + edges log edges), memory of the order of the file.
+/// Deterministic. O(length of the file + edges log edges), memory proportional to the length of the
+/// file.
 ///
 /// # Errors
 /// [`GraphError::Malformed`] with the line: another header, the dense format `array`, a matrix that
-/// is not square, an entry outside of the matrix, words that are no numbers, too few or too many of
-/// them, another number of entries than announced, lines of more than 65535 bytes.
+/// is not square, an entry outside of the matrix, words that are not numbers, too few or too many
+/// words, another number of entries than announced, lines of more than 65535 bytes.
 /// [`GraphError::Unreadable`] if the source fails, [`GraphError::TooMany`] for 2^31 edges or more.
 ///
 /// ```
@@ -83,7 +83,7 @@ pub fn read_matrix_market(source: impl BufRead) -> Result<ConstraintGraph, Graph
     build(size.line, size.vertices, found, &edges)
 }
 
-/// What stands behind row and column of an entry.
+/// The values of an entry, after row and column.
 #[derive(Clone, Copy)]
 enum Field {
     Pattern,
@@ -99,7 +99,7 @@ struct Size {
     entries: u64,
 }
 
-/// Neither blank nor a comment?
+/// True unless the line is blank or a comment.
 fn has_content(line: Line<'_>) -> bool {
     line.words().next().is_some_and(|word| word[0] != b'%')
 }
@@ -174,7 +174,7 @@ fn size(line: Line<'_>) -> Result<Size, GraphError> {
     })
 }
 
-/// `ROW COLUMN`, followed by as many numbers as the field has.
+/// `ROW COLUMN`, followed by the numbers of the field.
 fn entry(line: Line<'_>, field: Field, vertices: u32) -> Result<(u32, u32), GraphError> {
     let real = |word: &[u8]| {
         let number = str::from_utf8(word)

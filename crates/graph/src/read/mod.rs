@@ -1,9 +1,9 @@
 //! Graphs from text files.
 //!
-//! What the formats have in common: lines of words, a header with counts, vertices from 1. A reader
-//! believes no count: it keeps what it has read and nothing else, so memory follows the length of
-//! the file. It works on bytes, hence a comment in any encoding is no obstacle. Whatever the bytes
-//! are, the result is a graph or an error that names the line.
+//! Common parts of the formats: lines of words, a header with counts, vertices from 1. A reader
+//! reserves no memory for announced counts, so memory is proportional to the length of the file. It
+//! works on bytes, so comments may have any encoding. For any input the result is a graph or an
+//! error with the line.
 //!
 //! Cost: one pass over the file and [`ConstraintGraph::from_edges`].
 
@@ -17,11 +17,10 @@ pub use matrix_market::read_matrix_market;
 
 use crate::{ConstraintGraph, GraphError};
 
-/// No line may be longer, in bytes. Matrix Market allows 1024; comments get away with more.
+/// Longest line in bytes. Matrix Market allows 1024, but comments are often longer.
 const LONGEST_LINE: u16 = u16::MAX;
 
-/// So many vertices are believed without an edge in sight, and [`VERTICES_PER_EDGE`] more with
-/// every edge listed.
+/// Vertices accepted without any edge; each listed edge allows [`VERTICES_PER_EDGE`] more.
 const FREE_VERTICES: u64 = 1 << 20;
 /// See [`FREE_VERTICES`].
 const VERTICES_PER_EDGE: u64 = 16;
@@ -30,7 +29,7 @@ const VERTICES_PER_EDGE: u64 = 16;
 struct Lines<R> {
     source: R,
     buffer: Vec<u8>,
-    /// The number of lines read so far, which is that of the current one.
+    /// The number of lines read so far, which is the number of the current line.
     number: usize,
 }
 
@@ -92,7 +91,7 @@ struct Line<'a> {
 }
 
 impl<'a> Line<'a> {
-    /// What stands between blanks; line ends of all systems count as blanks.
+    /// The words between blanks; line ends of all systems count as blanks.
     fn words(self) -> impl Iterator<Item = &'a [u8]> {
         self.bytes
             .split(u8::is_ascii_whitespace)
@@ -123,7 +122,7 @@ impl<'a> Line<'a> {
         }
     }
 
-    /// A word as a whole number from 0 on.
+    /// Parses a word as a whole number from 0 on.
     fn count(self, word: &[u8], what: &str) -> Result<u64, GraphError> {
         if !word.iter().all(u8::is_ascii_digit) {
             let word = show(word);
@@ -135,7 +134,7 @@ impl<'a> Line<'a> {
             .ok_or_else(|| self.malformed(format!("{} is too large for {what}", show(word))))
     }
 
-    /// A word as the number of vertices of the graph.
+    /// Parses a word as the number of vertices of the graph.
     fn vertex_count(self, word: &[u8]) -> Result<u32, GraphError> {
         let count = self.count(word, "a number of vertices")?;
         u32::try_from(count).map_err(|_| {
@@ -146,7 +145,7 @@ impl<'a> Line<'a> {
         })
     }
 
-    /// A word as a vertex: from 1 in the file, from 0 here.
+    /// Parses a word as a vertex: from 1 in the file, from 0 here.
     fn vertex(self, word: &[u8], vertices: u32) -> Result<u32, GraphError> {
         let number = self.count(word, "a vertex")?;
         match u32::try_from(number) {
@@ -159,13 +158,14 @@ impl<'a> Line<'a> {
     }
 }
 
-/// A word for a message: in quotes, readable, and cut when it is long.
+/// A word for a message: quoted, printable, and shortened if it is long.
 fn show(word: &[u8]) -> String {
     format!("{:?}", String::from_utf8_lossy(&word[..word.len().min(40)]))
 }
 
-/// The graph, unless it would be nearly all vertices without an edge: a few bytes of header must
-/// not fill the memory. `header` is the line with the counts, `listed` the edges or entries found.
+/// Builds the graph, or an error if nearly all vertices have no edge: a header of a few bytes must
+/// not fill the memory. `header` is the line with the counts, `listed` the number of edges or
+/// entries found.
 fn build(
     header: usize,
     vertices: u32,

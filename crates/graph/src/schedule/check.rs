@@ -1,22 +1,21 @@
-//! The proofs of a schedule: that nothing in it collides, and that it is that of its clusters and colors.
+//! The checks of a schedule: no two clusters of a color conflict, and it matches its clustering and coloring.
 //!
-//! Both look at what is there and share nothing with how it came about. Cost: one pass over everything.
+//! Both look at the stored order and share no code with its construction. Cost: one pass over all arrays.
 
 use super::Schedule;
 use crate::{ClusterId, Clustering, ColorId, Coloring, GraphError, Incidence};
 
 impl Schedule {
-    /// Proves that the schedule solves everything once and that nothing that runs together shares a
-    /// particle. O(entries).
+    /// Checks that the schedule solves every constraint once and that clusters of one color share no particle.
+    /// O(entries).
     ///
-    /// A constraint without particles may be missing: that is the number of a removed constraint.
+    /// A constraint without particles may be missing: its number is that of a removed constraint.
     ///
     /// # Errors
-    /// A constraint that is unknown, missing or there twice; two clusters of one color on one
-    /// particle.
+    /// A constraint that is unknown, missing or repeated; two clusters of one color on one particle.
     pub fn check(&self, incidence: &Incidence) -> Result<(), GraphError> {
         each_once("schedule", self.order(), incidence)?;
-        // The last cluster and color that touched each particle.
+        // The last cluster and color at each particle.
         let mut touched = vec![(ClusterId::NONE, usize::MAX); incidence.particle_count()];
         for color in 0..self.color_count() {
             for &cluster in self.clusters(color) {
@@ -39,11 +38,12 @@ impl Schedule {
         Ok(())
     }
 
-    /// Proves that the schedule is that of a clustering and a coloring, whatever edits it went
-    /// through. O(constraints + clusters + colors).
+    /// Checks that the schedule matches a clustering and a coloring, after any edits. O(constraints + clusters +
+    /// colors).
     ///
     /// # Errors
-    /// A cluster that has other members or another color here than there.
+    ///
+    /// A cluster whose members or color differ.
     pub fn check_plan(
         &self,
         clustering: &Clustering,
@@ -64,7 +64,7 @@ impl Schedule {
                 return Err(GraphError::Misplaced { cluster });
             }
         }
-        // Each was found at a position of its own, so nothing else is there.
+        // Each was found at a distinct position, so there are no others.
         let labels = clustering.labels().iter();
         let labels = labels.copied().chain(std::iter::repeat(ClusterId::NONE));
         let labeled = self
@@ -84,7 +84,7 @@ impl Schedule {
     }
 }
 
-/// An error unless `order` lists every constraint once; those without particles may be missing.
+/// An error unless `order` lists every constraint once; constraints without particles may be missing.
 fn each_once(
     what: &'static str,
     order: impl Iterator<Item = u32>,

@@ -1,22 +1,23 @@
-//! [`Journal`]: which clusters changed when, for structures that follow a schedule.
+//! [`Journal`]: the record of changed clusters, for structures derived from a schedule.
 //!
-//! Each change gets a number that no other schedule has, so a follower that remembers the number
-//! it has seen last can tell whether it follows this schedule, and finds what changed since. As many
-//! changes are kept as there are clusters: a follower that is further behind has to be rebuilt.
+//! Each change gets a revision number that no other schedule has. A derived structure that stores
+//! its last revision can determine whether it belongs to this schedule and which clusters have
+//! changed since. The journal keeps as many changes as there are clusters; a structure that is
+//! further behind has to be rebuilt.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::ClusterId;
 
-/// The next number of a change. That numbers depend on what else runs in the process changes no
-/// result: they are compared for equality only.
+/// The number of the next change. Numbers depend on other schedules of the process, but this
+/// affects no result: they are compared for equality only.
 static NEXT: AtomicU64 = AtomicU64::new(1);
 
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Journal {
     revision: u64,
-    /// Revisions before each change, ascending, and where in `clusters` its entries begin.
+    /// Revisions before each change, ascending, and the start of its entries in `clusters`.
     revisions: Vec<(u64, usize)>,
     clusters: Vec<ClusterId>,
 }
@@ -26,14 +27,14 @@ impl Journal {
         self.revision
     }
 
-    /// Everything has changed.
+    /// Records that everything has changed.
     pub(super) fn restart(&mut self) {
         self.revisions.clear();
         self.clusters.clear();
         self.revision = NEXT.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Some clusters have changed, of `count` in all.
+    /// Records that some clusters of `count` have changed.
     pub(super) fn note(&mut self, changed: &[ClusterId], count: usize) {
         if changed.is_empty() {
             return;

@@ -59,7 +59,7 @@ impl<'t, I: Iterator<Item = Word<'t>>> Reader<'t, '_, I> {
             let message = "the file does not start with MeshVersionFormatted: not a Medit file";
             return Err(self.text.error(start.line, message));
         }
-        // Numbers are read as doubles, whatever the version says.
+        // Numbers are read as doubles in all versions.
         let version = self.word("the version")?;
         if !(1..=4).contains(&self.integer(version, "a version")?) {
             let message = format!("version {} is not 1 to 4", show(version.text));

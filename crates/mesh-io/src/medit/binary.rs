@@ -7,8 +7,8 @@
 //! | 3 | f64 | 64 bits | 32 bits |
 //! | 4 | f64 | 64 bits | 64 bits |
 //!
-//! The first number is 1 and tells the byte order; files are written little-endian. Places must grow, so that reading
-//! ends. Linear.
+//! The first number is 1 and shows the byte order; files are written little-endian. Offsets must
+//! increase, so that reading ends. Linear.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -32,7 +32,7 @@ fn widths(version: i32) -> (u64, u64) {
     )
 }
 
-/// Where the sections of a written file end: dimension, points, tets.
+/// The ends of the sections of a written file: dimension, points, tets.
 fn ends(mesh: &TetMesh, version: i32) -> [u64; 3] {
     let (offset, whole) = widths(version);
     let points = mesh.positions.len() as u64;
@@ -43,7 +43,7 @@ fn ends(mesh: &TetMesh, version: i32) -> [u64; 3] {
     [dimension, vertices, tetrahedra]
 }
 
-/// The lowest version with double coordinates and room for the mesh.
+/// The lowest version with double coordinates that is large enough for the mesh.
 pub(super) fn lowest_version(mesh: &TetMesh) -> i32 {
     let fits = |number: u64| i32::try_from(number).is_ok();
     if !fits(mesh.positions.len().max(mesh.tets.len()) as u64) {
@@ -55,13 +55,13 @@ pub(super) fn lowest_version(mesh: &TetMesh) -> i32 {
     }
 }
 
-/// Writes a file of a version from 2 on that has room for it.
+/// Writes a file of a version from 2 on that is large enough.
 pub(super) fn write(out: &mut dyn Write, file: &MeshFile, version: i32) -> io::Result<()> {
     let (mesh, points) = (&file.mesh, point_references(file).unwrap_or_default());
     let (offset, whole) = widths(version);
     let [dimension, vertices, tetrahedra] = ends(mesh, version);
     let number = |out: &mut dyn Write, number: i64, width: u64| {
-        // The lower bytes of a number that fits are the number.
+        // The lower bytes suffice for a number that fits.
         out.write_all(&number.to_le_bytes()[..if width == 4 { 4 } else { 8 }])
     };
     let offset = |out: &mut dyn Write, code: i32, next: u64| {
@@ -214,7 +214,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// A number of elements that the rest of the file has the bytes for.
+    /// A number of elements, checked against the rest of the file.
     fn count(&mut self, what: &str, bytes_each: usize) -> Result<usize, MeshIoError> {
         let at = self.at;
         let count = self.whole(&format!("the number of {what}"))?;

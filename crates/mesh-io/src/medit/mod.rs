@@ -1,9 +1,9 @@
 //! Medit's `.mesh` (ASCII) and `.meshb` (binary) files: points and cells, each with an integer called its reference.
 //!
-//! A file is a list of sections, each a keyword, a count and that many lines; it ends with the keyword `End`, which is
-//! insisted on, because a file that was cut short reads well otherwise. The references of tets are the regions. Those
-//! of points are the values named `reference`. References that are all 0 say nothing and are read as none. Points are
-//! numbered from 1. Sections other than points and volume cells are skipped.
+//! A file is a list of sections, each a keyword, a count and that many lines. The keyword `End` is required, because a
+//! truncated file would be read without an error otherwise. The references of tets are the regions, those of points the
+//! values named `reference`. If all references are 0, there are none. Points are numbered from 1. Sections other than
+//! points and volume cells are skipped.
 //!
 //! Source: P. Frey, "Medit: An interactive mesh visualization software" (INRIA RT-0253, 2001); the binary layout and
 //! the codes of the keywords after L. Maréchal's libMeshb 7. Linear.
@@ -21,7 +21,7 @@ use crate::fields::whole;
 use crate::text::load;
 use crate::{MeshFile, MeshIoError, NamedValues, OwnedValues, write_atomically};
 
-/// The name of the values that hold the references of points.
+/// The name of the values with the references of points.
 const REFERENCE: &str = "reference";
 
 /// Volume cells other than tets, as ASCII keyword and binary code.
@@ -43,9 +43,9 @@ const OTHER_VOLUMES: [(&str, i32); 15] = [
     ("PrismsP4", 103),
 ];
 
-/// Reads a Medit file, ASCII or binary as its first byte tells.
+/// Reads a Medit file, ASCII or binary depending on its first byte.
 ///
-/// Tets are kept as they are, negative ones too. References of tets become [`MeshFile::regions`] and references of
+/// Tets keep their orientation, also negative ones. References of tets become [`MeshFile::regions`] and references of
 /// points the scalars `reference`, unless all are 0.
 ///
 /// # Errors
@@ -69,7 +69,7 @@ pub fn read_medit(path: impl AsRef<Path>) -> Result<MeshFile, MeshIoError> {
     parse_medit(&load(path)?, path)
 }
 
-/// Reads the content of a Medit file from memory, ASCII or binary as its first byte tells.
+/// Parses a Medit file in memory, ASCII or binary depending on its first byte.
 pub(crate) fn parse_medit(bytes: &[u8], path: &Path) -> Result<MeshFile, MeshIoError> {
     // A binary file starts with the number 1, in either byte order.
     if matches!(bytes.first(), Some(0 | 1)) {
@@ -81,9 +81,9 @@ pub(crate) fn parse_medit(bytes: &[u8], path: &Path) -> Result<MeshFile, MeshIoE
 
 /// Writes a Medit file: binary if the name ends with `.meshb`, else ASCII. Both keep every bit of the coordinates.
 ///
-/// Regions become the references of tets, and the scalars named `reference` those of points if all are whole numbers
-/// of 32 bits; else references are 0. There is no place for other values. The binary version is the lowest that has
-/// room: 2, from 2 GiB on 3, from 2³¹ points or tets on 4.
+/// Regions become the references of tets, and the scalars named `reference` those of points if all are whole numbers of
+/// 32 bits; otherwise references are 0. Other values are not written. The binary version is the lowest that is large
+/// enough: 2, from 2 GiB on 3, from 2³¹ points or tets on 4.
 ///
 /// # Errors
 /// [`MeshIoError::FieldLength`] if regions or values are not one for each element, [`MeshIoError::Io`] if the file
@@ -101,21 +101,21 @@ pub fn write_medit(path: impl AsRef<Path>, file: &MeshFile) -> Result<(), MeshIo
     })
 }
 
-/// What has been read so far.
+/// The content read so far.
 #[derive(Default)]
 struct Contents {
-    /// Whether there was a section of points, and one of tets.
+    /// True after a section of points, and of tets.
     seen: [bool; 2],
     positions: Vec<DVec3>,
     point_references: Vec<i32>,
     tets: Vec<[ParticleId; 4]>,
     tet_references: Vec<i32>,
-    /// The largest corner and the line or byte where it is: tets may come before the points.
+    /// The largest corner and its line or byte: tets may come before the points.
     largest: Option<(ParticleId, usize)>,
 }
 
 impl Contents {
-    /// The particle of a corner numbered from 1, if there can be such.
+    /// The particle of a corner numbered from 1, if it can exist.
     fn corner(&mut self, number: i64, place: usize) -> Option<ParticleId> {
         let particle = ParticleId(u32::try_from(number.checked_sub(1)?).ok()?);
         if self.largest.is_none_or(|(largest, _)| particle > largest) {
@@ -124,7 +124,7 @@ impl Contents {
         Some(particle)
     }
 
-    /// Checks what can be checked at the end only; `error` makes an error of a line or byte and a message.
+    /// Makes the checks that need the whole file; `error` makes an error of a line or byte and a message.
     fn finish(self, error: impl Fn(usize, String) -> MeshIoError) -> Result<MeshFile, MeshIoError> {
         if self.tets.is_empty() {
             return Err(MeshIoError::Empty);
@@ -161,7 +161,7 @@ impl Contents {
     }
 }
 
-/// The reference of each point, or none if there are none that fit.
+/// The reference of each point; `None` without fitting values.
 fn point_references(file: &MeshFile) -> Option<Vec<i32>> {
     let values = file.particles.iter().find(|v| v.name == REFERENCE)?;
     let OwnedValues::Scalars(values) = &values.values else {
@@ -170,7 +170,7 @@ fn point_references(file: &MeshFile) -> Option<Vec<i32>> {
     values.iter().map(|&value| whole(value)).collect()
 }
 
-/// The reference of element `i`: 0 where there are none.
+/// The reference of element `i`; 0 without references.
 fn reference(references: &[i32], i: usize) -> i32 {
     references.get(i).copied().unwrap_or(0)
 }

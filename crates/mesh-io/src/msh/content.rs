@@ -1,7 +1,7 @@
-//! What is found in an MSH file, with the numbers of the file, and the mesh that follows from it.
+//! The content of an MSH file with the numbers of the file, and its conversion to a mesh.
 //!
-//! Nodes and elements carry any numbers in any order, and sections may come in any order too. So everything is kept
-//! until the end is reached; then the numbers are sorted once and looked up. Cost: O(n log n).
+//! Nodes and elements have arbitrary numbers in any order, and sections may come in any order, too. All are kept until
+//! the end; then the numbers are sorted once and looked up. Cost: O(n log n).
 
 use glam::DVec3;
 use incise_mesh::{ParticleId, TetMesh};
@@ -24,7 +24,7 @@ pub(super) struct Content {
     pub(super) data: Vec<Data>,
 }
 
-/// A tet as the file has it.
+/// A tet with the file's numbers.
 pub(super) struct Tet {
     pub(super) tag: u64,
     pub(super) corners: [u64; 4],
@@ -38,7 +38,7 @@ pub(super) struct Tet {
 /// A volume of section `$Entities` or `$PartitionedEntities`.
 pub(super) struct Volume {
     pub(super) tag: i32,
-    /// The volume it is part of, or itself.
+    /// The volume of which it is a part, or itself.
     pub(super) whole: i32,
     /// The first physical group, 0 for none.
     pub(super) physical: i32,
@@ -49,13 +49,14 @@ pub(super) struct Data {
     pub(super) name: String,
     pub(super) of_nodes: bool,
     pub(super) components: usize,
-    /// The number of each node or element, and where it stands.
+    /// The number of each node or element, and its position in the file.
     pub(super) tags: Vec<(u64, usize)>,
     pub(super) values: Vec<f64>,
 }
 
 impl Content {
-    /// Reads an element type. How many nodes to pass over for it; none for a tet. Other volume elements are refused.
+    /// Reads an element type; returns the number of nodes to skip, `None` for a tet. Other volume elements are an
+    /// error.
     pub(super) fn nodes_to_skip(source: &mut Source<'_>) -> Result<Option<usize>, MeshIoError> {
         let number = source.int("an element type")?;
         match kind_of(number) {
@@ -120,8 +121,8 @@ impl Content {
                 "two tetrahedra have the number {tag}, so that its values belong to neither, renumber them"
             )));
         }
-        // Data of a few elements become fields of all: a file of many such sections would fill the memory. One number
-        // is allowed for each byte of the file.
+        // Data of a few elements become fields of all elements, so a file of many such sections would fill the memory.
+        // One number is allowed for each byte of the file.
         let mut allowed = source.len();
         for data in self.data {
             let of_nodes = data.of_nodes;
@@ -136,9 +137,9 @@ impl Content {
         Ok(file)
     }
 
-    /// The physical groups if any tet is in one, or else the entities, unless all are 1, which says nothing.
+    /// The physical groups if any tet has one, otherwise the entities, unless all are 1.
     fn regions(&mut self) -> Vec<i32> {
-        // Stable: of two volumes with one number the first counts.
+        // The sort is stable: of two volumes with one number the first is used.
         self.volumes.sort_by_key(|volume| volume.tag);
         self.volumes.dedup_by_key(|volume| volume.tag);
         for tet in &mut self.tets {
@@ -159,8 +160,8 @@ impl Content {
 }
 
 impl Data {
-    /// The values in the order of the mesh, NaN where there are none; nothing if there is no value at all. No more than
-    /// the allowed number of NaN are filled in, which is lowered by it.
+    /// The values in the order of the mesh, NaN for missing ones; `None` without any value. The number of NaN is at
+    /// most `allowed`, which is reduced by it.
     fn resolve(
         self,
         numbers: &Numbers,
@@ -178,7 +179,7 @@ impl Data {
                     );
                     return Err(source.error_at(offset, message));
                 }
-                // An element of lower dimension, which was passed over.
+                // An element of lower dimension that was skipped.
                 None => {}
             }
         }
@@ -217,7 +218,7 @@ impl Data {
     }
 }
 
-/// The numbers that a file gives to its nodes or elements, sorted, each with its index.
+/// The file's numbers of its nodes or elements, sorted, each with its index.
 #[derive(Default)]
 struct Numbers(Vec<(u64, usize)>);
 

@@ -6,7 +6,7 @@ use super::content::{Content, Data};
 use super::source::Source;
 use crate::MeshIoError;
 
-/// Reads such a section after its name. Values with other than 1 or 3 components are passed over.
+/// Reads such a section after its name. Values with other than 1 or 3 components are skipped.
 pub(super) fn read_data(
     source: &mut Source<'_>,
     content: &mut Content,

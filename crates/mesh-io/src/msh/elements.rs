@@ -1,21 +1,21 @@
-//! The element types of MSH files: which are read, passed over, or refused.
+//! The element types of MSH files: read, skipped, or unsupported.
 //!
 //! Source: the Gmsh reference manual, section "MSH file format", list of element types.
 
-/// What to do with the elements of a type.
+/// The treatment of an element type.
 #[derive(Debug, PartialEq)]
 pub(super) enum Kind {
-    /// A tet with four nodes: read.
+    /// A tet with four nodes, which is read.
     Tet,
-    /// A point, line, triangle or quadrilateral of any order, with so many nodes: passed over.
+    /// A point, line, triangle or quadrilateral with this many nodes, which is skipped.
     Lower(usize),
-    /// A volume element that is no tet with four nodes: refused by this name.
+    /// A volume element other than a tet with four nodes, which is an error with this name.
     Volume(&'static str),
-    /// A number that is not known here: refused.
+    /// An unknown number, which is an error.
     Unknown,
 }
 
-/// What the number of an element type stands for.
+/// The treatment of the element type with this number.
 pub(super) const fn kind_of(number: i32) -> Kind {
     match number {
         4 => Kind::Tet,

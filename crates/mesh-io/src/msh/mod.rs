@@ -1,16 +1,16 @@
 //! Gmsh files (`.msh`), text and binary.
 //!
-//! Read are the versions 1 (`$NOD` and `$ELM`, text), 2.0 to 2.2 and 4.1; 3 and 4.0, which lived for a short time, are
-//! refused by name. A file is a row of sections `$Name` to `$EndName`, of which unknown ones are passed over. Tets are
-//! taken and elements of lower dimension left out; other volume elements are refused.
+//! Versions 1 (`$NOD` and `$ELM`, text), 2.0 to 2.2 and 4.1 are read; the rare versions 3 and 4.0 are an error. A file
+//! is a sequence of sections `$Name` to `$EndName`; unknown ones are skipped. Tets are read and elements of lower
+//! dimension skipped; other volume elements are an error.
 //!
-//! Regions are the physical groups of the tets (0 for a tet in none; the first one of several), or, where no tet is in
-//! one, the elementary entities. A single entity 1 without a group, which Gmsh writes for want of anything else, is no
-//! region at all. The names of groups (`$PhysicalNames`) are not kept: no other format stores them.
+//! Regions are the physical groups of the tets (0 for a tet without one; the first one of several), or, if no tet has
+//! one, the elementary entities. A single entity 1 without a group is Gmsh's default and not a region. The names of
+//! groups (`$PhysicalNames`) are dropped: no other format stores them.
 //!
-//! `$NodeData` and `$ElementData` with 1 or 3 components are fields; each time step is one; elements without a value
-//! have NaN, and a file is refused that needs more than eight times its size for them. Orientation is kept as it is.
-//! Cost: O(n log n), for the numbers of nodes may have gaps and be in any order.
+//! `$NodeData` and `$ElementData` with 1 or 3 components are fields, one for each time step. Elements without a value
+//! have NaN; a file that needs more than eight times its size for them is an error. Orientation is kept. Cost: O(n log
+//! n), because the numbers of nodes may have gaps and be in any order.
 //!
 //! Source: the Gmsh reference manual, sections "MSH file format", "MSH file format version 2" and "version 1" (Geuzaine
 //! and Remacle).
@@ -37,13 +37,13 @@ use crate::{MeshFile, MeshIoError};
 /// Reads the tets of a Gmsh file, versions 1, 2 and 4.1, text or binary, with regions and fields.
 ///
 /// # Errors
-/// The errors of [`read`](crate::read); [`MeshIoError::ParseBytes`] for what is wrong in a binary file.
+/// The errors of [`read`](crate::read); [`MeshIoError::ParseBytes`] for errors in a binary file.
 pub fn read_msh(path: impl AsRef<Path>) -> Result<MeshFile, MeshIoError> {
     let path = path.as_ref();
     parse_msh(&load(path)?, path)
 }
 
-/// The versions that are read.
+/// The supported versions.
 #[derive(Clone, Copy, PartialEq)]
 enum Version {
     V1,
@@ -51,7 +51,7 @@ enum Version {
     V41,
 }
 
-/// Reads the content of a file; its name is for errors.
+/// Parses the content of a file; the path is used in errors.
 pub(crate) fn parse_msh(bytes: &[u8], path: &Path) -> Result<MeshFile, MeshIoError> {
     let mut source = Source::new(path, bytes);
     let source = &mut source;

@@ -2,8 +2,8 @@
 //!
 //! Version 1 is a text: `$NOD` and `$ELM`, each element with its physical group, its entity and the number of its
 //! nodes. Version 2 has a list of tags for each element, of which the first is the physical group and the second the
-//! entity; in binary files elements stand in batches of one type. Gmsh also writes `$ParametricNodes` in place of
-//! `$Nodes`, which the manual does not mention. Linear.
+//! entity; in binary files elements are in batches of one type. Gmsh may write `$ParametricNodes` instead of `$Nodes`,
+//! which the manual does not mention. Linear.
 
 use glam::DVec3;
 
@@ -32,7 +32,7 @@ pub(super) fn read_nodes(
         ];
         content.positions.push(DVec3::from(position));
         if parametric {
-            // Nodes on lines and surfaces have their parameters there.
+            // Nodes on lines and surfaces are followed by their parameters.
             let dimension = source.int("the dimension of an entity")?;
             source.int("the number of an entity")?;
             let parameters = if dimension == 3 { 0 } else { dimension };
@@ -121,7 +121,7 @@ fn read_element_2(
     tags: i32,
     (tag, offset): (u64, usize),
 ) -> Result<(), MeshIoError> {
-    // Entity 1 and no group are what an element without tags belongs to.
+    // An element without tags belongs to entity 1 and no group.
     let (mut physical, mut entity) = (0, 1);
     for i in 0..tags {
         let value = source.int("a tag")?;

@@ -1,7 +1,7 @@
 //! Entities, nodes and elements of MSH version 4.1.
 //!
-//! Nodes and elements stand in blocks that belong to a geometric entity (dimension and number); the physical groups are
-//! those of the entities. In partitioned meshes the entities are parts of others. Linear.
+//! Nodes and elements are in blocks that belong to a geometric entity (dimension and number); physical groups are those
+//! of the entities. In partitioned meshes the entities are parts of others. Linear.
 
 use glam::DVec3;
 
@@ -149,7 +149,7 @@ pub(super) fn read_elements(
     check_complete(source, left, "elements")
 }
 
-/// The head of a section: the numbers of blocks and of items. The least and largest number of an item say nothing new.
+/// The head of a section: the numbers of blocks and of items. The smallest and largest number of an item are redundant.
 fn read_counts(source: &mut Source<'_>, what: &str) -> Result<(usize, usize), MeshIoError> {
     let blocks = source.count("the number of blocks")?;
     let count = source.count(&format!("the number of {what}"))?;
@@ -158,7 +158,7 @@ fn read_counts(source: &mut Source<'_>, what: &str) -> Result<(usize, usize), Me
     Ok((blocks, count))
 }
 
-/// The number of items of a block, taken from those that are left.
+/// The number of items of a block, subtracted from `left`.
 fn read_block(source: &mut Source<'_>, left: &mut usize, what: &str) -> Result<usize, MeshIoError> {
     let count = source.count(&format!("the number of {what} of a block"))?;
     match left.checked_sub(count) {

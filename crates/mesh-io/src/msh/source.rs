@@ -1,7 +1,7 @@
-//! The numbers of an MSH file, one after the other, whether they are words or bytes.
+//! [`Source`]: the numbers of an MSH file in sequence, from words or bytes.
 //!
-//! Both encodings have the same numbers in the same order, so that the rest of the reader does not ask which one it is.
-//! Places are bytes from the start; in a text they become lines when an error is shown. Linear.
+//! Both encodings have equal numbers in equal order, so the rest of the reader is independent of the encoding. Offsets
+//! are bytes from the start; in a text, errors show lines. Linear.
 
 use std::path::Path;
 use std::str::FromStr;
@@ -14,9 +14,9 @@ use crate::text::show;
 pub(super) enum Encoding {
     /// Words of text.
     Text,
-    /// Bytes, the lowest first.
+    /// Bytes, little-endian.
     Little,
-    /// Bytes, the highest first.
+    /// Bytes, big-endian.
     Big,
 }
 
@@ -25,7 +25,7 @@ pub(super) struct Source<'a> {
     path: &'a Path,
     bytes: &'a [u8],
     at: usize,
-    /// Where the item read last starts.
+    /// The start of the last item.
     item: usize,
     pub(super) encoding: Encoding,
     /// The bytes of a tag or a count in a binary file of version 4.1: 4 or 8.
@@ -49,12 +49,12 @@ impl<'a> Source<'a> {
         self.bytes.len()
     }
 
-    /// Where the item read last starts.
+    /// The start of the last item.
     pub(super) const fn offset(&self) -> usize {
         self.item
     }
 
-    /// An error at the item read last.
+    /// An error at the last item.
     pub(super) fn error(&self, message: impl Into<String>) -> MeshIoError {
         self.error_at(self.item, message)
     }
@@ -87,7 +87,7 @@ impl<'a> Source<'a> {
         )
     }
 
-    /// How many elements to make room for: as many as announced, but no more than the rest of the file can hold.
+    /// The capacity to reserve: the announced number of elements, bounded by the size of the rest of the file.
     pub(super) fn room_for(&self, announced: usize, least_bytes_each: usize) -> usize {
         announced.min((self.bytes.len() - self.at) / least_bytes_each)
     }
@@ -106,7 +106,7 @@ impl<'a> Source<'a> {
         Ok(word)
     }
 
-    /// Goes to the next byte that is not blank; false at the end.
+    /// Skips blanks; false at the end.
     pub(super) fn skip_blanks(&mut self) -> bool {
         let rest = &self.bytes[self.at..];
         let blanks = rest.iter().position(|b| !b.is_ascii_whitespace());
@@ -114,7 +114,7 @@ impl<'a> Source<'a> {
         self.at < self.bytes.len()
     }
 
-    /// The rest of the line, without its end, which is passed.
+    /// The rest of the line, without its end, which is skipped.
     pub(super) fn line(&mut self) -> &'a [u8] {
         let rest = &self.bytes[self.at..];
         self.item = self.at;
@@ -126,7 +126,7 @@ impl<'a> Source<'a> {
         line.strip_suffix(b"\r").unwrap_or(line)
     }
 
-    /// Passes everything up to a line that starts with `end`, and that too.
+    /// Skips everything up to and including a line that starts with `end`.
     pub(super) fn skip_past(&mut self, end: &[u8]) -> Result<(), MeshIoError> {
         let rest = &self.bytes[self.at..];
         let mut from = 0;
@@ -145,7 +145,7 @@ impl<'a> Source<'a> {
         Err(self.ends_early(&show(end)))
     }
 
-    /// The word that ends a section.
+    /// Reads the word that ends a section.
     pub(super) fn expect(&mut self, keyword: &str) -> Result<(), MeshIoError> {
         let word = self.word(keyword)?;
         if word == keyword.as_bytes() {
@@ -155,7 +155,7 @@ impl<'a> Source<'a> {
         Err(self.error(format!("{keyword} expected but {found:?} found")))
     }
 
-    /// A word as a number, in binary files too.
+    /// Parses a word as a number, in binary files too.
     pub(super) fn number<T: FromStr>(&mut self, what: &str) -> Result<T, MeshIoError> {
         let word = self.word(what)?;
         let number = str::from_utf8(word).ok().and_then(|text| text.parse().ok());
@@ -202,12 +202,12 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// A count of version 4.1. What does not fit in memory is as good as the largest count that does.
+    /// A count of version 4.1; too large ones become the largest `usize`.
     pub(super) fn count(&mut self, what: &str) -> Result<usize, MeshIoError> {
         Ok(usize::try_from(self.long_tag(what)?).unwrap_or(usize::MAX))
     }
 
-    /// A number with fraction; NaN and infinite ones are let through.
+    /// A floating-point number, which may be NaN or infinite.
     pub(super) fn double(&mut self, what: &str) -> Result<f64, MeshIoError> {
         if self.encoding == Encoding::Text {
             return self.number(what);

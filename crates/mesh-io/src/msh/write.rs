@@ -1,8 +1,8 @@
 //! Writing MSH files of versions 2.2 and 4.1, text and binary.
 //!
-//! Gmsh has one physical group for each region, and an entity for each, numbered from 1 in ascending order of the
-//! regions. Tets keep their order: in version 4.1, where elements stand in blocks of one entity, each run of tets of
-//! one region is a block. Numbers in a text are the shortest that give the same bits back. Cost: O(n log n).
+//! Each region is a physical group with an entity, numbered from 1 in ascending order of the regions. Tets keep their
+//! order: in version 4.1, where elements are in blocks of one entity, each run of tets of one region is a block.
+//! Numbers in a text are the shortest that keep every bit. Cost: O(n log n).
 //!
 //! Source: the Gmsh reference manual, sections "MSH file format" and "MSH file format version 2".
 
@@ -14,15 +14,15 @@ use incise_mesh::{Bounds, TetMesh};
 
 use crate::{Field, MeshFile, MeshIoError, NamedValues, Values, write_atomically};
 
-/// The kinds of Gmsh files that are written.
+/// The kinds of Gmsh files that can be written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MshKind {
-    /// Version 4.1 as text, what Gmsh itself writes when asked for nothing else.
+    /// Version 4.1 as text, Gmsh's default.
     #[default]
     Text41,
-    /// Version 4.1, binary. Larger than the text for coordinates of few digits, since its numbers have 8 bytes.
+    /// Version 4.1, binary. Larger than text for coordinates of few digits, since numbers have 8 bytes.
     Binary41,
-    /// Version 2.2 as text, which older programs read.
+    /// Version 2.2 as text, for older programs.
     Text22,
     /// Version 2.2, binary.
     Binary22,
@@ -41,14 +41,14 @@ impl MshKind {
 /// Writes a Gmsh file with regions as physical groups and fields as data of nodes and elements. Nodes and elements are
 /// numbered from 1.
 ///
-/// Group 0 is none to Gmsh: a tet of region 0 is written without a group if other tets have one, and with entity 0
-/// instead of 1 if not, so that reading gives the same regions back. All bits survive but those that tell one NaN from
-/// another in a text.
+/// Group 0 means no group in Gmsh: a tet of region 0 is written without a group if other tets have one, and with entity
+/// 0 instead of 1 otherwise, so that reading gives equal regions. Every bit is kept, except for the payload of NaN in a
+/// text.
 ///
 /// # Errors
 /// [`MeshIoError::FieldLength`] for values or regions of the wrong number, [`MeshIoError::Io`] if the file cannot be
-/// written or something does not fit in it: a field whose name has a line end, more than 2³¹ - 1 elements in version
-/// 2.2.
+/// written or its format does not support the content: a field whose name has a line end, more than 2³¹ - 1 elements in
+/// version 2.2.
 ///
 /// # Example
 /// ```
@@ -72,7 +72,7 @@ pub fn write_msh(
     write_atomically(path, |out| write_content(out, file, kind))
 }
 
-/// Writes the content of a file whose lengths agree.
+/// Writes the content; all lengths must have been checked.
 pub(super) fn write_content(out: &mut dyn Write, file: &MeshFile, kind: MshKind) -> io::Result<()> {
     let mut sink = Sink {
         out,
@@ -108,7 +108,7 @@ pub(super) fn write_content(out: &mut dyn Write, file: &MeshFile, kind: MshKind)
     Ok(())
 }
 
-/// The entities and physical groups that stand for the regions.
+/// The entities and physical groups of the regions.
 struct Regions {
     /// The physical group of each entity, 0 for none.
     groups: Vec<i32>,
@@ -159,7 +159,7 @@ fn write_entities(sink: &mut Sink<'_>, mesh: &TetMesh, regions: &Regions) -> io:
     for (entity, &Bounds { low, high }) in boxes.iter().enumerate() {
         sink.int(regions.number(entity)?)?;
         for corner in [low, high] {
-            // Without tets there is no box.
+            // Without tets the bounding box is empty.
             sink.vector(if low.x <= high.x { corner } else { DVec3::ZERO })?;
         }
         let group = regions.groups[entity];
@@ -235,7 +235,7 @@ fn write_nodes_22(sink: &mut Sink<'_>, mesh: &TetMesh) -> io::Result<()> {
 fn write_elements_22(sink: &mut Sink<'_>, mesh: &TetMesh, regions: &Regions) -> io::Result<()> {
     let count = mesh.tets.len();
     sink.line(&format!("$Elements\n{count}"))?;
-    // In a binary file the type and the number of tags stand once before all elements.
+    // In a binary file the type and the number of tags precede all elements.
     if sink.binary && count > 0 {
         for number in [4, short(count)?, 2] {
             sink.int(number)?;
@@ -298,12 +298,12 @@ fn short(number: usize) -> io::Result<i32> {
 struct Sink<'a> {
     out: &'a mut dyn Write,
     binary: bool,
-    /// Whether the line has a word already.
+    /// True if the line already has a word.
     in_line: bool,
 }
 
 impl Sink<'_> {
-    /// Words on lines of their own, in binary files too.
+    /// Writes words on a line of their own, in binary files too.
     fn line(&mut self, text: &str) -> io::Result<()> {
         writeln!(self.out, "{text}")
     }

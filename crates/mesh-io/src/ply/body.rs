@@ -1,4 +1,4 @@
-//! The elements after the header: values one after another, as words or bytes. Linear.
+//! The elements after the header: a sequence of values, as words or bytes. Linear.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use super::header::{Element, Type};
 use crate::MeshIoError;
 use crate::text::{Text, Word, show};
 
-/// What follows the header.
+/// The content after the header.
 pub(super) enum Body<'b, 't, I> {
     Ascii {
         text: &'b Text<'b>,
@@ -17,7 +17,7 @@ pub(super) enum Body<'b, 't, I> {
     Binary {
         path: &'t Path,
         bytes: &'t [u8],
-        /// Where the last value started, and where the next one does.
+        /// The starts of the last value and of the next one.
         last: usize,
         at: usize,
         big_endian: bool,
@@ -25,7 +25,7 @@ pub(super) enum Body<'b, 't, I> {
 }
 
 impl<'b, I: Iterator<Item = Word<'b>>> Body<'b, '_, I> {
-    /// The next value; of text, whatever number is there.
+    /// The next value; in text, any number.
     pub(super) fn number(&mut self, kind: Type, what: &str) -> Result<f64, MeshIoError> {
         match self {
             Body::Ascii { text, words, line } => {
@@ -50,7 +50,8 @@ impl<'b, I: Iterator<Item = Word<'b>>> Body<'b, '_, I> {
         }
     }
 
-    /// How many elements to make room for: as many as announced, but no more than the rest of the file can hold.
+    /// The capacity to reserve: the announced number of elements, bounded by the size of the rest
+    /// of the file.
     pub(super) fn room_for(&self, element: &Element<'_>) -> usize {
         let numbers = || {
             element
@@ -65,7 +66,7 @@ impl<'b, I: Iterator<Item = Word<'b>>> Body<'b, '_, I> {
         element.count.min(left.checked_div(least).unwrap_or(0))
     }
 
-    /// The most values of a type that the rest of the file can hold.
+    /// The largest number of values of a type that the rest of the file can hold.
     pub(super) fn most_values(&self, kind: Type) -> usize {
         match self {
             Body::Ascii { text, .. } => text.room_for(usize::MAX, 2),
@@ -88,7 +89,7 @@ impl<'b, I: Iterator<Item = Word<'b>>> Body<'b, '_, I> {
         Err(self.error(self.offset(), message))
     }
 
-    /// The next bytes, turned to little-endian order.
+    /// The next bytes in little-endian order.
     fn take<const N: usize>(&mut self, what: &str) -> Result<[u8; N], MeshIoError> {
         if let Body::Binary {
             bytes,

@@ -29,7 +29,7 @@ impl Type {
 
 pub(super) struct Property<'t> {
     pub(super) name: &'t [u8],
-    /// The type of the number of values, of a list.
+    /// For a list, the type of the number of its values.
     pub(super) count: Option<Type>,
     pub(super) value: Type,
 }
@@ -41,7 +41,7 @@ pub(super) struct Element<'t> {
     pub(super) properties: Vec<Property<'t>>,
 }
 
-/// The axis that a property is the coordinate of.
+/// The axis of a property that is a coordinate.
 pub(super) fn axis(property: &Property<'_>) -> Option<usize> {
     let axis = [b"x", b"y", b"z"]
         .iter()
@@ -53,7 +53,7 @@ pub(super) fn is_corners(property: &Property<'_>) -> bool {
     property.count.is_some() && [&b"vertex_indices"[..], b"vertex_index"].contains(&property.name)
 }
 
-/// Reads the header: encoding, elements, and how many lines it has.
+/// Reads the header; returns encoding, elements, and the number of its lines.
 pub(super) fn header<'t>(
     text: &'t Text<'_>,
 ) -> Result<(PlyEncoding, Vec<Element<'t>>, usize), MeshIoError> {

@@ -1,9 +1,8 @@
 //! Stanford's `.ply`: a text that declares elements and their properties, then the elements as text or binary.
 //!
-//! Needed are the elements `vertex` with `x`, `y`, `z` and `face` with a list `vertex_indices` or `vertex_index`; all
-//! else is skipped. All types have at most 32 bits or are `f64`, so that each value is read as an `f64` without loss.
-//! Text keeps the digits of doubles even where `float` is declared. Source: G. Turk, "The PLY Polygon File Format"
-//! (1994). Linear.
+//! The elements `vertex` with `x`, `y`, `z` and `face` with a list `vertex_indices` or `vertex_index` are read, all
+//! others skipped. All types have at most 32 bits or are `f64`, so reading a value as `f64` is exact. Text keeps the
+//! digits of doubles even where `float` is declared. Source: G. Turk, "The PLY Polygon File Format" (1994). Linear.
 
 mod body;
 mod header;
@@ -20,14 +19,14 @@ use crate::{MeshIoError, write_atomically};
 use body::Body;
 use header::{axis, header, is_corners};
 
-/// How the elements of a `.ply` file are written.
+/// The encoding of the elements of a `.ply` file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlyEncoding {
-    /// Text; the digits give the same bits back.
+    /// Text with enough digits to keep every bit.
     Ascii,
-    /// Binary with the low byte first.
+    /// Little-endian binary.
     LittleEndian,
-    /// Binary with the high byte first.
+    /// Big-endian binary.
     BigEndian,
 }
 
@@ -114,7 +113,7 @@ pub(crate) fn parse_ply(bytes: &[u8], path: &Path) -> Result<TriangleSurface, Me
     let mut largest: Option<(ParticleId, usize)> = None;
     let mut list = Vec::new();
     for element in &elements {
-        // Nothing to read, whatever the count.
+        // Elements without properties have no data.
         if element.properties.is_empty() {
             continue;
         }
@@ -125,8 +124,8 @@ pub(crate) fn parse_ply(bytes: &[u8], path: &Path) -> Result<TriangleSurface, Me
         if element.name == b"face"
             && let Some(property) = element.properties.iter().find(|p| is_corners(p))
         {
-            // Polygons may have a triangle of 12 bytes for each byte. A list that grows is two lists for a while, which
-            // would be too much.
+            // Polygons may need 12 bytes for each byte of the file. A growing list has two copies for a while, which
+            // would exceed the limit.
             if encoding != PlyEncoding::Ascii && property.value.bytes() < 4 {
                 let room = body.most_values(property.value);
                 surface.triangles.reserve_exact(room);

@@ -1,12 +1,12 @@
 //! TetGen's pair of files: `.node` with the points and `.ele` with the tets.
 //!
-//! One item per line after a line with counts; `#` starts a comment; points are numbered from 0 or 1, which the first
-//! one tells. The mid-edge points of 10-point tets are skipped. TetGen's own tets are mirror images of ours, other
-//! programs write either kind, so that negative tets are turned on reading.
+//! One item per line after a line with counts; `#` starts a comment; points are numbered from 0 or 1, depending on the
+//! first one. The mid-edge points of 10-point tets are skipped. TetGen's own tets are mirror images of ours, other
+//! programs write either kind, so negative tets are flipped on reading.
 //!
-//! Attributes have no names: they are called `attribute 1` and so on, and the markers of points `boundary marker`. The
-//! last attribute of tets is where TetGen puts the region: it is the region if it is a whole number for all. There may
-//! be 256 attributes at most. Linear.
+//! Attributes have no names: they are called `attribute 1` and so on, and the markers of points `boundary marker`.
+//! TetGen stores the region in the last attribute of tets: it is read as the region if all values are whole numbers. At
+//! most 256 attributes are supported. Linear.
 //!
 //! Source: H. Si, "TetGen User's Manual", file formats.
 
@@ -25,7 +25,7 @@ use rows::rows;
 
 pub use write::{write_tetgen, write_tetgen_file};
 
-/// The name of the values that hold the boundary markers of points.
+/// The name of the values with the boundary markers of points.
 const MARKER: &str = "boundary marker";
 
 /// Converts numbers to integers; `None` unless all are whole numbers of 32 bits.
@@ -66,8 +66,8 @@ pub fn read_tetgen_file(path: impl AsRef<Path>) -> Result<MeshFile, MeshIoError>
     parse_tetgen(path, &nodes?, &elements?)
 }
 
-/// Reads the content of a `.node` and an `.ele` file from memory, with attributes, boundary markers and regions. Errors
-/// name `path` with the ending `.node` or `.ele`.
+/// Parses the content of a `.node` and an `.ele` file in memory, with attributes, boundary markers and regions. Errors
+/// contain `path` with the ending `.node` or `.ele`.
 ///
 /// # Errors
 /// The errors of [`parse_file`](crate::parse_file).
@@ -106,7 +106,7 @@ pub fn parse_tetgen(
     })
 }
 
-/// Columns of attributes with the names they get.
+/// Columns of attributes with their names.
 fn named(columns: Vec<Vec<f64>>) -> Vec<NamedValues> {
     let values = (1..).zip(columns).map(|(i, column)| NamedValues {
         name: format!("attribute {i}"),

@@ -3,7 +3,7 @@
 use crate::MeshIoError;
 use crate::text::{Text, Word, show, without_comment, words_of};
 
-/// Each attribute becomes a field with a name, which takes far more memory than the two bytes of a number.
+/// Each attribute becomes a named field, which takes far more memory than the two bytes of a number.
 pub(super) const MOST_ATTRIBUTES: usize = 256;
 
 /// A line with content.
@@ -36,7 +36,7 @@ impl<'t, I: Iterator<Item = &'t [u8]>> Row<'t, '_, I> {
             .map_or(Ok(0), |text| self.text.count(Word::new(text, line), what))
     }
 
-    /// The number of attributes of each element, for so many elements, and a column for each attribute.
+    /// Reads the number of attributes of each element; returns a column for each, with capacity for this many elements.
     pub(super) fn columns(&mut self, elements: usize) -> Result<Vec<Vec<f64>>, MeshIoError> {
         let count = self.count_or_0("the number of attributes")?;
         if count > MOST_ATTRIBUTES {

@@ -1,4 +1,4 @@
-//! Writing: a line for each element, as it is numbered. Linear.
+//! Writing TetGen files: a line for each element in order. Linear.
 
 use std::fmt::{self, Display};
 use std::io;
@@ -19,8 +19,8 @@ pub fn write_tetgen(path: impl AsRef<Path>, mesh: &TetMesh) -> Result<(), MeshIo
 }
 
 /// Writes `.node` and `.ele` files with the stem of `path`, with the scalars of `file` as attributes, in their order,
-/// and its regions as the last attribute of tets. The scalars `boundary marker` of particles are markers if whole
-/// numbers of 32 bits. Vectors have no place in the format.
+/// and its regions as the last attribute of tets. The scalars `boundary marker` of particles are markers if they are
+/// whole numbers of 32 bits. Vectors are not supported by the format and are left out.
 ///
 /// # Errors
 /// [`MeshIoError::FieldLength`] if regions or values are not one for each element, [`MeshIoError::Io`] if a file cannot
@@ -95,7 +95,7 @@ fn write_pair(
     })
 }
 
-/// The attributes of one element, a space before each.
+/// The attributes of one element, each after a space.
 struct Attributes<'a>(&'a [&'a NamedValues], usize);
 
 impl Display for Attributes<'_> {
@@ -109,7 +109,7 @@ impl Display for Attributes<'_> {
     }
 }
 
-/// A number after a space, or nothing.
+/// A number after a space, or an empty text.
 struct Optional(Option<i32>);
 
 impl Display for Optional {

@@ -1,6 +1,6 @@
 //! The point and cell data of a legacy VTK file: arrays with a keyword of their own, and fields of many arrays.
 //!
-//! Arrays of one or three components are kept; the others are read to know where the next one starts. Linear.
+//! Arrays of one or three components are kept; others are skipped. Linear.
 
 use super::cursor::{Wanted, Word};
 use super::read::{Reader, Target};
@@ -10,7 +10,7 @@ use crate::vtk_grid::named_values;
 use crate::vtk_kind::Kind;
 
 impl Reader<'_> {
-    /// An array, which is kept if it has a name and belongs to someone.
+    /// Reads an array; it is kept if it has a name and an owner.
     pub(super) fn array(
         &mut self,
         kind: Kind,
@@ -66,7 +66,7 @@ impl Reader<'_> {
                 continue;
             }
             read += 1;
-            // A missing array is written so, without numbers.
+            // A missing array has this name and no numbers.
             if name.is("NULL_ARRAY") {
                 continue;
             }
@@ -91,8 +91,8 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Strings stand on lines of their own, or, in a binary file, behind their length: a number of 1, 2, 4 or 8 bytes
-    /// whose highest two bits say which.
+    /// Skips strings, which are on lines of their own, or, in a binary file, each after its length: a number of 1, 2, 4
+    /// or 8 bytes, depending on its highest two bits.
     fn skip_strings(&mut self, count: Option<usize>) -> Result<(), MeshIoError> {
         self.cursor.line();
         let count = count.ok_or_else(|| {
@@ -174,13 +174,13 @@ impl Reader<'_> {
             self.cursor.expect("the name of a table")?;
             return self.array(kind, components, tuples, Some(name.text));
         }
-        // Without the line of the table the data starts right here, where `array` would skip a line.
+        // Without the line of the table the data starts here, where `array` would skip a line.
         self.cursor.at -= usize::from(self.cursor.bytes[self.cursor.at - 1] == b'\n');
         self.array(kind, components, tuples, Some(name.text))
     }
 }
 
-/// A name as it was before the writer put `%` and two digits in the place of blanks and the like.
+/// A name after decoding of `%` and two digits, which writers use for blanks and special characters.
 fn decoded(name: &[u8]) -> String {
     let mut bytes = Vec::with_capacity(name.len());
     let mut rest = name;

@@ -1,7 +1,7 @@
-//! A place in a legacy VTK file that moves over words, lines and arrays of numbers.
+//! [`Cursor`]: a read position in a legacy VTK file, for words, lines and arrays of numbers.
 //!
-//! An array is words in an ASCII file and big-endian bytes, from the next line on, in a binary one. No memory is
-//! reserved that the rest of the file could not fill. Errors name the line, or the byte of a binary file. Linear.
+//! An array is words in an ASCII file and big-endian bytes, from the next line on, in a binary one. Memory is reserved
+//! only up to the size of the rest of the file. Errors have the line, or the byte of a binary file. Linear.
 
 use std::path::Path;
 
@@ -23,14 +23,14 @@ impl Word<'_> {
     }
 }
 
-/// What is to be done with numbers.
+/// The treatment of numbers.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Wanted {
-    /// They are kept if all are finite, else an error.
+    /// Keeps them; an error unless all are finite.
     Finite,
-    /// They are kept as they are.
+    /// Keeps them unchanged.
     Any,
-    /// They are passed over.
+    /// Skips them.
     Not,
 }
 
@@ -89,7 +89,7 @@ impl<'b> Cursor<'b> {
         words_of(self.line().unwrap_or_default())
     }
 
-    /// The next word, which stays the next.
+    /// The next word, without advancing.
     pub(super) fn peek(&self) -> Option<Word<'b>> {
         let rest = self.rest();
         let skipped = rest.iter().position(|b| !b.is_ascii_whitespace())?;
@@ -117,7 +117,7 @@ impl<'b> Cursor<'b> {
         self.word().ok_or_else(|| self.ends_early(what))
     }
 
-    /// A word as a number from 0 on.
+    /// Parses a word as a number from 0 on.
     pub(super) fn count(&mut self, what: &str) -> Result<usize, MeshIoError> {
         let word = self.expect(what)?;
         self.count_of(word, what)
@@ -146,7 +146,7 @@ impl<'b> Cursor<'b> {
         self.error(word.at, message)
     }
 
-    /// The bytes of an array of a binary file, which starts where the cursor is.
+    /// The bytes of an array of a binary file, which starts at the cursor.
     pub(super) fn take(
         &mut self,
         size: Option<usize>,
@@ -166,13 +166,13 @@ impl<'b> Cursor<'b> {
         Ok(taken)
     }
 
-    /// How many numbers to make room for: as many as announced, but no more than the rest of the file can hold.
+    /// The capacity to reserve: the announced number of values, bounded by the size of the rest of the file.
     pub(super) fn room_for(&self, announced: usize) -> usize {
         let least_bytes = if self.binary { 4 } else { 2 };
         announced.min(self.rest().len() / least_bytes + 1)
     }
 
-    /// An array of numbers, none where they are not wanted. In a binary file the cursor is at the start of the data.
+    /// Reads an array of numbers; empty if they are skipped. In a binary file the cursor is at the start of the data.
     pub(super) fn reals(
         &mut self,
         kind: Kind,
@@ -222,7 +222,7 @@ impl<'b> Cursor<'b> {
         Ok(values)
     }
 
-    /// An array of numbers from 0 on, in the same way.
+    /// Reads an array of numbers from 0 on; empty if they are skipped.
     pub(super) fn indices(
         &mut self,
         kind: Kind,

@@ -1,14 +1,14 @@
 //! Legacy VTK files with an unstructured grid, ASCII and binary.
 //!
-//! Read are versions 1 to 5.1: the cells as lists with sizes, or (from 5.0 on) as offsets and connectivity. Keywords
-//! may be in any case and sections in any order. Of mixed cells the tets are taken, cells of lower dimension are left
-//! out, and other volume cells refused. Point and cell data with one or three components become fields, the first cell
-//! array named as programs name regions becomes the regions; other data, tables and metadata are skipped. Orientation
-//! is kept as it is. Linear.
+//! Versions 1 to 5.1 are read: the cells as lists with sizes, or (from 5.0 on) as offsets and connectivity. Keywords
+//! may be in any case and sections in any order. Tets are read, cells of lower dimension skipped, and other volume
+//! cells are an error. Point and cell data with one or three components become fields. The first cell array with a
+//! common name of regions becomes the regions. Other data, tables and metadata are skipped. Orientation is kept.
+//! Linear.
 //!
 //! The crate `vtkio` (0.7.0-rc2) has both the legacy and the XML formats, but it trusts the numbers in a compressed
-//! file: it slices and multiplies by them unchecked and reserves what they say. It takes a last block of length 0 for
-//! an empty one, and its errors name no place. So the reader is our own.
+//! file: it slices and multiplies by them unchecked and reserves as much memory as they announce. It reads a last block
+//! of length 0 as empty, and its errors have no position. The reader is therefore our own.
 //!
 //! Source: "VTK File Formats for VTK Version 4.2" (Kitware) and the 5.1 format as the VTK library writes it.
 
@@ -29,7 +29,7 @@ pub use write::{write_vtk, write_vtk_binary, write_vtk_file};
 use crate::text::load;
 use crate::{MeshFile, MeshIoError};
 
-/// Reads the tets of a legacy VTK file; see [`read`](crate::read). Point and cell data are not looked at.
+/// Reads the tets of a legacy VTK file; see [`read`](crate::read). Point and cell data are skipped.
 ///
 /// # Errors
 /// The errors of [`read`](crate::read), and [`MeshIoError::ParseBytes`] if a binary file has wrong content.

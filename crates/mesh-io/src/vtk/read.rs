@@ -1,7 +1,7 @@
 //! Reading legacy VTK files section by section.
 //!
-//! In a binary file every section must be known, since nothing else tells where the next one starts. An ASCII file is
-//! read with more patience: lines that start with no keyword are skipped. Linear.
+//! In a binary file every section must be known, since its length is needed to find the next one.
+//! In an ASCII file, lines that do not start with a keyword are skipped. Linear.
 
 use std::path::Path;
 
@@ -13,12 +13,12 @@ use crate::vtk_grid::{Grid, positions};
 use crate::vtk_kind::Kind;
 use crate::{MeshFile, MeshIoError};
 
-/// The mesh alone; point and cell data are not looked at.
+/// Parses only the mesh; point and cell data are skipped.
 pub(crate) fn parse_vtk_mesh(bytes: &[u8], path: &Path) -> Result<TetMesh, MeshIoError> {
     Ok(parse(bytes, path, false)?.mesh)
 }
 
-/// The mesh with its point and cell data.
+/// Parses the mesh with its point and cell data.
 pub(crate) fn parse_vtk(bytes: &[u8], path: &Path) -> Result<MeshFile, MeshIoError> {
     parse(bytes, path, true)
 }
@@ -82,7 +82,7 @@ fn header(cursor: &mut Cursor<'_>) -> Result<(), MeshIoError> {
     Ok(())
 }
 
-/// Whom the arrays that come next belong to.
+/// The owner of the next arrays.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Target {
     None,
@@ -90,18 +90,18 @@ pub(super) enum Target {
     Cells,
 }
 
-/// The number of elements that `POINT_DATA` or `CELL_DATA` announced, and where.
+/// The number of elements in `POINT_DATA` or `CELL_DATA`, and its position.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Announced {
     pub(super) count: usize,
     at: Option<usize>,
 }
 
-/// Where the cells are in the file.
+/// The position of the cells in the file.
 enum CellSource {
-    /// Where their list starts, in which each has its number of points before it.
+    /// The start of a list with the number of points before each cell.
     Cells(usize),
-    /// Where the list of all their points starts, of numbers of a type.
+    /// The start of the list of all points of cells, and the type of its numbers.
     Connectivity(usize, Kind),
 }
 
@@ -109,7 +109,7 @@ pub(super) struct Reader<'b> {
     pub(super) cursor: Cursor<'b>,
     pub(super) grid: Grid,
     tets_at: CellSource,
-    /// Whether points, cells and cell types have been read.
+    /// True for points, cells and cell types that have been read.
     has: [bool; 3],
     pub(super) target: Target,
     pub(super) of_particles: Announced,
@@ -119,7 +119,7 @@ pub(super) struct Reader<'b> {
 impl Reader<'_> {
     fn sections(&mut self, with_data: bool) -> Result<(), MeshIoError> {
         while let Some(word) = self.cursor.word() {
-            // What is no keyword at the start of a line belongs to a section of no interest.
+            // Other words at the start of a line belong to a section that is skipped.
             if !word.first && !self.cursor.binary {
                 continue;
             }
@@ -207,7 +207,7 @@ impl Reader<'_> {
             return self.cells_with_offsets(count, size);
         }
         self.tets_at = CellSource::Cells(self.cursor.at);
-        // A list of so many numbers has one for each cell and one for each point of a cell.
+        // A list of this many numbers has one for each cell and one for each point of a cell.
         let numbers = self.cursor.room_for(size);
         let cells = count.min(numbers);
         self.grid.offsets.reserve_exact(cells + 1);
@@ -257,7 +257,7 @@ impl Reader<'_> {
         self.cursor.count_of(word, what).map(Some)
     }
 
-    /// Where the next number starts.
+    /// The start of the next number.
     fn next_place(&self) -> usize {
         if self.cursor.binary {
             return self.cursor.at;
@@ -302,7 +302,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// An error at a cell, before which there are so many points of cells.
+    /// An error at a cell, given the number of points of cells before it.
     fn cell_error(&self, cell: usize, points_before: usize, message: String) -> MeshIoError {
         let (start, kind, before) = match self.tets_at {
             CellSource::Cells(start) => (start, Kind::I32, cell + points_before),

@@ -1,7 +1,7 @@
 //! Writing legacy VTK files.
 //!
-//! Text is written so that reading gives the same bits back. A binary file has 64-bit offsets and connectivity (version
-//! 5.1), so that no size is too large; a text is of version 3.0 or 4.2, which every reader knows. Linear.
+//! Text keeps every bit of finite numbers. A binary file has 64-bit offsets and connectivity (version 5.1), so all
+//! sizes fit; a text is of version 3.0 or 4.2, which every reader supports. Linear.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -108,7 +108,7 @@ pub(super) fn binary(out: &mut dyn Write, file: &MeshFile) -> io::Result<()> {
     sections(
         out,
         file,
-        // Not `int`, which has four bytes but eight to meshio.
+        // Not `int`, which has four bytes but is read as eight by meshio.
         "vtktypeint64",
         |out, regions| {
             for &region in regions {
@@ -129,7 +129,7 @@ pub(super) fn binary(out: &mut dyn Write, file: &MeshFile) -> io::Result<()> {
     )
 }
 
-/// The point and cell data, with the numbers of regions (of that type) and of fields as the given functions write them.
+/// Writes the point and cell data; the given functions write the numbers of regions (of that type) and of fields.
 fn sections(
     out: &mut dyn Write,
     file: &MeshFile,
@@ -171,12 +171,12 @@ fn sections(
     arrays(out, &file.particles, particles)
 }
 
-/// A name as one word, with `%` and two digits in the place of blanks and the like.
+/// A name as one word, with `%` and two digits for blanks and special characters.
 fn encoded(values: &NamedValues) -> String {
     if values.name.is_empty() {
         return "values".to_owned();
     }
-    // These two mean something else where a name is expected.
+    // These two words have another meaning in the position of a name.
     let keyword = ["METADATA", "NULL_ARRAY"]
         .iter()
         .any(|keyword| values.name.eq_ignore_ascii_case(keyword));

@@ -1,8 +1,8 @@
-//! VTK XML unstructured grids in their smallest form: arrays compressed by zlib, appended behind the elements as they
-//! are.
+//! VTK XML unstructured grids in their smallest form: arrays compressed by zlib and appended in binary.
 //!
-//! Each array is cut into blocks of 32 KiB, which readers may load one by one. A third to a half of the size of the
-//! plain form, and some ten times the time to write. Source: "VTK XML Formats" (Kitware), "Appended Data". Linear.
+//! Each array is split into blocks of 32 KiB, which readers may load one by one. The size is a third to a half of the
+//! uncompressed form, but writing takes about ten times as long. Source: "VTK XML Formats" (Kitware), "Appended Data".
+//! Linear.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -16,10 +16,10 @@ use crate::{MeshFile, MeshIoError, NamedValues, OwnedValues, write_atomically};
 
 /// Bytes of a block before it is compressed.
 const BLOCK: usize = 1 << 15;
-/// How much time zlib may take, of 10.
+/// Compression level of zlib, of 10.
 const LEVEL: u8 = 6;
 
-/// Writes a mesh as [`write_vtu_file`](super::write_vtu_file) does, compressed: a third to a half of the size.
+/// Writes a mesh like [`write_vtu_file`](super::write_vtu_file), compressed to a third or half of the size.
 ///
 /// # Errors
 /// [`MeshIoError::FieldLength`] if the values or regions are of the wrong number, [`MeshIoError::Io`] if the file
@@ -41,7 +41,7 @@ pub fn write_vtu_compressed(path: impl AsRef<Path>, file: &MeshFile) -> Result<(
     write_atomically(path, |out| put(out, file))
 }
 
-/// The arrays of a file, of which the elements tell where they begin.
+/// The arrays of a file, with the start of each for its element.
 #[derive(Default)]
 struct Appended(Vec<u8>);
 
@@ -102,7 +102,7 @@ impl Appended {
         Ok(())
     }
 
-    /// Writes the element of an array, and keeps its compressed bytes.
+    /// Writes the element of an array, and stores its compressed bytes.
     fn array(
         &mut self,
         out: &mut dyn Write,
@@ -121,7 +121,8 @@ impl Appended {
             write!(out, " NumberOfComponents=\"{components}\"")?;
         }
         writeln!(out, "/>")?;
-        // The number of blocks, the size of all but the last, that of the last if it is smaller, then what each takes.
+        // The number of blocks, the size of all but the last, the size of a smaller last one, then the compressed
+        // sizes.
         let blocks: Vec<Vec<u8>> = bytes
             .chunks(BLOCK)
             .map(|block| compress_to_vec_zlib(block, LEVEL))

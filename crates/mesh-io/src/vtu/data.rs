@@ -1,17 +1,17 @@
 //! The bytes of a data array of an XML file: raw or in base64, compressed or not.
 //!
 //! An array starts with a header of whole numbers: its length in bytes, or, if compressed, the number of blocks, their
-//! length, that of a last shorter block or 0, and the compressed length of each. Header and data may be one base64 text
-//! or each their own with its padding, so padding is accepted at any group of four and decoding continues behind it;
-//! the crate `base64` refuses that. How long the array must be is known from elsewhere and checked before anything is
-//! decompressed; `miniz_oxide` stops at a limit. Memory is linear in the size of the file, but zlib can make a thousand
-//! bytes of one. Linear.
+//! length, the length of a shorter last block or 0, and the compressed length of each. Header and data may be one
+//! base64 text or two, each with its padding, so padding is accepted at any group of four and decoding continues after
+//! it; the crate `base64` does not support that. The expected length is known and checked before decompression, and
+//! `miniz_oxide` stops at a limit. Memory is linear in the size of the file, but zlib can expand a byte to a thousand.
+//! Linear.
 //!
 //! Source: "VTK XML Formats" (Kitware); RFC 4648, section 4.
 
 use miniz_oxide::inflate::decompress_to_vec_zlib_with_limit;
 
-/// How numbers are stored in the whole file.
+/// The representation of numbers in the whole file.
 #[derive(Clone, Copy)]
 pub(super) struct Storage {
     pub(super) big_endian: bool,
@@ -20,15 +20,15 @@ pub(super) struct Storage {
     pub(super) compressed: bool,
 }
 
-/// Bytes that are read one after the other.
+/// A sequential reader of bytes.
 pub(super) enum Stream<'b> {
     Raw(&'b [u8]),
-    /// The text that is left, and what has been decoded but not taken.
+    /// The remaining text, and decoded bytes that have not been taken.
     Base64(&'b [u8], Vec<u8>),
 }
 
 impl Stream<'_> {
-    /// The bytes of the file that have not been used.
+    /// The number of unused bytes of the file.
     pub(super) fn left(&self) -> usize {
         match self {
             Self::Raw(bytes) => bytes.len(),
@@ -77,9 +77,9 @@ impl Stream<'_> {
         usize::try_from(number).map_err(|_| format!("the length {number} is too large"))
     }
 
-    /// The bytes of an array that is to have so many of them.
+    /// The bytes of an array whose size must be `size`.
     pub(super) fn array(&mut self, size: usize, storage: Storage) -> Result<Vec<u8>, String> {
-        // Writers disagree on the header of an empty array, and there is nothing to read.
+        // Writers disagree on the header of an empty array, and it has no data.
         if size == 0 {
             return Ok(Vec::new());
         }

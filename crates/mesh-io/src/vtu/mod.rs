@@ -1,9 +1,10 @@
 //! VTK XML unstructured grids (`.vtu`): a whole mesh with fields.
 //!
-//! Read are files with one piece: arrays as text, in base64, or appended, raw or in base64; with headers of 32 or 64
-//! bits, of both byte orders, plain or compressed with zlib. LZ4 and LZMA are refused by name. Cells and fields are
-//! treated as in a legacy file (see `vtk`, also for why the crate `vtkio` is not used). The elements are read by
-//! `quick-xml`, which does not resolve entities of the file's own; the blocks by `miniz_oxide`, which takes a limit.
+//! Files with one piece are read: arrays as text, in base64, or appended, raw or in base64; with headers of 32 or 64
+//! bits, of both byte orders, uncompressed or compressed with zlib. LZ4 and LZMA are an error. Cells and fields are
+//! treated as in a legacy file (see `vtk`, also for why the crate `vtkio` is not used). Elements are parsed by
+//! `quick-xml`, which does not resolve entities of the file's own; blocks are decompressed by `miniz_oxide`, which
+//! takes a limit.
 //!
 //! Source: "VTK XML Formats" (Kitware). Linear.
 
@@ -31,7 +32,7 @@ const TETRA: u8 = 10;
 
 /// Reads a VTK XML file of an unstructured grid, with its regions and fields.
 ///
-/// Regions and fields are found as by [`read_vtk_file`](crate::read_vtk_file).
+/// [`read_vtk_file`](crate::read_vtk_file) describes how regions and fields are found.
 ///
 /// # Errors
 /// [`MeshIoError::Io`] if the file cannot be read, [`MeshIoError::Parse`] if its content is wrong,

@@ -1,8 +1,8 @@
 //! Reading VTK XML unstructured grids.
 //!
-//! The elements are walked once, up to the appended data, which need not be XML; the arrays are remembered where they
-//! are and decoded afterwards, when all counts are known. Errors name the line of the array, or the byte of the
-//! appended data. Linear.
+//! The elements are walked once, up to the appended data, which need not be XML. The positions of the arrays are
+//! stored, and the arrays are decoded afterwards, when all counts are known. Errors have the line of the array, or the
+//! byte of the appended data. Linear.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use crate::{MeshFile, MeshIoError, NamedValues};
 
 /// The mesh with its regions and fields.
 pub(crate) fn parse_vtu(bytes: &[u8], path: &Path) -> Result<MeshFile, MeshIoError> {
-    // A mark of the byte order is no part of the text.
+    // A byte order mark is not part of the text.
     let start = if bytes.starts_with(b"\xef\xbb\xbf") {
         3
     } else {
@@ -35,7 +35,7 @@ pub(crate) fn parse_vtu(bytes: &[u8], path: &Path) -> Result<MeshFile, MeshIoErr
     document.finish()
 }
 
-/// The file, for errors.
+/// The file, for positions in errors.
 #[derive(Clone, Copy)]
 struct Input<'b> {
     path: &'b Path,
@@ -61,7 +61,7 @@ impl Input<'_> {
     }
 }
 
-/// What an array belongs to.
+/// The owner of an array.
 #[derive(Clone, Copy, PartialEq)]
 enum Section {
     PointData,
@@ -89,11 +89,11 @@ const CELL_ARRAYS: [&str; 3] = ["offsets", "connectivity", "types"];
 struct Array {
     section: Section,
     name: String,
-    /// The type, `None` if it is not known.
+    /// The type; `None` for an unknown one.
     kind: Option<Kind>,
     components: usize,
     format: Format,
-    /// Where its element starts.
+    /// The start of its element.
     at: usize,
 }
 
@@ -109,9 +109,9 @@ struct Document<'b> {
     /// The numbers of points and cells.
     piece: Option<[usize; 2]>,
     arrays: Vec<Array>,
-    /// Where the appended data start, and whether they are raw.
+    /// The start of the appended data, and true if they are raw.
     appended: Option<(usize, bool)>,
-    /// The bytes of the appended data that arrays have used.
+    /// Bytes of the appended data that have been used.
     used: std::cell::Cell<usize>,
 }
 
@@ -121,9 +121,9 @@ impl Document<'_> {
         let mut reader = quick_xml::Reader::from_reader(&input.bytes[start..]);
         reader.config_mut().expand_empty_elements = true;
         let mut section = None;
-        // How many elements are open inside an array, itself included: text belongs to it at 1.
+        // The number of open elements inside an array, including itself: text belongs to it at 1.
         let mut depth = 0_usize;
-        // Whether that array is of interest, and whether there was one of points.
+        // True if that array is kept; true after an array of points.
         let (mut kept, mut has_points) = (false, false);
         loop {
             let position = |reader: &quick_xml::Reader<&[u8]>| {
@@ -150,7 +150,7 @@ impl Document<'_> {
                         kept = false;
                         if let Some(section) = section {
                             let array = array(&Element { element, input, at }, section)?;
-                            // An array takes more here than in the file, so that those of no use are left out.
+                            // An array takes more memory here than in the file, so unused ones are skipped.
                             kept = match section {
                                 Section::Points => !std::mem::replace(&mut has_points, true),
                                 Section::Cells => CELL_ARRAYS.contains(&array.name.as_str()),
@@ -274,7 +274,7 @@ impl Document<'_> {
         )
     }
 
-    /// The numbers of an array, exactly so many, from words or from bytes.
+    /// Parses an array of exactly this many numbers, from words or from bytes.
     fn numbers<T>(
         &self,
         array: &Array,
@@ -355,7 +355,7 @@ impl Document<'_> {
             message: format!("array {:?}: {message}", array.name),
         };
         let decoded = stream.array(size, storage).map_err(error)?;
-        // Many arrays on the same bytes would need more memory than the file gives reason for.
+        // Many arrays on shared bytes would need more memory than the size of the file justifies.
         self.used.set(self.used.get() + data.len() - stream.left());
         if self.used.get() > bytes.len() - start {
             return Err(error(
@@ -366,7 +366,7 @@ impl Document<'_> {
     }
 }
 
-/// An element with its attributes, and where it starts.
+/// An element with its attributes and its start.
 struct Element<'b> {
     element: BytesStart<'b>,
     input: Input<'b>,
@@ -404,7 +404,7 @@ impl Element<'_> {
     }
 }
 
-/// How the file stores numbers, from its first element.
+/// The representation of numbers in the file, from its first element.
 fn storage(element: &Element<'_>) -> Result<Storage, MeshIoError> {
     let attribute = |name, default: &str| {
         let text = element.text(name)?;

@@ -32,7 +32,7 @@ pub(super) struct Line {
     met: Option<[f64; 2]>,
     /// Distance in m from the eye to the body where the view ray last hit it.
     surface: Option<f64>,
-    /// Whether the button is up: the line ends with its last pose.
+    /// True if the button is up: the line ends with its last pose.
     lifted: bool,
     /// Number of the stroke, once it has begun.
     pub(super) stroke: Option<u32>,
@@ -130,7 +130,7 @@ impl Session {
         self.render_scene.set_blade(None);
     }
 
-    /// Whether a line is being drawn or cut.
+    /// True while a line is being drawn or cut.
     pub(crate) fn cuts(&self) -> bool {
         !self.lines.is_empty()
     }
@@ -197,7 +197,7 @@ impl Session {
         Ok(hit.map(|hit| hit.distance))
     }
 
-    /// Grabs the body under a pixel; returns whether particles were grabbed.
+    /// Grabs the body under a pixel; returns true if particles were grabbed.
     pub(crate) fn grab_at(&mut self, pixel: [f64; 2], size: [f64; 2]) -> anyhow::Result<bool> {
         self.release();
         self.simulation.read_back()?;
@@ -278,7 +278,7 @@ mod tests {
         let corner = line(&corner);
         assert_eq!(corner.waiting.len(), 2);
         assert_eq!(corner.last(), Some([49.0, 60.0]));
-        // There and back again is not straight.
+        // Back and forth is not a straight line.
         assert_eq!(line(&[[40.0, 0.0], [10.0, 0.0]]).waiting.len(), 2);
     }
 }

@@ -1,7 +1,7 @@
 //! [`Session`]: a simulation that is shown and edited in the window.
 //!
-//! A session owns all that belongs to a loaded scene: the simulation, its render scene, undo points, the blade and the grab
-//! in use. Input comes in pixels and is converted to world space here.
+//! A session owns all data of a loaded scene: the simulation, its render scene, undo points, the blade and the grab in
+//! use. Input comes in pixels and is converted to world space here.
 
 mod interaction;
 
@@ -23,7 +23,7 @@ use crate::settings::SettingChange;
 use crate::times::Times;
 use crate::tool::ToolSettings;
 
-/// Residuals are measured every so many frames.
+/// Interval in frames between measurements of residuals.
 const EVERY: u64 = 5;
 
 /// A grab in use.
@@ -49,13 +49,13 @@ pub(crate) struct Session {
     pub(crate) effects: SettingEffects,
     /// Time of the last frame in ms, until the device had finished.
     pub(crate) frame_ms: f64,
-    /// The scale of the colors, if they show numbers.
+    /// The scale of the colors, if they represent numbers.
     pub(crate) legend: Option<Legend>,
     /// The quantity that the colors show.
     shown: ColorBy,
     /// The last report that measured the body.
     pub(crate) measured: Option<FrameReport>,
-    /// Whether residuals are measured.
+    /// True if residuals are measured.
     measures: bool,
     start: Snapshot,
     history: History,
@@ -107,7 +107,7 @@ impl Session {
         Ok(session)
     }
 
-    /// Whether residuals are measured.
+    /// True if residuals are measured.
     pub(crate) fn measures(&self) -> bool {
         self.measures
     }
@@ -222,7 +222,7 @@ impl Session {
         self.history.len()
     }
 
-    /// Undoes the last stroke; returns whether it is part of the scene and begins again, and `None` without a stroke.
+    /// Undoes the last stroke; returns true if it is part of the scene and begins again, and `None` without a stroke.
     pub(crate) fn undo(&mut self) -> anyhow::Result<Option<bool>> {
         let Some(point) = self.history.pop() else {
             return Ok(None);

@@ -1,4 +1,4 @@
-//! A session without a window: lines are drawn, bodies cut, pulled and brought back.
+//! A session without a window: lines are drawn, bodies cut, pulled and restored.
 
 use incise::scene::{Method, Substeps};
 
@@ -6,7 +6,7 @@ use super::*;
 
 const SIZE: [f64; 2] = [800.0, 600.0];
 
-/// A block that floats, seen in a window.
+/// A floating block, viewed in a window.
 fn session(strokes: &str) -> Session {
     let scene =
         format!("[[body]]\nshape = {{ kind = \"box\", tets = 600 }}\nscale = 0.2\n{strokes}");
@@ -20,7 +20,7 @@ fn session(strokes: &str) -> Session {
     Session::new(loaded).unwrap()
 }
 
-/// A stroke of the scene that comes in frame 2.
+/// A stroke of the scene that begins in frame 2.
 const PLANE: &str = r#"
 [[stroke]]
 kind = "plane"
@@ -38,7 +38,7 @@ fn to_vbd() -> SettingChange {
     }
 }
 
-/// Draws from the top of the window to its bottom and waits until the body has met all of it.
+/// Draws from the top of the window to its bottom and steps until all of it has been cut.
 fn cut(session: &mut Session) {
     session.press_blade([410.0, 20.0], SIZE).unwrap();
     for step in 1..=20 {
@@ -63,7 +63,7 @@ fn a_drawn_line_cuts_and_is_undone() {
     assert_eq!(session.undo().unwrap(), Some(false));
     assert_eq!((session.report().pieces, session.report().tets), (1, tets));
     assert_eq!(session.undo().unwrap(), None);
-    // A cut that was undone can be made again.
+    // A cut that was undone can be repeated.
     cut(&mut session);
     assert_eq!(session.report().pieces, 2);
     session.reset().unwrap();
@@ -78,7 +78,7 @@ fn lines_drawn_while_paused_are_cut_in_order() {
         session.draw_blade([x, 580.0], SIZE).unwrap();
         session.lift_blade();
     }
-    // A finished line is not drawn on.
+    // A finished line is not continued.
     session.draw_blade([20.0, 580.0], SIZE).unwrap();
     assert_eq!((session.report().pieces, session.strokes()), (1, 0));
     while session.cuts() {
@@ -114,7 +114,7 @@ fn undo_releases_the_grab_of_its_state() {
     }
     session.release();
     session.change_setting(&to_vbd()).unwrap();
-    // Held softly at that time, which VBD does not know.
+    // The grab was soft at that time, which VBD does not support.
     assert_eq!(session.undo().unwrap(), Some(true));
     assert_eq!((session.report().pieces, session.grab_target()), (1, None));
     session.step().unwrap();
@@ -227,12 +227,12 @@ fn settings_change_on_a_cut_body() {
 fn all_colors_can_be_shown_at_any_time() {
     let mut session = session("");
     let residual = ColorBy::Residual;
-    // Nothing is known before the first frame, and nothing else is shown in its place.
+    // Before the first frame no colors are available, and no others are shown.
     session.color(ColorBy::Stretch).unwrap();
     assert!(session.legend.is_some());
     session.color(residual).unwrap();
     assert!(session.legend.is_none());
-    // Frame 0 is measured, the next ones are not: its colors stay, also on what they cut.
+    // Frame 0 is measured, the next ones are not: its colors stay, also on new surfaces.
     session.step().unwrap();
     session.color(residual).unwrap();
     assert!(session.legend.is_some());

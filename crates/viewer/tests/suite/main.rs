@@ -1,11 +1,11 @@
-//! The viewer as a program, where it can be tested without a display: what it says when it cannot open.
+//! The viewer as a program, without a display: its messages when no window can be opened.
 
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// Runs the viewer with arguments where no display can be found.
+/// Runs the viewer with arguments in an environment without a display.
 fn viewer(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_incise-viewer"))
         .args(arguments)
