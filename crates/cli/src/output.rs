@@ -11,6 +11,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use anyhow::Context;
 use incise::mesh::glam::DVec3;
+use incise::mesh::{RepairOptions, repair};
 use incise::mesh_io::{
     Field, Fields, MeshIoError, Values, write_atomically, write_pvd, write_vtp, write_vtu,
 };
@@ -268,17 +269,24 @@ pub(crate) fn require_mesh_file(path: &Path) -> Result<(), Failure> {
     require_file(path).map_err(Failure::Input)
 }
 
-/// Writes the mesh at rest; as `.vtu` with the deformed positions, which other formats have no place for.
+/// Writes the mesh at rest without particles that no tet uses, which removed tets leave behind; as `.vtu` with the
+/// deformed positions, which other formats have no place for.
 pub(crate) fn save_mesh(path: &Path, simulation: &Simulation) -> anyhow::Result<()> {
-    let mesh = simulation.mesh();
+    let drop_unused = RepairOptions {
+        drop_unused: true,
+        ..RepairOptions::default()
+    };
+    let used = repair(simulation.mesh(), &drop_unused);
+    let mesh = &used.mesh;
     if path
         .extension()
         .is_some_and(|ending| ending.eq_ignore_ascii_case("vtu"))
     {
-        let positions: &[DVec3] = simulation.positions();
+        let now = simulation.positions();
+        let positions: Vec<DVec3> = used.particles.iter().map(|p| now[p.index()]).collect();
         let particles = [Field {
             name: "position",
-            values: Values::Vectors(positions),
+            values: Values::Vectors(&positions),
         }];
         let fields = Fields {
             particles: &particles,

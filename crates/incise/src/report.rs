@@ -183,6 +183,10 @@ pub struct CutReport {
     pub particles_created: usize,
     /// Number of particles that the cut surface was snapped to.
     pub snapped: usize,
+    /// Parts too small to come off, which stayed with the other side of a cut; absent if none. A moving blade may find
+    /// one in several frames.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub crumbs: usize,
     /// The smallest volume of a new tet as a fraction of the one it was cut from.
     pub worst_volume_ratio: f64,
     /// Number of removed tets; absent if none.
@@ -200,6 +204,7 @@ impl CutReport {
         self.tets_created += delta.added.len();
         self.particles_created += delta.points.len() + delta.copies.len();
         self.snapped += delta.snapped;
+        self.crumbs += delta.crumbs;
         self.tets_removed += delta.deleted.len();
         self.worst_volume_ratio = self.worst_volume_ratio.min(delta.worst_volume_ratio);
         let range = |[a, b]: [f64; 2], [c, d]: [f64; 2]| [a.min(c), b.max(d)];
@@ -217,6 +222,7 @@ impl Default for CutReport {
             tets_created: 0,
             particles_created: 0,
             snapped: 0,
+            crumbs: 0,
             tets_removed: 0,
             worst_volume_ratio: 1.0,
             dihedral: None,
