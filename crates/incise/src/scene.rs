@@ -15,6 +15,7 @@ mod attachment;
 mod check;
 mod collider;
 mod contact;
+mod cutting;
 mod distance;
 mod lines;
 mod method;
@@ -29,6 +30,7 @@ pub use attachment::{AttachmentSpec, PathRotationSpec};
 pub(crate) use check::check;
 pub use collider::{ColliderSpec, RotationSpec};
 pub use contact::{ContactPairs, ContactSpec};
+pub use cutting::CuttingSpec;
 pub use distance::{DistanceSpec, EndSpec};
 pub use lines::{line_of, location};
 pub use method::{Integrator, Method, TetSolve};
@@ -87,6 +89,9 @@ pub struct Scene {
     /// Sutures, springs and rods.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub distance: Vec<DistanceSpec>,
+    /// Settings of all cuts.
+    #[serde(default, skip_serializing_if = "CuttingSpec::is_default")]
+    pub cutting: CuttingSpec,
     /// The cuts.
     #[serde(default)]
     pub stroke: Vec<StrokeSpec>,

@@ -180,10 +180,11 @@ impl Simulation {
                 None => fit(),
             }?;
         }
-        let mut timeline = Timeline::new(match precision {
+        let tolerance = match precision {
             Precision::F32 | Precision::Auto => 1e-5,
             Precision::F64 => 1e-9,
-        });
+        };
+        let mut timeline = Timeline::new(tolerance, scene.cutting.crumbs);
         for stroke in &scene.stroke {
             timeline.add(stroke)?;
         }

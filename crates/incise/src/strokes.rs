@@ -36,6 +36,8 @@ pub(crate) struct Timeline {
     added: u32,
     /// Smallest snap distance: rounding of the positions in the solver's precision.
     tolerance: f64,
+    /// Largest volume of a crumb, as in [`CutOptions::crumbs`].
+    crumbs: f64,
     /// For each island what its strokes leave for later ones to join; empty before the first stroke.
     registries: Vec<StrokeRegistry>,
     /// Strokes that began or ended to cut since the events were taken.
@@ -45,9 +47,10 @@ pub(crate) struct Timeline {
 }
 
 impl Timeline {
-    pub(crate) fn new(tolerance: f64) -> Self {
+    pub(crate) fn new(tolerance: f64, crumbs: f64) -> Self {
         Self {
             tolerance,
+            crumbs,
             ..Self::default()
         }
     }
@@ -74,6 +77,7 @@ impl Timeline {
         let options = CutOptions {
             snap,
             tolerance: self.tolerance,
+            crumbs: self.crumbs,
             tag: self.added,
             ..CutOptions::default()
         };

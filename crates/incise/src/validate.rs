@@ -48,13 +48,22 @@ pub(crate) fn existing(field: &str, body: usize, bodies: usize) -> Result<(), Er
     Err(value(field, body, "the number of a body, counted from 0"))
 }
 
+/// A bound as text: in digits unless it is very large or small.
+fn plain(bound: f64) -> String {
+    if bound == 0.0 || (1e-3..1e5).contains(&bound.abs()) {
+        bound.to_string()
+    } else {
+        format!("{bound:e}")
+    }
+}
+
 /// The number, if it lies in a range.
 pub(crate) fn within(field: &str, number: f64, low: f64, high: f64) -> Result<f64, Error> {
     if (low..=high).contains(&number) {
         return Ok(number);
     }
     let range = if number.is_finite() {
-        format!("from {low:e} to {high:e}")
+        format!("from {} to {}", plain(low), plain(high))
     } else {
         "finite".to_owned()
     };

@@ -2,7 +2,7 @@
 
 use super::Scene;
 use crate::Error;
-use crate::validate::value;
+use crate::validate::{value, within};
 
 /// Checks the ranges of solver settings, without looking at bodies.
 pub(crate) fn check(scene: &Scene) -> Result<(), Error> {
@@ -45,5 +45,6 @@ pub(crate) fn check(scene: &Scene) -> Result<(), Error> {
             }
         }
     }
+    within("cutting.crumbs", scene.cutting.crumbs, 0.0, 100.0)?;
     Ok(())
 }

@@ -6,7 +6,8 @@ use serde_json::Value;
 
 /// Scenes with a table each: the definition in the schema, the variant of it, and the text of the scene up to the table's
 /// other keys. `KEY` is replaced by a key with its value.
-const TABLES: [(&str, &str, &str); 18] = [
+const TABLES: [(&str, &str, &str); 19] = [
+    ("CuttingSpec", "", "[cutting]\nKEY\n"),
     ("SolverSpec", "", "[solver]\nKEY\n"),
     ("ReclusterSpec", "", "[solver]\nrecluster = { KEY }\n"),
     ("SleepSpec", "", "[solver]\nsleep = { KEY }\n"),

@@ -2,6 +2,7 @@
 
 use incise::cutting::{FaceTag, Skin};
 use incise::mesh::glam::DVec3;
+use incise::report::PieceReport;
 use incise::{Scene, Simulation, WarningCode};
 
 use crate::support::{body, plane, simulation, sweep};
@@ -228,4 +229,44 @@ fn strokes_that_cut_nothing_are_named() {
         named.extend(missed.map(|w| (report.frame, w.location.clone())));
     }
     assert_eq!(named, [(2, "stroke[1]".into()), (3, "stroke[2]".into())]);
+}
+
+/// Planes that cross at irregular angles leave parts below half a mean tet. By default those beside a larger part stay
+/// with it and are counted; with `crumbs = 0` they come off. Volume is the same.
+#[test]
+fn crumbs_stay_with_larger_parts_unless_the_scene_turns_that_off() {
+    let run = |cutting: &str| {
+        let mut text = format!("{cutting}\n[[body]]\nshape = {{ kind = \"box\", tets = 2000 }}\n");
+        for i in 0..12 {
+            let angle = 0.5 + 1.7 * f64::from(i);
+            let normal = [angle.cos(), angle.sin(), 0.3 * (2.0 * angle).sin()];
+            text += &format!(
+                "[[stroke]]\nkind = \"plane\"\nframe = {i}\npoint = [0.01, 0.02, 0.03]\nnormal = {normal:?}\nsnap = 0.0\n"
+            );
+        }
+        let mut simulation = simulation(&Scene::from_toml(&text).unwrap());
+        let mut crumbs = 0;
+        for _ in 0..12 {
+            let report = simulation.step().unwrap();
+            crumbs += report.cut.as_ref().map_or(0, |cut| cut.crumbs);
+        }
+        simulation.check().unwrap();
+        let pieces = simulation.pieces();
+        let volume: f64 = pieces.iter().map(|piece| piece.volume).sum();
+        let is_small = |piece: &&PieceReport| piece.volume < 0.5 * volume / 2000.0;
+        (
+            crumbs,
+            pieces.len(),
+            pieces.iter().filter(is_small).count(),
+            volume,
+        )
+    };
+    let (crumbs, pieces, small, volume) = run("");
+    let (none, all, all_small, same) = run("[cutting]\ncrumbs = 0.0");
+    assert!(crumbs > 0 && none == 0, "{crumbs} and {none} crumbs");
+    assert!(
+        pieces < all && 2 * small < all_small,
+        "{small} of {pieces}, {all_small} of {all}"
+    );
+    assert!((volume / same - 1.0).abs() < 1e-12);
 }
