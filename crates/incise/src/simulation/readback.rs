@@ -219,11 +219,11 @@ impl Simulation {
     ///     ground = { height = 0.0 }
     ///     [contact]
     ///     [[body]]
-    ///     shape = { kind = "box", tets = 100 }
+    ///     shape = { kind = "box", tets = 200 }
     ///     position = [0.0, 0.0, 0.3]
     ///     damping = 0.02
     ///     [[body]]
-    ///     shape = { kind = "box", tets = 100 }
+    ///     shape = { kind = "box", tets = 200 }
     ///     position = [0.0, 0.0, 0.9]
     ///     damping = 0.02
     ///     "#,
