@@ -55,7 +55,7 @@ fn part(clustering: &Clustering, incidence: &Incidence, c: u32) -> BTreeSet<u32>
 
 proptest! {
     #[test]
-    fn what_merging_promises(
+    fn merging_keeps_its_guarantees(
         incidence in incidences(),
         labels in prop::collection::vec(0u32..30, 60),
         seeds in prop::collection::vec(0usize..60, 0..20),
@@ -133,7 +133,7 @@ proptest! {
     /// If every cluster is connected, no loose constraint and no seed ends up in a small cluster that fits into a
     /// linked one.
     #[test]
-    fn whatever_fits_is_merged(
+    fn fitting_clusters_are_merged(
         incidence in incidences(),
         chosen in prop::collection::vec(0usize..60, 0..20),
         single in prop::collection::vec(0usize..60, 0..20),
@@ -199,7 +199,7 @@ fn loose_constraints_become_full_clusters_or_nearly_so() {
 
 /// Two adjacent triangles; a cut has separated the left one from the right ones.
 #[test]
-fn nothing_grows_or_is_merged_across_a_cut() {
+fn clusters_do_not_cross_a_cut() {
     let incidence = Incidence::from_constraints(7, [[0u32, 1, 2], [3, 4, 5], [3, 4, 6]]).unwrap();
     let mut clustering = Clustering::default();
     merge(&mut clustering, &incidence, &[0, 1, 2], &[], 4);
@@ -217,7 +217,7 @@ fn nothing_grows_or_is_merged_across_a_cut() {
 
 /// A cluster of four that a cut has separated: each half joins its own side.
 #[test]
-fn parts_of_a_cluster_go_their_own_ways() {
+fn parts_of_a_cluster_are_handled_separately() {
     let rows = [
         [0u32, 1],
         [1, 2],

@@ -84,7 +84,7 @@ proptest! {
     /// Constraints without a common particle never share a cluster, so an unlimited size gives the
     /// components, except for serial clusters, which end at the neighbors of the seed.
     #[test]
-    fn a_limit_that_is_none_gives_the_components(incidence in incidences()) {
+    fn an_unlimited_size_gives_the_components(incidence in incidences()) {
         let greedy = cluster(Method::GreedyK(NonZeroUsize::MAX), &incidence);
         let quotient = incidence.quotient(&greedy);
         prop_assert!(quotient.clique_bound() <= 1);

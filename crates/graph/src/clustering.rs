@@ -379,12 +379,12 @@ mod tests {
 
     #[test]
     #[should_panic(expected = "constraint 1 is in cluster 1")]
-    fn what_is_clustered_is_not_forgotten() {
+    fn clustered_constraints_cannot_be_truncated() {
         Clustering::none(2).truncate(1);
     }
 
     #[test]
-    fn check_sees_wrong_books() {
+    fn check_finds_wrong_counts() {
         let mut clustering = Clustering::none(3);
         clustering.sizes[1] = 2;
         assert!(matches!(

@@ -390,7 +390,7 @@ mod tests {
     }
 
     #[test]
-    fn quotient_ignores_what_is_in_no_cluster() {
+    fn quotient_ignores_unclustered_constraints() {
         let path = ConstraintGraph::from_edges(5, &[(0, 1), (1, 2), (2, 3), (3, 4)]).unwrap();
         let labels = vec![
             ClusterId(4),

@@ -84,7 +84,7 @@ proptest! {
     }
 
     #[test]
-    fn foreign_rows_make_the_same_graph_or_name_what_is_one_sided(
+    fn csr_rows_make_an_equal_graph_or_name_the_one_sided_edge(
         rows in (1u32..9).prop_flat_map(|n| vec(vec(0..n, 0..6), n as usize)),
         symmetric in any::<bool>(),
     ) {
@@ -121,7 +121,7 @@ proptest! {
     }
 
     #[test]
-    fn random_edits_keep_the_books(
+    fn random_edits_keep_counts_right(
         (incidence, mut clustering) in clustered(),
         edits in vec((0usize..40, 0usize..40), 0..60),
     ) {

@@ -231,7 +231,7 @@ fn revisions_tell_schedules_apart() {
 
 /// The journal drops old changes, but never those after the last revision of a derived structure.
 #[test]
-fn a_follower_of_every_change_is_never_left_behind() {
+fn changes_since_the_last_revision_are_kept() {
     let clustering = Clustering::none(5);
     let mut coloring = Coloring::new(vec![ColorId(0); 5]);
     let mut schedule = Schedule::new(&clustering, &coloring);

@@ -225,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn the_smallest_sufficient_number_is_wanted() {
+    fn the_smallest_sufficient_number_is_chosen() {
         for (square, substeps) in [
             (0.0, 1),
             (1.0, 1),

@@ -96,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nothing_is_left_behind() {
+    fn failed_writes_leave_no_file() {
         let folder = tempfile::tempdir().expect("there is a place for temporary files");
         let path = folder.path().join("a.txt");
         let failed = write_atomically(&path, |file| {

@@ -146,7 +146,7 @@ mod tests {
     use incise_mesh::{ParticleId, RepairOptions, kuhn_box, repair};
 
     #[test]
-    fn what_belongs_to_tets_and_particles_goes_with_them() {
+    fn regions_and_values_are_repaired_with_the_mesh() {
         let mut file = MeshFile::from(kuhn_box([2, 1, 1], DVec3::ONE));
         file.mesh.positions.insert(0, DVec3::splat(7.0));
         for p in file.mesh.tets.as_flattened_mut() {

@@ -149,7 +149,7 @@ fn points_without_triangles_or_direction() {
 }
 
 #[test]
-fn what_cannot_be_written_is_refused() {
+fn unsupported_content_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.glb");
     let far = TriangleSurface::boundary_of(&kuhn_box([1, 1, 1], DVec3::splat(1e39)));

@@ -301,7 +301,7 @@ mod tests {
     use crate::kuhn_box;
 
     #[test]
-    fn nothing_is_done_that_was_not_asked_for() {
+    fn only_selected_repairs_are_made() {
         let mut mesh = kuhn_box([2, 2, 1], DVec3::ONE);
         mesh.tets[3].swap(1, 2);
         mesh.positions.push(DVec3::ONE);
@@ -313,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn a_soup_becomes_a_body() {
+    fn a_tet_soup_is_merged_to_a_body() {
         let body = kuhn_box([3, 2, 2], DVec3::ONE);
         let positions = body
             .tets
@@ -357,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn tets_that_are_none_go() {
+    fn degenerate_tets_are_removed() {
         let mut mesh = kuhn_box([1, 1, 1], DVec3::ONE);
         let sound = mesh.clone();
         let [a, b, c, _] = mesh.tets[0];

@@ -103,7 +103,7 @@ fn overlapping_shells_and_holes() {
 }
 
 #[test]
-fn what_is_put_right_is_told() {
+fn repairs_of_a_surface_are_reported() {
     let mut surface = cube();
     surface.triangles.iter_mut().for_each(|t| t.swap(0, 1));
     let solid = Solid::new(&surface).unwrap();
@@ -140,7 +140,7 @@ fn what_is_put_right_is_told() {
 }
 
 #[test]
-fn what_has_no_inside_is_refused_by_its_first_edge() {
+fn open_surfaces_are_refused_with_their_first_edge() {
     let mut open = cube();
     let [a, b, _] = open.triangles.remove(0);
     let message = refusal(&open);
@@ -262,7 +262,7 @@ fn missed(solid: &Solid, surface: &TriangleSurface, mesh: &TetMesh) -> f64 {
 }
 
 #[test]
-fn shapes_are_filled_anew() {
+fn boundaries_of_shapes_are_filled_again() {
     // Beveled edges, and chords that lie inside a curved surface, cost volume on so coarse a lattice.
     let lost = 0.03;
     for shape in [Shape::Liver, Shape::Torus, Shape::Beam] {
@@ -333,7 +333,7 @@ fn a_graded_inside_leaves_more_tets_for_the_surface() {
 }
 
 #[test]
-fn shells_are_counted_and_what_tears_everywhere_has_the_fewest_pieces() {
+fn shells_are_counted_and_torn_bodies_have_the_fewest_pieces() {
     // Two balls joined by a rod a twentieth as thick.
     let dumbbell = |p: DVec3| {
         let balls = (p - DVec3::X).length().min((p + DVec3::X).length()) - 0.5;

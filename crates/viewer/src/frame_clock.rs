@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_dropped() {
+    fn excess_time_is_dropped() {
         let (mut clock, start) = (FrameClock::default(), Instant::now());
         let past = start - Duration::from_millis(500);
         clock.run(past, 0.01, || true);
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn a_failed_frame_ends_it() {
+    fn a_failed_frame_stops_the_clock() {
         let (mut clock, start) = (
             FrameClock::default(),
             Instant::now() + Duration::from_secs(1000),

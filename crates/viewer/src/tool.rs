@@ -71,7 +71,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_blade_lies_on_the_view_ray_and_goes_as_deep_as_told() {
+    fn a_blade_lies_on_the_view_ray_down_to_its_depth() {
         let bounds = [DVec3::splat(-1.0), DVec3::splat(1.0)];
         let camera = Camera::fit(bounds[0], bounds[1]);
         let (pixel, size) = ([400.0, 300.0], [800.0, 600.0]);

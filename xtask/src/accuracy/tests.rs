@@ -69,7 +69,7 @@ fn exchange_rates_are_ratios_of_rows() {
 
 /// Errors below what is left of the reference's are not told apart: the faster one is enough.
 #[test]
-fn the_reference_bounds_what_can_be_told() {
+fn the_reference_bounds_measurable_errors() {
     let row = scene_row(vec![
         setting("a", 1.0, 8.0),
         setting("b", 2.0, 0.4),
@@ -81,7 +81,7 @@ fn the_reference_bounds_what_can_be_told() {
 /// Two quick scenes, one with a handle, one cut: implicit Euler converges at its order, the error falls with substeps,
 /// iterations of a large step do not lead to the step, VBD does.
 #[test]
-fn quick_scenes_show_what_the_page_says() {
+fn quick_scenes_agree_with_the_page() {
     let folder = folder("quick");
     let rows: Vec<SceneRow> = [Kind::HangingBeam(300), Kind::CutLiver]
         .map(|kind| measure(kind, &folder, true, false).unwrap())
@@ -118,7 +118,7 @@ fn quick_scenes_show_what_the_page_says() {
 
 /// Every scene can be run with the default settings, and by the reference.
 #[test]
-fn all_scenes_can_be_done_by_the_reference() {
+fn the_reference_supports_all_scenes() {
     let folder = folder("scenes");
     for kind in Kind::ALL {
         let scene = kind.scene(&folder, true).unwrap();

@@ -61,7 +61,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_result_is_refused() {
+    fn invalid_results_are_refused() {
         assert!(result("").is_err());
         assert!(result("Traceback").is_err());
         assert!(result("{\"peer\": \"a\"}").is_err());

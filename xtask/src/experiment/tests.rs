@@ -68,7 +68,7 @@ fn folder(name: &str) -> PathBuf {
 }
 
 #[test]
-fn a_run_goes_on_where_it_was_and_writes_all_files() {
+fn a_continued_run_writes_all_files() {
     let out = folder("again");
     let measured = Rc::new(Counter::new(0));
     for _ in 0..2 {
@@ -139,7 +139,7 @@ fn shares_are_read_and_refused() {
 }
 
 #[test]
-fn a_number_that_is_none_fails_the_quick_form() {
+fn a_non_finite_number_fails_the_quick_form() {
     let folder = tempfile::tempdir().unwrap();
     let mut experiment = squares(&Rc::default());
     experiment

@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn a_page_has_what_the_report_says() {
+    fn a_page_shows_the_report() {
         let text = page(&sample()).unwrap();
         let first = text.lines().next().unwrap();
         assert!(first.contains("say nothing about a GPU"), "{first}");

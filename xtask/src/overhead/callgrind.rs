@@ -153,7 +153,7 @@ totals: 173 15 1
     }
 
     #[test]
-    fn what_is_no_callgrind_file_is_refused() {
+    fn other_files_than_callgrind_are_refused() {
         assert!(parse("").is_err());
         assert!(parse("events: Ir\n12 100\n").is_err());
         assert!(parse(&FILE.replace("12 100", "12 1x0")).is_err());

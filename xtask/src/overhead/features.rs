@@ -369,7 +369,7 @@ mod tests {
 
     /// Each case has another id, its base is there, and its scene is not that of its base.
     #[test]
-    fn cases_are_told_apart() {
+    fn cases_have_distinct_names() {
         let cases = cases();
         let mut ids: Vec<_> = cases.iter().map(Case::id).collect();
         ids.sort();

@@ -36,7 +36,7 @@ fn a_bare_frame_asks_for_no_memory() {
 
 /// What is declared but has nothing to keep, now or ever, takes no memory.
 #[test]
-fn what_needs_no_memory_takes_none() {
+fn features_without_memory_take_none() {
     let bare = memory_of(case(BARE, State::Base), 300);
     for (feature, state) in [
         ("gravity", State::Used),
@@ -54,7 +54,7 @@ fn what_needs_no_memory_takes_none() {
 
 /// What is declared and idle takes the same memory whatever the size of the mesh, and asks for none in a frame.
 #[test]
-fn what_is_idle_takes_a_constant() {
+fn idle_features_take_a_constant() {
     let more = |case: Case, tets| {
         let [here, bare] = [case, self::case(BARE, State::Base)].map(|case| memory_of(case, tets));
         assert_eq!(here.allocations, bare.allocations, "{}", case.id());
@@ -81,7 +81,7 @@ fn a_second_stiffness_takes_no_memory() {
 /// Each substep of a bare frame is a prediction, the pass and the velocities; a frame is one pass and one submit, with
 /// nothing sent and nothing read. What needs no kernel of its own adds none.
 #[test]
-fn a_device_is_told_only_what_a_scene_declares() {
+fn only_declared_features_are_sent_to_a_device() {
     let Ok(gpu) = GpuContext::new(&GpuOptions::from_env()) else {
         return;
     };
@@ -132,7 +132,7 @@ fn row(feature: &str, state: State, each: u64, once: u64) -> Row {
 
 /// Constants are told from passes; without valgrind there are gaps and no figures.
 #[test]
-fn the_page_tells_a_constant_from_a_pass() {
+fn the_page_distinguishes_constants_from_passes() {
     let mut rows = vec![
         row("hand", State::Base, 50, 0),
         row("empty", State::Base, 0, 7),

@@ -154,7 +154,7 @@ mod tests {
 
     /// Of two triangles one behind the other only the front one is drawn, and none that looks away.
     #[test]
-    fn what_is_not_seen_is_not_drawn() {
+    fn hidden_triangles_are_not_drawn() {
         let eye = EYE.normalize();
         let right = DVec3::Z.cross(eye).normalize();
         let up = eye.cross(right);

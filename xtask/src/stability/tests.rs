@@ -90,7 +90,7 @@ fn substeps_by_kappa_hold_a_body_together() {
 
 /// A device goes through the same extremes; one frame, as software devices are slow.
 #[test]
-fn a_device_is_watched_as_well() {
+fn devices_are_monitored() {
     let Ok(gpu) = GpuContext::new(&GpuOptions::from_env()) else {
         return; // A machine without one.
     };

@@ -59,7 +59,7 @@ fn the_best_setting_is_measured_and_can_be_pasted_in() {
 }
 
 #[test]
-fn it_says_so_if_nothing_meets_the_budget() {
+fn an_unreachable_budget_is_reported() {
     let sandbox = beam();
     let advice = ask(&sandbox, &["--budget-ms", "1e-9"]);
     assert_eq!(advice["best"], Value::Null);
@@ -78,7 +78,7 @@ fn it_says_so_if_nothing_meets_the_budget() {
 
 /// What the reference does not know is named, and the solver is measured against itself.
 #[test]
-fn scenes_that_newton_cannot_do_are_measured_against_the_solver() {
+fn scenes_without_newton_are_compared_with_the_solver() {
     for (more, why) in [
         ("[world.ground]\nheight = -1.0\n", "a ground"),
         (

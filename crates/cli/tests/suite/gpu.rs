@@ -24,7 +24,7 @@ fn has_gpu(test: &str, stderr: &str, code: i32) -> bool {
 }
 
 #[test]
-fn a_scene_runs_on_a_gpu_or_says_why_not() {
+fn a_scene_runs_on_a_gpu_or_reports_the_reason() {
     let sandbox = Sandbox::with_scene();
     let run = [
         "run",
@@ -38,7 +38,7 @@ fn a_scene_runs_on_a_gpu_or_says_why_not() {
     ];
     let outcome = sandbox.incise(&run);
     if !has_gpu(
-        "a_scene_runs_on_a_gpu_or_says_why_not",
+        "a_scene_runs_on_a_gpu_or_reports_the_reason",
         &outcome.stderr,
         outcome.code,
     ) {
@@ -78,7 +78,7 @@ fn a_scene_runs_on_a_gpu_or_says_why_not() {
 }
 
 #[test]
-fn auto_always_runs_and_says_where() {
+fn auto_always_runs_and_reports_its_backend() {
     let sandbox = Sandbox::with_scene();
     let out = sandbox.good(&["run", "scene.toml", "--frames", "2", "--backend", "auto"]);
     assert!(out.contains("computed on "), "{out}");

@@ -92,7 +92,7 @@ fn a_mesh_may_be_converted_in_place() {
 }
 
 #[test]
-fn what_a_mesh_is_like_is_shown_in_bars() {
+fn mesh_quality_is_shown_as_histograms() {
     let sandbox = Sandbox::with_mesh();
     let out = sandbox.good(&["mesh", "info", "box.vtk"]);
     for part in ["genus", "substeps", "dihedral angles", "radius ratios", "█"] {
@@ -124,7 +124,7 @@ fn what_a_mesh_is_like_is_shown_in_bars() {
 }
 
 #[test]
-fn repairs_are_told_one_by_one() {
+fn repairs_are_listed_one_by_one() {
     let sandbox = Sandbox::new();
     sandbox.good(&["mesh", "generate", "box", "--tets", "300", "box.node"]);
     assert_eq!(
@@ -203,7 +203,7 @@ const CUBE: &str = "OFF\n8 6 0\n-1 -1 -1\n1 -1 -1\n1 1 -1\n-1 1 -1\n-1 -1 1\n1 -
     4 0 3 2 1\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n";
 
 #[test]
-fn a_surface_is_filled_and_the_fit_told() {
+fn a_surface_is_filled_and_its_fit_reported() {
     let sandbox = Sandbox::new();
     sandbox.write("cube.off", CUBE);
     let told = sandbox.good(&[
@@ -229,7 +229,7 @@ fn a_surface_is_filled_and_the_fit_told() {
 }
 
 #[test]
-fn surfaces_that_cannot_be_filled_are_refused_in_a_sentence() {
+fn unfillable_surfaces_are_refused_with_a_reason() {
     let sandbox = Sandbox::new();
     sandbox.write(
         "open.off",

@@ -64,7 +64,7 @@ fn about_fifty_frames_are_seen() {
 }
 
 #[test]
-fn what_nobody_wants_is_not_there() {
+fn unrequested_files_are_not_written() {
     let sandbox = Sandbox::with_scene();
     let said = run(&sandbox, &["--frames", "2", "--no-pictures"]);
     assert!(!said.contains("drawn"), "{said}");
@@ -109,7 +109,7 @@ fn animations_are_written_in_both_formats() {
 }
 
 #[test]
-fn how_it_is_seen_can_be_chosen() {
+fn view_options_are_applied() {
     let sandbox = Sandbox::with_scene();
     let mut pictures = Vec::new();
     for (i, rest) in [

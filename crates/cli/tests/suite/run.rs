@@ -185,7 +185,7 @@ fn quiet_prints_nothing() {
 }
 
 #[test]
-fn check_says_how_many_cuts_it_checked() {
+fn check_reports_the_number_of_checked_cuts() {
     let sandbox = Sandbox::new();
     let second =
         "[[stroke]]\nkind = \"plane\"\nframe = 3\npoint = [0, 0.02, 0]\nnormal = [0, 1, 0]\n";

@@ -222,10 +222,10 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(8))]
 
     #[test]
-    fn edits_are_followed(
+    fn edits_are_applied(
         rounds in prop::collection::vec(prop::collection::vec(edit(), 1..6), 4),
     ) {
-        let Some(gpu) = gpu("edits_are_followed") else { return Ok(()) };
+        let Some(gpu) = gpu("edits_are_applied") else { return Ok(()) };
         for form in FORMS {
             let far = run(gpu, form, &rounds);
             // As without edits: rounding in another order, of halves of tets as well.

@@ -9,8 +9,8 @@ use crate::support::gpu;
 use crate::twin::{FORMS, bar};
 
 #[test]
-fn frames_that_nobody_reads() {
-    let Some(gpu) = gpu("frames_that_nobody_reads") else {
+fn frames_in_flight_are_bounded() {
+    let Some(gpu) = gpu("frames_in_flight_are_bounded") else {
         return;
     };
     let mesh = bar();

@@ -105,8 +105,8 @@ fn hanging_particles_keep_multipliers_over_iterations() {
 
 /// A particle that a handle holds is fixed and freed again, which does not change what is attached.
 #[test]
-fn held_particles_can_be_fixed_and_let_go() {
-    let Some(gpu) = gpu("held_particles_can_be_fixed_and_let_go") else {
+fn attached_particles_can_be_fixed_and_released() {
+    let Some(gpu) = gpu("attached_particles_can_be_fixed_and_released") else {
         return;
     };
     let mut twins = Twins::new(gpu, &bar(), SOFT, FORMS[0], hang);

@@ -81,8 +81,8 @@ fn jacobi_needs_no_multipliers_for_one_iteration() {
 }
 
 #[test]
-fn chebyshev_leaps() {
-    twins("chebyshev_leaps", SOFT, &iterated(CHEBYSHEV), |_| ());
+fn chebyshev_extrapolates() {
+    twins("chebyshev_extrapolates", SOFT, &iterated(CHEBYSHEV), |_| ());
     // The leaps are what makes the difference.
     let mesh = bar();
     let (schedule, _) = schedules(&mesh, "none");
@@ -120,8 +120,8 @@ fn chebyshev_leaps_between_handles_and_colliders() {
 
 /// One device switches from method to method.
 #[test]
-fn methods_take_turns() {
-    let Some(gpu) = gpu("methods_take_turns") else {
+fn methods_may_alternate() {
+    let Some(gpu) = gpu("methods_may_alternate") else {
         return;
     };
     let mut twins = Twins::new(gpu, &bar(), SOFT, FORMS[0], |_| ());

@@ -134,8 +134,8 @@ fn a_body_that_turns_far_from_the_origin() {
 
 /// What handles carry has no inverse mass, but a mass and a speed.
 #[test]
-fn what_handles_carry_counts() {
-    let Some(gpu) = gpu("what_handles_carry_counts") else {
+fn attached_mass_is_measured() {
+    let Some(gpu) = gpu("attached_mass_is_measured") else {
         return;
     };
     for form in FORMS {

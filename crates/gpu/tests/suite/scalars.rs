@@ -135,8 +135,8 @@ fn volumes_are_damped_with_multipliers() {
 
 /// A thread that is slack does nothing; a spring between particles at one place waits.
 #[test]
-fn what_has_no_direction_waits() {
-    let Some(gpu) = gpu("what_has_no_direction_waits") else {
+fn constraints_without_direction_do_nothing() {
+    let Some(gpu) = gpu("constraints_without_direction_do_nothing") else {
         return;
     };
     let make = || {
@@ -178,8 +178,8 @@ fn what_has_no_direction_waits() {
 /// Colors of more than 64 constraints have dispatches of their own, small ones share one; edits are followed; nothing is
 /// sent twice.
 #[test]
-fn constraints_follow_edits_and_are_sent_once() {
-    let Some(gpu) = gpu("constraints_follow_edits_and_are_sent_once") else {
+fn constraints_are_sent_once_after_edits() {
+    let Some(gpu) = gpu("constraints_are_sent_once_after_edits") else {
         return;
     };
     let gpu_of_its_own = share(gpu);

@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn failures_of_the_source_come_through() {
+    fn errors_of_the_source_are_returned() {
         let failed = GraphError::Unreadable {
             line: 3,
             kind: ErrorKind::TimedOut,
@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn a_header_alone_makes_no_giant() {
+    fn a_header_alone_reserves_no_memory() {
         let many = read_dimacs(&b"p edge 1048576 0"[..]).unwrap();
         assert_eq!(many.vertex_count(), 1 << 20);
         assert!(read_dimacs(&b"p edge 1048577 0"[..]).is_err());

@@ -42,7 +42,7 @@ mod tests {
     proptest! {
         /// Against the definition, on a grid coarse enough for ties and equal points.
         #[test]
-        fn the_front_is_what_nothing_dominates(
+        fn the_front_is_not_dominated(
             points in prop::collection::vec([0..6u8, 0..6u8], 0..30),
         ) {
             let points: Vec<[f64; 2]> = points.iter().map(|p| p.map(f64::from)).collect();
@@ -56,7 +56,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_finite_does_not_count() {
+    fn non_finite_candidates_are_ignored() {
         let points = [[f64::NAN, 0.0], [1.0, f64::INFINITY], [2.0, 3.0]];
         assert_eq!(non_dominated(&points), [2]);
         assert!(non_dominated(&[]).is_empty());

@@ -225,7 +225,7 @@ fn the_reference_is_given_the_cut_mesh() {
 }
 
 #[test]
-fn what_the_reference_does_not_know_is_named() {
+fn features_unsupported_by_the_reference_are_named() {
     for (more, what) in [
         ("[world.ground]\nheight = -1.0\n", "a ground"),
         (

@@ -65,7 +65,7 @@ fn weak_gravity_takes_double_precision() {
 /// A stiff body hits the ground in a frame that VBD does not solve in its rounds: the body gains no energy, and a scene
 /// that names an accuracy is told.
 #[test]
-fn an_impact_that_vbd_does_not_solve_is_told() {
+fn an_impact_unsolved_by_vbd_is_reported() {
     let mut simulation = simulation(&scene(
         "[world]\ngravity = [0.0, 0.0, -9.81]\nground = { height = 0.0, friction = 0.3 }\n\
          [solver]\ntime_step = 0.01\nmethod = \"vbd\"\ntwo_level = true\naccuracy = 0.05\n\
@@ -97,7 +97,7 @@ fn an_impact_that_vbd_does_not_solve_is_told() {
 
 /// Numbers and methods that a scene names are kept.
 #[test]
-fn what_is_named_is_not_chosen() {
+fn named_keys_are_not_overridden() {
     for keys in [
         "substeps = 5",
         "method = \"gauss-seidel\"",

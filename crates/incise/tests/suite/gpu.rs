@@ -234,7 +234,7 @@ fn a_report_fetches_what_it_needs() {
 }
 
 #[test]
-fn what_a_device_does_not_do_is_refused_and_auto_goes_elsewhere() {
+fn unsupported_features_are_refused_and_auto_uses_the_cpu() {
     let mut doubled = scene(200, "serial:10");
     doubled.solver.precision = Precision::F64;
     let large = scene(200, "pressure:300");
@@ -253,8 +253,8 @@ fn what_a_device_does_not_do_is_refused_and_auto_goes_elsewhere() {
 }
 
 #[test]
-fn auto_takes_no_processor_in_disguise() {
-    let Some(gpu) = gpu("auto_takes_no_processor_in_disguise") else {
+fn auto_skips_software_adapters() {
+    let Some(gpu) = gpu("auto_skips_software_adapters") else {
         return;
     };
     let mut scene = scene(200, "serial:10");

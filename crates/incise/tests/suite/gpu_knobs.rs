@@ -43,8 +43,8 @@ fn on(backend: Backend, spec: &SolverSpec) -> SolverSpec {
 }
 
 #[test]
-fn a_device_goes_on_as_it_did() {
-    let Some(gpu) = gpu("a_device_goes_on_as_it_did") else {
+fn a_restored_device_run_is_bit_identical() {
+    let Some(gpu) = gpu("a_restored_device_run_is_bit_identical") else {
         return;
     };
     let plain = two_bodies().solver;

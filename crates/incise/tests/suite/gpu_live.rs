@@ -24,8 +24,8 @@ fn handles(simulation: &Simulation) -> Vec<usize> {
 
 /// Takes hold, pulls, cuts through what is held, lets go, takes hold again: one rigidly, one by springs.
 #[test]
-fn a_hand_does_the_same() {
-    let Some(gpu) = gpu("a_hand_does_the_same") else {
+fn grabs_on_a_device_equal_those_on_the_cpu() {
+    let Some(gpu) = gpu("grabs_on_a_device_equal_those_on_the_cpu") else {
         return;
     };
     let gpu = counting(&gpu);

@@ -59,7 +59,7 @@ fn take(simulation: &mut Simulation, point: DVec3, radius: f64, compliance: f64)
 }
 
 #[test]
-fn what_is_held_goes_there_and_the_body_follows() {
+fn grabbed_particles_reach_the_target() {
     let vbd = |scene: &Scene| Scene {
         solver: SolverSpec {
             precision: scene.solver.precision,
@@ -129,7 +129,7 @@ fn a_soft_grab_lags_behind() {
 
 /// Between two frames a hand lets go and takes hold again, of a handle that has come a long way: nothing jumps.
 #[test]
-fn a_hand_may_take_hold_again_at_once() {
+fn a_released_region_can_be_grabbed_again_at_once() {
     for precision in [Precision::F32, Precision::F64] {
         let mut simulation = simulation(&free_box(precision));
         let mut point = DVec3::ZERO;
@@ -164,7 +164,7 @@ fn a_hand_may_take_hold_again_at_once() {
 
 /// All of a body in a hand that moves evenly: once released, it keeps moving as before.
 #[test]
-fn what_is_let_go_keeps_its_velocity() {
+fn released_particles_keep_their_velocity() {
     for precision in [Precision::F32, Precision::F64] {
         let mut simulation = simulation(&free_box(precision));
         let grab = take(&mut simulation, DVec3::ZERO, 2.0, 0.0);
@@ -216,7 +216,7 @@ fn momentum_is_kept_after_release() {
 }
 
 #[test]
-fn a_cut_through_what_is_held_leaves_both_sides_held_and_both_are_let_go() {
+fn both_sides_of_a_cut_grab_are_held_and_released() {
     let strokes = plane(4, [0.03, 0.0, 0.0], [1.0, 0.0, 0.0]);
     let run = |threads: usize, precision: Precision| {
         let mut scene = scene(&(body("box", 1500, [0.0; 3]) + &strokes));
@@ -272,7 +272,7 @@ fn a_cut_through_what_is_held_leaves_both_sides_held_and_both_are_let_go() {
 }
 
 #[test]
-fn what_is_fixed_or_held_cannot_be_grabbed() {
+fn fixed_or_attached_particles_cannot_be_grabbed() {
     let text = body("box", 300, [0.0; 3])
         + "fixed = [{ half_space = { point = [0, 0, 0.1], normal = [0, 0, 1] } }]\n"
         + "[[attachment]]\nregions = [{ half_space = { point = [0, 0, -0.4], normal = [0, 0, -1] } }]\n\
@@ -307,7 +307,7 @@ fn what_is_fixed_or_held_cannot_be_grabbed() {
 
 /// A radius over two bodies, and over two pieces of one: only that of the nearest particle is held.
 #[test]
-fn nothing_is_tied_together_that_hangs_apart() {
+fn grabs_do_not_join_separate_parts() {
     let bodies = body("box", 300, [0.0; 3]) + &body("box", 300, [0.0, 0.0, 1.01]);
     let mut scene = scene(&(bodies + &plane(0, [0.03, 0.0, 0.0], [1.0, 0.0, 0.0])));
     scene.solver.precision = Precision::F64;
@@ -343,7 +343,7 @@ fn nothing_is_tied_together_that_hangs_apart() {
 
 /// A stroke removes all that is held, or even the whole body; then the grab is released.
 #[test]
-fn what_is_held_may_be_cut_away() {
+fn grabbed_particles_may_be_cut_away() {
     for (precision, radius) in [
         (Precision::F32, 0.5),
         (Precision::F64, 0.5),
@@ -421,7 +421,7 @@ fn a_grab_wakes_what_it_holds_while_it_moves() {
 }
 
 #[test]
-fn what_cannot_be_is_refused_by_name() {
+fn impossible_grabs_are_refused_by_name() {
     let mut simulation = simulation(&free_box(Precision::F32));
     let nan = dvec3(0.0, f64::NAN, 0.0);
     let field = |error: Error| match error {

@@ -141,7 +141,7 @@ fn a_stroke_goes_on_where_another_stopped() {
 }
 
 #[test]
-fn what_is_no_blade_is_refused_and_nothing_changes() {
+fn invalid_blades_are_refused_and_nothing_changes() {
     let mut simulation = simulation(&scene(&body("box", 200, [0.0; 3])));
     let refused = |result: Result<(), incise::Error>, expected: &str| {
         let error = result.unwrap_err().to_string();

@@ -114,7 +114,7 @@ fn a_cut_changes_only_clusters_near_it() {
 }
 
 #[test]
-fn what_the_first_report_counts_is_the_scene() {
+fn the_first_report_counts_the_scene() {
     let simulation = cut_sphere(1200);
     let report = simulation.report();
     assert_eq!(report.tets, simulation.mesh().tets.len());

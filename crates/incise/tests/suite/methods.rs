@@ -290,7 +290,7 @@ const MISTAKES: [Mistake; 6] = [
 ];
 
 #[test]
-fn what_a_method_does_not_know_is_refused_by_name() {
+fn unsupported_features_of_a_method_are_named() {
     let sound = falling("method = \"vbd\"");
     simulation(&sound).step().unwrap();
     for (field, mistake) in MISTAKES {

@@ -73,7 +73,7 @@ fn the_ground_stops_a_falling_body() {
 
 /// A half that is cut loose falls, the half that is held stays.
 #[test]
-fn what_is_cut_loose_falls() {
+fn separated_pieces_fall() {
     let mut scene = scene(&format!(
         "[world]\ngravity = [0.0, 0.0, -9.81]\n{}{}{}",
         body("box", 500, [0.0, 0.0, 0.0]),

@@ -43,7 +43,7 @@ fn masses(pieces: &[PieceReport]) -> [f64; 3] {
 }
 
 #[test]
-fn what_comes_off_is_reported_with_its_mass() {
+fn separated_pieces_are_reported_with_their_mass() {
     let text = body("box", 600, [0.0; 3]) + "density = 700.0\n";
     let cut = plane(1, [0.2, 0.0, 0.0], [1.0, 0.0, 0.0]);
     let mut simulation = simulation(&scene(&(text + &cut)));

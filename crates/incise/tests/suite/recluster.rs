@@ -91,7 +91,7 @@ fn volume_constraints_take_the_new_order() {
 }
 
 #[test]
-fn a_limit_that_is_none_is_refused() {
+fn an_invalid_threshold_is_refused() {
     for threshold in ["1.0", "0.5", "-2.0", "inf", "nan"] {
         let scene = scene(&format!(
             "[solver]\nrecluster = {{ threshold = {threshold} }}\n{}",

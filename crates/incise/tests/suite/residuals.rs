@@ -26,7 +26,7 @@ fn sums(simulation: &Simulation) -> Option<[f64; 2]> {
 }
 
 #[test]
-fn they_sum_up_to_the_dual_residual() {
+fn residuals_of_tets_sum_up_to_the_dual_residual() {
     for solver in [
         SolverSpec::default(),
         SolverSpec::of(Method::Jacobi),
@@ -52,7 +52,7 @@ fn they_sum_up_to_the_dual_residual() {
 
 /// Tets of the box fall freely: what is left there is rounding. Those of the beam come first.
 #[test]
-fn they_are_where_the_tets_are() {
+fn residuals_have_the_order_of_the_tets() {
     let mut scene = two_bodies();
     scene.solver.precision = incise::scene::Precision::F64;
     let mut simulation = simulation(&scene);
@@ -70,7 +70,7 @@ fn they_are_where_the_tets_are() {
 }
 
 #[test]
-fn who_sleeps_has_none_left() {
+fn sleeping_bodies_have_no_residuals() {
     let mut scene = two_bodies();
     scene.report.every = 1;
     scene.world.gravity = None;
@@ -87,7 +87,7 @@ fn who_sleeps_has_none_left() {
 }
 
 #[test]
-fn they_are_gone_with_what_they_belong_to() {
+fn residuals_are_removed_with_their_tets() {
     let mut simulation = simulation(&two_bodies());
     simulation.step().unwrap();
     let then = simulation.residuals_of_tets();

@@ -24,7 +24,7 @@ fn center(mesh: &TetMesh, x: &[DVec3], belongs: impl Fn(DVec3) -> bool) -> DVec3
 
 /// Cut off what holds it, the lower part falls freely from the first moment on, and the upper one stays.
 #[test]
-fn what_is_cut_off_falls() {
+fn a_part_that_was_cut_off_falls() {
     let mut scene = scene(&format!(
         "[world]\ngravity = [0.0, 0.0, -9.81]\n{}fixed = [{{ half_space = {{ point = [0.0, 0.0, 0.4], normal = [0.0, 0.0, 1.0] }} }}]\n{}",
         body("box", 900, [0.0; 3]).replace("1e4", "1e5"),

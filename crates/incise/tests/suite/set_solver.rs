@@ -266,7 +266,7 @@ fn auto_chooses_from_the_body_as_it_is() {
 
 /// Sleeping bodies would not show other settings.
 #[test]
-fn who_sleeps_wakes() {
+fn sleeping_bodies_wake_after_a_change() {
     let sleep = Some(SleepSpec {
         speed: 10.0,
         time: 0.03,
@@ -312,7 +312,7 @@ fn worn_clusters_are_renewed_once_that_is_asked_for() {
 }
 
 #[test]
-fn what_is_refused_changes_nothing() {
+fn refused_settings_change_nothing() {
     let mut scene = two_bodies();
     scene.body[0].damping = 0.01;
     let mut simulation = simulation(&scene);

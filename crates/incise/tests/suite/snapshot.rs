@@ -155,7 +155,7 @@ fn clusters_under_way_are_taken_in_their_frame() {
 }
 
 #[test]
-fn what_came_after_is_gone() {
+fn later_changes_are_undone() {
     let mut simulation = simulation(&scene(&body("sphere", 300, [0.0, 0.0, 0.0])));
     simulation.step().unwrap();
     let before = simulation.snapshot().unwrap();
@@ -277,7 +277,7 @@ fn the_bytes_are_about_those_that_are_asked_for() {
 }
 
 #[test]
-fn hands_go_on_where_they_were() {
+fn grabs_continue_from_a_snapshot() {
     for precision in [Precision::F32, Precision::F64] {
         let mut scene = scene(&body("box", 400, [0.0; 3]));
         scene.solver.precision = precision;

@@ -52,7 +52,7 @@ fn dense_files() {
 }
 
 #[test]
-fn counts_that_are_not_true() {
+fn wrong_counts_reserve_no_memory() {
     let vtk = |body: &str| {
         format!("# vtk DataFile Version 3.0\n\nASCII\nDATASET UNSTRUCTURED_GRID\n{body}")
     };

@@ -91,7 +91,7 @@ fn no_volume() {
 }
 
 #[test]
-fn points_that_are_none() {
+fn invalid_points_are_refused() {
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         let mut points = grid(2);
         points[3].y = bad;

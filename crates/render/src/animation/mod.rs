@@ -297,7 +297,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_film_that_lost_a_picture_gets_no_name() {
+    fn an_animation_with_a_lost_frame_is_not_renamed() {
         for ending in ["gif", "png"] {
             let name = format!("incise-broken-{}.{ending}", std::process::id());
             let path = std::env::temp_dir().join(name);
@@ -316,7 +316,7 @@ mod tests {
     /// On a disk that is full.
     #[test]
     #[cfg(target_os = "linux")]
-    fn a_picture_that_does_not_fit_on_the_disk_ends_the_film() {
+    fn a_frame_that_cannot_be_written_ends_the_animation() {
         let size = [200, 200];
         let name = format!("incise-full-{}.gif", std::process::id());
         let path = std::env::temp_dir().join(name);

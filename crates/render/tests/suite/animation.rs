@@ -110,7 +110,7 @@ fn an_animated_png_keeps_every_pixel() {
 }
 
 #[test]
-fn a_gif_has_the_colors_that_it_can() {
+fn a_gif_keeps_as_many_colors_as_fit() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("film.gif");
     write(&path, 0.025);
@@ -132,7 +132,7 @@ fn a_gif_has_the_colors_that_it_can() {
 }
 
 #[test]
-fn films_are_small_where_little_changes() {
+fn animations_with_few_changes_are_small() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["still.gif", "still.png"] {
         let path = folder.path().join(name);
@@ -149,7 +149,7 @@ fn films_are_small_where_little_changes() {
 }
 
 #[test]
-fn what_is_no_film_is_refused_and_leaves_nothing() {
+fn invalid_animations_are_refused_without_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     for name in ["film.mp4", "film", "film.gif.txt"] {
@@ -194,7 +194,7 @@ fn what_is_no_film_is_refused_and_leaves_nothing() {
 }
 
 #[test]
-fn a_film_replaces_another_when_it_is_finished() {
+fn a_finished_animation_replaces_the_old_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("film.png");
     fs::write(&path, b"before").unwrap();

@@ -27,7 +27,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn what_is_projected_lies_on_the_ray_there(
+    fn projected_points_lie_on_the_view_ray(
         camera in camera(),
         pixel in (0.0..800.0, 0.0..600.0),
         depth in 0.1..10.0_f64,
@@ -73,7 +73,7 @@ proptest! {
     }
 
     #[test]
-    fn no_motion_of_the_hand_loses_the_camera(
+    fn camera_stays_valid_under_any_input(
         steps in prop::collection::vec((0..3, -1e3..1e3, -1e3..1e3), 1..40),
     ) {
         let mut camera = Camera::fit(DVec3::ZERO, DVec3::ONE);

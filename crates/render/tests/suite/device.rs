@@ -142,8 +142,8 @@ fn positions_do_not_leave_the_device() {
 }
 
 #[test]
-fn a_painting_made_late_needs_positions_of_the_host() {
-    let Some(gpu) = gpu("a_painting_made_late_needs_positions_of_the_host") else {
+fn a_late_render_scene_needs_host_positions() {
+    let Some(gpu) = gpu("a_late_render_scene_needs_host_positions") else {
         return;
     };
     let scene = Scene::from_toml(&LIVER.replace("substeps = 8", "substeps = 1")).unwrap();
@@ -232,8 +232,8 @@ fn normals_of_both(renderer: &mut GpuRenderer, shown: &Shown) -> [Vec<[i32; 3]>;
 }
 
 #[test]
-fn normals_are_those_of_the_processor() {
-    let Some(gpu) = gpu("normals_are_those_of_the_processor") else {
+fn device_normals_equal_those_of_the_cpu() {
+    let Some(gpu) = gpu("device_normals_equal_those_of_the_cpu") else {
         return;
     };
     let shown = Shown::new(LIVER, 4);

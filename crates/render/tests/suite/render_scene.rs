@@ -55,7 +55,7 @@ fn triangles(render_scene: &RenderScene) -> Vec<Triangle> {
 }
 
 #[test]
-fn following_is_starting_anew() {
+fn updated_scenes_equal_rebuilt_ones() {
     for by in [
         ColorBy::Tissue,
         ColorBy::Color,
@@ -175,7 +175,7 @@ fn a_piece_keeps_its_color_when_another_is_carved() {
 }
 
 #[test]
-fn colors_that_nobody_made_are_tissue() {
+fn surfaces_without_colors_are_tissue() {
     let mut shown = Shown::new(STROKES, 0);
     shown
         .render_scene

@@ -38,7 +38,7 @@ fn cells_are_as_large_as_the_largest_picture() {
 }
 
 #[test]
-fn captions_differ_and_nothing_is_no_trouble() {
+fn captions_differ_and_empty_sheets_are_allowed() {
     let sheet =
         |caption: &str| contact_sheet(&[(Image::filled(60, 10, [9; 3]), caption.to_owned())], 4);
     assert_eq!(sheet("a").width, 80, "as many columns as pictures");

@@ -134,7 +134,7 @@ fn a_shallow_stroke_does_not_go_through() {
 }
 
 #[test]
-fn undo_of_a_scene_stroke_says_that_it_begins_again() {
+fn undo_of_a_scene_stroke_reports_its_restart() {
     let mut session = session(PLANE);
     for _ in 0..4 {
         session.step().unwrap();

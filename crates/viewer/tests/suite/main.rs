@@ -26,7 +26,7 @@ fn sentence(output: &Output) -> String {
 // Elsewhere a window needs no such variables.
 #[cfg(all(unix, not(target_os = "macos")))]
 #[test]
-fn without_a_display_it_says_so() {
+fn a_missing_display_is_reported() {
     let output = viewer(&[]);
     assert_eq!(output.status.code(), Some(1));
     let text = sentence(&output);

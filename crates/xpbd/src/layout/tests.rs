@@ -92,7 +92,7 @@ impl Plan {
 /// A cut of 20 tets changes up to 20 clusters of 5 and makes 20 of 2, whatever the size of the body. What is rebuilt
 /// now and then is less than that in the long run.
 #[test]
-fn following_a_cut_costs_what_was_cut() {
+fn update_cost_is_proportional_to_the_cut() {
     for clusters in [2_000, 20_000] {
         let (mut plan, cuts, mut filled) = (Plan::new(clusters), 40, 0);
         for cut in 0..cuts {

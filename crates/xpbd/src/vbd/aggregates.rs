@@ -81,7 +81,7 @@ mod tests {
 
     /// Two rows of points without an edge between them.
     #[test]
-    fn nothing_couples_what_no_edge_connects() {
+    fn unconnected_particles_are_not_coupled() {
         let (mut offsets, mut columns) = (vec![0], Vec::new());
         for i in 0..40u32 {
             let half = i / 20;

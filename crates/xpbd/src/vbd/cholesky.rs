@@ -162,7 +162,7 @@ mod tests {
 
     /// Two blocks that are not coupled: with rows that begin at their block and with full ones, to the bit.
     #[test]
-    fn what_is_not_coupled_is_left_out_to_the_bit() {
+    fn uncoupled_rows_are_unchanged_to_the_bit() {
         let blocks = [0..19, 19..32];
         let block = |i: usize| blocks[usize::from(i >= 19)].clone();
         let entry = |i: usize, j: usize| match (block(i).contains(&j), i == j) {

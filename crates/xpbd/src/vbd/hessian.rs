@@ -182,7 +182,7 @@ mod tests {
 
     /// At rest, turned, the pressure -1 is kept, and turning further costs nothing.
     #[test]
-    fn nothing_is_held_back_at_rest() {
+    fn rest_is_not_clamped() {
         let turn = DMat3::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 1.1);
         let f = [turn.x_axis, turn.y_axis, turn.z_axis];
         for l in [1.0, 10.0, 1e4] {

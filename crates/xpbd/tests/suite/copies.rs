@@ -85,7 +85,7 @@ fn goes_on<R: Real>(method: Method, iterations: u32) {
 }
 
 #[test]
-fn a_copy_goes_on_as_the_original() {
+fn a_copy_and_its_original_stay_bit_identical() {
     let chebyshev = Method::Chebyshev {
         spectral_radius: 0.9,
         chebyshev_start: 2,
@@ -103,7 +103,7 @@ fn a_copy_goes_on_as_the_original() {
 
 /// A copy asks for the bytes that it says, but for schedules and a few materials.
 #[test]
-fn a_copy_weighs_what_it_says() {
+fn the_reported_size_of_a_copy_is_right() {
     fn check<R: Real>() {
         let (solver, order) = everything::<R>();
         let mut copy = None;
@@ -120,7 +120,7 @@ fn a_copy_weighs_what_it_says() {
 }
 
 #[test]
-fn what_vbd_keeps_weighs_what_it_says() {
+fn the_reported_size_of_vbd_state_is_right() {
     let mesh = kuhn_box([4, 2, 2], dvec3(0.4, 0.2, 0.2));
     let mut solver = body::<f32>(&mesh, RUBBER);
     let particles = u32::try_from(solver.particle_count()).unwrap();

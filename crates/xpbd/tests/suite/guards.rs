@@ -51,7 +51,7 @@ fn a_speck_does_not_keep_its_tet_from_moving() {
 /// No share of an infinite correction is not a number: a corner that is held stays where it is all the same. The split
 /// form does not take a step whose energy is infinite, so there is nothing to repair.
 #[test]
-fn an_infinite_correction_does_not_move_what_is_held() {
+fn an_infinite_correction_does_not_move_fixed_particles() {
     infinite_correction(TetSolve::Block, 4);
     infinite_correction(TetSolve::Split, 0);
 }
@@ -107,7 +107,7 @@ fn a_tet_too_small_to_represent_takes_no_part() {
 
 /// Rounding of a stiffness is no softening, and nothing softened of nothing is nothing.
 #[test]
-fn only_what_was_softened_counts_as_softened() {
+fn only_softened_tets_are_counted() {
     for k in 0..100 {
         let young_modulus = 1e6 / (3.0 + f64::from(k));
         let (solver, _) = tet::<f32>(

@@ -302,7 +302,7 @@ fn edits<R: Real>(materials: &[Material], seed: u64) {
 }
 
 #[test]
-fn following_is_the_same_as_starting_anew() {
+fn updated_and_rebuilt_layouts_are_equal() {
     edits::<f32>(&[RUBBER], 1);
     edits::<f64>(&[RUBBER], 2);
     edits::<f32>(&[RUBBER, HEAVY], 3);
@@ -327,7 +327,7 @@ fn a_solver_may_fall_behind() {
 
 /// All goes, then some comes back.
 #[test]
-fn nothing_left_is_a_layout_too() {
+fn an_empty_layout_is_valid() {
     let mesh = kuhn_box([1, 1, 1], DVec3::ONE);
     let mut body = Body::<f32>::new(&mesh, &[RUBBER]);
     body.step(&settings());

@@ -290,7 +290,7 @@ fn residuals_too_large_to_represent_are_the_largest_double() {
 
 /// A tet too flat to take part has no energy, whatever its corners do, and what is held does not count as load.
 #[test]
-fn what_takes_no_part_is_not_measured() {
+fn skipped_tets_are_not_measured() {
     let rest = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::X + DVec3::Y];
     let mut solver = Solver::<f64>::new(&rest);
     let rubber = solver.add_material(RUBBER).unwrap();

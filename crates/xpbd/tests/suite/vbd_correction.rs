@@ -163,7 +163,7 @@ fn an_accuracy_bounds_the_error_of_a_swing() {
 /// A strained beam, held at both ends, holds most of the energy. A tet beside it that nothing holds keeps falling
 /// as implicit Euler falls: `g Δt² n (n + 1) / 2` after n substeps.
 #[test]
-fn what_falls_beside_a_strained_body_falls_freely() {
+fn a_body_falls_freely_beside_a_strained_one() {
     let steel = Material {
         young_modulus: 1e9,
         ..RUBBER
@@ -417,7 +417,7 @@ fn an_impact_adds_no_energy_in_single_precision() {
 
 /// Two bodies that share no particle, one disturbed: the other does not feel it, though one correction serves both.
 #[test]
-fn nothing_couples_separate_pieces() {
+fn separate_pieces_are_not_coupled() {
     let mesh = kuhn_box([3, 2, 2], dvec3(0.3, 0.2, 0.2));
     let count = u32::try_from(mesh.positions.len()).unwrap();
     let far: Vec<DVec3> = mesh.positions.iter().map(|x| *x + DVec3::X).collect();
