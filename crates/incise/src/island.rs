@@ -539,7 +539,7 @@ impl Island {
                 step.map_err(|source| Error::Xpbd { field: "solver".into(), source })?
             });
             report.repaired += step.repaired;
-            report.unfolded += step.unfolded;
+            report.jittered += step.jittered;
             contacts.note(solver, cuttable, pieces);
         }
         contacts.end_frame();

@@ -112,7 +112,7 @@ impl<R: Real> Vbd<R> {
         }?;
         Ok(StepReport {
             repaired: self.last.repaired,
-            unfolded: 0,
+            jittered: 0,
         })
     }
 }

@@ -114,11 +114,11 @@ impl<R: Float> Solver<R> {
     /// width to a body on an exact line. Returns the number of particles that the latter moved.
     pub fn prepare_state(&mut self) -> usize {
         let origin = self.particles.origin;
-        let unfolded = self.prepare();
+        let jittered = self.prepare();
         if let Some(changes) = &mut self.changes {
-            changes.all_particles |= origin != self.particles.origin || unfolded > 0;
+            changes.all_particles |= origin != self.particles.origin || jittered > 0;
         }
-        unfolded
+        jittered
     }
 
     /// Loads positions (the fourth number is ignored) and velocities that were computed elsewhere from this solver's

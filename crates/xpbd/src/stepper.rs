@@ -31,7 +31,7 @@ pub struct StepReport {
     pub repaired: usize,
     /// Number of particles that were moved by a millionth of a tet's size because all tets lay on one exact line, from
     /// which no constraint could move them.
-    pub unfolded: usize,
+    pub jittered: usize,
 }
 
 /// What residuals need of the last substep.

@@ -538,7 +538,7 @@ impl<R: Float> Solver<R> {
             settings.method.check_contacts()?;
         }
         self.update_layout(schedule);
-        let unfolded = if part.start == 0 { self.prepare() } else { 0 };
+        let jittered = if part.start == 0 { self.prepare() } else { 0 };
         let Self {
             particles,
             tets,
@@ -547,7 +547,7 @@ impl<R: Float> Solver<R> {
             ..
         } = self;
         let repaired = stepper.frame(particles, tets, constraints, settings, part, keep);
-        Ok(StepReport { repaired, unfolded })
+        Ok(StepReport { repaired, jittered })
     }
 }
 

@@ -259,7 +259,7 @@ impl<'a, R: Float> ImplicitStep<'a, R> {
         }
         StepReport {
             repaired: repaired + self.lost,
-            unfolded: 0,
+            jittered: 0,
         }
     }
 }

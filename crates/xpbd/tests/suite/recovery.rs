@@ -34,7 +34,7 @@ const HELD: [(&str, Place); 4] = [
     ("a line", |_, x| dvec3(x.x, 0.125, 0.125)),
 ];
 
-/// Inverted tets, volume over rest volume after a second, and how many particles were unfolded.
+/// Inverted tets, volume over rest volume after a second, and how many particles were jittered.
 fn recover<R: Real>(method: Method, held: bool, place: Place) -> (usize, f64, usize) {
     let mesh = kuhn_box([16, 4, 4], dvec3(16.0, 4.0, 4.0) * CELL);
     let mut solver = body::<R>(&mesh, RUBBER);
@@ -46,21 +46,21 @@ fn recover<R: Real>(method: Method, held: bool, place: Place) -> (usize, f64, us
             solver.set_position(p, place(&mut noise, x));
         }
     }
-    let (schedule, mut unfolded) = (plain(&mesh), 0);
+    let (schedule, mut jittered) = (plain(&mesh), 0);
     for _ in 0..60 {
         let report = method.step(&mut solver, &schedule, &falling());
         assert_eq!(report.repaired, 0);
-        unfolded += report.unfolded;
+        jittered += report.jittered;
     }
     let volume = solver.volume();
-    (volume.inverted, volume.total / volume.rest, unfolded)
+    (volume.inverted, volume.total / volume.rest, jittered)
 }
 
 /// Measured: none inverted, volume within 1.1 % (what still rings), in both precisions.
 fn assert_recovers(states: &[(&str, Place)], held: bool) {
     for method in Method::ACCURATE {
         for &(what, place) in states {
-            for (inverted, ratio, unfolded) in [
+            for (inverted, ratio, jittered) in [
                 recover::<f32>(method, held, place),
                 recover::<f64>(method, held, place),
             ] {
@@ -69,9 +69,9 @@ fn assert_recovers(states: &[(&str, Place)], held: bool) {
                 // Only what is on a line to the last digit needs it, and only once.
                 let all = if held { 0 } else { 17 * 5 * 5 };
                 match what {
-                    "a slanted line" => assert!([0, all].contains(&unfolded), "{unfolded}"),
-                    "a line" | "a line in the middle" => assert_eq!(unfolded, all, "{what}"),
-                    _ => assert_eq!(unfolded, 0, "{what}"),
+                    "a slanted line" => assert!([0, all].contains(&jittered), "{jittered}"),
+                    "a line" | "a line in the middle" => assert_eq!(jittered, all, "{what}"),
+                    _ => assert_eq!(jittered, 0, "{what}"),
                 }
             }
         }
@@ -101,14 +101,14 @@ fn a_line_is_unfolded_far_from_the_origin_too() {
     solver.set_fixed(0, true);
     let settings = StepSettings::new(1e-9);
     let report = solver.step(&plain(&mesh), &settings).unwrap();
-    assert_eq!(report.unfolded, mesh.positions.len() - 1);
+    assert_eq!(report.jittered, mesh.positions.len() - 1);
     assert_eq!(solver.position(0), DVec3::splat(1e3));
     for (p, &x) in mesh.positions.iter().enumerate().skip(1) {
         let gap = (solver.position(p) - line(x)).abs();
         assert!(gap.min_element() > 0.0 && gap.max_element() < 1e-3, "{gap}");
     }
     let report = solver.step(&plain(&mesh), &settings).unwrap();
-    assert_eq!(report.unfolded, 0);
+    assert_eq!(report.jittered, 0);
 }
 
 fn falling() -> StepSettings {
