@@ -369,7 +369,7 @@ mod tests {
 
     /// Each case has another id, its base is there, and its scene is not that of its base.
     #[test]
-    fn cases_have_distinct_names() {
+    fn cases_are_distinct() {
         let cases = cases();
         let mut ids: Vec<_> = cases.iter().map(Case::id).collect();
         ids.sort();

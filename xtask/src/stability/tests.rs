@@ -90,7 +90,7 @@ fn substeps_by_kappa_hold_a_body_together() {
 
 /// A device goes through the same extremes; one frame, as software devices are slow.
 #[test]
-fn devices_are_monitored() {
+fn extremes_run_on_a_device() {
     let Ok(gpu) = GpuContext::new(&GpuOptions::from_env()) else {
         return; // A machine without one.
     };

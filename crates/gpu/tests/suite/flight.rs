@@ -9,8 +9,8 @@ use crate::support::gpu;
 use crate::twin::{FORMS, bar};
 
 #[test]
-fn frames_in_flight_are_bounded() {
-    let Some(gpu) = gpu("frames_in_flight_are_bounded") else {
+fn frames_without_readback_equal_awaited_ones() {
+    let Some(gpu) = gpu("frames_without_readback_equal_awaited_ones") else {
         return;
     };
     let mesh = bar();

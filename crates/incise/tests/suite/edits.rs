@@ -76,7 +76,7 @@ fn a_collider_that_is_sent_is_one_with_that_velocity() {
 
 /// What was removed is no obstacle; other handles still name what they named, and come back with a snapshot.
 #[test]
-fn handles_keep_their_numbers() {
+fn handles_stay_valid_after_other_removals() {
     let mut builder = box_of_jelly();
     builder.ground(-2.0, 0.0);
     let first = builder.add_collider(ball(DVec3::X * 3.0));

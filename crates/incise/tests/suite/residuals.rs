@@ -87,7 +87,7 @@ fn sleeping_bodies_have_no_residuals() {
 }
 
 #[test]
-fn residuals_are_removed_with_their_tets() {
+fn residuals_are_dropped_with_outdated_settings() {
     let mut simulation = simulation(&two_bodies());
     simulation.step().unwrap();
     let then = simulation.residuals_of_tets();

@@ -266,7 +266,7 @@ fn auto_chooses_from_the_body_as_it_is() {
 
 /// Sleeping bodies would not show other settings.
 #[test]
-fn sleeping_bodies_wake_after_a_change() {
+fn sleeping_bodies_wake_after_changed_settings() {
     let sleep = Some(SleepSpec {
         speed: 10.0,
         time: 0.03,

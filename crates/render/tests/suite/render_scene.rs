@@ -175,7 +175,7 @@ fn a_piece_keeps_its_color_when_another_is_carved() {
 }
 
 #[test]
-fn surfaces_without_colors_are_tissue() {
+fn new_surfaces_have_no_color_until_recolored() {
     let mut shown = Shown::new(STROKES, 0);
     shown
         .render_scene
