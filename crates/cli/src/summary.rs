@@ -135,7 +135,7 @@ fn substeps(body: &BodyReport) -> String {
     let substeps = body.substeps;
     match body.choice {
         Some(choice) => match choice.shortfall {
-            Some(Shortfall::Cap) => {
+            Some(Shortfall::Cap | Shortfall::Growth) => {
                 format!("{substeps} (limited; {} needed)", choice.substeps_wanted)
             }
             Some(Shortfall::Sliver) => format!(

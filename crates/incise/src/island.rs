@@ -306,11 +306,9 @@ impl Island {
             |_| substeps,
             form,
         );
-        if self
-            .choice
-            .is_some_and(|c| c.shortfall == Some(Shortfall::Budget))
-        {
-            judged.shortfall = Some(Shortfall::Budget);
+        let limit = self.choice.and_then(|choice| choice.shortfall);
+        if let Some(Shortfall::Budget | Shortfall::Growth) = limit {
+            judged.shortfall = limit;
         }
         let chosen = self.choice.is_some();
         self.warnings.extend(warning::of_substeps(
@@ -412,14 +410,25 @@ impl Island {
         if self.choice.is_some() && self.budget.is_none() && !self.spec.kappa_limit.is_finite() {
             let (chosen, choice) = substeps(asked, &self.spec, &self.solver, self.cuttable.mesh());
             let most = MOST_GROWTH.saturating_mul(self.first_substeps);
-            self.settings.substeps = chosen.min(most).max(before);
+            let taken = chosen.min(most).max(before);
+            self.settings.substeps = taken;
             let ratio = f64::from(before) / f64::from(self.settings.substeps);
             if let Some(noted) = &mut self.cut_kappa {
                 // Kappa goes with the square of the substep.
                 noted.before = noted.before.map(|kappa| kappa * ratio * ratio);
                 noted.new_tets *= ratio * ratio;
             }
-            self.choice = choice;
+            self.choice = match choice {
+                Some(_) if taken < chosen => {
+                    let form = tet_solve(self.spec.tet_solve);
+                    let mesh = self.cuttable.mesh();
+                    let tets = demands(&self.spec, &self.solver, mesh, |_| true);
+                    let mut limited = evaluate(tets, |_| taken, form);
+                    limited.shortfall = Some(Shortfall::Growth);
+                    Some(limited)
+                }
+                choice => choice,
+            };
             self.judge_settings();
         }
         self.outside.at_choice = self.outside.outside;

@@ -30,6 +30,8 @@ pub enum Shortfall {
     Cap,
     /// More are needed than `budget_ms` allows.
     Budget,
+    /// Cuts need more than twice the number of the start.
+    Growth,
     /// Only a few slivers need more.
     Sliver,
 }

@@ -133,6 +133,12 @@ pub(crate) fn of_substeps(
     } else if choice.shortfall == Some(Shortfall::Budget) {
         let fix = "raise budget_ms, use fewer tets or a softer material";
         (WarningCode::BudgetTooSmall, fix)
+    } else if choice.shortfall == Some(Shortfall::Growth) {
+        let fix = format!(
+            "cuts at most double the substeps of the start: set substeps = {needed} for them, or use more snap in strokes"
+        );
+        let message = format!("{error}; {fix}");
+        return Some(Warning::new(WarningCode::SubstepsCapped, bodies, message));
     } else if capped {
         let fix = "raise max_substeps, or set method = \"vbd\" and two_level = true";
         (WarningCode::SubstepsCapped, fix)

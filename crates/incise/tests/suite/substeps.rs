@@ -2,7 +2,7 @@
 
 use incise::report::{BodyReport, Shortfall};
 use incise::scene::{Precision, Substeps};
-use incise::{Scene, Simulation};
+use incise::{Scene, Simulation, Warning, WarningCode};
 use serde_json::Value;
 
 use crate::support::{body, plane, scene, simulation, state};
@@ -259,4 +259,36 @@ fn auto_is_the_number_it_chooses() {
         named.step().unwrap();
     }
     assert!(state(&auto) == state(&named));
+}
+
+/// A cut leaves tets that need five times the substeps of the start, and cuts at most double them: the report has the error
+/// of the number taken, and the warning names a setting that helps.
+#[test]
+fn limited_growth_after_a_cut_is_reported() {
+    let text = r#"
+        [world]
+        gravity = [0.0, 0.0, -9.81]
+        [[body]]
+        shape = { kind = "box", tets = 1500 }
+        scale = 0.2
+        young_modulus = 5e4
+        [[stroke]]
+        kind = "plane"
+        frame = 1
+        point = [0.0, 0.0, 0.02]
+        normal = [0.2, 0.1, 1.0]
+    "#;
+    let mut simulation = simulation(&Scene::from_toml(text).unwrap());
+    let before = simulation.step().unwrap().bodies[0].clone();
+    assert_eq!(before.choice.unwrap().shortfall, None);
+    let report = simulation.step().unwrap();
+    let (after, choice) = (&report.bodies[0], report.bodies[0].choice.unwrap());
+    assert_eq!(after.substeps, 2 * before.substeps);
+    assert!(choice.substeps_wanted > after.substeps);
+    assert_eq!(choice.shortfall, Some(Shortfall::Growth));
+    assert!(choice.expected_error > 0.1, "{choice:?}");
+    let is_capped = |warning: &&Warning| warning.code == WarningCode::SubstepsCapped;
+    let warning = report.warnings().iter().find(is_capped).unwrap();
+    assert!(warning.message.contains("set substeps = "), "{warning}");
+    assert!(!warning.message.contains("max_substeps"), "{warning}");
 }
