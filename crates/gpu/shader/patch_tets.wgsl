@@ -1,7 +1,7 @@
 // Scatters tets to their slots after a cut.
 
 struct TetPatch {
-    slot: u32,
+    tet_slot: u32,
     unused: array<u32, 3>,
     corners: vec4<u32>,
     rest: array<f32, 16>,
@@ -28,7 +28,7 @@ fn main(
     if index >= dispatch_range.count {
         return;
     }
-    let slot = patches[index].slot;
+    let slot = patches[index].tet_slot;
     corners[slot] = patches[index].corners;
     let at = (slot / THREADS) * (NUMBERS * THREADS) + slot % THREADS;
     for (var k = 0u; k < NUMBERS; k++) {
