@@ -69,9 +69,9 @@ struct Rectangle {
 }
 
 impl Animation {
-    /// Creates an animation of images of `size` pixels, each shown for `seconds_per_frame`, in a file whose extension selects the
-    /// format: `.gif`, or `.png` or `.apng` for an animated PNG. It plays forever. Most viewers show an image of a GIF
-    /// for at least 0.02 s.
+    /// Creates an animation of images of `size` pixels, each shown for `seconds_per_frame`, in a file whose extension
+    /// selects the format: `.gif`, or `.png` or `.apng` for an animated PNG. It plays forever. Most viewers show an
+    /// image of a GIF for at least 0.02 s.
     ///
     /// # Errors
     /// Before anything is written: if the extension is not supported; if a side of the images is 0 or, in a GIF, more
