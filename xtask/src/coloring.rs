@@ -1,8 +1,8 @@
-//! `cargo xtask coloring`: every clustering and coloring on every mesh, beside the bound, and what it takes.
+//! `cargo xtask coloring`: all clusterings and colorings on all meshes, with the lower bound and the times.
 //!
-//! Colors: no coloring has fewer colors than clusters meet at a particle. Balance: the same number of colors, made
-//! even. Algorithms: rounds, looks at neighbors, and times from particles and from a graph, on one thread and on all.
-//! Every coloring is verified from the particles alone before its row is written.
+//! Colors: the lower bound is the largest number of clusters at a particle. Balance: equal numbers of colors, balanced.
+//! Algorithms: rounds, neighbor visits, and times from particles and from a graph, on one thread and on all. Every
+//! coloring is verified from the particles alone before its row is written.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -48,7 +48,7 @@ const CLUSTERINGS: [&str; 7] = [
     "pressure:10",
 ];
 
-/// A mesh as constraints.
+/// Constraints of a mesh.
 struct Case {
     name: String,
     incidence: Incidence,
@@ -95,7 +95,7 @@ pub(crate) fn coloring(arguments: &ColoringArguments) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Colors beside the bound, for the orders of the research and the default.
+/// Numbers of colors and the bound, for the orders from the literature and the default.
 fn colors(cases: &[Case]) -> anyhow::Result<Table> {
     let mut table = table([
         "mesh",
@@ -140,7 +140,7 @@ fn colors(cases: &[Case]) -> anyhow::Result<Table> {
     Ok(table)
 }
 
-/// The number of colors of a coloring that the particles prove proper.
+/// Number of colors of a coloring after its check by the particles.
 fn verified(clusters: &Incidence, coloring: &Coloring) -> anyhow::Result<usize> {
     coloring.verify_incidence(clusters)?;
     Ok(coloring.color_count())
@@ -229,7 +229,7 @@ fn algorithms(case: &Case, clustering: &str) -> anyhow::Result<Table> {
             visits.map_or("-".to_owned(), |visits| visits.to_string()),
             format!("{particles:.1}"),
             format!("{single:.1}"),
-            // Threads are of no use to the sequential ones.
+            // Threads do not speed up the sequential algorithms.
             visits.map_or("-".to_owned(), |_| format!("{parallel:.1}")),
         ]);
     }

@@ -1,11 +1,12 @@
-//! `cargo xtask cutting`: what a cut costs by stage and size of the mesh, and what snapping trades.
+//! `cargo xtask cutting`: cost of cuts by stage and mesh size, and effect of snapping.
 //!
-//! Costs: a blade sweeps through the middle of a body at rest in 60 frames, one thread, 20 Gauss-Seidel iterations a
-//! frame; the stages of the same frames are set beside the time to solve. Where cost follows the cut, the cost of a cut
-//! tet does not depend on the mesh. The same stroke faster and slower: a frame of a slow one cuts fewer tets.
+//! Costs: a blade sweeps through the middle of a body at rest in 60 frames, one thread, 20 Gauss-Seidel iterations per
+//! frame; the table shows the stages next to the solve time of these frames. If the cost is proportional to the cut,
+//! the cost per cut tet does not depend on the mesh. The stroke is repeated faster and slower: a frame of a slow one
+//! cuts fewer tets.
 //!
-//! Snapping: five planes through the body one after the other. More snapping makes fewer and better tets, of which the
-//! solver asks fewer substeps, and bends the cut surface to particles of the mesh.
+//! Snapping: five planes through the body one after another. More snapping makes fewer and better tets, which need
+//! fewer substeps, and moves the cut surface to particles of the mesh.
 
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -87,28 +88,28 @@ pub(crate) fn cutting(arguments: &CuttingArguments) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The blade over the body at the start, and the way through it.
+/// Blade above the body at the start, and its path through the body.
 pub(crate) fn stroke(mesh: &TetMesh) -> ([DVec3; 2], DVec3) {
     let low = mesh.positions.iter().copied().reduce(DVec3::min);
     let high = mesh.positions.iter().copied().reduce(DVec3::max);
     let (low, high) = (low.unwrap_or_default(), high.unwrap_or_default());
     let at = |x, y, z| low + (high - low) * DVec3::new(x, y, z);
-    // A little askew, so that no lattice is met along its planes.
+    // Slightly tilted, so that it does not coincide with lattice planes.
     let blade = [at(0.48, -0.2, 1.02), at(0.493, 1.2, 1.02)];
     (blade, at(0.0, 0.0, 0.0) - at(0.0, 0.0, 1.04))
 }
 
-/// What a stroke through the middle of a body in so many frames costs.
+/// Cost of a stroke through the middle of a body in a number of frames.
 struct Cost {
     cut_tets: usize,
     cutting_frames: usize,
-    /// Microseconds a cut tet: cut, cluster, color, schedule.
+    /// Microseconds per cut tet: cut, cluster, color, schedule.
     stages: [f64; 4],
     /// Median in ms.
     solve: f64,
     /// Median of all stages in ms.
     follow: f64,
-    /// The largest share of solving in a frame.
+    /// Largest ratio of a frame's cutting to its solving.
     largest: f64,
 }
 
@@ -157,7 +158,7 @@ impl Cost {
     }
 }
 
-/// Stages of the frames that cut, in microseconds a cut tet, beside the time to solve.
+/// Stages of the frames that cut, in microseconds per cut tet, and the solve time.
 fn stages(models: &[Model]) -> anyhow::Result<Table> {
     let mut table = table([
         "mesh",
@@ -230,7 +231,7 @@ fn speeds(model: &Model, quick: bool) -> anyhow::Result<Table> {
     Ok(table)
 }
 
-/// The cutting crate by itself: the swept blade, a plane at once, and what follows their deltas.
+/// The cutting crate alone: the swept blade, a plane cut, and updates by their deltas.
 fn alone(models: &[Model]) -> anyhow::Result<Table> {
     let mut table = table([
         "mesh",
@@ -269,7 +270,7 @@ fn alone(models: &[Model]) -> anyhow::Result<Table> {
             cut_tets += delta.removed.len();
             deltas.push(delta);
         }
-        // Once more where the blade stands: nothing is left to cut.
+        // Repeated at the blade's last position: nothing is left to cut.
         let last = blade.map(|x| x + way);
         let start = Instant::now();
         ensure!(sweep.advance(&mut body, &positions, &last)?.is_empty());
@@ -311,7 +312,7 @@ fn alone(models: &[Model]) -> anyhow::Result<Table> {
     Ok(table)
 }
 
-/// What snapping trades.
+/// Effects of snapping.
 fn snapping(model: &Model) -> anyhow::Result<Table> {
     let mut table = table([
         "snap",
@@ -375,7 +376,8 @@ fn snapping(model: &Model) -> anyhow::Result<Table> {
             }
         }
         body.check()?;
-        // Kappa grows with the inverse square of the smallest altitude, the substeps with its root.
+        // Kappa is proportional to the inverse square of the smallest altitude, the number of substeps to the root of
+        // kappa.
         let substeps = before / smallest_altitude(body.mesh());
         table.add_row([
             format!("{snap}"),

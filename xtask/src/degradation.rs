@@ -1,8 +1,8 @@
-//! `cargo xtask degradation`: many small strokes into one mesh, and what becomes of clusters, colors and the time to solve.
+//! `cargo xtask degradation`: effect of many small strokes into one mesh on clusters, colors and the solve time.
 //!
-//! One scene runs without merging, with it, and with re-clustering in the background, frame by frame in turn, so that
-//! other load of the machine affects all of them. Nothing moves: the strokes fall on the mesh at rest, and the solver
-//! makes 20 Gauss-Seidel iterations a frame. At the end everything derived is checked.
+//! One scene runs without merging, with merging, and with background re-clustering, alternating frame by frame, so that
+//! other load of the machine affects all alike. The mesh stays at rest, and the solver makes 20 Gauss-Seidel iterations
+//! per frame. At the end all derived data is checked.
 
 use std::fmt::Write;
 use std::num::NonZeroU32;
@@ -31,10 +31,10 @@ pub(crate) struct DegradationArguments {
     /// Only the model of this name.
     #[arg(long, value_name = "NAME", default_value = "liver_11k")]
     model: String,
-    /// How many strokes.
+    /// Number of strokes.
     #[arg(long, value_name = "N", default_value_t = 200)]
     strokes: u64,
-    /// How many threads solve.
+    /// Number of solver threads.
     #[arg(long, value_name = "N", default_value_t = 1)]
     threads: usize,
     /// Write the tables to this file as well.
@@ -42,20 +42,20 @@ pub(crate) struct DegradationArguments {
     out: Option<PathBuf>,
 }
 
-/// Frames a stroke takes.
+/// Frames per stroke.
 const FRAMES: u64 = 5;
-/// The parts of the run that rows are about.
+/// Number of parts of the run; each has a row.
 const PARTS: u64 = 4;
-/// Depth of a stroke and its length, as parts of the largest extent of the body.
+/// Depth of a stroke and its length, as fractions of the largest extent of the body.
 const DEPTH: f64 = 0.12;
 const LENGTH: f64 = 0.15;
 
-/// One way to keep the plan, and what it has been through.
+/// One way to maintain the partition, with its history.
 struct Run {
     name: &'static str,
     simulation: Simulation,
     reports: Vec<FrameReport>,
-    /// Clusters and colors of a plan made from the mesh as it is after each part.
+    /// Clusters and colors of a partition rebuilt from the current mesh after each part.
     fresh: Vec<[usize; 2]>,
 }
 
@@ -132,7 +132,7 @@ fn runs(model: &Model, strokes: u64, threads: usize) -> anyhow::Result<Vec<Run>>
     Ok(runs)
 }
 
-/// Short sweeps of a short blade into the surface at random places, one after the other.
+/// Short sweeps of a short blade into the surface at random places, one after another.
 fn small_strokes(mesh: &TetMesh, scale: f64, strokes: u64) -> Vec<StrokeSpec> {
     let surface = mesh.surface();
     let low = mesh.positions.iter().copied().reduce(DVec3::min);
@@ -161,7 +161,7 @@ fn small_strokes(mesh: &TetMesh, scale: f64, strokes: u64) -> Vec<StrokeSpec> {
     (0..strokes).map(stroke).collect()
 }
 
-/// A linear congruential generator (Knuth's constants), of which the high bits are used.
+/// Linear congruential generator (Knuth's constants); only the high bits are used.
 struct Dice(u64);
 
 impl Dice {
@@ -177,13 +177,13 @@ impl Dice {
         usize::try_from(self.next()).unwrap_or(0) % end
     }
 
-    /// From -1 to 1.
+    /// Random value from -1 to 1.
     fn unit(&mut self) -> f64 {
         self.next() as f64 / f64::from(1u32 << 30) - 1.0
     }
 }
 
-/// Clusters and colors of a plan made as at the start.
+/// Clusters and colors of a partition built as at the start.
 fn fresh_plan(mesh: &TetMesh) -> anyhow::Result<[usize; 2]> {
     let tets = mesh.tets.iter().copied();
     let incidence = Incidence::from_constraints(mesh.positions.len(), tets)?;
@@ -193,7 +193,7 @@ fn fresh_plan(mesh: &TetMesh) -> anyhow::Result<[usize; 2]> {
     Ok([clustering.occupied(), coloring.color_count()])
 }
 
-/// Clusters, colors and the time to solve after each part of the strokes.
+/// Clusters, colors and the solve time after each part of the strokes.
 fn course(runs: &[Run], frames: u64) -> Table {
     let mut table = table([
         "strokes",
@@ -217,7 +217,7 @@ fn course(runs: &[Run], frames: u64) -> Table {
                 continue;
             };
             let reports = &run.reports[start..end];
-            // In a frame with a cut the solver also puts the tets in order.
+            // In a frame with a cut the solver also reorders the tets.
             let quiet = reports.iter().filter(|report| report.cut.is_none());
             let ms = median(quiet.map(|report| report.ms.solve));
             let first = *first.get_or_insert(ms);
@@ -238,7 +238,7 @@ fn course(runs: &[Run], frames: u64) -> Table {
     table
 }
 
-/// What following a cut took.
+/// Time of the updates after a cut.
 fn costs(runs: &[Run]) -> Table {
     let mut table = table([
         "",

@@ -1,6 +1,6 @@
-//! Sweeps over incise: `cargo xtask --help`.
+//! Experiments and sweeps over incise: `cargo xtask --help`.
 //!
-//! One module per command; no algorithms of its own, except the slow ones that results are compared with.
+//! One module per command. The only algorithms here are slow reference versions that results are compared with.
 
 mod accuracy;
 mod coloring;
@@ -88,9 +88,9 @@ const EXPERIMENTS: &[(&str, Run)] = &[
 enum Command {
     /// Run all experiments, and write a page of each and one of all.
     All(ExperimentArguments),
-    /// Cluster and color meshes in every way there is, and write tables.
+    /// Cluster and color meshes by all methods, and write tables.
     Coloring(coloring::ColoringArguments),
-    /// What a cut costs by stage and size of the mesh, and what snapping trades.
+    /// Measure the cost of cuts by stage and mesh size, and the effect of snapping.
     Cutting(cutting::CuttingArguments),
     /// Default settings: errors against Newton's method, and bodies after cuts, under load and at rest.
     Defaults(defaults::DefaultsArguments),
@@ -98,29 +98,29 @@ enum Command {
     GpuSweep(gpu::GpuArguments),
     /// Repeat the tables and figures of the paper, its numbers and ours side by side.
     Paper(paper::PaperArguments),
-    /// Gather what runs with --shard have measured, and write the pages.
+    /// Collect the measurements of runs with --shard, and write the pages.
     Merge(MergeArguments),
-    /// What a scene pays for what it does not use: instructions, bytes, dispatches.
+    /// Measure the cost of unused features of a scene: instructions, bytes, dispatches.
     Overhead(overhead::OverheadArguments),
-    /// What `overhead` runs under valgrind.
+    /// Child process that `overhead` runs under valgrind.
     #[command(hide = true)]
     OverheadProbe(overhead::ProbeArguments),
-    /// Our solver next to other systems on the same mesh, each in turns with ours.
+    /// Compare this solver with other systems on one mesh, measured alternately.
     Comparison(comparison::ComparisonArguments),
-    /// Compare the methods of the solver: what they cost and what they are worth.
+    /// Compare cost and accuracy of the solver's methods.
     Solver(solver::SolverArguments),
-    /// Make random strokes by the thousand and check everything after each.
+    /// Make thousands of random strokes and check all derived data after each.
     StressCut(stress::StressArguments),
-    /// What becomes of bodies in extreme states, materials, steps and cuts: a matrix, and why what does not recover
-    /// does not.
+    /// Test bodies in extreme states, materials, steps and cuts: a matrix of outcomes, with an explanation for each
+    /// body that does not recover.
     Stability(ExperimentArguments),
-    /// Cut meshes, check everything and write a table.
+    /// Cut meshes, check all derived data and write a table.
     Sweep(sweep::SweepArguments),
-    /// What accuracy costs: errors against Newton's method beside times, for every knob of the solver.
+    /// Measure errors against Newton's method and times for every setting of the solver.
     Accuracy(ExperimentArguments),
-    /// Use the viewer with a synthetic hand on a screen without a monitor, and check what it shows (needs Xvfb).
+    /// Test the viewer with synthetic input on a virtual screen (needs Xvfb).
     ViewerSmoke(viewer::SmokeArguments),
-    /// Cut a mesh many times in small strokes, and see what becomes of clusters, colors and the time to solve.
+    /// Cut a mesh with many small strokes, and measure clusters, colors and the solve time.
     Degradation(degradation::DegradationArguments),
 }
 
@@ -148,7 +148,7 @@ fn main() -> anyhow::Result<()> {
     }
 }
 
-/// The experiment whose page has a name.
+/// Finds the experiment of a page by name.
 fn named(name: &str) -> anyhow::Result<Run> {
     let found = EXPERIMENTS.iter().find(|(known, _)| *known == name);
     found

@@ -1,4 +1,4 @@
-//! The meshes a sweep runs over: those in a folder, or generated ones.
+//! Meshes of a sweep: those in a folder, or generated ones.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use incise::mesh_io;
 use incise::meshing::{Shape, generate};
 use incise::scene::{BodySpec, ShapeSpec};
 
-/// A mesh and where it comes from.
+/// A mesh and its source.
 #[derive(Debug)]
 pub(crate) struct Model {
     pub(crate) name: String,
@@ -23,7 +23,7 @@ enum Source {
 }
 
 impl Model {
-    /// A generated shape.
+    /// Generates a shape.
     pub(crate) fn generated(shape: Shape, tets: usize) -> anyhow::Result<Self> {
         let name = format!("{shape} (generated)");
         Ok(Self {
@@ -33,7 +33,7 @@ impl Model {
         })
     }
 
-    /// The mesh of a file, checked.
+    /// Reads and checks a mesh file.
     pub(crate) fn read(path: PathBuf) -> anyhow::Result<Self> {
         let mesh = mesh_io::read(&path)?;
         mesh.check().with_context(|| path.display().to_string())?;
@@ -49,7 +49,7 @@ impl Model {
         })
     }
 
-    /// Makes `body` a body of this mesh.
+    /// Sets the mesh of `body`.
     pub(crate) fn put_into(&self, body: &mut BodySpec) {
         (body.mesh, body.shape) = match &self.source {
             Source::File(path) => (Some(path.clone()), None),

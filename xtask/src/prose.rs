@@ -1,10 +1,10 @@
-//! Rules about sentences: words for people are no subjects for code and data, and a doc comment stands alone, since it is
-//! read in a tooltip.
+//! Rules about sentences: words for people are not the subjects of code and data, and a doc comment stands alone,
+//! because it is read in a tooltip.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Words that no text of the project has, in two parts so that this list is none of their uses.
+/// Words forbidden in all texts of the project, in two parts so that this list is not a hit itself.
 const WORDS: [(&str, &str); 7] = [
     ("any", "body"),
     ("dear", "er"),
@@ -15,13 +15,13 @@ const WORDS: [(&str, &str); 7] = [
     ("a", "new"),
 ];
 
-/// What no doc comment begins with: it refers to something that a tooltip does not show.
+/// Forbidden beginnings of doc comments: they refer to text that a tooltip does not show.
 const BEGINNINGS: [&str; 2] = ["The same", "As "];
 
 /// Folders without sources.
 const SKIPPED: [&str; 3] = ["target", "out", ".git"];
 
-/// The texts below a folder.
+/// Collects the text files below a folder.
 fn texts(folder: &Path, into: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
@@ -39,7 +39,7 @@ fn texts(folder: &Path, into: &mut Vec<PathBuf>) {
     }
 }
 
-/// What is wrong with the lines of a text, each with its number from 1.
+/// Violations in the lines of a text, each with its line number from 1.
 fn faults(text: &str) -> Vec<(usize, String)> {
     let words = WORDS.map(|(first, last)| format!("{first}{last}"));
     let mut faults = Vec::new();
@@ -85,7 +85,7 @@ fn sentences_keep_the_rules() {
     assert!(all.is_empty(), "{}", all.join("\n"));
 }
 
-/// The rule's own oracle.
+/// Checks the rule on a text with known violations.
 #[test]
 fn faults_are_found() {
     let [word, other] = [WORDS[3], WORDS[6]].map(|(first, last)| format!("{first}{last}"));

@@ -1,6 +1,6 @@
-//! [`Random`]: seeded pseudo-random numbers, the same on every machine.
+//! [`Random`]: seeded pseudo-random numbers, equal on every machine.
 //!
-//! `SplitMix64` of Steele, Lea and Flood 2014: a counter and a mixing function. Cost: two multiplications a number.
+//! `SplitMix64` of Steele, Lea and Flood 2014: a counter and a mixing function. Cost: two multiplications per number.
 
 use incise::mesh::glam::DVec3;
 

@@ -1,10 +1,10 @@
-//! `cargo xtask stress-cut`: random strokes by the thousand, everything checked after each.
+//! `cargo xtask stress-cut`: thousands of random strokes, with all derived data checked after each.
 //!
-//! The body sags under its weight, held on one side, with a ground for what comes off. Each stroke is of a random kind
-//! and place, a few edges large: rectangles, bent strips, punches, blades swept over several frames, the stroke before
-//! once more, now and then a bite taken out. After every frame with a stroke everything derived is recomputed and
-//! compared (`Simulation::check`), positions must be finite and what the deltas say must be what the mesh is. Cutting
-//! only ever adds tets, so a body that has grown threefold is replaced by a fresh one. All is determined by the seed.
+//! The body sags under its weight, fixed on one side, with a ground for falling pieces. Each stroke is of a random kind
+//! and place, a few edges large: rectangles, bent strips, punches, blades swept over several frames, repeats of the
+//! previous stroke, sometimes a removal of tets. After every frame with a stroke all derived data is recomputed and
+//! compared (`Simulation::check`), positions must be finite, and the deltas must agree with the mesh. Cutting only adds
+//! tets, so a body that has tripled is replaced by a new one. The seed determines everything.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -23,10 +23,10 @@ use crate::table;
 
 #[derive(Debug, Args)]
 pub(crate) struct StressArguments {
-    /// How many strokes on each mesh.
+    /// Number of strokes on each mesh.
     #[arg(long, default_value_t = 10_000)]
     strokes: u64,
-    /// The seed of all randomness.
+    /// Random seed.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Stop after so many seconds in all.
@@ -40,7 +40,7 @@ pub(crate) struct StressArguments {
     mesh: Option<PathBuf>,
 }
 
-/// What a stress saw.
+/// Statistics of a stress run.
 #[derive(Debug, Default)]
 struct Tally {
     strokes: u64,
@@ -108,7 +108,7 @@ pub(crate) fn stress(arguments: &StressArguments) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Runs until all strokes are made or it is `late`; fails at the first violation.
+/// Runs until all strokes are made or time is up; fails at the first violation.
 fn stress_one(
     model: &Model,
     arguments: &StressArguments,
@@ -148,7 +148,7 @@ fn stress_one(
     Ok(tally)
 }
 
-/// Makes a frame and checks everything.
+/// Runs a frame and checks all derived data.
 fn checked_step(
     simulation: &mut Simulation,
     skin: &mut Skin,
@@ -268,7 +268,7 @@ fn random_stroke(simulation: &Simulation, random: &mut Random) -> StrokeSpec {
     }
 }
 
-/// The stroke from a frame on.
+/// Moves a stroke to start at a frame.
 fn due(mut stroke: StrokeSpec, now: u64) -> StrokeSpec {
     match &mut stroke {
         StrokeSpec::Plane { frame, .. }

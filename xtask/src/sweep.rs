@@ -1,8 +1,8 @@
-//! `cargo xtask sweep`: cuts meshes, checks everything and writes a table.
+//! `cargo xtask sweep`: cuts meshes, checks all derived data and writes a table.
 //!
 //! The built-in stroke on every mesh, once through the body at rest without snapping, where the number of pieces is
-//! known from the signs of the particles, and once in the built-in scene. After every cut everything derived is
-//! recomputed and compared, and at the end the volume at rest is compared with that at the start.
+//! known from the signs of the particles, and once in the built-in scene. After every cut all derived data is
+//! recomputed and compared, and at the end the rest volume is compared with that at the start.
 
 use std::path::PathBuf;
 
@@ -187,7 +187,8 @@ mod tests {
 
     use super::*;
 
-    /// The scenes in `fixtures/` run, pass every check and end with the pieces they promise.
+    /// Runs the scenes in `fixtures/` with all checks and compares the number of pieces at the end with the expected
+    /// one.
     #[test]
     fn fixtures_run() {
         for (name, frames, pieces) in [

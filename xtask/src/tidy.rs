@@ -1,14 +1,13 @@
-//! Rules about the source that no compiler checks: modules of a crate do not depend on each other in a circle.
+//! Rules about the source beyond the compiler's: the modules of a crate have no cyclic dependencies.
 //!
-//! A module is a file or folder directly under `src`; it depends on each one that it names in a path that begins with
-//! `crate::`, tests left out, also where that names something that the crate's root re-exports. Source of the search:
-//! Tarjan 1972.
+//! A module is a file or folder directly under `src`; it depends on each module in a path that begins with `crate::`,
+//! tests excluded, also through a re-export of the crate's root. Source of the search: Tarjan 1972.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// For each module those that it names.
+/// Dependencies of each module.
 type Modules = BTreeMap<String, BTreeSet<String>>;
 
 fn sources(folder: &Path, into: &mut Vec<PathBuf>) {
@@ -29,7 +28,7 @@ fn code(text: &str) -> String {
     bare.collect::<Vec<_>>().join("\n")
 }
 
-/// The names right after each `prefix` in a text: one, or those at the first level of braces.
+/// Names directly after each `prefix` in a text: one, or those at the first level of braces.
 fn names_after<'a>(text: &'a str, prefix: &str) -> Vec<&'a str> {
     let mut names = Vec::new();
     let mut add = |text: &'a str| {
@@ -66,7 +65,7 @@ fn modules(src: &Path) -> Modules {
         first.to_str().unwrap().trim_end_matches(".rs").to_owned()
     };
     let root = fs::read_to_string(src.join("lib.rs")).unwrap_or_default();
-    // What the root re-exports belongs to its module.
+    // A re-export of the root belongs to its module.
     let mut homes = BTreeMap::new();
     for line in code(&root).split(';') {
         let Some(path) = line
@@ -105,7 +104,7 @@ fn modules(src: &Path) -> Modules {
     modules
 }
 
-/// A way from a module back to itself, if there is one.
+/// Finds a dependency cycle of modules.
 fn circle(modules: &Modules) -> Option<Vec<String>> {
     modules.keys().find_map(|start| {
         let mut ways = vec![vec![start.clone()]];

@@ -41,7 +41,7 @@ pub(crate) fn advise(arguments: &AdviseArguments) -> Result<(), Failure> {
     print(words(&advice))
 }
 
-/// The reference solution in words.
+/// Description of the reference solution.
 fn reference(advice: &Advice) -> String {
     let ReferenceSummary {
         kind,
@@ -116,7 +116,7 @@ fn table(advice: &Advice) -> Table {
     table
 }
 
-/// The result in words, with the `[solver]` table for the scene file.
+/// Text report, with the `[solver]` table for the scene file.
 fn words(advice: &Advice) -> String {
     let budget = advice.budget_ms;
     let row = |i: Option<usize>| i.and_then(|i| advice.measured.get(i));
@@ -148,7 +148,7 @@ fn words(advice: &Advice) -> String {
     }
 }
 
-/// Two or three digits.
+/// Formats a value with two or three digits.
 fn digits(value: f64) -> String {
     match value.abs() {
         ..0.001 => format!("{value:.1e}"),

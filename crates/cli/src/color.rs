@@ -106,14 +106,14 @@ pub(crate) fn color(arguments: &ColorArguments) -> Result<(), Failure> {
     }
 }
 
-/// A coloring and what it took to find it.
+/// A coloring with its time and statistics.
 struct Found {
     coloring: Coloring,
     rounds: usize,
     edge_visits: Option<u64>,
 }
 
-/// Colors the clusters and evens the colors out if that was asked for.
+/// Colors the clusters and balances the colors if requested.
 fn colored(
     clusters: &impl Conflicts,
     algorithm: Algorithm,
@@ -145,7 +145,7 @@ fn colored(
     Ok(result)
 }
 
-/// Colors the clusters on a GPU; sending the graph there is part of the time.
+/// Colors the clusters on a GPU; the time includes the upload of the graph.
 #[cfg(feature = "gpu")]
 fn on_gpu(algorithm: Algorithm, clusters: &impl Conflicts, seed: u64) -> Result<Found, Failure> {
     use incise::gpu::coloring::{ColoringKernels, DeviceGraph, color};
@@ -170,7 +170,7 @@ fn on_gpu(_: Algorithm, _: &impl Conflicts, _: u64) -> Result<Found, Failure> {
     )))
 }
 
-/// Milliseconds from lap to lap.
+/// Stopwatch: milliseconds from lap to lap.
 struct Clock(Instant);
 
 impl Clock {

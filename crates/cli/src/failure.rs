@@ -10,7 +10,7 @@ use incise::{Error, shape_suggestion};
 /// An error that ends a command.
 #[derive(Debug)]
 pub(crate) enum Failure {
-    /// The input cannot be used: exit code 2.
+    /// Invalid input: exit code 2.
     Input(anyhow::Error),
     /// The run failed: exit code 1.
     Run(anyhow::Error),
@@ -32,7 +32,7 @@ impl Failure {
     }
 }
 
-/// The error and its causes in one line. A cause that the error itself already names is left out.
+/// Formats the error and its causes in one line. A cause whose text is part of the error's message is omitted.
 fn sentence(error: &anyhow::Error) -> String {
     let mut sentence = error.to_string();
     for cause in error.chain().skip(1).map(ToString::to_string) {

@@ -1,7 +1,8 @@
 //! The command line of incise: cuts soft bodies, colors meshes, converts and generates them.
 //!
-//! This crate reads arguments, prints and writes files; everything else is the facade's. Bad input ends with one
-//! sentence on the error stream and exit code 2, a failed run with exit code 1; nothing half-written keeps its name.
+//! This crate parses arguments, prints and writes files; everything else is in the `incise` library. Invalid input
+//! gives a one-line message on stderr and exit code 2, a failed run exit code 1. Incomplete files never get their final
+//! names.
 
 mod advise;
 mod args;
@@ -55,7 +56,7 @@ fn manual(folder: &Path) -> Result<(), Failure> {
     named.map_err(Failure::Input)
 }
 
-/// Says where an option belongs that was given without its command.
+/// Adds a hint to the error of an option that was given without its command.
 fn with_tip(mut error: clap::Error) -> clap::Error {
     let option = std::env::args().nth(1).unwrap_or_default();
     let name = option.trim_start_matches("--").split('=').next();

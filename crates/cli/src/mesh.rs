@@ -14,7 +14,7 @@ use crate::args::MeshCommand;
 use crate::failure::Failure;
 use crate::print::{count, print};
 
-/// The object that `incise mesh info --json` prints.
+/// JSON object printed by `incise mesh info --json`.
 #[derive(Debug, Serialize)]
 struct MeshReport {
     input: String,
@@ -29,14 +29,14 @@ struct MeshReport {
     max_dihedral_degrees: f64,
     worst_radius_ratio: f64,
     max_tets_per_particle: usize,
-    /// Genus of all boundary surfaces; absent if they are no manifolds.
+    /// Genus of all boundary surfaces; absent if they are not manifolds.
     #[serde(skip_serializing_if = "Option::is_none")]
     genus: Option<usize>,
     /// Substeps that bring the kappa of every tet to 0.5.
     substeps: f64,
-    /// Angles in classes of 10 degrees from 0 to 180.
+    /// Histogram of dihedral angles in bins of 10 degrees from 0 to 180.
     dihedral_histogram: [usize; 18],
-    /// Tets in classes of a tenth from 0 to 1.
+    /// Histogram of radius ratios in bins of a tenth from 0 to 1.
     radius_ratio_histogram: [usize; 10],
 }
 
@@ -48,7 +48,7 @@ struct Stiffness {
 }
 
 impl Stiffness {
-    /// The substeps of a frame that keep `E Δt² / (ρ h²)` at 0.5 or below for an altitude h in m.
+    /// Number of substeps that keeps `E Δt² / (ρ h²)` at 0.5 or below for an altitude h in m.
     fn substeps(&self, altitude: f64) -> f64 {
         let speed = (self.young_modulus / (0.5 * self.density)).sqrt();
         (self.time_step * speed / altitude).ceil().max(1.0)
@@ -122,7 +122,7 @@ pub(crate) fn mesh(command: &MeshCommand) -> Result<(), Failure> {
     }
 }
 
-/// Fills a surface and prints how well the body fits it.
+/// Fills a surface and prints the deviation of the body from it.
 fn fill(file: &Path, output: &Path, tets: usize, levels: u32) -> Result<(), Failure> {
     let surface = mesh_io::read_surface(file)?;
     let named = |error| {
@@ -205,10 +205,10 @@ fn info(file: &Path, json: bool, stiffness: &Stiffness) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Characters of the longest bar.
+/// Length of the longest bar in characters.
 const BAR: usize = 40;
 
-/// A histogram as bars, without the empty classes outside of all others.
+/// Histogram as bars, without empty bins at both ends.
 fn bars(title: &str, classes: impl Iterator<Item = (String, usize)>) -> Table {
     let classes: Vec<_> = classes.collect();
     let first = classes.iter().position(|(_, n)| *n > 0).unwrap_or(0);
@@ -218,7 +218,7 @@ fn bars(title: &str, classes: impl Iterator<Item = (String, usize)>) -> Table {
     table.load_style(UTF8_FULL_CONDENSED);
     table.set_header([title, "count", ""]);
     for (name, number) in &classes[first..=last] {
-        // Small counts get a visible bar, too.
+        // Rounded up so that small counts get a visible bar.
         let length = (number * BAR).div_ceil(most);
         table.add_row([name.clone(), number.to_string(), "█".repeat(length)]);
     }

@@ -1,8 +1,8 @@
-//! The files of a run: scene, frames, surfaces, pictures and last mesh.
+//! Files of a run: scene, frame reports, surfaces, images and the last mesh.
 //!
-//! Lines are collected under a temporary name and get their own when the run has ended well and all else is written;
-//! all other files are written beside and renamed. So a name always stands for a complete file. Pictures of an earlier run
-//! in the folder are removed at the start, so that those that are there belong together.
+//! Line files are written under a temporary name and renamed after the run has succeeded and all other files are
+//! written; other files are written to a temporary file and renamed. A final name therefore always refers to a complete
+//! file. Images of an earlier run in the folder are removed at the start, so that all images belong to one run.
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
@@ -21,7 +21,7 @@ use crate::failure::Failure;
 use crate::files::{require_file, save_every};
 use crate::pictures::Pictures;
 
-/// A file of lines that gets its name in the end.
+/// Line file that gets its final name at the end.
 #[derive(Debug)]
 struct Lines {
     path: PathBuf,
@@ -33,7 +33,7 @@ impl Lines {
     fn create(path: &Path) -> anyhow::Result<Self> {
         require_file(path)?;
         let mut name = path.file_name().unwrap_or_default().to_owned();
-        // Numbered, so that two files of lines may have the same final name.
+        // Numbered, because two line files may have one final name.
         static COUNTER: AtomicU32 = AtomicU32::new(0);
         let unique = COUNTER.fetch_add(1, Ordering::Relaxed);
         name.push(format!(".partial-{}-{unique}", std::process::id()));
@@ -69,13 +69,13 @@ impl Lines {
 impl Drop for Lines {
     fn drop(&mut self) {
         if self.file.take().is_some() {
-            // The run has failed already; an error here is not reported as well.
+            // The run has already failed; this error is not reported too.
             let _ = fs::remove_file(&self.temporary);
         }
     }
 }
 
-/// Removes the pictures of an earlier run; files of other names stay.
+/// Removes the images of an earlier run; files with other names stay.
 fn remove_pictures(folder: &Path) -> anyhow::Result<()> {
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
@@ -88,7 +88,7 @@ fn remove_pictures(folder: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Whether a run gives its pictures such a name.
+/// True if a file name is one that a run gives its images.
 fn is_picture(name: &str) -> bool {
     let number = name
         .strip_prefix("frame_")
@@ -97,7 +97,7 @@ fn is_picture(name: &str) -> bool {
     name == "contact_sheet.png" || number.is_some_and(is_number)
 }
 
-/// The scene with absolute paths, which mean the same wherever it is written to.
+/// Scene with absolute paths, independent of the folder it is written to.
 fn movable(scene: &Scene) -> anyhow::Result<Scene> {
     let mut scene = scene.clone();
     for mesh in scene.body.iter_mut().filter_map(|body| body.mesh.as_mut()) {
@@ -106,7 +106,7 @@ fn movable(scene: &Scene) -> anyhow::Result<Scene> {
     Ok(scene)
 }
 
-/// Where a run's files go.
+/// Output files of a run.
 #[derive(Debug)]
 pub(crate) struct Output {
     folder: PathBuf,
@@ -118,7 +118,7 @@ pub(crate) struct Output {
 }
 
 impl Output {
-    /// Makes the folder and opens the files, so that what cannot be written is known before the run.
+    /// Creates the folder and opens the files, so that paths that cannot be written fail before the run.
     pub(crate) fn create(
         folder: &Path,
         jsonl: Option<&Path>,
@@ -147,7 +147,7 @@ impl Output {
         };
         let lines = open().map_err(|error| {
             for folder in missing {
-                // A folder that was not made, or that is not empty, stays as it is.
+                // `remove_dir` leaves folders that are missing or not empty.
                 let _ = fs::remove_dir(folder);
             }
             Failure::Input(error)
@@ -162,7 +162,7 @@ impl Output {
         })
     }
 
-    /// Writes the line of a frame, and its surface and picture if it is one to save.
+    /// Writes the line of a frame, and its surface and image if the frame is saved.
     pub(crate) fn frame(&mut self, simulation: &mut Simulation) -> anyhow::Result<()> {
         let report = simulation.report();
         let line = serde_json::to_string(report)?;
@@ -203,7 +203,7 @@ impl Output {
         Ok(())
     }
 
-    /// Writes what is known at the end and gives all files their names; returns what is to be said about pictures.
+    /// Writes the final files and gives all files their final names; returns a line about the images.
     pub(crate) fn finish(self, simulation: &Simulation) -> anyhow::Result<Option<String>> {
         write_pvd(self.folder.join("surface.pvd"), &self.surfaces)?;
         let mesh = simulation.mesh();
@@ -250,10 +250,10 @@ impl Output {
     }
 }
 
-/// The endings that [`save_mesh`] can write.
+/// Extensions that [`save_mesh`] supports.
 const MESH_ENDINGS: [&str; 4] = ["vtk", "vtu", "node", "ele"];
 
-/// Refuses a file that [`save_mesh`] could not write after the run.
+/// Returns an error for a path that [`save_mesh`] could not write after the run.
 pub(crate) fn require_mesh_file(path: &Path) -> Result<(), Failure> {
     let ending = path.extension().unwrap_or_default();
     if !MESH_ENDINGS
@@ -269,8 +269,8 @@ pub(crate) fn require_mesh_file(path: &Path) -> Result<(), Failure> {
     require_file(path).map_err(Failure::Input)
 }
 
-/// Writes the mesh at rest without particles that no tet uses, which removed tets leave behind; as `.vtu` with the
-/// deformed positions, which other formats have no place for.
+/// Writes the rest mesh without the unused particles of removed tets. A `.vtu` file also has the deformed positions;
+/// other formats cannot store them.
 pub(crate) fn save_mesh(path: &Path, simulation: &Simulation) -> anyhow::Result<()> {
     let drop_unused = RepairOptions {
         drop_unused: true,

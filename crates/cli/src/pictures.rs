@@ -16,7 +16,7 @@ use crate::files::{require_file, save_every};
 
 /// Width and height of an image in pixels.
 const SIZE: [u32; 2] = [640, 480];
-/// Azimuth and elevation in degrees, and zoom.
+/// Default azimuth and elevation in degrees, and zoom.
 const VIEW: [f64; 3] = [-60.0, 22.0, 1.0];
 /// Smallest number of images of an animation for each second.
 const PER_SECOND: f64 = 25.0;
@@ -38,7 +38,7 @@ pub(crate) struct Pictures {
     style: Style,
     size: [u32; 2],
     strokes: Vec<StrokeSpec>,
-    /// Whether saved frames get an image file.
+    /// True if saved frames get an image file.
     saved: bool,
     animation: Option<PathBuf>,
     writer: Option<Animation>,
@@ -103,8 +103,8 @@ impl Pictures {
         Ok(())
     }
 
-    /// Updates the render scene after a frame and draws the frame if it is saved or part of the animation. `saved` tells
-    /// whether files of this frame are written.
+    /// Updates the render scene after a frame and draws the frame if it is saved or part of the animation. `saved` is
+    /// true if files of this frame are written.
     pub(crate) fn frame(
         &mut self,
         simulation: &mut Simulation,
@@ -223,7 +223,7 @@ fn animation_every(time_step: f64) -> u64 {
 fn on_sheet(frames: u64) -> Vec<u64> {
     let every = save_every(frames);
     let last = frames - 1;
-    // The last one is saved whatever its number.
+    // The last frame is always saved.
     let saved = last.div_ceil(every) + 1;
     let count = saved.min(ON_SHEET);
     (0..count)

@@ -1,4 +1,4 @@
-//! Results go to the standard output.
+//! Printing of results to stdout.
 
 use std::io::{ErrorKind, Write, stdout};
 
@@ -6,7 +6,7 @@ use anyhow::Context;
 
 use crate::failure::Failure;
 
-/// Prints a line. A reader that has seen enough, as `head` in a pipe, is no failure.
+/// Prints a line. A closed pipe, as from `head`, is not an error.
 pub(crate) fn print(line: impl std::fmt::Display) -> Result<(), Failure> {
     match writeln!(stdout(), "{line}") {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
@@ -17,7 +17,7 @@ pub(crate) fn print(line: impl std::fmt::Display) -> Result<(), Failure> {
     }
 }
 
-/// A count with its noun, in singular or plural.
+/// Formats a count with its noun, in singular or plural.
 pub(crate) fn count(count: usize, one: &str, many: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { many })
 }

@@ -33,7 +33,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<(), Failure> {
     pool.install(|| simulate(arguments))
 }
 
-/// Simulates and draws on the threads of the pool that it is called in.
+/// Simulates and draws on the current thread pool.
 fn simulate(arguments: &RunArguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.save_mesh {
         require_mesh_file(path)?;
@@ -68,7 +68,7 @@ fn simulate(arguments: &RunArguments) -> Result<(), Failure> {
         ));
         summary.add(report);
         for warning in report.warnings() {
-            // The terminal gets each warning once for each part of the scene, frames.jsonl all of them.
+            // The terminal shows each warning once per part of the scene; frames.jsonl has all of them.
             if warned.insert((warning.code, warning.location.clone())) && !arguments.quiet {
                 progress.suspend(|| print_warning(warning));
             }
@@ -92,7 +92,7 @@ fn simulate(arguments: &RunArguments) -> Result<(), Failure> {
         }
     }
     progress.finish_and_clear();
-    // Without a surface of the last frame nothing has asked for it yet.
+    // Positions have not been read back if the last frame has no surface.
     simulation
         .read_back()
         .map_err(|error| Failure::Run(error.into()))?;
@@ -124,13 +124,13 @@ fn print_warning(warning: &Warning) {
     eprintln!("warning: {warning}");
 }
 
-/// The scene of a file, or the built-in one.
+/// Loads a scene file, or the built-in scene.
 pub(crate) fn load(path: Option<&Path>) -> Result<Scene, Failure> {
     let Some(path) = path else {
         return Ok(Scene::built_in());
     };
     Scene::load(path).map_err(|error| match error {
-        // The others name the file themselves.
+        // Other errors name the file themselves.
         Error::Parse { .. } => {
             Failure::Input(anyhow::Error::from(error).context(path.display().to_string()))
         }
@@ -138,7 +138,7 @@ pub(crate) fn load(path: Option<&Path>) -> Result<Scene, Failure> {
     })
 }
 
-/// An error about a scene, with the file and the line of the key that it is about.
+/// Adds the file and the line of the key to an error about a scene.
 pub(crate) fn located(error: Error, path: Option<&Path>) -> Failure {
     match path.and_then(|path| location(path, &error)) {
         Some(location) => Failure::Input(anyhow::Error::from(error).context(location)),
@@ -146,7 +146,7 @@ pub(crate) fn located(error: Error, path: Option<&Path>) -> Failure {
     }
 }
 
-/// The scene as asked for, with what the command line changes.
+/// Scene of a run, with the changes of the command line.
 fn scene(arguments: &RunArguments) -> Result<Scene, Failure> {
     let mut scene = load(arguments.scene.as_deref())?;
     if let Some(mesh) = &arguments.mesh {
@@ -156,7 +156,7 @@ fn scene(arguments: &RunArguments) -> Result<Scene, Failure> {
         body.mesh = Some(mesh.clone());
         body.shape = None;
     }
-    // Without pictures, what their colors show has no effect.
+    // Without images their coloring has no effect.
     if arguments.draws() && arguments.color_by == ColorBy::Residual {
         if scene.solver.method == Method::Vbd {
             let why = "--color-by residual needs constraints: the scene is solved by vbd";
@@ -189,6 +189,6 @@ fn progress(frames: u64, quiet: bool) -> ProgressBar {
         return ProgressBar::hidden();
     }
     let style = ProgressStyle::with_template("{bar:40} frame {pos}/{len}  {msg}  {elapsed}");
-    // A template that does not parse is no reason not to simulate.
+    // An invalid template must not stop the simulation.
     ProgressBar::new(frames).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }

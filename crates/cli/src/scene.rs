@@ -1,6 +1,7 @@
 //! `incise scene`: the keys of a scene file as a JSON Schema, as a reference page or as a commented scene; validation.
 //!
-//! Page and commented scene are made from the schema, which is made from the structs of `incise::scene`.
+//! Reference page and commented scene are generated from the schema, which is derived from the structs of
+//! `incise::scene`.
 
 use std::path::Path;
 
@@ -27,7 +28,7 @@ pub(crate) fn scene(arguments: &SceneArguments) -> Result<(), Failure> {
     }
 }
 
-/// Reads a scene and sets its simulation up, which finds every mistake that `incise run` would find at its start.
+/// Reads a scene and sets up its simulation, which finds every error that `incise run` would find at its start.
 fn check(path: &Path) -> Result<(), Failure> {
     let scene = Scene::load(path).map_err(|error| located(error, Some(path)))?;
     let simulation = Simulation::new(&scene).map_err(|error| located(error, Some(path)))?;
@@ -61,14 +62,14 @@ fn keys(table: &Value) -> Vec<Key<'_>> {
     .collect()
 }
 
-/// The name that a schema refers to.
+/// Name of the definition that a schema refers to.
 fn referred(schema: &Value) -> Option<&str> {
     let reference = schema["$ref"].as_str();
     let reference = reference.or_else(|| schema["allOf"][0]["$ref"].as_str());
     reference?.rsplit('/').next()
 }
 
-/// The name of a type on the page.
+/// Title of a type on the page.
 fn title(name: &str) -> &str {
     name.trim_end_matches("Spec")
 }
@@ -79,12 +80,12 @@ fn description(schema: &Value) -> String {
     text.split("\n\n").next().unwrap_or("").replace('\n', " ")
 }
 
-/// The text of a key of the schema, empty if there is none.
+/// Text of a key of the schema; empty if absent.
 fn text<'a>(schema: &'a Value, key: &str) -> &'a str {
     schema[key].as_str().unwrap_or("")
 }
 
-/// The named strings that a schema allows with their descriptions; `None` of another schema.
+/// Named strings that a schema allows, with their descriptions; `None` for other schemas.
 fn names(schema: &Value) -> Option<Vec<(&str, &str)>> {
     if let Some(names) = schema["enum"].as_array() {
         return names
@@ -98,7 +99,7 @@ fn names(schema: &Value) -> Option<Vec<(&str, &str)>> {
         .collect()
 }
 
-/// A value as TOML writes it.
+/// Formats a value as TOML.
 fn toml(value: &Value) -> String {
     match value {
         Value::Array(items) => {
@@ -140,7 +141,7 @@ fn range(schema: &Value) -> String {
     limits.join(", ")
 }
 
-/// The type of a value in words.
+/// Type of a value in words.
 fn kind(schema: &Value, definitions: &Value) -> String {
     if let Some(name) = referred(schema) {
         let definition = &definitions[name];
@@ -176,21 +177,21 @@ fn kind(schema: &Value, definitions: &Value) -> String {
     }
 }
 
-/// The default of a key as TOML, `required` or `-`.
+/// Default of a key as TOML, `required` or `-`.
 fn default(key: &Key<'_>) -> String {
     match &key.schema["default"] {
         Value::Null if key.is_required => "required".to_owned(),
-        // A list of tables or a table that has its own defaults.
+        // An array of tables, or a table with its own defaults.
         Value::Null | Value::Object(_) => "-".to_owned(),
         Value::Array(items) if items.is_empty() => "-".to_owned(),
         value => format!("`{}`", toml(value)),
     }
 }
 
-/// A text in a cell of a table.
+/// Escapes text for a table cell.
 fn cell(text: &str) -> String {
     let text = text.replace('\n', " ").replace('|', "\\|");
-    // Links to items of the library mean nothing on a page.
+    // Links to library items do not work on the page.
     let text = text.replace("[`Algorithm`](incise_coloring::Algorithm)", "algorithm");
     if text.is_empty() {
         "-".to_owned()
@@ -199,7 +200,7 @@ fn cell(text: &str) -> String {
     }
 }
 
-/// Appends the table of some keys.
+/// Appends the table of the given keys.
 fn table(page: &mut String, keys: &[Key<'_>], definitions: &Value) {
     page.push_str("| key | type | unit | range | default | meaning |\n|---|---|---|---|---|---|\n");
     for key in keys {
@@ -215,7 +216,7 @@ fn table(page: &mut String, keys: &[Key<'_>], definitions: &Value) {
     }
 }
 
-/// Appends a table or enumeration with the heading it has.
+/// Appends a table or enumeration under its heading.
 fn section(page: &mut String, heading: &str, schema: &Value, definitions: &Value) {
     page.push_str(&format!("\n## {heading}\n\n{}\n\n", description(schema)));
     let Some(choices) = schema["oneOf"].as_array() else {
@@ -229,7 +230,7 @@ fn section(page: &mut String, heading: &str, schema: &Value, definitions: &Value
             let keys: Vec<Key<'_>> = keys.into_iter().filter(|key| key.name != "kind").collect();
             table(page, &keys, definitions);
         } else if let [key] = &keys[..] {
-            // One key that names the choice.
+            // A single key names the choice.
             page.push_str(&format!("**`{}`**: {description}\n\n", key.name));
             match key.schema["properties"].is_object() {
                 true => table(page, &self::keys(key.schema), definitions),
@@ -246,9 +247,9 @@ fn section(page: &mut String, heading: &str, schema: &Value, definitions: &Value
 struct Table<'a> {
     name: &'a str,
     definition: &'a str,
-    /// Whether there may be several.
+    /// True for an array of tables.
     is_list: bool,
-    /// Whether its presence means something.
+    /// True if the presence of the table has a meaning.
     is_optional: bool,
 }
 
@@ -273,7 +274,7 @@ fn tables(schema: &Value) -> Vec<Table<'_>> {
         .collect()
 }
 
-/// The reference page in Markdown.
+/// Generates the reference page in Markdown.
 fn reference(schema: &Value) -> String {
     let definitions = &schema["definitions"];
     let mut page = String::from(
@@ -314,10 +315,10 @@ fn reference(schema: &Value) -> String {
     page
 }
 
-/// Columns of the commented scene.
+/// Line width of the commented scene.
 const WIDTH: usize = 110;
 
-/// Appends a text as comments, in lines of words.
+/// Appends text as comment lines, wrapped at words.
 fn comment(scene: &mut String, text: &str) {
     let mut line = String::from("#");
     for word in text.split_whitespace() {
@@ -353,7 +354,7 @@ fn assignments(scene: &mut String, keys: &[Key<'_>], definitions: &Value, is_use
     }
 }
 
-/// A type without the marks of Markdown.
+/// Removes Markdown markup from a type.
 fn plain(kind: &str) -> String {
     let names = kind.replace('`', "");
     match names.split_once("](#") {
@@ -362,7 +363,7 @@ fn plain(kind: &str) -> String {
     }
 }
 
-/// A scene with every key, its meaning and its default. It runs: the body is a generated beam.
+/// Generates a scene with every key, its meaning and its default. It is runnable: the body is a generated beam.
 fn defaults(schema: &Value) -> String {
     let definitions = &schema["definitions"];
     let mut scene = String::from(

@@ -1,11 +1,11 @@
-//! The table at the end of a run.
+//! Summary table at the end of a run.
 
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table};
 use incise::FrameReport;
 use incise::report::{BodyReport, Milliseconds, Shortfall, SoftenedReport};
 
-/// Name and time of each stage that has one.
+/// Name of a stage and a function that returns its time.
 type Stage = (&'static str, fn(&Milliseconds) -> f64);
 const STAGES: [Stage; 8] = [
     ("cut", |ms| ms.cut),
@@ -30,7 +30,7 @@ pub(crate) struct Summary {
 }
 
 impl Summary {
-    /// `before` is the report before the first frame.
+    /// Starts the summary; `before` is the report before the first frame.
     pub(crate) fn new(before: &FrameReport) -> Self {
         Self {
             times: Vec::new(),
@@ -52,7 +52,7 @@ impl Summary {
         self.last = report.clone();
     }
 
-    /// The times by stage, then the counts.
+    /// Formats the times by stage, then the counts.
     pub(crate) fn table(&self, kappa: [f64; 2], softened: &SoftenedReport) -> String {
         let mut stages = Table::new();
         stages.load_style(UTF8_FULL_CONDENSED);
@@ -124,13 +124,13 @@ impl Summary {
     }
 }
 
-/// The name of the row for some bodies.
+/// Row name of the substeps of the given bodies.
 fn substeps_of(bodies: &[usize]) -> String {
     let numbers: Vec<String> = bodies.iter().map(ToString::to_string).collect();
     format!("substeps of body {}", numbers.join(", "))
 }
 
-/// The number of substeps, with the reason if more are needed.
+/// Formats the number of substeps, with the reason if more are needed.
 fn substeps(body: &BodyReport) -> String {
     let substeps = body.substeps;
     match body.choice {

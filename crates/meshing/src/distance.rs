@@ -1,36 +1,36 @@
 //! Signed distances of simple solids and their smooth blends, negative inside.
 //!
-//! Source: I. Quilez, "Distance functions" and "Smooth minimum" (articles); the ellipsoid is only a bound of the
-//! distance, scaled from the unit ball, which is all that stuffing needs. Constant time.
+//! Source: I. Quilez, "Distance functions" and "Smooth minimum" (articles). The ellipsoid's value is only a lower bound
+//! of the distance, scaled from the unit ball; stuffing needs no more. Constant time.
 
 use glam::DVec3;
 
-/// A ball around the origin.
+/// Ball around the origin.
 pub(super) fn ball(p: DVec3, radius: f64) -> f64 {
     p.length() - radius
 }
 
-/// An axis-aligned box around the origin.
+/// Axis-aligned box around the origin.
 pub(super) fn cuboid(p: DVec3, half: DVec3) -> f64 {
     let beyond = p.abs() - half;
     beyond.max(DVec3::ZERO).length() + beyond.max_element().min(0.0)
 }
 
-/// A ring in the xy plane around the origin.
+/// Torus in the xy plane around the origin.
 pub(super) fn torus(p: DVec3, ring: f64, tube: f64) -> f64 {
     let from_ring = (p.x * p.x + p.y * p.y).sqrt() - ring;
     (from_ring * from_ring + p.z * p.z).sqrt() - tube
 }
 
-/// An axis-aligned ellipsoid: right in sign, in size at most the distance.
+/// Axis-aligned ellipsoid: exact sign; the absolute value is at most the distance.
 pub(super) fn ellipsoid(p: DVec3, center: DVec3, radii: DVec3) -> f64 {
     (((p - center) / radii).length() - 1.0) * radii.min_element()
 }
 
-/// A ball that moves from one end to the other while its radius changes evenly. Exact.
+/// Round cone: hull of two balls. Exact.
 ///
-/// The nearest ball on the way is where the line to its center leans by the slope of the radius, unless that lies
-/// beyond an end; the ends must be farther apart than their radii differ.
+/// The nearest ball of the family between the ends is where the line to its center is inclined by the slope of the
+/// radius, clamped to the ends. The distance of the ends must exceed the difference of their radii.
 pub(super) fn round_cone(p: DVec3, [from, to]: [DVec3; 2], [first, last]: [f64; 2]) -> f64 {
     let axis = to - from;
     let length = axis.length();
@@ -44,18 +44,18 @@ pub(super) fn round_cone(p: DVec3, [from, to]: [DVec3; 2], [first, last]: [f64; 
     (lead * lead + aside * aside).sqrt() - (first - slope * center)
 }
 
-/// The union of two solids with the crease between them filled over a width of about `k`.
+/// Union of two solids with the crease between them filled over a width of about `k`.
 pub(super) fn smooth_union(a: f64, b: f64, k: f64) -> f64 {
     let overlap = (k - (a - b).abs()).max(0.0);
     a.min(b) - overlap * overlap / (4.0 * k)
 }
 
-/// The first solid without the second, the new edge rounded over a width of about `k`.
+/// First solid minus the second, with the new edge rounded over a width of about `k`.
 pub(super) fn smooth_difference(a: f64, b: f64, k: f64) -> f64 {
     smooth_intersection(a, -b, k)
 }
 
-/// What two solids share, the new edge rounded over a width of about `k`.
+/// Intersection of two solids, with the new edge rounded over a width of about `k`.
 pub(super) fn smooth_intersection(a: f64, b: f64, k: f64) -> f64 {
     -smooth_union(-a, -b, k)
 }

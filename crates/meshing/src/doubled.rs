@@ -1,23 +1,23 @@
-//! [`Doubled`]: cells of a lattice joined to larger ones where nothing needs small ones, and the tets that fill them.
+//! [`Doubled`]: merges interior lattice cells into larger cells, and fills these with tets.
 //!
 //! Cubes of 2, 4, 8 .. cells a side become one cell each, so that cells form the leaves of octrees whose neighbors,
 //! also at edges and corners, differ by a factor of two at most. A face between cells of one size is filled as in the
-//! lattice: four tets around the line between the two centers, two each where an edge of the face is halved by a
-//! smaller cell. A face between a cell and four smaller ones is cut into eight triangles that meet in its middle; each
-//! is joined to the center on either side. Both sides of a face and all cells around an edge see the same triangles and
-//! halves, so faces match.
+//! lattice: four tets around the line between the two centers, or two per edge that a smaller cell halves. A face
+//! between a cell and four smaller ones is cut into eight triangles that meet at its center; each is joined to the
+//! center on either side. Both sides of a face and all cells around an edge use equal triangles and halves, so faces
+//! match.
 //!
-//! Source: the graded interior of F. Labelle and J. R. Shewchuk, "Isosurface Stuffing", 2007, with tets of our own
-//! choice between sizes. Cost: linear in the number of cells, a byte each.
+//! Source: the graded interior of F. Labelle and J. R. Shewchuk, "Isosurface Stuffing", 2007, with a different choice
+//! of tets between sizes. Cost: linear in the number of cells, one byte each.
 
 /// Coordinates of a lattice vertex in half spacings.
 type At = [i32; 3];
 
-/// See the module.
+/// Levels of merged cells; see the module.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Doubled {
     cells: [usize; 3],
-    /// Per cell, how often the cell it is part of was doubled; empty if none was.
+    /// Level of the merged cell that contains each cell; empty if there are none.
     levels: Vec<u8>,
 }
 
@@ -32,7 +32,7 @@ impl Doubled {
             cells,
             levels: vec![0; nx * ny * nz],
         };
-        // Beyond the largest power of two that fits nothing can be doubled.
+        // Cubes larger than the largest power of two that fits cannot be merged.
         let fits = nx.min(ny).min(nz).max(1).ilog2();
         let most = u8::try_from(most.min(fits)).unwrap_or(u8::MAX);
         for level in 1..=most {
@@ -42,12 +42,12 @@ impl Doubled {
         doubled
     }
 
-    /// Whether a cell is part of a larger one.
+    /// True if a cell is part of a larger one.
     pub(super) fn is_doubled(&self, cell: usize) -> bool {
         self.levels.get(cell).is_some_and(|&level| level > 0)
     }
 
-    /// Joins eight cells of the level below wherever that can be.
+    /// Merges eight cells of the level below wherever possible.
     fn double(&mut self, level: u8, inside: &impl Fn(usize) -> bool) {
         let side = 1 << level;
         for low in self.blocks(level) {
@@ -64,7 +64,7 @@ impl Doubled {
         }
     }
 
-    /// Takes back the last doubling of cells that touch one less than half as large. Whether there were any.
+    /// Undoes the last merge for cells that touch a cell less than half as large; returns true if there were any.
     fn halve_beside_small(&mut self) -> bool {
         let mut changed = false;
         for level in 2..=self.levels.iter().copied().max().unwrap_or(0) {
@@ -83,7 +83,7 @@ impl Doubled {
         changed
     }
 
-    /// The low cells of all cubes of a level that lie in the lattice.
+    /// Low cells of all cubes of a level that lie in the lattice.
     fn blocks(&self, level: u8) -> impl Iterator<Item = [usize; 3]> + use<> {
         let side = 1 << level;
         let [nx, ny, nz] = self.cells.map(|n| n / side);
@@ -91,7 +91,7 @@ impl Doubled {
             .map(move |block| [block % nx, block / nx % ny, block / nx / ny].map(|b| b * side))
     }
 
-    /// The cells of a cube, with so many layers around it as far as there are.
+    /// Cells of a cube and of the given number of layers around it, clipped to the lattice.
     fn around(
         &self,
         low: [usize; 3],
@@ -117,13 +117,13 @@ impl Doubled {
         x + self.cells[0] * (y + self.cells[1] * z)
     }
 
-    /// The level of the cell around a place that lies on no face between cells.
+    /// Level of the cell that contains a point, which must not lie on a face between cells.
     #[expect(clippy::cast_sign_loss, reason = "doubled cells are not at the rim")]
     fn level_at(&self, at: At) -> u8 {
         self.levels[self.cell(at.map(|c| (c >> 1) as usize))]
     }
 
-    /// Makes all tets at doubled cells. Their corners come in no particular orientation.
+    /// Emits all tets at merged cells, in no particular orientation.
     pub(super) fn fill(&self, mut emit: impl FnMut([At; 4])) {
         let most = self.levels.iter().copied().max().unwrap_or(0);
         for level in 1..=most {
@@ -135,7 +135,7 @@ impl Doubled {
         }
     }
 
-    /// Makes the tets at a doubled cell, up to those that belong to its neighbors.
+    /// Emits the tets at a merged cell, except those that belong to its neighbors.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_possible_wrap,
@@ -147,7 +147,7 @@ impl Doubled {
         let center = low.map(|c| 2 * c as i32 + half);
         for (axis, sign) in [(0, -1), (0, 1), (1, -1), (1, 1), (2, -1), (2, 1)] {
             let face = step(center, axis, sign * half);
-            // Just across the face, off all edges of the lattice there.
+            // Just across the face, off all lattice edges there.
             let across = step(face.map(|c| c + 1), axis, if sign > 0 { 0 } else { -2 });
             let beyond = self.level_at(across);
             let others = [(axis + 1) % 3, (axis + 2) % 3];
@@ -156,7 +156,7 @@ impl Doubled {
                     self.fill_between(center, face, axis, level, emit);
                 }
             } else if beyond < level {
-                // The eight triangles in the middle, and the centers beyond where those cells are smaller.
+                // The eight triangles around the face center, and the centers beyond where those cells are smaller.
                 for (u, v) in [(-1, -1), (1, -1), (1, 1), (-1, 1)] {
                     let corner = step(step(face, others[0], u * half), others[1], v * half);
                     let quarter = step(
@@ -202,7 +202,7 @@ impl Doubled {
         }
     }
 
-    /// Whether one of the cells around the middle of an edge of a cell is smaller than that.
+    /// True if a cell around the middle of an edge of a cell is smaller than that cell.
     fn is_halved(&self, middle: At, level: u8) -> bool {
         (0..8).any(|octant| {
             let near = [0, 1, 2].map(|a| middle[a] + if octant >> a & 1 == 1 { 1 } else { -1 });
@@ -228,7 +228,8 @@ mod tests {
         stuff_graded(&lattice.expect("is a box"), levels, region).expect("fits")
     }
 
-    /// Regions of all kinds: matching faces, positive tets, the same surface and volume, and the bounds of the angles.
+    /// Checks regions of all kinds: matching faces, positive tets, unchanged surface and volume, and the bounds of the
+    /// angles.
     #[test]
     fn graded_meshes_are_sound_and_have_the_same_surface() {
         let ball = |p: DVec3| p.length() - 0.95;
@@ -249,7 +250,7 @@ mod tests {
                     let more = graded.total_volume() / uniform.total_volume() - 1.0;
                     assert!(more.abs() < 1e-11, "{more}");
                     assert!(graded.tets.len() <= uniform.tets.len());
-                    // The same surface, though particles are numbered otherwise.
+                    // Equal surfaces, with different particle numbers.
                     let corners = |mesh: &TetMesh| {
                         let mut all: Vec<_> = mesh
                             .surface()
@@ -286,7 +287,7 @@ mod tests {
     #[test]
     fn tets_of_doubled_cells_have_angles_of_45_to_120_degrees() {
         let graded = mesh(4, 40.0, |p| p.length() - 0.95);
-        // Those without a corner near the surface.
+        // Tets without a corner near the surface.
         let deep = graded.tets.iter().filter(|tet| {
             tet.iter()
                 .all(|p| graded.positions[p.index()].length() < 0.95 - 4.0 * 0.05)

@@ -1,32 +1,32 @@
-//! [`MeshingError`]: why a body was not made.
+//! [`MeshingError`]: errors of mesh generation.
 
-/// Why a shape, a surface or points could not be filled with tets.
+/// Error of filling a shape, a surface or points with tets.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshingError {
-    /// A name that is not a [`Shape`](crate::Shape).
+    /// Unknown name of a [`Shape`](crate::Shape).
     #[error("unknown shape '{name}'; known are: {known}")]
     UnknownShape {
-        /// The name given.
+        /// Name given.
         name: String,
-        /// The names that work, separated by commas.
+        /// Known names, separated by commas.
         known: String,
     },
 
-    /// A number of tets that a shape cannot be generated with.
+    /// Number of tets outside the range of a shape.
     #[error("a {shape} cannot be made of {wanted} tets: ask for {smallest} to {largest}")]
     TetCount {
-        /// The name of the shape.
+        /// Name of the shape.
         shape: &'static str,
-        /// The number asked for.
+        /// Number given.
         wanted: usize,
-        /// The smallest number supported.
+        /// Smallest number supported.
         smallest: usize,
-        /// The largest number supported.
+        /// Largest number supported.
         largest: usize,
     },
 
-    /// A surface without an inside, or one that cannot be filled as asked.
+    /// A surface that does not enclose a volume, or cannot be filled with the given settings.
     #[error("the surface cannot be filled: {0}")]
     Surface(String),
 
@@ -34,7 +34,7 @@ pub enum MeshingError {
     #[error("the points cannot be filled with tetrahedra: {0}")]
     Points(String),
 
-    /// A lattice that cannot be laid out.
+    /// A lattice with invalid bounds, spacing or size.
     #[error("the lattice cannot be laid out: {0}")]
     Lattice(String),
 }

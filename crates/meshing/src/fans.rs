@@ -1,20 +1,21 @@
-//! Bodies with known answers: tets around one edge, tets around one particle, and copies of any mesh side by side.
+//! Test bodies with known properties: tets around one edge, tets around one particle, and copies of any mesh side by
+//! side.
 //!
-//! What is asked of the graph that joins tets with a common particle, of pieces, and of tets per particle can be
-//! checked against these exactly. Their coordinates are exact or rounded once; their tets are positive, but as thin as
-//! it takes. Linear in the number of tets.
+//! Results for the graph of tets that share a particle, for pieces, and for tets per particle can be checked exactly
+//! against these. Their coordinates are exact or rounded once; their tets have positive volume, but may be very thin.
+//! Linear in the number of tets.
 
 use glam::{DVec3, dvec3};
 use incise_mesh::{ParticleId, TetMesh};
 
-/// `tets` tets around one common edge, from the particle 0 to the particle 1, closing a ring.
+/// Creates a closed ring of `tets` tets around one common edge, from the particle 0 to the particle 1.
 ///
 /// Any two tets share the edge: the graph of tets with a common particle is complete, with `tets` colors needed and
 /// `tets - 1` neighbors each. The particles 0 and 1 have `tets` tets, all others two. One piece by faces; the surface
 /// is a double pyramid. The edge is 1 m long, on the z axis around the origin; the ring has the radius 1 m.
 ///
 /// # Panics
-/// For fewer than three tets, which leave the ring open.
+/// For fewer than three tets, which cannot close the ring.
 ///
 /// # Example
 /// ```
@@ -31,7 +32,7 @@ pub fn fan(tets: usize) -> TetMesh {
     assert!(tets >= 3, "{tets} tets cannot surround an edge, take three");
     let mut positions = vec![dvec3(0.0, 0.0, -0.5), dvec3(0.0, 0.0, 0.5)];
     positions.extend((0..tets).map(|k| {
-        // Along the square with its corners on the axes, then outward onto the circle.
+        // Along the square with its corners on the axes, then projected onto the circle.
         let (quarter, part) = (4 * k / tets, (4 * k % tets) as f64 / tets as f64);
         let [u, v] = [1.0 - part, part];
         let [x, y] = [[u, v], [-v, u], [-u, -v], [v, -u]][quarter];
@@ -44,7 +45,7 @@ pub fn fan(tets: usize) -> TetMesh {
     }
 }
 
-/// `tets` tets that share one particle, the particle 0, and nothing else.
+/// Creates `tets` tets that share only particle 0.
 ///
 /// The graph of tets with a common particle is complete, with `tets` colors needed and `tets - 1` neighbors each. The
 /// particle 0 has `tets` tets, all others one. One piece by particles, `tets` pieces by faces. The common particle is
@@ -72,7 +73,7 @@ pub fn star(tets: usize) -> TetMesh {
     };
     let middle = 0.5 * side as f64;
     for k in 0..tets {
-        // Half of each square, away from its sides, so that no two faces touch.
+        // Half of each square, with a distance to its sides, so that no two faces touch.
         let [x, y] = [k % side, k / side].map(|c| c as f64 - middle);
         let corner = |u: f64, v: f64| dvec3(x + u, y + v, side as f64);
         let first = mesh.positions.len();
@@ -88,11 +89,11 @@ pub fn star(tets: usize) -> TetMesh {
     mesh
 }
 
-/// `count` copies of a mesh, each moved by `offset` (meters) from the one before, none joined with another.
+/// Creates `count` separate copies of a mesh, each moved by `offset` (meters) from the previous one.
 ///
-/// Everything that is counted is multiplied: particles, tets, pieces, edges of the graph of tets with a common
-/// particle. The largest number of tets at a particle and the number of colors needed stay as they are. The first copy
-/// comes first, unmoved. Copies overlap when the offset is too short.
+/// All counts are multiplied: particles, tets, pieces, edges of the graph of tets with a common particle. The largest
+/// number of tets at a particle and the number of colors needed do not change. The first copy is not moved. Copies
+/// overlap if the offset is too short.
 ///
 /// # Panics
 /// From 2³² particles on.
@@ -128,7 +129,7 @@ mod tests {
     use super::*;
     use incise_mesh::kuhn_box;
 
-    /// How many particles have how many tets, ascending.
+    /// Number of particles by their number of tets, ascending.
     fn valences(mesh: &TetMesh) -> Vec<(usize, usize)> {
         let mut uses = vec![0_usize; mesh.positions.len()];
         for p in mesh.tets.iter().flatten() {
@@ -178,7 +179,7 @@ mod tests {
                 assert_eq!(uses.pop(), Some((tets, 1)));
                 assert_eq!(uses, [(1, 3 * tets)]);
             }
-            // Cones over disjoint triangles in a plane are disjoint: here no two lie in the same square.
+            // Cones over disjoint triangles in a plane are disjoint: no two triangles lie in one square.
             let half = (mesh.positions.last().map_or(0.0, |p| p.z) / 2.0).fract();
             let tops = mesh.tets.iter().map(|tet| mesh.positions[tet[1].index()]);
             let mut squares: Vec<_> = tops

@@ -1,17 +1,17 @@
-//! Numbers of 32 bits for places in arrays.
+//! Conversion of array indices to 32 bits.
 
-/// A place in an array.
+/// Converts an array index.
 ///
 /// # Panics
-/// From 2³² on. The sizes that are accepted keep all arrays shorter.
+/// For 2³² or more. Accepted mesh sizes keep all arrays shorter.
 pub(crate) fn index(place: usize) -> u32 {
     u32::try_from(place).expect("arrays have fewer than 2^32 elements")
 }
 
-/// The number of a tet, of which the faces have numbers, too: four times that, and more.
+/// Converts the index of a tet; face numbers, four times the index and more, fit too.
 ///
 /// # Panics
-/// From 2³⁰ on.
+/// For 2³⁰ or more.
 pub(crate) fn tet_index(place: usize) -> u32 {
     u32::try_from(place)
         .ok()

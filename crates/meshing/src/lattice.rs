@@ -1,34 +1,34 @@
-//! The lattice on which level sets are sampled, and the search for the surface on its edges.
+//! Lattice on which level sets are sampled, and root finding on its edges.
 //!
-//! Cubic cells, whose corners and centers together form a body-centered cubic lattice,
-//! whose natural tets are all alike and well shaped. Constant time.
+//! Cubic cells, whose corners and centers together form a body-centered cubic lattice; its tets are congruent and well
+//! shaped. Constant time.
 
 use glam::DVec3;
 
 use crate::MeshingError;
 
-/// Cells a lattice may have: the tables then take about 2 GiB.
+/// Largest number of cells: the tables then take about 2 GiB.
 const MAX_CELLS: usize = 1 << 26;
 
 /// Cubic cells whose corners and centers are the vertices of a body-centered cubic lattice.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lattice {
-    /// The low corner, in meters.
+    /// Low corner, in meters.
     pub origin: DVec3,
-    /// The side of a cell, in meters.
+    /// Side of a cell, in meters.
     pub spacing: f64,
-    /// The number of cells along each axis.
+    /// Number of cells along each axis.
     pub cells: [usize; 3],
 }
 
 impl Lattice {
-    /// The smallest lattice that covers the box from `low` to `high` with a layer of cells to spare on every side.
+    /// Creates the smallest lattice that covers the box from `low` to `high` with a margin of one layer of cells.
     ///
-    /// `shift`, in spacings, moves the lattice vertices away from the box; whole numbers change nothing.
+    /// `shift`, in spacings, moves the lattice vertices relative to the box; integers have no effect.
     ///
     /// # Errors
-    /// [`MeshingError::Lattice`] if a number is not finite, the spacing is not positive, the box is inside out, or
-    /// there would be more than 2²⁶ cells.
+    /// [`MeshingError::Lattice`] if a number is not finite, the spacing is not positive, the box has a low corner above
+    /// its high one, or there would be more than 2²⁶ cells.
     pub fn covering(
         low: DVec3,
         high: DVec3,
@@ -68,7 +68,7 @@ impl Lattice {
         })
     }
 
-    /// The number of cells, refused beyond the limit.
+    /// Number of cells; an error beyond the limit.
     pub(super) fn cell_count(&self) -> Result<usize, MeshingError> {
         let [nx, ny, nz] = self.cells;
         nx.checked_mul(ny)
@@ -81,7 +81,7 @@ impl Lattice {
             })
     }
 
-    /// The number of cells along an axis.
+    /// Number of cells along an axis.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_possible_wrap,
@@ -91,7 +91,7 @@ impl Lattice {
         self.cells[axis] as i32
     }
 
-    /// The coordinates of a vertex in half spacings. Vertex `2 c` is the low corner of cell `c`, `2 c + 1` its center.
+    /// Coordinates of a vertex in half spacings. Vertex `2 c` is the low corner of cell `c`, `2 c + 1` its center.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_possible_wrap,
@@ -103,15 +103,16 @@ impl Lattice {
         [cell % nx, cell / nx % ny, cell / nx / ny].map(|c| 2 * c as i32 + (vertex % 2) as i32)
     }
 
-    /// Where a vertex with these coordinates in half spacings lies.
+    /// Position of the vertex with these coordinates in half spacings.
     pub(super) fn position(&self, at: [i32; 3]) -> DVec3 {
         self.origin + 0.5 * self.spacing * DVec3::from_array(at.map(f64::from))
     }
 }
 
-/// Where the function is zero on the edge between an inside and an outside vertex, to about 1e-6 of its values there.
+/// Finds the zero of the function on the edge between an inside and an outside vertex, to about 1e-6 of the values at
+/// its ends.
 ///
-/// False position with the Illinois modification: the bracket always holds a change of sign.
+/// False position with the Illinois modification: the bracket always contains a change of sign.
 pub(super) fn root(ends: [DVec3; 2], values: [f64; 2], distance: &impl Fn(DVec3) -> f64) -> DVec3 {
     let at = |t: f64| ends[0] + t * (ends[1] - ends[0]);
     let [mut low, mut high] = [0.0, 1.0];

@@ -1,5 +1,5 @@
-//! Makes tetrahedral meshes: shapes by isosurface stuffing, closed surfaces filled with tets, Delaunay
-//! tetrahedralizations, irregular bodies, and bodies with known answers.
+//! Generates tetrahedral meshes: shapes by isosurface stuffing, closed surfaces filled with tets, Delaunay
+//! tetrahedralizations, irregular bodies, and test bodies with known properties.
 //!
 //! ```
 //! use incise_mesh::{TriangleSurface, glam::DVec3};
@@ -23,9 +23,9 @@
 //! # Ok::<(), incise_meshing::MeshingError>(())
 //! ```
 //!
-//! Only `+`, `-`, `*`, `/`, square root, minimum, maximum and absolute value are used, so that the same call gives the
-//! same bits on every platform, for any number of threads. What is inside, above or in a sphere is decided by exact
-//! predicates, never by a tolerance.
+//! Only `+`, `-`, `*`, `/`, square root, minimum, maximum and absolute value are used, so that results are
+//! bit-identical on all platforms and for any number of threads. Exact predicates, not tolerances, decide which points
+//! are inside, above a plane or in a sphere.
 
 mod delaunay;
 mod distance;

@@ -1,7 +1,7 @@
-//! The ways from a vertex of the body-centered cubic lattice to its neighbors, as offsets and as steps of the index.
+//! Neighbors of a vertex in the body-centered cubic lattice, as coordinate offsets and as index steps.
 //!
-//! A vertex has six neighbors along long edges, which are of its own kind, and eight along short ones, which are of the
-//! other. A way is a place in one fixed list of the fourteen. Constant time.
+//! A vertex has six neighbors of its own kind along long edges and eight of the other kind along short ones. A
+//! direction is an index into one fixed list of the fourteen. Constant time.
 
 use crate::stencil::{Corner, is_long};
 
@@ -23,7 +23,7 @@ pub(super) const NEIGHBORS: [[i32; 3]; 14] = [
     [1, 1, 1],
 ];
 
-/// The place of the way from one vertex to a neighbor in [`NEIGHBORS`].
+/// Index in [`NEIGHBORS`] of the direction from one vertex to a neighbor.
 pub(super) fn direction(from: Corner, to: Corner) -> usize {
     let ahead = |axis: usize| usize::from(to.at[axis] > from.at[axis]);
     if is_long(from, to) {
@@ -36,13 +36,13 @@ pub(super) fn direction(from: Corner, to: Corner) -> usize {
     }
 }
 
-/// Steps of the index to the neighbors of a corner and of a center of a cell, in the order of [`NEIGHBORS`].
+/// Index steps to the neighbors of a corner and of a center of a cell, in the order of [`NEIGHBORS`].
 #[expect(clippy::cast_possible_wrap, reason = "at most 2^26 cells")]
 pub(super) fn steps([nx, ny, _]: [usize; 3]) -> [[isize; 14]; 2] {
     let strides = [1, nx, nx * ny].map(|stride| 2 * stride as isize);
     [0, 1].map(|center| {
         NEIGHBORS.map(|offset| {
-            // The cell of a neighbor is found by halving its coordinates, rounded down.
+            // The cell of a neighbor is half its coordinates, rounded down.
             let cells: isize = (0..3)
                 .map(|axis| (offset[axis] + center).div_euclid(2) as isize * strides[axis])
                 .sum();
@@ -51,12 +51,12 @@ pub(super) fn steps([nx, ny, _]: [usize; 3]) -> [[isize; 14]; 2] {
     })
 }
 
-/// The set bits.
+/// Iterates over the set bits.
 pub(super) fn directions(bits: u16) -> impl Iterator<Item = usize> {
     (0..NEIGHBORS.len()).filter(move |direction| bits >> direction & 1 == 1)
 }
 
-/// The place of the opposite offset in [`NEIGHBORS`].
+/// Index of the opposite offset in [`NEIGHBORS`].
 pub(super) fn backward(direction: usize) -> usize {
     if direction < 6 {
         direction ^ 1

@@ -1,11 +1,11 @@
-//! Random numbers from counters: the same for the same arguments on every platform, in any order.
+//! Counter-based random numbers: a pure function of the arguments, equal on every platform.
 //!
 //! The finalizer of `SplitMix64` (Steele, Lea and Flood, "Fast Splittable Pseudorandom Number Generators", 2014),
 //! applied to a seed and a counter. Constant time.
 
 use glam::{DVec3, dvec3};
 
-/// A random number for a counter.
+/// Random number for a counter.
 pub(super) fn hash(seed: u64, counter: u64) -> u64 {
     let mut h = seed
         .wrapping_mul(0xd134_2543_de82_ef95)
@@ -15,7 +15,7 @@ pub(super) fn hash(seed: u64, counter: u64) -> u64 {
     h ^ h >> 31
 }
 
-/// A vector for a counter, uniform in the cube from -1 to 1.
+/// Vector for a counter, uniform in the cube from -1 to 1.
 pub(super) fn in_cube(seed: u64, counter: u64) -> DVec3 {
     let coordinate = |axis| {
         let bits = hash(seed, counter.wrapping_mul(3).wrapping_add(axis));
@@ -30,7 +30,7 @@ mod tests {
 
     #[test]
     fn fixed_and_uniform() {
-        // Pinned, so that meshes stay the same between versions and platforms.
+        // Fixed values, so that meshes are stable across versions and platforms.
         assert_eq!(hash(0, 0), 0xe220_a839_7b1d_cdaf);
         let mut mean = DVec3::ZERO;
         for n in 0..4096 {

@@ -1,10 +1,9 @@
-//! Generating a shape with a wanted number of tets.
+//! Search for the lattice that gives a shape the requested number of tets.
 //!
 //! The number of tets is close to 12 volume / spacing³, but jumps whenever a layer of lattice vertices enters or leaves
-//! the shape, by several percent for flat sides and small meshes. The spacing is searched by bisection sped up with
-//! that law; when a jump straddles the wanted number, the lattice is shifted against the shape and the search repeated,
-//! at last also turned, so that its layers meet no flat side all at once. Shifts follow a low-discrepancy sequence:
-//! they are all different and the same for everyone.
+//! the shape, by several percent for flat sides and small meshes. The spacing is found by bisection accelerated with
+//! that law. If a jump straddles the requested number, the search is repeated with a shifted lattice, finally also with
+//! a rotated one, whose layers do not cross a flat side all at once. Shifts are a fixed low-discrepancy sequence.
 //!
 //! Cost: a few stuffings for curved shapes, some dozens for flat ones.
 
@@ -14,22 +13,22 @@ use incise_mesh::{TetId, TetMesh, outward_normals};
 use crate::stuffing::{Grid, Slope};
 use crate::{Lattice, MeshingError, Shape};
 
-/// The largest number of tets that can be asked for.
+/// Largest number of tets.
 const LARGEST: usize = 4_000_000;
-/// Shifts of the aligned lattice that are tried, then of the turned lattice.
+/// Largest number of shifts of the aligned lattice, then of the rotated lattice.
 const SHIFTS: [u32; 2] = [24, 200];
-/// Spacings that are tried with one shift.
+/// Largest number of spacings per shift.
 const SPACINGS: usize = 14;
-/// The cosines of the dihedral angles 164.8 and 10.7 degrees.
+/// Cosines of the dihedral angles 164.8 and 10.7 degrees.
 const DIHEDRAL_COSINES: [f64; 2] = [-0.965_016, 0.982_613];
 
-/// A mesh of the shape with `tets` tets to within 2 %.
+/// Generates a mesh of the shape with `tets` tets to within 2 %.
 ///
-/// The mesh is sound ([`TetMesh::check`]), of as many pieces as the shape, also by faces, with a manifold surface of
-/// the shape's topology and all dihedral angles between 10.7 and 164.8 degrees. Deterministic on all platforms, for any
+/// The mesh is valid ([`TetMesh::check`]), has as many pieces as the shape, also by faces, a manifold surface of the
+/// shape's topology and all dihedral angles between 10.7 and 164.8 degrees. Deterministic on all platforms, for any
 /// number of threads.
 ///
-/// With few tets, parts thinner than a tet are lost or come out as stumps, such as ears and limbs.
+/// With few tets, parts thinner than a tet, such as ears and limbs, are shortened or lost.
 ///
 /// # Errors
 /// [`MeshingError::TetCount`] for fewer than [`Shape::smallest_tet_count`] or more than four million tets.
@@ -62,14 +61,15 @@ pub fn generate(shape: Shape, tets: usize) -> Result<TetMesh, MeshingError> {
     })
 }
 
-/// Fills the shape on a lattice turned and shifted in a given way, if that many tets make a mesh of its topology.
+/// Fills the shape on a lattice with a given rotation and shift; `None` if the number of tets or the topology is not
+/// met.
 fn search(
     shape: Shape,
     tets: usize,
     turn: DMat3,
     shift: DVec3,
 ) -> Result<Option<TetMesh>, MeshingError> {
-    // The turned lattice covers the box around the shape as seen along its own axes.
+    // The rotated lattice covers the bounding box of the shape along its own axes.
     let half = turn.transpose().abs() * shape.half_extent();
     let wanted = Wanted {
         tets,
@@ -88,16 +88,16 @@ fn search(
     Ok(Some(mesh).filter(|mesh| is_faithful(mesh, shape)))
 }
 
-/// What to look for.
+/// Target of the search.
 pub(super) struct Wanted {
     pub(super) tets: usize,
-    /// Of the region, in m³.
+    /// Volume of the region in m³.
     pub(super) volume: f64,
-    /// How often cells inside may be doubled.
+    /// Largest number of doublings of inner cells.
     pub(super) levels: u32,
 }
 
-/// Looks for a spacing that gives the wanted number of tets to within 2 %, in a box around the origin. The slope of
+/// Searches a spacing that gives the requested number of tets to within 2 %, in a box around the origin. The slope of
 /// `distance` is at most one.
 pub(super) fn find_grid(
     half: DVec3,
@@ -134,7 +134,7 @@ pub(super) fn find_grid(
     Ok(None)
 }
 
-/// Whether a mesh has the topology of the shape, which too coarse a lattice breaks, and good angles.
+/// True if a mesh has the topology of the shape, which a coarse lattice can change, and good angles.
 fn is_faithful(mesh: &TetMesh, shape: Shape) -> bool {
     if !(0..mesh.tets.len()).all(|t| has_good_angles(mesh.corners(TetId::new(t)))) {
         return false;
@@ -146,19 +146,19 @@ fn is_faithful(mesh: &TetMesh, shape: Shape) -> bool {
         && mesh.face_pieces_from(&faces).count == shape.pieces()
 }
 
-/// Whether the dihedral angles keep the bounds, judged by their cosines, which are the same on all platforms.
+/// True if the dihedral angles are within the bounds, tested by their cosines, which are equal on all platforms.
 fn has_good_angles(corners: [DVec3; 4]) -> bool {
     let normals = outward_normals(corners).map(|n| n / n.length());
     let [low, high] = DIHEDRAL_COSINES;
     (0..4).all(|i| (0..i).all(|j| (low..=high).contains(&-normals[i].dot(normals[j]))))
 }
 
-/// A turn after which the sides of a box are far from all directions of the lattice.
+/// Rotation that keeps the sides of a box away from all lattice directions.
 pub(super) fn turned() -> DMat3 {
     DMat3::from_quat(DQuat::from_xyzw(1.0, 2.0, 3.0, 5.0).normalize())
 }
 
-/// The points of the additive sequence of Roberts (2018), which fills the unit cube evenly.
+/// Point of the additive sequence of Roberts (2018), which fills the unit cube evenly.
 pub(super) fn shift(n: u32) -> DVec3 {
     let n = f64::from(n) + 0.5;
     (n * dvec3(
@@ -169,7 +169,7 @@ pub(super) fn shift(n: u32) -> DVec3 {
     .fract()
 }
 
-/// The cube root of a positive number by Newton's method, since the library function may differ between platforms.
+/// Cube root of a positive number by Newton's method; the library function may differ between platforms.
 pub(super) fn cube_root(x: f64) -> f64 {
     let mut root = x.max(1.0);
     for _ in 0..64 {
@@ -191,7 +191,7 @@ mod tests {
             let mesh = Grid::new(&lattice, Slope::AtMostOne, &|p| shape.signed_distance(p))
                 .map(|grid| grid.extract(grid.tet_count()))
                 .expect("the box around the shape holds it");
-            // A percent, and what the beveled edges and flattened curves of this spacing lose.
+            // One percent, plus the loss at beveled edges and flattened curves for this spacing.
             let volume = mesh.total_volume() / shape.volume();
             assert!((volume - 1.0).abs() < 0.015, "{shape}: {volume}");
         }

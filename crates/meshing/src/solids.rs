@@ -1,9 +1,9 @@
 //! The solids of [`Shape`](crate::Shape) that are blended from several parts, as signed distance functions.
 //!
-//! Animals and organs are stand-ins of our own: balls, cones with round ends and ellipsoids, joined with filled
-//! creases. Animals look along x and stand along z; y mirrors left and right. Each is drawn at a size of its own and
-//! then scaled and moved so that the box around it has a longest side of 1 m and its center at the origin. No value
-//! exceeds the distance in size. Constant time.
+//! Animals and organs are modeled from balls, cones with round ends and ellipsoids, joined with filled creases. Animals
+//! look along x and stand along z; y mirrors left and right. Each is modeled at its own size, then scaled and moved so
+//! that its bounding box has a longest side of 1 m and its center at the origin. The absolute value never exceeds the
+//! distance. Constant time.
 
 use glam::{DVec3, dvec3};
 
@@ -58,7 +58,7 @@ pub(super) fn bunny(p: DVec3) -> f64 {
 
 /// The armadillo, upright: a torso with studs on its back, a head with snout and ears, thin arms and legs, a tail.
 pub(super) fn armadillo(p: DVec3) -> f64 {
-    /// Limbs of the left side: both ends, and the radii there.
+    /// Limbs of the left side: both ends and their radii.
     const LIMBS: [([DVec3; 2], [f64; 2]); 7] = [
         // Upper arm, forearm, hand.
         (
@@ -92,7 +92,7 @@ pub(super) fn armadillo(p: DVec3) -> f64 {
             [0.036, 0.03],
         ),
     ];
-    /// The tail from its root to its tip, and the radii there.
+    /// Tail from root to tip, with radii.
     const TAIL: [(DVec3, f64); 4] = [
         (dvec3(-0.08, 0.0, -0.14), 0.08),
         (dvec3(-0.22, 0.0, -0.28), 0.06),
@@ -158,7 +158,7 @@ pub(super) fn gear(p: DVec3) -> f64 {
         let beyond = (y * cosine - x * sine).max(0.0);
         (x, y) = (x + 2.0 * beyond * sine, y - 2.0 * beyond * cosine);
     }
-    // The flank leans inward by about 16 degrees: 7, 24 and 25 are the sides of a right triangle.
+    // The flank is inclined inward by about 16 degrees: 7, 24 and 25 are the sides of a right triangle.
     let flank = 0.28 * (x - 0.44) + 0.96 * (y - 0.056);
     let tooth = smooth_intersection(x - 0.5, flank, 0.02);
     let wheel = smooth_union(from_axis - 0.39, tooth, 0.03);
@@ -166,12 +166,12 @@ pub(super) fn gear(p: DVec3) -> f64 {
     smooth_intersection(bored, p.z.abs() - 0.1, 0.02)
 }
 
-/// The shell: a ball around a void.
+/// The shell: a ball with a concentric void.
 pub(super) fn shell(p: DVec3) -> f64 {
     (p.length() - 0.425).abs() - 0.075
 }
 
-/// The pair: a ball and a cube, apart.
+/// The pair: a separate ball and cube.
 pub(super) fn pair(p: DVec3) -> f64 {
     let offset = dvec3(0.275, 0.0, 0.0);
     ball(p + offset, 0.225).min(cuboid(p - offset, DVec3::splat(0.225)))

@@ -1,9 +1,9 @@
-//! How isosurface stuffing fills one lattice tet: the stencils, with the rules for the diagonals.
+//! Stencils of isosurface stuffing for one lattice tet, with the rules for the diagonals.
 //!
 //! A lattice tet has corners inside (+), outside (-) or on the surface (0), and a cut point on each edge from + to -.
-//! What remains of it inside is a tet, a pyramid or a prism. Where a face with two + corners loses its - corner, a
-//! quadrilateral is left that two lattice tets share; both must choose the same diagonal, and the choice decides the
-//! dihedral angles. Each quadrilateral is the rest of a triangle with one long and two short edges:
+//! Its inside part is a tet, a pyramid or a prism. Where a face with two + corners loses its - corner, the remaining
+//! quadrilateral is shared by two lattice tets; both must choose one diagonal, and the choice determines the dihedral
+//! angles. Each quadrilateral is the rest of a triangle with one long and two short edges:
 //!
 //! - the long edge is cut: the diagonal runs from the cut of the long edge to the inside end of the short one;
 //! - both short edges are cut: the *parity rule*. The ends of the long edge differ in one of the signs of their offset
@@ -13,15 +13,15 @@
 //! In the prism with two + and two - corners the two shared diagonals then always have different ends, and only one
 //! diagonal of the third quadrilateral, which lies on the surface, makes three tets possible.
 //!
-//! With moved vertices and cuts at their extremes, all angles lie between 9.3 and 161.7 degrees (a test tries them
-//! all). The paper states 10.7 to 164.8 degrees for the same parts of edges. No table of diagonals gives that here:
-//! three moved vertices and an inside one make a single tet, without a diagonal, that can have 9.3 degrees (a test
-//! builds it). The opposite choice in the first rule falls to 7.2 degrees.
+//! With moved vertices and cuts at their extremes, all angles lie between 9.3 and 161.7 degrees (a test enumerates
+//! them). The paper states 10.7 to 164.8 degrees for equal fractions of edges. No choice of diagonals reaches that
+//! here: three moved vertices and an inside one make a single tet, without a diagonal, that can have 9.3 degrees (a
+//! test builds it). The opposite choice in the first rule gives 7.2 degrees.
 //!
 //! Source: F. Labelle and J. R. Shewchuk, "Isosurface Stuffing: Fast Tetrahedral Meshes with Good Dihedral Angles",
 //! 2007. Constant time per tet.
 
-/// Where a lattice vertex lies.
+/// Side of the surface on which a lattice vertex lies.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Side {
     Inside,
@@ -44,12 +44,12 @@ pub(super) enum Node {
     Cut(Corner, Corner),
 }
 
-/// Whether two vertices of one lattice tet are joined by a long edge: both cube corners or both cube centers.
+/// True if two vertices of one lattice tet are joined by a long edge: both cube corners or both cube centers.
 pub(super) fn is_long(a: Corner, b: Corner) -> bool {
     (a.at[0] ^ b.at[0]) & 1 == 0
 }
 
-/// Whether the quadrilateral left of the face `p`, `q` (inside), `m` (outside) has its diagonal at `p`, not at `q`.
+/// True if the quadrilateral left of the face `p`, `q` (inside), `m` (outside) has its diagonal at `p`, not at `q`.
 fn diagonal_at_first(p: Corner, q: Corner, m: Corner) -> bool {
     if is_long(p, q) {
         (0..3).filter(|&axis| p.at[axis] > m.at[axis]).count() % 2 == 0
@@ -58,7 +58,7 @@ fn diagonal_at_first(p: Corner, q: Corner, m: Corner) -> bool {
     }
 }
 
-/// Calls `emit` for each output tet of a lattice tet. The corners of the output come in no particular orientation.
+/// Calls `emit` for each output tet of a lattice tet, with corners in no particular orientation.
 pub(super) fn fill(tet: [Corner; 4], mut emit: impl FnMut([Node; 4])) {
     use Node::{Cut, Vertex};
     let select = |side| {
@@ -121,7 +121,7 @@ pub(super) fn fill(tet: [Corner; 4], mut emit: impl FnMut([Node; 4])) {
     }
 }
 
-/// The two inside corners of a quadrilateral, the one with the diagonal first.
+/// Inside corners of a quadrilateral, the one with the diagonal first.
 fn diagonal_first(p: Corner, q: Corner, m: Corner) -> (Corner, Corner) {
     if diagonal_at_first(p, q, m) {
         (p, q)
@@ -140,7 +140,7 @@ mod tests {
 
     const LATTICE_TET: [[i32; 3]; 4] = [[0, 0, 0], [2, 0, 0], [1, -1, -1], [1, -1, 1]];
 
-    /// A surface vertex in place, or moved along each of its 14 edges as far as it may.
+    /// Positions of a surface vertex: in place, or moved along each of its 14 edges by the largest fraction.
     fn moves() -> Vec<DVec3> {
         let mut moves = vec![DVec3::ZERO];
         moves.extend(
@@ -161,7 +161,7 @@ mod tests {
         moves
     }
 
-    /// The angles of all output tets with the cuts as near to their vertices as they may be, in all combinations.
+    /// Angles of all output tets with the cuts at their extreme positions, in all combinations.
     fn angles(tets: &[[Node; 4]], positions: [DVec3; 4]) -> (f64, f64) {
         const EDGE: [[usize; 4]; 4] = [[0, 0, 1, 2], [0, 0, 3, 4], [1, 3, 0, 5], [2, 4, 5, 0]];
         let mut angles = (180.0_f64, 0.0_f64);
@@ -195,7 +195,7 @@ mod tests {
         angles
     }
 
-    /// The edge that a vertex moved along, of `moves`, in half spacings; zero if it stayed.
+    /// Edge among `moves` that a vertex moved along, in half spacings; zero if it did not move.
     fn edge_of(the_move: DVec3) -> DVec3 {
         let part = if the_move.abs().max_element() == the_move.abs().element_sum() {
             ALPHA_LONG
@@ -205,7 +205,7 @@ mod tests {
         (the_move / part).round()
     }
 
-    /// Whether two vertices move toward each other along one edge, which cannot be: the first takes the cut with it.
+    /// True if two vertices move toward each other along one edge. This is impossible: the first move removes the cut.
     fn meet(moved: &[(usize, DVec3)]) -> bool {
         moved.iter().any(|&(i, along)| {
             moved.iter().any(|&(j, back)| {

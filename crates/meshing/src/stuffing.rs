@@ -2,17 +2,17 @@
 //!
 //! The function is sampled at the vertices of a body-centered cubic lattice. On each edge between an inside and an
 //! outside vertex the surface is located on the function itself (not on its linear interpolant). A vertex with a cut
-//! point so near that slivers would follow is moved onto it, which removes the other cuts at its edges. Each lattice
-//! tet is then filled from the stencils of the module `stencil`.
+//! point close enough to cause slivers is moved onto it, which removes the other cuts at its edges. Each lattice tet is
+//! then filled from the stencils of the module `stencil`.
 //!
-//! Whatever the function, faces match, every tet is positive, and the dihedral angles stay between 9.3 and 161.7
-//! degrees. These bounds are not proved but found by trying all extremes of the stencils; they are not the 10.7 and
-//! 164.8 degrees that the paper proves, which smooth surfaces keep as a rule but not always. Features thinner than the
-//! spacing are lost, sharp edges are beveled.
+//! For every function, faces match, every tet is positive, and the dihedral angles stay between 9.3 and 161.7 degrees.
+//! These bounds were found by enumerating all extremes of the stencils, not by proof. The paper proves 10.7 and 164.8
+//! degrees; smooth surfaces usually stay within those bounds, but not always. Features thinner than the spacing are
+//! lost, sharp edges are beveled.
 //!
 //! Source: F. Labelle and J. R. Shewchuk, "Isosurface Stuffing: Fast Tetrahedral Meshes with Good Dihedral Angles",
-//! 2007, for a uniform lattice. Cost: linear in the number of lattice cells, with two samples each and 26 bytes; only
-//! vertices with a cut at their edges have more. A true distance saves the samples far from the surface.
+//! 2007, for a uniform lattice. Cost: linear in the number of lattice cells, with two samples and 26 bytes each;
+//! vertices with a cut at their edges take more. A true distance function saves the samples far from the surface.
 
 use glam::DVec3;
 use incise_mesh::{ParticleId, TetMesh, signed_volume};
@@ -25,22 +25,22 @@ use crate::lattice::{Lattice, root};
 use crate::neighbors::{NEIGHBORS, add, backward, direction, directions, steps};
 use crate::stencil::{Corner, Node, Side, fill};
 
-/// A vertex moves onto a cut on a long edge nearer than this part of the edge (values of the paper).
+/// Fraction of a long edge within which a vertex moves onto a cut (value of the paper).
 pub(super) const ALPHA_LONG: f64 = 0.24999;
-/// A vertex moves onto a cut on a short edge nearer than this part of the edge (values of the paper).
+/// Fraction of a short edge within which a vertex moves onto a cut (value of the paper).
 pub(super) const ALPHA_SHORT: f64 = 0.41189;
 /// No entry in a table of indices.
 const NONE: u32 = u32::MAX;
 
 /// Fills the region where `distance` is negative with tets.
 ///
-/// `distance` takes a position in meters; it must be continuous, and only its sign matters for the shape of the result.
-/// The region must not reach the outermost layer of cells. The result has no unused
-/// particles. It has no tets when no lattice vertex lies inside.
+/// `distance` takes a position in meters and must be continuous; only its sign affects the shape of the result. The
+/// region must not reach the outermost layer of cells. The result has no unused particles. It has no tets if no lattice
+/// vertex lies inside.
 ///
-/// Deterministic: the same function values give the same bits on every platform and for any number of threads, which
-/// share sampling and the search for the surface. Tets come in the order of the cells, x first, and particles in the
-/// order of their first use.
+/// Deterministic: equal function values give bit-identical results on every platform and for any number of threads.
+/// Sampling and the search for the surface are parallel. Tets are in the order of the cells, x first, and particles in
+/// the order of their first use.
 ///
 /// # Errors
 /// [`MeshingError::Lattice`] if `distance` is not finite somewhere, the region reaches the outermost layer of cells, or
@@ -65,12 +65,12 @@ pub fn stuff(
     stuff_graded(lattice, 0, distance)
 }
 
-/// Fills the region where `distance` is negative with tets, with up to `levels` times doubled cells inside: where a
-/// cube of cells and all around it lies inside, it may become one, and eight of those again one, while neighbors, also
-/// at edges and corners, differ by one doubling at most.
+/// Fills the region where `distance` is negative with tets, with inner cells doubled up to `levels` times: a cube of
+/// eight cells becomes one if it and all cells around it lie inside. Neighbors, also at edges and corners, differ by
+/// one doubling at most.
 ///
-/// The surface is that of [`stuff`], and tets at it are as small. Of the others, those of doubled cells have dihedral
-/// angles of 45 to 120 degrees. A thick body of n tets keeps some n^(2/3).
+/// The surface is that of [`stuff`], with tets of equal size there. Tets inside doubled cells have dihedral angles of
+/// 45 to 120 degrees. A thick body of n tets keeps some n^(2/3).
 ///
 /// # Errors
 /// The errors of [`stuff`].
@@ -98,42 +98,42 @@ pub fn stuff_graded(
     Ok(grid.extract(grid.tet_count()))
 }
 
-/// What is known of the function to fill.
+/// Known bound of the slope of the function.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Slope {
-    /// Nothing: it is sampled everywhere.
+    /// Unknown: the function is sampled everywhere.
     Any,
-    /// It differs between two points by no more than their distance: far from the surface few samples do.
+    /// Values at two points differ by no more than their distance: few samples suffice far from the surface.
     AtMostOne,
 }
 
-/// The lattice with what is known about it. Vertex `2 c` is the low corner of cell `c`, vertex `2 c + 1` its center.
+/// Sampled lattice. Vertex `2 c` is the low corner of cell `c`, vertex `2 c + 1` its center.
 ///
-/// All vertices of the rim lie outside. A step over the rim, which may land on the opposite rim, is thus a step
+/// All vertices of the rim lie outside. An index step past the rim may wrap to the opposite rim and still lands
 /// outside.
 pub(super) struct Grid {
     lattice: Lattice,
-    /// Steps of the index to the neighbors of a corner and of a center, in the order of [`NEIGHBORS`].
+    /// Index steps to the neighbors of a corner and of a center, in the order of [`NEIGHBORS`].
     steps: [[isize; 14]; 2],
-    /// Per vertex.
+    /// Side of each vertex.
     sides: Vec<Side>,
-    /// Vertex -> its index in `near`, if it has an edge with a cut.
+    /// Index in `near` of each vertex that has an edge with a cut.
     near_indices: Vec<u32>,
-    /// The vertices that have an edge with a cut, in ascending order.
+    /// Vertices that have an edge with a cut, in ascending order.
     near: Vec<Near>,
     cuts: Vec<DVec3>,
-    /// Cells that were doubled.
+    /// Merged cells.
     doubled: Doubled,
 }
 
 /// A vertex with cuts at its edges.
 struct Near {
     vertex: u32,
-    /// The neighbors that lay on the other side before vertices were moved, a bit for each of [`NEIGHBORS`].
+    /// Bit mask over [`NEIGHBORS`] of the neighbors on the opposite side before vertices were moved.
     opposite: u16,
-    /// The cut the vertex was moved onto.
+    /// Cut onto which the vertex was moved.
     moved: u32,
-    /// For an inside vertex, the first of its cuts. They come in the order of [`NEIGHBORS`].
+    /// First cut of an inside vertex. Its cuts are in the order of [`NEIGHBORS`].
     first: u32,
 }
 
@@ -161,7 +161,7 @@ impl Grid {
         Ok(grid)
     }
 
-    /// Fills in the sides. Returns the value at each vertex, or 0 where it was not needed.
+    /// Computes the sides. Returns the value at each vertex, or 0 where it was not needed.
     fn sample(
         &mut self,
         slope: Slope,
@@ -189,20 +189,20 @@ impl Grid {
                 Ok(())
             })
             .collect();
-        // The first error in the order of the vertices, whichever was met first.
+        // The first error in the order of the vertices, independent of the threads.
         layers.into_iter().collect::<Result<(), _>>()?;
         self.sides = sides;
         Ok(values)
     }
 
-    /// How many vertices that follow one with a given value in its row have no neighbor on the other side.
+    /// Number of next vertices in the row that have no neighbor on the opposite side, given the value at a vertex.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "only a positive finite number is cast"
     )]
     fn vertices_far_from_surface(&self, slope: Slope, value: f64) -> usize {
-        // The n-th is at most n / 2 + 0.71 spacings away, its neighbors one more. The rest is for rounding.
+        // The n-th is at most n / 2 + 0.71 spacings away, its neighbors one more. The rest is a margin for rounding.
         let vertices = 2.0 * (0.999 * value.abs() / self.lattice.spacing - 1.75);
         match slope {
             Slope::AtMostOne if vertices > 0.0 => vertices as usize,
@@ -271,7 +271,7 @@ impl Grid {
             .collect();
     }
 
-    /// The neighbors on the other side of the surface, a bit for each of [`NEIGHBORS`].
+    /// Bit mask over [`NEIGHBORS`] of the neighbors on the opposite side of the surface.
     fn opposite_neighbors(&self, vertex: usize) -> u16 {
         let opposite = match self.sides[vertex] {
             Side::Inside => Side::Outside,
@@ -280,14 +280,14 @@ impl Grid {
         };
         let mut neighbors = 0;
         for (direction, &step) in self.steps[vertex % 2].iter().enumerate() {
-            // What lies beyond the first and the last vertex is outside, like the rim.
+            // Indices before the first and after the last vertex are outside, like the rim.
             let side = self.sides.get(vertex.wrapping_add_signed(step));
             neighbors |= u16::from(side == Some(&opposite)) << direction;
         }
         neighbors
     }
 
-    /// Moves vertices onto cut points that are too near, one after the other, and drops the cuts at their edges.
+    /// Moves vertices onto cut points that are too close, one after another, and drops the cuts at their edges.
     fn warp(&mut self) {
         let long = self.lattice.spacing;
         let short = long * (0.75_f64).sqrt();
@@ -326,7 +326,7 @@ impl Grid {
         }
     }
 
-    /// The cut on the edge in a direction from the inside vertex with this index in `near`.
+    /// Index of the cut on the edge in a direction from the inside vertex with this index in `near`.
     fn cut_at(&self, near_index: usize, direction: usize) -> usize {
         let Near {
             opposite, first, ..
@@ -339,7 +339,7 @@ impl Grid {
         vertex.wrapping_add_signed(self.steps[vertex % 2][direction])
     }
 
-    /// Doubles cells inside, up to `levels` times. All lattice tets at them are whole and in place.
+    /// Doubles cells inside, up to `levels` times. All lattice tets at them are uncut and have no moved vertices.
     pub(super) fn coarsen(&mut self, levels: u32) {
         let cells = self.lattice.cells;
         self.doubled = Doubled::new(cells, levels, |cell| {
@@ -347,14 +347,14 @@ impl Grid {
         });
     }
 
-    /// The number of tets that [`extract`](Self::extract) makes.
+    /// Number of tets that [`extract`](Self::extract) makes.
     pub(super) fn tet_count(&self) -> usize {
         let mut count = 0;
         self.fill_all(|_| count += 1);
         count
     }
 
-    /// Makes the mesh. `tets` is their number.
+    /// Creates the mesh; `tets` is its number of tets.
     pub(super) fn extract(&self, tets: usize) -> TetMesh {
         let mut output = Output {
             mesh: TetMesh {
@@ -370,9 +370,9 @@ impl Grid {
 
     /// Fills all lattice tets: four around each face between two cells.
     fn fill_all(&self, mut emit: impl FnMut([Node; 4])) {
-        /// The corners of a face across an axis, counterclockwise around it, relative to the center below the face.
+        /// Corners of a face across an axis, counterclockwise, relative to the center below the face.
         const RING: [[i32; 2]; 4] = [[-1, -1], [1, -1], [1, 1], [-1, 1]];
-        // The way from a center to the next one along each axis, and to the corners of the face between them.
+        // Index steps from a center to the next one along each axis, and to the corners of the face between them.
         let ways = [0, 1, 2].map(|axis| {
             let corners = RING.map(|[u, v]| {
                 let mut to = [1; 3];
@@ -383,7 +383,7 @@ impl Grid {
             (2 * axis + 1, corners)
         });
         let [nx, ny, nz] = self.lattice.cells;
-        // The faces of the last cells along each axis lie outside.
+        // The faces of the last cells along each axis are outside.
         let cells = (0..nz.saturating_sub(1)).flat_map(|z| {
             (0..ny.saturating_sub(1))
                 .flat_map(move |y| (0..nx.saturating_sub(1)).map(move |x| x + nx * (y + ny * z)))
@@ -414,7 +414,7 @@ impl Grid {
         });
     }
 
-    /// The index of a vertex.
+    /// Index of a vertex.
     #[expect(clippy::cast_sign_loss, reason = "callers stay inside the lattice")]
     fn vertex(&self, at: [i32; 3]) -> usize {
         let [nx, ny, _] = self.lattice.cells;
@@ -431,7 +431,7 @@ impl Grid {
     }
 }
 
-/// The mesh under construction, with the particles already made for lattice vertices and cuts.
+/// Mesh under construction, with the particles already made for lattice vertices and cuts.
 struct Output {
     mesh: TetMesh,
     vertices: Vec<u32>,

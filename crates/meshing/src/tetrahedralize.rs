@@ -1,15 +1,15 @@
-//! From a closed triangle surface to a body: isosurface stuffing of the inside of a [`Solid`].
+//! Fills a closed triangle surface: isosurface stuffing of the inside of a [`Solid`].
 //!
-//! The surface itself is not kept: its inside is sampled on a lattice, whose spacing is found by bisection such that
-//! the wanted number of tets comes out, and filled by the stencils of the module `stencil`. Edges and corners come out
-//! beveled over about a spacing, and parts thinner than that are lost or torn: every point of the result lies within a
-//! spacing of the surface, but not the other way around. A curved surface loses volume, as its chords lie inside.
-//! Dihedral angles keep the bound of [`stuff`](crate::stuff) whatever the surface. Where the body would touch itself at
-//! a single particle it is taken apart there; where it still touches itself along an edge, or falls into more pieces
-//! than the surface has shells, another place of the lattice is tried.
+//! The surface triangles are not kept: the inside is sampled on a lattice and filled by the stencils of the module
+//! `stencil`. Bisection finds the spacing for the requested number of tets. Edges and corners are beveled over about a
+//! spacing, and thinner parts are lost or torn: every point of the result lies within a spacing of the surface, but not
+//! vice versa. A curved surface loses volume, because its chords lie inside. Dihedral angles keep the bound of
+//! [`stuff`](crate::stuff) for every surface. Where the body would touch itself at a single particle it is separated
+//! there. If it still touches itself along an edge, or has more pieces than the surface has shells, another shift of
+//! the lattice is tried.
 //!
-//! Cost: some three to ten stuffings, six times as many where thin parts tear, each two samples a cell of the box
-//! around the surface at O(log n) for n triangles.
+//! Cost: some three to ten stuffings, six times as many where thin parts tear, each with two samples per cell of the
+//! bounding box at O(log n) for n triangles.
 
 use glam::{DMat3, DVec3};
 use incise_mesh::TetMesh;
@@ -17,27 +17,26 @@ use incise_mesh::TetMesh;
 use crate::search::{Wanted, cube_root, find_grid, shift, turned};
 use crate::{MeshingError, Solid};
 
-/// The distance that is told from far, in cube roots of the volume of a tet.
+/// Distance up to which distances are computed exactly, in cube roots of the mean tet volume.
 const REACH: f64 = 16.0;
-/// Places of the lattice that are tried, along the axes and turned.
+/// Number of lattice shifts that are tried, aligned and rotated.
 const SHIFTS: u32 = 6;
-/// The fewest and most tets that can be asked for.
+/// Range of the number of tets.
 const TETS: std::ops::RangeInclusive<usize> = 100..=4_000_000;
 
 /// Fills a solid with `tets` tets to within 2 %.
 ///
-/// `levels` says how often cells far enough inside may be doubled: 0 makes all tets alike, and each level more takes
-/// tets from the inside for finer ones at the surface, see [`stuff_graded`](crate::stuff_graded).
+/// `levels` is the largest number of doublings of inner cells: 0 gives tets of one size; each further level moves tets
+/// from the inside to a finer surface, see [`stuff_graded`](crate::stuff_graded).
 ///
-/// The mesh is sound ([`TetMesh::check`]) and its boundary a closed manifold. All dihedral angles lie between 9.3 and
-/// 161.7 degrees, see [`stuff`](crate::stuff). Pieces and handles are those of the solid as far as the spacing
-/// resolves them. The same bits come out on every platform.
+/// The mesh is valid ([`TetMesh::check`]) and its boundary a closed manifold. All dihedral angles lie between 9.3 and
+/// 161.7 degrees, see [`stuff`](crate::stuff). Pieces and handles match the solid where the spacing resolves them.
+/// Bit-identical on every platform.
 ///
 /// # Errors
-/// [`MeshingError::Surface`] if fewer than 100 or more than four million tets are asked for, or if no lattice was found
-/// with which that many come out and the body does not touch itself: thin parts need more.
-/// [`MeshingError::Lattice`] if the box around the solid has too many cells, as that of a thin long body across its
-/// box.
+/// [`MeshingError::Surface`] if fewer than 100 or more than four million tets are requested, or if no lattice gives
+/// that number and a body that does not touch itself: thin parts need more tets. [`MeshingError::Lattice`] if the
+/// bounding box of the solid has too many cells, as for a thin body along the diagonal of its box.
 ///
 /// # Example
 /// ```
@@ -63,7 +62,7 @@ pub fn tetrahedralize(solid: &Solid, tets: usize, levels: u32) -> Result<TetMesh
     }
     let mut touching = false;
     for turn in [DMat3::IDENTITY, turned()] {
-        // Where thin parts tear, others may on a lattice that lies elsewhere; the first with the fewest pieces is kept.
+        // Thin parts tear on some lattice shifts and not on others; the first result with the fewest pieces is kept.
         let mut torn: Option<(usize, TetMesh)> = None;
         for n in 0..SHIFTS {
             match search(solid, tets, levels, turn, shift(n))? {
@@ -97,7 +96,7 @@ enum Found {
     Nothing,
 }
 
-/// Fills the solid on a lattice turned and shifted in a given way.
+/// Fills the solid on a lattice with a given rotation and shift.
 fn search(
     solid: &Solid,
     tets: usize,
@@ -106,7 +105,7 @@ fn search(
     shift: DVec3,
 ) -> Result<Found, MeshingError> {
     let center = solid.low().midpoint(solid.high());
-    // The box around the solid as seen along the axes of the lattice.
+    // Bounding box of the solid along the axes of the lattice.
     let half = turn.transpose().abs() * (0.5 * (solid.high() - solid.low()));
     let place = |p: DVec3| center + turn * p;
     let wanted = Wanted {
@@ -114,7 +113,7 @@ fn search(
         volume: solid.volume(),
         levels,
     };
-    // Knowing more of the distance saves samples, but takes longer to find out.
+    // A larger reach saves samples, but makes each distance query slower.
     let reach = REACH * cube_root(solid.volume() / tets as f64);
     let distance = |p| solid.signed_distance_within(place(p), reach);
     let Some((grid, count)) = find_grid(half, shift, &wanted, &distance)? else {

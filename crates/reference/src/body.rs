@@ -1,4 +1,4 @@
-//! [`Body`]: particles, tets and the state that steps change.
+//! [`Body`]: particles, tets and the state that steps update.
 
 use glam::{DMat3, DVec3};
 
@@ -10,8 +10,8 @@ use crate::{Material, ReferenceError, Report};
 
 /// A soft body of linear tets with lumped masses.
 ///
-/// The state is public: move a fixed particle between steps to prescribe its motion. The tets and what follows from
-/// them (masses, the pattern of the matrix and its ordering) stay as they were made.
+/// The state is public: move a fixed particle between steps to prescribe its motion. The tets and the data derived from
+/// them (masses, the sparsity pattern of the matrix and its ordering) do not change.
 ///
 /// ```
 /// use glam::DVec3;
@@ -29,11 +29,11 @@ use crate::{Material, ReferenceError, Report};
 /// ```
 #[derive(Debug)]
 pub struct Body {
-    /// The position of each particle in m.
+    /// Position of each particle in m.
     pub positions: Vec<DVec3>,
-    /// The velocity of each particle in m/s. That of a fixed particle is neither read nor written.
+    /// Velocity of each particle in m/s. The velocity of a fixed particle is neither read nor written.
     pub velocities: Vec<DVec3>,
-    /// Which particles stay where they are put. A particle of no tet has no mass and stays, too.
+    /// Marks the particles that do not move. A particle that belongs to no tet has no mass and is fixed too.
     pub fixed: Vec<bool>,
     pub(crate) masses: Vec<f64>,
     pub(crate) elements: Vec<Element>,
@@ -43,14 +43,14 @@ pub struct Body {
 /// Energies in J.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Energy {
-    /// Of the motion of the particles that are not fixed.
+    /// Kinetic energy of the particles that are not fixed.
     pub kinetic: f64,
-    /// Of deformation; 0 at rest, its minimum.
+    /// Elastic energy; 0 at rest, its minimum.
     pub elastic: f64,
 }
 
 impl Body {
-    /// A body at rest in the shape of `positions`; `material` gives the material of each tet.
+    /// Creates a body at rest in the shape of `positions`; `material` gives the material of each tet.
     ///
     /// Each corner of a tet gets a quarter of its mass. O(tets), and the symbolic factorization.
     ///
@@ -92,13 +92,13 @@ impl Body {
         })
     }
 
-    /// The mass of each particle in kg.
+    /// Mass of each particle in kg.
     #[must_use]
     pub fn masses(&self) -> &[f64] {
         &self.masses
     }
 
-    /// The deformation gradient of a tet.
+    /// Deformation gradient of a tet.
     ///
     /// # Panics
     /// If the tet does not exist.
@@ -107,7 +107,7 @@ impl Body {
         self.elements[tet].deformation(&self.positions)
     }
 
-    /// The elastic force on each particle in N; on a fixed one, what its support has to resist. O(tets).
+    /// Elastic force on each particle in N; the support of a fixed particle carries it. O(tets).
     #[must_use]
     pub fn elastic_forces(&self) -> Vec<DVec3> {
         let mut forces = vec![DVec3::ZERO; self.positions.len()];
@@ -120,7 +120,7 @@ impl Body {
         forces
     }
 
-    /// The energies of the present state. O(tets).
+    /// Energies of the current state. O(tets).
     #[must_use]
     pub fn energy(&self) -> Energy {
         let moving = (0..self.positions.len()).filter(|&p| !self.fixed[p]);
@@ -135,9 +135,9 @@ impl Body {
         }
     }
 
-    /// The number of tets with no volume or a negative one. O(tets).
+    /// Number of tets with zero or negative volume. O(tets).
     ///
-    /// An equilibrium with inverted tets is one of several; ask for this after large steps and violent loads.
+    /// An equilibrium with inverted tets is one of several; check this count after large steps and large loads.
     #[must_use]
     pub fn inverted(&self) -> usize {
         let inverted = |e: &&Element| e.deformation(&self.positions).determinant() <= 0.0;
@@ -147,20 +147,20 @@ impl Body {
     /// Advances by `time_step` s under `gravity` in m/s², by implicit Euler.
     ///
     /// The new positions are a minimum of `Σ m/2 |x - x̃|²/Δt² + U(x)` with the prediction `x̃ = x + Δt v + Δt² g`,
-    /// found by Newton's method: see [`Report`] for what that promises. Fixed particles stay where they were put. Of
-    /// several minima, which large steps have, it is the one found downhill from the prediction or from the present
-    /// state, whichever has less of this sum.
+    /// found by Newton's method: see [`Report`] for its accuracy. Fixed particles stay at their positions. Large steps
+    /// can have several minima; the result is the one found downhill from the prediction or from the current state,
+    /// whichever has the lower potential.
     ///
     /// # Errors
     /// [`ReferenceError::Setting`] for a time step that is not positive or a gravity that is not finite,
     /// [`ReferenceError::NotFinite`] for the state, [`ReferenceError::NotConverged`] and [`ReferenceError::Range`] if
-    /// there is no solution to report. Then the body is as it was.
+    /// no solution was found. The body is unchanged on an error.
     ///
     /// # Panics
-    /// If the public lists do not have an entry for each particle.
+    /// If the public lists do not have one entry per particle.
     ///
     /// # Determinism
-    /// One thread; the same bits on the same kind of processor.
+    /// One thread; bit-identical results on processors of one kind.
     pub fn step(&mut self, time_step: f64, gravity: DVec3) -> Result<Report, ReferenceError> {
         let _span = tracing::debug_span!("reference::step").entered();
         let rate = 1.0 / (time_step * time_step);
@@ -187,17 +187,18 @@ impl Body {
         Ok(report)
     }
 
-    /// Moves the body to a static equilibrium under `gravity` in m/s², downhill from where it is; velocities become
-    /// zero.
+    /// Moves the body to a static equilibrium under `gravity` in m/s², downhill from its current state; velocities
+    /// become zero.
     ///
     /// # Errors
-    /// [`ReferenceError::NotHeld`] if a piece could drift or turn, and as [`Body::step`]. Then the body is as it was.
+    /// [`ReferenceError::NotHeld`] if a piece can translate or rotate freely, and the errors of [`Body::step`]. The
+    /// body is unchanged on an error.
     ///
     /// # Panics
-    /// If the public lists do not have an entry for each particle.
+    /// If the public lists do not have one entry per particle.
     ///
     /// # Determinism
-    /// One thread; the same bits on the same kind of processor.
+    /// One thread; bit-identical results on processors of one kind.
     pub fn settle(&mut self, gravity: DVec3) -> Result<Report, ReferenceError> {
         let _span = tracing::debug_span!("reference::settle").entered();
         self.check(gravity)?;
@@ -238,7 +239,7 @@ impl Body {
             .collect()
     }
 
-    /// Takes over a solution if it is finite.
+    /// Stores a solution if it is finite.
     fn commit(
         &mut self,
         held: &[bool],

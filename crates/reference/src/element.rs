@@ -1,4 +1,4 @@
-//! [`Element`]: a linear tet, which turns functions of the deformation gradient into functions of four corners.
+//! [`Element`]: a linear tet, which maps functions of the deformation gradient to functions of its four corners.
 //!
 //! The deformation gradient is constant in a linear tet: `F = Σ x_a ⊗ ∇λ_a` over the corners a, with the gradients of
 //! the barycentric coordinates λ of the rest shape. Forces and stiffness are chain rules through it.
@@ -8,7 +8,7 @@ use glam::{DMat3, DVec3};
 
 use crate::{Material, ReferenceError, StableNeoHookean};
 
-/// A tet with what is needed of its rest shape.
+/// A tet with the precomputed data of its rest shape.
 #[derive(Clone, Debug)]
 pub(crate) struct Element {
     pub(crate) particles: [u32; 4],
@@ -20,7 +20,7 @@ pub(crate) struct Element {
 }
 
 impl Element {
-    /// The tet number `tet` with rest shape `rest`.
+    /// Creates the element of tet number `tet` with rest shape `rest`.
     pub(crate) fn new(
         tet: usize,
         particles: [u32; 4],
@@ -45,14 +45,15 @@ impl Element {
         })
     }
 
-    /// The deformation gradient with the corners at `x`.
+    /// Deformation gradient for corners at `x`.
     pub(crate) fn deformation(&self, x: &[DVec3]) -> DMat3 {
         let [a, b, c, d] = self.particles.map(|p| x[p as usize]);
         let [_, p, q, r] = self.gradients;
         outer(b - a, p) + outer(c - a, q) + outer(d - a, r)
     }
 
-    /// The blocks of the stiffness matrix: entry `[a][b]` is the derivative of minus the force on corner a by corner b.
+    /// Blocks of the stiffness matrix: entry `[a][b]` is the derivative of minus the force on corner a with respect to
+    /// corner b.
     pub(crate) fn stiffness(&self, h: &crate::Matrix9) -> [[DMat3; 4]; 4] {
         let blocks: [[DMat3; 3]; 3] = std::array::from_fn(|i| {
             std::array::from_fn(|j| {
@@ -63,7 +64,7 @@ impl Element {
         });
         let g = self.gradients.map(|g| g.to_array());
         std::array::from_fn(|a| {
-            // First over the columns of F at corner a, then at corner b.
+            // Contract over the columns of F at corner a, then at corner b.
             let half: [DMat3; 3] = std::array::from_fn(|j| {
                 blocks[0][j] * g[a][0] + blocks[1][j] * g[a][1] + blocks[2][j] * g[a][2]
             });

@@ -1,25 +1,25 @@
-//! What can be wrong with a body, a step, or its solution.
+//! Errors of bodies, steps and solutions.
 
-/// A body that cannot be, a step that cannot be taken, or one that was not solved.
+/// Error of a body, of the arguments of a step, or of its solution.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReferenceError {
-    /// A number of a material outside its range.
+    /// A material constant outside its range.
     #[error("the material's {what} is {value}; it must be {range}")]
     Material {
-        /// Which number.
+        /// Name of the constant.
         what: &'static str,
-        /// What it was.
+        /// Value given.
         value: f64,
-        /// What it may be.
+        /// Allowed range.
         range: &'static str,
     },
-    /// A tet that names a particle that does not exist.
+    /// A tet with a particle index that does not exist.
     #[error("tet {tet} names particle {particle}, but there are only {particles}")]
     NoParticle {
         /// The tet.
         tet: usize,
-        /// What it names.
+        /// Index given.
         particle: u32,
         /// The number of particles.
         particles: usize,
@@ -37,22 +37,22 @@ pub enum ReferenceError {
     /// A position or velocity that is infinite or not a number.
     #[error("the {what} of particle {particle} is not finite")]
     NotFinite {
-        /// Position or velocity.
+        /// `position` or `velocity`.
         what: &'static str,
         /// The particle.
         particle: usize,
     },
-    /// A number of a step outside its range.
+    /// An argument of a step outside its range.
     #[error("the {what} is {value}; it must be {range}")]
     Setting {
-        /// Which number.
+        /// Name of the argument.
         what: &'static str,
-        /// What it was.
+        /// Value given.
         value: f64,
-        /// What it may be.
+        /// Allowed range.
         range: &'static str,
     },
-    /// A piece that has no unique equilibrium because it is not held.
+    /// A piece without a unique equilibrium because it has too few fixed particles.
     #[error(
         "the piece of particle {particle} can turn or drift; fix three of its particles that are not on one line"
     )]
@@ -60,22 +60,22 @@ pub enum ReferenceError {
         /// One of its particles.
         particle: usize,
     },
-    /// Newton's method did not reach the residual that it promises. The body is as it was.
+    /// Newton's method did not reach the required residual. The body is unchanged.
     #[error(
         "after {iterations} iterations a force of {residual:e} N is left, of {scale:e} N at play; use a smaller step or approach the load in parts"
     )]
     NotConverged {
         /// Iterations taken.
         iterations: usize,
-        /// Norm of the forces out of balance in N.
+        /// Norm of the unbalanced forces in N.
         residual: f64,
-        /// Norm of the forces at play in N.
+        /// Norm of the acting forces in N.
         scale: f64,
     },
-    /// Forces or energies leave the range of double precision.
+    /// Forces or energies exceed the range of double precision.
     #[error("the forces or energies of this state leave the range of double precision")]
     Range,
-    /// The matrix is too large for the memory or its indices.
+    /// The matrix is too large for memory or for its index type.
     #[error("the matrix of {particles} particles does not fit into memory")]
     Memory {
         /// The number of particles.

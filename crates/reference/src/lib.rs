@@ -1,8 +1,8 @@
-//! Reference solutions for soft bodies: what fast solvers are measured against.
+//! Reference solutions for soft bodies, as a ground truth for fast solvers.
 //!
 //! Stable Neo-Hookean tets by implicit Euler in double precision. Each step is solved by Newton's method, with an exact
-//! Hessian and a sparse Cholesky factorization, until the force out of balance is 1e-10 of the forces at play; if that
-//! cannot be reached, the step is an error and not a result. [`Body::settle`] finds static equilibria in the same way.
+//! Hessian and a sparse Cholesky factorization, until the unbalanced force is 1e-10 of the acting forces; a step that
+//! does not reach this returns an error. [`Body::settle`] finds static equilibria in the same way.
 //!
 //! ```
 //! use glam::DVec3;
@@ -25,8 +25,8 @@
 //! # Ok::<(), incise_reference::ReferenceError>(())
 //! ```
 //!
-//! Implicit Euler is of first order and damps: its limit for small steps is the exact motion of the tets. It shares no
-//! code with any solver that is measured against it.
+//! Implicit Euler is of first order and adds damping; for small steps it converges to the exact motion of the tets. The
+//! crate shares no code with the solvers that are compared with it.
 
 mod body;
 mod element;

@@ -1,4 +1,4 @@
-//! [`Material`]: what a tet is made of, in engineering constants.
+//! [`Material`]: engineering constants of a tet.
 
 use crate::{ReferenceError, StableNeoHookean};
 
@@ -17,7 +17,7 @@ impl Material {
     /// Checks that each value lies in its range.
     ///
     /// # Errors
-    /// [`ReferenceError::Material`] names the first value that does not.
+    /// [`ReferenceError::Material`] names the first value outside its range.
     pub fn check(&self) -> Result<(), ReferenceError> {
         let refuse = |what, value, range| Err(ReferenceError::Material { what, value, range });
         for (what, value) in [
@@ -38,10 +38,10 @@ impl Material {
         Ok(())
     }
 
-    /// Its energy as a function of the deformation gradient.
+    /// Energy density as a function of the deformation gradient.
     ///
-    /// With Lamé's `λ = 2 μ ν / (1 - 2 ν)` the volume term has the factor `l = λ + μ = μ / (1 - 2 ν)` and rests at
-    /// `γ = 1 + μ / l = 2 (1 - ν)`.
+    /// With Lamé's `λ = 2 μ ν / (1 - 2 ν)` the volume term has the factor `l = λ + μ = μ / (1 - 2 ν)` and is zero at `γ
+    /// = 1 + μ / l = 2 (1 - ν)`.
     #[must_use]
     pub fn law(&self) -> StableNeoHookean {
         let nu = self.poisson_ratio;

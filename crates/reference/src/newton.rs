@@ -1,16 +1,16 @@
 //! Newton's method on the incremental potential.
 //!
-//! The unknowns are the displacements d from the positions at the start, not positions: inertia compares them with
-//! `Δt v`, and a difference of positions would be wrong by their last digit over the square of the step. With
-//! `k = 1/Δt²` (0 in statics) the potential is `Σ m (k/2 |d - Δt v|² - g · d) + U(x + d)`.
+//! The unknowns are the displacements d from the start, not positions: inertia compares d with `Δt v`, and a difference
+//! of positions would divide their rounding error by the square of the step. With `k = 1/Δt²` (0 in statics) the
+//! potential is `Σ m (k/2 |d - Δt v|² - g · d) + U(x + d)`.
 //!
-//! An iteration solves with the exact Hessian, which converges quadratically; where that is not positive definite, it
-//! takes the Hessian with the eigenvalues of each tet clamped, which goes downhill. Halving until the potential has
-//! decreased enough (Armijo's rule) makes it converge from anywhere. Near the end the decrease drowns in rounding, so
-//! the rule allows for as much; what ends the iterations is the force out of balance.
+//! An iteration solves with the exact Hessian, which converges quadratically. If that is not positive definite, the
+//! iteration uses the Hessian with the eigenvalues of each tet clamped, which gives a descent direction. Backtracking
+//! until the potential has decreased enough (Armijo's rule) makes it converge from any start. Near the end the decrease
+//! is below rounding, so the rule has a tolerance for rounding; the iterations stop by the unbalanced force.
 //!
 //! Source: Nocedal and Wright 2006, chapters 3.1 and 3.4; Teran et al. 2005 (clamping).
-//! Cost: a factorization per iteration, sometimes two, and a pass over the tets per trial.
+//! Cost: one factorization per iteration, sometimes two, and a pass over the tets per trial.
 
 use glam::DVec3;
 
@@ -18,77 +18,77 @@ use crate::element::Element;
 use crate::system::System;
 use crate::{ReferenceError, clamp_eigenvalues};
 
-/// The force out of balance as a fraction of the forces at play at which a solution is accepted.
+/// Accepted unbalanced force as a fraction of the acting forces.
 const TOLERANCE: f64 = 1e-10;
-/// Iterations after which a solution is given up.
+/// Iterations before the solution fails.
 const MAX_ITERATIONS: usize = 500;
-/// Halvings after which a direction is given up: then it is a 10¹⁸th.
+/// Step halvings before a direction is rejected: the step is then about 1e-18.
 const MAX_HALVINGS: usize = 60;
-/// The share of the predicted decrease that is enough.
+/// Sufficient fraction of the predicted decrease.
 const ARMIJO: f64 = 1e-4;
-/// The smallest eigenvalue of a tet's stiffness after clamping, in shear moduli.
+/// Smallest eigenvalue of a tet's stiffness after clamping, in shear moduli.
 const FLOOR: f64 = 1e-3;
 /// Rounding of a sum of a few terms, in units of their size.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
-/// How well a step was solved.
+/// Accuracy of a solved step.
 ///
-/// A solution is accepted when the force out of balance is at most 1e-10 of the forces at play, or at most what
-/// rounding alone can cause: at rest nothing else is left. The forces at play are the elastic forces on all particles,
-/// inertia and gravity; their norms are added.
+/// A solution is accepted when the unbalanced force is at most 1e-10 of the acting forces, or at most the rounding
+/// error: at rest nothing else is left. The acting forces are the elastic forces on all particles, inertia and gravity;
+/// their norms are added.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
-    /// Norms of the force out of balance in N, at the start and after each iteration. Towards the end each is about
-    /// the square of the one before, in proportion.
+    /// Norms of the unbalanced force in N, at the start and after each iteration. Relative to the scale, each is about
+    /// the square of the previous one near the end.
     pub residuals: Vec<f64>,
-    /// Norm of the forces at play in N.
+    /// Norm of the acting forces in N.
     pub scale: f64,
-    /// What rounding may leave of the force out of balance in N, an upper estimate.
+    /// Upper estimate of the rounding error of the unbalanced force in N.
     pub rounding: f64,
-    /// Iterations in which the Hessian was not positive definite and had to be changed.
+    /// Iterations with a Hessian that was not positive definite and was clamped.
     pub clamped: usize,
 }
 
 impl Report {
-    /// Newton iterations taken: factorizations, but for those of matrices that were not positive definite.
+    /// Newton iterations: the number of factorizations, except those of matrices that were not positive definite.
     #[must_use]
     pub fn iterations(&self) -> usize {
         self.residuals.len() - 1
     }
 
-    /// Norm of the force out of balance in N.
+    /// Norm of the unbalanced force in N after the last iteration.
     #[must_use]
     pub fn residual(&self) -> f64 {
         self.residuals.last().copied().unwrap_or(0.0)
     }
 }
 
-/// The body whose potential it is.
+/// Borrowed parts of a body.
 pub(crate) struct Parts<'a> {
-    /// At the start.
+    /// Positions at the start.
     pub(crate) positions: &'a [DVec3],
     pub(crate) masses: &'a [f64],
     pub(crate) elements: &'a [Element],
     pub(crate) system: &'a mut System,
 }
 
-/// What is to be minimized.
+/// Minimization problem of a step.
 pub(crate) struct Problem {
-    /// One over the square of the time step, 0 in statics.
+    /// Reciprocal of the squared time step, 0 in statics.
     pub(crate) rate: f64,
-    /// Displacement of each particle by its velocity.
+    /// Displacement of each particle by its velocity over the step.
     pub(crate) inertial: Vec<DVec3>,
     pub(crate) gravity: DVec3,
     /// Particles that do not move.
     pub(crate) held: Vec<bool>,
 }
 
-/// The potential and its gradient at some displacements.
+/// Potential and its gradient at given displacements.
 struct Evaluation {
     energy: f64,
-    /// What rounding may do to the energy.
+    /// Bound of the rounding error of the energy.
     energy_rounding: f64,
-    /// Forces out of balance, with opposite sign; zero where held.
+    /// Negative unbalanced forces; zero at fixed particles.
     gradient: Vec<DVec3>,
     residual: f64,
     scale: f64,
@@ -106,7 +106,7 @@ impl Evaluation {
     }
 }
 
-/// The displacements of a minimum, found downhill from no displacement or from `start`, whichever is lower.
+/// Minimizes the potential, downhill from zero displacement or from `start`, whichever is lower.
 pub(crate) fn minimize(
     body: &mut Parts<'_>,
     problem: &Problem,
@@ -149,7 +149,7 @@ pub(crate) fn minimize(
     Ok((d, report))
 }
 
-/// One iteration; `None` if no direction goes downhill.
+/// Does one iteration; `None` if no descent direction was found.
 fn improve(
     body: &mut Parts<'_>,
     problem: &Problem,
@@ -171,7 +171,8 @@ fn improve(
     Ok(None)
 }
 
-/// The first of the whole direction, its half, its quarter and so on that decreases the potential enough.
+/// Backtracking line search: returns the first of the full step, its half, its quarter and so on with a sufficient
+/// decrease.
 fn search(
     body: &Parts<'_>,
     problem: &Problem,
@@ -209,7 +210,7 @@ fn evaluate(body: &Parts<'_>, problem: &Problem, d: &[DVec3]) -> Evaluation {
     let x: Vec<DVec3> = body.positions.iter().zip(d).map(|(x, d)| x + d).collect();
     let (mut energy, mut energy_terms) = (0.0, 0.0);
     let mut gradient = vec![DVec3::ZERO; x.len()];
-    // What rounding may leave of the force on each particle.
+    // Rounding error of the force on each particle.
     let mut noise = vec![0.0; x.len()];
     for element in body.elements {
         let f = element.deformation(&x);
@@ -227,7 +228,7 @@ fn evaluate(body: &Parts<'_>, problem: &Problem, d: &[DVec3]) -> Evaluation {
             .iter()
             .map(|g| g.length())
             .fold(0.0, f64::max);
-        // Terms that cancel, and the last digit of the positions on its way through the stiffness.
+        // Cancellation between terms, and rounding of the positions multiplied by the stiffness.
         let stress_noise = law.stress_terms(f) + law.stiffness_bound(f) * steepest * far;
         for (p, g) in element.particles.into_iter().zip(element.gradients) {
             gradient[p as usize] += stress * g * element.volume;
@@ -271,7 +272,7 @@ fn evaluate(body: &Parts<'_>, problem: &Problem, d: &[DVec3]) -> Evaluation {
     }
 }
 
-/// Fills the matrix with the Hessian, if asked with the eigenvalues of each tet clamped.
+/// Assembles the Hessian, with the eigenvalues of each tet clamped if `clamp` is set.
 fn assemble(body: &mut Parts<'_>, problem: &Problem, d: &[DVec3], clamp: bool) {
     let x: Vec<DVec3> = body.positions.iter().zip(d).map(|(x, d)| x + d).collect();
     let system = &mut *body.system;

@@ -1,11 +1,11 @@
-//! Which pieces of a body are held so that they have a unique equilibrium near by.
+//! Check that the fixed particles of each piece give it a unique equilibrium nearby.
 //!
-//! Pieces are joined by shared particles (union-find with path halving); one is held if three of its fixed particles
-//! are not on one line. Cost: near O(tets).
+//! Pieces are connected by shared particles (union-find with path halving); a piece is held if three of its fixed
+//! particles are not collinear. Cost: near O(tets).
 
 use glam::DVec3;
 
-/// A particle of a piece whose held particles let it drift or turn, the first by number.
+/// Returns the lowest particle of a piece that can translate or rotate freely; `None` if all pieces are held.
 pub(crate) fn first_not_held(
     positions: &[DVec3],
     tets: impl Iterator<Item = [u32; 4]>,
@@ -28,7 +28,7 @@ pub(crate) fn first_not_held(
     (0..positions.len()).find(|&p| !held[p] && supports[root(&mut parent, p)] != Support::Held)
 }
 
-/// What the held particles of a piece span.
+/// Span of the fixed particles of a piece.
 #[derive(Clone, Copy, PartialEq)]
 enum Support {
     None,
@@ -42,7 +42,7 @@ impl Support {
         *self = match *self {
             Self::None => Self::Point(x),
             Self::Point(a) if a != x => Self::Line(a, x),
-            // An angle above rounding.
+            // The angle has to exceed rounding.
             Self::Line(a, b)
                 if (b - a).cross(x - a).length() > 1e-9 * (b - a).length() * (x - a).length() =>
             {

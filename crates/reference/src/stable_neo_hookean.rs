@@ -11,7 +11,7 @@ use glam::{DMat3, DVec3};
 
 use crate::symmetric::Matrix9;
 
-/// A Stable Neo-Hookean material by the constants of its energy; [`crate::Material::law`] computes them.
+/// Stable Neo-Hookean material, given by the constants of its energy; [`crate::Material::law`] computes them.
 ///
 /// ```
 /// use glam::DMat3;
@@ -28,30 +28,30 @@ use crate::symmetric::Matrix9;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StableNeoHookean {
-    /// The shear modulus μ in Pa.
+    /// Shear modulus μ in Pa.
     pub mu: f64,
-    /// The factor `l` of the volume term in Pa: Lamé's λ plus μ.
+    /// Factor `l` of the volume term in Pa: Lamé's λ plus μ.
     pub l: f64,
-    /// The value of `det F` at which the volume term is zero: `1 + μ/l`.
+    /// Value of `det F` at which the volume term is zero: `1 + μ/l`.
     pub gamma: f64,
 }
 
 impl StableNeoHookean {
-    /// The energy density Ψ(F) in J/m³: 0 at rest, its minimum.
+    /// Energy density Ψ(F) in J/m³: 0 at rest, its minimum.
     #[must_use]
     pub fn energy_density(&self, f: DMat3) -> f64 {
         let j = f.determinant();
-        // (J - γ)² - (1 - γ)² as a product: near rest little is left of the difference.
+        // (J - γ)² - (1 - γ)² as a product: the difference would lose its digits to cancellation near rest.
         0.5 * (self.mu * (square(f) - 3.0) + self.l * (j - 1.0) * (j + 1.0 - 2.0 * self.gamma))
     }
 
-    /// The first Piola-Kirchhoff stress `∂Ψ/∂F` in Pa.
+    /// First Piola-Kirchhoff stress `∂Ψ/∂F` in Pa.
     #[must_use]
     pub fn stress(&self, f: DMat3) -> DMat3 {
         f * self.mu + cofactor(f) * (self.l * (f.determinant() - self.gamma))
     }
 
-    /// The stiffness `∂²Ψ/∂F²` in Pa, with the entries of F in the order of its columns.
+    /// Stiffness `∂²Ψ/∂F²` in Pa, with the entries of F in column-major order.
     #[must_use]
     pub fn stiffness(&self, f: DMat3) -> Matrix9 {
         let g = cofactor(f).to_cols_array();
@@ -61,7 +61,7 @@ impl StableNeoHookean {
         for (i, row) in h.iter_mut().enumerate() {
             row[i] += self.mu;
         }
-        // ∂cof F/∂F: by f₁ × f₂ = [f₁] f₂ and its turns, blocks of cross products off the diagonal.
+        // ∂cof F/∂F: from f₁ × f₂ = [f₁] f₂ and its cyclic permutations, off-diagonal blocks of cross products.
         for (i, j, axis) in [(0, 1, -f.z_axis), (0, 2, f.y_axis), (1, 2, -f.x_axis)] {
             let cross = cross_matrix(axis * pressure);
             for (c, column) in cross.iter().enumerate() {
@@ -74,39 +74,39 @@ impl StableNeoHookean {
         h
     }
 
-    /// What bounds the size of each term of the stress, in Pa: near rest the terms cancel and only their rounding is
+    /// Bound of the size of each term of the stress, in Pa: near rest the terms cancel and only their rounding error is
     /// left.
     pub(crate) fn stress_terms(&self, f: DMat3) -> f64 {
         let cofactor = square(cofactor(f)).sqrt();
         self.mu * square(f).sqrt() + self.l * (f.determinant().abs() + self.gamma) * cofactor
     }
 
-    /// What bounds the size of each term of the energy density, in J/m³: near rest the terms cancel and only their
-    /// rounding is left.
+    /// Bound of the size of each term of the energy density, in J/m³: near rest the terms cancel and only their
+    /// rounding error is left.
     pub(crate) fn energy_terms(&self, f: DMat3) -> f64 {
         let bulge = f.determinant().abs() + self.gamma;
         0.5 * self.mu * (square(f) + 3.0) + 0.5 * self.l * bulge * bulge
     }
 
-    /// What bounds the norm of the stiffness, in Pa.
+    /// Bound of the norm of the stiffness, in Pa.
     pub(crate) fn stiffness_bound(&self, f: DMat3) -> f64 {
         let pressure = self.l * (f.determinant() - self.gamma).abs();
         self.mu + self.l * square(cofactor(f)) + pressure * square(f).sqrt()
     }
 }
 
-/// The derivative of the determinant.
+/// Cofactor matrix: the derivative of the determinant.
 fn cofactor(f: DMat3) -> DMat3 {
     let (a, b, c) = (f.x_axis, f.y_axis, f.z_axis);
     DMat3::from_cols(b.cross(c), c.cross(a), a.cross(b))
 }
 
-/// The squared Frobenius norm.
+/// Squared Frobenius norm.
 fn square(f: DMat3) -> f64 {
     f.x_axis.length_squared() + f.y_axis.length_squared() + f.z_axis.length_squared()
 }
 
-/// The columns of the matrix that takes the cross product with `a` from the left.
+/// Columns of the cross-product matrix of `a`.
 fn cross_matrix(a: DVec3) -> [DVec3; 3] {
     [a.cross(DVec3::X), a.cross(DVec3::Y), a.cross(DVec3::Z)]
 }

@@ -1,19 +1,19 @@
-//! Symmetric 9×9 matrices: are they positive definite, and if not, the nearest ones that are.
+//! Symmetric 9×9 matrices: test for positive definiteness and clamping of eigenvalues.
 //!
-//! The stiffness of a tet may have negative eigenvalues where the tet is compressed or inverted. Raised to a small
-//! positive value they give a direction of VBD (Teran et al. 2005). Most tets need none of it, and a Cholesky
-//! factorization tells which; the others get all their eigenvalues by Jacobi's method of cyclic rotations
-//! (Golub and Van Loan, section 8.5), which is accurate to rounding without any condition.
+//! The stiffness of a tet may have negative eigenvalues where the tet is compressed or inverted. Raising them to a
+//! small positive value gives a descent direction (Teran et al. 2005). Most tets do not need it; a Cholesky
+//! factorization decides. For the others Jacobi's method of cyclic rotations (Golub and Van Loan, section 8.5) computes
+//! all eigenvalues, accurate to rounding for any matrix.
 //!
-//! Cost: 250 operations for a positive definite matrix, about 30,000 for another.
+//! Cost: 250 operations for a positive definite matrix, about 30,000 otherwise.
 
 /// A symmetric 9×9 matrix, row by row.
 pub type Matrix9 = [[f64; 9]; 9];
 
-/// Sweeps of rotations; convergence is quadratic and takes five to eight.
+/// Largest number of sweeps of rotations; convergence is quadratic and takes five to eight.
 const SWEEPS: usize = 30;
 
-/// Raises eigenvalues of a symmetric matrix that are below `floor` to `floor`; tells whether there were any.
+/// Raises eigenvalues of a symmetric matrix below `floor` to `floor`; returns true if there were any.
 ///
 /// ```
 /// use incise_reference::clamp_eigenvalues;
@@ -43,7 +43,7 @@ pub fn clamp_eigenvalues(h: &mut Matrix9, floor: f64) -> bool {
     true
 }
 
-/// Whether all eigenvalues are above `floor`, by the pivots of a Cholesky factorization.
+/// Tests by the pivots of a Cholesky factorization that all eigenvalues are above `floor`.
 fn exceeds(h: &Matrix9, floor: f64) -> bool {
     let mut l = [[0.0; 9]; 9];
     for j in 0..9 {
@@ -60,7 +60,7 @@ fn exceeds(h: &Matrix9, floor: f64) -> bool {
     true
 }
 
-/// Eigenvalues and, in the same order, orthonormal eigenvectors.
+/// Eigenvalues and, in the order of these, orthonormal eigenvectors.
 fn eigen(h: &Matrix9) -> ([f64; 9], Matrix9) {
     let mut a = *h;
     let mut vectors: Matrix9 = std::array::from_fn(|i| std::array::from_fn(|j| f64::from(i == j)));
@@ -82,13 +82,13 @@ fn eigen(h: &Matrix9) -> ([f64; 9], Matrix9) {
     (std::array::from_fn(|i| a[i][i]), vectors)
 }
 
-/// Turns rows and columns p and q so that their common entry vanishes.
+/// Rotates rows and columns p and q so that their common entry becomes zero.
 fn rotate(a: &mut Matrix9, vectors: &mut Matrix9, p: usize, q: usize) {
     if a[p][q] == 0.0 {
         return;
     }
     let slope = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-    // The smaller of both angles; for a huge slope the root may overflow, and then the angle is zero.
+    // The smaller of the two angles; for a very large slope the root may overflow, and the angle is then zero.
     let tangent = slope.signum() / (slope.abs() + slope.hypot(1.0));
     let cosine = 1.0 / tangent.hypot(1.0);
     let sine = tangent * cosine;

@@ -1,8 +1,8 @@
 //! [`System`]: the sparse matrix of Newton's method, and its Cholesky factorization.
 //!
-//! Particles that share a tet share a 3×3 block; of the symmetric matrix only the lower triangle is kept, column by
-//! column. Pattern, ordering and symbolic factorization depend on the tets alone and are made once. A particle that is
-//! held keeps its rows, as those of the identity, so that holding and releasing changes no pattern.
+//! Particles that share a tet share a 3×3 block; only the lower triangle of the symmetric matrix is stored, by columns.
+//! Pattern, ordering and symbolic factorization depend on the tets alone and are computed once. A fixed particle has
+//! rows of the identity, so that fixing and releasing particles does not change the pattern.
 //!
 //! Cost: O(tets) to assemble; a factorization of n particles takes about n² operations in three dimensions.
 
@@ -18,10 +18,10 @@ use crate::ReferenceError;
 
 /// A symmetric matrix over the coordinates of particles.
 pub(crate) struct System {
-    /// For each particle p the particles after it that share a tet with it, ascending.
+    /// Offsets of the neighbors of each particle p: the particles after p that share a tet with it, ascending.
     neighbor_offsets: Vec<usize>,
     neighbors: Vec<u32>,
-    /// The lower triangle by columns.
+    /// Column offsets of the lower triangle.
     offsets: Vec<usize>,
     rows: Vec<usize>,
     values: Vec<f64>,
@@ -37,7 +37,7 @@ impl std::fmt::Debug for System {
 }
 
 impl System {
-    /// The zero matrix with the pattern of these tets.
+    /// Creates the zero matrix with the pattern of the given tets.
     pub(crate) fn new(
         particles: usize,
         tets: impl Iterator<Item = [u32; 4]>,
@@ -91,7 +91,7 @@ impl System {
         self.values.fill(0.0);
     }
 
-    /// Adds a number to the diagonal at a particle.
+    /// Adds a value to the diagonal entries of a particle.
     pub(crate) fn add_diagonal(&mut self, p: usize, value: f64) {
         for k in 0..3 {
             let start = self.offsets[3 * p + k];
@@ -99,7 +99,8 @@ impl System {
         }
     }
 
-    /// Adds a block at row particle r and column particle c, r not before c; of a diagonal block the lower triangle.
+    /// Adds a block at row particle r and column particle c, r not before c; of a diagonal block only the lower
+    /// triangle.
     pub(crate) fn add(&mut self, r: u32, c: u32, block: DMat3) {
         let p = c as usize;
         let place = (r != c).then(|| {
@@ -144,7 +145,7 @@ impl System {
 mod tests {
     use super::*;
 
-    /// A row of tets whose matrix is `diagonal` on the diagonal and random, symmetric blocks elsewhere.
+    /// Matrix of a row of tets with `diagonal` on the diagonal and random symmetric blocks elsewhere.
     fn system(tets: u32, diagonal: f64) -> (System, Vec<Vec<f64>>) {
         let n = tets as usize + 3;
         let mut system =
@@ -175,8 +176,8 @@ mod tests {
         (system, dense)
     }
 
-    /// Both kinds of factorization that the library chooses from, for thin and for thick factors. The matrices are
-    /// diagonally dominant with a condition number below 10.
+    /// Covers both kinds of factorization that the library chooses from, for thin and for thick factors. The matrices
+    /// are diagonally dominant with a condition number below 10.
     #[test]
     fn solutions_solve_the_dense_system() {
         for tets in [1, 7, 200] {

@@ -1,4 +1,4 @@
-// What is behind everything: one triangle over the whole picture.
+// The background: one triangle over the whole image.
 
 @vertex
 fn vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {

@@ -9,7 +9,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {
     return vec4<f32>(x, y, 0.0, 1.0);
 }
 
-// Beyond the edge there is nothing.
+// Texels outside the texture count as 0.
 fn texel(at: vec2<i32>) -> f32 {
     let side = vec2<i32>(textureDimensions(texels));
     if any(at < vec2<i32>(0)) || any(at >= side) {

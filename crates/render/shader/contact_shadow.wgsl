@@ -1,8 +1,8 @@
-// What bodies leave on the ground, seen from right above: how near the lowest triangle is, the largest value of all that
-// are drawn to a texel. Twin: contact_shadow.rs.
+// Contact shadow, seen from directly above: nearness to the ground of the lowest triangle above each texel, by a maximum
+// blend. Twin: contact_shadow.rs.
 
 @group(0) @binding(1) var<storage, read> positions: array<vec4<f32>>;
-// The particle; its part, and in the highest bit whether a cut laid it bare.
+// x: particle; y: part, and in the highest bit whether the vertex is on a cut face.
 @group(0) @binding(2) var<storage, read> vertices: array<vec2<u32>>;
 @group(0) @binding(3) var<storage, read> triangles: array<u32>;
 @group(0) @binding(4) var<storage, read> parts: array<vec4<f32>>;
@@ -44,7 +44,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> Seen {
     let c = put(triangles[first + 2u]);
     let mine = put(triangles[index]);
     let out = max(max(abs(a.xy), abs(b.xy)), abs(c.xy));
-    // What sticks out is left out as a whole: all its corners are one point.
+    // A triangle that reaches outside the square is dropped: all its corners become one point.
     let scale = select(1.0, 0.0, max(out.x, out.y) > 1.0);
     // Rows go along v.
     return Seen(vec4<f32>(mine.x * scale, -mine.y * scale, 0.5, 1.0), mine.z);

@@ -1,11 +1,11 @@
-// The normals of skin vertices: sums of the normals of their triangles, weighted by the angle there, in fixed point, so
-// that the order of the sum does not matter. Twin: normals.rs.
+// Vertex normals of the skin: sums of triangle normals weighted by the corner angle, in fixed point, so that the result
+// does not depend on the order of the sum. Twin: normals.rs.
 
 @group(0) @binding(0) var<storage, read> positions: array<vec4<f32>>;
 @group(0) @binding(1) var<storage, read> vertices: array<vec2<u32>>;
 @group(0) @binding(2) var<storage, read> triangles: array<u32>;
 @group(0) @binding(3) var<storage, read_write> sums: array<atomic<i32>>;
-// x: triangles.
+// x: number of triangles.
 @group(0) @binding(4) var<uniform> count: vec4<u32>;
 
 const UNIT: f32 = 1048576.0;
@@ -42,10 +42,10 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups
     let ca = unit(a - c);
     let normal = unit(cross(ab, -ca));
     if all(normal == vec3<f32>(0.0)) {
-        // No area and perhaps no edges, of which an arc tangent is not defined.
+        // Zero area; edges may have length 0, for which atan2 is undefined.
         return;
     }
-    // Of two directions, by sine and cosine.
+    // Angle between two directions from sine and cosine.
     let at_a = atan2(length(cross(ab, -ca)), dot(ab, -ca));
     let at_b = atan2(length(cross(bc, -ab)), dot(bc, -ab));
     let at_c = PI - at_a - at_b;

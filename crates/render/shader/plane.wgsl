@@ -5,16 +5,16 @@
 
 const TABLE = vec3<f32>(0.62, 0.635, 0.66);
 const TABLE_LINE = vec3<f32>(0.30, 0.32, 0.36);
-// Half the side of the square with the contact shadow, in radii.
+// Half the side of the contact shadow's square, in radii.
 const SHARE: f32 = 0.6;
 
 struct Patch {
     // w: the radius.
     @location(0) center: vec4<f32>,
-    // Along the grid, of length 1; w: where the lines begin.
+    // Unit vector along the grid; w: offset of the grid lines.
     @location(1) u: vec4<f32>,
     @location(2) v: vec4<f32>,
-    // Distance of lines, opacity, 1 if it bears contact shadows.
+    // Grid spacing, opacity, 1 if the plane receives contact shadows.
     @location(3) numbers: vec4<f32>,
 }
 
@@ -37,7 +37,7 @@ fn vertex(@builtin(vertex_index) index: u32, grid: Patch) -> Seen {
     return Seen(view.clip * vec4<f32>(position, 1.0), grid.center, grid.u, grid.v, grid.numbers);
 }
 
-// How much of a pixel the lines across an axis cover.
+// Fraction of a pixel covered by the grid lines across an axis.
 fn line(axis: vec4<f32>, spacing: f32, position: vec3<f32>, right: vec3<f32>, down: vec3<f32>) -> f32 {
     let at = (dot(position, axis.xyz) + axis.w) / spacing;
     let width = (abs(dot(right, axis.xyz)) + abs(dot(down, axis.xyz))) / spacing;
@@ -65,7 +65,7 @@ fn fragment(seen: Seen) -> @location(0) vec4<f32> {
         line(seen.u, seen.numbers.x, position, right, down),
         line(seen.v, seen.numbers.x, position, right, down),
     );
-    // All pixels look it up: a lookup by only some in a square of pixels is not defined.
+    // Sampled by all pixels: a texture sample in non-uniform control flow is undefined.
     let from_center = vec2<f32>(dot(position - seen.center.xyz, seen.u.xyz), dot(position - seen.center.xyz, seen.v.xyz));
     let at = from_center / (SHARE * seen.center.w) * 0.5 + 0.5;
     let dark = textureSampleLevel(contact_shadow, between, at, 0.0).x;

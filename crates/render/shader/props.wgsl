@@ -1,4 +1,4 @@
-// Obstacles and blades: triangles with a normal and a color a corner.
+// Obstacles and blades: triangles with a normal and a color per corner.
 
 struct Corner {
     @location(0) position: vec3<f32>,

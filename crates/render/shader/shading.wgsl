@@ -1,4 +1,4 @@
-// The color of what is seen at a pixel, in linear light: twin of shading.rs, function by function.
+// Surface color of a pixel in linear light: twin of shading.rs, function by function.
 
 const TISSUE = vec3<f32>(0.245, 0.044, 0.036);
 const FLESH = vec3<f32>(0.780, 0.290, 0.250);
@@ -12,7 +12,7 @@ const LINE = vec3<f32>(0.012, 0.012, 0.018);
 const TOP = vec3<f32>(0.92, 0.935, 0.955);
 const BOTTOM = vec3<f32>(0.66, 0.69, 0.73);
 
-// `normalize`, but a vector without a direction becomes up.
+// Normalized vector; up for a vector of length 0.
 fn direction(v: vec3<f32>) -> vec3<f32> {
     let squared = dot(v, v);
     if squared > 0.0 {
@@ -21,13 +21,13 @@ fn direction(v: vec3<f32>) -> vec3<f32> {
     return vec3<f32>(0.0, 0.0, 1.0);
 }
 
-// A part of sRGB as linear light.
+// Converts sRGB channels to linear light.
 fn decode(c: vec3<f32>) -> vec3<f32> {
     let high = pow((c + 0.055) / 1.055, vec3<f32>(2.4));
     return select(high, c / 12.92, c <= vec3<f32>(0.04045));
 }
 
-// The color of a triangle of a body from its word (nothing in it: tissue) and whether a cut laid it bare; w: its gloss.
+// Base color of a skin triangle from its color word (0: tissue) and whether it is a cut face; w: its gloss.
 fn skin_base(word: u32, cut: bool) -> vec4<f32> {
     if word == 0u {
         if cut {
@@ -42,7 +42,7 @@ fn skin_base(word: u32, cut: bool) -> vec4<f32> {
     return vec4<f32>(base, 0.25);
 }
 
-// The normal that a triangle of a body is shaded by: cut faces are flatter than others.
+// Shading normal of a skin triangle: cut faces are shaded flatter than others.
 fn skin_normal(normal: vec3<f32>, face: vec3<f32>, cut: bool, smoothly: bool) -> vec3<f32> {
     if !smoothly {
         return face;
@@ -51,7 +51,7 @@ fn skin_normal(normal: vec3<f32>, face: vec3<f32>, cut: bool, smoothly: bool) ->
     return direction(mix(direction(normal), face, share));
 }
 
-// What a surface sends to the eye.
+// Light that a surface reflects to the eye.
 fn shade(base_color: vec3<f32>, glossiness: f32, position: vec3<f32>, shading: vec3<f32>, face: vec3<f32>) -> vec3<f32> {
     let to_eye = direction(-position);
     let light = view.light.xyz;
@@ -59,7 +59,7 @@ fn shade(base_color: vec3<f32>, glossiness: f32, position: vec3<f32>, shading: v
     var base = base_color;
     var gloss = glossiness;
     if dot(face, to_eye) < 0.0 {
-        // The inside.
+        // Back side.
         normal = -normal;
         base = base * 0.5;
         gloss = gloss * 0.3;
@@ -82,14 +82,14 @@ fn shade(base_color: vec3<f32>, glossiness: f32, position: vec3<f32>, shading: v
     return diffuse + KEY * highlight + ambient * rim;
 }
 
-// Draws the edges of a triangle over a color, by the distances to them in pixels.
+// Draws the edges of a triangle over a color, given the distances to them in pixels.
 fn wire(color: vec3<f32>, distances: vec3<f32>) -> vec3<f32> {
     let nearest = min(distances.x, min(distances.y, distances.z));
     let share = 1.0 - smoothstep(0.2, 1.1, nearest);
     return mix(color, LINE, 0.75 * share);
 }
 
-// What is behind everything, at a fraction of the picture's height from above.
+// Background color at a fraction of the image height from the top.
 fn background(y: f32) -> vec3<f32> {
     return mix(TOP, BOTTOM, y * y * (3.0 - 2.0 * y));
 }

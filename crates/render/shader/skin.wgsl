@@ -1,20 +1,20 @@
-// The skin of bodies, from the solver's own positions: each corner looks up its triangle.
+// Skin of the bodies, drawn from the solver's position buffer: each corner looks up its triangle.
 //
-// Normals are sums of normals.wgsl in fixed point. Edges of triangles are drawn in the same pass: each corner knows its
-// distance in pixels from the edge across, which is interpolated on the screen (J. Bærentzen et al., "Single-pass
-// wireframe rendering", 2006).
+// Normals come from the fixed-point sums of normals.wgsl. Triangle edges are drawn in the same pass: each corner
+// carries its distance in pixels from the opposite edge, interpolated in screen space (J. Bærentzen et al.,
+// "Single-pass wireframe rendering", 2006).
 
-// Relative to the origin of their part, in m; w: of no interest here.
+// Relative to the origin of their part, in m; w is unused.
 @group(0) @binding(1) var<storage, read> positions: array<vec4<f32>>;
-// The particle; its part, and in the highest bit whether a cut laid it bare.
+// x: particle; y: part, and in the highest bit whether the vertex is on a cut face.
 @group(0) @binding(2) var<storage, read> vertices: array<vec2<u32>>;
 // Three vertices each.
 @group(0) @binding(3) var<storage, read> triangles: array<u32>;
 // The origins of parts relative to the eye.
 @group(0) @binding(4) var<storage, read> parts: array<vec4<f32>>;
-// Three numbers a vertex.
+// Three sums per vertex.
 @group(0) @binding(5) var<storage, read> sums: array<i32>;
-// A word a triangle.
+// One color word per triangle.
 @group(0) @binding(6) var<storage, read> colors: array<u32>;
 
 const CUT: u32 = 0x80000000u;
@@ -24,7 +24,7 @@ struct Seen {
     @location(0) @interpolate(perspective, centroid) position: vec3<f32>,
     @location(1) @interpolate(perspective, centroid) normal: vec3<f32>,
     @location(2) @interpolate(flat) face: vec3<f32>,
-    // w: the gloss, negative for what a cut laid bare.
+    // w: the gloss, negative for cut faces.
     @location(3) @interpolate(flat) base: vec4<f32>,
     @location(4) @interpolate(linear, centroid) distances: vec3<f32>,
 }
@@ -34,7 +34,7 @@ fn position_of(vertex: u32) -> vec3<f32> {
     return positions[found.x].xyz + parts[found.y & ~CUT].xyz;
 }
 
-// Distances in pixels of the corners from the edges across; far away if a corner is not in front of the eye.
+// Distances in pixels of the corners from the opposite edges; a large value if a corner is not in front of the eye.
 fn heights(a: vec4<f32>, b: vec4<f32>, c: vec4<f32>) -> vec3<f32> {
     if min(a.z, min(b.z, c.z)) <= 0.0 {
         return vec3<f32>(1e6);

@@ -1,21 +1,21 @@
-//! [`Camera`]: from where a scene is seen.
+//! [`Camera`]: viewpoint and projection of a scene.
 //!
-//! It looks at a target from a distance, in a direction given by two angles; z is up. All that renderers and picking
-//! with a mouse need follows from these five numbers: axes, rays, projections. In double precision throughout.
+//! The camera looks at a target from a distance, in a direction given by two angles; z is up. Axes, rays and
+//! projections for rendering and picking are derived from five values, in double precision.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{DMat4, DVec3, DVec4};
 
-/// How close to straight up or down a camera may look, in radians.
+/// Smallest angle between the view direction and straight up or down, in radians.
 const POLE: f64 = 0.01;
-/// Distances stay within these, in m.
+/// Smallest distance to the target, in m.
 const NEAREST: f64 = 1e-6;
 const FARTHEST: f64 = 1e9;
-/// The nearest that is drawn, in distances to the target.
+/// Near plane, in distances to the target.
 const NEAR: f64 = 1e-2;
 
-/// From where a scene is seen. Lengths are in m, angles in radians.
+/// Viewpoint of a scene. Lengths are in m, angles in radians.
 ///
 /// # Example
 /// ```
@@ -32,21 +32,21 @@ const NEAR: f64 = 1e-2;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// The point in the middle of the picture.
+    /// Point at the center of the image.
     pub target: DVec3,
-    /// From the eye to the target, positive.
+    /// Distance from the eye to the target; positive.
     pub distance: f64,
-    /// Of the eye seen from the target, against the clock seen from above; 0 is on the side of x.
+    /// Angle of the eye around the target, counterclockwise seen from above; 0 is the direction of x.
     pub azimuth: f64,
-    /// Of the eye above the target, within a right angle.
+    /// Angle of the eye above the target, between -π/2 and π/2.
     pub elevation: f64,
-    /// From the lower to the upper edge of the picture, from 0 to π.
+    /// Vertical field of view, from 0 to π.
     pub field_of_view: f64,
 }
 
 impl Camera {
-    /// The three-quarter view that shows all of a box, in any picture that is at least as wide as it is high. A box that
-    /// is a point is seen from 1 m.
+    /// Three-quarter view that shows all of a box, in any image at least as wide as it is high. A box without extent is
+    /// seen from 1 m.
     #[must_use]
     pub fn fit(low: DVec3, high: DVec3) -> Self {
         let mut camera = Self {
@@ -60,9 +60,9 @@ impl Camera {
         camera
     }
 
-    /// Goes as close to its target as still shows all of a box in a picture of `aspect`, width over height, whatever the
-    /// direction: for a camera that was turned after [`Camera::fit`], and for pictures higher than wide. An aspect that is
-    /// no positive number changes nothing.
+    /// Sets the smallest distance that shows all of a box in an image of `aspect` (width over height), in the current
+    /// direction: for a camera turned after [`Camera::fit`], and for images higher than wide. An `aspect` that is not a
+    /// positive number changes nothing.
     pub fn fit_distance(&mut self, low: DVec3, high: DVec3, aspect: f64) {
         let tangent = (self.field_of_view * 0.5).tan();
         let (forward, right, up) = (self.forward(), self.right(), self.up());
@@ -78,7 +78,8 @@ impl Camera {
         }
     }
 
-    /// Turns the eye around the target, in radians. It is held off the poles, where right and left are not known.
+    /// Turns the eye around the target, in radians. The elevation stops short of the poles, where right and left are
+    /// undefined.
     pub fn orbit(&mut self, right: f64, up: f64) {
         if right.is_finite() {
             self.azimuth = (self.azimuth + right % TAU + PI).rem_euclid(TAU) - PI;
@@ -89,8 +90,8 @@ impl Camera {
         }
     }
 
-    /// Shifts the picture's content by fractions of the picture's height at the distance of the target: to the right and
-    /// up, the camera going the other way.
+    /// Pans: shifts the image content right and up by fractions of the image height at the target's distance; the
+    /// camera moves the opposite way.
     pub fn pan(&mut self, right: f64, up: f64) {
         let height = 2.0 * self.distance * (self.field_of_view * 0.5).tan();
         let shift = (self.right() * right + self.up() * up) * height;
@@ -100,48 +101,49 @@ impl Camera {
         }
     }
 
-    /// Multiplies the distance: below 1 comes closer. What is no positive number changes nothing, and the distance stays
-    /// between a micrometer and a million kilometers.
+    /// Multiplies the distance: a factor below 1 moves closer. A factor that is not a positive number changes nothing.
+    /// The distance stays between a micrometer and a million kilometers.
     pub fn zoom(&mut self, factor: f64) {
         if factor > 0.0 {
             self.distance = (self.distance * factor).clamp(NEAREST, FARTHEST);
         }
     }
 
-    /// Where the eye is.
+    /// Position of the eye.
     #[must_use]
     pub fn eye(&self) -> DVec3 {
         self.target - self.forward() * self.distance
     }
 
-    /// Where it looks, of length 1.
+    /// View direction, of length 1.
     #[must_use]
     pub fn forward(&self) -> DVec3 {
         let (sin, cos) = self.elevation.sin_cos();
         -DVec3::new(cos * self.azimuth.cos(), cos * self.azimuth.sin(), sin)
     }
 
-    /// To the right in the picture, horizontal and of length 1.
+    /// Right direction of the image, horizontal and of length 1.
     #[must_use]
     pub fn right(&self) -> DVec3 {
         DVec3::new(-self.azimuth.sin(), self.azimuth.cos(), 0.0)
     }
 
-    /// Up in the picture, of length 1.
+    /// Up direction of the image, of length 1.
     #[must_use]
     pub fn up(&self) -> DVec3 {
         self.right().cross(self.forward())
     }
 
-    /// From points relative to the eye to the clip space of wgpu: x to the right, y up, depth from 0 to 1. `aspect` is width
-    /// over height. What is nearer than a hundredth of the distance to the target is not seen; there is no farthest.
+    /// Projection from points relative to the eye to the clip space of wgpu: x to the right, y up, depth from 0 to 1.
+    /// `aspect` is width over height. The near plane is at a hundredth of the distance to the target; there is no far
+    /// plane.
     pub(crate) fn projection(&self, aspect: f64) -> DMat4 {
         let (right, up, back) = (self.right(), self.up(), -self.forward());
         let row = |axis: DVec3| axis.extend(0.0);
         let view = DMat4::from_cols(row(right), row(up), row(back), DVec4::W).transpose();
         let near = self.distance * NEAR;
         let slope = 1.0 / (self.field_of_view * 0.5).tan();
-        // Depth is 1 - near over the distance, for which 32 bits are fine enough.
+        // Depth is 1 - near / distance; 32 bits are precise enough for it.
         let projection = DMat4::from_cols(
             DVec4::new(slope / aspect, 0.0, 0.0, 0.0),
             DVec4::new(0.0, slope, 0.0, 0.0),
@@ -151,8 +153,9 @@ impl Camera {
         projection * view
     }
 
-    /// Where a point is seen in a picture of `size` pixels: pixels from its upper left corner, to the right and down, and
-    /// the distance from the eye along [`Camera::forward`] in m. `None` for what is not in front of the eye.
+    /// Projects a point into an image of `size` pixels: x and y in pixels from the upper left corner, to the right and
+    /// down; z is the distance from the eye along [`Camera::forward`] in m. `None` for a point that is not in front of
+    /// the eye.
     #[must_use]
     pub fn project(&self, point: DVec3, size: [f64; 2]) -> Option<DVec3> {
         let from_eye = point - self.eye();
@@ -166,7 +169,7 @@ impl Camera {
         Some(DVec3::new(x, y, depth))
     }
 
-    /// The ray through a place in a picture, in pixels from its upper left corner: the eye and a direction of length 1.
+    /// Ray through a position in the image, in pixels from its upper left corner: the eye and a direction of length 1.
     #[must_use]
     pub fn ray(&self, pixel: [f64; 2], size: [f64; 2]) -> (DVec3, DVec3) {
         let pixels = self.pixels_per_slope(size);
@@ -176,7 +179,7 @@ impl Camera {
         (self.eye(), direction.normalize())
     }
 
-    /// Pixels of a slope of 1.
+    /// Pixels per unit slope.
     fn pixels_per_slope(&self, size: [f64; 2]) -> f64 {
         size[1] * 0.5 / (self.field_of_view * 0.5).tan()
     }
@@ -208,7 +211,7 @@ mod tests {
             let clip = camera.projection(size[0] / size[1]) * (at - camera.eye()).extend(1.0);
             let place = clip / clip.w;
             let seen = camera.project(at, size).unwrap();
-            // Pixels of some hundred with sixteen digits.
+            // Pixel coordinates of a few hundred with sixteen digits.
             assert!(((place.x + 1.0) * 0.5 * size[0] - seen.x).abs() < 1e-9);
             assert!(((1.0 - place.y) * 0.5 * size[1] - seen.y).abs() < 1e-9);
             assert!((0.0..=1.0).contains(&place.z));

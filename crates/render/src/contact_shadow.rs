@@ -1,9 +1,10 @@
-//! [`ContactShadow`]: the soft dark spot that bodies leave on the ground, from right above.
+//! [`ContactShadow`]: soft contact shadow of bodies on the ground, as if lit from directly above.
 //!
-//! The ground around the bodies is a square of texels. Each knows how near to the ground the lowest triangle above it is; this
-//! is blurred in both directions. It is no shadow of the key light, which would move with the camera: it shows whether and
-//! where something touches. Twin: `contact_shadow.wgsl` and `blur.wgsl`, with all steps rounded to a byte as a texture has
-//! them. Cost: a pass over the triangles, most of which are smaller than a texel, and 13 operations a texel twice.
+//! The ground around the bodies is a square of texels. Each texel stores the height of the lowest triangle above it, as
+//! a darkness; this is blurred in both directions. It is not a shadow of the key light, which would move with the
+//! camera: it shows whether and where bodies touch the ground. Twin: `contact_shadow.wgsl` and `blur.wgsl`, with all
+//! steps rounded to a byte as in a texture. Cost: a pass over the triangles, most of which are smaller than a texel,
+//! and two passes of 13 operations per texel.
 
 use glam::Vec3;
 
@@ -14,22 +15,22 @@ use crate::raster::fill;
 pub(crate) const SIDE: usize = 128;
 /// Half the square's side, in radii of the ground's patch.
 pub(crate) const SHARE: f32 = 0.6;
-/// The height at which the contact shadow is a third, in radii.
+/// Height at which the contact shadow has a third of its strength, in radii.
 pub(crate) const FALLOFF: f32 = 0.05;
-/// Weights of the blur: the middle and then to both sides, as of a bell of 2.5 texels.
+/// Weights of the blur: center first, then outward, from a Gaussian of 2.5 texels.
 const WEIGHTS: [f32; 7] = [0.1624, 0.1499, 0.1179, 0.0790, 0.0451, 0.0219, 0.0050];
 
-/// How dark the ground is, texel by texel.
+/// Darkness of the ground per texel.
 #[derive(Clone, Debug)]
 pub(crate) struct ContactShadow {
     plane: Plane,
     texels: Vec<f32>,
-    /// The rows and columns between which it is dark, in texels.
+    /// Columns and rows that bound the dark texels.
     bounds: [[f32; 2]; 2],
 }
 
 impl ContactShadow {
-    /// What triangles leave on a plane, with corners at positions relative to the eye.
+    /// Contact shadow of triangles on a plane; positions are relative to the eye.
     pub(crate) fn new(plane: Plane, triangles: &[[u32; 3]], positions: &[Vec3]) -> Self {
         let mut texels = vec![0.0; SIDE * SIDE];
         let normal = plane.u.cross(plane.v);
@@ -37,7 +38,7 @@ impl ContactShadow {
         let half = SIDE as f32 * 0.5;
         let put = |position: Vec3| {
             let from = position - plane.center;
-            // Texels across and down, and the height.
+            // Texel coordinates and height.
             Vec3::new(
                 from.dot(plane.u) * scale + half,
                 from.dot(plane.v) * scale + half,
@@ -48,7 +49,7 @@ impl ContactShadow {
         let inside = |x: Vec3| x.x >= 0.0 && x.y >= 0.0 && x.x <= SIDE as f32 && x.y <= SIDE as f32;
         for corners in triangles {
             let corners = corners.map(|v| positions[v as usize]);
-            // Not clipped: what sticks out of the square is far from what pictures show.
+            // Not clipped: triangles outside the square are far from the visible area.
             if !corners.into_iter().all(inside) {
                 continue;
             }
@@ -68,7 +69,7 @@ impl ContactShadow {
             bounds = [[SIDE as f32, 0.0], [(first / SIDE) as f32, 0.0]];
             for i in (first..texels.len()).filter(dark) {
                 for (bounds, at) in bounds.iter_mut().zip([i % SIDE, i / SIDE]) {
-                    // A texel reaches to the middle of the next one.
+                    // Interpolation extends a texel to the center of the next one.
                     bounds[0] = bounds[0].min(at as f32 - 1.0).max(0.0);
                     bounds[1] = bounds[1].max(at as f32 + 1.0).min((SIDE - 1) as f32);
                 }
@@ -81,7 +82,7 @@ impl ContactShadow {
         }
     }
 
-    /// How dark it is at a position relative to the eye, from 0 to 1: between texels.
+    /// Darkness at a position relative to the eye, from 0 to 1, interpolated between texels.
     pub(crate) fn at(&self, position: Vec3) -> f32 {
         let plane = &self.plane;
         let scale = 1.0 / (SHARE * plane.radius);
@@ -100,7 +101,7 @@ impl ContactShadow {
     }
 }
 
-/// The whole part and the rest.
+/// Integer part and fraction.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -110,12 +111,12 @@ fn split(at: f32) -> (usize, f32) {
     (at as usize, at - (at as usize) as f32)
 }
 
-/// What a byte holds of a part of one.
+/// Value from 0 to 1 rounded to a multiple of 1/255.
 fn rounded(part: f32) -> f32 {
     (part * 255.0).round() / 255.0
 }
 
-/// Blurred along one direction, given the distance from a texel to the next one; beyond the edge there is nothing.
+/// Blurs along one direction, given the index distance to the next texel; texels outside the square count as 0.
 fn blurred(texels: &[f32], step: usize) -> Vec<f32> {
     let at = |i: usize, by: isize| {
         let along = i / step % SIDE;

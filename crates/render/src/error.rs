@@ -1,40 +1,40 @@
-//! [`RenderError`]: why a picture or a film could not be made, and what to do about it.
+//! [`RenderError`]: errors of drawing and of writing images and animations.
 
 use std::path::PathBuf;
 
 use thiserror::Error;
 
-/// Why something could not be drawn or written.
+/// Error of drawing or writing an image or an animation.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum RenderError {
-    /// A picture of a size that cannot be drawn.
+    /// An image size that cannot be drawn.
     #[error("a picture of {width} x {height} pixels: {range}")]
     Size {
-        /// Pixels across.
+        /// Width in pixels.
         width: u32,
-        /// Pixels down.
+        /// Height in pixels.
         height: u32,
-        /// What is allowed.
+        /// Allowed range.
         range: String,
     },
-    /// A name that means no coloring.
+    /// Unknown name of a [`ColorBy`](crate::ColorBy).
     #[error("unknown coloring '{given}': known are {known}")]
     UnknownColoring {
-        /// What was given.
+        /// Name given.
         given: String,
-        /// The names of all.
+        /// List of known names.
         known: &'static str,
     },
-    /// Residuals are to be shown, and none were given.
+    /// Coloring by residual without residuals.
     #[error("colors by residual need a residual of each tet")]
     NoResiduals,
-    /// The number of given residuals is not the number of tets.
+    /// Number of residuals that differs from the number of tets.
     #[error("{given} residuals were given for {tets} tets")]
     Residuals {
-        /// How many were given.
+        /// Number of residuals given.
         given: usize,
-        /// How many tets there are.
+        /// Number of tets.
         tets: usize,
     },
     /// An animation in a format that is not supported.
@@ -42,13 +42,13 @@ pub enum RenderError {
     UnknownAnimation {
         /// The file.
         path: PathBuf,
-        /// The endings that are.
+        /// List of supported extensions.
         known: &'static str,
     },
     /// An animation with a frame time that its format cannot store.
     #[error("an animation with {given} s for each image; use 0.01 s to 10 s")]
     FrameTime {
-        /// What was asked for.
+        /// Time given, in s.
         given: f64,
     },
     /// An image whose size is not that of its animation.
@@ -56,16 +56,16 @@ pub enum RenderError {
         "an image of {width} x {height} pixels in an animation of {animation_width} x {animation_height} pixels"
     )]
     OtherSize {
-        /// Pixels across.
+        /// Width of the image in pixels.
         width: u32,
-        /// Pixels down.
+        /// Height of the image in pixels.
         height: u32,
-        /// Those of the film.
+        /// Width of the animation in pixels.
         animation_width: u32,
-        /// Those of the film.
+        /// Height of the animation in pixels.
         animation_height: u32,
     },
-    /// A film without a picture.
+    /// An animation without images.
     #[error("{}: an animation needs an image", .path.display())]
     EmptyFilm {
         /// The file.
@@ -74,27 +74,27 @@ pub enum RenderError {
     /// A file could not be read or written.
     #[error("cannot {action} {}: {source}", .path.display())]
     Io {
-        /// What was tried: `read` or `write`.
+        /// Failed action: `read` or `write`.
         action: &'static str,
         /// The file.
         path: PathBuf,
-        /// Why it failed.
+        /// Cause.
         source: std::io::Error,
     },
-    /// The simulation could not say where its particles are.
+    /// Positions could not be read from the simulation.
     #[error(transparent)]
     Simulation(#[from] incise::Error),
-    /// The device cannot draw, or is lost.
+    /// Device error while drawing.
     #[cfg(feature = "gpu")]
     #[error(transparent)]
     Gpu(#[from] incise::gpu::GpuError),
-    /// The device lacks what drawing needs.
+    /// The device lacks a required feature or limit.
     #[cfg(feature = "gpu")]
     #[error("the GPU {adapter} cannot draw: {reason}")]
     Unable {
         /// The adapter's name.
         adapter: String,
-        /// What it lacks.
+        /// Missing feature or limit.
         reason: String,
     },
 }

@@ -1,4 +1,4 @@
-//! [`Image`]: pixels, and PNG files of them.
+//! [`Image`]: pixels in sRGB, and PNG files.
 
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Write};
@@ -9,7 +9,7 @@ use incise::mesh_io::{MeshIoError, write_atomically};
 use crate::RenderError;
 use crate::srgb::{decode, encode};
 
-/// Pixels in sRGB.
+/// An image with pixels in sRGB.
 ///
 /// # Example
 /// ```
@@ -24,16 +24,16 @@ use crate::srgb::{decode, encode};
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
-    /// Pixels across.
+    /// Width in pixels.
     pub width: u32,
-    /// Pixels down.
+    /// Height in pixels.
     pub height: u32,
-    /// Four bytes a pixel, row by row from above, opaque.
+    /// Four bytes per pixel, row by row from the top, opaque.
     pub rgba: Vec<u8>,
 }
 
 impl Image {
-    /// One color everywhere.
+    /// Creates an image of one color.
     #[must_use]
     pub fn filled(width: u32, height: u32, [r, g, b]: [u8; 3]) -> Self {
         let pixels = width as usize * height as usize;
@@ -44,10 +44,10 @@ impl Image {
         }
     }
 
-    /// The color of a pixel, counted from the upper left.
+    /// Color of a pixel, counted from the upper left.
     ///
     /// # Panics
-    /// If there is no such pixel.
+    /// If the pixel is outside the image.
     #[must_use]
     pub fn pixel(&self, x: u32, y: u32) -> [u8; 3] {
         assert!(x < self.width, "no such pixel");
@@ -55,8 +55,8 @@ impl Image {
         [self.rgba[at], self.rgba[at + 1], self.rgba[at + 2]]
     }
 
-    /// The picture at one over `factor` of its size, each pixel the mean of a square of pixels in linear light; what does
-    /// not fill a square at the right and the lower edge is left out. A factor of 0 or one above a side changes nothing.
+    /// Downscales the image by `factor`: each pixel is the mean of a square of pixels in linear light. Pixels that do
+    /// not fill a square at the right and lower edge are dropped. A factor of 0 or above a side changes nothing.
     #[must_use]
     pub fn shrunk(&self, factor: u32) -> Self {
         if factor == 0 || factor > self.width.min(self.height) {
@@ -83,7 +83,7 @@ impl Image {
         }
     }
 
-    /// Writes a PNG file, beside its name first: the name never stands for half a file.
+    /// Writes a PNG file through a temporary file, so that a failed write leaves no partial file under its name.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -91,7 +91,7 @@ impl Image {
         atomically(path.as_ref(), |out| self.encode_png(out))
     }
 
-    /// The bytes of a PNG file, without the opacity that all pixels have. O(pixels).
+    /// Writes the bytes of a PNG file, without the alpha channel. O(pixels).
     fn encode_png(&self, out: &mut dyn Write) -> io::Result<()> {
         let mut encoder = png::Encoder::new(out, self.width, self.height);
         encoder.set_color(png::ColorType::Rgb);
@@ -103,7 +103,7 @@ impl Image {
         Ok(())
     }
 
-    /// Three bytes a pixel.
+    /// Converts to three bytes per pixel.
     pub(crate) fn rgb(&self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(self.rgba.len() / 4 * 3);
         for pixel in self.rgba.chunks_exact(4) {
@@ -112,7 +112,7 @@ impl Image {
         bytes
     }
 
-    /// Reads a PNG file with eight bits a channel, the first picture of an animated one.
+    /// Reads a PNG file with eight bits per channel; of an animated PNG, the first image.
     ///
     /// # Errors
     /// If it cannot be read or is not such a file.
@@ -145,7 +145,7 @@ impl Image {
     }
 }
 
-/// Writes a file all or nothing.
+/// Writes a file completely or not at all.
 pub(crate) fn atomically(
     path: &Path,
     content: impl FnOnce(&mut dyn Write) -> io::Result<()>,

@@ -1,9 +1,8 @@
-//! Pictures of deformable bodies: on a GPU without a copy, or by a software rasterizer.
+//! Images of deformable bodies: drawn on a GPU without copying positions, or by a software rasterizer.
 //!
-//! A [`RenderScene`] follows a [`Simulation`](incise::Simulation) through its cuts. A [`Renderer`] draws it as a [`Camera`] sees
-//! it and a [`Style`] wants it: on a device, where the positions of a solver there are drawn from its own buffer, or on the
-//! processor, with the same formulas and nearly the same pixels. [`Animation`] and
-//! [`contact_sheet`] put pictures together.
+//! A [`RenderScene`] tracks the surface of a [`Simulation`](incise::Simulation) through its cuts. A [`Renderer`] draws
+//! it for a [`Camera`] and a [`Style`]: on a device, from the solver's own position buffer, or on the processor, with
+//! the same formulas and nearly equal pixels. [`Animation`] and [`contact_sheet`] combine several images.
 
 mod animation;
 mod camera;

@@ -1,17 +1,17 @@
-//! [`normal_sums`]: the normals of skin vertices: twin of `normals.wgsl`, which it defines.
+//! [`normal_sums`]: vertex normals of the skin, and the reference for its twin `normals.wgsl`.
 //!
-//! The normal of a vertex is the sum of the normals of its triangles, each of length 1 times the angle of the triangle
-//! there (G. Thürmer and C. Wüthrich, "Computing vertex normals from polygonal facets", 1998), so that it does not depend on
-//! how a surface is divided into triangles. Sums are in fixed point, a millionth: integers can be added in any order, also
-//! by threads of a device, with the same result. Cost: O(triangles).
+//! The normal of a vertex is the sum of the unit normals of its triangles, each weighted by the triangle's angle at the
+//! vertex (G. Thürmer and C. Wüthrich, "Computing vertex normals from polygonal facets", 1998), so that it does not
+//! depend on the triangulation of a surface. Sums are in fixed point, in units of about a millionth: integer sums do
+//! not depend on their order, also across threads of a device. Cost: O(triangles).
 
 use glam::Vec3;
 
-/// What a length of 1 is in the sums. Angles around a vertex would have to add up to 2000 to overflow.
+/// Fixed-point value of 1. Angles around a vertex would have to add up to 2000 to overflow.
 const UNIT: f32 = 1_048_576.0;
 
-/// Three sums a vertex, for corners of triangles and the positions of vertices in m. They are no unit vectors; a vertex
-/// without a triangle, or with flat ones only, has zeros.
+/// Sums of angle-weighted triangle normals for each vertex, in fixed point; positions are in m. The sums do not have
+/// unit length. A vertex without triangles, or with degenerate ones only, has zeros.
 ///
 /// # Panics
 /// If a triangle has a vertex that does not exist.
@@ -33,7 +33,7 @@ pub fn normal_sums(triangles: &[[u32; 3]], positions: &[Vec3]) -> Vec<[i32; 3]> 
         let (ab, bc, ca) = (unit(b - a), unit(c - b), unit(a - c));
         let normal = unit(ab.cross(-ca));
         if normal == Vec3::ZERO {
-            // No area and perhaps no edges, of which an arc tangent is not defined.
+            // Zero area; edges may have length 0, for which atan2 is undefined.
             continue;
         }
         let at_a = angle(ab, -ca);
@@ -49,12 +49,12 @@ pub fn normal_sums(triangles: &[[u32; 3]], positions: &[Vec3]) -> Vec<[i32; 3]> 
     sums
 }
 
-/// Of two directions, by sine and cosine.
+/// Angle between two directions, from sine and cosine.
 fn angle(a: Vec3, b: Vec3) -> f32 {
     a.cross(b).length().atan2(a.dot(b))
 }
 
-/// Of length 1, or zero. Longest part first: squares of small edges must not vanish.
+/// Unit vector, or zero. Scaled by the largest component first: squares of short edges must not underflow.
 fn unit(v: Vec3) -> Vec3 {
     let largest = v.abs().max_element();
     if largest > 0.0 {

@@ -1,24 +1,24 @@
-//! [`Legend`] and the colors of things: numbers of clusters to hues, values to a ramp.
+//! [`Legend`] and colors: hues for cluster numbers, a ramp for values.
 //!
-//! Things without an order get hues a golden angle apart, so that any run of numbers is told apart, at equal lightness in
-//! Oklab (B. Ottosson, "A perceptual color space for image processing", 2020). Values get a ramp from blue over green and
-//! yellow to red. All colors are sRGB.
+//! Unordered items get hues a golden angle apart, so that consecutive numbers are distinguishable, at equal lightness
+//! in Oklab (B. Ottosson, "A perceptual color space for image processing", 2020). Values get a ramp from blue through
+//! green and yellow to red. All colors are sRGB.
 
-/// What the colors of a picture mean, for a panel beside it.
+/// Meaning of the colors in an image, for a panel beside it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Legend {
-    /// The value at the lower end; what is below has the same color.
+    /// Value at the lower end; smaller values have its color.
     pub low: f64,
-    /// The value at the upper end; what is above has the same color.
+    /// Value at the upper end; larger values have its color.
     pub high: f64,
-    /// Whether equal distances are equal factors.
+    /// True for a logarithmic scale.
     pub logarithmic: bool,
-    /// The unit of the values; empty if they have none.
+    /// Unit of the values; empty for dimensionless values.
     pub unit: &'static str,
 }
 
-/// The ramp from its lower to its upper end at equal distances.
+/// Colors of the ramp at equal distances from its lower to its upper end.
 const RAMP: [[u8; 3]; 6] = [
     [52, 66, 138],
     [58, 128, 170],
@@ -29,7 +29,7 @@ const RAMP: [[u8; 3]; 6] = [
 ];
 
 impl Legend {
-    /// The color at a fraction of the way from the lower to the upper end.
+    /// Color at a fraction of the ramp: 0 is the lower end, 1 the upper end.
     ///
     /// ```
     /// # use incise::{Scene, Simulation, scene::ShapeSpec};
@@ -55,7 +55,7 @@ impl Legend {
         })
     }
 
-    /// Where a value is on the way from the lower to the upper end.
+    /// Position of a value on the ramp, from 0 at the lower to 1 at the upper end.
     #[must_use]
     pub fn fraction(&self, value: f64) -> f64 {
         let share = if self.logarithmic {
@@ -67,15 +67,15 @@ impl Legend {
     }
 }
 
-/// The color of the thing of a number.
+/// Color of an item number; consecutive numbers are distinguishable.
 pub(crate) fn distinct(number: u32) -> [u8; 3] {
-    // Half the plane times the golden ratio: no run of numbers comes back to a hue soon.
+    // Multiples of half the golden ratio: hues repeat only after long runs of numbers.
     let hue = (f64::from(number) * 0.618_033_988_749_894_9 + 0.08).fract();
     let lightness = [0.70, 0.60, 0.78][(number % 3) as usize];
     oklch(lightness, 0.115, hue * std::f64::consts::TAU)
 }
 
-/// A color of Oklab in sRGB, as near as that has it.
+/// Converts a color of Oklab to the nearest sRGB color.
 fn oklch(lightness: f64, chroma: f64, hue: f64) -> [u8; 3] {
     let (a, b) = (chroma * hue.cos(), chroma * hue.sin());
     let cube = |x: f64| x * x * x;
@@ -98,7 +98,7 @@ fn oklch(lightness: f64, chroma: f64, hue: f64) -> [u8; 3] {
     })
 }
 
-/// The nearest byte.
+/// Rounds to the nearest byte.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -108,13 +108,13 @@ fn byte(value: f64) -> u8 {
     value.round().clamp(0.0, 255.0) as u8
 }
 
-/// A color as four bytes of a word, the first the lowest, opaque.
+/// Packs a color as four bytes of a word, red in the lowest, opaque.
 pub(crate) fn pack([r, g, b]: [u8; 3]) -> u32 {
     u32::from_le_bytes([r, g, b, 255])
 }
 
-/// A legend for values from `low` on up to what all but a fiftieth of them reach, rounded up to a step that does not
-/// change from frame to frame.
+/// Legend for values from `low` to their 98th percentile, rounded up to a step so that it does not change from frame to
+/// frame.
 pub(crate) fn legend_from(low: f64, mut values: Vec<f64>, unit: &'static str) -> Legend {
     values.retain(|value| value.is_finite());
     let rank = values.len().saturating_sub(1) * 49 / 50;
@@ -132,7 +132,7 @@ pub(crate) fn legend_from(low: f64, mut values: Vec<f64>, unit: &'static str) ->
     }
 }
 
-/// A legend over six powers of ten that ends above the largest value.
+/// Logarithmic legend over six decades that ends above the largest value.
 pub(crate) fn decades(values: &[f64], unit: &'static str) -> Legend {
     let largest = values.iter().copied().filter(|value| value.is_finite());
     let largest = largest.fold(0.0, f64::max).max(1e-300);
@@ -145,7 +145,7 @@ pub(crate) fn decades(values: &[f64], unit: &'static str) -> Legend {
     }
 }
 
-/// The smallest of 1, 2, 5 times a power of ten that is not below a positive value.
+/// Smallest of 1, 2, 5 times a power of ten that is at least a positive value.
 pub(crate) fn nice(value: f64) -> f64 {
     let power = 10_f64.powf(value.log10().floor());
     let steps = [1.0, 2.0, 5.0].map(|step| step * power);

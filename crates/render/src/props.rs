@@ -1,7 +1,7 @@
-//! Obstacles, ground and blade as triangles and planes relative to the eye.
+//! Geometry of obstacles, ground and blade: triangles and planes relative to the eye.
 //!
-//! Rebuilt for each picture: some thousand triangles at most, and obstacles move. Round shapes have as many facets as
-//! make no corner visible at usual sizes. Infinite planes are drawn as patches that fade out.
+//! Rebuilt for each image: obstacles move, and there are a few thousand triangles at most. Round shapes have enough
+//! facets to look smooth at usual sizes. Infinite planes are drawn as patches that fade out.
 
 use glam::{DQuat, DVec3, Vec3};
 use incise::Simulation;
@@ -15,7 +15,7 @@ use crate::view::{View, single};
 const STONE: [u8; 4] = [150, 154, 160, 70];
 const STEEL: [u8; 4] = [168, 174, 184, 255];
 
-/// Facets around round shapes.
+/// Facets around round obstacles.
 const AROUND: usize = 48;
 /// Facets around a blade.
 const AROUND_BLADE: usize = 12;
@@ -28,36 +28,36 @@ const PATCH: f64 = 2.2;
 #[cfg_attr(feature = "gpu", derive(bytemuck::Pod, bytemuck::Zeroable))]
 #[repr(C)]
 pub(crate) struct PropCorner {
-    /// Relative to the eye.
+    /// Position relative to the eye.
     pub(crate) position: [f32; 3],
     pub(crate) normal: [f32; 3],
-    /// sRGB, and the gloss.
+    /// sRGB and gloss.
     pub(crate) color: [u8; 4],
 }
 
-/// A patch of a plane.
+/// Patch of a plane.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Plane {
-    /// Relative to the eye.
+    /// Center relative to the eye.
     pub(crate) center: Vec3,
     pub(crate) radius: f32,
-    /// Along the grid; their cross product is the normal.
+    /// Grid axes; their cross product is the normal.
     pub(crate) u: Vec3,
     pub(crate) v: Vec3,
-    /// Offsets along the axes, so that lines are at multiples of the spacing.
+    /// Offsets along the axes that put grid lines at multiples of the spacing.
     pub(crate) offsets: [f32; 2],
     pub(crate) spacing: f32,
     pub(crate) opacity: f32,
-    /// Whether what stands on it leaves a contact shadow.
+    /// True if it receives contact shadows.
     pub(crate) ground: bool,
 }
 
-/// What there is beside bodies.
+/// Drawn geometry other than bodies.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Props {
-    /// Three a triangle.
+    /// Three corners per triangle.
     pub(crate) corners: Vec<PropCorner>,
-    /// The farthest first.
+    /// Planes, the farthest first.
     pub(crate) planes: Vec<Plane>,
 }
 
@@ -137,7 +137,7 @@ impl Props {
         }
     }
 
-    /// A patch of a plane around the point that is nearest to the middle of the bodies.
+    /// Adds a patch of a plane around the point nearest to the center of the bodies.
     fn plane(
         &mut self,
         view: &View,
@@ -148,7 +148,7 @@ impl Props {
         ground: bool,
     ) {
         let center = middle - normal * normal.dot(middle - point);
-        // x on a floor.
+        // Grid axis along x for a floor.
         let aside = if normal.z.abs() > 0.9 {
             DVec3::Y
         } else {
@@ -197,14 +197,14 @@ impl Props {
         }
     }
 
-    /// All points within the radius of a polyline, whose ends may coincide: half balls at both ends, and a rounded corner
-    /// at each point between.
+    /// Adds a tube around a polyline, whose ends may coincide: half balls at both ends, and rounded corners at the
+    /// points between.
     fn tube(&mut self, view: &View, line: &[DVec3], radius: f64, around: usize, color: [u8; 4]) {
         for ends in line.windows(2) {
             let along = (ends[1] - ends[0]).normalize_or(DVec3::Z);
             let side = along.any_orthonormal_vector();
             let other = along.cross(side);
-            // Rings from one pole to the other; the middle one is there twice, once at each end.
+            // Rings from one pole to the other; the middle ring is used twice, once at each end.
             let half = around / 4;
             let ring = |i: usize| {
                 let (end, step) = if i <= half { (0, i) } else { (1, i - 1) };
@@ -230,7 +230,7 @@ impl Props {
     }
 }
 
-/// The rotation that a scene describes.
+/// Rotation from its description in a scene.
 fn turned(spec: RotationSpec) -> DQuat {
     let axis = DVec3::from_array(spec.axis).normalize_or(DVec3::Z);
     DQuat::from_axis_angle(axis, spec.angle_degrees.to_radians())

@@ -1,17 +1,17 @@
-//! [`clip`] and [`fill`]: triangles cut by the planes of the view, and the rows of pixels whose middle they cover.
+//! [`clip`] and [`fill`]: clipping of triangles to the view volume, and the rows of pixels whose centers they cover.
 //!
-//! Without the planes a camera inside a scene would draw what is behind it. A row begins at the first middle on or right of
-//! one edge and ends before the first middle on or right of the other. An edge is walked from its upper end whichever triangle
-//! it belongs to, so triangles that share it cover each middle along it exactly once.
+//! Without clipping, triangles behind a camera inside the scene would be drawn. A row starts at the first pixel center
+//! on or right of one edge and ends before the first center on or right of the other. An edge is always walked from its
+//! upper end, so triangles that share it cover each pixel center along it exactly once.
 //!
-//! Source: Sutherland and Hodgman 1974 for clipping; Pineda 1988 for the plane of the depth. Cost: O(rows) and a division a
-//! triangle, a sum a pixel.
+//! Source: Sutherland and Hodgman 1974 for clipping; Pineda 1988 for the depth plane. Cost: O(rows) and a division per
+//! triangle, an addition per pixel.
 
 use std::ops::Range;
 
 use glam::{Vec2, Vec3, Vec4};
 
-/// The planes of the view: what has a positive product with all of them is seen. Depth is from 0 to w.
+/// Planes of the view volume: a point with positive products with all of them is inside. Depth is from 0 to w.
 const PLANES: [Vec4; 6] = [
     Vec4::new(1.0, 0.0, 0.0, 1.0),
     Vec4::new(-1.0, 0.0, 0.0, 1.0),
@@ -21,7 +21,7 @@ const PLANES: [Vec4; 6] = [
     Vec4::new(0.0, 0.0, -1.0, 1.0),
 ];
 
-/// The part of a triangle in clip coordinates that is in view, as triangles.
+/// Clips a triangle in clip coordinates to the view volume and passes the resulting triangles to `each`.
 pub(crate) fn clip(corners: [Vec4; 3], mut each: impl FnMut([Vec4; 3])) {
     let beyond = |plane: &Vec4| corners.iter().any(|corner| plane.dot(*corner) < 0.0);
     let mut polygon = corners.to_vec();
@@ -47,26 +47,27 @@ pub(crate) fn clip(corners: [Vec4; 3], mut each: impl FnMut([Vec4; 3])) {
     }
 }
 
-/// A row of pixels that a triangle covers.
+/// Row of pixels that a triangle covers.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Row {
     pub(crate) y: usize,
-    /// The first pixel, and the one after the last.
+    /// First pixel, and the one after the last.
     pub(crate) start: usize,
     pub(crate) end: usize,
-    /// The depth at the middle of the first pixel, and how much it grows from one to the next.
+    /// Depth at the center of the first pixel, and its step per pixel.
     depth: f32,
     growth: f32,
 }
 
 impl Row {
-    /// The depths at the middles of its pixels.
+    /// Depths at the centers of its pixels.
     pub(crate) fn depths(self) -> impl Iterator<Item = f32> {
         (0u16..).map(move |x| self.depth + f32::from(x) * self.growth)
     }
 }
 
-/// The rows among `rows` of the pixels below `width` whose middle is in a triangle: pixels from the upper left, and a depth.
+/// Rows among `rows` of the pixels below `width` whose center is inside a triangle, given in pixels from the upper left
+/// and a depth.
 pub(crate) fn fill(
     corners: [Vec3; 3],
     width: usize,
@@ -115,7 +116,7 @@ pub(crate) fn fill(
     }
 }
 
-/// The first pixel whose middle is at or beyond a place.
+/// First pixel whose center is at or beyond a coordinate.
 fn first_middle(place: f32) -> usize {
     #[expect(
         clippy::cast_possible_truncation,
@@ -145,7 +146,7 @@ mod tests {
     }
 
     fn place() -> impl Strategy<Value = Vec3> {
-        // On halves of pixels as well, where rules about edges matter.
+        // Includes pixel centers, where the fill rule matters.
         let at = prop_oneof![
             -4.0f32..28.0,
             (-8i16..56).prop_map(|half| f32::from(half) / 2.0)
@@ -156,7 +157,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(512))]
 
-        /// Signed areas in double precision say what is clearly in and clearly out; depth is that of barycentric coordinates.
+        /// Signed areas in double precision decide clear cases; depth equals that of barycentric coordinates.
         #[test]
         fn middles_inside_are_covered_once(corners in [place(), place(), place()]) {
             let [a, b, c] = corners.map(|p| p.as_dvec3());
@@ -192,16 +193,16 @@ mod tests {
             }
         }
 
-        /// Two triangles on the two sides of an edge leave no gap and share no pixel.
+        /// Two triangles on either side of an edge leave no gap and share no pixel.
         #[test]
         fn an_edge_belongs_to_one_side([a, b, c, d] in [place(), place(), place(), place()]) {
             let side = |p: Vec3| (b - a).truncate().perp_dot((p - a).truncate());
-            // On the other side than c.
+            // On the opposite side from c.
             let d = if side(c) * side(d) > 0.0 { a + b - d } else { d };
             prop_assume!(side(c) * side(d) < 0.0);
             let (one, other) = (covered([a, b, c]), covered([b, a, d]));
             prop_assert!(one.iter().zip(&other).all(|(p, q)| p + q <= 1));
-            // Along the edge: a middle on it that is between its ends belongs to one of the two.
+            // A pixel center on the edge between its ends belongs to one of the two.
             for y in 0..SIDE {
                 for x in 0..SIDE {
                     let middle = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
@@ -216,8 +217,8 @@ mod tests {
             }
         }
 
-        /// What is left is in view and has the area of what was in view: of samples of the triangle, those in view are in one
-        /// of the parts.
+        /// Clipping keeps exactly the visible part: sample points of the triangle are inside the view volume if and
+        /// only if one of the parts contains them.
         #[test]
         fn clipping_keeps_what_is_in_view(
             corners in prop::array::uniform3((-3.0f32..3.0, -3.0f32..3.0, -3.0f32..3.0, -1.0f32..3.0)),
@@ -233,7 +234,7 @@ mod tests {
                 let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
                 let x = corners[0] * (1.0 - u - v) + corners[1] * u + corners[2] * v;
                 let margin = PLANES.iter().map(|plane| plane.dot(x)).fold(f32::INFINITY, f32::min);
-                // In the plane of the triangle, by its own coordinates: those of parts are linear in them.
+                // In the triangle's plane by its own coordinates, in which the parts are linear.
                 let inside = parts.iter().any(|part| contains(*part, x));
                 if margin > 1e-2 {
                     prop_assert!(inside, "{} {:?}", x, parts);
@@ -242,7 +243,7 @@ mod tests {
         }
     }
 
-    /// Whether a point of the plane of a triangle in four dimensions is in it, up to rounding.
+    /// True if a point in the plane of a triangle in four dimensions is inside it, up to rounding.
     fn contains([a, b, c]: [Vec4; 3], x: Vec4) -> bool {
         let (ab, ac, ax) = ((b - a).as_dvec4(), (c - a).as_dvec4(), (x - a).as_dvec4());
         let (bb, bc, cc) = (ab.dot(ab), ab.dot(ac), ac.dot(ac));

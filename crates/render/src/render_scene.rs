@@ -1,9 +1,9 @@
-//! [`RenderScene`]: what is drawn of a simulation, kept current.
+//! [`RenderScene`]: drawable state of a simulation, kept up to date.
 //!
-//! It holds the skin, which follows cuts, and the colors of its triangles; obstacles and ground as the scene has them; a
-//! blade where its owner says. It holds no positions: those are the simulation's, on the processor or on a device. What
-//! changed is known by revisions, unique in the process, so that any number of renderers upload only what they do not
-//! have. Cost: what the cuts changed; nothing in frames without one.
+//! It holds the skin, which is updated after cuts, the colors of its triangles, obstacles and ground of the scene, and
+//! the blades. It holds no positions: those stay in the simulation, on the processor or on a device. Changes are marked
+//! by revisions that are unique in the process, so that each renderer uploads only what it lacks. Cost per frame:
+//! proportional to the changes by cuts; nothing without a cut.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -15,10 +15,10 @@ use incise::{Scene, Simulation};
 use crate::palette::{self, Legend, decades, legend_from};
 use crate::{ColorBy, RenderError, stretch};
 
-/// The color of a triangle without one: it is drawn as tissue.
+/// Color word of a triangle that is drawn as tissue.
 const NONE: u32 = 0;
 
-/// What is drawn of a simulation.
+/// Drawable state of a simulation.
 ///
 /// # Example
 /// ```
@@ -52,32 +52,33 @@ const NONE: u32 = 0;
 #[derive(Debug)]
 pub struct RenderScene {
     skin: Skin,
-    /// Of each triangle, or nothing where colors show tissue.
+    /// Color of each triangle; empty if all are drawn as tissue.
     colors: Vec<u32>,
     shown: ColorBy,
-    /// What colors that stay while nothing changes were made for.
+    /// Coloring and revision of the current colors, if they stay valid without changes.
     made_for: Option<(ColorBy, u64)>,
-    /// Of the skin.
+    /// Revision of the skin.
     topology: u64,
-    /// Of clusters and colors, which change with each cut and when they are rebuilt.
+    /// Revision of clusters and colors, which change with each cut and each rebuild.
     plan: u64,
-    /// Of the triangles' colors.
+    /// Revision of the triangles' colors.
     coloring: u64,
-    /// The simulated time at which it last followed.
+    /// Simulated time of the last update, in s.
     followed: f64,
-    /// Whether a device has had a step since the topology last changed other than by its cuts.
+    /// True if a device has made a step since the last topology change other than by its own cuts.
     device_is_current: bool,
     ground: Option<GroundSpec>,
     obstacles: Vec<ColliderSpec>,
-    /// The points of all blades, and where each one ends.
+    /// Points of all blades, and the end of each blade in them.
     blade_points: Vec<DVec3>,
     blade_ends: Vec<usize>,
-    /// The bodies' box at the start.
+    /// Bounding box of the bodies at the start.
     start: [DVec3; 2],
 }
 
 impl RenderScene {
-    /// All of a simulation as it is now; of `scene`, which it was made from, ground and obstacles. O(tets).
+    /// Creates the render scene of a simulation in its current state; ground and obstacles come from `scene`, which the
+    /// simulation was made from. O(tets).
     #[must_use]
     pub fn new(simulation: &Simulation, scene: &Scene) -> Self {
         let mut render_scene = Self {
@@ -101,10 +102,11 @@ impl RenderScene {
         render_scene
     }
 
-    /// Follows a step of the simulation. To be called after each; a second call after the same one does nothing.
+    /// Updates the render scene after a step of the simulation. Call it after each step; a second call for one step
+    /// does nothing.
     ///
     /// # Panics
-    /// If a step with a cut was left out: [`RenderScene::reset`] starts over.
+    /// If a step with a cut was skipped: use [`RenderScene::reset`] then.
     pub fn sync(&mut self, simulation: &Simulation) {
         let now = simulation.report().time_s;
         if now == self.followed {
@@ -136,8 +138,8 @@ impl RenderScene {
         self.plan = self.topology;
     }
 
-    /// Rebuilds everything from the present state of the simulation: after a jump to another state, or a change of how
-    /// the same one is solved. Until the next step, positions are those that the host knows. O(tets).
+    /// Rebuilds everything from the current state of the simulation: after a jump to another state, or a change of
+    /// solver settings. Until the next step, positions are those of the host. O(tets).
     pub fn reset(&mut self, simulation: &Simulation) {
         self.skin = Skin::new(simulation.boundary());
         self.topology = revision();
@@ -149,13 +151,13 @@ impl RenderScene {
         self.device_is_current = false;
     }
 
-    /// Colors the triangles for the present state; returns what the colors mean where they are values.
+    /// Colors the triangles for the current state; returns the legend if the colors show values.
     ///
-    /// Colors, clusters and pieces are looked at only when they or `by` changed. Stretch fetches positions from a device
-    /// and takes O(triangles) each time; `residuals` has a value for each tet and is shown by its logarithm.
+    /// Colors, clusters and pieces are recomputed only when they or `by` changed. Stretch reads positions from a device
+    /// and takes O(triangles) each time; `residuals` has a value for each tet and is shown on a logarithmic scale.
     ///
     /// # Errors
-    /// If residuals are to be shown and there is not one for each tet; if a device is lost.
+    /// If residuals are to be shown and their number is not that of the tets; if a device is lost.
     pub fn color(
         &mut self,
         simulation: &mut Simulation,
@@ -236,20 +238,20 @@ impl RenderScene {
         self.colors = values.into_iter().map(color).collect();
     }
 
-    /// Says where a blade is that is drawn as a thin tube along a polyline; `None` or a single point: there is none.
+    /// Sets the blade, drawn as a thin tube along a polyline; `None` or a single point removes it.
     pub fn set_blade(&mut self, blade: Option<&[DVec3]>) {
         self.blade_points.clear();
         self.blade_ends.clear();
         self.add_blade(blade.unwrap_or_default());
     }
 
-    /// Adds another blade to those that are drawn, until the next [`RenderScene::set_blade`].
+    /// Adds another blade until the next [`RenderScene::set_blade`].
     pub fn add_blade(&mut self, blade: &[DVec3]) {
         self.blade_points.extend_from_slice(blade);
         self.blade_ends.push(self.blade_points.len());
     }
 
-    /// The box of all bodies at the positions that the host knows: see [`Simulation::read_back`]. O(triangles).
+    /// Bounding box of all bodies at the host's positions: see [`Simulation::read_back`]. O(triangles).
     #[must_use]
     pub fn bounds(&self, simulation: &Simulation) -> [DVec3; 2] {
         let positions = simulation.positions();
@@ -265,13 +267,13 @@ impl RenderScene {
         }
     }
 
-    /// The triangles that are drawn.
+    /// Triangles of the skin.
     #[must_use]
     pub fn skin(&self) -> &Skin {
         &self.skin
     }
 
-    /// The color of each triangle in sRGB, as [`RenderScene::color`] made them; `None` for one that is drawn as tissue.
+    /// Color of each triangle in sRGB from the last [`RenderScene::color`]; `None` for one that is drawn as tissue.
     #[must_use]
     pub fn color_of(&self, triangle: usize) -> Option<[u8; 3]> {
         let word = self.colors.get(triangle).copied().unwrap_or(NONE);
@@ -279,7 +281,7 @@ impl RenderScene {
         (alpha > 0).then_some([r, g, b])
     }
 
-    /// The colors that a style shows: one for each triangle, or none at all.
+    /// Colors for a style: one per triangle, or an empty slice.
     pub(crate) fn colors_for(&self, by: ColorBy) -> &[u32] {
         if by == self.shown { &self.colors } else { &[] }
     }
@@ -307,20 +309,20 @@ impl RenderScene {
         &self.obstacles
     }
 
-    /// The polylines of all blades.
+    /// Polylines of all blades.
     pub(crate) fn blades(&self) -> impl Iterator<Item = &[DVec3]> {
         let starts = std::iter::once(&0).chain(&self.blade_ends);
         let ranges = starts.zip(&self.blade_ends);
         ranges.map(|(start, end)| &self.blade_points[*start..*end])
     }
 
-    /// The bodies' box at the start.
+    /// Bounding box of the bodies at the start.
     pub(crate) fn start(&self) -> [DVec3; 2] {
         self.start
     }
 }
 
-/// A number that nothing else in the process has.
+/// Returns a revision that is unique in the process.
 fn revision() -> u64 {
     static LAST: AtomicU64 = AtomicU64::new(0);
     LAST.fetch_add(1, Ordering::Relaxed) + 1

@@ -1,4 +1,4 @@
-//! [`Renderer`]: a device if there is one, else the processor.
+//! [`Renderer`]: a device renderer if there is one, else the software renderer.
 
 use incise::Simulation;
 
@@ -6,21 +6,21 @@ use incise::Simulation;
 use crate::GpuRenderer;
 use crate::{Camera, Image, RenderError, RenderScene, Style, software_picture};
 
-/// Draws on a device or on the processor.
+/// Renderer on a device or on the processor.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum Renderer {
-    /// On a device.
+    /// Device renderer.
     #[cfg(feature = "gpu")]
     Gpu(Box<GpuRenderer>),
-    /// On the processor.
+    /// Software renderer.
     Software,
 }
 
 impl Renderer {
-    /// A device's if there is a real one that can, else the processor's, with the reason. Opening a device takes some
-    /// hundred milliseconds. A device that is a processor in disguise is slower than the processor itself: it draws only if
-    /// the environment names it, by `WGPU_ADAPTER_NAME`.
+    /// Opens a device renderer if a hardware device supports it, else the software renderer, with the reason. Opening a
+    /// device takes some hundred milliseconds. A device emulated by the processor is slower than the software renderer;
+    /// it is used only if `WGPU_ADAPTER_NAME` names it.
     #[must_use]
     pub fn open() -> (Self, Option<String>) {
         #[cfg(feature = "gpu")]
@@ -51,8 +51,8 @@ impl Renderer {
         GpuRenderer::new(gpu.into()).map_err(|error| error.to_string())
     }
 
-    /// The device that a simulation is computed on, so that its positions need not leave it; for one that is not on a device,
-    /// or on one that cannot draw, as [`Renderer::open`].
+    /// Opens a renderer on the device that a simulation runs on, so that its positions stay there. For a simulation
+    /// that runs on no device, or on one that cannot draw, equivalent to [`Renderer::open`].
     #[must_use]
     pub fn for_simulation(simulation: &Simulation) -> (Self, Option<String>) {
         #[cfg(feature = "gpu")]
@@ -66,8 +66,9 @@ impl Renderer {
         Self::open()
     }
 
-    /// Whether a simulation has to be [read back](Simulation::read_back) for a picture of the present: it is on a device,
-    /// and not drawn from there. Until a step after the render scene was made or reset, no simulation is drawn from a device.
+    /// True if drawing the current state needs a [readback](Simulation::read_back) of the simulation first: it runs on
+    /// a device and is not drawn from there. Before the first step after the render scene was created or reset, no
+    /// simulation is drawn from a device.
     #[must_use]
     pub fn needs_read_back(&self, render_scene: &RenderScene, simulation: &Simulation) -> bool {
         match self {
@@ -83,7 +84,7 @@ impl Renderer {
         }
     }
 
-    /// What it draws on, in words.
+    /// Description of the device or processor that draws.
     #[must_use]
     pub fn describe(&self) -> String {
         match self {
@@ -96,13 +97,14 @@ impl Renderer {
         }
     }
 
-    /// Draws a picture, of the present if the simulation was read back where [`Renderer::needs_read_back`] says so.
+    /// Draws an image; of the current state if the simulation was read back where [`Renderer::needs_read_back`] says
+    /// so.
     ///
     /// # Errors
-    /// If a side of the picture is 0 or too large; if a device is lost or out of memory.
+    /// If a side of the image is 0 or too large; if a device is lost or out of memory.
     ///
     /// # Panics
-    /// If the render scene does not follow the simulation.
+    /// If the render scene does not match the simulation.
     pub fn picture(
         &mut self,
         render_scene: &RenderScene,
@@ -119,8 +121,8 @@ impl Renderer {
     }
 }
 
-/// Whether it makes sense to look for a real device. Loading drivers takes a tenth of a second, and those that find nothing
-/// complain on the terminal; on Linux a GPU shows in the file system.
+/// True if a hardware device may exist. Loading drivers takes a tenth of a second, and drivers without a device print
+/// warnings; on Linux a GPU is visible in the file system.
 #[cfg(feature = "gpu")]
 fn may_have_gpu() -> bool {
     const NODES: [&str; 6] = [

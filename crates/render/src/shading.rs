@@ -1,9 +1,9 @@
-//! The color of what is seen at a pixel, in linear light: twin of `shading.wgsl`, function by function.
+//! Surface color of a pixel in linear light: twin of `shading.wgsl`, function by function.
 //!
-//! A hemisphere of ambient light, one key light that wraps a little around (soft bodies scatter), a highlight by the half
-//! vector (J. Blinn, "Models of light reflection", 1977) and a rim by the grazing angle. Powers are products, so that both
-//! twins round alike. The ground has a grid, whose lines are as wide as a pixel at any distance by the exact derivatives of
-//! the ray, and fades into the background. Cost: some 100 operations a pixel.
+//! Hemispherical ambient light, one wrapped key light (soft bodies scatter), a highlight by the half vector (J. Blinn,
+//! "Models of light reflection", 1977) and a rim light at grazing angles. Powers are products, so that both twins round
+//! alike. The ground has a grid, whose lines are one pixel wide at any distance by the exact derivatives of the ray,
+//! and fades into the background. Cost: some 100 operations per pixel.
 
 use glam::Vec3;
 
@@ -11,11 +11,11 @@ use crate::props::Plane;
 use crate::srgb::decode;
 use crate::view::View;
 
-/// Tissue, in linear light.
+/// Color of tissue in linear light.
 pub(crate) const TISSUE: Vec3 = Vec3::new(0.245, 0.044, 0.036);
-/// Tissue that a cut laid bare.
+/// Color of tissue on cut faces in linear light.
 pub(crate) const FLESH: Vec3 = Vec3::new(0.780, 0.290, 0.250);
-/// How much it shines.
+/// Gloss of tissue.
 pub(crate) const GLOSS: f32 = 0.55;
 const FLESH_GLOSS: f32 = 0.35;
 
@@ -28,21 +28,21 @@ const TABLE_LINE: Vec3 = Vec3::new(0.30, 0.32, 0.36);
 const TOP: Vec3 = Vec3::new(0.92, 0.935, 0.955);
 const BOTTOM: Vec3 = Vec3::new(0.66, 0.69, 0.73);
 
-/// A point of a surface.
+/// Point of a surface.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Surface {
-    /// Its color in linear light.
+    /// Base color in linear light.
     pub(crate) base: Vec3,
     pub(crate) gloss: f32,
-    /// Relative to the eye.
+    /// Position relative to the eye.
     pub(crate) position: Vec3,
-    /// The normal that shading goes by, of length 1.
+    /// Shading normal, of length 1.
     pub(crate) normal: Vec3,
-    /// That of the triangle, of length 1.
+    /// Normal of the triangle, of length 1.
     pub(crate) face: Vec3,
 }
 
-/// `normalize`, but a vector without a direction becomes up.
+/// Normalized vector; up for a vector of length 0.
 pub(crate) fn direction(v: Vec3) -> Vec3 {
     let squared = v.dot(v);
     if squared > 0.0 {
@@ -57,7 +57,7 @@ pub(crate) fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// The color of a triangle of a body from its word (nothing in it: tissue) and whether a cut laid it bare; and its gloss.
+/// Base color and gloss of a skin triangle from its color word (0: tissue) and whether it is a cut face.
 pub(crate) fn skin_base(word: u32, cut: bool) -> (Vec3, f32) {
     if word == 0 {
         return if cut {
@@ -75,7 +75,7 @@ pub(crate) fn skin_base(word: u32, cut: bool) -> (Vec3, f32) {
     }
 }
 
-/// The normal that a triangle of a body is shaded by: cut faces are flatter than others.
+/// Shading normal of a skin triangle: cut faces are shaded flatter than others.
 pub(crate) fn skin_normal(normal: Vec3, face: Vec3, cut: bool, smooth: bool) -> Vec3 {
     if !smooth {
         return face;
@@ -84,12 +84,12 @@ pub(crate) fn skin_normal(normal: Vec3, face: Vec3, cut: bool, smooth: bool) -> 
     direction(direction(normal).lerp(face, share))
 }
 
-/// What a surface sends to the eye.
+/// Light that a surface reflects to the eye.
 pub(crate) fn shade(surface: Surface, light: Vec3) -> Vec3 {
     let to_eye = direction(-surface.position);
     let (mut normal, mut base, mut gloss) = (surface.normal, surface.base, surface.gloss);
     if surface.face.dot(to_eye) < 0.0 {
-        // The inside.
+        // Back side.
         (normal, base, gloss) = (-normal, base * 0.5, gloss * 0.3);
     }
     let sky = 0.5 + 0.5 * normal.z;
@@ -110,20 +110,20 @@ pub(crate) fn shade(surface: Surface, light: Vec3) -> Vec3 {
     diffuse + KEY * highlight + ambient * rim
 }
 
-/// Draws the edges of a triangle over a color, by the distances to them in pixels.
+/// Draws the edges of a triangle over a color, given the distances to them in pixels.
 pub(crate) fn wire(color: Vec3, distances: Vec3) -> Vec3 {
     let nearest = distances.min_element();
     let share = 1.0 - smoothstep(0.2, 1.1, nearest);
     color.lerp(LINE, 0.75 * share)
 }
 
-/// What is behind everything, at a fraction of the picture's height from above.
+/// Background color at a fraction of the image height from the top.
 pub(crate) fn background(y: f32) -> Vec3 {
     TOP.lerp(BOTTOM, y * y * (3.0 - 2.0 * y))
 }
 
-/// A plane where the ray through a pixel meets it: its color in linear light and how much of what is behind it covers;
-/// and the depth. `shade_of` is the contact shadow of what stands on it, from 0 to 1, at a position relative to the eye.
+/// Intersects the ray through a pixel with a plane: its color in linear light, its opacity, and the depth. `shade_of`
+/// is the contact shadow, from 0 to 1, at a position relative to the eye.
 pub(crate) fn plane(
     view: &View,
     plane: &Plane,
@@ -151,7 +151,7 @@ pub(crate) fn plane(
     Some((color, cover * fade, depth))
 }
 
-/// How much of a pixel the lines across an axis cover.
+/// Fraction of a pixel covered by the grid lines across an axis.
 fn line(axis: Vec3, offset: f32, spacing: f32, position: Vec3, steps: [Vec3; 2]) -> f32 {
     let at = (position.dot(axis) + offset) / spacing;
     let width = (steps[0].dot(axis).abs() + steps[1].dot(axis).abs()) / spacing;
@@ -159,7 +159,7 @@ fn line(axis: Vec3, offset: f32, spacing: f32, position: Vec3, steps: [Vec3; 2])
     (1.0 - smoothstep(0.4 * width, 1.3 * width, distance)) * (1.0 - smoothstep(0.08, 0.45, width))
 }
 
-/// `floor` without a call, for what is far from the ends of an integer.
+/// `floor` without a call, for values in the range of an integer.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "lines are counted from the eye, and those beyond the patch are not asked for"

@@ -1,12 +1,12 @@
-//! [`contact_sheet`]: pictures side by side, with captions.
+//! [`contact_sheet`]: a grid of images with captions.
 
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 
 use crate::Image;
 
-/// Pixels around each picture.
+/// Pixels around each image.
 const MARGIN: usize = 10;
-/// Pixels from one line of a caption's top to its bottom.
+/// Height of a caption line in pixels.
 const LINE: usize = 20;
 const PAPER: [u8; 3] = [250, 250, 251];
 const INK: [u8; 3] = [40, 44, 52];
@@ -14,9 +14,9 @@ const INK: [u8; 3] = [40, 44, 52];
 const WEIGHT: FontWeight = FontWeight::Regular;
 const HEIGHT: RasterHeight = RasterHeight::Size16;
 
-/// Pictures in rows of `columns`, from the upper left, each with its caption below. All cells are as large as the largest
-/// picture; captions that are longer than a cell is wide are cut, and characters other than ASCII become `?`. Without a
-/// picture or a column: a sheet of margins. O(pixels).
+/// Arranges images in rows of `columns`, from the upper left, each with its caption below. All cells have the size of
+/// the largest image; captions wider than a cell are truncated, and characters other than ASCII become `?`. Without
+/// images or columns the sheet has margins only. O(pixels).
 ///
 /// # Example
 /// ```
@@ -57,7 +57,7 @@ pub fn contact_sheet(pictures: &[(Image, String)], columns: usize) -> Image {
     sheet
 }
 
-/// Writes a line of text from a place on, as much of it as fits.
+/// Writes a line of text from a position on, truncated to the width.
 fn write(sheet: &mut Image, text: &str, [left, top]: [usize; 2], width: usize) {
     let advance = get_raster_width(WEIGHT, HEIGHT);
     for (i, letter) in text.chars().take(width / advance).enumerate() {

@@ -1,12 +1,12 @@
-//! [`software_picture`]: the same pictures without a device.
+//! [`software_picture`]: images drawn on the processor.
 //!
 //! Triangles are clipped and cut into rows of pixels (`raster.rs`).
 //!
-//! What the rasterizer is asked for is only which triangle is in front at each of four samples of a pixel, placed as devices
-//! place them. A pixel is then shaded once for each triangle that it shows, at the middle of the samples that show it: what
-//! a device does with four samples. Bands of rows are done in parallel; each pixel is computed by one thread in one order,
-//! so a picture is the same for any number of threads. Cost: each band looks at each triangle, O(bands x triangles); four
-//! passes over the rows of those in it, and a shading or two a pixel.
+//! The rasterizer only decides which triangle is in front at each of four samples of a pixel, at the positions that
+//! devices use. A pixel is then shaded once for each visible triangle, at the center of its samples, as in four-sample
+//! MSAA on a device. Bands of rows are drawn in parallel; each pixel is computed by one thread in one order, so an
+//! image is the same for any number of threads. Cost: each band visits each triangle, O(bands x triangles); four passes
+//! over the rows of those in it, and one or two shadings per pixel.
 
 use glam::{Vec2, Vec3, Vec4};
 use incise::Simulation;
@@ -22,29 +22,29 @@ use crate::srgb::{decode, encode};
 use crate::view::{LARGEST_SIDE, View};
 use crate::{Camera, Image, RenderError, RenderScene, Style};
 
-/// Where the samples of a pixel are: the standard positions of Vulkan, Metal and Direct3D.
+/// Sample positions in a pixel: the standard ones of Vulkan, Metal and Direct3D.
 const SAMPLES: [Vec2; 4] = [
     Vec2::new(0.375, 0.125),
     Vec2::new(0.875, 0.375),
     Vec2::new(0.125, 0.625),
     Vec2::new(0.625, 0.875),
 ];
-/// Rows that a thread does at once.
+/// Rows per parallel task.
 const BAND: usize = 16;
-/// Triangles that a thread projects at once.
+/// Triangles per parallel task of the projection.
 const CHUNK: usize = 512;
-/// No triangle.
+/// Index of an empty sample.
 const NOTHING: u32 = u32::MAX;
 
-/// Draws a picture on the processor, of the positions that the host knows: see [`Simulation::read_back`].
+/// Draws an image on the processor from the host's positions: see [`Simulation::read_back`].
 ///
 /// Equal input gives equal bytes for any number of threads.
 ///
 /// # Errors
-/// If a side of the picture is 0 or more than [`LARGEST_SIDE`].
+/// If a side of the image is 0 or more than [`LARGEST_SIDE`].
 ///
 /// # Panics
-/// If the render scene does not follow the simulation.
+/// If the render scene does not match the simulation.
 ///
 /// # Example
 /// See [`RenderScene`].
@@ -72,28 +72,28 @@ pub fn software_picture(
     })
 }
 
-/// All that is drawn in a picture.
+/// Everything drawn in an image.
 struct Frame<'a> {
     view: View,
     style: Style,
     render_scene: &'a RenderScene,
     colors: &'a [u32],
-    /// Of the skin's vertices, relative to the eye.
+    /// Positions of the skin's vertices relative to the eye.
     positions: Vec<Vec3>,
     normals: Vec<Vec3>,
     props: Props,
     contact_shadow: Option<ContactShadow>,
 }
 
-/// A triangle on the screen: pixels from the upper left and one over the depth.
+/// Triangle on the screen: pixels from the upper left, and the reciprocal of the depth.
 #[derive(Clone, Copy, Debug)]
 struct Placed {
     corners: [Vec3; 3],
-    /// The skin's triangles come first, then those of obstacles.
+    /// Index of the triangle: the skin's triangles come first, then those of obstacles.
     triangle: u32,
 }
 
-/// What a triangle shows at a position.
+/// Surface data of a triangle.
 struct Corners<'a> {
     positions: [Vec3; 3],
     kind: Kind<'a>,
@@ -168,7 +168,7 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// All triangles on the screen, clipped, in their order.
+    /// Clips and projects all triangles, in their order.
     fn place(&self) -> Vec<Placed> {
         let triangles: Vec<u32> = (0..self.triangles()).map(number).collect();
         let chunks = triangles.par_chunks(CHUNK);
@@ -206,7 +206,7 @@ impl<'a> Frame<'a> {
         )
     }
 
-    /// What a triangle sends to the eye at a position of the picture.
+    /// Color of a triangle at a position in the image, in linear light.
     fn shade(&self, triangle: u32, at: Vec2) -> Vec3 {
         let Corners { positions, kind } = self.corners(triangle as usize);
         let shares = shares(positions, self.view.ray(at.x, at.y));
@@ -251,7 +251,7 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// Distances in pixels from the edges of a triangle; far away if a corner is not in front of the eye.
+    /// Distances in pixels from the edges of a triangle; a large value if a corner is not in front of the eye.
     fn distances(&self, positions: [Vec3; 3], at: Vec2) -> Vec3 {
         let [Some(a), Some(b), Some(c)] = positions.map(|position| self.view.pixel(position))
         else {
@@ -261,13 +261,13 @@ impl<'a> Frame<'a> {
         Vec3::new(from(b, c), from(c, a), from(a, b))
     }
 
-    /// The color of a pixel from what each of its samples shows.
+    /// Color of a pixel from its samples.
     fn pixel(&self, x: usize, y: usize, samples: [(u32, f32); 4], sky: Sky) -> [u8; 4] {
         let corner = Vec2::new(x as f32, y as f32);
         let middle = corner + 0.5;
         let empty = samples.iter().all(|sample| sample.0 == NOTHING);
         let mut colors = [sky.color; 4];
-        // Of a pixel with nothing in it one sample is enough.
+        // One sample is enough for an empty pixel.
         let colors = if empty {
             &mut colors[..1]
         } else {
@@ -278,7 +278,7 @@ impl<'a> Frame<'a> {
                     colors[i] = colors[same];
                 } else if triangle != NOTHING {
                     let color = self.shade(triangle, corner + middle_of(triangle, samples));
-                    // What a device keeps of its samples is between black and white.
+                    // A device clamps its samples to this range.
                     colors[i] = color.clamp(Vec3::ZERO, Vec3::ONE);
                 }
             }
@@ -295,7 +295,7 @@ impl<'a> Frame<'a> {
         opaque(colors.iter().sum::<Vec3>() / colors.len() as f32)
     }
 
-    /// Draws a plane over the samples that show something behind it; whether there is any.
+    /// Blends a plane over the samples that show something behind it; returns true if there are any.
     fn blend(
         &self,
         plane: &Plane,
@@ -319,20 +319,20 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// What is behind everything in a row.
+/// Background of a row.
 #[derive(Clone, Copy)]
 struct Sky {
     color: Vec3,
     encoded: [u8; 4],
 }
 
-/// The bytes of a color in linear light.
+/// Encodes a color in linear light as opaque sRGB bytes.
 fn opaque(color: Vec3) -> [u8; 4] {
     let [r, g, b] = color.to_array().map(encode);
     [r, g, b, 255]
 }
 
-/// The middle of the samples of a pixel that show a triangle.
+/// Center of the samples of a pixel that show a triangle.
 fn middle_of(triangle: u32, samples: [(u32, f32); 4]) -> Vec2 {
     let shown = SAMPLES.iter().zip(samples);
     let shown = shown.filter(|(_, sample)| sample.0 == triangle);
@@ -342,7 +342,7 @@ fn middle_of(triangle: u32, samples: [(u32, f32); 4]) -> Vec2 {
     sum / count
 }
 
-/// The barycentric coordinates of where a ray meets a triangle's plane, held within the triangle.
+/// Barycentric coordinates of the intersection of a ray with a triangle's plane, clamped to the triangle.
 fn shares([a, b, c]: [Vec3; 3], ray: Vec3) -> Vec3 {
     let (ab, ac) = (b - a, c - a);
     let across = ray.cross(ac);
@@ -350,22 +350,22 @@ fn shares([a, b, c]: [Vec3; 3], ray: Vec3) -> Vec3 {
     let v = -a.dot(across) / determinant;
     let w = -ray.dot(a.cross(ab)) / determinant;
     if !(v.is_finite() && w.is_finite()) {
-        // Seen from the edge.
+        // Seen edge-on.
         return Vec3::splat(1.0 / 3.0);
     }
     let shares = Vec3::new(1.0 - v - w, v, w).max(Vec3::ZERO);
     shares / shares.element_sum()
 }
 
-/// A few rows of pixels, four samples each.
+/// Band of pixel rows, four samples per pixel.
 #[derive(Default)]
 struct Band {
-    /// The triangle and one over its depth.
+    /// Triangle and reciprocal depth.
     samples: Vec<[(u32, f32); 4]>,
 }
 
 impl Band {
-    /// Draws rows from `top` on.
+    /// Draws the rows from `top` on.
     fn draw(&mut self, frame: &Frame<'_>, placed: &[Placed], top: usize, rows: &mut [u8]) {
         let width = frame.view.size[0] as usize;
         let height = rows.len() / (4 * width);
@@ -389,11 +389,11 @@ impl Band {
         }
     }
 
-    /// Puts a triangle into the samples where it is in front; of several at one depth the first stays.
+    /// Writes a triangle into the samples where it is in front; at equal depth the first triangle stays.
     fn fill(&mut self, placed: &Placed, top: usize, width: usize) {
         let height = self.samples.len() / width;
         for (sample, position) in SAMPLES.iter().enumerate() {
-            // The rasterizer asks for the middle of a pixel.
+            // The rasterizer samples at pixel centers.
             let shift = 0.5 - *position;
             let corners = placed.corners.map(|corner| corner + shift.extend(0.0));
             fill(corners, width, top..top + height, |row| {

@@ -1,12 +1,12 @@
-//! sRGB (IEC 61966-2-1): [`encode`] gives the byte of a part of linear light, [`decode`] goes back. Both by tables: the one
-//! is so fine that no byte is off by more than one, the other exact.
+//! sRGB (IEC 61966-2-1): [`encode`] converts linear light to a byte, [`decode`] the reverse. Both use tables: `encode`
+//! is within one level, `decode` is exact.
 
 use std::sync::LazyLock;
 
-/// Steps of the table: the darkest byte of sRGB is a step of 1/3295 in linear light.
+/// Steps of the table: the darkest sRGB level is a step of 1/3295 in linear light.
 const STEPS: f32 = 16_383.0;
 
-/// The byte of a part of linear light; what is below 0 is black, what is above 1 is full.
+/// Converts linear light to an sRGB byte; values are clamped to 0 to 1.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -28,7 +28,7 @@ pub(crate) fn encode(linear: f32) -> u8 {
     TABLE[(linear.clamp(0.0, 1.0) * STEPS + 0.5) as usize]
 }
 
-/// A byte of sRGB as linear light.
+/// Converts an sRGB byte to linear light.
 pub(crate) fn decode(byte: u8) -> f32 {
     static TABLE: LazyLock<[f32; 256]> = LazyLock::new(|| {
         std::array::from_fn(|i| {

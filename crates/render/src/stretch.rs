@@ -1,13 +1,14 @@
 //! [`stretch`]: the largest principal stretch of a tet.
 //!
-//! With the edges from one corner as columns, at rest R and now D, the deformation is F = D R⁻¹; its singular values are
-//! the principal stretches. The largest is the root of the largest eigenvalue of `FᵀF`, which for a symmetric matrix of
-//! three rows has a closed form (O. K. Smith, "Eigenvalues of a symmetric 3 × 3 matrix", 1961). Cost: some 100 operations.
+//! With the edges from one corner as columns, R at rest and D now, the deformation gradient is F = D R⁻¹; its singular
+//! values are the principal stretches. The largest is the square root of the largest eigenvalue of `FᵀF`, which has a
+//! closed form for a symmetric 3 x 3 matrix (O. K. Smith, "Eigenvalues of a symmetric 3 × 3 matrix", 1961). Cost: some
+//! 100 operations.
 
 use glam::{DMat3, DVec3};
 
-/// The largest principal stretch of a tet with corners at `rest` and at `now` in m: 1 where nothing is deformed. A tet
-/// without a volume at rest has none: 1.
+/// Largest principal stretch of a tet with corners at `rest` and at `now` in m: 1 where nothing is deformed, and for a
+/// tet with zero rest volume.
 ///
 /// # Example
 /// ```
@@ -30,7 +31,7 @@ pub fn stretch(rest: [DVec3; 4], now: [DVec3; 4]) -> f64 {
         .sqrt()
 }
 
-/// Of a symmetric matrix.
+/// Largest eigenvalue of a symmetric matrix.
 fn largest_eigenvalue(m: DMat3) -> f64 {
     let [a, b, c] = [m.x_axis.x, m.y_axis.y, m.z_axis.z];
     let [d, e, f] = [m.y_axis.x, m.z_axis.x, m.z_axis.y];

@@ -1,11 +1,11 @@
-//! [`Style`] and [`ColorBy`]: how bodies are drawn.
+//! [`Style`] and [`ColorBy`]: drawing options of bodies.
 
 use std::fmt;
 use std::str::FromStr;
 
 use crate::RenderError;
 
-/// What the colors of a body show.
+/// Quantity that the colors of a body show.
 ///
 /// ```
 /// use incise_render::ColorBy;
@@ -17,23 +17,23 @@ use crate::RenderError;
 /// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum ColorBy {
-    /// What the body is made of: the outer surface dark, cut faces light.
+    /// Material: the outer surface dark, cut faces light.
     #[default]
     Tissue,
-    /// The color of the tet's cluster: what is solved together.
+    /// Color of the tet's cluster: clusters of one color are solved together.
     Color,
     /// The tet's cluster.
     Cluster,
     /// The piece that the tet belongs to.
     Piece,
-    /// The largest principal stretch of the tet.
+    /// Largest principal stretch of the tet.
     Stretch,
-    /// How far the tet's constraints are from solved.
+    /// Constraint residual of the tet.
     Residual,
 }
 
 impl ColorBy {
-    /// All of them.
+    /// All values.
     pub const ALL: [Self; 6] = [
         Self::Tissue,
         Self::Color,
@@ -42,10 +42,10 @@ impl ColorBy {
         Self::Stretch,
         Self::Residual,
     ];
-    /// Their names, for messages.
+    /// Names of all values, for messages.
     pub const KNOWN: &str = "tissue, color, cluster, piece, stretch, residual";
 
-    /// The name, as it is parsed.
+    /// Name, as it is parsed.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -77,15 +77,15 @@ impl FromStr for ColorBy {
     }
 }
 
-/// How bodies are drawn.
+/// Drawing options of bodies.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Style {
-    /// What colors show. Colors other than of tissue are those that [`RenderScene::color`](crate::RenderScene::color) made last
-    /// for the same; triangles without one are drawn as tissue.
+    /// Quantity shown by the colors. Colors other than of tissue are those of the last
+    /// [`RenderScene::color`](crate::RenderScene::color) with this value; triangles without one are drawn as tissue.
     pub color_by: ColorBy,
-    /// Whether the edges of triangles are drawn.
+    /// Draws the edges of triangles.
     pub wireframe: bool,
-    /// Whether shading is smooth over the outer surface; otherwise each triangle is flat.
+    /// Shades the outer surface smoothly; otherwise each triangle is flat.
     pub smooth: bool,
 }
 

@@ -1,36 +1,36 @@
-//! [`View`]: what both renderers derive from camera and size, in single precision relative to the eye.
+//! [`View`]: values that both renderers derive from camera and size, in single precision relative to the eye.
 //!
-//! Differences to the eye are taken in double precision and rounded once. Particles have single precision relative to the
-//! origin of their solver, or to the first particle where positions are sent: what is near that is as sharp far from the
-//! origin of the world as at it.
+//! Differences to the eye are taken in double precision and rounded once. Particles have single precision relative to
+//! the origin of their solver, or to the first particle where positions are uploaded: precision near that point does
+//! not depend on the distance from the world origin.
 
 use glam::{Mat4, Vec3, Vec4Swizzles};
 
 use crate::{Camera, RenderError};
 
-/// Most pixels on a side of a picture by software: what every device allows that has WebGPU's default limits.
+/// Largest side of an image by software, in pixels: the limit of every device with WebGPU's default limits.
 pub const LARGEST_SIDE: u32 = 8192;
 
-/// What is the same for all that is drawn in a picture.
+/// Values shared by everything drawn in an image.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct View {
     pub(crate) eye: glam::DVec3,
-    /// From points relative to the eye to clip space, depth from 0 to 1.
+    /// Projection from points relative to the eye to clip space, depth from 0 to 1.
     pub(crate) clip: Mat4,
     pub(crate) right: Vec3,
     pub(crate) up: Vec3,
     pub(crate) forward: Vec3,
-    /// Half the picture's width and height at a depth of 1.
+    /// Half the image width and height at a depth of 1.
     pub(crate) tangents: [f32; 2],
-    /// To the light, of length 1.
+    /// Unit vector to the light.
     pub(crate) light: Vec3,
-    /// In pixels.
+    /// Size of the image in pixels.
     pub(crate) size: [u32; 2],
 }
 
 impl View {
     /// # Errors
-    /// If a side of the picture is 0 or more than `largest`.
+    /// If a side of the image is 0 or more than `largest`.
     pub(crate) fn new(
         camera: &Camera,
         [width, height]: [u32; 2],
@@ -47,7 +47,7 @@ impl View {
         let aspect = f64::from(width) / f64::from(height);
         let tangent = (camera.field_of_view * 0.5).tan();
         let (right, forward) = (camera.right(), camera.forward());
-        // From behind the camera's left shoulder, from above in the world.
+        // From behind the camera's left shoulder and above in the world.
         let light = glam::DVec3::Z * 0.8 - right * 0.55 - forward.with_z(0.0) * 0.45;
         Ok(Self {
             eye: camera.eye(),
@@ -61,12 +61,12 @@ impl View {
         })
     }
 
-    /// A point relative to the eye.
+    /// Converts a point to single precision relative to the eye.
     pub(crate) fn relative(&self, point: glam::DVec3) -> Vec3 {
         (point - self.eye).as_vec3()
     }
 
-    /// The ray through a place in the picture, in pixels from its upper left corner; as long as is a depth of 1.
+    /// Ray through a position in the image, in pixels from its upper left corner; it ends at a depth of 1.
     pub(crate) fn ray(&self, x: f32, y: f32) -> Vec3 {
         let [width, height] = self.size.map(|side| side as f32);
         self.forward
@@ -74,7 +74,7 @@ impl View {
             + self.up * (self.tangents[1] * (1.0 - 2.0 * y / height))
     }
 
-    /// What the ray changes by from a pixel to the next to the right and to the next below.
+    /// Change of the ray per pixel to the right and per pixel down.
     pub(crate) fn ray_steps(&self) -> [Vec3; 2] {
         let [width, height] = self.size.map(|side| side as f32);
         [
@@ -83,8 +83,8 @@ impl View {
         ]
     }
 
-    /// Where a point relative to the eye is seen in pixels from the upper left corner; nothing for what is nearer than
-    /// what is drawn.
+    /// Projects a point relative to the eye to pixels from the upper left; `None` for a point nearer than the near
+    /// plane.
     pub(crate) fn pixel(&self, point: Vec3) -> Option<glam::Vec2> {
         let clip = self.clip * point.extend(1.0);
         let size = glam::Vec2::new(self.size[0] as f32, self.size[1] as f32);
@@ -93,7 +93,7 @@ impl View {
     }
 }
 
-/// The nearest single.
+/// Rounds to the nearest single-precision value.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "meant to round: what is drawn is single precision"

@@ -1,8 +1,8 @@
-//! `cargo xtask accuracy`: what accuracy costs, scene by scene and knob by knob.
+//! `cargo xtask accuracy`: error and frame time of solver settings, by scene and setting.
 //!
-//! Errors are distances from a converged solution of the same tets, by Newton's method in double precision, whose own
-//! error is stated; times are those of whole frames on one thread. The machinery is that of `incise advise`
-//! ([`incise::advise`]), so a user's scene is measured as these are.
+//! Errors are distances from a converged solution of the mesh by Newton's method in double precision, with its own
+//! error stated; times are those of whole frames on one thread. The measurements use the code of `incise advise`
+//! ([`incise::advise`]), so a user's scene is measured in the same way.
 
 mod page;
 mod scenes;
@@ -22,24 +22,24 @@ use crate::experiment::{Backend, Cell, Experiment, ExperimentArguments};
 use scenes::{Kind, frames};
 use settings::{large_step, large_vbd, settings};
 
-/// All that was measured of a scene.
+/// Measurements of one scene.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct SceneRow {
     title: String,
     tets: usize,
     frames: u32,
-    /// The substeps that bring kappa to 0.5.
+    /// Number of substeps that brings kappa to 0.5.
     substeps: u32,
     reference: ReferenceRow,
     settings: Vec<SettingRow>,
-    /// Settings that the scene cannot be run with, and why.
+    /// Settings that the scene cannot run with, and the reasons.
     refused: Vec<String>,
     exchanges: Vec<ExchangeRow>,
-    /// One step a frame, iterated: the distance from the same step by Newton's method.
+    /// One step per frame, iterated: distance from that step by Newton's method.
     large: Vec<LargeRow>,
 }
 
-/// How well the reference is known.
+/// Accuracy of the reference.
 #[derive(Debug, Serialize, Deserialize)]
 struct ReferenceRow {
     steps: [u32; 3],
@@ -48,7 +48,7 @@ struct ReferenceRow {
     left: Deviation,
 }
 
-/// A setting: what it costs and what it is worth.
+/// A setting with its error and time.
 #[derive(Debug, Serialize, Deserialize)]
 struct SettingRow {
     curve: String,
@@ -57,7 +57,7 @@ struct SettingRow {
     error: Deviation,
 }
 
-/// Two settings of a scene that differ in one knob.
+/// Two settings of a scene that differ in one parameter.
 #[derive(Debug, Serialize, Deserialize)]
 struct ExchangeRow {
     knob: String,
@@ -69,7 +69,7 @@ struct ExchangeRow {
 #[derive(Debug, Serialize, Deserialize)]
 struct LargeRow {
     iterations: u32,
-    /// In %; of XPBD, and of VBD with coarse correction where the scene allows that.
+    /// In %: for XPBD, and for VBD with coarse correction where the scene supports it.
     xpbd: Deviation,
     vbd: Option<Deviation>,
 }
@@ -161,7 +161,7 @@ fn tets(scene: &Scene) -> anyhow::Result<usize> {
         .len())
 }
 
-/// How far one step a frame, iterated, is from the same step by Newton's method.
+/// Distance of one iterated step per frame from that step by Newton's method.
 fn large(scene: &Scene, frames: u32, quick: bool) -> anyhow::Result<Vec<LargeRow>> {
     let newton = newton_motion(scene, frames, 1)?;
     let counts: &[u32] = if quick {
@@ -172,7 +172,7 @@ fn large(scene: &Scene, frames: u32, quick: bool) -> anyhow::Result<Vec<LargeRow
     let row = |&iterations: &u32| {
         let motion = |spec| Motion::of(&with(scene, &spec), frames, Some(1));
         let xpbd = motion(large_step(iterations))?;
-        // Rounds of VBD are dear, and few are enough. Scenes with links cannot be run with it.
+        // VBD rounds are expensive, and few suffice. Scenes with links do not support VBD.
         let vbd = if iterations <= 16 && scene.distance.is_empty() {
             Some(motion(large_vbd(iterations))?.deviation(&newton))
         } else {

@@ -1,5 +1,5 @@
-//! The page of `cargo xtask accuracy`, made of the rows alone: sentences by knob, and for each scene a plot, the settings
-//! that no other one dominates, and all of them.
+//! Page of `cargo xtask accuracy`, generated from the rows alone: sentences by parameter, and for each scene a plot,
+//! the Pareto-optimal settings, and all settings.
 
 use incise::advise::non_dominated;
 
@@ -7,7 +7,7 @@ use super::{ExchangeRow, SceneRow, SettingRow};
 use crate::experiment::{Axis, Page, Part, Plot, Series, Style, Table};
 use crate::solver::digits;
 
-/// Errors of more than this, in % of the body's size, are not drawn.
+/// Largest plotted error, in % of the body's size.
 const USELESS: f64 = 100.0;
 
 pub(super) fn page(rows: &[SceneRow]) -> anyhow::Result<Page> {
@@ -41,7 +41,7 @@ with its fastest time. A press is a prescribed motion of held particles and a cu
 reference knows no contacts and no later cuts; the layers are two bodies stitched together by links, for the reference \
 one body.";
 
-/// What is known of the references.
+/// Accuracy of the references.
 fn references(rows: &[SceneRow]) -> Part {
     let mut table = Table::new(
         "The references: what may be left of their own error, and the order at which implicit Euler converges to them",
@@ -72,7 +72,7 @@ fn references(rows: &[SceneRow]) -> Part {
     Part::Table(table)
 }
 
-/// A sentence for each exchange, in the order of the first scene, with a heading for each knob.
+/// One sentence for each exchange, in the order of the first scene, with a heading for each parameter.
 fn knobs(rows: &[SceneRow]) -> Vec<String> {
     let mut sentences: Vec<String> = Vec::new();
     let mut last = "";
@@ -89,7 +89,7 @@ fn knobs(rows: &[SceneRow]) -> Vec<String> {
     sentences
 }
 
-/// What turning a knob does in all scenes; `None` if no scene has both settings.
+/// Describes the effect of changing a parameter in all scenes; `None` if no scene has both settings.
 pub(super) fn sentence(rows: &[SceneRow], exchange: &ExchangeRow) -> Option<String> {
     let (mut errors, mut times) = (Vec::new(), Vec::new());
     let (mut lost, mut saved) = (0, 0);
@@ -148,7 +148,7 @@ fn find<'a>(row: &'a SceneRow, name: &str) -> Option<&'a SettingRow> {
     row.settings.iter().find(|setting| setting.name == name)
 }
 
-/// Smallest, median, largest.
+/// Smallest, median and largest value.
 fn spread(values: &mut [f64]) -> Option<[f64; 3]> {
     values.sort_by(f64::total_cmp);
     let n = values.len();
@@ -156,7 +156,7 @@ fn spread(values: &mut [f64]) -> Option<[f64; 3]> {
     (n > 0).then(|| [values[0], middle(n), values[n - 1]])
 }
 
-/// What became of one step a frame, by its last rows.
+/// Result of one step per frame, from its last rows.
 fn large_step(rows: &[SceneRow]) -> String {
     let mut text = "XPBD drops a part of the equations of motion, so with one substep a frame its iterations do not lead to \
         the solution of that step; vbd with coarse correction solves the same step. Distances from the solution of \
@@ -245,7 +245,7 @@ fn scene(row: &SceneRow, parts: &mut Vec<Part>) {
     }
 }
 
-/// Errors below what is left of the reference's are no better than that.
+/// Indices of the Pareto-optimal settings. Errors below the error of the reference count as equal to it.
 pub(super) fn front(row: &SceneRow) -> Vec<usize> {
     let floor = row.reference.left.largest;
     let point = |s: &SettingRow| [s.ms, s.error.largest.max(floor)];

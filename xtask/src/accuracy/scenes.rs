@@ -1,9 +1,8 @@
-//! The scenes whose trade of speed for accuracy is measured: each as a user would write it, and each such that Newton's
-//! method can do it as well.
+//! Scenes of the accuracy measurements: typical user scenes that Newton's method can solve too.
 //!
 //! A hanging beam bends far, at three of Poisson's ratios; a bar is twisted by a handle; a liver is pressed by a handle
-//! (prescribed motion in the place of a contact, which the reference does not know); a liver that a plane has cut
-//! before it moves falls open; a stiff beam is stitched to a soft one. Frames are 1/60 s.
+//! (prescribed motion in place of contact, which the reference does not support); a liver opens along a plane cut made
+//! before it moves; a stiff beam is stitched to a soft one. Frames are 1/60 s.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -14,10 +13,10 @@ use incise::mesh::glam::DVec3;
 use incise::mesh::kuhn_box;
 use incise::mesh_io;
 
-/// A scene to measure.
+/// A measured scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// With Poisson's ratio in thousandths.
+    /// Poisson's ratio in thousandths.
     HangingBeam(u32),
     TwistedBar,
     PressedLiver,
@@ -36,7 +35,7 @@ impl Kind {
         Self::Bilayer,
     ];
 
-    /// The name of the scene's cell.
+    /// Cell id of the scene.
     pub(super) fn id(self) -> String {
         match self {
             Self::HangingBeam(ratio) => format!("hanging-beam-0.{ratio}"),
@@ -47,7 +46,7 @@ impl Kind {
         }
     }
 
-    /// What happens, in a sentence without its point.
+    /// Description as a sentence without its period.
     pub(super) fn title(self) -> String {
         match self {
             Self::HangingBeam(ratio) => {
@@ -71,7 +70,7 @@ impl Kind {
         }
     }
 
-    /// The scene; meshes and the scene itself are kept in a folder, so that `incise advise` can be asked of it.
+    /// Scene; meshes and scene file are stored in a folder, so that `incise advise` can run on them.
     pub(super) fn scene(self, folder: &Path, quick: bool) -> anyhow::Result<Scene> {
         let mut text = "[solver]\ntime_step = 0.016666666666666666\n".to_owned();
         if self != Self::TwistedBar {
@@ -119,12 +118,12 @@ impl Kind {
     }
 }
 
-/// The frames that are measured.
+/// Number of measured frames.
 pub(super) fn frames(quick: bool) -> u32 {
     if quick { 5 } else { 30 }
 }
 
-/// A beam of 1 m, `thickness` high and 0.25 m deep, from the origin on; its mesh goes to the folder.
+/// Beam of 1 m, `thickness` high and 0.25 m deep, starting at the origin; its mesh is written to the folder.
 fn body(
     folder: &Path,
     name: &str,
@@ -150,7 +149,7 @@ fn liver(quick: bool) -> String {
     )
 }
 
-/// A stiff layer above a soft one, each of half the beam's height; particles that meet are stitched together.
+/// A stiff layer on a soft one, each half as high as the beam; coincident particles are stitched together.
 fn bilayer(folder: &Path, quick: bool) -> anyhow::Result<String> {
     let n = if quick { 2 } else { 4 };
     let cells = [4 * n, n, n / 2];

@@ -1,20 +1,20 @@
-//! The settings that are measured for every scene, and the pairs of them that differ in one knob.
+//! Settings measured for every scene, and the pairs of them that differ in one parameter.
 //!
-//! Stated accuracies; and around the split form with `n` substeps, the number that brings kappa to 0.5, each setting
-//! alone, and substeps with each method and form.
+//! They cover stated accuracies; each setting varied alone around the split form with `n` substeps, the number that
+//! brings kappa to 0.5; and numbers of substeps with each method and form.
 
 use incise::scene::{Backend, Integrator, Method, Precision, SolverSpec, Substeps, TetSolve};
 
-/// The settings that are compared, with the knob that each turns: the curve it belongs to.
+/// Compared settings, with the parameter that each varies: the curve it belongs to.
 pub(super) struct Settings {
     pub(super) all: Vec<(&'static str, SolverSpec)>,
     pub(super) exchanges: Vec<Exchange>,
 }
 
-/// Two settings that differ in one knob.
+/// Two settings that differ in one parameter.
 pub(super) struct Exchange {
     pub(super) knob: &'static str,
-    /// What is done, as the start of a sentence.
+    /// Description of the change, as the start of a sentence.
     pub(super) what: &'static str,
     pub(super) from: SolverSpec,
     pub(super) to: SolverSpec,
@@ -330,7 +330,7 @@ pub(super) fn settings(substeps: u32, gpu: bool) -> Settings {
     Settings { all, exchanges }
 }
 
-/// One substep of as many iterations in double precision: nothing but the iteration is tested.
+/// One substep of `iterations` iterations in double precision, to test the iteration alone.
 pub(super) fn large_step(iterations: u32) -> SolverSpec {
     SolverSpec {
         time_step: 1.0 / 60.0,

@@ -1,4 +1,4 @@
-//! The quick run makes a whole page, and what it says follows from its rows.
+//! Tests that the quick run makes a complete page that agrees with its rows.
 
 use std::fs;
 use std::path::PathBuf;
@@ -67,7 +67,7 @@ fn exchange_rates_are_ratios_of_rows() {
     assert!(sentence(&rows[3..], &rows[0].exchanges[0]).is_none());
 }
 
-/// Errors below what is left of the reference's are not told apart: the faster one is enough.
+/// Errors below the error of the reference count as equal: the faster setting wins.
 #[test]
 fn the_reference_bounds_measurable_errors() {
     let row = scene_row(vec![
@@ -78,8 +78,8 @@ fn the_reference_bounds_measurable_errors() {
     assert_eq!(front(&row), [0, 1]);
 }
 
-/// Two quick scenes, one with a handle, one cut: implicit Euler converges at its order, the error falls with substeps,
-/// iterations of a large step do not lead to the step, VBD does.
+/// Runs two quick scenes, one with a handle, one cut: implicit Euler converges at its order, the error falls with
+/// substeps, iterations of a large XPBD step do not converge to the step, those of VBD do.
 #[test]
 fn quick_scenes_agree_with_the_page() {
     let folder = folder("quick");
@@ -87,7 +87,7 @@ fn quick_scenes_agree_with_the_page() {
         .map(|kind| measure(kind, &folder, true, false).unwrap())
         .into();
     for row in &rows {
-        // Of first order, seen from steps that are not small yet.
+        // First order, observed at steps that are not yet in the asymptotic range.
         assert!(
             (0.6..1.4).contains(&row.reference.order),
             "{:?}",
@@ -116,7 +116,7 @@ fn quick_scenes_agree_with_the_page() {
     fs::remove_dir_all(folder).unwrap();
 }
 
-/// Every scene can be run with the default settings, and by the reference.
+/// Every scene runs with the default settings and with the reference.
 #[test]
 fn the_reference_supports_all_scenes() {
     let folder = folder("scenes");

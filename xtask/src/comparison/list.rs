@@ -1,28 +1,28 @@
-//! The other systems: what each solves, and how it is run.
+//! Other systems: the problem that each solves, and the command that runs it.
 
 use incise::scene::Precision;
 
-/// A system that our solver is compared with.
+/// A system that is compared with this solver.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Peer {
     pub(super) id: &'static str,
-    /// What it solves.
+    /// Solved problem.
     pub(super) what: &'static str,
-    /// In what it is not the same as ours.
+    /// Difference from this solver's problem.
     pub(super) caveat: &'static str,
-    /// Its own; ours is measured in the same.
+    /// Precision of the system; this solver is measured in it too.
     pub(super) precision: Precision,
-    /// Whether its first run compiles for minutes.
+    /// True if its first run compiles for minutes.
     pub(super) compiles: bool,
     pub(super) program: Program,
 }
 
-/// How a system is run.
+/// Way to run a system.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Program {
-    /// A source file of this name, built and run.
+    /// A C++ source file, built and run.
     Cpp(&'static str),
-    /// A script that needs a module.
+    /// A Python script and the module it needs.
     Python {
         module: &'static str,
         script: &'static str,

@@ -1,7 +1,7 @@
-//! `cargo xtask comparison`: our solver next to other systems on the same mesh, each in turns with ours within one run.
+//! `cargo xtask comparison`: this solver and other systems on one mesh, measured alternately within one run.
 //!
-//! The other systems are run by the scripts of a folder, which is given; they are copied into the output folder and run
-//! there, since they write beside themselves. What is not installed is a row that says so. One thread each.
+//! Scripts in a given folder run the other systems; they are copied to the output folder and run there, because they
+//! write next to themselves. A system that is not installed has a row that says so. One thread each.
 
 mod list;
 mod ours;
@@ -21,9 +21,9 @@ use list::{PEERS, Peer, Program};
 use ours::{Ours, ours};
 use output::{PeerResult, result};
 
-/// Where scripts are looked for.
+/// Default folder of the scripts.
 const FOLDER: &str = "../shared/peers";
-/// What runs them.
+/// Default Python interpreter.
 const PYTHON: &str = "python3";
 
 #[derive(Debug, Args)]
@@ -38,30 +38,30 @@ pub(crate) struct ComparisonArguments {
     python: PathBuf,
 }
 
-/// A system beside ours.
+/// Measurements of another system and of this solver.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Row {
     id: String,
-    /// Why there are no rounds.
+    /// Reason for missing rounds.
     missing: Option<String>,
     rounds: Vec<Round>,
 }
 
-/// A measurement of each, one right after the other.
+/// One measurement of each, one directly after the other.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Round {
     peer: PeerResult,
     ours: Ours,
 }
 
-/// How much is measured.
+/// Extent of the measurements.
 #[derive(Clone, Copy, Debug)]
 struct Extent {
     size: &'static str,
     cells: [usize; 3],
     frames: u32,
     rounds: u32,
-    /// Whether there is time for systems that compile for minutes.
+    /// True if systems that compile for minutes are included.
     compiles: bool,
 }
 
@@ -80,7 +80,7 @@ const QUICK: Extent = Extent {
     compiles: false,
 };
 
-/// Runs this experiment as one of all experiments, if the scripts are at the usual place.
+/// Runs this experiment as part of `all`, if the scripts are in the default folder.
 #[expect(clippy::print_stderr, reason = "says what is left out")]
 pub(crate) fn usual(arguments: &ExperimentArguments) -> anyhow::Result<()> {
     let peers = PathBuf::from(FOLDER);
@@ -122,7 +122,7 @@ pub(crate) fn comparison(arguments: &ComparisonArguments) -> anyhow::Result<()> 
     experiment.run(&arguments.experiment)
 }
 
-/// Copies the scripts to a folder and returns its absolute name.
+/// Copies the scripts to a folder and returns its absolute path.
 fn copy(from: &Path, to: &Path) -> anyhow::Result<PathBuf> {
     fs::create_dir_all(to).with_context(|| to.display().to_string())?;
     for entry in fs::read_dir(from)? {
@@ -131,7 +131,7 @@ fn copy(from: &Path, to: &Path) -> anyhow::Result<PathBuf> {
             .extension()
             .is_some_and(|ending| ending == "py" || ending == "cpp");
         if let Some(name) = path.file_name().filter(|_| wanted) {
-            // Not `fs::copy`, which would make copies of protected files protected.
+            // `fs::copy` would also copy the read-only flag.
             let target = to.join(name);
             fs::write(&target, fs::read(&path)?).with_context(|| target.display().to_string())?;
         }
@@ -163,7 +163,7 @@ fn row(peer: &Peer, extent: Extent, folder: &Path, python: &Path) -> anyhow::Res
     Ok(row)
 }
 
-/// Builds or looks for a system; what is missing, in words.
+/// Builds or finds a system; returns a description of the missing part.
 fn prepare(peer: &Peer, folder: &Path, python: &Path) -> Option<String> {
     match peer.program {
         Program::Cpp(name) => {
@@ -202,7 +202,7 @@ fn run(peer: &Peer, extent: Extent, folder: &Path, python: &Path) -> anyhow::Res
         Program::Cpp(name) => {
             let mut command = Command::new(folder.join(name));
             let precision = peer.precision.name();
-            // Repeats are frames of one iteration: cheap, so there are more.
+            // Repeats are frames of one iteration: short, so there are more of them.
             let repeats = (5 * extent.frames).to_string();
             command.args([extent.size, precision, "block", "1", &repeats]);
             command

@@ -1,8 +1,9 @@
-//! Our solver on the beam of the scripts, measured as they measure.
+//! Measures this solver on the beam of the scripts in their way.
 //!
-//! The beam is 1 m by 0.25 by 0.25 of Kuhn cubes, E = 1e6 Pa, Poisson's ratio 0.45, 1000 kg/m³, held at one end, with
-//! gravity, in substeps of 1/1200 s. An iteration is a third of what a substep of four takes more than one of one, the
-//! fastest of each, so that prediction and velocities fall out; a frame is 20 substeps of one iteration.
+//! The beam is 1 m by 0.25 by 0.25 of Kuhn cubes, E = 1e6 Pa, Poisson's ratio 0.45, 1000 kg/m³, fixed at one end, with
+//! gravity, in substeps of 1/1200 s. The time of an iteration is a third of the difference between a substep with four
+//! iterations and one with one, the fastest of each, which excludes prediction and velocities; a frame is 20 substeps
+//! of one iteration.
 
 use std::time::Instant;
 
@@ -18,7 +19,7 @@ use crate::solver::body::{body, schedule};
 
 const SUBSTEPS: u32 = 20;
 
-/// What ours takes.
+/// Times of this solver.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct Ours {
     pub(super) tets: usize,
@@ -27,7 +28,7 @@ pub(super) struct Ours {
     pub(super) ms_frame: f64,
 }
 
-/// Measures ours, in clusters of ten as scenes have them.
+/// Measures this solver, with clusters of ten as in scenes.
 pub(super) fn ours(cells: [usize; 3], frames: u32, precision: Precision) -> anyhow::Result<Ours> {
     match precision {
         Precision::F32 | Precision::Auto => in_precision::<f32>(cells, frames),
@@ -78,7 +79,7 @@ fn in_precision<R: Real>(cells: [usize; 3], frames: u32) -> anyhow::Result<Ours>
     })
 }
 
-/// The fastest of some steps in ms, after two that do not count.
+/// Fastest of some steps in ms, after two warm-up steps.
 fn fastest<R: Real>(
     solver: &mut Solver<R>,
     schedule: &Schedule,

@@ -1,9 +1,9 @@
-//! What a script prints: one JSON object in a line of its own, among other lines.
+//! Output of a script: one JSON object on a line of its own, among other lines.
 
 use anyhow::Context;
 use serde::{Deserialize, Serialize};
 
-/// What a system says of itself; each script says part of this.
+/// Values reported by a system; each script reports some of them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct PeerResult {
     pub(super) peer: String,
@@ -11,23 +11,23 @@ pub(super) struct PeerResult {
     pub(super) tets: usize,
     pub(super) precision: String,
     pub(super) colors: Option<usize>,
-    /// Of an iteration more, the fastest.
+    /// Time of an additional iteration in ms, the fastest.
     #[serde(alias = "ms_per_iter_min")]
     pub(super) ms_per_iter: f64,
-    /// Of 20 substeps of one iteration.
+    /// Time in ms of 20 substeps of one iteration.
     pub(super) ms_frame_20sub_1it: Option<f64>,
     pub(super) setup_cpu_ms: Option<f64>,
-    /// How far the end of the beam has come down in m, at the end of whatever the script ran.
+    /// Displacement of the beam's end in m, downward, at the end of the script's run.
     pub(super) tip: Option<f64>,
     pub(super) finite: Option<bool>,
-    /// The largest coordinate in m.
+    /// Largest coordinate in m.
     pub(super) max_abs: Option<f64>,
-    /// What it printed besides that is worth knowing.
+    /// Other relevant output.
     #[serde(default)]
     pub(super) note: Option<String>,
 }
 
-/// Finds the result in what a script printed.
+/// Finds the result in the output of a script.
 pub(super) fn result(text: &str) -> anyhow::Result<PeerResult> {
     let line = text.lines().rev().find(|line| line.starts_with('{'));
     let line = line.context("it printed no result")?;
@@ -65,7 +65,7 @@ mod tests {
         assert!(result("").is_err());
         assert!(result("Traceback").is_err());
         assert!(result("{\"peer\": \"a\"}").is_err());
-        // Infinity and NaN are no JSON.
+        // JSON has no infinity and no NaN.
         assert!(
             result("{\"peer\":\"a\",\"tets\":6,\"precision\":\"f32\",\"ms_per_iter\":NaN}")
                 .is_err()

@@ -1,4 +1,4 @@
-//! The page: each system beside ours.
+//! Page of the comparison: each system next to this solver.
 
 use super::list::{PEERS, Peer};
 use super::{Round, Row};
@@ -76,7 +76,7 @@ fn note(row: &Row) -> String {
     all.collect::<Vec<_>>().join("; ")
 }
 
-/// The times of a system; `None` if it was not run.
+/// Times of a system; `None` if it was not run.
 fn line(peer: &Peer, row: &Row) -> Option<[String; 13]> {
     let last = &row.rounds.last()?.peer;
     let of = |value: fn(&Round) -> Option<f64>| -> Option<Vec<f64>> {
@@ -116,7 +116,7 @@ fn least(values: &[f64]) -> f64 {
     values.iter().copied().fold(f64::INFINITY, f64::min)
 }
 
-/// How many times as long as ours, by the fastest of each and in the rounds.
+/// Ratio of the times to those of this solver, by the fastest of each and per round.
 fn ratio(theirs: &Option<Vec<f64>>, ours: &Option<Vec<f64>>) -> String {
     let (Some(theirs), Some(ours)) = (theirs, ours) else {
         return "-".to_owned();
@@ -149,7 +149,7 @@ mod tests {
         }
     }
 
-    /// What ran is in the table with its ratios, what did not says why, and no system is left out.
+    /// Each system is in the table: with its ratios if it ran, otherwise with the reason.
     #[test]
     fn every_system_is_on_the_page() {
         let mut rows: Vec<Row> = PEERS

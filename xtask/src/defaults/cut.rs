@@ -17,10 +17,10 @@ use crate::random::Random;
 /// Longest side of a body in m.
 const SIZE: f64 = 0.25;
 
-/// A body that is cut.
+/// A body to cut.
 #[derive(Clone, Debug)]
 pub(super) enum CutBody {
-    /// A file; the row says so where there is none.
+    /// A mesh file; a missing one has a row that says so.
     File(Option<PathBuf>),
     /// A generated liver.
     Liver(usize),
@@ -49,7 +49,7 @@ impl CutBody {
     }
 }
 
-/// When strokes are made into a falling body.
+/// Time of the strokes into a falling body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum Strokes {
     /// In free fall, before the ground loads the body.
@@ -77,16 +77,16 @@ pub(crate) struct LoadRow {
     pub(super) precision: String,
     pub(super) snap: f64,
     pub(super) tets: usize,
-    /// The largest kappa of a tet.
+    /// Largest kappa of a tet.
     pub(super) kappa: f64,
-    /// The largest speed in m/s of all frames, and of the last 50.
+    /// Largest speed in m/s of all frames, and of the last 50.
     pub(super) fastest: f64,
     pub(super) fastest_at_end: f64,
-    /// Inverted tets: the most of a frame, and in the last frame.
+    /// Inverted tets: the maximum over frames, and in the last frame.
     pub(super) most_inverted: usize,
     pub(super) inverted: usize,
     pub(super) softened: usize,
-    /// The largest kinetic energy of the last 50 frames as a fraction of what gravity has released.
+    /// Largest kinetic energy of the last 50 frames as a fraction of the energy released by gravity.
     pub(super) kinetic_at_end: f64,
     /// The speed in m/s of a fall from the top of the body to the ground.
     pub(super) fall: f64,
@@ -95,12 +95,12 @@ pub(crate) struct LoadRow {
 }
 
 impl LoadRow {
-    /// Whether the body has less energy of motion than its fall gave it.
+    /// True if the kinetic energy is less than that of the fall.
     pub(super) fn is_bounded(&self) -> bool {
         !self.is_failure && self.kinetic_at_end < 1.0
     }
 
-    /// Whether also its fastest particle is slower than ten falls, and at the end than three.
+    /// True if the fastest particle is also slower than ten falls, and at the end than three.
     pub(super) fn is_slow(&self) -> bool {
         self.fastest < 10.0 * self.fall && self.fastest_at_end < 3.0 * self.fall
     }
@@ -114,16 +114,16 @@ pub(crate) struct RestRow {
     pub(super) snap: f64,
     pub(super) tets: usize,
     pub(super) substeps: u32,
-    /// The largest speed in m/s of the first and the last 100 of 500 frames after the strokes.
+    /// Largest speed in m/s of the first and the last 100 of 500 frames after the strokes.
     pub(super) first: f64,
     pub(super) last: f64,
-    /// The most inverted tets of a frame.
+    /// Largest number of inverted tets in a frame.
     pub(super) inverted: usize,
     pub(super) warned: Warned,
 }
 
 impl RestRow {
-    /// The largest speed that passes in m/s.
+    /// Limit of the largest speed in m/s.
     pub(super) fn bar(&self) -> f64 {
         if self.precision == "f64" { 1e-9 } else { 1e-2 }
     }
@@ -135,13 +135,13 @@ impl RestRow {
             && self.tets > 0
     }
 
-    /// Rounding makes the largest speed of some frames larger or smaller by less than this.
+    /// True if the speed grows by more than the effect of rounding on the largest speed.
     pub(super) fn is_growing(&self) -> bool {
         self.last > 2.0 * self.first
     }
 }
 
-/// A rectangle of two to eight tenths of the body, at a random particle as it is now.
+/// Rectangle of two to eight tenths of the body, at the current position of a random particle.
 fn random_stroke(simulation: &Simulation, random: &mut Random, snap: f64) -> StrokeSpec {
     let positions = simulation.positions();
     #[expect(
@@ -163,7 +163,7 @@ fn random_stroke(simulation: &Simulation, random: &mut Random, snap: f64) -> Str
     }
 }
 
-/// A body of 25 cm whose mesh is a file.
+/// Scene with a body of 25 cm from a mesh file.
 fn scene(file: PathBuf, mesh: &TetMesh, young_modulus: f64, precision: Precision) -> Scene {
     let (low, high) = ends(mesh);
     let mut scene = Scene::default();
@@ -193,7 +193,7 @@ pub(super) fn ends(mesh: &TetMesh) -> (DVec3, DVec3) {
     })
 }
 
-/// Strokes into a body that falls on a ground, one a frame of 0.01 s.
+/// Strokes into a body that falls on a ground, one per frame of 0.01 s.
 pub(super) fn load(
     body: &CutBody,
     file: PathBuf,
@@ -269,8 +269,8 @@ pub(super) fn load(
     Ok(row)
 }
 
-/// Thirty strokes into a free body of E = 1e5 Pa without gravity, one a frame; then it is left alone for 500 frames.
-/// `None` where the mesh is absent.
+/// Thirty strokes into a free body of E = 1e5 Pa without gravity, one per frame, followed by 500 frames without
+/// strokes. `None` if the mesh is missing.
 pub(super) fn rest(
     body: &CutBody,
     file: PathBuf,

@@ -1,8 +1,8 @@
-//! `cargo xtask defaults`: what a scene with default settings gets, accuracy and stability, without tuning.
+//! `cargo xtask defaults`: accuracy and stability of scenes with default settings.
 //!
-//! Four parts: default scenes beside Newton's method, with the warnings they gave; a stiff organ with stated
-//! accuracies; bodies under load after cuts, from soft to rigid; bodies at rest after cuts. A result over its bar is
-//! counted at the top of the page.
+//! Four parts: default scenes compared with Newton's method, with their warnings; a stiff organ with stated accuracies;
+//! bodies under load after cuts, from soft to rigid; bodies at rest after cuts. The top of the page counts the results
+//! beyond their limits.
 
 mod cut;
 mod newton;
@@ -32,14 +32,14 @@ use organ::OrganRow;
 /// The codes of the warnings of a run.
 type Warned = BTreeSet<String>;
 
-/// What was measured in a cell.
+/// Result of a cell.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) enum Row {
     Newton(Vec<NewtonRow>),
     Organ(OrganRow),
     Load(Vec<LoadRow>),
     Rest(Vec<RestRow>),
-    /// A body whose mesh is absent.
+    /// A body whose mesh is missing.
     Skipped(String),
 }
 
@@ -75,7 +75,7 @@ pub(crate) fn defaults(arguments: &DefaultsArguments) -> anyhow::Result<()> {
     experiment.run_and_check(&arguments.experiment, check)
 }
 
-/// The bars that the quick form holds: they are lower than those of the page, which counts its misses.
+/// Checks the limits of the quick form: they are less strict than those of the page, which counts misses.
 ///
 /// # Errors
 /// On the first row that misses one.
@@ -85,7 +85,7 @@ fn check(rows: &[Row]) -> anyhow::Result<()> {
             Row::Newton(rows) => {
                 for row in rows {
                     let error = row.settled.unwrap_or(0.0);
-                    // Soft, compressible and held: what the law of the error was measured for.
+                    // Soft, compressible and fixed: the range in which the error law was measured.
                     let is_plain = row.young_modulus < 1e6 && row.poisson_ratio < 0.4;
                     let is_warned = !is_plain && !row.warned.is_empty();
                     ensure!(error <= 0.1 || is_warned, "{row:?}");
@@ -198,7 +198,7 @@ fn organ_cells(quick: bool, folder: &Path) -> Vec<Cell<Row>> {
     runs.map(cell).collect()
 }
 
-/// The mesh of a body as a file for scenes.
+/// Mesh of a body as a file for scenes.
 fn file_of(body: &CutBody, folder: &Path) -> anyhow::Result<Option<PathBuf>> {
     if let CutBody::File(path) = body {
         return Ok(path.clone());

@@ -31,12 +31,12 @@ const PRESS: f64 = 0.1;
 /// Implicit steps of a period at the coarsest of three step sizes.
 const STEPS: f64 = 24.0;
 
-/// What acts on a body.
+/// Load on a body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum Load {
-    /// Held at one end, gravity from the first frame on.
+    /// Fixed at one end, gravity from the first frame.
     Hanging,
-    /// Held at one side; a handle moves the opposite side.
+    /// Fixed at one side; a handle moves the opposite side.
     Pressed,
     /// Free, rigid rotation at the start, no gravity.
     Spinning,
@@ -72,13 +72,13 @@ pub(crate) struct NewtonRow {
     pub(super) young_modulus: f64,
     pub(super) poisson_ratio: f64,
     pub(super) tets: usize,
-    /// What `auto` chose.
+    /// Method that `auto` chose.
     pub(super) method: String,
     pub(super) substeps: u32,
     pub(super) precision: String,
     /// Frames of 0.016 s over which the motion is compared.
     pub(super) frames: u64,
-    /// Period of the slowest vibration or of a turn in s.
+    /// Period of the slowest vibration or of a revolution in s.
     pub(super) period: f64,
     /// Absent for a spinning body, which does not settle.
     pub(super) settled: Option<f64>,
@@ -88,7 +88,7 @@ pub(crate) struct NewtonRow {
     pub(super) warned: Warned,
 }
 
-/// A scene with what the reference needs to know of it.
+/// A scene with the data that the reference needs.
 struct Setup {
     scene: Scene,
     mesh: TetMesh,
@@ -102,12 +102,12 @@ struct Setup {
     center: DVec3,
 }
 
-/// How long a scene runs, in strides of some frames: those are compared.
+/// Duration of a scene, in strides of some frames; states are compared after each stride.
 struct Span {
     stride: u64,
-    /// Implicit steps of a stride at the coarsest step size.
+    /// Implicit steps per stride at the coarsest step size.
     steps: u32,
-    /// Strides of the handle's motion, of the compared motion and in all.
+    /// Strides of the handle's motion, of the compared motion and in total.
     ramp: u64,
     motion: u64,
     all: u64,
@@ -134,7 +134,7 @@ pub(super) fn measure(case: Case, folder: &Path) -> anyhow::Result<NewtonRow> {
         Load::Spinning => None,
         Load::Hanging | Load::Pressed => Some(setup.equilibrium(case)?),
     };
-    // Frames may meet a vibration where it comes back to its start, so the settled state counts as motion, too.
+    // Frames may coincide with the start of a vibration's period, so the settled state counts as motion too.
     let sag = equilibrium.as_deref().map_or(0.0, |x| setup.moved(x));
     let [motion, uncertainty] =
         [&run.motion, &uncertain].map(|states| setup.error(states, &reference, sag));
@@ -157,7 +157,7 @@ pub(super) fn measure(case: Case, folder: &Path) -> anyhow::Result<NewtonRow> {
     })
 }
 
-/// What a run of a scene gave.
+/// Results of a run of a scene.
 struct Run {
     /// Positions after each stride of the compared motion.
     motion: States,
@@ -181,7 +181,7 @@ impl Setup {
             .iter()
             .fold(ends, |(low, high), &x| (low.min(x), high.max(x)));
         let extent = high - low;
-        // The beam is bent by its free end, the others are pressed flat.
+        // The beam is bent by its free end; the others are compressed.
         let axis = if case.load == Load::Pressed && case.shape != Shape::Beam {
             DVec3::Z
         } else {
@@ -271,7 +271,7 @@ impl Setup {
         Ok(setup)
     }
 
-    /// The reference's body, handled particles fixed.
+    /// Body of the reference, with handled particles fixed.
     fn body(&self, case: Case) -> anyhow::Result<Body> {
         let material = incise_reference::Material {
             young_modulus: case.young_modulus,
@@ -290,7 +290,7 @@ impl Setup {
         Ok(body)
     }
 
-    /// The period of a turn, or Rayleigh's estimate of the slowest vibration's from a small sag.
+    /// Period of a revolution, or Rayleigh's estimate for the slowest vibration from a small sag.
     fn period(&self, case: Case) -> anyhow::Result<f64> {
         if case.load == Load::Spinning {
             return Ok(TAU / self.spin.length());
@@ -307,7 +307,7 @@ impl Setup {
         Ok(TAU / (work / square).sqrt())
     }
 
-    /// Gives the handle its path, a smooth ramp with a point after each stride.
+    /// Sets the handle's path, a smooth ramp with a point after each stride.
     fn add_press(&mut self, span: &Span) {
         let press = self.press;
         for handle in &mut self.scene.attachment {
@@ -317,7 +317,7 @@ impl Setup {
         }
     }
 
-    /// The twice extrapolated motion and the finer one of those extrapolated once.
+    /// Twice extrapolated motion, and the finer of the two once extrapolated ones.
     fn reference_motion(
         &self,
         case: Case,
@@ -382,7 +382,7 @@ impl Setup {
 
     fn run(&self, case: Case, span: &Span) -> anyhow::Result<Run> {
         let mut simulation = Simulation::with_threads(&self.scene, 1)?;
-        // Single precision rounds them.
+        // The mesh rounded to single precision.
         let same = simulation.positions().iter().zip(&self.mesh.positions);
         ensure!(
             simulation.positions().len() == self.mesh.positions.len()
@@ -407,7 +407,7 @@ impl Setup {
         let is_vbd = chosen.method == Some(ChosenMethod::TwoLevelVbd);
         run.method = if is_vbd { "vbd" } else { "gauss-seidel" }.to_owned();
         report.precision.clone_into(&mut run.precision);
-        // The mean is over what comes after the handle and two periods.
+        // The mean excludes the handle's motion and two periods.
         let first = span.ramp.max(span.all / 4) * span.stride;
         let last = match case.load {
             Load::Spinning => span.motion,
@@ -436,8 +436,8 @@ impl Setup {
         Ok(run)
     }
 
-    /// The root of the mean squared distance of all free particles in all states, over that of the displacement, or
-    /// over `sag` if that is more.
+    /// RMS distance of all free particles in all states, relative to the RMS displacement or to `sag`, whichever is
+    /// larger.
     fn error(&self, states: &[Vec<DVec3>], exact: &[Vec<DVec3>], sag: f64) -> f64 {
         let (mut off, mut moved) = (0.0, 0.0);
         for (state, exact) in states.iter().zip(exact) {
@@ -451,7 +451,7 @@ impl Setup {
         (off / moved).sqrt().min(f64::MAX)
     }
 
-    /// The root of the summed squares of the displacements of all free particles.
+    /// Root of the summed squared displacements of all free particles.
     fn moved(&self, state: &[DVec3]) -> f64 {
         let squares = self
             .free()
@@ -477,8 +477,7 @@ impl Span {
             Load::Hanging | Load::Pressed => (STEPS, 2.0),
         };
         let stride = count(period / frame / steps_wanted);
-        // No more than 24 steps a frame: of vibrations faster than that the reference is not converged, which is
-        // stated.
+        // At most 24 steps per frame: the reference is not converged for faster vibrations; the page states this.
         let steps = count((steps_wanted * frame / period).ceil().min(STEPS));
         let strides = |periods: f64| count((periods * period / frame / stride as f64).ceil());
         let ramp = if load == Load::Pressed {
@@ -499,7 +498,7 @@ impl Span {
         }
     }
 
-    /// How far the handle is on its way after some strides.
+    /// Fraction of the handle's path after a number of strides.
     fn part(&self, stride: u64) -> f64 {
         let x = stride.min(self.ramp) as f64 / self.ramp.max(1) as f64;
         x * x * (3.0 - 2.0 * x)

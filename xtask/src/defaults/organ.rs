@@ -1,5 +1,5 @@
-//! A stiff organ whose end is pulled, uncut and while a blade is swept through it: time and error of the accuracy asked
-//! for.
+//! A stiff organ whose end is pulled, uncut and while a blade sweeps through it: time and error at a requested
+//! accuracy.
 
 use std::path::Path;
 
@@ -19,17 +19,17 @@ const SIZE: f64 = 0.2;
 const PULL: usize = 30;
 /// Frames in all.
 const FRAMES: u32 = 60;
-/// Strokes of the form that is cut, four frames each.
+/// Strokes of the cut form, four frames each.
 pub(super) const STROKES: usize = 6;
-/// Substeps of the reference; half as many tell its own error.
+/// Substeps of the reference; half as many estimate its own error.
 const REFERENCE_SUBSTEPS: u32 = 8;
-/// The accuracy whose times have a bar.
+/// Accuracy whose times have a limit.
 const TIMED_ACCURACY: f64 = 0.05;
-/// The bars in ms of a frame of the pull without strokes, and of the slowest frame that cuts.
+/// Limits in ms for a frame of the pull without strokes, and for the slowest frame that cuts.
 const BARS_MS: [f64; 2] = [8.0, 16.0];
-/// Runs, which do the same work frame by frame: the time of a frame is that of the fastest.
+/// Identical runs; the time of a frame is that of the fastest.
 const RUNS: usize = 3;
-/// Rounds of a substep of the reference, from the third on each squares the error.
+/// Rounds per substep of the reference; from the third on each squares the error.
 const REFERENCE_ROUNDS: u32 = 6;
 
 /// An organ with an accuracy.
@@ -37,24 +37,24 @@ const REFERENCE_ROUNDS: u32 = 6;
 pub(crate) struct OrganRow {
     pub(super) accuracy: f64,
     pub(super) strokes: usize,
-    /// At the start and at the end.
+    /// Number of tets at the start and at the end.
     pub(super) tets: [usize; 2],
-    /// By its name in reports.
+    /// Method, by its name in reports.
     pub(super) method: String,
     pub(super) substeps: u32,
     pub(super) precision: String,
-    /// Median of the frames of the pull but the first two, the slowest frame that cuts, and the median of the last 20,
-    /// in ms.
+    /// Median of the frames of the pull except the first two, the slowest frame that cuts, and the median of the last
+    /// 20, in ms.
     pub(super) pulled_ms: f64,
     pub(super) slowest_cut_ms: Option<f64>,
     pub(super) last_ms: f64,
-    /// Of the motion of all frames, uncut only: its error, and that of the reference.
+    /// Error of the motion over all frames, and that of the reference; uncut only.
     pub(super) error: Option<[f64; 2]>,
     pub(super) warned: Warned,
 }
 
 impl OrganRow {
-    /// What misses its bar, in words; `None` for a row that has no bar.
+    /// Descriptions of the values beyond their limits; `None` for a row without limits.
     pub(super) fn misses(&self) -> Option<Vec<String>> {
         let [uncut, cut] = BARS_MS;
         let is_timed = self.accuracy == TIMED_ACCURACY;
@@ -75,7 +75,7 @@ impl OrganRow {
     }
 }
 
-/// The organ with the strokes of the form that is cut, or without.
+/// Organ scene with or without the strokes of the cut form.
 fn scene(tets: usize, strokes: usize, accuracy: f64, folder: &Path) -> anyhow::Result<Scene> {
     let mesh = generate(Shape::Liver, tets)?;
     let (low, high) = super::cut::ends(&mesh);

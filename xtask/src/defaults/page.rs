@@ -1,4 +1,4 @@
-//! The page: counts of what misses its bar, then a table of each part.
+//! Page of the experiment: counts of misses, then a table for each part.
 
 use super::cut::{LoadRow, RestRow, Strokes};
 use super::newton::{Load, NewtonRow};
@@ -6,9 +6,9 @@ use super::organ::OrganRow;
 use super::{Row, Warned};
 use crate::experiment::{Page, Part, Table};
 
-/// The largest error without a warning.
+/// Largest error without a warning.
 const BAR: f64 = 0.1;
-/// The warning that is about vibrations alone, and the largest error that their loss explains.
+/// Warning about vibrations, and the largest error that their damping explains.
 const DAMPED: &str = "vibrations_damped";
 const ALL_OF_IT: f64 = 1.0;
 
@@ -124,7 +124,7 @@ pub(super) fn page(rows: &[Row]) -> anyhow::Result<Page> {
     })
 }
 
-/// How an error stands to the bar.
+/// Comparison of an error with the limit.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Standing {
     Within,
@@ -142,16 +142,16 @@ fn standing(error: f64, warned: &Warned) -> Standing {
     }
 }
 
-/// The warnings of a row that explain an error of its motion.
+/// Warnings of a row that explain an error of its motion.
 fn reasons_for_motion(row: &NewtonRow) -> Warned {
     match row.load {
         Load::Hanging | Load::Pressed if row.motion <= ALL_OF_IT => row.warned.clone(),
-        // A turn is no vibration, and one that is damped away is off by itself.
+        // A revolution is not a vibration; a vibration that is damped away has an error of its own.
         _ => reasons_for_state(row),
     }
 }
 
-/// The warnings of a row that explain an error of a settled state: vibrations that are damped settle where others do.
+/// Warnings of a row that explain an error of a settled state. Damped vibrations settle at the state of undamped ones.
 fn reasons_for_state(row: &NewtonRow) -> Warned {
     let mut warned = row.warned.clone();
     warned.remove(DAMPED);
@@ -177,7 +177,7 @@ fn summary(
     ];
     let mut table = Table::new("Results by part", header);
     let mut add = |name: &str, standings: Vec<Standing>| {
-        // Another part of the page was asked for.
+        // Only another part of the page was requested.
         if standings.is_empty() {
             return;
         }
@@ -223,7 +223,7 @@ fn summary(
     table
 }
 
-/// All results that miss their bar.
+/// Results that miss their limits.
 fn misses(
     newton: &[&NewtonRow],
     organs: &[&OrganRow],
@@ -369,7 +369,7 @@ fn newton_tables(rows: &[&NewtonRow]) -> Vec<Part> {
     parts
 }
 
-/// An error and how it stands to the bar.
+/// Formats an error with its comparison to the limit.
 fn cell(error: f64, warned: &Warned) -> String {
     let percent = percent(error);
     match standing(error, warned) {

@@ -1,4 +1,5 @@
-//! A cell of the quick form, and synthetic rows: the page shows each miss, and the check of the quick form refuses it.
+//! Tests a cell of the quick form, and synthetic rows: the page shows each miss, and the check of the quick form
+//! rejects it.
 
 use std::fs;
 
@@ -60,7 +61,7 @@ fn newton_row(motion: f64, warned: &[&str]) -> NewtonRow {
     }
 }
 
-/// The quick form refuses an error above 10% without a warning, and with one where no warning is expected.
+/// The quick form rejects an error above 10% without a warning, and an unexpected warning.
 #[test]
 fn the_quick_form_refuses_errors_without_a_reason() {
     let case = |young_modulus, settled, warned: &[&str]| NewtonRow {
@@ -131,7 +132,7 @@ fn the_page_shows_what_misses_its_bar() {
         (rest(2.1e-12, 0), true),
         (rest(1e-12, 1), true),
     ] {
-        // The quick form has bars for what settles, for rest and for the error of the organ, none for times.
+        // The quick form has limits for settled states, for rest and for the error of the organ, not for times.
         let is_refused = match &row {
             Row::Organ(row) => row.error.is_some_and(|[error, _]| error > row.accuracy),
             row => is_missed && matches!(row, Row::Rest(_)),

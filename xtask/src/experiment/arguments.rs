@@ -1,4 +1,4 @@
-//! What all experiments can be told.
+//! Arguments of all experiments.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ pub(crate) struct ExperimentArguments {
     /// Take the meshes of this folder (`liver_11k.vtk` and the like) instead of generated ones.
     #[arg(long, value_name = "DIR")]
     pub(crate) models: Option<PathBuf>,
-    /// Where to compute what both can.
+    /// Compute device where an experiment supports both.
     #[arg(long, value_enum, default_value_t = Backend::Cpu)]
     pub(crate) backend: Backend,
     /// Keep measurements, pages and pictures in this folder, and continue from what it holds.
@@ -29,7 +29,7 @@ pub(crate) struct ExperimentArguments {
     pub(crate) shard: Option<Shard>,
 }
 
-/// Where to compute.
+/// Compute device of an experiment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 pub(crate) enum Backend {
     /// The processor.
@@ -38,7 +38,7 @@ pub(crate) enum Backend {
     Gpu,
 }
 
-/// A share of the cells.
+/// One share of the cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Shard {
     index: usize,
@@ -46,7 +46,7 @@ pub(crate) struct Shard {
 }
 
 impl Shard {
-    /// Whether the cell of this place is in it.
+    /// True if the share contains the cell of this index.
     pub(super) fn has(self, place: usize) -> bool {
         place % self.count == self.index
     }
@@ -71,7 +71,7 @@ impl FromStr for Shard {
     }
 }
 
-/// What the cells of a folder were measured with.
+/// Configuration that the cells of a folder were measured with.
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Setup {
     pub(super) quick: bool,
@@ -80,7 +80,7 @@ pub(super) struct Setup {
 }
 
 impl ExperimentArguments {
-    /// Makes sure that a folder holds no cells of another setup, by a file in it that names its own.
+    /// Checks that a folder holds no cells of another configuration, by a file in it that stores the configuration.
     pub(super) fn agree_with(&self, file: &Path) -> anyhow::Result<()> {
         let setup = Setup {
             quick: self.quick,

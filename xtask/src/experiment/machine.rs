@@ -1,4 +1,4 @@
-//! [`Machine`]: where and when a cell was measured, and of what.
+//! [`Machine`]: machine, date and commit of a measurement.
 
 use std::fs;
 use std::process::Command;
@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub(super) struct Machine {
     date: String,
-    /// The name of the processor, and how many threads it gives this process.
+    /// Name of the processor, and number of threads available to the process.
     processor: String,
-    /// The commit, with a word if files differ from it.
+    /// Commit, with a mark if files differ from it.
     commit: String,
 }
 
@@ -44,13 +44,13 @@ impl Machine {
         }
     }
 
-    /// In a line.
+    /// Description in one line.
     pub(super) fn describe(&self) -> String {
         format!("{}, {}, commit {}", self.processor, self.date, self.commit)
     }
 }
 
-/// Today in universal time, as year, month and day.
+/// Current date in universal time, as year, month and day.
 pub(crate) fn today() -> String {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     let days = since.map_or(0, |since| since.as_secs() / 86_400);
@@ -58,7 +58,7 @@ pub(crate) fn today() -> String {
     format!("{year}-{month:02}-{day:02}")
 }
 
-/// The date so many days after the first of January 1970.
+/// Date that many days after 1 January 1970.
 fn date(mut days: u64) -> (u64, u64, u64) {
     let leap = |year: u64| {
         year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400))

@@ -1,7 +1,7 @@
-//! `cargo xtask merge`: gathers the cells that several runs measured, and writes the pages.
+//! `cargo xtask merge`: collects the cells of several runs and writes the pages.
 //!
-//! The cells of an experiment that are then all there need no measuring: running its command with the same folder
-//! writes its page. Cells that are missing in all folders are measured by that.
+//! Complete experiments need no measurement: running their command with the merged folder writes the page. Cells that
+//! are missing in all folders are then measured.
 
 use std::fs;
 use std::path::PathBuf;
@@ -14,9 +14,9 @@ use super::arguments::Setup;
 
 #[derive(Debug, Args)]
 pub(crate) struct MergeArguments {
-    /// The folder to gather in.
+    /// Folder to collect in.
     out: PathBuf,
-    /// What runs with `--shard` were given as `--out`.
+    /// Folders given as `--out` to the runs with `--shard`.
     #[arg(required = true)]
     from: Vec<PathBuf>,
 }
@@ -28,7 +28,7 @@ impl MergeArguments {
     }
 }
 
-/// Copies all cells to one folder; the experiments they are of, with the arguments that make their pages.
+/// Copies all cells to one folder; returns their experiments, with the arguments that make their pages.
 pub(crate) fn merge(
     arguments: &MergeArguments,
 ) -> anyhow::Result<Vec<(String, ExperimentArguments)>> {

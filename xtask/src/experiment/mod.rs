@@ -1,8 +1,8 @@
-//! [`Experiment`]: cells that are measured one by one, and the page that is made of them.
+//! [`Experiment`]: independently measured cells, and the page made from them.
 //!
-//! Each cell is written as it is done, so that a run that was broken off continues where it was, and so that the cells
-//! of a long run can be shared out among machines: `--shard 2/5` measures every fifth one, and `cargo xtask merge`
-//! gathers what came of it. A page is a function of the rows alone.
+//! Each cell is written when it is done, so that an interrupted run can continue, and so that the cells of a long run
+//! can be distributed over machines: `--shard 2/5` measures every fifth cell, and `cargo xtask merge` collects the
+//! results. A page is a function of the rows alone.
 
 mod arguments;
 mod machine;
@@ -27,23 +27,23 @@ pub(crate) use merge::{MergeArguments, merge};
 pub(crate) use page::{Page, Part, Table};
 pub(crate) use plot::{Axis, Plot, Series, Style};
 
-/// Independent measurements and what is made of them.
+/// Independent measurements and the page made from them.
 pub(crate) struct Experiment<R> {
-    /// Names the files.
+    /// Name of the experiment and of its files.
     pub(crate) name: &'static str,
     pub(crate) cells: Vec<Cell<R>>,
-    /// Makes the page of all rows, which come in the order of the cells.
+    /// Makes the page from all rows, which are in the order of the cells.
     pub(crate) page: fn(&[R]) -> anyhow::Result<Page>,
 }
 
-/// A measurement that depends on no other.
+/// An independent measurement.
 pub(crate) struct Cell<R> {
-    /// In lower case, digits, dots and dashes; differs from that of all other cells of the experiment.
+    /// Unique id in lower case letters, digits, dots and dashes.
     pub(crate) id: String,
     pub(crate) measure: Box<dyn Fn() -> anyhow::Result<R>>,
 }
 
-/// The file of a cell.
+/// File of a cell.
 #[derive(Debug, Serialize, Deserialize)]
 struct Done<R> {
     machine: Machine,
@@ -51,13 +51,12 @@ struct Done<R> {
 }
 
 impl<R: Serialize + DeserializeOwned> Experiment<R> {
-    /// Measures the cells that are not there yet, and writes the page unless this is one shard of several.
+    /// Measures the missing cells, and writes the page unless this is one of several shards.
     pub(crate) fn run(self, arguments: &ExperimentArguments) -> anyhow::Result<()> {
         self.run_and_check(arguments, |_| Ok(()))
     }
 
-    /// Measures like [`Experiment::run`]; the quick form then fails where a table has NaN or `check` finds a
-    /// row that must not occur.
+    /// Measures like [`Experiment::run`]; the quick form then fails if a table has NaN or `check` rejects a row.
     pub(crate) fn run_and_check(
         self,
         arguments: &ExperimentArguments,
@@ -109,7 +108,7 @@ impl<R: Serialize + DeserializeOwned> Cell<R> {
         }
     }
 
-    /// What a file has of the cell, or else its measurement, written to that file.
+    /// Reads the cell from its file, or measures it and writes the file.
     fn done(&self, folder: &Path, here: &Machine) -> anyhow::Result<Done<R>> {
         let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || ".-".contains(c);
         ensure!(
@@ -136,7 +135,7 @@ impl<R: Serialize + DeserializeOwned> Cell<R> {
     }
 }
 
-/// A bar on the standard error, which shows nothing where that is no terminal.
+/// Progress bar on stderr; hidden if stderr is not a terminal.
 fn progress(name: &'static str, cells: usize) -> ProgressBar {
     let style = ProgressStyle::with_template("{prefix} {bar:30} {pos}/{len} {elapsed} {msg}")
         .unwrap_or_else(|_| ProgressStyle::default_bar());
@@ -147,7 +146,7 @@ fn progress(name: &'static str, cells: usize) -> ProgressBar {
     bar
 }
 
-/// The middle of some values; 0 of none.
+/// Median of some values; 0 of none.
 pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> f64 {
     let mut values: Vec<f64> = values.into_iter().collect();
     values.sort_by(f64::total_cmp);

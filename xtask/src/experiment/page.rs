@@ -1,8 +1,8 @@
-//! [`Page`]: text, tables, plots and pictures, before they become Markdown and HTML.
+//! [`Page`]: text, tables, plots and images, before conversion to Markdown and HTML.
 
 use super::plot::Plot;
 
-/// What came of an experiment.
+/// Result page of an experiment.
 #[derive(Debug)]
 pub(crate) struct Page {
     pub(crate) title: String,
@@ -10,7 +10,7 @@ pub(crate) struct Page {
 }
 
 impl Page {
-    /// Whether a cell of one of the tables shows a number that is none.
+    /// True if a cell of one of the tables shows NaN.
     pub(super) fn has_nan(&self) -> bool {
         self.parts.iter().any(|part| match part {
             Part::Table(table) => table.rows.iter().flatten().any(|cell| cell.contains("NaN")),
@@ -56,7 +56,7 @@ impl Table {
     /// Adds a row.
     ///
     /// # Panics
-    /// If it is not as long as the header.
+    /// If its length differs from that of the header.
     pub(crate) fn push<S: Into<String>>(&mut self, row: impl IntoIterator<Item = S>) {
         let row: Vec<String> = row.into_iter().map(Into::into).collect();
         assert_eq!(row.len(), self.header.len(), "{row:?}");

@@ -17,7 +17,7 @@ pub(crate) struct Plot {
 #[derive(Debug)]
 pub(crate) struct Axis {
     pub(crate) label: String,
-    /// Whether equal ways are equal ratios. Values that are not positive are then left out.
+    /// Logarithmic axes. Values that are not positive are then omitted.
     pub(crate) log: bool,
 }
 
@@ -41,7 +41,7 @@ impl Axis {
 pub(crate) struct Series {
     pub(crate) name: String,
     pub(crate) points: Vec<(f64, f64)>,
-    /// Words beside the points, or none.
+    /// Labels of the points; may be empty.
     pub(crate) labels: Vec<String>,
     pub(crate) style: Style,
 }
@@ -54,9 +54,9 @@ pub(crate) enum Style {
 }
 
 const SIZE: (u32, u32) = (960, 480);
-/// Pixels at the right that the key takes.
+/// Width of the legend at the right in pixels.
 const KEY: u32 = 210;
-/// Eight colors that people who see colors differently tell apart (Okabe and Ito 2008), then some more.
+/// Eight colors that are distinguishable with color vision deficiency (Okabe and Ito 2008), then some more.
 const COLORS: [RGBColor; 12] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -97,7 +97,7 @@ impl Plot {
         [&self.x, &self.y][which]
     }
 
-    /// Whether a point can be drawn.
+    /// True if a point can be drawn.
     fn shows(&self, point: (f64, f64)) -> bool {
         [point.0, point.1]
             .iter()
@@ -105,7 +105,7 @@ impl Plot {
             .all(|(which, &v)| v.is_finite() && (!self.axis(which).log || v > 0.0))
     }
 
-    /// What the points span along an axis, and some more.
+    /// Range of the points along an axis, with a margin.
     fn range(&self, which: usize) -> (f64, f64) {
         let points = self.series.iter().flat_map(|series| &series.points);
         let values = points
@@ -123,7 +123,7 @@ impl Plot {
         if low > high {
             return (0.0, 1.0);
         }
-        // From zero where that is near.
+        // Starts at zero if zero is near.
         let low = if low > 0.0 && low < 0.5 * high {
             0.0
         } else {
@@ -133,7 +133,7 @@ impl Plot {
         (if low == 0.0 { 0.0 } else { low - more }, high + more)
     }
 
-    /// The names of the curves, beside the plot.
+    /// Draws the names of the curves next to the plot.
     fn key(
         &self,
         root: &DrawingArea<SVGBackend<'_>, Shift>,
@@ -207,15 +207,15 @@ impl Plot {
     }
 }
 
-/// Height of words in pixels.
+/// Height of text in pixels.
 const FONT: i32 = 11;
 
-/// Where words stand, so that none is written over another.
+/// Occupied label positions, to avoid overlaps.
 #[derive(Default)]
 struct Words(Vec<[i32; 4]>);
 
 impl Words {
-    /// A free position for words at a point, above it or below; none where both are taken.
+    /// Free position for a label at a point, above it or below; `None` if both are occupied.
     fn position(&mut self, (x, y): (i32, i32), label: &str) -> Option<(i32, i32)> {
         let width = i32::try_from(label.chars().count()).unwrap_or(i32::MAX / 8) * 6;
         let positions = [(x + 5, y - 13), (x + 5, y + 4)];
@@ -232,7 +232,7 @@ impl Words {
     }
 }
 
-/// A number at an axis.
+/// Formats a number at an axis.
 fn number(v: f64) -> String {
     if v != 0.0 && !(1e-3..1e5).contains(&v.abs()) {
         format!("{v:.0e}")

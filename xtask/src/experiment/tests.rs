@@ -1,4 +1,4 @@
-//! Cells that count how often they are measured.
+//! Tests with cells that count their measurements.
 
 use std::cell::Cell as Counter;
 use std::path::PathBuf;

@@ -1,7 +1,7 @@
-//! What the memory of the device gives: copies from one buffer to another and back.
+//! Memory bandwidth of the device, by copies between two buffers.
 //!
-//! Each byte is read once and written once. The buffers are larger than caches of today, so what a small body reaches
-//! may be more than that.
+//! Each byte is read once and written once. The buffers are larger than current caches, so a small body may exceed this
+//! bandwidth.
 
 use std::time::Instant;
 
@@ -12,7 +12,7 @@ use incise::gpu::wgpu::{BufferDescriptor, BufferUsages, CommandEncoderDescriptor
 use super::measure::{flush, ms_since};
 use super::report::Bandwidth;
 
-/// Bytes of a buffer, unless the device has smaller ones; and on request, for tests.
+/// Bytes per buffer, unless the device or a test sets a lower limit.
 const BYTES: u64 = 512 << 20;
 const QUICK: u64 = 32 << 20;
 

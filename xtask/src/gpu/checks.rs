@@ -1,7 +1,7 @@
-//! What has to be right before anything is timed: the tests of the workspace, or checks that are built in.
+//! Correctness checks before any timing: the tests of the workspace, or built-in checks.
 //!
-//! Where cargo and the sources are, their tests run, required to find a GPU. Where the program was carried alone, every
-//! coloring is compared with its twin on a small body, and both forms of the solver with theirs.
+//! If cargo and the sources are present, their tests run and must find a GPU. Otherwise every coloring is compared with
+//! its twin on a small body, and both forms of the solver with theirs.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -22,13 +22,13 @@ use super::coloring::colorings;
 use crate::models::Model;
 use crate::solver::body::body;
 
-/// The tests of the GPU path.
+/// Tests of the GPU path.
 const TESTS: [&[&str]; 2] = [
     &["test", "-p", "incise-gpu"],
     &["test", "-p", "incise", "--features", "gpu", "gpu"],
 ];
 
-/// Checks, and says how; `tests` if those of the workspace may be run.
+/// Runs the checks and returns their description; `tests` allows those of the workspace.
 pub(crate) fn checks(
     gpu: &Arc<GpuContext>,
     kernels: &mut ColoringKernels,
@@ -40,7 +40,7 @@ pub(crate) fn checks(
     }
 }
 
-/// The workspace that the current folder is in.
+/// Workspace that contains the current folder.
 fn workspace() -> Option<PathBuf> {
     let here = std::env::current_dir().ok()?;
     let folder = here
@@ -85,7 +85,7 @@ fn in_workspace(folder: &Path) -> anyhow::Result<String> {
     ))
 }
 
-/// The tests that passed, as the test program says.
+/// Number of passed tests in the output of the test program.
 fn passed_in(text: &str) -> usize {
     let lines = text
         .lines()
@@ -114,7 +114,7 @@ fn built_in(gpu: &Arc<GpuContext>, kernels: &mut ColoringKernels) -> anyhow::Res
     ))
 }
 
-/// How far the device is from the host after ten frames of a bar that bends, in m.
+/// Distance between device and host in m after ten frames of a bending bar.
 fn apart(gpu: &Arc<GpuContext>, clustering: &str, form: ClusterMapping) -> anyhow::Result<f64> {
     let mesh = kuhn_box([6, 3, 3], DVec3::new(1.0, 0.5, 0.5));
     let soft = Material {
@@ -142,7 +142,7 @@ fn apart(gpu: &Arc<GpuContext>, clustering: &str, form: ClusterMapping) -> anyho
     let moved = mesh.positions.iter().enumerate();
     let moved = moved.map(|(p, x)| host.position(p).distance(*x));
     let moved = moved.fold(0.0, f64::max);
-    // Rounding in another order, over ten frames of a body that moves by centimeters.
+    // Rounding in a different order, over ten frames of a body that moves by centimeters.
     ensure!(
         far < 1e-5,
         "{clustering}: device and host are {far} m apart"

@@ -1,7 +1,7 @@
 //! Colorings on the device: every algorithm, every mesh, clustered and not, each equal to its twin on the host.
 //!
-//! A coloring ends with the host knowing how many colors there are, so each is a round trip at least. Bringing the
-//! graph to the device is timed by itself: in a frame it would be there.
+//! A coloring ends when the host knows the number of colors, so each takes at least one round trip. The upload of the
+//! graph is timed separately: in a frame it would already be on the device.
 
 use std::num::NonZeroUsize;
 use std::time::Instant;
@@ -22,14 +22,14 @@ use crate::models::Model;
 /// Clusterings whose quotients are colored.
 pub(crate) const CLUSTERINGS: [&str; 2] = ["none", "serial:10"];
 
-/// An algorithm that colors a graph.
+/// A graph coloring algorithm.
 #[derive(Clone, Copy, Debug)]
 enum Algorithm {
     Scgc,
     JonesPlassmann,
     EclGc,
     Vivace(u32),
-    /// With so many vertices at the same time.
+    /// Number of vertices processed concurrently.
     Wlc(usize),
 }
 
@@ -130,7 +130,7 @@ pub(crate) fn colorings(
 /// A coloring and the time it took, in ms.
 type Timed = (Coloring, f64);
 
-/// What came of a coloring on the device.
+/// Result of a coloring on the device.
 type Outcome = Result<(DeviceColoring, ColoringRun), GpuError>;
 
 fn on_host(color: impl FnOnce() -> anyhow::Result<Coloring>) -> anyhow::Result<Timed> {
@@ -139,7 +139,7 @@ fn on_host(color: impl FnOnce() -> anyhow::Result<Coloring>) -> anyhow::Result<T
     Ok((coloring, ms_since(start)))
 }
 
-/// Brings an input to the device.
+/// Uploads an input to the device.
 fn upload<T>(
     gpu: &GpuContext,
     repeats: u32,
@@ -202,7 +202,7 @@ pub(crate) fn from_graph(
     measured(gpu, upload, repeats, run)
 }
 
-/// The run, if the device has room for it; an error if the coloring is not that of the twin.
+/// Runs the coloring if it fits the device; an error if it differs from its twin.
 pub(crate) fn compared(
     gpu: &GpuContext,
     outcome: Outcome,

@@ -1,9 +1,9 @@
-//! Whole frames of a scene, with a cut and without, on the device and on the host.
+//! Whole frames of a scene, with and without a cut, on the device and on the host.
 //!
-//! The scene is the built-in one on another mesh, without its floor: a body held at one side falls, and a blade comes
+//! The scene is the built-in one on another mesh, without its floor: a body fixed at one side falls, and a blade moves
 //! down through its middle. Without a cut nothing is read back, so frames are timed many in a row, and each with a
-//! wait, as needed to look at every frame. A frame with a cut waits for the device by itself, since a blade has to know
-//! where the body is; the wait for the end of the frame is added.
+//! wait, as needed to display every frame. A frame with a cut waits for the device itself, because the cut needs the
+//! current positions; the wait for the end of the frame is added.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -20,7 +20,7 @@ use crate::cutting::stroke;
 use crate::experiment::median;
 use crate::models::Model;
 
-/// Where a scene is computed, and with which clusters.
+/// Compute devices and clusterings of a scene.
 const PLACES: [(&str, bool, &str); 3] = [
     ("device, serial:10", true, "serial:10"),
     ("device, pressure:128", true, "pressure:128"),
@@ -29,14 +29,14 @@ const PLACES: [(&str, bool, &str); 3] = [
 
 const SUBSTEPS: u32 = 20;
 
-/// What a stroke left behind.
+/// Result of a stroke.
 pub(crate) struct Cut {
     pub(crate) simulation: Simulation,
-    /// Of the frames that cut.
+    /// Reports of the frames that cut.
     pub(crate) reports: Vec<FrameReport>,
 }
 
-/// Rows of a mesh, and what became of the first of them.
+/// Rows of a mesh, and the cut of the first of them.
 pub(crate) fn frames(
     gpu: &Arc<GpuContext>,
     model: &Model,
@@ -72,7 +72,7 @@ pub(crate) fn frames(
     Ok((rows, first))
 }
 
-/// Whether the device has no room for it.
+/// True if the error means that the device is out of memory.
 fn is_full(error: &anyhow::Error) -> bool {
     matches!(
         error.downcast_ref::<Error>(),
@@ -82,7 +82,7 @@ fn is_full(error: &anyhow::Error) -> bool {
     )
 }
 
-/// The scene, with a stroke of so many frames if not 0.
+/// Scene, with a stroke of `stroke_frames` frames if not 0.
 fn scene(model: &Model, clustering: &str, stroke_frames: u32) -> Scene {
     let mut scene = Scene::built_in();
     scene.world.ground = None;
@@ -110,7 +110,7 @@ fn simulation(gpu: Option<&Arc<GpuContext>>, scene: &Scene) -> anyhow::Result<Si
     })
 }
 
-/// A frame, and the end of all that the device was told.
+/// Runs a frame and waits for the device.
 fn step(gpu: Option<&Arc<GpuContext>>, simulation: &mut Simulation) -> anyhow::Result<f64> {
     let start = Instant::now();
     simulation.step()?;

@@ -1,8 +1,7 @@
-//! One iteration over the tets of a body: a thread for a cluster, a workgroup for a cluster, Jacobi.
+//! One iteration over the tets of a body: one thread per cluster, one workgroup per cluster, Jacobi.
 //!
-//! The time of an iteration is the difference between a frame of many iterations and one of few, over how many more
-//! they are, so prediction and velocities are not in it. Multipliers are kept, as they are with more than one
-//! iteration.
+//! The time of an iteration is the difference between frames of many and of few iterations, over the difference of
+//! their numbers, which excludes prediction and velocities. Multipliers are stored, as with more than one iteration.
 //!
 //! **Bytes.** What an iteration has to move at least: of each tet 64 bytes of rest shape, 16 of corners and 8 of
 //! multipliers there and back; of each cluster its particles, 16 bytes there and back, once; where a workgroup solves
@@ -22,13 +21,13 @@ use super::measure::{batch, ms_since};
 use super::report::{PassRow, PassRun, ResidualPoint, Times};
 use crate::solver::body::{body, scaled, schedule};
 
-/// A way to solve.
+/// A solve method.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Way {
     pub(crate) name: &'static str,
     pub(crate) clustering: &'static str,
     pub(crate) form: ClusterMapping,
-    /// Jacobi's relaxation, if it is Jacobi.
+    /// Relaxation of Jacobi; `None` for other methods.
     jacobi: Option<f64>,
 }
 
@@ -77,17 +76,17 @@ impl Way {
     }
 }
 
-/// Iterations of the shorter frame, and how many more the longer one has.
+/// Iterations of the shorter frame, and additional iterations of the longer one.
 const FEW: u32 = 4;
 const MORE: u32 = 20;
 
-/// Small, so that whatever the mesh nothing is far from rest.
+/// Small, so that no body moves far from rest.
 const TIME_STEP: f64 = 1e-4;
 
-/// After how many iterations residuals are taken.
+/// Iteration counts at which residuals are computed.
 pub(crate) const CURVE: [u32; 5] = [1, 2, 5, 10, 20];
 
-/// The step of residuals in s.
+/// Time step of residuals in s.
 const LARGE_STEP: f64 = 1.0 / 60.0;
 
 const RUBBER: Material = Material {
@@ -97,12 +96,12 @@ const RUBBER: Material = Material {
     damping: 0.0,
 };
 
-/// A body, 1 m long, held where x is smallest.
+/// Body 1 m long, fixed at its lowest x.
 pub(crate) fn hanging(mesh: &TetMesh) -> anyhow::Result<Solver<f32>> {
     body(mesh, RUBBER, |x| x.x < 0.05)
 }
 
-/// All ways to solve a mesh; residuals, too, if asked for.
+/// All solve methods on a mesh; with residuals on request.
 pub(crate) fn passes(
     gpu: &Arc<GpuContext>,
     name: &str,
@@ -139,7 +138,7 @@ pub(crate) fn passes(
     Ok(rows)
 }
 
-/// The result, or why there is none if the device cannot do it.
+/// Result, or the reason if the device does not support it.
 pub(crate) fn absent<T>(outcome: anyhow::Result<T>) -> anyhow::Result<(Option<T>, String)> {
     match outcome {
         Ok(value) => Ok((Some(value), String::new())),
@@ -171,7 +170,7 @@ fn run(
     };
     let mut device = GpuSolver::new(Arc::clone(gpu), host, way.form)?;
     let [short, long] = [FEW, FEW + MORE].map(|iterations| way.settings(TIME_STEP, iterations));
-    // Compiles, and says how long a frame is.
+    // Warm-up: compiles kernels and measures the time of a frame.
     frames(gpu, &mut device, schedule, &long, 1)?;
     let [_, once] = frames(gpu, &mut device, schedule, &long, 1)?;
     let count = batch(once);
@@ -204,7 +203,7 @@ fn run(
     })
 }
 
-/// What a frame takes in ms, to record it and in all, over so many of them.
+/// Time of a frame in ms, for recording it and in total, averaged over a number of frames.
 fn frames(
     gpu: &GpuContext,
     device: &mut GpuSolver,
@@ -222,7 +221,7 @@ fn frames(
     Ok([recorded, ms_since(start)].map(|ms| ms / f64::from(count)))
 }
 
-/// The bytes that an iteration of Gauss-Seidel moves at least.
+/// Minimum bytes moved by a Gauss-Seidel iteration.
 pub(crate) fn least_bytes(
     schedule: &Schedule,
     form: ClusterMapping,

@@ -1,6 +1,6 @@
-//! Timing: medians and the fastest of many runs, the first left out, since it compiles kernels.
+//! Timing: medians and minima of many runs; the first run is excluded, because it compiles kernels.
 //!
-//! A wait for a device costs more than a small frame, so what is short is repeated before a wait.
+//! A wait for a device takes longer than a small frame, so short runs are repeated before a wait.
 
 use std::time::Instant;
 
@@ -9,7 +9,7 @@ use incise::gpu::{GpuContext, GpuError};
 use super::report::Times;
 use crate::experiment::median;
 
-/// Time to fill before a wait, in ms, and most runs in it.
+/// Target time before a wait in ms, and largest number of runs in it.
 const BATCH_MS: f64 = 50.0;
 const MOST: u32 = 20;
 
@@ -23,12 +23,12 @@ impl Times {
     }
 }
 
-/// Milliseconds since.
+/// Milliseconds elapsed since `start`.
 pub(crate) fn ms_since(start: Instant) -> f64 {
     start.elapsed().as_secs_f64() * 1e3
 }
 
-/// Times a run that ends when its work is done; one more run before that is not counted.
+/// Times a synchronous run, after one warm-up run.
 pub(crate) fn timed<T, E>(
     repeats: u32,
     mut run: impl FnMut() -> Result<T, E>,
@@ -43,13 +43,13 @@ pub(crate) fn timed<T, E>(
     Ok((result, Times::of(ms)))
 }
 
-/// Hands over what was written to buffers, and waits for all.
+/// Submits pending buffer writes and waits for the device.
 pub(crate) fn flush(gpu: &GpuContext) -> Result<(), GpuError> {
     gpu.queue().submit([]);
     gpu.wait()
 }
 
-/// How many runs that take so long are made before a wait.
+/// Number of runs of the given duration before a wait.
 pub(crate) fn batch(ms: f64) -> u32 {
     (1..MOST)
         .find(|&runs| f64::from(runs) * ms >= BATCH_MS)

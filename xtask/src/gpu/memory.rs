@@ -1,4 +1,4 @@
-//! Device memory that bodies need, by form: what the solver has asked for once a body is there, before it moves.
+//! Device memory of bodies, by form: allocations of the solver after set-up, before the first step.
 
 use std::sync::Arc;
 use std::time::Instant;

@@ -1,8 +1,8 @@
-//! `cargo xtask gpu-sweep`: is the GPU path right, and what does it take?
+//! `cargo xtask gpu-sweep`: checks and times the GPU path.
 //!
-//! Checks first, then the bandwidth of copies, colorings, iterations, frames with a cut and without, and coloring after
-//! a cut, all on the same device in the same run. What was found goes to a JSON file, and as tables to a page. On a
-//! processor that plays a GPU the times say nothing about GPUs, and the page says so.
+//! Checks first, then the bandwidth of copies, colorings, iterations, frames with and without a cut, and coloring after
+//! a cut, all on one device in one run. The results go to a JSON file, and as tables to a page. On a software adapter
+//! the times say nothing about GPUs, and the page says so.
 
 mod bandwidth;
 mod checks;
@@ -75,17 +75,17 @@ enum Part {
     Frame,
 }
 
-/// Tets of bodies whose memory is told.
+/// Tets of the bodies in the memory table.
 const MEMORY: [usize; 3] = [10_000, 100_000, 1_000_000];
 
-/// Tets of the smallest grown body, and how many times as many the next one has.
+/// Tets of the smallest generated body, and growth factor to the next one.
 const SMALLEST: usize = 5_000;
 const GROWTH: usize = 4;
 
-/// Bytes of a tet's rest shape: the largest array, which says what cannot fit.
+/// Bytes of a tet's rest shape: the largest array, which limits the size of a body.
 const REST_BYTES: u64 = 64;
 
-/// The most tets on a software adapter, unless told otherwise.
+/// Default limit of tets on a software adapter.
 const SOFTWARE_LARGEST: usize = 25_000;
 
 #[expect(clippy::print_stdout, reason = "the page is the result of the command")]
@@ -186,7 +186,7 @@ fn report(gpu: &Arc<GpuContext>, arguments: &GpuArguments) -> anyhow::Result<Rep
     Ok(report)
 }
 
-/// What all bodies are measured with.
+/// Configuration shared by all bodies.
 struct Sweep<'a> {
     gpu: &'a Arc<GpuContext>,
     kernels: ColoringKernels,
@@ -239,11 +239,11 @@ impl Sweep<'_> {
     }
 }
 
-/// Tets of bodies beside the models: several times as many as before, as long as the limit of a buffer and that of the
-/// user allow it, and one that nearly fills a buffer; none of about the size of a model.
+/// Tets of generated bodies in addition to the models: growing by a factor up to the limit of a buffer and that of the
+/// user, and one that nearly fills a buffer; sizes close to a model's are skipped.
 fn grown(models: &[usize], largest: usize, buffer_limit: u64) -> Vec<usize> {
     let room = usize::try_from(buffer_limit / REST_BYTES).unwrap_or(usize::MAX);
-    // Some places stay empty.
+    // Margin for empty slots.
     let most = largest.min(room / 10 * 6);
     let next = |tets: &usize| tets.checked_mul(GROWTH);
     let mut sizes: Vec<usize> = std::iter::successors(Some(SMALLEST), next)
@@ -276,7 +276,7 @@ fn facts(gpu: &GpuContext, date: Option<String>) -> Facts {
     }
 }
 
-/// What comes now, since some of it takes long.
+/// Prints the next step.
 #[expect(clippy::print_stderr, reason = "progress of a long command")]
 fn say(what: &str) {
     eprintln!("{what}");

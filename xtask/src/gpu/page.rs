@@ -1,4 +1,4 @@
-//! The page: what a sweep found, as tables in Markdown.
+//! Page of a sweep: its results as tables in Markdown.
 
 use std::fmt::Write;
 
@@ -66,7 +66,7 @@ pub(crate) fn page(report: &Report) -> anyhow::Result<String> {
     Ok(text)
 }
 
-/// What is not in the tables, and why.
+/// Omitted parts of the sweep, with reasons.
 fn left_out(report: &Report) -> Vec<String> {
     let mut lines = report.notes.clone();
     for row in report.passes.iter().filter(|row| !row.note.is_empty()) {

@@ -1,7 +1,7 @@
-//! Colors after a cut: following it on the host, which a frame does, beside a full coloring on the device.
+//! Colors after a cut: the incremental update on the host, as in a frame, next to a full coloring on the device.
 //!
-//! The body is that of the frames, after its stroke. For a full coloring the device needs the particles of the
-//! clusters, which the host has to list and send; a graph has to be made as well.
+//! The body is that of the frames, after its stroke. For a full coloring the host has to list the particles of the
+//! clusters and upload them; a graph has to be built as well.
 
 use std::time::Instant;
 

@@ -1,8 +1,8 @@
-//! What a sweep found, as the JSON file has it and the page is made from.
+//! Results of a sweep, as stored in the JSON file and used by the page.
 
 use serde::{Deserialize, Serialize};
 
-/// A sweep.
+/// Results of a sweep.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Report {
     pub(crate) facts: Facts,
@@ -13,11 +13,11 @@ pub(crate) struct Report {
     pub(crate) memory: Vec<MemoryRow>,
     pub(crate) frames: Vec<FrameRow>,
     pub(crate) recolorings: Vec<RecoloringRow>,
-    /// What was left out, and why.
+    /// Omitted parts, with reasons.
     pub(crate) notes: Vec<String>,
 }
 
-/// Where and how it was measured.
+/// Machine and configuration of the measurement.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Facts {
     pub(crate) date: String,
@@ -26,11 +26,11 @@ pub(crate) struct Facts {
     pub(crate) driver: String,
     pub(crate) backend: String,
     pub(crate) software: bool,
-    /// The most bytes that a kernel sees of one buffer.
+    /// Largest buffer binding in bytes.
     pub(crate) buffer_limit: u64,
     /// Threads of the host.
     pub(crate) threads: usize,
-    /// Whether the host's code was compiled without optimization for speed.
+    /// True if the host's code was compiled without optimization for speed.
     pub(crate) debug: bool,
 }
 
@@ -41,7 +41,7 @@ pub(crate) struct Times {
     pub(crate) fastest: f64,
 }
 
-/// What copying from buffer to buffer reaches.
+/// Bandwidth of copies between buffers.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Bandwidth {
     /// Bytes of each buffer.
@@ -59,13 +59,13 @@ pub(crate) struct ColoringRow {
     pub(crate) vertices: usize,
     pub(crate) edges: usize,
     pub(crate) algorithm: String,
-    /// Absent if the device has no room for the graph.
+    /// `None` if the graph does not fit the device.
     pub(crate) run: Option<ColoringRun>,
-    /// What the twin takes on the host, once.
+    /// Time of the twin on the host in ms, one run.
     pub(crate) host_ms: f64,
 }
 
-/// What a coloring on the device took and gave.
+/// Time and result of a coloring on the device.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ColoringRun {
     pub(crate) colors: usize,
@@ -75,7 +75,7 @@ pub(crate) struct ColoringRun {
     pub(crate) upload: Upload,
 }
 
-/// What it took to bring the input to the device.
+/// Cost of the upload of the input.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Upload {
     pub(crate) bytes: u64,
@@ -91,25 +91,25 @@ pub(crate) struct PassRow {
     pub(crate) form: String,
     pub(crate) clusters: usize,
     pub(crate) colors: usize,
-    /// Absent if the device cannot.
+    /// `None` if the device does not support it.
     pub(crate) run: Option<PassRun>,
-    /// By iterations, where they were asked for.
+    /// Residuals by iterations, if requested.
     pub(crate) residuals: Vec<ResidualPoint>,
-    /// Why something is absent.
+    /// Reason for a missing value.
     pub(crate) note: String,
 }
 
-/// What a pass takes.
+/// Cost of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct PassRun {
     pub(crate) dispatches: usize,
-    /// Of an iteration.
+    /// Time of an iteration.
     pub(crate) times: Times,
-    /// What the host takes to record an iteration, in ms.
+    /// Time of the host to record an iteration, in ms.
     pub(crate) recording: f64,
-    /// Bytes that an iteration has to move at least; absent where that is not counted.
+    /// Minimum bytes moved by an iteration; `None` if not counted.
     pub(crate) least_bytes: Option<u64>,
-    /// Bytes of device memory, with multipliers.
+    /// Device memory in bytes, with multipliers.
     pub(crate) memory: u64,
 }
 
@@ -117,11 +117,11 @@ pub(crate) struct PassRun {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ResidualPoint {
     pub(crate) iterations: u32,
-    /// Of the step: `E Δt² / (ρ h²)` of the worst tet.
+    /// Kappa of the step, `E Δt² / (ρ h²)`, for the worst tet.
     pub(crate) kappa: f64,
-    /// Root of the mean square of what the constraints are off.
+    /// Root mean square of the constraint residuals.
     pub(crate) dual: f64,
-    /// The force that is left, over the weight.
+    /// Unbalanced force over the weight.
     pub(crate) force: f64,
 }
 
@@ -131,20 +131,20 @@ pub(crate) struct MemoryRow {
     pub(crate) tets: usize,
     pub(crate) particles: usize,
     pub(crate) form: String,
-    /// Absent if it does not fit.
+    /// `None` if it does not fit.
     pub(crate) used: Option<MemoryUse>,
-    /// Why something is absent.
+    /// Reason for a missing value.
     pub(crate) note: String,
 }
 
-/// What a body takes on the device.
+/// Resources of a body on the device.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct MemoryUse {
-    /// Of device memory, without multipliers.
+    /// Device memory in bytes, without multipliers.
     pub(crate) bytes: u64,
-    /// Sent once.
+    /// Bytes uploaded once.
     pub(crate) uploaded: u64,
-    /// What laying out and sending takes, in ms, once.
+    /// Time of layout and upload in ms, once.
     pub(crate) sending: f64,
 }
 
@@ -153,17 +153,17 @@ pub(crate) struct MemoryUse {
 pub(crate) struct FrameRow {
     pub(crate) mesh: String,
     pub(crate) tets: usize,
-    /// Where and with which clusters.
+    /// Compute device and clustering.
     pub(crate) place: String,
     pub(crate) substeps: u32,
-    /// Many frames in a row before a wait.
+    /// Time per frame with many frames before a wait.
     pub(crate) quiet: Times,
-    /// Waited for, each.
+    /// Time per frame with a wait for each.
     pub(crate) waited: Times,
     pub(crate) cutting: CuttingFrames,
 }
 
-/// Frames with a cut, each waited for: medians in ms.
+/// Frames with a cut, with a wait for each: medians in ms.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct CuttingFrames {
     pub(crate) frames: usize,
@@ -178,28 +178,28 @@ pub(crate) struct CuttingFrames {
     pub(crate) upload: f64,
 }
 
-/// Coloring after a cut: what a frame does, and a full coloring, on the host and on the device. In ms.
+/// Coloring after a cut, in ms: the update of a frame, and full colorings on the host and on the device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct RecoloringRow {
     pub(crate) mesh: String,
-    /// After the stroke.
+    /// Number of tets after the stroke.
     pub(crate) tets: usize,
     pub(crate) clusters: usize,
-    /// What following a frame's cut takes on the host.
+    /// Time of the host to update the colors after a frame's cut.
     pub(crate) following: f64,
     pub(crate) following_largest: f64,
     pub(crate) following_colors: usize,
-    /// What the host takes to list the particles of clusters, which any full coloring needs.
+    /// Time of the host to list the particles of clusters, which any full coloring needs.
     pub(crate) incidence: f64,
     /// A full coloring on the host, by `auto`.
     pub(crate) host: f64,
     pub(crate) host_colors: usize,
     /// A full coloring on the device from the particles of clusters.
     pub(crate) from_incidence: Option<ColoringRun>,
-    /// What the host takes to make a graph.
+    /// Time of the host to build a graph.
     pub(crate) graph: f64,
     /// A full coloring on the device from the graph.
     pub(crate) from_graph: Option<ColoringRun>,
-    /// Reading the colors back.
+    /// Time to read the colors back.
     pub(crate) readback: f64,
 }

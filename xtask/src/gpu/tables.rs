@@ -6,7 +6,7 @@ use super::iteration::CURVE;
 use super::report::{ColoringRun, PassRow, Report, Times};
 use crate::table;
 
-/// Where there is nothing.
+/// Content of an empty cell.
 const DASH: &str = "-";
 
 pub(super) fn iterations(report: &Report) -> Table {
@@ -274,7 +274,7 @@ fn or_dash<T>(value: Option<T>, show: impl FnOnce(T) -> String) -> String {
     value.map_or_else(|| DASH.to_owned(), show)
 }
 
-/// Cells with nothing in them.
+/// Empty cells.
 fn missing(cells: usize) -> Vec<String> {
     vec![DASH.to_owned(); cells]
 }

@@ -1,11 +1,11 @@
-//! Instructions of some frames, counted by Callgrind, and whose functions they were in.
+//! Instruction counts of some frames by Callgrind, in total and by function.
 //!
 //! This program runs itself under `valgrind --tool=callgrind` as a child that simulates a scene (`probe.rs`), and
-//! counts only while the child is in the function that the frames are in, so set-up and first frames do not count. One
-//! thread, which computes the frames itself: counts repeat to the instruction, but for what the allocator does.
-//! Valgrind knows AVX 2 at most, so of the kernel's widths that one is counted, on newer processors too.
+//! counts only while the child is inside the function that runs the frames, so that set-up and first frames are
+//! excluded. One thread computes the frames: counts are reproducible except for the allocator. Valgrind supports AVX 2
+//! at most, so the kernel of that width is counted, on newer processors too.
 //!
-//! Format: Callgrind manual, "Callgrind Format Specification". Cost: valgrind is some 50 times as slow as the program.
+//! Format: Callgrind manual, "Callgrind Format Specification". Cost: a run under valgrind is some 50 times slower.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,18 +16,18 @@ use serde::{Deserialize, Serialize};
 
 use super::probe::COUNTED;
 
-/// What was executed in a number of frames.
+/// Executed instructions of a number of frames.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Counts {
     pub(crate) instructions: u64,
     /// Conditional branches.
     pub(crate) branches: u64,
-    /// Instructions by function, those in functions that it calls not included.
+    /// Instructions by function, without those of called functions.
     pub(crate) functions: BTreeMap<String, u64>,
 }
 
 impl Counts {
-    /// Instructions in functions whose name has one of these parts.
+    /// Instructions in functions whose name contains one of these parts.
     pub(crate) fn of(&self, parts: &[&str]) -> u64 {
         let named = |name: &str| parts.iter().any(|part| name.contains(part));
         let functions = self.functions.iter().filter(|(name, _)| named(name));
@@ -70,7 +70,7 @@ pub(crate) fn count(arguments: &[&str], folder: &Path) -> anyhow::Result<Counts>
     Ok(counts)
 }
 
-/// Reads what Callgrind wrote with `--compress-strings=no --compress-pos=no`.
+/// Parses the output of Callgrind with `--compress-strings=no --compress-pos=no`.
 fn parse(text: &str) -> anyhow::Result<Counts> {
     let mut counts = Counts::default();
     let mut events: Vec<&str> = Vec::new();
@@ -84,13 +84,13 @@ fn parse(text: &str) -> anyhow::Result<Counts> {
         } else if line.starts_with("calls=") {
             of_call = true;
         } else if line.starts_with(|c: char| c.is_ascii_digit()) {
-            // The line after `calls=` is the cost of what was called.
+            // The line after `calls=` is the cost of the called function.
             if std::mem::take(&mut of_call) {
                 continue;
             }
             let numbers = line.split_whitespace().skip(1).map(str::parse::<u64>);
             let of = |wanted: &str| -> anyhow::Result<u64> {
-                // Trailing zeros are left out.
+                // Trailing zeros are omitted.
                 let place = events.iter().position(|&event| event == wanted);
                 let Some(place) = place else { return Ok(0) };
                 Ok(numbers.clone().nth(place).transpose()?.unwrap_or(0))

@@ -1,8 +1,8 @@
-//! The scenes: a bare one, and for each feature that one with it declared and idle, and declared and used.
+//! Scenes of the comparison: a bare one, and for each feature one with it declared but idle, and one with it in use.
 //!
-//! The bare scene is a beam of soft material that floats at rest, in two substeps of one iteration: no forces, nothing
-//! held, nothing reported, no limit of kappa. A case names the scene that it is compared with: mostly the bare one;
-//! what only makes sense together with something else is compared with that alone.
+//! The bare scene is a beam of soft material that floats at rest, in two substeps of one iteration: no forces, no fixed
+//! particles, no reports, no limit of kappa. A case names its base scene: usually the bare one. A feature that requires
+//! another one is compared with that alone.
 
 use incise::Scene;
 use incise::scene::{
@@ -11,14 +11,14 @@ use incise::scene::{
     Substeps, TetSolve,
 };
 
-/// What of a feature a scene has.
+/// State of a feature in a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum State {
-    /// What others are compared with.
+    /// Base of comparisons.
     Base,
-    /// Declared, but nothing there is for it to do.
+    /// Declared, but without effect.
     Idle,
-    /// Declared and at work.
+    /// Declared and in use.
     Used,
 }
 
@@ -37,9 +37,9 @@ impl State {
 pub(crate) struct Case {
     pub(crate) feature: &'static str,
     pub(crate) state: State,
-    /// The feature of the base that it is compared with.
+    /// Feature of the base scene.
     pub(crate) base: &'static str,
-    /// What is there, in words.
+    /// Description of the scene.
     pub(crate) what: &'static str,
     pub(crate) change: fn(&mut Scene),
 }
@@ -57,7 +57,7 @@ impl Case {
     }
 }
 
-/// The name of the base that has nothing.
+/// Name of the base without features.
 pub(crate) const BARE: &str = "bare";
 
 fn bare(tets: usize) -> Scene {
@@ -68,7 +68,7 @@ fn bare(tets: usize) -> Scene {
     scene
 }
 
-/// A beam of length 1 along x, with its middle at a height.
+/// Beam of length 1 along x, with its center at a height.
 fn beam(tets: usize, height: f64) -> BodySpec {
     BodySpec {
         mesh: None,
@@ -89,9 +89,9 @@ fn beam(tets: usize, height: f64) -> BodySpec {
     }
 }
 
-/// What is never reached.
+/// Distance that is never reached, in m.
 const FAR: f64 = 1e3;
-/// A frame that never comes.
+/// Frame that is never reached.
 const LATE: u64 = 1_000_000;
 /// The end of the beam.
 const END: Region = Region::HalfSpace {

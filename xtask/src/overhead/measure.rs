@@ -1,8 +1,8 @@
 //! Bytes, allocations, instructions and device traffic of one scene.
 //!
-//! Bytes are what the scene holds on the heap after some frames, capacity included, allocations those of later frames;
-//! both on a thread of its own, by a counting allocator. Traffic is what a device, a software one too, was told in
-//! later frames. All of that repeats exactly.
+//! Bytes are those that the scene holds on the heap after some frames, including unused capacity; allocations are those
+//! of later frames. Both are measured on a separate thread by a counting allocator. Traffic is the commands and bytes
+//! sent to a device, possibly a software one, in later frames. All values are exactly reproducible.
 
 use std::cell::OnceCell;
 use std::path::Path;
@@ -22,33 +22,33 @@ use super::probe::{FIRST, Run, Way, run};
 /// Frames that are counted.
 pub(crate) const FRAMES: u32 = 4;
 
-/// What a scene costs in one size.
+/// Cost of a scene in one size.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Measured {
     pub(crate) tets: usize,
     pub(crate) particles: usize,
     pub(crate) memory: Memory,
-    /// Of [`FRAMES`] frames; `None` without valgrind.
+    /// Instructions of [`FRAMES`] frames; `None` without valgrind.
     pub(crate) counts: Option<Counts>,
-    /// `None` if there is no device, or it does not do this.
+    /// `None` if there is no device, or it does not support the scene.
     pub(crate) device: Option<Device>,
 }
 
-/// What is asked of the heap.
+/// Heap use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Memory {
-    /// Held after some frames.
+    /// Bytes held after some frames.
     pub(crate) bytes: i64,
-    /// Of those, what makes ready for cuts: neighbors, boundary and pieces.
+    /// Part of these bytes for cutting: neighbors, boundary and pieces.
     pub(crate) ready_to_cut: i64,
     /// Allocations in [`FRAMES`] frames.
     pub(crate) allocations: u64,
 }
 
-/// What a device was told in [`FRAMES`] frames.
+/// Device traffic of [`FRAMES`] frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Device {
-    /// Held in buffers of the solver.
+    /// Bytes held in buffers of the solver.
     pub(crate) bytes: u64,
     pub(crate) dispatches: u64,
     pub(crate) passes: u64,
@@ -58,7 +58,7 @@ pub(crate) struct Device {
     pub(crate) read: u64,
 }
 
-/// A device, opened when it is first asked for.
+/// Device, opened on first use.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Gpu(Rc<OnceCell<Option<Arc<GpuContext>>>>);
 
@@ -69,7 +69,7 @@ impl Gpu {
     }
 }
 
-/// Measures a scene. Nothing is asked of a device unless the scene is run as a simulation.
+/// Measures a scene. Device traffic is measured only if the scene is run as a simulation.
 pub(crate) fn measure(
     scene: &Scene,
     way: Way,
@@ -112,14 +112,14 @@ fn instructions(scene: &Scene, way: Way, folder: &Path) -> anyhow::Result<Counts
     callgrind::count(&[&arguments[..], &["--frames", &frames]].concat(), folder)
 }
 
-/// What a scene asks of the heap.
+/// Measures the heap use of a scene.
 ///
-/// A simulation keeps the description it was made from, to be turned to other settings later; it is as long as the
-/// scene was written, whatever is simulated, and not counted.
+/// A simulation keeps the scene description for later changes of settings. Its size depends on the text of the scene,
+/// not on the simulation, and is not counted.
 pub(crate) fn memory(scene: &Scene, way: Way) -> anyhow::Result<Memory> {
     let pool = ThreadPoolBuilder::new().num_threads(1).build()?;
     pool.install(|| {
-        // Built once before, so that what is made once in a process does not count.
+        // Warm-up, so that allocations made once per process are not counted.
         let mut result = run(scene, way).map(drop);
         let frames = |run: &mut anyhow::Result<Run>, count| {
             for _ in 0..count {
@@ -152,7 +152,7 @@ pub(crate) fn memory(scene: &Scene, way: Way) -> anyhow::Result<Memory> {
     })
 }
 
-/// Bytes of the lists and names in the description of a scene, of which a simulation keeps a copy.
+/// Bytes of lists and strings in the description of a scene, of which a simulation keeps a copy.
 fn description(scene: &Scene, way: Way) -> i64 {
     if way != Way::Facade {
         return 0;
@@ -163,7 +163,7 @@ fn description(scene: &Scene, way: Way) -> i64 {
     held.bytes_current
 }
 
-/// Bytes that a mesh takes beside its positions and tets so that it can be cut at any time.
+/// Bytes of a mesh in addition to its positions and tets that keep it ready for cuts.
 fn ready_to_cut(scene: &Scene) -> anyhow::Result<i64> {
     let mesh = Simulation::new(scene)?.mesh().clone();
     let mut made = None;
@@ -175,7 +175,7 @@ fn ready_to_cut(scene: &Scene) -> anyhow::Result<i64> {
     Ok(held.bytes_current)
 }
 
-/// What a device is told; `None` if it does not do what the scene asks for.
+/// Measures device traffic; `None` if the device does not support the scene.
 pub(crate) fn traffic(scene: &Scene, gpu: &Arc<GpuContext>) -> anyhow::Result<Option<Device>> {
     let Ok(mut simulation) = Simulation::on_device(scene, Arc::clone(gpu)) else {
         return Ok(None);

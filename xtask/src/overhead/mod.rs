@@ -1,8 +1,8 @@
-//! `cargo xtask overhead`: what a scene pays for what it does not use.
+//! `cargo xtask overhead`: cost of features that a scene does not use.
 //!
-//! Each feature is declared in an otherwise bare scene, once with nothing to do and once at work, in two sizes, and the
-//! differences to the bare scene are listed: instructions, branches, bytes, and what a GPU is told. The bare scene
-//! itself is held against a loop by hand over the solver alone, which has never heard of any feature of the facade.
+//! Each feature is declared in an otherwise bare scene, once idle and once in use, in two sizes. The page lists the
+//! differences to the bare scene: instructions, branches, bytes, and device traffic. The bare scene itself is compared
+//! with a handwritten loop over the solver alone, which has no features of the library.
 
 mod callgrind;
 mod features;
@@ -33,16 +33,16 @@ pub(crate) struct OverheadArguments {
 pub(crate) struct Row {
     feature: String,
     state: String,
-    /// The feature whose base this is compared with.
+    /// Feature whose base this is compared with.
     base: String,
     what: String,
-    /// What counted instructions, if anything did.
+    /// Version of valgrind, if instructions were counted.
     valgrind: Option<String>,
     /// By ascending size.
     sizes: Vec<Measured>,
 }
 
-/// The bare scene by hand, and by hand without a body.
+/// Bare scene as a handwritten loop, and that loop without a body.
 const BY_HAND: [(Way, &str); 2] = [
     (Way::Hand, "the solver alone"),
     (Way::Empty, "the solver alone, without a body"),
@@ -66,7 +66,7 @@ pub(crate) fn overhead(arguments: &OverheadArguments) -> anyhow::Result<()> {
     experiment(arguments.experiment.quick, &valgrind).run(&arguments.experiment)
 }
 
-/// Runs this experiment as one of all experiments.
+/// Runs this experiment as part of `all`.
 pub(crate) fn run(arguments: &ExperimentArguments) -> anyhow::Result<()> {
     overhead(&OverheadArguments {
         experiment: arguments.clone(),
@@ -75,7 +75,7 @@ pub(crate) fn run(arguments: &ExperimentArguments) -> anyhow::Result<()> {
 }
 
 fn experiment(quick: bool, valgrind: &Option<String>) -> Experiment<Row> {
-    // Quick: the smallest that still tells a constant from a pass.
+    // Quick: the smallest sizes that distinguish a constant from a cost per element.
     let tets: &'static [usize] = if quick { &[200, 400] } else { &[800, 3200] };
     let gpu = Gpu::default();
     let mut cells = Vec::new();
@@ -119,7 +119,7 @@ fn experiment(quick: bool, valgrind: &Option<String>) -> Experiment<Row> {
     }
 }
 
-/// Whether a quick run counts the instructions of this one, and asks a device; bytes are counted of all.
+/// True if a quick run counts the instructions and device traffic of the case; bytes are counted for all cases.
 fn of_a_quick_run(case: &Case) -> bool {
     case.state == State::Base || ["gravity", "attachment"].contains(&case.feature)
 }

@@ -1,4 +1,4 @@
-//! The page: what is not declared, what is declared and idle, what is at work.
+//! Page of the experiment: undeclared features, declared but idle ones, and those in use.
 
 use anyhow::Context;
 
@@ -8,8 +8,7 @@ use super::features::{BARE, State};
 use super::measure::{Device, FRAMES, Measured};
 use crate::experiment::{Page, Part, Table};
 
-/// Features and the modules that are theirs alone: what of a bare frame is in those is paid by a scene that declares
-/// nothing.
+/// Features and their own modules: instructions of a bare frame in these modules are the cost of an undeclared feature.
 const MODULES: [(&str, &[&str]); 12] = [
     (
         "attachments",
@@ -55,7 +54,7 @@ const MODULES: [(&str, &[&str]); 12] = [
     ("bodies on a line", &["xpbd::degeneracy_jitter"]),
 ];
 
-/// The function of the facade that has a pass: what a frame is for.
+/// Function of the library with a pass over the particles that every frame needs.
 const POSITIONS: &str = "AnySolver::positions";
 
 const INTRODUCTION: &str = "\
@@ -115,7 +114,7 @@ pub(crate) fn page(rows: &[Row]) -> anyhow::Result<Page> {
     })
 }
 
-/// The bare scene beside the loops by hand.
+/// Bare scene next to the handwritten loops.
 fn undeclared(bare: &Row, hand: &Row, empty: &Row) -> Table {
     let mut table = Table::new(
         "Nothing declared",
@@ -211,7 +210,7 @@ fn modules(bare: &Row) -> Table {
     table
 }
 
-/// A scene beside its base, in every size.
+/// A scene next to its base, in every size.
 fn pairs<'a>(
     rows: &'a [Row],
     row: &'a Row,
@@ -245,7 +244,7 @@ pub(super) fn declared_table(caption: &str, rows: &[Row], state: State) -> anyho
         let part = more
             .zip(instructions(base))
             .map(|(more, all)| 100.0 * more / all);
-        // Between the sizes: a constant falls out.
+        // The difference between the sizes cancels constants.
         let slope = match differences[..] {
             [(small, small_base), .., (large, large_base)] => {
                 let more = |a, b| minus(instructions(a), instructions(b));
@@ -274,7 +273,7 @@ pub(super) fn declared_table(caption: &str, rows: &[Row], state: State) -> anyho
     Ok(table)
 }
 
-/// What a device is told.
+/// Table of device traffic.
 fn device_table(rows: &[Row]) -> anyhow::Result<Table> {
     let mut table = Table::new(
         "On a GPU: a bare frame, and what a frame of others is told more, at the larger size",

@@ -1,7 +1,7 @@
-//! What is run under Callgrind: some frames of a scene, through the facade or by hand.
+//! Process run under Callgrind: some frames of a scene, by the library or by a handwritten loop.
 //!
-//! By hand is the least code for the same mesh and schedule: the solver of incise-xpbd, a step and a copy of the
-//! positions. It knows nothing of scenes, strokes, pieces, handles, sleep or reports.
+//! The handwritten loop is the least code for the given mesh and schedule: the solver of incise-xpbd, a step and a copy
+//! of the positions. It has no scenes, strokes, pieces, handles, sleep or reports.
 
 use std::path::PathBuf;
 
@@ -15,10 +15,10 @@ use rayon::ThreadPoolBuilder;
 
 use crate::solver::body::body;
 
-/// A part of the name of the function that frames are counted in.
+/// Part of the name of the function whose frames are counted.
 pub(crate) const COUNTED: &str = "counted_frames";
 
-/// Frames before those that are counted: arrays get their sizes.
+/// Warm-up frames in which arrays get their sizes.
 pub(crate) const FIRST: u32 = 3;
 
 #[derive(Debug, Args)]
@@ -26,7 +26,7 @@ pub(crate) struct ProbeArguments {
     /// The scene.
     #[arg(long)]
     scene: PathBuf,
-    /// How it is run.
+    /// Way to run the scene.
     #[arg(long, value_enum)]
     way: Way,
     /// Frames that are counted.
@@ -34,7 +34,7 @@ pub(crate) struct ProbeArguments {
     frames: u32,
 }
 
-/// How a scene is run.
+/// Way to run a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Way {
     /// By the facade, in a simulation.
@@ -57,7 +57,7 @@ impl Way {
 
 /// Runs the frames.
 pub(crate) fn probe(arguments: &ProbeArguments) -> anyhow::Result<()> {
-    // This thread is the pool: no thread is woken or waits.
+    // The current thread is the pool, so no thread wakes or waits.
     let pool = ThreadPoolBuilder::new().num_threads(1).use_current_thread();
     pool.build_global()?;
     let scene = Scene::load(&arguments.scene)?;
@@ -68,7 +68,7 @@ pub(crate) fn probe(arguments: &ProbeArguments) -> anyhow::Result<()> {
     counted_frames(&mut run, arguments.frames)
 }
 
-/// In a function of its own, which Callgrind knows by its name.
+/// Separate function, which Callgrind finds by its name.
 #[inline(never)]
 fn counted_frames(run: &mut Run, frames: u32) -> anyhow::Result<()> {
     for _ in 0..frames {
@@ -77,7 +77,7 @@ fn counted_frames(run: &mut Run, frames: u32) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What has frames.
+/// Simulation or handwritten loop.
 #[derive(Debug)]
 pub(crate) enum Run {
     Facade(Box<Simulation>),
@@ -109,7 +109,7 @@ pub(crate) struct Hand {
 }
 
 impl Hand {
-    /// The bare scene's, on this mesh in this order of solving.
+    /// Body of the bare scene, with the given mesh and schedule.
     pub(crate) fn new(scene: &Scene, mesh: &TetMesh, schedule: Schedule) -> anyhow::Result<Self> {
         let spec = &scene.body[0];
         let material = Material {

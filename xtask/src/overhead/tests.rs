@@ -1,4 +1,4 @@
-//! What repeats exactly: bytes, allocations, dispatches.
+//! Tests of exactly reproducible values: bytes, allocations, dispatches.
 
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ fn memory_of(case: Case, tets: usize) -> Memory {
     memory(&case.scene(tets), Way::Facade).unwrap()
 }
 
-/// A frame of a scene that declares nothing asks for no memory.
+/// A frame of a scene without features allocates no memory.
 #[test]
 fn a_bare_frame_asks_for_no_memory() {
     let bare = case(BARE, State::Base);
@@ -34,7 +34,7 @@ fn a_bare_frame_asks_for_no_memory() {
     }
 }
 
-/// What is declared but has nothing to keep, now or ever, takes no memory.
+/// Declared features that never need storage take no memory.
 #[test]
 fn features_without_memory_take_none() {
     let bare = memory_of(case(BARE, State::Base), 300);
@@ -52,7 +52,7 @@ fn features_without_memory_take_none() {
     assert_eq!(memory_of(case("snapping", State::Idle), 300), stroke);
 }
 
-/// What is declared and idle takes the same memory whatever the size of the mesh, and asks for none in a frame.
+/// Declared idle features take memory independent of the mesh size, and allocate none in a frame.
 #[test]
 fn idle_features_take_a_constant() {
     let more = |case: Case, tets| {
@@ -69,7 +69,7 @@ fn idle_features_take_a_constant() {
     }
 }
 
-/// Materials that differ only in their stiffness are one to the solver.
+/// Materials that differ only in their stiffness take no more memory than one.
 #[test]
 fn a_second_stiffness_takes_no_memory() {
     let of = |feature, state| memory_of(case(feature, state), 300).bytes;
@@ -78,8 +78,8 @@ fn a_second_stiffness_takes_no_memory() {
     assert!(of("other material", State::Used) > linked);
 }
 
-/// Each substep of a bare frame is a prediction, the pass and the velocities; a frame is one pass and one submit, with
-/// nothing sent and nothing read. What needs no kernel of its own adds none.
+/// Each substep of a bare frame is a prediction, the constraint pass and the velocities; a frame is one pass and one
+/// submit, without uploads or readbacks. Features without a kernel add no dispatch.
 #[test]
 fn only_declared_features_are_sent_to_a_device() {
     let Ok(gpu) = GpuContext::new(&GpuOptions::from_env()) else {
@@ -89,7 +89,7 @@ fn only_declared_features_are_sent_to_a_device() {
     let told = |case: Case| traffic(&case.scene(200), &gpu).unwrap().unwrap();
     let bare = told(case(BARE, State::Base));
     let frames = u64::from(measure::FRAMES);
-    // 2 substeps, and a body so small is solved in one dispatch.
+    // 2 substeps; a body this small is solved in one dispatch.
     assert_eq!(bare.dispatches, 2 * 3 * frames);
     assert_eq!((bare.passes, bare.submits), (frames, frames));
     assert_eq!((bare.uploaded, bare.readbacks, bare.read), (0, 0, 0));
@@ -104,7 +104,7 @@ fn only_declared_features_are_sent_to_a_device() {
     assert_eq!(told(case("ground", State::Idle)).dispatches, 2 * 4 * frames);
 }
 
-/// A scene of a thousand particles, or two, whose frames take `each` instructions a particle and `once` more.
+/// A scene of one or two thousand particles whose frames take `each` instructions per particle and `once` more.
 fn row(feature: &str, state: State, each: u64, once: u64) -> Row {
     let size = |particles: usize| Measured {
         tets: 4 * particles,
@@ -130,7 +130,7 @@ fn row(feature: &str, state: State, each: u64, once: u64) -> Row {
     }
 }
 
-/// Constants are told from passes; without valgrind there are gaps and no figures.
+/// Constants are distinguished from costs per element; without valgrind cells are empty.
 #[test]
 fn the_page_distinguishes_constants_from_passes() {
     let mut rows = vec![

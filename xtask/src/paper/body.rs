@@ -1,7 +1,7 @@
-//! The bodies of the paper: meshes of a folder, or generated stand-ins of the same shapes and sizes.
+//! Bodies of the paper: meshes of a folder, or generated stand-ins with similar shapes and sizes.
 //!
-//! A stand-in is irregular, with the spread of valences that meshes of TetGen have: on a lattice, colorings and
-//! clusterings behave differently. It is written to a file once, so that scenes can name it, too.
+//! A stand-in is irregular, with a valence distribution like that of TetGen meshes: colorings and clusterings behave
+//! differently on a lattice. It is written to a file once, so that scenes can refer to it.
 
 use std::path::PathBuf;
 
@@ -51,7 +51,7 @@ impl Body {
         body.with_context(|| format!("the paper has no body {name}"))
     }
 
-    /// The file of its mesh: that of the folder of models, or a generated one under `--out`.
+    /// Mesh file: from the folder of models, or generated under `--out`.
     pub(super) fn file(&self, arguments: &ExperimentArguments) -> anyhow::Result<PathBuf> {
         if let Some(folder) = &arguments.models {
             let path = folder.join(format!("{}.vtk", self.name));
@@ -81,7 +81,7 @@ impl Body {
     }
 }
 
-/// The particles of the tets of a mesh.
+/// Incidence of the tets of a mesh.
 pub(super) fn incidence(mesh: &TetMesh) -> anyhow::Result<Incidence> {
     let tets = mesh.tets.iter().copied();
     Ok(Incidence::from_constraints(mesh.positions.len(), tets)?)

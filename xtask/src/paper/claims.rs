@@ -1,8 +1,7 @@
-//! What the paper claims, and whether it was found: each claim with a rule, decided from the rows of the tables and
-//! figures.
+//! Claims of the paper and their verdicts: each claim has a rule, decided from the rows of the tables and figures.
 //!
-//! Cells of the tables that are there are taken, missing ones measured. The rules are about the paper's methods as they
-//! are here, on a processor.
+//! Existing cells of the tables are used, missing ones measured. The rules apply to the implementations of the paper's
+//! methods in this project, on a processor.
 
 pub(super) mod rules;
 
@@ -14,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::{fig4, fig7, fig8, fig11, table1, table2};
 use crate::experiment::{Cell, Experiment, ExperimentArguments, Page, Part, Table};
 
-/// A row of one of the others.
+/// A row of another experiment.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) enum Evidence {
     Table1(table1::Row),
@@ -25,7 +24,7 @@ pub(super) enum Evidence {
     Fig11(fig11::Row),
 }
 
-/// What was found of a claim.
+/// Verdict on a claim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Verdict {
     Confirmed,
@@ -34,7 +33,7 @@ pub(super) enum Verdict {
 }
 
 impl Verdict {
-    /// Confirmed where it holds for all, not confirmed where for none.
+    /// Confirmed if all cases hold, not confirmed if none does, otherwise partly.
     fn of(holds: &[bool]) -> Self {
         match holds.iter().filter(|&&holds| holds).count() {
             0 => Self::NotConfirmed,
@@ -52,7 +51,7 @@ impl Verdict {
     }
 }
 
-/// A claim with what was found.
+/// A claim with its verdict.
 pub(super) struct Claim {
     pub(super) claim: &'static str,
     rule: &'static str,
@@ -62,7 +61,7 @@ pub(super) struct Claim {
 
 pub(super) fn experiment(arguments: &ExperimentArguments) -> Experiment<Evidence> {
     let mut cells = Vec::new();
-    // In shards each would have to measure what another has; the page is made of what is there when all is.
+    // In shards each would measure cells that another shard has; the page is made when all cells exist.
     if arguments.shard.is_none() {
         take(
             &mut cells,
@@ -114,7 +113,7 @@ struct Done<R> {
     row: R,
 }
 
-/// Adds the cells of an experiment, which take what the experiment has measured, if it has.
+/// Adds the cells of an experiment, which reuse its measurements where they exist.
 fn take<R: DeserializeOwned + 'static>(
     cells: &mut Vec<Cell<Evidence>>,
     arguments: &ExperimentArguments,
@@ -167,7 +166,7 @@ mod tests {
         assert_eq!(Verdict::of(&[true, true]), Verdict::Confirmed);
         assert_eq!(Verdict::of(&[true, false]), Verdict::Depends);
         assert_eq!(Verdict::of(&[false]), Verdict::NotConfirmed);
-        // Nothing confirms nothing.
+        // No cases confirm nothing.
         assert_eq!(Verdict::of(&[]), Verdict::NotConfirmed);
     }
 }

@@ -1,7 +1,7 @@
-//! Colorings of one graph by several algorithms, timed in turns, with what each costs the solver.
+//! Colorings of one graph by several algorithms, timed alternately, with the solve time of each.
 //!
-//! Everything runs on one thread, so that what else the machine does falls on all alike. The paper's algorithms color a
-//! graph that is there; `auto` colors from lists of particles and needs none.
+//! Everything runs on one thread, so that other load of the machine affects all alike. The paper's algorithms color an
+//! existing graph; `auto` colors from lists of particles without a graph.
 
 use std::time::Instant;
 
@@ -16,9 +16,9 @@ use crate::solver::body::{body, scaled};
 /// Gauss-Seidel iterations of a frame. The paper names no number; this one times its 1.15 ms for an iteration (Table 3)
 /// comes close to its 4.3 ms for solving (Table 2).
 pub(super) const ITERATIONS: u32 = 4;
-/// Rounds of turns; the fastest counts.
+/// Timing rounds; the fastest counts.
 const ROUNDS: usize = 3;
-/// An algorithm that takes longer than this in ms has no second turn.
+/// Time in ms above which an algorithm is timed only once.
 const PATIENCE: f64 = 300.0;
 /// The last of [`ALGORITHMS`], which is more than an algorithm.
 pub(super) const BALANCED: &str = "auto, balanced";
@@ -29,7 +29,7 @@ pub(super) const ALGORITHMS: [&str; 11] = [
     BALANCED,
 ];
 
-/// What came of an algorithm.
+/// Results of an algorithm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Colored {
     pub(super) algorithm: String,
@@ -56,14 +56,14 @@ impl Colored {
         self.chi2 * self.colors.saturating_sub(1) as f64
     }
 
-    /// The sample's standard deviation, which divides by k - 1.
+    /// Sample standard deviation, which divides by k - 1.
     pub(super) fn sample_std(&self) -> f64 {
         let k = self.colors as f64;
         self.std * (k / (k - 1.0).max(1.0)).sqrt()
     }
 }
 
-/// Constraints in clusters, as something to color.
+/// Clustered constraints as a coloring problem.
 pub(super) struct Problem {
     pub(super) clustering: Clustering,
     pub(super) clusters: Incidence,
@@ -81,7 +81,7 @@ impl Problem {
         }
     }
 
-    /// Proper colorings by each of the algorithms in one thread, with the shortest time of each in ms.
+    /// Proper colorings by each of the algorithms on one thread, with the shortest time of each in ms.
     pub(super) fn colorings(&self, algorithms: &[&str]) -> anyhow::Result<Vec<(Coloring, f64)>> {
         one_thread(|| {
             let mut best: Vec<Option<(Coloring, f64)>> = vec![None; algorithms.len()];
@@ -120,7 +120,7 @@ impl Problem {
         })
     }
 
-    /// All that a table needs of each of the algorithms.
+    /// Measures all table values of each of the algorithms.
     pub(super) fn measure(
         &self,
         mesh: &TetMesh,
@@ -152,9 +152,9 @@ impl Problem {
     }
 }
 
-/// The shortest time in ms of a frame of [`ITERATIONS`] in each order, in turns.
+/// Shortest time in ms of a frame of [`ITERATIONS`] in each order, measured alternately.
 ///
-/// The body is at rest and the step so small that it stays there: what an iteration costs does not depend on either.
+/// The body is at rest and the step so small that it stays there; the cost of an iteration depends on neither.
 pub(super) fn solve_ms(mesh: &TetMesh, schedules: &[Schedule]) -> anyhow::Result<Vec<f64>> {
     const SOFT: Material = Material {
         young_modulus: 1e4,
@@ -173,7 +173,7 @@ pub(super) fn solve_ms(mesh: &TetMesh, schedules: &[Schedule]) -> anyhow::Result
         let mut solvers = Vec::new();
         for schedule in schedules {
             let mut solver = body::<f32>(&mesh, SOFT, |_| false)?;
-            // The first step of all puts the tets in order.
+            // The first step reorders the tets.
             solver.step(schedule, &settings)?;
             solvers.push(solver);
         }
@@ -197,7 +197,7 @@ pub(super) fn one_thread<T: Send>(
     pool.install(run)
 }
 
-/// The clusters that still hold tets, numbered without gaps: empty ones conflict with no other and need no color.
+/// Clusters that still hold tets, numbered without gaps: empty ones conflict with no other and need no color.
 pub(super) fn occupied(clustering: &Clustering) -> anyhow::Result<Clustering> {
     let mut numbers = vec![None; clustering.cluster_count()];
     let mut next = 0;

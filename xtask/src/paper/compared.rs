@@ -1,4 +1,4 @@
-//! How a number of ours is set beside the paper's.
+//! Format of values next to those of the paper.
 
 /// The header of three columns.
 pub(super) fn header(what: &str) -> [String; 3] {
@@ -9,7 +9,7 @@ pub(super) fn header(what: &str) -> [String; 3] {
     ]
 }
 
-/// The paper's number if it has one, ours, and their ratio.
+/// Paper's value if it has one, measured value, and their ratio.
 pub(super) fn compared(paper: Option<f64>, ours: f64) -> [String; 3] {
     let ratio = paper.map(|paper| ours / paper);
     [
@@ -19,7 +19,7 @@ pub(super) fn compared(paper: Option<f64>, ours: f64) -> [String; 3] {
     ]
 }
 
-/// Three digits, or all of a whole number.
+/// Formats three digits, or all digits of an integer.
 pub(super) fn number(value: f64) -> String {
     let size = value.abs();
     if value == value.trunc() && size < 1e9 {
@@ -41,7 +41,7 @@ pub(super) fn number(value: f64) -> String {
     }
 }
 
-/// The mean, 0 of nothing.
+/// Mean of the values; 0 of none.
 pub(super) fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for value in values {

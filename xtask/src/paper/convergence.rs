@@ -1,10 +1,11 @@
-//! One step of the liver from a known state by each method: the ground of Table 3 and Figures 7 and 10.
+//! One step of the liver from a known state by each method: the basis of Table 3 and Figures 7 and 10.
 //!
-//! The paper gives material and time step (section 5.2), not density, size or what its residual is the norm of. Its
-//! start is "the first frame after a 2.0x scaling-restoration cycle", taken here as the body at twice its size,
-//! released at rest. Three setups: of organ size, where its numbers make iterating a large step hopeless (kappa of a
-//! million), so large that the step is well-posed near rest (kappa 1/2), and the same released closer to rest, where it
-//! is well-posed all the way. A step's iterations cannot be watched from outside, so each count is a run of its own.
+//! The paper gives material and time step (section 5.2), not density, size or the norm of its residual. Its start is
+//! "the first frame after a 2.0x scaling-restoration cycle", taken here as the body at twice its size, released at
+//! rest. Three setups: at organ size, where its parameters make the iteration of a large step hopeless (kappa of a
+//! million); at a size where the step is well-posed near rest (kappa 1/2); and that size released closer to rest, where
+//! the step is well-posed throughout. Intermediate iterations of a step are not accessible, so each count is a separate
+//! run.
 
 use std::time::Instant;
 
@@ -19,16 +20,17 @@ use super::colorings::one_thread;
 use crate::experiment::ExperimentArguments;
 use crate::solver::body::{body, scaled, schedule};
 
-/// Section 5.2. The density is ours; what the paper's damping of 0.05 is a factor of is unknown, and none is taken.
+/// Section 5.2. The density is chosen here; the meaning of the paper's damping of 0.05 is unknown, and no damping is
+/// used.
 pub(super) const MATERIAL: Material = Material {
     young_modulus: 1e7,
     poisson_ratio: 0.49,
     density: 1000.0,
     damping: 0.0,
 };
-/// In s.
+/// Time step in s.
 pub(super) const TIME_STEP: f64 = 0.016;
-/// How large the body is, and by how much it is scaled before it is released.
+/// Size of the body, and its scale factor before release.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Setup {
     Organ,
@@ -139,33 +141,33 @@ impl PaperMethod {
     }
 }
 
-/// What is left after some iterations.
+/// Residuals after some iterations.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Point {
     pub(super) iterations: u32,
-    /// Of the whole step.
+    /// Time of the whole step in ms.
     pub(super) ms: f64,
-    /// `‖C + α̃ λ‖`, what XPBD iterates on.
+    /// Norm of the residual that XPBD iterates on, `‖C + α̃ λ‖`.
     pub(super) dual: f64,
-    /// `‖M (x - x̃) / Δt² + ∇U‖` over the same before the first iteration.
+    /// Norm of the unbalanced force, `‖M (x - x̃) / Δt² + ∇U‖`, relative to its value before the first iteration.
     pub(super) force: f64,
 }
 
 impl Point {
-    /// Whether the numbers have left every scale.
+    /// True if the values have diverged.
     pub(super) fn diverged(&self) -> bool {
         self.dual.max(self.force) > 1e100
     }
 }
 
-/// A body and how to move it.
+/// A body and its method.
 pub(super) struct Trial {
     pub(super) mesh: TetMesh,
     schedule: Schedule,
     solving: PaperMethod,
-    /// By how much the body is scaled before it is released.
+    /// Scale factor before release.
     scaled: f64,
-    /// The force at the start in N.
+    /// Force at the start in N.
     start: f64,
 }
 
@@ -178,7 +180,7 @@ impl Trial {
         let mesh = Body::named("liver_11k")?.mesh(arguments)?;
         let size = match setup {
             Setup::Organ => 0.2,
-            // Kappa goes with the square of the step over the size.
+            // Kappa is proportional to the square of step over size.
             Setup::Large | Setup::Gentle => {
                 let unit = body::<f64>(&scaled(&mesh, 1.0), MATERIAL, |_| false)?;
                 (unit.kappa(TIME_STEP) / 0.5).sqrt()
@@ -205,7 +207,7 @@ impl Trial {
         Ok(trial)
     }
 
-    /// The body scaled and without speed.
+    /// Scaled body at zero velocity.
     pub(super) fn released(&self) -> anyhow::Result<Solver<f64>> {
         let mut solver = body::<f64>(&self.mesh, MATERIAL, |_| false)?;
         for (p, &x) in self.mesh.positions.iter().enumerate() {
@@ -214,7 +216,7 @@ impl Trial {
         Ok(solver)
     }
 
-    /// The body after a step of so many iterations, and what that took in ms.
+    /// Body after a step of `iterations` iterations, and the time in ms.
     pub(super) fn step(&self, iterations: u32) -> anyhow::Result<(Solver<f64>, f64)> {
         let mut solver = self.released()?;
         solver.lay_out(&self.schedule);

@@ -1,9 +1,10 @@
 //! Figure 10: power density spectra of the residual after 1, 15 and 500 iterations.
 //!
-//! The paper does not say of which sequence its spectrum is. Two readings of the force out of balance at the particles:
-//! over space, `|Σ_p f_p exp(2πi k·x_p)|² / N` with the rest positions, mean over 64 directions of wave vectors of each
-//! length, which tells coarse errors from fine ones; and over the numbers of the particles, as an array handed to a
-//! Fourier transform, which depends on how the mesh is numbered. Each as a part of the mean square force at the start.
+//! The paper does not define the sequence of its spectrum. Two readings of the unbalanced force at the particles are
+//! computed: over space, `|Σ_p f_p exp(2πi k·x_p)|² / N` with the rest positions, mean over 64 directions of wave
+//! vectors of each length, which separates coarse from fine errors; and over the particle indices, as an array passed
+//! to a Fourier transform, which depends on the numbering of the mesh. Each is relative to the mean square force at the
+//! start.
 
 use std::f64::consts::{PI, TAU};
 
@@ -38,13 +39,13 @@ pub(super) struct Row {
     spectra: Vec<Spectra>,
 }
 
-/// After so many iterations.
+/// Spectra after a number of iterations.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Spectra {
     iterations: u32,
-    /// Waves on the length of the body, and power.
+    /// Waves per length of the body, and power.
     space: Vec<(f64, f64)>,
-    /// Cycles a particle, and power.
+    /// Cycles per particle, and power.
     index: Vec<(f64, f64)>,
 }
 
@@ -81,7 +82,7 @@ fn measure(
     for iterations in counts {
         let (solver, _) = trial.step(iterations)?;
         let forces = trial.forces(&solver)?;
-        // Forces beyond every scale have no spectrum.
+        // Diverged forces have no spectrum.
         if !norm(&forces).is_finite() || norm(&forces) > 1e100 {
             break;
         }

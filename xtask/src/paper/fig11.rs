@@ -1,4 +1,4 @@
-//! Figure 11: where the time of a frame goes while the liver is cut.
+//! Figure 11: stages of the frame time while the liver is cut.
 
 use std::time::Instant;
 
@@ -15,7 +15,7 @@ use crate::experiment::{Cell, Experiment, ExperimentArguments, Page, Part, Table
 
 const FRAMES: u64 = 220;
 const BLADES: u64 = 3;
-/// In frames that cut, every so many is also made as the paper would make it.
+/// Interval of the cutting frames that are also measured in the paper's way.
 const STRIDE: usize = 8;
 const STAGES: [&str; 6] = ["cut", "cluster", "graph", "color", "schedule", "solve"];
 

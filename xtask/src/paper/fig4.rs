@@ -89,7 +89,7 @@ fn measure(
     })
 }
 
-/// What is plotted of a coloring.
+/// Plotted quantity of a coloring.
 type Quantity = fn(&Colored) -> f64;
 
 fn page(rows: &[Row]) -> anyhow::Result<Page> {

@@ -46,7 +46,7 @@ pub(super) fn experiment(arguments: &ExperimentArguments) -> Experiment<Row> {
     }
 }
 
-/// What is plotted of a point.
+/// Plotted quantity of a point.
 type Quantity = fn(&Point) -> f64;
 
 fn page(rows: &[Row]) -> anyhow::Result<Page> {

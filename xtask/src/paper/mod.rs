@@ -1,7 +1,7 @@
-//! `cargo xtask paper`: the tables and figures of the paper, its numbers and ours side by side.
+//! `cargo xtask paper`: tables and figures of the paper, with its values next to the measured ones.
 //!
-//! One module per table or figure, each an experiment of the common frame. The paper's numbers are data in `printed`,
-//! its bodies stand in `body`. Where the paper leaves open what it means, every reading is run and the page says so.
+//! One module per table or figure, each an experiment. The paper's values are data in `printed`, its bodies are in
+//! `body`. Where the paper is ambiguous, every reading is run and the page says so.
 
 mod body;
 mod claims;
@@ -30,7 +30,7 @@ use crate::experiment::{Backend, ExperimentArguments};
 
 #[derive(Debug, Args)]
 pub(crate) struct PaperArguments {
-    /// Which table or figure.
+    /// Table or figure to run.
     #[arg(value_enum)]
     what: What,
     #[command(flatten)]
@@ -60,13 +60,13 @@ pub(crate) enum What {
     Fig10,
     /// The time of a frame by stages.
     Fig11,
-    /// What the paper claims, and whether it was found; takes what the others have measured.
+    /// Claims of the paper and their verdicts; uses the measurements of the others.
     Claims,
     /// All of these.
     All,
 }
 
-/// The names of the experiments begin with this.
+/// Prefix of the names of the experiments.
 const PREFIX: &str = "paper-";
 
 pub(crate) fn paper(arguments: &PaperArguments) -> anyhow::Result<()> {
@@ -78,7 +78,7 @@ pub(crate) fn paper(arguments: &PaperArguments) -> anyhow::Result<()> {
     run(arguments.what, &arguments.experiment)
 }
 
-/// Runs the experiment of a table or figure, on the processor also where others of `all` run on a GPU.
+/// Runs the experiment of a table or figure; always on the processor, even if others of `all` run on a GPU.
 pub(crate) fn run(what: What, arguments: &ExperimentArguments) -> anyhow::Result<()> {
     match what {
         What::Table1 => table1::experiment(arguments).run(arguments),

@@ -1,14 +1,13 @@
 //! Pictures of bodies as SVG: the triangles of the boundary, far ones first, each filled with a color of its own.
 //!
-//! The painter's algorithm (Newell et al. 1972) from the front, above and to the left. Triangles that look away are
-//! left out, and so are those no pixel of which is in front: a picture holds what is seen of a body, not the body.
-//! Cost: O(triangles log triangles + pixels).
+//! The painter's algorithm (Newell et al. 1972) from the front, above and to the left. Back faces are omitted, and so
+//! are triangles that are visible at no pixel. Cost: O(triangles log triangles + pixels).
 
 use std::fmt::Write;
 
 use incise::mesh::glam::DVec3;
 
-/// Width and height of a picture; triangles are tested at so many pixels.
+/// Width and height of an image; visibility is tested at this resolution.
 const SIZE: usize = 640;
 /// From the body to the eye, and up in the picture.
 const EYE: DVec3 = DVec3::new(-0.45, -0.8, 0.4);
@@ -87,7 +86,7 @@ fn shade(part: u8, light: f64) -> u8 {
     (f64::from(part) * light.clamp(0.0, 1.0)).round() as u8
 }
 
-/// Which triangles are in front at the middle of some pixel.
+/// Marks the triangles that are in front at the center of some pixel.
 fn seen(flat: &[Flat]) -> Vec<bool> {
     let mut front = vec![(f64::MIN, usize::MAX); SIZE * SIZE];
     for (i, triangle) in flat.iter().enumerate() {

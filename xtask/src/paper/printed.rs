@@ -1,4 +1,4 @@
-//! The numbers that the paper prints, as data: what our measurements are set beside.
+//! Values printed in the paper, as data for comparison with the measurements.
 //!
 //! "Parallel Constraint Graph Partitioning and Coloring for Realtime Soft-Body Cutting", measured with CUDA on an RTX
 //! 3090 and an i9-10900X (section 5). Names of algorithms and clusterings are ours. Figures 4, 7, 8, 10 and 11 print no
@@ -135,7 +135,7 @@ pub(super) const TABLE_2: [Model; 4] = [
 pub(super) struct Converged {
     /// `gauss-seidel`, `jacobi` or `chebyshev`.
     pub(super) method: &'static str,
-    /// 1 is no clustering.
+    /// Cluster size; 1 means without clustering.
     pub(super) cluster: u32,
     pub(super) iterations: f64,
     pub(super) ms: f64,

@@ -19,7 +19,7 @@ use crate::experiment::{Cell, Experiment, ExperimentArguments, Page, Part, Table
 /// Frames of the stroke, of which the reading in the midst of a cut takes the state after half.
 const FRAMES: u64 = 60;
 
-/// What is colored.
+/// Reading of the paper: the graph that is colored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Reading {
     Unclustered,
@@ -61,7 +61,7 @@ pub(super) struct Row {
     pub(super) reading: Reading,
     pub(super) tets: usize,
     pub(super) clusters: usize,
-    /// Clusters at the most crowded particle: no coloring has fewer colors.
+    /// Largest number of clusters at a particle: a lower bound of the number of colors.
     pub(super) bound: usize,
     /// Mean of the frames that cut.
     pub(super) cut_ms: f64,
@@ -105,7 +105,7 @@ fn measure(name: &str, reading: Reading, arguments: &ExperimentArguments) -> any
         if report.cut.is_some() {
             cut.push(report.ms.cut);
         }
-        // Halfway, or as soon as the blade has met a body that it only meets later.
+        // Halfway, or at the first later frame in which the blade cuts the body.
         if reading == Reading::Cut && !taken && frame >= FRAMES / 2 && !cut.is_empty() {
             taken = true;
             mesh = simulation.mesh().clone();
@@ -155,7 +155,7 @@ fn page(rows: &[Row]) -> anyhow::Result<Page> {
     })
 }
 
-/// What the paper prints on a body, and of an algorithm.
+/// Values of the paper for a body and an algorithm.
 fn paper(
     body: &str,
     algorithm: &str,
@@ -275,7 +275,7 @@ fn definitions(rows: &[Row]) -> Table {
     table
 }
 
-/// Which reading comes closest to what the paper prints of SCGC, by the mean factor between them.
+/// Reading closest to the paper's values for SCGC, by the mean factor between them.
 fn nearest_reading(rows: &[Row]) -> String {
     type Value = (
         &'static str,

@@ -1,7 +1,8 @@
 //! Table 3: iterations and milliseconds to a residual of 1.5 by method and cluster size.
 //!
-//! 1.5 of what the paper does not say. Read literally, as the norm of what XPBD iterates on over all constraints; and
-//! as a part of the force at the start, for which a fifth is asked (iterated XPBD stops at a tenth).
+//! The paper does not define the quantity whose value is 1.5. Two readings: literally, as the norm of the XPBD residual
+//! over all constraints; and relative to the force at the start, with a target of a fifth (iterated XPBD stops at a
+//! tenth).
 
 use serde::{Deserialize, Serialize};
 
@@ -54,7 +55,7 @@ fn measure(
 ) -> anyhow::Result<Row> {
     let trial = Trial::new(setup, solving, arguments)?;
     let cap = if arguments.quick { QUICK_CAP } else { CAP };
-    // Where a step is well-posed, what has not come after a few thousand will not come.
+    // A well-posed step that has not converged after a few thousand iterations will not converge.
     let cap = if setup != Setup::Organ {
         cap.min(4096)
     } else {
@@ -82,7 +83,8 @@ fn measure(
     })
 }
 
-/// The first count by bisection between the last point that has not reached it and the first that has, to 5 percent.
+/// First count that reaches the target, by bisection between the last point that does not and the first that does, to 5
+/// percent.
 fn first(
     trial: &Trial,
     points: &[Point],

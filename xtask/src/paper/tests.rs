@@ -1,4 +1,5 @@
-//! The quick pages: they can be made, have the paper's rows, and what does not depend on the machine is what it is.
+//! Tests of the quick pages: they are complete, have the paper's rows, and correct values where these do not depend on
+//! the machine.
 
 use std::path::PathBuf;
 
@@ -13,7 +14,7 @@ use super::convergence::{PaperMethod, Setup, TIME_STEP, Trial, norm};
 use super::{What, printed, run};
 use crate::experiment::{Backend, ExperimentArguments};
 
-/// Of a folder of its own, removed at the end.
+/// Arguments with a temporary folder, removed at the end.
 struct Folder(ExperimentArguments);
 
 impl Folder {
@@ -41,7 +42,7 @@ impl Folder {
 
 impl Drop for Folder {
     fn drop(&mut self) {
-        // What cannot be removed from a folder of temporary files does no harm.
+        // Errors of the removal are harmless in a temporary folder.
         let _ = std::fs::remove_dir_all(&self.0.out);
     }
 }
@@ -90,7 +91,7 @@ fn table_1_has_the_papers_rows() {
             assert_eq!(found.colors, colors);
             assert!(found.bound <= found.colors);
         }
-        // The same algorithm from particles and by the graph.
+        // One algorithm, from particles and by the graph.
         let counts = ["serial", "graph-serial"].map(|name| row.of(name).unwrap().clusters);
         assert_eq!(counts[0], counts[1]);
     }
@@ -166,7 +167,7 @@ fn table_2_and_figure_4_have_the_papers_rows() {
         verdict("clustering lowers the number of colors (5.1)"),
         Verdict::Confirmed
     );
-    // The same colors are a theorem, on whatever mesh.
+    // A theorem for every mesh.
     let same = "SCGC and ECL-GC find the same colors and distribution (Table 2)";
     assert_eq!(verdict(same), Verdict::Confirmed);
 }
@@ -224,7 +225,7 @@ fn forces_have_the_norm_that_the_solver_reports() {
     }
 }
 
-/// Colors of a mesh with a known answer: the tets of a fan are all in each other's way.
+/// Colors of a mesh with a known answer: all tets of a fan conflict.
 #[test]
 fn colors_of_a_clique() {
     let fan: Vec<[u32; 4]> = (0..9)

@@ -1,4 +1,4 @@
-//! Bodies that the tables are about.
+//! Bodies of the tables.
 
 use std::path::Path;
 
@@ -38,7 +38,7 @@ pub(crate) fn scaled(mesh: &TetMesh, size: f64) -> TetMesh {
     mesh
 }
 
-/// A body of one material; `held` says which particles do not move.
+/// Body of one material; `held` selects the fixed particles.
 pub(crate) fn body<R: Real>(
     mesh: &TetMesh,
     material: Material,
@@ -47,7 +47,7 @@ pub(crate) fn body<R: Real>(
     mixed_body(mesh, &[material], |_tet| 0, held)
 }
 
-/// A body of several materials; `material_of` gives the place of each tet's in the list.
+/// Body of several materials; `material_of` gives the index of each tet's material in the list.
 pub(crate) fn mixed_body<R: Real>(
     mesh: &TetMesh,
     materials: &[Material],

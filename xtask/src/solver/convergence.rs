@@ -1,9 +1,9 @@
-//! Iterations and milliseconds to the same residual, by method: the paper's Table 3 in a norm that no state can cheat.
+//! Iterations and milliseconds to a residual, by method: the paper's Table 3 with a force residual.
 //!
-//! One implicit step of a liver that hangs by one end, from rest, with the paper's material and time step, once of
-//! organ size and once so large that its setting is well-posed (kappa at most 0.5). The residual is the force that is
-//! left, `‖M (x - x̃) / Δt² + ∇U(x)‖`, over the weight `‖M g‖`: 1 is doing nothing. XPBD drops a part of the equations,
-//! so its residual stops at a floor, which the table shows.
+//! One implicit step of a liver that hangs by one end, from rest, with the paper's material and time step, once at
+//! organ size and once at a size where the step is well-posed (kappa at most 0.5). The residual is the unbalanced
+//! force, `‖M (x - x̃) / Δt² + ∇U(x)‖`, over the weight `‖M g‖`: it is 1 at the start. XPBD omits a part of the
+//! equations, so its residual stops at a floor, which the table shows.
 
 use std::time::Instant;
 
@@ -28,7 +28,7 @@ const PAPER: Material = Material {
 /// The paper's time step in s.
 const TIME_STEP: f64 = 0.016;
 const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, -9.81);
-/// Residuals that the table asks for.
+/// Target residuals of the table.
 const TARGETS: [f64; 4] = [0.5, 0.1, 0.05, 0.01];
 
 /// Runs of XPBD of which the fastest counts.
@@ -39,7 +39,7 @@ struct Point {
     iterations: u32,
     ms: f64,
     residual: f64,
-    /// What XPBD iterates on.
+    /// Residual that XPBD iterates on.
     dual: Option<f64>,
 }
 
@@ -74,7 +74,7 @@ fn hanging(mesh: &TetMesh) -> anyhow::Result<Solver<f64>> {
     body(mesh, PAPER, |x| x.x < 0.05 * length)
 }
 
-/// All methods with what they reach.
+/// All methods with their residuals.
 fn runs(mesh: &TetMesh, quick: bool) -> anyhow::Result<Vec<(String, Vec<Point>)>> {
     let mut runs = Vec::new();
     let most = if quick { 20 } else { 2048 };
@@ -171,7 +171,7 @@ fn curves(runs: &[(String, Vec<Point>)]) -> Table {
     table
 }
 
-/// Whatever does not fit into a double has left every scale.
+/// Formats a number; a value that is not finite has diverged.
 fn number(value: f64) -> String {
     if value < 1e100 {
         format!("{value:.1e}")
@@ -206,7 +206,7 @@ fn xpbd(
         let mut ms = f64::INFINITY;
         for _ in 0..TIMINGS {
             let mut timed = hanging(mesh)?;
-            // The first step of all puts the tets in order.
+            // The first step reorders the tets.
             timed.step(&schedule, &StepSettings::new(1e-9))?;
             let start = Instant::now();
             timed.step(&schedule, &settings)?;

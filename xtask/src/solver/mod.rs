@@ -1,4 +1,4 @@
-//! `cargo xtask solver`: what the methods of the solver cost and what they are worth, as tables.
+//! `cargo xtask solver`: cost and accuracy of the solver's methods, as tables.
 
 mod beam;
 pub(crate) mod body;

@@ -1,9 +1,9 @@
-//! What kappa is worth at rest: where a beam under gravity settles by XPBD, and where it should.
+//! Error at rest by kappa: settled position of a beam under gravity by XPBD, compared with the equilibrium.
 //!
-//! With one iteration a substep XPBD is off even where nothing moves, in proportion to kappa and, as kappa knows
-//! Young's modulus only, nearly in proportion to `l/μ = 1 / (1 - 2 ν)`. The beam starts where Newton's method finds the
-//! equilibrium, and velocities are damped at about the critical rate until it stays: at rest the damping does nothing.
-//! With some more iterations the error hardly depends on Poisson's ratio until close to 1/2: the second table.
+//! With one iteration per substep XPBD has an error even at rest, proportional to kappa and, because kappa depends on
+//! Young's modulus only, nearly proportional to `l/μ = 1 / (1 - 2 ν)`. The beam starts at the equilibrium found by
+//! Newton's method, and velocities are damped at about the critical rate until it stops; damping has no effect at rest.
+//! With a few more iterations the error hardly depends on Poisson's ratio until close to 1/2: the second table.
 
 use comfy_table::Table;
 use incise::mesh::glam::DVec3;
@@ -16,7 +16,7 @@ use super::digits;
 use crate::table;
 
 const RATIOS: [f64; 6] = [0.0, 0.3, 0.4, 0.45, 0.49, 0.499];
-/// Times of `1 / RATE` after which a beam that still moves is given up.
+/// Multiples of `1 / RATE` after which a beam that still moves is a failure.
 const PATIENCE: usize = 100;
 
 pub(crate) fn at_rest(quick: bool) -> anyhow::Result<String> {
@@ -59,7 +59,7 @@ fn header(nu: f64) -> String {
     format!("ν = {nu}, l/μ = {}", digits(1.0 / (1.0 - 2.0 * nu)))
 }
 
-/// The last row: the error of the smallest kappa as a part of `kappa l/μ`.
+/// Last row: the error of the smallest kappa relative to `kappa l/μ`.
 fn proportion(table: &mut Table, kappas: &[f64], ratios: &[f64], errors: &[Vec<Option<f64>>]) {
     let smallest = kappas.last().copied().unwrap_or(1.0);
     let cells = ratios.iter().zip(errors).map(|(nu, column)| {
@@ -70,7 +70,7 @@ fn proportion(table: &mut Table, kappas: &[f64], ratios: &[f64], errors: &[Vec<O
     table.add_row(name.into_iter().chain(cells));
 }
 
-/// The errors in % for each kappa; none where the beam does not settle.
+/// Errors in % for each kappa; `None` where the beam does not settle.
 fn column(beam: &Beam, kappas: &[f64], iterations: u32) -> anyhow::Result<Vec<Option<f64>>> {
     let mut body = beam.reference()?;
     body.settle(GRAVITY)?;
@@ -84,7 +84,7 @@ fn column(beam: &Beam, kappas: &[f64], iterations: u32) -> anyhow::Result<Vec<Op
         .collect()
 }
 
-/// Where the tip comes to rest, to `tolerance` a time of `1 / RATE`.
+/// Rest position of the tip, to `tolerance` per time of `1 / RATE`.
 fn settle(
     beam: &Beam,
     kappa: f64,

@@ -1,4 +1,4 @@
-//! A body and the method that moves it, frame by frame: what the tables of motion have in common.
+//! Common code of the tables of motion: a body and its method, advanced frame by frame.
 
 use incise::graph::Schedule;
 use incise::mesh::TetMesh;
@@ -21,14 +21,14 @@ pub(crate) enum Recipe {
     Corrected(VbdSettings),
 }
 
-/// A body that moves by a recipe.
+/// A body advanced by a recipe.
 pub(crate) struct Runner<R: Real> {
     pub(crate) solver: Solver<R>,
     recipe: Recipe,
     tools: Tools<R>,
 }
 
-/// What a recipe has to prepare.
+/// Precomputed data of a recipe.
 enum Tools<R: Real> {
     Schedule(Schedule),
     VertexStars(Box<VertexStars<R>>, Option<Box<CoarseCorrection<R>>>),
@@ -53,7 +53,7 @@ impl<R: Real> Runner<R> {
         })
     }
 
-    /// Advances by a frame; returns the number of particles that would not have been finite.
+    /// Advances by a frame; returns the number of particles reset because they were not finite.
     pub(crate) fn frame(&mut self) -> anyhow::Result<usize> {
         let (solver, recipe) = (&mut self.solver, &self.recipe);
         let repaired = match (recipe, &mut self.tools) {

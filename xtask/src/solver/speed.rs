@@ -1,8 +1,8 @@
-//! What a Gauss-Seidel pass costs: nanoseconds a tet and milliseconds an iteration, on one thread and on two.
+//! Cost of a Gauss-Seidel pass: nanoseconds per tet and milliseconds per iteration, on one thread and on two.
 //!
-//! A beam of Kuhn cubes, 1 m by 0.25 by 0.25, of 11,520 or 92,160 tets, E = 1e6 Pa, Poisson's ratio 0.45, held at one
-//! end and swinging, and the liver. One frame of 20 substeps of one iteration, the fastest of many, over the number of
-//! tets and substeps: everything is in it, prediction and velocities, too.
+//! A beam of Kuhn cubes, 1 m by 0.25 by 0.25, of 11,520 or 92,160 tets, E = 1e6 Pa, Poisson's ratio 0.45, fixed at one
+//! end and swinging, and the liver. The time is that of one frame of 20 substeps of one iteration, the fastest of many,
+//! over the number of tets and substeps; it includes prediction and velocities.
 
 use std::time::Instant;
 
@@ -71,7 +71,7 @@ fn row<R: Real>(
     let mut solver = body::<R>(mesh, RUBBER, |x| x.x < 0.02)?;
     let pools = [1, 2].map(|threads| ThreadPoolBuilder::new().num_threads(threads).build());
     let mut best = [f64::INFINITY; 2];
-    // Both in turn, so that what else the machine does falls on both.
+    // Alternating, so that other load of the machine affects both.
     for _ in 0..if quick { 2 } else { 40 } {
         for (pool, best) in pools.iter().zip(&mut best) {
             let pool = pool.as_ref().map_err(|error| anyhow::anyhow!("{error}"))?;

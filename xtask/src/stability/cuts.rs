@@ -1,8 +1,7 @@
-//! The rows of the matrix that are about cutting: scenes with strokes, everything recomputed and compared after each.
+//! Cutting rows of the matrix: scenes with strokes, with all derived data recomputed and compared after each.
 //!
-//! The body is a beam of E = 1e4 Pa, held at one end over a ground for what comes off, or free without one. A body that
-//! has grown threefold is replaced by a fresh one. Strokes are made without snapping, which leaves whatever slivers
-//! come.
+//! The body is a beam of E = 1e4 Pa, fixed at one end above a ground, or free without one. A body that has tripled its
+//! number of tets is replaced by a new one. Strokes do not snap, so all slivers remain.
 
 use std::sync::Arc;
 
@@ -19,17 +18,18 @@ use crate::random::Random;
 /// A way to cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Cut {
-    /// A stroke at random in every frame.
+    /// A random stroke in every frame.
     Strokes,
-    /// A blade that is through the body within a frame.
+    /// A blade that passes through the body within a frame.
     FastBlade,
-    /// A blade that moves by a hundredth of an edge a frame.
+    /// A blade that moves by a hundredth of an edge per frame.
     SlowBlade,
-    /// A body that falls past a blade that hardly moves.
+    /// A body that falls past a nearly static blade.
     FastBody,
-    /// So many random strokes into a free body at rest without gravity, one a frame; then it is left alone.
+    /// Number of random strokes into a free body at rest without gravity, one per frame, followed by frames without
+    /// strokes.
     AtRest(u64),
-    /// So many random strokes into a body that hangs from one end, one a frame; then it is left alone.
+    /// Number of random strokes into a body that hangs from one end, one per frame, followed by frames without strokes.
     UnderLoad(u64),
     /// Pairs of planes 1/50 edge apart through a body that hangs from one end.
     Slivers,
@@ -95,7 +95,7 @@ impl Cut {
         let gravity = if self == Self::FastBody { 1e2 } else { 9.81 };
         let at_rest = matches!(self, Self::AtRest(_));
         scene.world.gravity = (!at_rest).then_some([0.0, 0.0, -gravity]);
-        // What falls past the blade falls on, and is not crushed.
+        // Parts cut off by the blade fall on without a ground and are not crushed.
         scene.world.ground = (self != Self::FastBody && !at_rest).then_some(GroundSpec {
             height: -1.0,
             friction: 0.5,
@@ -148,7 +148,7 @@ impl Cut {
                 .flat_map(|(&x, frame)| [plane(frame, x), plane(frame + 1, x + 0.02 * edge)])
                 .collect(),
             Self::FastBlade => vec![sweep([2, 3], blade(1.0), -3.0)],
-            // From inside, since it would be long in coming.
+            // Starts inside the body, because the blade is slow.
             Self::SlowBlade => vec![sweep([2, last], blade(-0.1), -6e-4 * last as f64)],
             Self::FastBody => vec![sweep([2, last], blade(-0.4), 1e-3)],
         };
@@ -156,7 +156,7 @@ impl Cut {
     }
 }
 
-/// What becomes of a body that is cut.
+/// Runs the cuts on a body and returns its outcome.
 pub(crate) fn run(
     cut: Cut,
     column: Column,
@@ -200,7 +200,7 @@ pub(crate) fn run(
     Ok(watch.outcome)
 }
 
-/// A rectangle half an edge to three edges large at a random particle, now.
+/// Rectangle of half an edge to three edges at the current position of a random particle.
 fn random_stroke(simulation: &Simulation, noise: &mut Random) -> StrokeSpec {
     let positions = simulation.positions();
     let share = 0.5 * (noise.signed() + 1.0) * positions.len() as f64;
@@ -225,12 +225,12 @@ fn random_stroke(simulation: &Simulation, noise: &mut Random) -> StrokeSpec {
     }
 }
 
-/// Looks at a simulation after every frame.
+/// Monitors a simulation after every frame.
 pub(super) struct Watch {
     pub(super) outcome: Outcome,
     /// The unit of energies, in J.
     unit: f64,
-    /// The energy at the start of the present body, in J.
+    /// Energy at the start of the current body, in J.
     start: Option<f64>,
 }
 
@@ -243,7 +243,7 @@ impl Watch {
         }
     }
 
-    /// Notes what the body is; `false` if it is not finite.
+    /// Records the state of the body; `false` if it is not finite.
     pub(super) fn look(&mut self, simulation: &Simulation) -> anyhow::Result<bool> {
         let (report, outcome) = (simulation.report(), &mut self.outcome);
         outcome.frames += 1;

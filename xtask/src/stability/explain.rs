@@ -1,18 +1,18 @@
-//! Why a body has not come back: sentences by extreme and method.
+//! Explanations of bodies that do not recover: sentences by extreme and method.
 //!
-//! The first that fits is taken. Each is for some extremes, some methods and some verdicts, and says no more than what
-//! is known of them: an outcome that none fits is a finding.
+//! The first match is used. Each explanation applies to some extremes, methods and verdicts, and states only known
+//! facts; an outcome without a match is reported as a finding.
 
 use super::methods::Method;
 use super::outcome::{Outcome, Row, Verdict};
 
-/// A reason, and where it holds.
+/// An explanation and its conditions.
 pub(super) struct Explanation {
-    /// Ids of extremes, or what they begin with up to a dash; an empty one is all.
+    /// Ids of extremes, or their beginnings up to a dash; an empty one matches all.
     extremes: &'static [&'static str],
     methods: &'static [Method],
     verdicts: &'static [Verdict],
-    /// Kappa of the substep must be above this.
+    /// Lower limit of the substep's kappa.
     kappa: f64,
     pub(super) text: &'static str,
 }
@@ -191,7 +191,7 @@ const STATES: &[&str] = &[
     "stretched",
 ];
 
-/// The reason for what is not fine; `None` if it is fine or the reason is not known.
+/// Explanation of an outcome that is not fine; `None` if it is fine or there is no explanation.
 pub(super) fn explain(row: &Row, outcome: &Outcome) -> Option<&'static Explanation> {
     let verdict = outcome.verdict(row.is_state);
     TABLE.iter().find(|e| {
@@ -202,7 +202,7 @@ pub(super) fn explain(row: &Row, outcome: &Outcome) -> Option<&'static Explanati
     })
 }
 
-/// Whether an id is `start` or continues with a dash after it, so that `young-1e1` is not the start of `young-1e12`.
+/// True if an id is `start` or continues with a dash after it, so that `young-1e1` is not the start of `young-1e12`.
 fn begins(id: &str, start: &str) -> bool {
     let rest = id.strip_prefix(start);
     rest.is_some_and(|rest| start.is_empty() || rest.is_empty() || rest.starts_with('-'))

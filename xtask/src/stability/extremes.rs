@@ -21,7 +21,7 @@ const FRAME: f64 = 1.0 / 60.0;
 /// The most frames of a run.
 const MOST_FRAMES: f64 = 1000.0;
 
-/// Where a particle is put at the start.
+/// Start position of a particle.
 type Deformation = fn(&mut Random, DVec3) -> DVec3;
 
 /// A body, its surroundings and its start.
@@ -38,9 +38,9 @@ pub(crate) struct Extreme {
     pub(crate) time_step: f64,
     /// Downward, in m/s²; 0 is none.
     gravity: f64,
-    /// Simulated, in s.
+    /// Simulated time in s.
     pub(crate) time: f64,
-    /// Substeps of a frame, for the columns that have more than one.
+    /// Substeps per frame, for the columns that have more than one.
     pub(crate) substeps: Option<u32>,
     pose: Deformation,
 }
@@ -269,7 +269,7 @@ impl Extreme {
         })
     }
 
-    /// The work of gravity over the length of the body, in J: the unit of energies.
+    /// Work of gravity over the length of the body, in J: the unit of energies.
     pub(crate) fn work(&self) -> f64 {
         let (low, high) = self.ends();
         let middle = 0.5 * (low + high);

@@ -1,4 +1,4 @@
-//! The columns of the matrix: methods with the settings that they are looked at with, precisions, backends.
+//! Columns of the matrix: methods with their settings, precisions, backends.
 //!
 //! *Default* is a simulation with the settings of an empty `[solver]` table, which choose method, substeps and
 //! precision. *Split* is the default form with as many substeps as bring kappa to 0.5, at most 200, and nothing
@@ -12,30 +12,30 @@ use serde::{Deserialize, Serialize};
 
 use crate::solver::runner::Recipe;
 
-/// Above this a substep of one iteration is not accurate.
+/// Largest kappa at which a substep of one iteration is accurate.
 const KAPPA: f64 = 0.5;
-/// The largest kappa of a tet where stiffer ones are softened, as in scenes.
+/// Limit of kappa to which stiffer tets are softened, as in scenes.
 const KAPPA_LIMIT: f64 = 1.0;
-/// The most substeps of a frame.
+/// Largest number of substeps per frame.
 const MOST_SUBSTEPS: f64 = 200.0;
-/// Iterations of a frame, or sweeps.
+/// Iterations or sweeps per frame.
 const ITERATIONS: u32 = 20;
 /// Rounds of a sweep and a correction.
 const ROUNDS: u32 = 5;
 
-/// How a frame is computed.
+/// Method of computing a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Method {
-    /// What a scene without settings gets.
+    /// Default settings of a scene.
     Defaults,
-    /// XPBD in split form, one iteration a substep, substeps by kappa, nothing softened.
+    /// XPBD in split form, one iteration per substep, substeps by kappa, no softening.
     Split,
-    /// XPBD in block form, one iteration a substep, substeps by kappa, softened to a kappa of 1.
+    /// XPBD in block form, one iteration per substep, substeps by kappa, softened to a kappa of 1.
     Softened,
     /// XPBD in block form, one step of 20 iterations.
     Block,
-    /// The paper's: one constraint of a tet after the other, clusters of 10, relaxation 0.8.
+    /// Method of the paper: the constraints of a tet one after another, clusters of 10, relaxation 0.8.
     Paper,
     /// Relaxation 0.1.
     Jacobi,
@@ -43,7 +43,7 @@ pub(crate) enum Method {
     Chebyshev,
     /// 20 sweeps.
     Vbd,
-    /// 5 sweeps, each with a correction of the whole body.
+    /// 5 sweeps, each with a global correction.
     Corrected,
 }
 
@@ -68,12 +68,12 @@ impl Method {
         }
     }
 
-    /// Whether it is XPBD in all rows, which kappa limits, and which a device computes as well.
+    /// True if it is XPBD in all rows; kappa limits it, and devices support it.
     pub(crate) fn is_xpbd(self) -> bool {
         !matches!(self, Defaults | Vbd | Corrected)
     }
 
-    /// Iterations, sweeps or rounds of a substep.
+    /// Iterations, sweeps or rounds per substep.
     fn iterations(self) -> u32 {
         match self {
             Defaults | Split | Softened => 1,
@@ -82,12 +82,12 @@ impl Method {
         }
     }
 
-    /// Whether a frame may have more than one substep.
+    /// True if a frame may have more than one substep.
     pub(crate) fn has_substeps(self) -> bool {
         matches!(self, Split | Softened)
     }
 
-    /// Substeps of a frame for a body with that kappa at the frame's time.
+    /// Substeps per frame for a body with that kappa at the frame's time.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -109,7 +109,7 @@ impl Method {
         })
     }
 
-    /// The settings of a solver.
+    /// Solver settings.
     pub(crate) fn recipe(self, time_step: f64, substeps: u32, gravity: Option<DVec3>) -> Recipe {
         let settings = StepSettings {
             substeps,
@@ -153,7 +153,7 @@ impl Method {
         }
     }
 
-    /// The settings of a scene. What a cut leaves too stiff is softened in the columns of the block form.
+    /// Scene settings. The columns of the block form soften tets that are too stiff after a cut.
     pub(crate) fn spec(self, column: Column) -> SolverSpec {
         let method = match self {
             Defaults => scene::Method::Auto,
@@ -186,7 +186,7 @@ impl Method {
     }
 }
 
-/// Width of the numbers.
+/// Floating-point precision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Precision {
@@ -196,24 +196,24 @@ pub(crate) enum Precision {
     F64,
 }
 
-/// What a body is moved by.
+/// Method, precision and backend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Column {
     pub(crate) method: Method,
     pub(crate) precision: Precision,
-    /// On a device, in place of the processor.
+    /// Runs on a device instead of the processor.
     pub(crate) gpu: bool,
 }
 
 impl Column {
-    /// What a scene without settings gets.
+    /// Default settings of a scene.
     pub(crate) const DEFAULTS: Self = Self {
         method: Defaults,
         precision: Precision::Auto,
         gpu: false,
     };
 
-    /// The defaults, every other method in both precisions, and on a device what a device does.
+    /// Defaults, all other methods in both precisions, and on a device the supported methods.
     pub(crate) fn all(gpu: bool) -> Vec<Self> {
         let mut columns = vec![Self::DEFAULTS];
         for method in Method::ALL.into_iter().filter(|&m| m != Defaults) {
@@ -235,7 +235,7 @@ impl Column {
         columns
     }
 
-    /// The second line of its head.
+    /// Second line of the column's heading.
     pub(crate) fn place(self) -> &'static str {
         match (self.gpu, self.precision) {
             (true, _) => "GPU",

@@ -1,8 +1,8 @@
-//! `cargo xtask stability`: what becomes of bodies in extreme states, materials, steps and cuts, by method, precision
-//! and backend.
+//! `cargo xtask stability`: outcomes of bodies in extreme states, materials, steps and cuts, by method, precision and
+//! backend.
 //!
-//! The matrix is about shape and finiteness, not about accuracy: nothing may be infinite or NaN, ever, and what does
-//! not come back to its shape is explained. Rows: `extremes` and `cuts`; columns: `methods`.
+//! The matrix tests shape and finiteness, not accuracy: no value may ever be infinite or NaN, and each body that does
+//! not return to its shape is explained. Rows: `extremes` and `cuts`; columns: `methods`.
 
 mod cuts;
 mod explain;
@@ -27,16 +27,16 @@ use cuts::Cut;
 use methods::Column;
 use outcome::{Row, Verdict};
 
-/// The columns of a row are measured side by side, since nothing is timed.
+/// Runs the experiment. The columns of a row are measured in parallel, because there are no timings.
 pub(crate) fn stability(arguments: &ExperimentArguments) -> anyhow::Result<()> {
     experiment(arguments.quick, arguments.backend)?.run_and_check(arguments, check)
 }
 
-/// What holds of every cell whatever its verdict: finite, explained where it is not green, momentum kept by
+/// Checks conditions of all cells, independent of the verdict: finite, explained if not green, momentum conserved by
 /// constraints.
 ///
 /// # Errors
-/// On the first outcome of which it does not hold.
+/// On the first outcome that violates one.
 fn check(rows: &[Row]) -> anyhow::Result<()> {
     for row in rows {
         for outcome in &row.outcomes {
@@ -64,7 +64,7 @@ fn experiment(quick: bool, backend: Backend) -> anyhow::Result<Experiment<Row>> 
         let (columns, device) = (columns.clone(), device.clone());
         cells.push(Cell::new(extreme.id.clone(), move || {
             let gpu = open(&device, backend)?;
-            // A simulation starts at rest, not in a state.
+            // A simulation always starts at rest.
             let is_state = extreme.gravity().is_none();
             let outcomes = columns.par_iter();
             let outcomes = outcomes.filter(|&&column| !is_state || column != Column::DEFAULTS);
@@ -77,7 +77,7 @@ fn experiment(quick: bool, backend: Backend) -> anyhow::Result<Experiment<Row>> 
             })
         }));
     }
-    // Thirty cuts leave a body of the quick form in thousands of slivers: minutes in the columns of many sweeps.
+    // Thirty cuts leave thousands of slivers in a body of the quick form: minutes in the columns of many sweeps.
     let cuts = Cut::ALL.into_iter();
     for cut in cuts.filter(|&cut| !quick || !matches!(cut, Cut::AtRest(30) | Cut::UnderLoad(30))) {
         let (columns, device) = (columns.clone(), device.clone());
@@ -100,7 +100,7 @@ fn experiment(quick: bool, backend: Backend) -> anyhow::Result<Experiment<Row>> 
     })
 }
 
-/// The device of all cells, if there is to be one.
+/// Device shared by all cells, if the backend is a GPU.
 fn open(device: &Device, backend: Backend) -> anyhow::Result<Option<&Arc<GpuContext>>> {
     if backend == Backend::Cpu {
         return Ok(None);

@@ -1,21 +1,21 @@
-//! What became of a body in a run, in numbers and in a word.
+//! Outcome of a body's run, as values and as a verdict.
 
 use serde::{Deserialize, Serialize};
 
 use super::methods::Column;
 
-/// A row of the matrix: an extreme with what became of it in every column.
+/// Row of the matrix: an extreme with its outcome in every column.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Row {
     pub(crate) id: String,
     pub(crate) name: String,
-    /// Whether it is a state to come back from: then the distance from the shape at rest counts.
+    /// True for an extreme state to recover from: the distance from the rest shape then counts.
     pub(crate) is_state: bool,
     pub(crate) outcomes: Vec<Outcome>,
 }
 
 impl Row {
-    /// The columns of the row that has most of them.
+    /// Columns of the row with the largest number of columns.
     pub(crate) fn columns(rows: &[Self]) -> Vec<Column> {
         let longest = rows.iter().max_by_key(|row| row.outcomes.len());
         let outcomes = longest.map_or(&[][..], |row| &row.outcomes);
@@ -23,47 +23,48 @@ impl Row {
     }
 }
 
-/// What became of a body.
+/// Outcome of a body's run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Outcome {
     pub(crate) column: Column,
-    /// Of a frame; at the end the largest of any body.
+    /// Substeps per frame; at the end the largest of any body.
     pub(crate) substeps: u32,
-    /// Of a substep, of the stiffest tet, had none been softened; for cuts the largest of all frames.
+    /// Kappa of a substep for the stiffest tet, without softening; for cuts the largest of all frames.
     pub(crate) kappa: f64,
     pub(crate) frames: usize,
-    /// The first frame after which a number was not finite; nothing after that was looked at.
+    /// First frame after which a value was not finite; monitoring stops there.
     pub(crate) not_finite: Option<usize>,
-    /// The most that kinetic, elastic and gravitational energy together rose above the start, in units of what there is
-    /// to begin with: elastic energy at the start, and the work of gravity over the length of the body.
+    /// Largest rise of the total energy (kinetic, elastic and gravitational) above the start, in units of the elastic
+    /// energy at the start plus the work of gravity over the length of the body.
     pub(crate) energy_rise: f64,
-    /// From the shape at rest up to a rigid motion, over the length of the body, at the end; not for bodies in pieces.
+    /// Distance from the rest shape up to a rigid motion, over the length of the body, at the end; `None` for bodies in
+    /// pieces.
     pub(crate) distance: Option<f64>,
-    /// From when on until the end no tet was inverted and the volume was right, in s.
+    /// Time in s from which to the end no tet was inverted and the volume was correct.
     pub(crate) in_shape_from: Option<f64>,
     pub(crate) tets: usize,
-    /// At the end.
+    /// Inverted tets at the end.
     pub(crate) inverted: usize,
-    /// Volume at the end over that at rest.
+    /// Volume at the end over the rest volume.
     pub(crate) volume: f64,
-    /// The most momentum that a free body without gravity ever had, over the most that its particles had one by one.
+    /// Largest momentum of a free body without gravity, over the largest sum of its particles' momentum magnitudes.
     pub(crate) momentum_drift: Option<f64>,
-    /// Particles that would not have been finite and were put back, once for each substep.
+    /// Number of resets of particles that were not finite, per particle and substep.
     pub(crate) repaired: usize,
-    /// Tets softened to the limit of kappa; for cuts the most of all frames.
+    /// Tets softened to the limit of kappa; for cuts the maximum over all frames.
     pub(crate) softened: usize,
-    /// Whether no particle has moved at all.
+    /// True if no particle has moved.
     pub(crate) frozen: bool,
-    /// Why no simulation of it could be built.
+    /// Error of building the simulation, if any.
     #[serde(default)]
     pub(crate) refused: Option<String>,
-    /// Whether any frame carried a warning; only simulations warn.
+    /// True if any frame had a warning; only simulations warn.
     #[serde(default)]
     pub(crate) warned: bool,
 }
 
 impl Outcome {
-    /// Of a body of which nothing is known yet.
+    /// Outcome of a body before its first frame.
     pub(crate) fn new(column: Column) -> Self {
         Self {
             column,
@@ -87,38 +88,38 @@ impl Outcome {
     }
 }
 
-/// The share of the volume by which it may differ.
+/// Tolerance of the volume, as a fraction.
 pub(crate) const VOLUME_TOLERANCE: f64 = 0.05;
-/// More tets than this share inverted are no more a few.
+/// Largest fraction of inverted tets that counts as a few.
 const FEW: f64 = 0.02;
-/// More than this many times the energy to begin with does not come from rounding.
+/// Energy rise, in units of the initial energy, that rounding cannot cause.
 const ENERGY_TOLERANCE: f64 = 1.0;
-/// What a body that still vibrates is from its shape at rest at most, over its length.
+/// Largest distance of a vibrating body from its rest shape, over its length.
 const DISTANCE_TOLERANCE: f64 = 0.1;
 
-/// What is worst about an outcome.
+/// Worst defect of an outcome.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Verdict {
     NotFinite,
     /// A value is out of its range.
     Refused,
-    /// Less than half the volume, or more than twice.
+    /// Less than half the volume, or more than twice the volume.
     Collapsed,
     Frozen,
-    /// More than a few tets.
+    /// More than a few inverted tets.
     Inverted,
-    /// More energy than there was.
+    /// Energy above that at the start.
     Gains,
     Repaired,
     FewInverted,
-    /// The volume.
+    /// Wrong volume.
     Off,
-    /// Not at rest yet, or at rest elsewhere.
+    /// Not at rest yet, or at rest in another shape.
     Bent,
     Fine,
 }
 
-/// How bad it is.
+/// Severity of a verdict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Color {
     Green,
@@ -142,7 +143,7 @@ impl Verdict {
 }
 
 impl Outcome {
-    /// The worst that can be said.
+    /// Worst verdict that applies.
     pub(crate) fn verdict(&self, is_state: bool) -> Verdict {
         let far = |distance: f64| distance > DISTANCE_TOLERANCE;
         if self.not_finite.is_some() {
@@ -170,7 +171,7 @@ impl Outcome {
         }
     }
 
-    /// The verdict in words, with whether the simulation warned.
+    /// Verdict in words, with a mark if the simulation warned.
     pub(crate) fn words(&self, is_state: bool) -> String {
         let warned = if self.warned { ", warned" } else { "" };
         self.verdict_in_words(is_state) + warned
@@ -194,7 +195,7 @@ impl Outcome {
     }
 }
 
-/// A ratio of volumes.
+/// Formats a ratio of volumes.
 fn ratio(volume: f64) -> String {
     match volume.abs() {
         ..0.005 => "0".to_owned(),

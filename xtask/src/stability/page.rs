@@ -1,4 +1,4 @@
-//! The page of the matrix: as a picture, in words, what comes back and when, by method, and why what does not.
+//! Page of the matrix: an image, a table in words, recovery times by method, and explanations.
 
 use super::explain::explain;
 use super::methods::{Column, Method};
@@ -53,7 +53,7 @@ fn all(rows: &[Row]) -> impl Iterator<Item = (&Row, &Outcome)> {
     rows.iter().flat_map(outcomes)
 }
 
-/// What can be said of all.
+/// Summary of all rows.
 fn summary(rows: &[Row]) -> String {
     let count = all(rows).count();
     let infinite = all(rows).filter(|(_, o)| o.not_finite.is_some()).count();
@@ -71,7 +71,7 @@ fn summary(rows: &[Row]) -> String {
     )
 }
 
-/// Row by row and method by method, places put together where they say the same.
+/// Outcomes by row and method, with equal ones merged.
 fn words(rows: &[Row]) -> Table {
     let head = Method::ALL.iter().map(|method| method.name());
     let mut table = Table::new("In words", ["extreme"].into_iter().chain(head));
@@ -98,7 +98,7 @@ fn words(rows: &[Row]) -> Table {
     table
 }
 
-/// What is not green, by the reason for it.
+/// Outcomes that are not green, by explanation.
 fn reasons(rows: &[Row]) -> String {
     let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
     for (row, outcome) in all(rows) {
@@ -122,7 +122,7 @@ fn reasons(rows: &[Row]) -> String {
     )
 }
 
-/// When bodies that start out of shape are in shape for good, and how far from that at rest they are at the end.
+/// Recovery times of bodies that start deformed, and their distance from the rest shape at the end.
 fn recovery(rows: &[Row]) -> Table {
     let head = Method::ALL.iter().map(|method| method.name());
     let caption = "Recovery in double precision: seconds until no tet is inverted and the volume is right for good, and \
@@ -146,7 +146,7 @@ fn recovery(rows: &[Row]) -> Table {
     table
 }
 
-/// The worst of each column.
+/// Worst verdict of each column.
 fn methods(rows: &[Row]) -> Table {
     let mut table = Table::new(
         "By method",

@@ -1,4 +1,4 @@
-//! How far a shape is from another, up to a rigid motion.
+//! Distance between two shapes up to a rigid motion.
 //!
 //! The best rotation is the unit quaternion that maximizes a quadratic form (Horn 1987); its eigenvector to the largest
 //! eigenvalue is what repeated squaring of the shifted matrix leaves. Cost: O(particles) and some dozens of products of
@@ -9,8 +9,7 @@ use incise::mesh::glam::{DMat3, DMat4, DQuat, DVec3, DVec4};
 /// Squarings: eigenvalues apart by a part in 1e9 are told apart.
 const SQUARINGS: usize = 40;
 
-/// The root of the mean squared distance between `shape` and `rest` moved onto it as well as it can be, over the
-/// longest side of `rest`.
+/// RMS distance between `rest` and `shape` after the best rigid motion, over the longest side of `rest`.
 pub(crate) fn distance(rest: &[DVec3], shape: &[DVec3]) -> f64 {
     let count = rest.len().max(1) as f64;
     let middle = |points: &[DVec3]| points.iter().sum::<DVec3>() / count;
@@ -20,7 +19,7 @@ pub(crate) fn distance(rest: &[DVec3], shape: &[DVec3]) -> f64 {
         .iter()
         .fold(ends, |(low, high), &x| (low.min(x), high.max(x)));
     let size = (high - low).max_element().max(f64::MIN_POSITIVE);
-    // In units of the body, so that no size overflows or vanishes.
+    // In units of the body, to avoid overflow and underflow.
     let pairs = || {
         let pairs = rest.iter().zip(shape);
         pairs.map(|(&a, &b)| ((a - from) / size, (b - to) / size))
@@ -32,7 +31,7 @@ pub(crate) fn distance(rest: &[DVec3], shape: &[DVec3]) -> f64 {
     (sum / count).sqrt()
 }
 
-/// The rotation that brings first ones closest to second ones.
+/// Rotation that best aligns the first points with the second.
 fn rotation(pairs: impl Iterator<Item = (DVec3, DVec3)>) -> DQuat {
     let mut s = DMat3::ZERO;
     for (a, b) in pairs {
@@ -65,7 +64,7 @@ fn rotation(pairs: impl Iterator<Item = (DVec3, DVec3)>) -> DQuat {
     DQuat::from_xyzw(q.y, q.z, q.w, q.x)
 }
 
-/// Of Frobenius: at least the largest eigenvalue's.
+/// Frobenius norm: an upper bound of the largest eigenvalue.
 fn norm(m: &DMat4) -> f64 {
     let columns = [m.x_axis, m.y_axis, m.z_axis, m.w_axis];
     columns

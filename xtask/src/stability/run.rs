@@ -1,4 +1,4 @@
-//! Runs a body through an extreme and watches it after every frame.
+//! Runs a body through an extreme and monitors it after every frame.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use super::rigid;
 use crate::solver::body::schedule;
 use crate::solver::runner::{Recipe, Runner};
 
-/// What becomes of the body of an extreme in a column; those on a device need one.
+/// Runs the body of an extreme in a column; columns on a device need one.
 pub(crate) fn run(
     extreme: &Extreme,
     column: Column,
@@ -29,7 +29,7 @@ pub(crate) fn run(
     }
 }
 
-/// Runs it as a simulation, which chooses method, substeps and precision.
+/// Runs it as a simulation, which selects method, substeps and precision.
 fn simulate(extreme: &Extreme, column: Column) -> anyhow::Result<Outcome> {
     let mut simulation = match extreme.simulation(column.method.spec(column)) {
         Ok(simulation) => simulation,
@@ -89,7 +89,7 @@ fn on_device(extreme: &Extreme, column: Column, gpu: &Arc<GpuContext>) -> anyhow
     Ok(watch.outcome)
 }
 
-/// A body at its start, how it will be moved, and what watches it.
+/// Body at its start, its runner and its monitor.
 fn start<R: Real>(
     extreme: &Extreme,
     column: Column,
@@ -108,16 +108,16 @@ fn start<R: Real>(
     Ok((solver, recipe, watch))
 }
 
-/// Looks at a body after every frame.
+/// Monitors a body after every frame.
 struct Watch<'a> {
     extreme: &'a Extreme,
     outcome: Outcome,
     start: Vec<DVec3>,
     now: Vec<DVec3>,
     energy_at_start: f64,
-    /// What energies are told in.
+    /// Unit of energies in J.
     unit: f64,
-    /// The most of the sum of the momenta, and of the sum of their lengths.
+    /// Largest norm of the total momentum, and largest sum of the momentum magnitudes.
     momentum: [f64; 2],
 }
 
@@ -143,7 +143,7 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Notes what the body is; `false` if it is not finite.
+    /// Records the state of the body; `false` if it is not finite.
     fn look<R: Real>(&mut self, solver: &Solver<R>, repaired: usize) -> bool {
         let outcome = &mut self.outcome;
         outcome.frames += 1;

@@ -1,4 +1,4 @@
-//! Some rows of the quick matrix: what must hold of every cell, whatever the numbers.
+//! Tests on some rows of the quick matrix that do not depend on exact values.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -56,8 +56,8 @@ fn rows_are_finite_explained_and_shown() {
     assert_eq!(boxes, 1 + outcomes.sum::<usize>());
 }
 
-/// What substeps by kappa are there for: no state of a body that is held, no Poisson's ratio, no distance from the
-/// origin breaks a body.
+/// Substeps by kappa keep a fixed body stable in all states, for all of Poisson's ratios and all distances from the
+/// origin.
 #[test]
 fn substeps_by_kappa_hold_a_body_together() {
     for extreme in extremes::extremes(true).unwrap() {
@@ -139,7 +139,7 @@ fn fine() -> Outcome {
     }
 }
 
-/// The worst comes first, and each is told apart.
+/// Verdicts are ordered by severity and distinguishable.
 #[test]
 fn verdicts_name_the_worst() {
     let verdict = |change: &dyn Fn(&mut Outcome)| {

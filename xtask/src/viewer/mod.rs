@@ -1,9 +1,9 @@
-//! `cargo xtask viewer-smoke`: a synthetic hand uses the viewer on a screen without a monitor.
+//! `cargo xtask viewer-smoke`: tests the viewer with synthetic input on a virtual screen.
 //!
-//! It builds the viewer, shows it a block on a table, cuts that in two with the mouse, takes the cut back, pulls the
-//! body and looks at what the screen shows after each: the picture is not blank, the panel is there, one piece has
-//! become two. Needs Xvfb and an adapter that can show windows there, such as Mesa's lavapipe; the normal gates only
-//! compile the viewer.
+//! It builds the viewer, opens a scene of a block on a table, cuts the block in two with the mouse, undoes the cut,
+//! pulls the body and checks the screen after each: the image is not blank, the panel is visible, one piece has become
+//! two. Needs Xvfb and an adapter that can show windows there, such as Mesa's lavapipe; the normal checks only compile
+//! the viewer.
 
 mod screen;
 
@@ -21,27 +21,27 @@ use screen::{Button, Running, Screen};
 /// Options of `cargo xtask viewer-smoke`.
 #[derive(Debug, Args)]
 pub(crate) struct SmokeArguments {
-    /// Where the screenshots go.
+    /// Folder of the screenshots.
     #[arg(long, default_value = "target/viewer-smoke")]
     out: PathBuf,
-    /// The viewer; absent: it is built, in release.
+    /// Viewer program; without it, the viewer is built in release.
     #[arg(long)]
     viewer: Option<PathBuf>,
-    /// Where the viewer simulates: cpu, gpu or auto.
+    /// Compute device of the viewer: cpu, gpu or auto.
     #[arg(long, default_value = "cpu")]
     backend: String,
 }
 
 /// Size of the screen in pixels; the window is as large.
 const SIZE: [u16; 2] = [1280, 800];
-/// Where the panel begins.
+/// Left edge of the panel in pixels.
 const PANEL: u32 = 960;
-/// The symbol of the key for help.
+/// Key symbol of the help key.
 const F1: u32 = 0xffbe;
-/// A part of the picture that counts as a piece.
+/// Smallest fraction of the image that counts as a piece.
 const PART: f64 = 0.01;
 
-/// A block that lies on a table: what is drawn through it falls apart.
+/// A block on a table: a stroke through it separates it.
 const SCENE: &str = r#"
 [world]
 gravity = [0.0, 0.0, -9.81]
@@ -71,7 +71,7 @@ pub(crate) fn smoke(arguments: &SmokeArguments) -> anyhow::Result<()> {
     let scene = scene.to_string_lossy();
     let mut running = start(&viewer, &[&*scene], &arguments.backend, &screen)?;
     let result = use_it(&screen, &arguments.out);
-    // What it says when it dies is worth more than that it did.
+    // The output of a crashed viewer is more useful than its exit status.
     if let Ok(Some(status)) = running.0.try_wait() {
         bail!("the viewer ended with {status}: {result:?}");
     }
@@ -83,7 +83,7 @@ pub(crate) fn smoke(arguments: &SmokeArguments) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Builds the viewer and tells where it is.
+/// Builds the viewer and returns its path.
 fn build() -> anyhow::Result<PathBuf> {
     let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned());
     let output = Command::new(cargo)
@@ -131,13 +131,13 @@ fn portrait(viewer: &Path, backend: &str, screen: &Screen, out: &Path) -> anyhow
         screen.key('.')?;
         sleep(Duration::from_millis(60));
     }
-    // The last frames may wait in a queue.
+    // The last frames may still be in a queue.
     sleep(Duration::from_secs(2));
     screen.picture()?.write_png(out.join("8-liver.png"))?;
     Ok(())
 }
 
-/// Uses the viewer as a person would.
+/// Simulates a user session.
 fn use_it(screen: &Screen, out: &Path) -> anyhow::Result<()> {
     screen.window("block.toml", Duration::from_secs(60))?;
     let look = |name: &str| -> anyhow::Result<Image> {
@@ -209,7 +209,7 @@ fn progress(what: &str) {
     println!("{what}");
 }
 
-/// Waits until something is so; software may draw a frame a second.
+/// Waits until a condition holds; a software renderer may take a second per frame.
 fn until(what: &str, is_so: impl Fn() -> anyhow::Result<bool>) -> anyhow::Result<()> {
     let start = Instant::now();
     while start.elapsed() < Duration::from_secs(30) {
@@ -250,7 +250,7 @@ fn pixels(picture: &Image) -> impl Iterator<Item = [u8; 3]> + '_ {
         .map(|rgba| [rgba[0], rgba[1], rgba[2]])
 }
 
-/// How many different colors there are.
+/// Number of distinct colors.
 fn colors_of(picture: &Image) -> usize {
     let mut colors: Vec<[u8; 3]> = pixels(picture).collect();
     colors.sort_unstable();
@@ -258,14 +258,14 @@ fn colors_of(picture: &Image) -> usize {
     colors.len()
 }
 
-/// The part of the pixels that differ visibly.
+/// Fraction of visibly different pixels.
 fn differ(a: &Image, b: &Image) -> f64 {
     let far = |(a, b): &([u8; 3], [u8; 3])| (0..3).any(|k| a[k].abs_diff(b[k]) > 12);
     let count = pixels(a).zip(pixels(b)).filter(far).count();
     count as f64 / f64::from(a.width * a.height)
 }
 
-/// How many hues strong colors have: the pieces' colors lie far apart, shading only darkens them.
+/// Number of hues of saturated colors: the colors of pieces have distinct hues, which shading does not change.
 fn hues(picture: &Image) -> usize {
     const BINS: usize = 36;
     let mut count = [0_usize; BINS];

@@ -1,6 +1,6 @@
-//! [`Screen`]: an X server without a monitor, with synthetic hands.
+//! [`Screen`]: a virtual X server with synthetic input.
 //!
-//! Xvfb keeps the picture in memory; pointer and keys come through its XTEST extension, as if a person moved them.
+//! Xvfb keeps the image in memory; pointer and key events use its XTEST extension.
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
@@ -18,13 +18,13 @@ use x11rb::protocol::xproto::{
 use x11rb::protocol::xtest::ConnectionExt as _;
 use x11rb::rust_connection::RustConnection;
 
-/// A program that ends with its owner.
+/// A child process that is killed when dropped.
 #[derive(Debug)]
 pub(super) struct Running(pub(super) Child);
 
 impl Drop for Running {
     fn drop(&mut self) {
-        // It may have ended by itself.
+        // The process may have ended already.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
@@ -39,7 +39,7 @@ pub(super) enum Button {
 
 /// An X server and a connection to it.
 pub(super) struct Screen {
-    /// The name of the display, for the variable `DISPLAY`.
+    /// Name of the display, for the variable `DISPLAY`.
     pub(super) display: String,
     connection: RustConnection,
     root: Window,
@@ -126,12 +126,12 @@ impl Screen {
         Ok(())
     }
 
-    /// Puts the pointer somewhere.
+    /// Moves the pointer.
     pub(super) fn point(&self, at: [i16; 2]) -> anyhow::Result<()> {
         self.send(MOTION_NOTIFY_EVENT, 0, at)
     }
 
-    /// Drags from one place to another in some steps, as a hand would.
+    /// Drags from one point to another in several steps.
     pub(super) fn drag(
         &self,
         button: Button,
@@ -148,7 +148,7 @@ impl Screen {
         self.send(BUTTON_RELEASE_EVENT, button as u8, [0, 0])
     }
 
-    /// Drags from one place to another in some steps and keeps the button pressed.
+    /// Drags from one point to another in several steps and keeps the button pressed.
     pub(super) fn hold(
         &self,
         button: Button,
@@ -194,7 +194,7 @@ impl Screen {
         Ok(())
     }
 
-    /// What the screen shows.
+    /// Image of the screen.
     pub(super) fn picture(&self) -> anyhow::Result<Image> {
         let [width, height] = self.size;
         let image = self.connection.get_image(

@@ -1,7 +1,7 @@
-//! What `incise color` colors: the tets of a mesh, or the vertices of a graph file.
+//! Input of `incise color`: the tets of a mesh, or the vertices of a graph file.
 //!
-//! The two differ in three things: how they are read, which clusterings they allow, and what proves
-//! a coloring proper. A mesh is colored straight from the particles of its tets, without a graph.
+//! The two differ in three points: the reader, the allowed clusterings, and the proof that a coloring is proper. A mesh
+//! is colored directly from the particles of its tets, without a graph.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -18,10 +18,10 @@ use incise::mesh_io::{self, MeshIoError};
 
 use crate::failure::Failure;
 
-/// What the ending of a file name promises.
+/// File format by extension.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Format {
-    /// Anything that may be a mesh.
+    /// Any mesh format.
     Mesh,
     /// `.mtx`
     MatrixMarket,
@@ -29,30 +29,30 @@ pub(crate) enum Format {
     Dimacs,
 }
 
-/// What was in the file.
+/// Content of the file.
 #[derive(Debug)]
 pub(crate) enum Source {
     Mesh(TetMesh),
     Graph(ConstraintGraph),
 }
 
-/// What is to be colored.
+/// Conflict structure to be colored.
 #[derive(Debug)]
 pub(crate) enum Problem {
-    /// The tets of a mesh, in each other's way when they share a particle.
+    /// Tets of a mesh; they conflict if they share a particle.
     Mesh(Incidence),
     Graph(ConstraintGraph),
 }
 
-/// What a second look at a coloring gives.
+/// Result of the independent check of a coloring.
 #[derive(Debug)]
 pub(crate) struct Proof {
-    /// Whether the coloring is proper, by the input alone.
+    /// True if the coloring is proper, judged by the input alone.
     pub(crate) verified: bool,
-    /// So many clusters are known to be all in each other's way: of a mesh the most at one
-    /// particle, of a graph the most that a greedy search finds.
+    /// Size of a clique of clusters: for a mesh the largest number at one particle, for a graph the largest clique of a
+    /// greedy search. It is a lower bound of the number of colors.
     pub(crate) clique: usize,
-    /// The pairs of clusters that are in each other's way.
+    /// Number of pairs of conflicting clusters.
     pub(crate) edges: usize,
 }
 
@@ -66,7 +66,7 @@ impl Format {
         }
     }
 
-    /// Refuses a clustering that needs more than a graph.
+    /// Returns an error for a clustering that the format does not support.
     pub(crate) fn require(self, method: Method) -> anyhow::Result<()> {
         match (self, method) {
             (Self::Mesh, _) | (_, Method::None | Method::Serial(_) | Method::SerialLoose(_)) => {
@@ -145,7 +145,7 @@ impl Problem {
         }
     }
 
-    /// A graph has none.
+    /// Number of particles; 0 for a graph.
     pub(crate) fn particle_count(&self) -> usize {
         match self {
             Self::Mesh(incidence) => incidence.particle_count(),
@@ -153,8 +153,8 @@ impl Problem {
         }
     }
 
-    /// Proves a coloring of the clusters without the graph of the clusters that it was made from: a
-    /// mesh by its particles, a graph by its edges between different clusters.
+    /// Checks a coloring of the clusters without the cluster graph that it was made from: a mesh by its particles, a
+    /// graph by its edges between different clusters.
     pub(crate) fn check(&self, clustering: &Clustering, coloring: &Coloring) -> Proof {
         match self {
             Self::Mesh(incidence) => {

@@ -1,4 +1,4 @@
-//! What `incise color` says: an object, a table, rows of a CSV file.
+//! Output of `incise color`: a JSON object, a table, a CSV file.
 
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::failure::Failure;
 
-/// The object that `--json` prints.
+/// JSON object printed by `--json`.
 #[derive(Debug, Serialize)]
 pub(crate) struct ColorReport {
     pub(crate) input: String,
@@ -23,25 +23,25 @@ pub(crate) struct ColorReport {
     pub(crate) clustering: String,
     pub(crate) backend: &'static str,
     pub(crate) seed: u64,
-    /// By what the colors were made even, if they were.
+    /// Measure by which the colors were balanced, if they were.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) balanced: Option<&'static str>,
     pub(crate) colors: usize,
     pub(crate) max_clique: usize,
-    /// Counted in clusters; its fields are fields of the object.
+    /// Metrics in clusters; the fields are flattened into the object.
     #[serde(flatten)]
     pub(crate) evenness: Evenness,
-    /// Counted in constraints.
+    /// Metrics in constraints.
     pub(crate) by_constraints: Evenness,
     pub(crate) rounds: usize,
-    /// Where the algorithm counts them.
+    /// Statistics of the algorithm, if it provides them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) edge_visits: Option<u64>,
     pub(crate) verified: bool,
     pub(crate) ms: Times,
 }
 
-/// How even the colors are: the fields of [`ColoringMetrics`] of these names.
+/// Balance of the colors: the fields of [`ColoringMetrics`] with these names.
 #[derive(Debug, Serialize)]
 pub(crate) struct Evenness {
     std: f64,
@@ -95,7 +95,7 @@ pub(crate) fn write_csv(
     Ok(())
 }
 
-/// The report for human eyes.
+/// Report as a table for the terminal.
 pub(crate) fn table(report: &ColorReport) -> Table {
     let mut table = Table::new();
     table.load_style(UTF8_FULL_CONDENSED);

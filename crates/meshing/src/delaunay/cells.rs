@@ -1,14 +1,14 @@
 //! The triangulation under construction: flat arrays of cells, and the insertion of one point.
 //!
 //! The outside is filled with ghost cells, one on each face of the hull, that share a vertex at infinity; a point
-//! outside is then inserted like any other. A cell is in conflict with a new point that lies strictly inside its
-//! circumsphere, for ghosts: strictly beyond their face of the hull, or in its plane and strictly inside its
+//! outside is then inserted like any other. A cell is in conflict with a new point strictly inside its circumsphere; a
+//! ghost is in conflict with a point strictly beyond its hull face, or in the plane of the face and strictly inside its
 //! circumcircle. The cells in conflict form a cavity that is star-shaped around the point; they are replaced by the
 //! cone from the point over the cavity's boundary.
 //!
-//! Signs are exact, and points on a sphere count as outside. This is the rule for points raised a little above the
-//! paraboloid, each less than the next by far, and so is consistent: no flat cell ever arises, since a point in the
-//! plane of a boundary face is on the same side of both its circumspheres.
+//! Signs are exact, and points on a sphere count as outside. This equals a symbolic perturbation that raises each point
+//! above the paraboloid by a much smaller amount than the next, and so is consistent. No flat cell ever arises: a point
+//! in the plane of a boundary face is on one side of both its circumspheres.
 //!
 //! Sources: A. Bowyer and D. F. Watson (independently), 1981; ghosts as in J. R. Shewchuk, "Lecture Notes on Geometric
 //! Robustness" and "Delaunay mesh generation", 2012. Cost of an insertion: linear in the length of the walk, O(k log k)
@@ -22,30 +22,32 @@ use crate::index::tet_index;
 
 /// The vertex at infinity.
 const GHOST: u32 = u32::MAX;
-/// In place of the first vertex of a cell that is no more.
+/// Marker in place of the first vertex of a removed cell.
 const DEAD: u32 = u32::MAX - 1;
 
-/// A triangulation of some of the points.
+/// Delaunay triangulation of the points inserted so far.
 pub(super) struct Cells<'a> {
     points: &'a [DVec3],
-    /// Positive with any point beyond the face in place of a ghost.
+    /// Vertices of each cell; a ghost has positive orientation when its vertex at infinity is replaced by a point
+    /// beyond its face.
     vertices: Vec<[u32; 4]>,
-    /// Across the face opposite each vertex: four times the cell there plus its vertex opposite that face.
+    /// Neighbors across the face opposite each vertex: four times the cell index plus the index of that cell's vertex
+    /// opposite the face.
     neighbors: Vec<[u32; 4]>,
-    /// When a cell was last tested, and with what result: twice the insertion, plus one in conflict.
+    /// Result of the last conflict test of each cell: twice the insertion number, plus one if in conflict.
     marks: Vec<u64>,
     free: Vec<u32>,
-    /// A cell that is no ghost, where the next walk starts.
+    /// Start of the next walk; a cell that is not a ghost.
     start: u32,
     insertions: u64,
-    /// Storage kept between insertions: the cells in conflict, the new cells, the sides between new cells.
+    /// Buffers reused between insertions: the cells in conflict, the new cells, the sides between new cells.
     cavity: Vec<u32>,
     made: Vec<u32>,
     sides: Vec<(u64, u32)>,
 }
 
 impl<'a> Cells<'a> {
-    /// The triangulation of four points with a positive volume.
+    /// Creates the triangulation of four points with a positive volume.
     pub(super) fn new(points: &'a [DVec3], first: [u32; 4]) -> Self {
         let mut cells = Self {
             points,
@@ -60,7 +62,7 @@ impl<'a> Cells<'a> {
             sides: Vec::new(),
         };
         for opposite in 0..4 {
-            // Seen from outside the first cell, its face is turned around.
+            // Seen from outside the first cell, its face has the opposite orientation.
             let mut ghost = first;
             ghost[opposite] = GHOST;
             ghost.swap((opposite + 1) % 4, (opposite + 2) % 4);
@@ -80,7 +82,7 @@ impl<'a> Cells<'a> {
         cells
     }
 
-    /// Inserts a point; false when it lies where another one is.
+    /// Inserts a point; returns false if another vertex has its position.
     pub(super) fn insert(&mut self, point: u32) -> bool {
         let p = self.points[point as usize];
         let Some(first) = self.locate(p) else {
@@ -128,17 +130,17 @@ impl<'a> Cells<'a> {
         true
     }
 
-    /// The cells that are no ghosts.
+    /// Returns the cells that are not ghosts.
     pub(super) fn into_tets(self) -> Vec<[u32; 4]> {
         let mut tets = self.vertices;
         tets.retain(|tet| tet[0] != DEAD && !tet.contains(&GHOST));
         tets
     }
 
-    /// A cell in conflict with the point; none when it lies on a vertex.
+    /// Finds a cell in conflict with the point; `None` if the point coincides with a vertex.
     ///
-    /// The walk crosses any face that has the point strictly beyond it, which cannot go around in circles in a Delaunay
-    /// triangulation (H. Edelsbrunner, "An acyclicity theorem for cell complexes", 1990).
+    /// The walk crosses any face that has the point strictly beyond it; it cannot cycle in a Delaunay triangulation (H.
+    /// Edelsbrunner, "An acyclicity theorem for cell complexes", 1990).
     fn locate(&self, p: DVec3) -> Option<u32> {
         let mut cell = self.start;
         'walk: loop {
@@ -177,7 +179,7 @@ impl<'a> Cells<'a> {
             || beyond == 0.0 && self.is_in_conflict(self.neighbors[cell as usize][ghost] / 4, p)
     }
 
-    /// Which vertex of a cell is the one at infinity.
+    /// Index of the vertex at infinity in a cell; `None` if the cell is not a ghost.
     fn ghost(&self, cell: u32) -> Option<usize> {
         let vertices = self.vertices[cell as usize];
         (0..4).find(|&k| vertices[k] == GHOST)
@@ -200,7 +202,7 @@ impl<'a> Cells<'a> {
         self.neighbors[b as usize / 4][b as usize % 4] = a;
     }
 
-    /// Notes a face that has the apex among its vertices under the other two.
+    /// Records a face that contains the apex, keyed by its other two vertices.
     fn note_side(&mut self, cell: u32, k: usize, apex: u32) {
         let mut edge = [0; 2];
         let mut filled = 0;
@@ -214,7 +216,7 @@ impl<'a> Cells<'a> {
         self.sides.push((edge[0] << 32 | edge[1], code(cell, k)));
     }
 
-    /// Joins the noted faces in pairs.
+    /// Joins the recorded faces in pairs.
     fn join_sides(&mut self) {
         let mut sides = std::mem::take(&mut self.sides);
         sides.sort_unstable();
@@ -227,14 +229,14 @@ impl<'a> Cells<'a> {
     }
 }
 
-/// Whether a point lies strictly inside the circumsphere of a positive tet.
+/// True if a point lies strictly inside the circumsphere of a positively oriented tet.
 pub(super) fn is_in_sphere(corners: [DVec3; 4], p: DVec3) -> bool {
     let [a, b, c, d, p] = [corners[0], corners[1], corners[2], corners[3], p].map(|p| Coord3D {
         x: p.x,
         y: p.y,
         z: p.z,
     });
-    // The predicate calls tets positive that are negative here.
+    // The predicate has the opposite orientation convention.
     insphere(b, a, c, d, p) > 0.0
 }
 

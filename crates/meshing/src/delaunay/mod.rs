@@ -1,11 +1,11 @@
-//! The Delaunay tetrahedralization of points, with exact signs.
+//! Delaunay tetrahedralization of points, with exact signs.
 //!
 //! Points are inserted one by one (Bowyer 1981, Watson 1981; module `cells`) in rounds along a space-filling curve
-//! (module `order`). Expected cost: O(n log n) for points spread evenly, some microseconds a point; the output, and so
-//! the cost, is quadratic for the worst point sets, such as two skew lines.
+//! (module `order`). Expected cost: O(n log n) for evenly distributed points; the output, and so the cost, is quadratic
+//! for the worst point sets, such as two skew lines.
 //!
-//! Own code, since no library fits: of the crates, `simple_delaunay_lib` leaves undocumented what becomes of degenerate
-//! points, `rita` builds a C++ library, and `delaunay`, for any dimension, brings more than fifty packages.
+//! An implementation of our own: of the available crates, `simple_delaunay_lib` does not document its handling of
+//! degenerate points, `rita` builds a C++ library, and `delaunay`, for any dimension, has more than fifty dependencies.
 
 mod cells;
 mod order;
@@ -18,20 +18,18 @@ pub(super) use self::order::morton_keys;
 use crate::MeshingError;
 use incise_mesh::{ParticleId, TetMesh, orientation};
 
-/// The Delaunay tetrahedralization of `points` (meters): tets that fill their convex hull, with no point strictly
-/// inside the circumsphere of any.
+/// Computes the Delaunay tetrahedralization of `points` (meters): tets that fill their convex hull, with no point
+/// strictly inside the circumsphere of any.
 ///
-/// The particles are the points in the given order. A point equal to an earlier one may be left out of all tets, or the
-/// earlier one; exactly one of equal points is in tets. All others are used, and no tet is flat. Where more than four
-/// points lie on an empty sphere, several answers are right; the one given depends on the points and their order alone,
-/// not on the platform.
+/// The particles are the points in the given order. Of equal points exactly one is used by tets. All other points are
+/// used, and no tet is flat. Where more than four points lie on an empty sphere, several results are valid; the
+/// returned one depends only on the points and their order, not on the platform.
 ///
-/// Signs are exact as long as the smallest difference of two coordinates, zero aside, is no less than about 1e-60 of
-/// the largest coordinate, whatever the scale.
+/// Signs are exact as long as the smallest nonzero difference of two coordinates is at least about 1e-60 of the largest
+/// coordinate, at any scale.
 ///
 /// # Errors
-/// [`MeshingError::Points`] if a coordinate is not finite, or all points lie in one plane, as fewer than four always
-/// do.
+/// [`MeshingError::Points`] if a coordinate is not finite, or all points lie in one plane; fewer than four always do.
 ///
 /// # Panics
 /// From 2³⁰ tets on.
@@ -77,17 +75,17 @@ fn flat(points: &[DVec3]) -> MeshingError {
     ))
 }
 
-/// The points multiplied by the power of two that brings them near 1, which is exact: products neither overflow nor
-/// underflow then.
+/// Multiplies the points by the power of two that brings them near 1. This is exact and prevents overflow and underflow
+/// of products.
 fn scaled(points: &[DVec3]) -> Vec<DVec3> {
     let largest = points.iter().fold(0.0, |m, p| p.abs().max_element().max(m));
-    // The exponent bits of 1/2^e for those of 2^e, kept within normal numbers.
+    // Exponent bits of 1/2^e from those of 2^e, clamped to normal numbers.
     let exponent = largest.to_bits() >> 52;
     let scale = f64::from_bits((2046 - exponent).max(1) << 52);
     points.iter().map(|&p| p * scale).collect()
 }
 
-/// Four points, the first possible ones in the order, with a positive volume.
+/// First four points in the order that form a tet, oriented to a positive volume.
 fn first_tet(points: &[DVec3], order: &[u32]) -> Option<[u32; 4]> {
     let at = |point: u32| points[point as usize];
     let mut rest = order.iter().copied();
@@ -102,7 +100,7 @@ fn first_tet(points: &[DVec3], order: &[u32]) -> Option<[u32; 4]> {
     })
 }
 
-/// Whether three points lie on a line, which they do when their shadows along all axes do.
+/// True if three points lie on a line: their projections along all axes are collinear.
 fn are_collinear(a: DVec3, b: DVec3, c: DVec3) -> bool {
     (0..3).all(|axis| {
         let shadow = |p: DVec3| Coord {

@@ -1,18 +1,18 @@
-//! The order in which points are inserted: random rounds of doubling size, each along a space-filling curve.
+//! Insertion order of points: random rounds of doubling size, each along a space-filling curve.
 //!
-//! Neighbors in a round are near each other, which keeps walks short; the rounds spread early points over the whole
-//! body, which keeps cavities small in expectation. Source: N. Amenta, S. Choi and G. Rote, "Incremental constructions
-//! con BRIO", 2003, with the Z-order of G. M. Morton, 1966. Cost: O(n log n).
+//! Consecutive points of a round are near each other, which keeps walks short; the rounds distribute early points over
+//! the whole body, which keeps cavities small in expectation. Source: N. Amenta, S. Choi and G. Rote, "Incremental
+//! constructions con BRIO", 2003, with the Z-order of G. M. Morton, 1966. Cost: O(n log n).
 
 use glam::DVec3;
 use incise_mesh::Bounds;
 
 use crate::random::hash;
 
-/// Bits an axis of the curve.
+/// Bits per axis of the curve.
 const BITS: u32 = 20;
 
-/// The indices of the points in the order of insertion; a function of the points alone.
+/// Indices of the points in the order of insertion; a function of the points alone.
 pub(super) fn insertion_order(points: &[DVec3]) -> Vec<u32> {
     let keys = morton_keys(points);
     let mut order: Vec<(u32, u64, u32)> = (0_u32..)
@@ -27,7 +27,7 @@ pub(super) fn insertion_order(points: &[DVec3]) -> Vec<u32> {
     order.into_iter().map(|(_, _, point)| point).collect()
 }
 
-/// The place of each point on the Z-order curve through the box around them.
+/// Position of each point on the Z-order curve through the bounding box.
 pub(crate) fn morton_keys(points: &[DVec3]) -> impl Iterator<Item = u64> {
     let bounds = Bounds::around(points.iter().copied());
     let extent = bounds.size().max_element();
@@ -38,7 +38,7 @@ pub(crate) fn morton_keys(points: &[DVec3]) -> impl Iterator<Item = u64> {
     })
 }
 
-/// The bits of the whole part of a number, two zeros between any two.
+/// Integer bits of a number, spread with two zeros between any two.
 fn spread(coordinate: f64) -> u64 {
     #[expect(
         clippy::cast_possible_truncation,

@@ -1,4 +1,4 @@
-//! The defining property by brute force, the hull, and every degenerate case by name.
+//! Tests of the defining property by brute force, of the hull, and of named degenerate cases.
 
 use glam::dvec3;
 use incise_mesh::TetId;
@@ -8,11 +8,11 @@ use super::*;
 use crate::delaunay::cells::is_in_sphere;
 use crate::random::in_cube;
 
-/// A sound mesh whose surface is convex, that uses each position once, with empty circumspheres.
+/// Asserts a valid mesh with a convex surface that uses each position once and has empty circumspheres.
 fn assert_delaunay(points: &[DVec3]) -> TetMesh {
     let mesh = delaunay(points).expect("the points span a volume");
     assert_eq!(mesh.positions, points);
-    // Judged at a scale where nothing overflows.
+    // Tested at a scale without overflow.
     let scaled = TetMesh {
         positions: scaled(points),
         tets: mesh.tets.clone(),
@@ -133,7 +133,7 @@ fn on_a_sphere() {
     }
     assert!(points.len() > 200);
     assert_delaunay(&points);
-    // And nearly, with the center.
+    // Nearly cospherical points and their center.
     let mut points: Vec<_> = (0..300).map(|n| in_cube(3, n).normalize()).collect();
     assert_delaunay(&points);
     points.push(DVec3::ZERO);
@@ -163,10 +163,10 @@ fn all_scales() {
         let moved: Vec<_> = points.iter().map(|p| *p * scale).collect();
         assert_eq!(assert_delaunay(&moved).tets, mesh.tets);
     }
-    // Far from the origin the coordinates are coarse, and many points coplanar.
+    // Far from the origin coordinates are coarse, and many points become coplanar.
     let far: Vec<_> = points.iter().map(|p| *p + 1e15).collect();
     assert_delaunay(&far);
-    // Flat as a sheet, thin as a needle.
+    // Flat and thin point sets.
     assert_delaunay(
         &points
             .iter()
@@ -196,7 +196,7 @@ fn many_points_in_linear_time() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Whole numbers in a small range: nearly everything is degenerate.
+    /// Integers in a small range: nearly everything is degenerate.
     #[test]
     fn small_whole_numbers(coordinates in prop::collection::vec(prop::array::uniform3(0..4_i32), 0..60)) {
         let points: Vec<_> = coordinates.iter().map(|c| DVec3::from_array(c.map(f64::from))).collect();

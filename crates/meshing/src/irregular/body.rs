@@ -1,7 +1,7 @@
-//! A tetrahedral mesh that can be changed locally: each tet knows its neighbors, and a few tets at a time are replaced
-//! by others that fill the same room.
+//! Tetrahedral mesh for local changes: each tet knows its neighbors, and a few tets at a time are replaced by others
+//! that fill the same volume.
 //!
-//! Cost: constant time a change.
+//! Cost: constant time per change.
 
 use glam::DVec3;
 use incise_mesh::{ParticleId, TetMesh};
@@ -10,27 +10,27 @@ use crate::index::tet_index;
 
 /// No neighbor: a boundary face.
 pub(super) const NONE: u32 = u32::MAX;
-/// In place of the first corner of a tet that is no more.
+/// Marker in place of the first corner of a removed tet.
 const DEAD: u32 = u32::MAX;
 
 /// Tets with their neighbors.
 pub(super) struct Body {
     pub(super) positions: Vec<DVec3>,
-    /// Whether a particle lies on the surface.
+    /// Marks the particles on the surface.
     pub(super) on_surface: Vec<bool>,
-    /// Positive.
+    /// Positively oriented.
     tets: Vec<[u32; 4]>,
-    /// Across the face opposite each corner: four times the tet there plus its corner opposite that face, or none.
+    /// Neighbors across the face opposite each corner: four times the tet plus its corner opposite the face, or `NONE`.
     neighbors: Vec<[u32; 4]>,
-    /// Per particle a tet at it.
+    /// One tet at each particle.
     at: Vec<u32>,
     free: Vec<u32>,
-    /// Storage kept between changes.
+    /// Buffers reused between changes.
     faces: Vec<([u32; 3], u32, bool)>,
 }
 
 impl Body {
-    /// Takes over a sound mesh with a manifold surface.
+    /// Takes a valid mesh with a manifold surface.
     pub(super) fn new(mesh: TetMesh) -> Self {
         let particles = mesh.positions.len();
         let faces = mesh.faces();
@@ -43,7 +43,7 @@ impl Body {
             free: Vec::new(),
             faces: Vec::new(),
         };
-        /// The corner opposite each local face.
+        /// Corner opposite each local face.
         const OPPOSITE: [usize; 4] = [3, 2, 1, 0];
         for face in faces.iter() {
             if let [a, b] = face {
@@ -63,7 +63,7 @@ impl Body {
         body
     }
 
-    /// The mesh, without unused particles; tets ascend by their lowest particles.
+    /// Returns the mesh without unused particles; tets ascend by their lowest particles.
     pub(super) fn into_mesh(self) -> TetMesh {
         let mut tets = self.tets;
         tets.retain(|tet| tet[0] != DEAD);
@@ -92,12 +92,12 @@ impl Body {
         }
     }
 
-    /// One more than the last tet.
+    /// One past the largest tet index.
     pub(super) fn end(&self) -> u32 {
         tet_index(self.tets.len())
     }
 
-    /// The corners of a tet; none if it is no more.
+    /// Corners of a tet; `None` if it was removed.
     pub(super) fn tet(&self, t: u32) -> Option<[u32; 4]> {
         Some(self.tets[t as usize]).filter(|tet| tet[0] != DEAD)
     }
@@ -110,14 +110,14 @@ impl Body {
         tet.map(|p| self.positions[p as usize])
     }
 
-    /// The tets and the particles around an inner edge `a b` of a tet, counterclockwise seen from `b`; false at the
-    /// surface.
+    /// Collects the tets and the particles around an inner edge `a b` of a tet, counterclockwise seen from `b`; returns
+    /// false for an edge on the surface.
     ///
     /// Tet `k` lies between the particles `k` and `k + 1` of the ring.
     pub(super) fn ring(&self, t: u32, [i, j]: [usize; 2], ring: &mut Ring) -> bool {
         let tet = self.tets[t as usize];
         let rest = other_two(i, j);
-        // The ring turns rightly when (a, b, first, second) is positive.
+        // The ring is counterclockwise if (a, b, first, second) is positive.
         let [k, l] = if is_even([i, j, rest[0], rest[1]]) {
             rest
         } else {
@@ -143,7 +143,7 @@ impl Body {
         }
     }
 
-    /// All tets at a particle.
+    /// Collects all tets at a particle.
     pub(super) fn star(&self, particle: u32, star: &mut Vec<u32>) {
         star.clear();
         star.push(self.at[particle as usize]);
@@ -162,7 +162,7 @@ impl Body {
         }
     }
 
-    /// Replaces tets by others with the same outer faces and no new particles.
+    /// Replaces tets by others with equal outer faces and no new particles.
     pub(super) fn replace(&mut self, old: &[u32], new: &[[u32; 4]]) {
         let mut faces = std::mem::take(&mut self.faces);
         faces.clear();
@@ -224,7 +224,7 @@ impl Body {
     }
 }
 
-/// What lies around an edge.
+/// Tets and particles around an edge.
 #[derive(Default)]
 pub(super) struct Ring {
     pub(super) tets: Vec<u32>,
@@ -238,13 +238,13 @@ impl Ring {
     }
 }
 
-/// The two of the numbers 0 to 3 that are left, ascending.
+/// Remaining two of the numbers 0 to 3, ascending.
 pub(super) fn other_two(i: usize, j: usize) -> [usize; 2] {
     let mut rest = (0..4).filter(|&k| k != i && k != j);
     [rest.next().unwrap_or(0), rest.next().unwrap_or(0)]
 }
 
-/// Whether a permutation is even.
+/// True for an even permutation.
 fn is_even(order: [usize; 4]) -> bool {
     let inversions: usize = (0..4)
         .map(|k| (0..k).filter(|&j| order[j] > order[k]).count())
@@ -252,7 +252,7 @@ fn is_even(order: [usize; 4]) -> bool {
     inversions.is_multiple_of(2)
 }
 
-/// The face opposite a corner, ascending.
+/// Face opposite a corner, ascending.
 fn face(tet: [u32; 4], corner: usize) -> [u32; 3] {
     let mut face = [1, 2, 3].map(|k| tet[(corner + k) % 4]);
     face.sort_unstable();

@@ -1,8 +1,8 @@
-//! Which Delaunay tets lie inside a solid, chosen so that their surface is a manifold.
+//! Selection of the Delaunay tets inside a solid such that their surface is a manifold.
 //!
-//! A tet is inside when its centroid is. Flat tets between surface particles can lie on either side, and where the
-//! choice leaves an edge or a particle at which the surface touches itself, those at hand are dropped or taken in by
-//! turns until none is left. Cost: O(n log n) a round; rounds after the first are rarely more than three.
+//! A tet is inside if its centroid is. Flat tets between surface particles can be on either side. Where the surface
+//! touches itself at an edge or a particle, such tets are alternately dropped and added until no such place is left.
+//! Cost: O(n log n) per round; there are rarely more than three rounds after the first.
 
 use std::cmp::Reverse;
 
@@ -11,14 +11,15 @@ use incise_mesh::{ParticleId, Surface, TetId, TetMesh};
 
 use crate::Shape;
 
-/// Points with a smaller distance are on the surface; they are put there to 1e-9 m.
+/// Distance up to which points are on the surface; they are placed there to 1e-9 m.
 const ON_SURFACE: f64 = 1e-7;
-/// Tets between surface particles with centroids no farther from the surface, in spacings, can be on either side.
+/// Distance from the surface, in spacings, up to which the centroids of tets between surface particles count as on
+/// either side.
 const SHALLOW: f64 = 0.2;
-/// Rounds of dropping and taking in.
+/// Largest number of rounds.
 const ROUNDS: usize = 12;
 
-/// Keeps the tets of a Delaunay mesh that lie inside; none if their surface is not of the shape's topology.
+/// Keeps the tets of a Delaunay mesh that lie inside; `None` if the topology of their surface is not that of the shape.
 pub(super) fn carve(mut mesh: TetMesh, shape: Shape, spacing: f64) -> Option<TetMesh> {
     let distances: Vec<f64> = (0..mesh.tets.len())
         .map(|t| shape.signed_distance(0.25 * mesh.corners(TetId::new(t)).iter().sum::<DVec3>()))
@@ -28,7 +29,7 @@ pub(super) fn carve(mut mesh: TetMesh, shape: Shape, spacing: f64) -> Option<Tet
         .iter()
         .map(|&p| shape.signed_distance(p).abs() < ON_SURFACE)
         .collect();
-    // Rounding errors on a flat side are neither inside nor to be taken in.
+    // Flat tets on a flat side come from rounding: they are not inside and are never added.
     let mut kept: Vec<bool> = distances.iter().map(|&d| d < -ON_SURFACE).collect();
     let all = std::mem::take(&mut mesh.tets);
     for round in 0..ROUNDS {
@@ -67,9 +68,9 @@ pub(super) fn carve(mut mesh: TetMesh, shape: Shape, spacing: f64) -> Option<Tet
     None
 }
 
-/// The particles at which a closed surface touches itself: those with triangles that are not one fan.
+/// Marks the particles at which a closed surface touches itself: their triangles do not form one fan.
 fn pinched(surface: &Surface, particles: usize) -> Vec<bool> {
-    // A corner (p; a, b) of a triangle is followed around p by the corner (p; b, c).
+    // Around p, corner (p; a, b) of a triangle is followed by corner (p; b, c).
     let mut corners: Vec<[ParticleId; 3]> = Vec::with_capacity(3 * surface.triangles.len());
     for &[a, b, c] in &surface.triangles {
         corners.extend([[a, b, c], [b, c, a], [c, a, b]]);
@@ -105,7 +106,7 @@ mod tests {
         };
         let mut mesh = kuhn_box([2, 2, 1], DVec3::ONE);
         assert_eq!(pinches(&mesh), 0);
-        // Two columns that share the edge between them, with its three particles of which it has two.
+        // Two columns that share the edge between them and its three particles.
         let columns: Vec<_> = [0..6, 18..24]
             .into_iter()
             .flatten()

@@ -1,14 +1,14 @@
-//! Removing slivers: local changes, each of which raises the worst tet it touches.
+//! Sliver removal by local changes, each of which improves the worst tet it touches.
 //!
 //! For each bad tet: the best of all edge removals (the tets around an edge are replaced by two for each triangle of a
-//! fan in the polygon around it) and face removals (two tets become three), else small random moves of its corners,
-//! else, at the surface, dropping it where that leaves the topology as it is. Only bad tets and what surrounds them
-//! change, so that the mesh stays irregular.
+//! fan in the polygon around it) and face removals (two tets become three); otherwise small random moves of its
+//! corners; otherwise, at the surface, removal of the tet if the topology does not change. Only bad tets and their
+//! surroundings change, so that the mesh stays irregular.
 //!
-//! Source: L. A. Freitag and C. Ollivier-Gooch, "Tetrahedral mesh improvement using swapping and smoothing", 1997;
-//! quality is the smallest sine of the dihedral angles, which is small for angles near 0 and near 180 degrees, or twice
-//! the radius ratio, which is small for needles too, whichever is less. Cost: linear in the number of bad tets and of
-//! passes.
+//! Source: L. A. Freitag and C. Ollivier-Gooch, "Tetrahedral mesh improvement using swapping and smoothing", 1997.
+//! Quality is the smaller of two values: the smallest sine of the dihedral angles, which is small for angles near 0 and
+//! near 180 degrees, and twice the radius ratio, which is small for needles too. Cost: linear in the number of bad tets
+//! and of passes.
 
 use glam::DVec3;
 use incise_mesh::{outward_normals, signed_volume};
@@ -18,14 +18,14 @@ use super::sample::project;
 use crate::Shape;
 use crate::random::in_cube;
 
-/// The largest number of tets around an edge that is removed.
+/// Largest number of tets around an edge that can be removed.
 const LARGEST_RING: usize = 8;
-/// Sizes of the random moves, in spacings, with so many tries each.
+/// Sizes of the random moves in spacings.
 const MOVES: [f64; 4] = [0.2, 0.1, 0.05, 0.02];
 const TRIES: u64 = 6;
 
-/// The smallest sine of the dihedral angles, or twice the radius ratio if less; not positive for a flat or inverted
-/// tet.
+/// Tet quality: the smaller of the smallest sine of the dihedral angles and twice the radius ratio; not positive for a
+/// flat or inverted tet.
 pub(super) fn quality(corners: [DVec3; 4]) -> f64 {
     let normals = outward_normals(corners);
     let volume = 6.0 * signed_volume(corners);
@@ -35,7 +35,7 @@ pub(super) fn quality(corners: [DVec3; 4]) -> f64 {
     let mut worst = f64::INFINITY;
     for i in 0..4 {
         for j in 0..i {
-            // The faces opposite i and j meet in the edge between the other two.
+            // The faces opposite i and j share the edge between the other two corners.
             let [k, l] = other_two(i, j);
             let edge = (corners[k] - corners[l]).length_squared();
             let areas = normals[i].length_squared() * normals[j].length_squared();
@@ -47,7 +47,8 @@ pub(super) fn quality(corners: [DVec3; 4]) -> f64 {
         .min(2.0 * radius_ratio(corners, volume, normals))
 }
 
-/// Three times the inscribed over the circumscribed radius, for six times the volume and twice the areas.
+/// Radius ratio: three times the inscribed over the circumscribed radius, given six times the volume and twice the
+/// areas.
 fn radius_ratio([a, b, c, d]: [DVec3; 4], volume: f64, normals: [DVec3; 4]) -> f64 {
     let [u, v, w] = [b - a, c - a, d - a];
     let circum = u.length_squared() * v.cross(w)
@@ -57,7 +58,7 @@ fn radius_ratio([a, b, c, d]: [DVec3; 4], volume: f64, normals: [DVec3; 4]) -> f
     6.0 * volume * volume / (areas * circum.length())
 }
 
-/// Improves all tets below `target`, in up to `passes` passes.
+/// Improves all tets with a quality below `target`, in up to `passes` passes.
 pub(super) fn improve(body: &mut Body, shape: Shape, spacing: f64, target: f64, passes: u64) {
     let mut work = Work::default();
     for pass in 0..passes {
@@ -71,7 +72,7 @@ pub(super) fn improve(body: &mut Body, shape: Shape, spacing: f64, target: f64, 
         bad.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let mut changed = false;
         for (_, t) in bad {
-            // An earlier change may have seen to it.
+            // An earlier change may have fixed or removed it.
             let Some(tet) = body
                 .tet(t)
                 .filter(|&tet| quality(body.corners(tet)) < target)
@@ -93,7 +94,7 @@ pub(super) fn improve(body: &mut Body, shape: Shape, spacing: f64, target: f64, 
     }
 }
 
-/// Storage kept between changes.
+/// Buffers reused between changes.
 #[derive(Default)]
 struct Work {
     ring: Ring,
@@ -104,7 +105,7 @@ struct Work {
 }
 
 impl Work {
-    /// The best edge or face removal at a tet, if any raises the worst quality.
+    /// Applies the best edge or face removal at a tet, if any raises the worst quality.
     fn reconnect(&mut self, body: &mut Body, t: u32) -> bool {
         let Some(tet) = body.tet(t) else {
             return false;
@@ -139,7 +140,7 @@ impl Work {
                 continue;
             };
             let b = other[across as usize % 4];
-            // Counterclockwise seen from b, as all corners but i are after an even number of exchanges.
+            // Counterclockwise seen from b: even permutations of all corners but i.
             let [p, q, r] = match i {
                 0 => [tet[1], tet[2], tet[3]],
                 1 => [tet[0], tet[3], tet[2]],
@@ -158,7 +159,7 @@ impl Work {
         true
     }
 
-    /// Keeps the new tets if they are better by more than the best so far.
+    /// Keeps the new tets as the best candidate if they gain more than the best so far.
     fn keep_better(&mut self, body: &Body, before: f64, gain: &mut f64, pair: Option<&[u32]>) {
         let bound = before + *gain;
         let after = self.new.iter().try_fold(f64::INFINITY, |worst, &tet| {
@@ -173,7 +174,7 @@ impl Work {
         }
     }
 
-    /// Moves a particle at random where that raises the worst quality around it; surface particles stay on the surface.
+    /// Moves a particle at random if that raises the worst quality around it; surface particles stay on the surface.
     fn relocate(&mut self, body: &mut Body, shape: Shape, spacing: f64, p: u32, pass: u64) -> bool {
         body.star(p, &mut self.star);
         let start = body.positions[p as usize];
@@ -197,12 +198,12 @@ impl Work {
             }
         }
         body.positions[p as usize] = place;
-        // Tiny gains would keep the passes going for nothing.
+        // A minimum gain prevents long runs of tiny improvements.
         best > before + 1e-3
     }
 }
 
-/// The worst quality of some tets.
+/// Worst quality of the given tets.
 fn worst_of(body: &Body, tets: &[u32]) -> f64 {
     tets.iter()
         .filter_map(|&t| body.tet(t))
@@ -210,8 +211,8 @@ fn worst_of(body: &Body, tets: &[u32]) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Removes a tet at the surface if that keeps the body and its surface manifolds of the same topology: with one
-/// boundary face if the corner opposite lies inside, with two if the edge opposite does, with three always.
+/// Removes a tet at the surface if the body and its surface stay manifolds of unchanged topology: with one boundary
+/// face if the opposite corner is inside, with two if the opposite edge is, with three always.
 fn peel(body: &mut Body, t: u32, ring: &mut Ring) -> bool {
     let Some(tet) = body.tet(t) else {
         return false;
@@ -253,7 +254,7 @@ mod tests {
             let expected = sine(measured.min_dihedral)
                 .min(sine(measured.max_dihedral))
                 .min(2.0 * measured.radius_ratio);
-            // Random tets are as flat as 1e-5, which is what cancellation is amplified by.
+            // Random tets are as flat as 1e-5, which amplifies cancellation.
             assert!((quality(corners) - expected).abs() < 1e-9, "{n}");
         }
         assert!(quality([DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::X + DVec3::Y]) == 0.0);
@@ -283,7 +284,7 @@ mod tests {
         let surface = mesh.surface();
         assert!(surface.is_manifold() && surface.euler_characteristic() == 2);
         assert_eq!(mesh.face_pieces().count, 1);
-        // The room is the same but where corners were cut or tets at the surface dropped.
+        // The volume changes only where corners were cut or surface tets dropped.
         assert!(
             (0.98..1.0 + 1e-9).contains(&mesh.total_volume()),
             "{}",

@@ -1,10 +1,10 @@
-//! Irregular bodies: Delaunay meshes of random points, whose particles have as unequal numbers of tets as in meshes of
-//! other mesh generators.
+//! Irregular bodies: Delaunay meshes of random points, with as varied numbers of tets per particle as meshes of other
+//! generators.
 //!
-//! Lattice meshes have nearly equal numbers everywhere (24 in stuffed ones), which hides what makes coloring and
-//! clustering hard. Here points are strewn over the surface and the inside of a solid (module `sample`) and joined
-//! ([`delaunay`]), the tets inside are kept (`carve`), and slivers are removed by local changes (`improve`). The number
-//! of tets is met by repeating that with other spacings and other points.
+//! Lattice meshes have nearly constant numbers (24 in stuffed ones), which hides the hard cases of coloring and
+//! clustering. Here random points on the surface and inside a solid (module `sample`) are connected ([`delaunay`]), the
+//! tets inside are kept (`carve`), and slivers are removed by local changes (`improve`). Further attempts with other
+//! spacings and points bring the number of tets into its range.
 //!
 //! Measured with seed 1 by the tests `as_irregular_as_other_meshes` and, for the last rows, the ignored
 //! `large_and_as_irregular_as_other_meshes`. For comparison, TetGen's meshes of a ball with 6,846, 27,755 and
@@ -23,8 +23,7 @@
 //! | liver | 119,881 | 23.0, 50 | 73.8, 118 | 14.5 to 161.3 | 0.125 |
 //! | torus | 119,531 | 22.5, 48 | 72.9, 118 | 14.5 to 160.7 | 0.125 |
 //!
-//! Cost: linear in the number of tets, to the logarithm of sorting. For 120,000 tets as a rule two attempts of about a
-//! second, for a million some twenty seconds in all.
+//! Cost: linear in the number of tets, times the logarithm of sorting; usually two attempts.
 
 mod body;
 mod carve;
@@ -43,26 +42,26 @@ use crate::random::hash;
 use crate::search::cube_root;
 use crate::{MeshingError, Shape};
 
-/// The lower bound of the sines of dihedral angles, which is that of 14.47 degrees, and of twice the radius ratio.
+/// Lower bound of the sines of dihedral angles (14.47 degrees) and of twice the radius ratio.
 const QUALITY: f64 = 0.25;
-/// Passes over the bad tets before an attempt is given up.
+/// Passes over the bad tets before an attempt fails.
 const PASSES: u64 = 40;
-/// Attempts before giving up; small meshes meet their number by chance.
+/// Attempts before an error; small meshes need several to hit their number.
 const ATTEMPTS: u64 = 400;
-/// The largest number of tets that can be asked for.
+/// Largest number of tets.
 const LARGEST: usize = 1_000_000;
 
-/// A mesh of the shape with `tets` tets to within 2 %, as irregular as those of other mesh generators.
+/// Creates an irregular mesh of the shape with `tets` tets to within 2 %.
 ///
-/// The mesh is sound ([`TetMesh::check`]), a single piece also by faces, with a manifold surface of the shape's
-/// topology. All dihedral angles lie between 14.4 and 165.6 degrees, all radius ratios above 0.124. Particles come
-/// along a space-filling curve, tets by their lowest particle. Sharp edges and corners of the shape get particles of
-/// their own, but may be beveled in places where slivers were dropped. Another `seed` gives another mesh of the same
+/// The mesh is valid ([`TetMesh::check`]), a single piece also by faces, with a manifold surface of the shape's
+/// topology. All dihedral angles lie between 14.4 and 165.6 degrees, all radius ratios above 0.124. Particles are
+/// ordered along a space-filling curve, tets by their lowest particle. Sharp edges and corners of the shape get
+/// particles of their own, but may be beveled where slivers were dropped. Another `seed` gives another mesh of this
 /// kind. Deterministic on all platforms.
 ///
 /// # Errors
-/// [`MeshingError::TetCount`] for fewer than [`Shape::smallest_tet_count`] or more than a million tets, or when no
-/// attempt meets all promises.
+/// [`MeshingError::TetCount`] for fewer than [`Shape::smallest_tet_count`] or more than a million tets, or if no
+/// attempt meets all guarantees above.
 ///
 /// # Example
 /// ```
@@ -85,7 +84,8 @@ pub fn irregular(shape: Shape, tets: usize, seed: u64) -> Result<TetMesh, Meshin
     if !(smallest..=LARGEST).contains(&tets) {
         return Err(out_of_range);
     }
-    // Tets times the spacing cubed: nearly constant, less for coarse meshes, so that it is averaged over the attempts.
+    // Tets times the cube of the spacing: nearly constant, smaller for coarse meshes, so it is averaged over the
+    // attempts.
     let mut room = 11.0 * shape.volume();
     for attempt in 0..ATTEMPTS {
         let spacing = cube_root(room / tets as f64);
@@ -103,7 +103,7 @@ pub fn irregular(shape: Shape, tets: usize, seed: u64) -> Result<TetMesh, Meshin
     Err(out_of_range)
 }
 
-/// A mesh with about the given spacing; none when the carved surface is not that of the shape.
+/// Makes a mesh with about the given spacing; `None` if the carved surface has not the topology of the shape.
 fn attempt_at(shape: Shape, spacing: f64, seed: u64) -> Result<Option<TetMesh>, MeshingError> {
     let points = sample(shape, spacing, seed)?;
     let mut order: Vec<(u64, usize)> = morton_keys(&points).zip(0..).collect();
@@ -117,7 +117,7 @@ fn attempt_at(shape: Shape, spacing: f64, seed: u64) -> Result<Option<TetMesh>, 
     Ok(Some(body.into_mesh()))
 }
 
-/// Whether a mesh has the topology of the shape and the promised quality.
+/// True if a mesh has the topology of the shape and the guaranteed quality.
 fn is_faithful(mesh: &TetMesh, shape: Shape) -> bool {
     let surface = mesh.surface();
     surface.euler_characteristic() == shape.euler_characteristic()

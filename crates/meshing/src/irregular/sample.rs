@@ -1,13 +1,13 @@
-//! Points for an irregular mesh: evenly thinned ones on the surface of a solid, jittered lattice points inside.
+//! Points for an irregular mesh: Poisson disk samples on the surface of a solid, jittered lattice points inside.
 //!
-//! Surface points come from dense random candidates near the surface, moved onto it by Newton steps along the gradient,
-//! and taken in random order as long as they keep a distance from those taken (maximal Poisson disk sampling: no gap is
-//! larger than the distance). Candidates on edges and corners go first, so that these stay sharp. Inside, the vertices
-//! of a body-centered cubic lattice are moved at random.
+//! Surface points come from dense random candidates near the surface. Newton steps along the gradient move them onto
+//! it; a candidate is accepted, in random order, if it keeps a minimum distance from the accepted points (maximal
+//! Poisson disk sampling: no gap is larger than the distance). Candidates on edges and corners are first, so that these
+//! stay sharp. Inside, the vertices of a body-centered cubic lattice are moved at random.
 //!
 //! Source: Delaunay meshing of jittered lattices is folklore; for the surface M. S. Ebeida and others, "Efficient
-//! maximal Poisson-disk sampling", 2011. Cost: linear in the volume over the spacing cubed, some thirty distances per
-//! point.
+//! maximal Poisson-disk sampling", 2011. Cost: linear in the volume over the cube of the spacing, some thirty distance
+//! evaluations per point.
 
 use glam::DVec3;
 
@@ -24,10 +24,10 @@ const APART: f64 = 0.65;
 /// Smallest distance of inner points from the surface, and from its points, in spacings.
 const DEPTH: f64 = 0.4;
 const FROM_SURFACE_POINTS: f64 = 0.6;
-/// Candidates for surface points along a spacing.
+/// Candidates for surface points per spacing.
 const CANDIDATES: f64 = 3.0;
 
-/// Points of `shape` for a body-centered cubic lattice with the given side of its cells.
+/// Samples points of `shape` for a body-centered cubic lattice with cells of side `spacing`.
 pub(super) fn sample(shape: Shape, spacing: f64, seed: u64) -> Result<Vec<DVec3>, MeshingError> {
     let half = shape.half_extent();
     let low = -half - 2.0 * spacing;
@@ -55,7 +55,7 @@ pub(super) fn sample(shape: Shape, spacing: f64, seed: u64) -> Result<Vec<DVec3>
     Ok(near.points)
 }
 
-/// Random points on the surface, many to a spacing: corners first, then edges, then the rest, each in random order.
+/// Random points on the surface, several per spacing: corners first, then edges, then the rest, each in random order.
 fn candidates(shape: Shape, spacing: f64, seed: u64) -> Result<Vec<DVec3>, MeshingError> {
     let half = shape.half_extent();
     let fine = spacing / CANDIDATES;
@@ -76,7 +76,7 @@ fn candidates(shape: Shape, spacing: f64, seed: u64) -> Result<Vec<DVec3>, Meshi
     Ok(found.into_iter().map(|(_, _, p)| p).collect())
 }
 
-/// The point moved onto the surface, unless that is farther than `reach` or does not succeed.
+/// Projects a point onto the surface; `None` if it is farther than `reach` or the iteration fails.
 pub(super) fn project(shape: Shape, from: DVec3, reach: f64) -> Option<DVec3> {
     let mut p = from;
     for _ in 0..12 {
@@ -90,10 +90,10 @@ pub(super) fn project(shape: Shape, from: DVec3, reach: f64) -> Option<DVec3> {
     None
 }
 
-/// Whether a point lies inside by more than `depth`, to first order.
+/// True if a point lies inside by more than `depth`, to first order.
 fn is_deep(shape: Shape, p: DVec3, depth: f64) -> bool {
     let distance = shape.signed_distance(p);
-    // No distance function of a shape is steeper than the true distance.
+    // The distance functions of shapes are never steeper than the true distance.
     distance <= -depth || distance < 0.0 && distance < -depth * gradient(shape, p).length()
 }
 
@@ -106,11 +106,12 @@ fn gradient(shape: Shape, p: DVec3) -> DVec3 {
     DVec3::new(along(DVec3::X), along(DVec3::Y), along(DVec3::Z))
 }
 
-/// 0 at a corner, 1 at an edge, 2 elsewhere: outside a sharp edge the distance grows faster than it falls inside.
+/// Class of a surface point: 0 at a corner, 1 at an edge, 2 elsewhere. Outside a sharp edge the distance changes faster
+/// than inside.
 fn smoothness(shape: Shape, p: DVec3) -> u8 {
     let step = 1e-5 * gradient(shape, p).normalize_or_zero();
     let [outside, inside] = [p + step, p - step].map(|p| shape.signed_distance(p).abs());
-    // One, the square root of a half, and of a third in the corner of a box.
+    // 1, √(1/2) and √(1/3) on a side, an edge and a corner of a box.
     match inside / outside.max(1e-9) {
         ratio if ratio < 0.64 => 0,
         ratio if ratio < 0.9 => 1,
@@ -118,12 +119,12 @@ fn smoothness(shape: Shape, p: DVec3) -> u8 {
     }
 }
 
-/// Points sorted into cubic cells, to find near ones.
+/// Grid of cubic cells for neighbor search.
 struct Grid {
     low: DVec3,
     side: f64,
     cells: [usize; 3],
-    /// Per cell its last point, per point the one before in its cell.
+    /// Last point of each cell; for each point the previous one in its cell.
     last: Vec<u32>,
     before: Vec<u32>,
     points: Vec<DVec3>,
@@ -162,7 +163,7 @@ impl Grid {
         self.points.push(p);
     }
 
-    /// Whether there is a point nearer than `distance`.
+    /// True if there is a point nearer than `distance`.
     fn has_within(&self, p: DVec3, distance: f64) -> bool {
         let [low, high] = [p - distance, p + distance].map(|p| self.cell(p));
         for k in low[2]..=high[2] {
@@ -205,7 +206,7 @@ mod tests {
                 let near = FROM_SURFACE_POINTS * spacing;
                 assert!(surface.iter().all(|q| q.distance(*p) >= near));
             }
-            // Other places on the surface have a point near; the candidates are a third of a spacing apart.
+            // Every other surface point has a sample nearby; candidates are a third of a spacing apart.
             for n in 0..500 {
                 let from = in_cube(9, n) * shape.half_extent();
                 if let Some(p) = project(shape, from, 1.0) {

@@ -1,12 +1,11 @@
-//! [`Solid`]: the inside of a closed triangle surface, asked point by point.
+//! [`Solid`]: the inside of a closed triangle surface, for point queries.
 //!
-//! What is inside is a matter of the winding number, which is decided exactly (module `winding`), so that points at any
-//! distance from the surface, along its edges and in its planes are on the side they should be. It is well defined for
-//! every surface in which each directed edge is matched by an opposite one: also for surfaces that cut through
-//! themselves, touch themselves or consist of many shells. Module `prepare` brings a surface into that form or says
-//! what keeps it from it. Questions go through a tree of boxes (module `tree`).
+//! A point is inside by its winding number, which is computed exactly (module `winding`), also for points on edges, in
+//! the planes of triangles and at any distance. It is defined for every surface in which each directed edge is matched
+//! by an opposite one, including surfaces that intersect themselves, touch themselves or consist of many shells. Module
+//! `prepare` brings a surface into that form or returns an error. Queries use a tree of boxes (module `tree`).
 //!
-//! Cost: O(n log n) to build for n triangles, O(log n) a question as a rule.
+//! Cost: O(n log n) to build for n triangles; usually O(log n) per query.
 
 mod nearest;
 mod prepare;
@@ -21,7 +20,7 @@ use tree::Tree;
 
 pub use prepare::Prepared;
 
-/// The inside of a closed surface: the points with a positive winding number.
+/// Inside of a closed surface: the points with a positive winding number.
 ///
 /// # Example
 /// ```
@@ -45,15 +44,15 @@ pub struct Solid {
 }
 
 impl Solid {
-    /// Takes a surface as the boundary of a solid.
+    /// Creates the solid bounded by a surface.
     ///
-    /// Points at the same place become one, triangles without area by their corners are left out, triangles that face
-    /// the other way than their neighbors are turned, and so is the whole if it would enclose a negative volume.
-    /// [`prepared`](Self::prepared) tells what was done.
+    /// Coincident points are merged, triangles with repeated corners are dropped, triangles that face the opposite way
+    /// to their neighbors are flipped, and all are flipped if they enclose a negative volume.
+    /// [`prepared`](Self::prepared) reports the changes.
     ///
     /// # Errors
-    /// [`MeshingError::Surface`] if a position is not finite or absent, if there is no triangle, or if the surface has
-    /// a rim or cannot be oriented: with the first edge where that shows.
+    /// [`MeshingError::Surface`] if a position is missing or not finite, if there are no triangles, or if the surface
+    /// is open or not orientable; the message names the first such edge.
     pub fn new(surface: &TriangleSurface) -> Result<Self, MeshingError> {
         let (prepared, triangles) = prepare::prepare(surface)?;
         let volume = volume(&triangles);
@@ -64,57 +63,56 @@ impl Solid {
         })
     }
 
-    /// What had to be repaired in the surface.
+    /// Repairs that were made to the surface.
     #[must_use]
     pub const fn prepared(&self) -> &Prepared {
         &self.prepared
     }
 
-    /// The number of triangles.
+    /// Number of triangles.
     #[must_use]
     pub fn triangle_count(&self) -> usize {
         self.tree.triangles().len()
     }
 
-    /// The low corner of the smallest box around the surface.
+    /// Low corner of the bounding box.
     #[must_use]
     pub fn low(&self) -> DVec3 {
         self.tree.bounds().low
     }
 
-    /// The high corner of the smallest box around the surface.
+    /// High corner of the bounding box.
     #[must_use]
     pub fn high(&self) -> DVec3 {
         self.tree.bounds().high
     }
 
-    /// The enclosed volume in m³, each part as often as the surface winds around it.
+    /// Enclosed volume in m³; each part counts as often as the surface winds around it.
     #[must_use]
     pub const fn volume(&self) -> f64 {
         self.volume
     }
 
-    /// How often the surface winds around a point: 1 inside a simple surface, 0 outside. Exact; a point on the surface
-    /// counts to one of its sides.
+    /// Winding number of the surface around a point: 1 inside a simple surface, 0 outside. Exact; a point on the
+    /// surface is assigned to one of its sides.
     #[must_use]
     pub fn winding_number(&self, point: DVec3) -> i32 {
         winding::winding_number(&self.tree, point)
     }
 
-    /// The distance of a point to the surface in meters, up to rounding.
+    /// Distance from a point to the surface in meters, up to rounding.
     #[must_use]
     pub fn distance(&self, point: DVec3) -> f64 {
         self.distance_within(point, f64::INFINITY)
     }
 
-    /// The distance to the surface, negative inside. The sign is exact.
+    /// Distance to the surface in meters, negative inside. The sign is exact.
     #[must_use]
     pub fn signed_distance(&self, point: DVec3) -> f64 {
         self.signed_distance_within(point, f64::INFINITY)
     }
 
-    /// The signed distance where it is at most `reach` in size, and `reach` with its sign elsewhere: much faster than
-    /// the distance of far points.
+    /// Signed distance clamped to `reach` in absolute value: much faster than the exact distance of far points.
     #[must_use]
     pub fn signed_distance_within(&self, point: DVec3, reach: f64) -> f64 {
         let distance = self.distance_within(point, reach);
@@ -129,8 +127,8 @@ impl Solid {
         nearest::distance_within(&self.tree, point, reach)
     }
 
-    /// The largest distance of points of `surface` to this solid's surface, in meters: of its corners, the middles of
-    /// its edges and of its triangles. Half a Hausdorff distance, sampled.
+    /// Largest distance from points of `surface` to this solid's surface, in meters: a one-sided Hausdorff distance,
+    /// sampled at the corners, edge midpoints and centroids of its triangles.
     #[must_use]
     pub fn farthest(&self, surface: &TriangleSurface) -> f64 {
         let mut farthest = 0.0_f64;
@@ -138,7 +136,7 @@ impl Solid {
             let [a, b, c] = triangle.map(|p| surface.positions[p.index()]);
             let middle = (a + b + c) / 3.0;
             for point in [a, b, c, middle, a.midpoint(b), b.midpoint(c), c.midpoint(a)] {
-                // What is nearer than the farthest so far need not be known well.
+                // Distances below the maximum so far need not be exact.
                 let distance = self.distance_within(point, f64::INFINITY);
                 farthest = farthest.max(distance);
             }
@@ -147,7 +145,7 @@ impl Solid {
     }
 }
 
-/// The volume that triangles enclose, by the divergence theorem, seen from a point nearby.
+/// Volume enclosed by triangles, by the divergence theorem, relative to a point nearby.
 fn volume(triangles: &[[DVec3; 3]]) -> f64 {
     let origin = triangles.first().map_or(DVec3::ZERO, |t| t[0]);
     let terms = triangles.iter().map(|corners| {

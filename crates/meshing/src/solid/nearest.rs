@@ -1,25 +1,25 @@
-//! The distance of a point to the nearest triangle of a tree.
+//! Distance from a point to the nearest triangle of a tree.
 //!
 //! Source: C. Ericson, "Real-Time Collision Detection", 2005, section 5.1.5 (the nearest point of a triangle by the
-//! regions of its corners and edges). Cost: O(log n) as a rule, O(n) for points as far from many triangles.
+//! regions of its corners and edges). Cost: usually O(log n); O(n) for points equally far from many triangles.
 
 use glam::DVec3;
 
 use super::tree::Tree;
 
-/// The distance to the nearest triangle, or `reach` if none is nearer.
+/// Distance to the nearest triangle, or `reach` if none is nearer.
 pub(super) fn distance_within(tree: &Tree, point: DVec3, reach: f64) -> f64 {
     tree.nearest(point, reach * reach, |t| distance_squared(t, point))
         .sqrt()
 }
 
-/// The squared distance of a point to a triangle, which may be a line or a point.
+/// Squared distance from a point to a triangle, which may be degenerate.
 fn distance_squared(&[a, b, c]: &[DVec3; 3], point: DVec3) -> f64 {
     let (ab, ac, ap) = (b - a, c - a, point - a);
     let normal = ab.cross(ac);
     let area = normal.length_squared();
     if area > 0.0 {
-        // Barycentric coordinates of the foot of the perpendicular, times the area.
+        // Barycentric coordinates of the projected point, times the area.
         let v = ap.cross(ac).dot(normal);
         let w = ab.cross(ap).dot(normal);
         if v >= 0.0 && w >= 0.0 && v + w <= area {
@@ -33,7 +33,7 @@ fn distance_squared(&[a, b, c]: &[DVec3; 3], point: DVec3) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-// Without this, inlining varies with unrelated changes; a call costs a sixth of the time of `tetrahedralize`.
+// Without this, inlining varies with unrelated changes, and a call is significant in the cost of `tetrahedralize`.
 #[inline(always)]
 fn to_segment(from: DVec3, to: DVec3, point: DVec3) -> f64 {
     let along = to - from;

@@ -1,8 +1,8 @@
-//! Brings a surface into the form in which it has an inside: welded, without flat triangles, facing one way, closed.
+//! Repair of a surface so that it has an inside: welded, without degenerate triangles, consistently oriented, closed.
 //!
-//! A surface has an inside where each directed edge of its triangles is matched by one in the opposite direction. Files
-//! often miss that only because points are doubled along seams or triangles turned, which is repaired. The rest is
-//! refused with the first edge where it shows: a rim, or a part that has no two sides.
+//! A surface has an inside if each directed edge of its triangles is matched by one in the opposite direction.
+//! Duplicated points along seams and flipped triangles are common in files and are repaired. An open or non-orientable
+//! surface is an error that names the first such edge.
 //!
 //! Cost: O(n log n).
 
@@ -11,23 +11,23 @@ use incise_mesh::{DisjointSets, ParticleId, TriangleSurface};
 
 use crate::MeshingError;
 
-/// What was repaired in a surface to take it as the boundary of a solid.
+/// Repairs of a surface used as the boundary of a solid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Prepared {
-    /// Points that lay where another one was.
+    /// Points merged into an earlier coincident one.
     pub welded: usize,
     /// Triangles with fewer than three different corners.
     pub degenerate: usize,
-    /// Triangles turned to face as their neighbors do.
+    /// Triangles flipped to face like their neighbors.
     pub turned: usize,
-    /// Whether all were turned then, since they enclosed a negative volume.
+    /// True if all triangles were flipped afterwards because they enclosed a negative volume.
     pub inside_out: bool,
-    /// Parts of the surface that share no point: a cavity is one, too.
+    /// Parts of the surface that share no point; the surface of a cavity counts.
     pub shells: usize,
 }
 
-/// The corners of all triangles, in a consistent orientation that encloses a positive volume.
+/// Corners of all triangles, in a consistent orientation that encloses a positive volume.
 pub(super) fn prepare(
     surface: &TriangleSurface,
 ) -> Result<(Prepared, Vec<[DVec3; 3]>), MeshingError> {
@@ -84,7 +84,7 @@ fn fault<T>(message: String) -> Result<T, MeshingError> {
     Err(MeshingError::Surface(message))
 }
 
-/// The first point with the same coordinates, for each point.
+/// First point with equal coordinates, for each point.
 fn weld(positions: &[DVec3]) -> Vec<u32> {
     // Zeros of either sign are equal.
     let location = |p: u32| {
@@ -103,7 +103,7 @@ fn weld(positions: &[DVec3]) -> Vec<u32> {
     same
 }
 
-/// How many sets of triangles share points.
+/// Number of sets of triangles that share points.
 fn shells(triangles: &[[u32; 3]], points: usize) -> usize {
     let mut sets = DisjointSets::new(points);
     for &[a, b, c] in triangles {
@@ -120,7 +120,7 @@ fn directed_edges([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
     [[a, b], [b, c], [c, a]]
 }
 
-/// The smallest directed edge that has not as many opposite ones.
+/// Smallest directed edge without an equal number of opposite ones.
 fn first_unmatched(triangles: &[[u32; 3]]) -> Option<[u32; 2]> {
     let mut forward: Vec<_> = triangles.iter().flat_map(|&t| directed_edges(t)).collect();
     let mut backward: Vec<_> = forward.iter().map(|&[a, b]| [b, a]).collect();
@@ -130,9 +130,9 @@ fn first_unmatched(triangles: &[[u32; 3]]) -> Option<[u32; 2]> {
     differ.map(|(&f, &b)| f.min(b))
 }
 
-/// Turns triangles to face as the first of those they are joined with over edges of two triangles.
+/// Flips triangles to face like the first of those connected through edges of two triangles; returns their number.
 fn orient(triangles: &mut [[u32; 3]]) -> usize {
-    // Each edge with its triangle, and whether that runs along it upward.
+    // Each edge with its triangle, and whether the triangle traverses it in ascending order.
     let mut sides: Vec<([u32; 2], u32, bool)> = Vec::with_capacity(3 * triangles.len());
     for (t, &triangle) in (0_u32..).zip(triangles.iter()) {
         for [a, b] in directed_edges(triangle) {
@@ -143,7 +143,7 @@ fn orient(triangles: &mut [[u32; 3]]) -> usize {
     let mut neighbors: Vec<(u32, u32, bool)> = Vec::with_capacity(sides.len());
     for pair in sides.chunk_by(|s, t| s.0 == t.0) {
         if let [(_, s, up), (_, t, also_up)] = *pair {
-            // Neighbors that run along the edge in the same direction face opposite ways.
+            // Neighbors that traverse the edge in one direction have opposite orientations.
             neighbors.extend([(s, t, up == also_up), (t, s, up == also_up)]);
         }
     }
@@ -180,7 +180,7 @@ fn orient(triangles: &mut [[u32; 3]]) -> usize {
     count
 }
 
-/// What is wrong at an edge.
+/// Describes the defect at an edge.
 fn describe(triangles: &[[u32; 3]], positions: &[DVec3], [a, b]: [u32; 2]) -> String {
     let at_edge: Vec<usize> = (0..triangles.len())
         .filter(|&t| triangles[t].contains(&a) && triangles[t].contains(&b))

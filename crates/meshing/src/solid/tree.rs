@@ -1,28 +1,28 @@
-//! [`Tree`]: triangles in a binary tree of boxes, for questions about what is near a point or a ray.
+//! [`Tree`]: triangles in a binary tree of boxes, for nearest-triangle and ray queries.
 //!
-//! Triangles are halved by the middles of their boxes along the longest side until few are left. Nodes lie in one
-//! array, the left child right behind its parent. Cost: O(n log n) to build, 56 bytes a node and 72 a triangle.
+//! Triangles are split at the median of their box centers along the longest side until few are left. Nodes lie in one
+//! array, the left child directly after its parent. Cost: O(n log n) to build, 56 bytes per node and 72 per triangle.
 
 use glam::DVec3;
 use incise_mesh::Bounds;
 
 use crate::index::index;
 
-/// Triangles of a leaf.
+/// Largest number of triangles in a leaf.
 const LEAF: usize = 4;
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
     bounds: Bounds,
-    /// The right child, or 0 in a leaf.
+    /// Index of the right child, or 0 in a leaf.
     right: u32,
-    /// The first triangle of a leaf.
+    /// First triangle of a leaf.
     start: u32,
-    /// The triangles of a leaf.
+    /// Number of triangles of a leaf.
     count: u32,
 }
 
-/// See the module.
+/// Binary tree of boxes over triangles; see the module.
 #[derive(Clone, Debug)]
 pub(super) struct Tree {
     nodes: Vec<Node>,
@@ -30,7 +30,7 @@ pub(super) struct Tree {
 }
 
 impl Tree {
-    /// Sorts at least one and fewer than 2³¹ triangles into a tree.
+    /// Builds a tree of at least one and fewer than 2³¹ triangles.
     pub(super) fn new(mut triangles: Vec<[DVec3; 3]>) -> Self {
         let mut nodes = Vec::with_capacity(triangles.len());
         split(&mut triangles, 0, &mut nodes);
@@ -45,13 +45,13 @@ impl Tree {
         self.nodes[0].bounds
     }
 
-    /// Shows all triangles in boxes that are wanted.
+    /// Visits all triangles in the boxes that a predicate accepts.
     pub(super) fn visit(
         &self,
         wanted: impl Fn(&Bounds) -> bool,
         mut show: impl FnMut(&[DVec3; 3]),
     ) {
-        // Halving makes no tree deeper than the bits of a count of triangles.
+        // The depth of the tree is at most the number of bits of the triangle count.
         let mut waiting = [0_u32; 64];
         let mut count = 1;
         while count > 0 {
@@ -74,8 +74,8 @@ impl Tree {
         }
     }
 
-    /// Goes down from near boxes to far ones: `distance` of a triangle replaces `best` where it is smaller, and boxes
-    /// farther than `best` are left out. Squared distances.
+    /// Searches boxes from near to far: `distance` of a triangle replaces `best` if smaller, and boxes farther than
+    /// `best` are skipped. All distances are squared.
     pub(super) fn nearest(
         &self,
         point: DVec3,
@@ -105,7 +105,7 @@ impl Tree {
                     self.nodes[child as usize].bounds.distance_squared(point),
                 )
             });
-            // The nearer one comes last, to be looked at first.
+            // The nearer child is pushed last, so that it is popped first.
             if children[0].1 < children[1].1 {
                 children.swap(0, 1);
             }
@@ -117,7 +117,7 @@ impl Tree {
     }
 }
 
-/// Makes the node of some triangles, of which the first is number `start`, and those below it.
+/// Creates the node of the given triangles, the first of which has number `start`, and its subtree.
 fn split(triangles: &mut [[DVec3; 3]], start: usize, nodes: &mut Vec<Node>) {
     let bounds = Bounds::around(triangles.iter().flatten().copied());
     let here = nodes.len();

@@ -1,11 +1,11 @@
-//! Angles, faces and samples of stuffing, for functions of all kinds.
+//! Tests of angles, faces and samples of stuffing, for functions of all kinds.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::*;
 use crate::Shape;
 
-/// Continuous noise without any regularity: values at random, blended between the nodes of a unit grid.
+/// Continuous random function: random values, interpolated between the nodes of a unit grid.
 fn noise(p: DVec3, seed: u64) -> f64 {
     let hash = |at: [i64; 3]| {
         let mut h = seed;

@@ -1,7 +1,7 @@
 //! Animated PNG (W3C, "Portable Network Graphics (PNG) Specification (Third Edition)", 2025, section 4.9).
 //!
-//! Pictures are compressed by the `png` crate, one at a time, and their data put into an animation's chunks. The number of
-//! pictures, which has to come first, is put in at the end.
+//! The `png` crate compresses each image; its data goes into the animation's chunks. The number of images is at the
+//! start of the file and is written last.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
@@ -9,17 +9,17 @@ use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use super::{Rectangle, around};
 use crate::Image;
 
-/// Parts of a second that delays are counted in.
+/// Time base of delays: units per second.
 const PER_SECOND: u16 = 1000;
 
-/// A file of pictures.
+/// An animated PNG file that is being written.
 #[derive(Debug)]
 pub(super) struct Apng {
     file: BufWriter<File>,
     size: [u32; 2],
-    /// Where the number of pictures is.
+    /// File offset of the number of images.
     control: u64,
-    /// Of the chunks of the animation.
+    /// Sequence number of the next animation chunk.
     sequence: u32,
 }
 
@@ -29,7 +29,7 @@ impl Apng {
         file.write_all(b"\x89PNG\r\n\x1a\n")?;
         let mut header = Vec::new();
         header.extend(size.iter().flat_map(|side| side.to_be_bytes()));
-        // Eight bits, red green blue, the only ways of compression and filters, not interlaced.
+        // Eight bits, RGB, the only compression and filter methods, not interlaced.
         header.extend([8, 2, 0, 0, 0]);
         chunk(&mut file, b"IHDR", &header)?;
         chunk(&mut file, b"sRGB", &[0])?;
@@ -63,7 +63,7 @@ impl Apng {
                 .iter()
                 .flat_map(|part| part.to_be_bytes()),
         );
-        // Pictures stay, and what is new replaces what was there.
+        // Dispose: leave the image; blend: overwrite.
         control.extend([0, 0]);
         chunk(&mut self.file, b"fcTL", &control)?;
         for data in compressed(picture, part)? {
@@ -82,7 +82,7 @@ impl Apng {
     pub(super) fn finish(mut self, pictures: u32) -> io::Result<()> {
         chunk(&mut self.file, b"IEND", &[])?;
         self.file.seek(SeekFrom::Start(self.control))?;
-        // The second number: it plays forever.
+        // The second number, 0, makes it play forever.
         let control = [pictures, 0].map(u32::to_be_bytes).concat();
         chunk(&mut self.file, b"acTL", &control)?;
         self.file.flush()
@@ -94,7 +94,7 @@ impl Apng {
     }
 }
 
-/// The compressed data of a part of a picture, as the `png` crate divides it.
+/// Compressed data of a rectangle of an image, in the chunks that the `png` crate makes.
 fn compressed(picture: &Image, part: Rectangle) -> io::Result<Vec<Vec<u8>>> {
     let mut file = Vec::new();
     let mut encoder = png::Encoder::new(&mut file, part.width, part.height);

@@ -1,6 +1,6 @@
 //! Animated GIF ("Graphics Interchange Format, version 89a", 1990).
 //!
-//! A picture has a palette of its own for the pixels that changed; the others are transparent.
+//! Each image has its own palette for the changed pixels; the others are transparent.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -11,13 +11,13 @@ use super::reduce::{Reduced, reduce};
 use super::{Rectangle, around};
 use crate::Image;
 
-/// Colors of a picture, and the number of the one that is none.
+/// Colors per image; also the index of the transparent color.
 const COLORS: usize = 255;
 const TRANSPARENT: u8 = 255;
-/// What channels may differ by without being stored: less than palettes do.
+/// Largest difference of a channel that is not stored: less than the error of palettes.
 const TOLERANCE: u8 = 2;
 
-/// A file of pictures.
+/// An animated GIF file that is being written.
 pub(super) struct Gif {
     encoder: Encoder<BufWriter<File>>,
     size: [u32; 2],
@@ -55,7 +55,7 @@ impl Gif {
         } else {
             around(shown, &picture.rgba, self.size[0], differs)
         };
-        // The colors that are stored, one after the other, and where.
+        // Colors of the changed pixels in order, and their indices.
         let mut colors = Vec::new();
         let mut stored = Vec::new();
         for row in part.rows(self.size[0]) {
@@ -97,7 +97,7 @@ impl Gif {
     }
 }
 
-/// What was checked to fit when the film was begun.
+/// Side of an image as stored; its range was checked when the file was created.
 fn side(pixels: u32) -> u16 {
     u16::try_from(pixels).unwrap_or(u16::MAX)
 }

@@ -1,9 +1,9 @@
-//! [`Animation`]: pictures one after the other in an animated GIF or PNG.
+//! [`Animation`]: images written as an animated GIF or PNG.
 //!
-//! Each picture is stored as what differs from the one before, so that a film of a still background stays small: as the
-//! rectangle around it in a PNG, which keeps every pixel, and pixel by pixel in a GIF, which has 255 colors a picture.
-//! Nothing but one picture is held in memory. The file has a name of its own while it is written and gets its final one
-//! when it is finished. Cost: O(pixels) a picture; some ten milliseconds for half a million.
+//! Each image is stored as its difference from the previous one, so that an animation with a still background stays
+//! small: a PNG stores the rectangle around the changes without loss; a GIF stores the changed pixels with 255 colors
+//! per image. Only one image is held in memory. The file has a temporary name while it is written and gets its final
+//! name when it is finished. Cost: O(pixels) per image.
 
 mod apng;
 mod gif;
@@ -18,12 +18,12 @@ use crate::{Image, RenderError};
 use apng::Apng;
 use gif::Gif;
 
-/// The endings of films.
+/// Supported file extensions.
 const KNOWN: &str = ".gif, .png, .apng";
 /// Largest side of a picture in a GIF.
 const LARGEST_GIF: u32 = 65_535;
 
-/// An animated picture that is being written; gone if it is dropped before it is finished.
+/// An animated image that is being written; its file is removed if it is dropped before it is finished.
 ///
 /// # Example
 /// ```
@@ -45,11 +45,11 @@ pub struct Animation {
     temporary: PathBuf,
     size: [u32; 2],
     seconds: f64,
-    /// Pictures so far.
+    /// Images written so far.
     pictures: u32,
-    /// What is seen after the last one: for a GIF what it was before its colors were reduced.
+    /// Image shown after the last push: for a GIF, before its colors were reduced.
     shown: Vec<u8>,
-    /// `None` once it is finished or a picture could not be written.
+    /// `None` once the animation is finished or a write failed.
     writer: Option<Writer>,
 }
 
@@ -59,7 +59,7 @@ enum Writer {
     Apng(Apng),
 }
 
-/// Part of a picture.
+/// Rectangle of an image, in pixels.
 #[derive(Clone, Copy, Debug)]
 struct Rectangle {
     left: u32,
@@ -69,13 +69,13 @@ struct Rectangle {
 }
 
 impl Animation {
-    /// Begins a film of pictures of `size` pixels, each shown for as many seconds, in a file whose ending says the format:
-    /// `.gif`, or `.png` or `.apng` for an animated PNG. It plays forever. Most viewers show a picture of a GIF for at
-    /// least 0.02 s.
+    /// Creates an animation of images of `size` pixels, each shown for `seconds_per_frame`, in a file whose extension
+    /// selects the format: `.gif`, or `.png` or `.apng` for an animated PNG. It plays forever. Most viewers show an
+    /// image of a GIF for at least 0.02 s.
     ///
     /// # Errors
-    /// Before anything is written: if the ending is another one; if a side of the pictures is 0 or, in a GIF, more than
-    /// 65535; if the time is not from 0.01 s to 10 s; if the file cannot be made.
+    /// Before anything is written: if the extension is not supported; if a side of the images is 0 or, in a GIF, more
+    /// than 65535; if the time is not from 0.01 s to 10 s; if the file cannot be created.
     pub fn create(
         path: impl AsRef<Path>,
         size: [u32; 2],
@@ -127,18 +127,19 @@ impl Animation {
         Ok(film)
     }
 
-    /// Whether a film can have such a name.
+    /// Checks that a file name has a supported extension.
     ///
     /// # Errors
-    /// If not: the message names the endings that are known.
+    /// If it has not: the message lists the supported extensions.
     pub fn check_path(path: impl AsRef<Path>) -> Result<(), RenderError> {
         is_gif(path.as_ref()).map(|_| ())
     }
 
-    /// Adds a picture.
+    /// Adds an image.
     ///
     /// # Errors
-    /// If it has another size than the film; if it or an earlier one cannot be written: then the film is lost.
+    /// If its size is not that of the animation; if it cannot be written or an earlier write failed: the animation is
+    /// then lost.
     pub fn push(&mut self, picture: &Image) -> Result<(), RenderError> {
         let Image { width, height, .. } = *picture;
         if [width, height] != self.size {
@@ -162,7 +163,7 @@ impl Animation {
             None => Err(broken()),
         };
         if let Err(source) = written {
-            // Part of a picture may have been written: no film with that gets its name.
+            // The file may end in part of an image and must not get its final name.
             self.writer = None;
             return Err(self.failed(source));
         }
@@ -170,10 +171,10 @@ impl Animation {
         Ok(())
     }
 
-    /// Completes the film and gives it its name.
+    /// Completes the animation and gives its file the final name.
     ///
     /// # Errors
-    /// If it has no picture or one of them or the end cannot be written; then nothing is left.
+    /// If it has no image, or if a write failed; no file is left then.
     pub fn finish(mut self) -> Result<(), RenderError> {
         if self.pictures == 0 {
             return Err(RenderError::EmptyFilm {
@@ -202,12 +203,12 @@ impl Drop for Animation {
     fn drop(&mut self) {
         // Closed before it is removed: not every system removes an open file.
         self.writer = None;
-        // The file is gone already if the film was finished; else an error here is not reported.
+        // The temporary file is already renamed if the animation was finished; other errors cannot be reported here.
         let _ = fs::remove_file(&self.temporary);
     }
 }
 
-/// The error of a film without a writer.
+/// Error of an animation after a failed write.
 fn broken() -> io::Error {
     io::Error::other("an earlier picture could not be written")
 }
@@ -227,7 +228,7 @@ fn is_gif(path: &Path) -> Result<bool, RenderError> {
     }
 }
 
-/// How long the picture of a number is shown, in parts of a second, so that rounding does not add up.
+/// Delay of the image of a given index in units of the time base; rounding errors do not add up.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -239,8 +240,8 @@ fn ticks(number: u32, seconds: f64, per_second: f64) -> u16 {
     (until(number + 1.0) - until(number)).clamp(1.0, f64::from(u16::MAX)) as u16
 }
 
-/// The rectangle around all pixels for which `differs` holds, given their four bytes before and now; the first pixel
-/// alone if there is none.
+/// Bounding rectangle of all pixels for which `differs` holds, given their four bytes before and now; the first pixel
+/// if there are none.
 fn around(
     before: &[u8],
     now: &[u8],
@@ -273,7 +274,7 @@ fn around(
 }
 
 impl Rectangle {
-    /// All of a picture.
+    /// Rectangle that covers an image.
     fn whole([width, height]: [u32; 2]) -> Self {
         Self {
             left: 0,
@@ -283,7 +284,7 @@ impl Rectangle {
         }
     }
 
-    /// The bytes of its rows in a picture of some width.
+    /// Byte ranges of its rows in an image of the given width.
     fn rows(self, width: u32) -> impl Iterator<Item = std::ops::Range<usize>> {
         (self.top..self.top + self.height).map(move |y| {
             let start = 4 * (y as usize * width as usize + self.left as usize);
@@ -304,7 +305,7 @@ mod tests {
             let picture = Image::filled(3, 2, [1, 2, 3]);
             let mut film = Animation::create(&path, [3, 2], 0.1).unwrap();
             film.push(&picture).unwrap();
-            // What a push does that fails.
+            // State after a failed push.
             film.writer = None;
             assert!(matches!(film.push(&picture), Err(RenderError::Io { .. })));
             let temporary = film.temporary.clone();
@@ -313,7 +314,7 @@ mod tests {
         }
     }
 
-    /// On a disk that is full.
+    /// Writing to a full disk fails.
     #[test]
     #[cfg(target_os = "linux")]
     fn a_frame_that_cannot_be_written_ends_the_animation() {
@@ -321,7 +322,7 @@ mod tests {
         let name = format!("incise-full-{}.gif", std::process::id());
         let path = std::env::temp_dir().join(name);
         let mut picture = Image::filled(size[0], size[1], [0; 3]);
-        // More than a buffer of eight thousand bytes holds, however it is compressed.
+        // More than a buffer of 8 KiB holds, even compressed.
         let noise = (0..).map(|i: u32| i.wrapping_mul(2_654_435_761).to_be_bytes()[0]);
         for (byte, noise) in picture.rgba.iter_mut().zip(noise) {
             *byte = noise;

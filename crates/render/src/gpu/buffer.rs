@@ -1,4 +1,4 @@
-//! [`Buffer`]: numbers in device memory that are replaced as a whole.
+//! [`Buffer`]: array in device memory that is replaced as a whole.
 
 use std::marker::PhantomData;
 
@@ -6,20 +6,20 @@ use bytemuck::NoUninit;
 use incise::gpu::wgpu::{self, BufferUsages};
 use incise::gpu::{GpuContext, GpuError};
 
-/// A row of numbers that grows when it has to, by half more than is needed.
+/// Growable array in device memory; it grows to 1.5 times the needed size.
 #[derive(Debug)]
 pub(super) struct Buffer<T> {
     what: &'static str,
     usage: BufferUsages,
     buffer: wgpu::Buffer,
     len: usize,
-    /// Bytes written since it was made.
+    /// Bytes written since its creation.
     sent: u64,
     of: PhantomData<T>,
 }
 
 impl<T: NoUninit> Buffer<T> {
-    /// An empty one.
+    /// Creates an empty buffer.
     pub(super) fn new(
         gpu: &GpuContext,
         what: &'static str,
@@ -48,7 +48,7 @@ impl<T: NoUninit> Buffer<T> {
         Ok(())
     }
 
-    /// Makes room for as many values; what was there is lost if there was none.
+    /// Makes room for `len` values; contents are lost if the buffer has to grow.
     pub(super) fn resize(&mut self, gpu: &GpuContext, len: usize) -> Result<(), GpuError> {
         let bytes = (len * size_of::<T>()) as u64;
         if bytes > self.buffer.size() {
@@ -73,7 +73,8 @@ impl<T: NoUninit> Buffer<T> {
     }
 }
 
-/// Most bytes of a buffer: those that no shader sees, as for pictures on their way, may be larger than a binding.
+/// Size limit of a buffer in bytes: buffers that no shader binds, such as readback buffers, may exceed the binding
+/// limit.
 fn limit(gpu: &GpuContext, usage: BufferUsages) -> u64 {
     if usage.intersects(BufferUsages::STORAGE | BufferUsages::UNIFORM) {
         gpu.buffer_limit()
@@ -82,7 +83,7 @@ fn limit(gpu: &GpuContext, usage: BufferUsages) -> u64 {
     }
 }
 
-/// Makes a buffer, or says why not.
+/// Creates a buffer after a check of its size.
 pub(super) fn create(
     gpu: &GpuContext,
     what: &'static str,

@@ -1,12 +1,12 @@
-//! [`GpuRenderer`]: pictures drawn by a device.
+//! [`GpuRenderer`]: images drawn by a device.
 //!
-//! The bodies' vertices are not sent: the vertex shader reads positions from the solver's own buffer, looks up the triangle
-//! and its corners, and normals are computed on the device too. What is sent is all of the skin's triangles and colors when
-//! any changed, and for each picture the view and the obstacles. Several solvers' positions are put together by copies on the device. A
-//! simulation that runs on the processor sends its positions. All is one submit; nothing is read back unless an [`Image`]
-//! is asked for.
+//! Vertex positions are not uploaded: the vertex shader reads the solver's position buffer and looks up the triangle
+//! and its corners; normals are computed on the device. Triangles and colors of the whole skin are uploaded when any of
+//! them changed, view and obstacles for each image. Positions of several solvers are concatenated by copies on the
+//! device. A simulation on the processor uploads its positions. All commands go in one submit; only an [`Image`] is
+//! read back.
 //!
-//! Cost: a thread a triangle for the normals, four samples a pixel.
+//! Cost: one thread per triangle for the normals, four samples per pixel.
 
 mod buffer;
 mod pipelines;
@@ -28,13 +28,13 @@ use pipelines::{Pipelines, bind};
 use target::{Dark, Target};
 use upload::{Upload, solvers_here};
 
-/// Threads of a workgroup of `normals.wgsl`.
+/// Workgroup size of `normals.wgsl`.
 const THREADS: usize = 64;
-/// Most workgroups along one axis.
+/// Largest number of workgroups along one axis.
 const WIDEST: u32 = 65_535;
 
-/// Draws on a device. One of them serves any number of paintings and simulations, but those that take turns upload their
-/// triangles each time.
+/// Renderer on a device. One renderer serves any number of render scenes and simulations, but alternating between them
+/// uploads the triangles each time.
 ///
 /// # Example
 /// ```
@@ -70,10 +70,10 @@ pub struct GpuRenderer {
 }
 
 impl GpuRenderer {
-    /// Compiles what is drawn with.
+    /// Compiles the pipelines.
     ///
     /// # Errors
-    /// [`RenderError::Unable`] names what the device lacks; [`RenderError::Gpu`] if it is lost.
+    /// [`RenderError::Unable`] names the missing feature; [`RenderError::Gpu`] if the device is lost.
     pub fn new(gpu: Arc<GpuContext>) -> Result<Self, RenderError> {
         pipelines::require(&gpu)?;
         Ok(Self {
@@ -92,21 +92,20 @@ impl GpuRenderer {
         &self.gpu
     }
 
-    /// Bytes that it has sent to the device since it was made. What the solvers send is counted by
-    /// [`GpuContext::traffic`].
+    /// Number of bytes uploaded by this renderer. Uploads of the solvers are counted by [`GpuContext::traffic`].
     #[must_use]
     pub fn uploaded_bytes(&self) -> u64 {
         self.upload.sent()
     }
 
-    /// How often it has read something from the device since it was made, each a wait: once an [`Image`].
+    /// Number of readbacks by this renderer, each with a wait for the device: one per [`Image`].
     #[must_use]
     pub fn readbacks(&self) -> u64 {
         self.readbacks
     }
 
-    /// Whether a simulation has to be [read back](Simulation::read_back) for a picture of the present: it is on another
-    /// device than this, or on any and has made no step since the render scene was made or reset.
+    /// True if drawing the current state needs a [readback](Simulation::read_back) of the simulation first: it runs on
+    /// another device, or it has made no step since the render scene was created or reset.
     #[must_use]
     pub fn needs_read_back(&self, render_scene: &RenderScene, simulation: &Simulation) -> bool {
         let mut solvers = simulation.device_solvers();
@@ -114,15 +113,15 @@ impl GpuRenderer {
         solvers.any(|solver| !current || !Arc::ptr_eq(solver.gpu(), &self.gpu))
     }
 
-    /// Draws into textures of its own and returns the finished picture's, which stays the same until the size changes, for
-    /// a window to show: its colors as they are stored (`Rgba8Unorm`), to be sampled. Returns when the commands are with the
-    /// driver.
+    /// Draws into textures of the renderer and returns the texture of the finished image, for a window to show. The
+    /// texture stays the same until the size changes and holds stored colors (`Rgba8Unorm`) for sampling. Returns when
+    /// the commands are submitted.
     ///
-    /// A simulation on this device is drawn from there, once it has made a step since the render scene was made or reset. Of
-    /// others, and until then, the positions that the host knows are sent: see [`GpuRenderer::needs_read_back`].
+    /// A simulation on this device is drawn from its own buffer after its first step since the render scene was created
+    /// or reset. Otherwise the host's positions are uploaded: see [`GpuRenderer::needs_read_back`].
     ///
     /// # Errors
-    /// If a side of the picture is 0 or more than the device allows; if the device is lost or out of memory.
+    /// If a side of the image is 0 or more than the device allows; if the device is lost or out of memory.
     ///
     /// # Panics
     /// If the render scene does not match the simulation.
@@ -153,7 +152,7 @@ impl GpuRenderer {
         Ok(&self.target.insert(target).shown)
     }
 
-    /// Hands over the commands that draw what was sent.
+    /// Submits the draw commands.
     fn record(&self, target: &Target, solvers: &[&GpuSolver]) {
         let (gpu, upload) = (&*self.gpu, &self.upload);
         let mut encoder = gpu.device().create_command_encoder(&Default::default());
@@ -209,7 +208,7 @@ impl GpuRenderer {
         gpu.queue().submit([encoder.finish()]);
     }
 
-    /// Sums up the normals of the skin's vertices.
+    /// Computes the normal sums of the skin's vertices.
     fn compute_normals(&self, encoder: &mut wgpu::CommandEncoder, positions: &wgpu::Buffer) {
         let upload = &self.upload;
         if upload.triangles.len() == 0 {
@@ -235,8 +234,8 @@ impl GpuRenderer {
         pass.dispatch_workgroups(groups.div_ceil(rows), rows, 1);
     }
 
-    /// The sums that [`normal_sums`](crate::normal_sums) defines, of the skin's vertices in the last picture, for tests: waits
-    /// for the device.
+    /// Reads the [`normal_sums`](crate::normal_sums) of the skin's vertices in the last image, for tests. Waits for the
+    /// device.
     ///
     /// # Errors
     /// If the device is lost or out of memory.
@@ -247,7 +246,7 @@ impl GpuRenderer {
         Ok(bytemuck::pod_collect_to_vec(&values))
     }
 
-    /// Draws what bodies leave on the ground and blurs it.
+    /// Draws the contact shadow and blurs it.
     fn draw_contact_shadow(&self, encoder: &mut wgpu::CommandEncoder, positions: &wgpu::Buffer) {
         let [first, second] = &self.dark.views;
         {
@@ -284,7 +283,7 @@ impl GpuRenderer {
         }
     }
 
-    /// Draws, waits and reads the picture back.
+    /// Draws, waits and reads the image back.
     ///
     /// # Errors
     /// Returns the errors of [`GpuRenderer::draw`].

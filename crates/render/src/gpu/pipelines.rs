@@ -1,4 +1,4 @@
-//! [`Pipelines`]: all shaders compiled, each with the state that it draws with.
+//! [`Pipelines`]: all shaders compiled, each with its render state.
 
 use incise::gpu::wgpu::{self, VertexAttribute, VertexFormat, VertexStepMode};
 use incise::gpu::{GpuContext, GpuError};
@@ -7,7 +7,7 @@ use super::shaders::shaders;
 use super::target::{COLOR, DARK, DEPTH, SAMPLES};
 use crate::RenderError;
 
-/// All that is drawn with.
+/// All pipelines and their layouts.
 #[derive(Debug)]
 pub(super) struct Pipelines {
     pub(super) normals: wgpu::ComputePipeline,
@@ -20,33 +20,33 @@ pub(super) struct Pipelines {
     pub(super) plane: wgpu::RenderPipeline,
 }
 
-/// How something is drawn.
+/// State of a render pipeline.
 struct How<'a> {
     shader: &'a str,
     fragment: &'a str,
-    /// Once for each vertex or each instance, and its rows of numbers, if vertices come from a buffer.
+    /// Step mode and attributes of the vertex buffer, if there is one.
     vertices: Option<(VertexStepMode, &'a [VertexFormat])>,
-    /// Into the picture with its samples and depths, or else into the contact shadow.
+    /// Depth mode for the image with its samples; `None` for the contact shadow.
     depth: Option<Depth>,
     blend: Option<wgpu::BlendState>,
 }
 
-/// What is in front of what.
+/// Depth test and write mode.
 #[derive(Clone, Copy)]
 enum Depth {
-    /// Behind all.
+    /// Background: drawn without a depth test.
     Behind,
-    /// Hides what is behind it.
+    /// Opaque: tests and writes depth.
     Solid,
-    /// Is hidden and hides nothing.
+    /// Transparent: tests depth and writes none.
     Veil,
 }
 
 impl Pipelines {
     /// # Errors
-    /// If the device refuses one of them.
+    /// If the device rejects one of them.
     pub(super) fn new(gpu: &GpuContext) -> Result<Self, RenderError> {
-        // What a device lacks is reported here and not by its handler of uncaptured errors.
+        // Validation errors are returned here instead of reaching the handler of uncaptured errors.
         let refused = gpu.device().push_error_scope(wgpu::ErrorFilter::Validation);
         let how = How {
             shader: "",
@@ -129,7 +129,7 @@ impl Pipelines {
     }
 }
 
-/// Binds buffers, textures and samplers in the order of the shader's numbers.
+/// Binds buffers, textures and samplers in the order of the shader's binding numbers.
 pub(super) fn bind(
     gpu: &GpuContext,
     layout: &wgpu::BindGroupLayout,
@@ -149,7 +149,7 @@ pub(super) fn bind(
     })
 }
 
-/// The largest of all that is drawn.
+/// Blend by maximum.
 const LARGEST: wgpu::BlendState = wgpu::BlendState {
     color: wgpu::BlendComponent {
         src_factor: wgpu::BlendFactor::One,
@@ -163,7 +163,7 @@ const LARGEST: wgpu::BlendState = wgpu::BlendState {
     },
 };
 
-/// Over what is there, which stays opaque.
+/// Alpha blend over an opaque target.
 const COVERING: wgpu::BlendState = wgpu::BlendState {
     color: wgpu::BlendComponent {
         src_factor: wgpu::BlendFactor::SrcAlpha,
@@ -177,7 +177,7 @@ const COVERING: wgpu::BlendState = wgpu::BlendState {
     },
 };
 
-/// A report of several lines as one.
+/// Joins the lines of a message into one.
 fn one_line(message: &str) -> String {
     let lines = message.lines().map(str::trim);
     let lines: Vec<_> = lines.filter(|line| !line.is_empty()).collect();
@@ -235,7 +235,7 @@ fn drawn(gpu: &GpuContext, how: &How<'_>) -> wgpu::RenderPipeline {
                 compilation_options: wgpu::PipelineCompilationOptions::default(),
                 buffers,
             },
-            // Nothing is culled: through an open cut the inside is seen.
+            // No culling: the inside is visible through an open cut.
             primitive: wgpu::PrimitiveState::default(),
             depth_stencil: how.depth.map(|depth| wgpu::DepthStencilState {
                 format: DEPTH,
@@ -266,10 +266,10 @@ fn drawn(gpu: &GpuContext, how: &How<'_>) -> wgpu::RenderPipeline {
         })
 }
 
-/// Whether the device grants what the shaders use.
+/// Checks that the device supports the features that the shaders use.
 ///
 /// # Errors
-/// If it does not, with what is missing.
+/// If it does not; the error names the missing feature.
 pub(super) fn require(gpu: &GpuContext) -> Result<(), RenderError> {
     let limits = gpu.device().limits();
     let needs = [

@@ -1,19 +1,19 @@
-//! [`shaders`]: the text of every shader, for the device and for other compilers to check.
+//! [`shaders`]: source text of every shader, for the device and for validation by other compilers.
 
-/// A shader as it is given to the driver.
+/// A shader as passed to the driver.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Shader {
-    /// The name, which is that of its file.
+    /// Name of the shader and of its file.
     pub name: &'static str,
-    /// WGSL, with the parts that it shares with others in front.
+    /// WGSL source, including the shared parts in front.
     pub source: String,
 }
 
 const VIEW: &str = include_str!("../../shader/view.wgsl");
 const SHADING: &str = include_str!("../../shader/shading.wgsl");
 
-/// What is drawn into a picture has the view and the shading in front; the others stand alone.
+/// Shaders of the image pass: view and shading are put in front. The others stand alone.
 const DRAWN: [(&str, &str); 4] = [
     ("background", include_str!("../../shader/background.wgsl")),
     ("skin", include_str!("../../shader/skin.wgsl")),

@@ -1,4 +1,4 @@
-//! [`Target`]: the textures that a picture is drawn into, and the way of its pixels to the host.
+//! [`Target`]: render textures of an image and readback of its pixels.
 
 use std::sync::mpsc;
 
@@ -10,12 +10,12 @@ use crate::contact_shadow::SIDE;
 use crate::{Image, RenderError};
 
 pub(super) const COLOR: TextureFormat = TextureFormat::Rgba8UnormSrgb;
-/// The format of colors without their meaning: eight bits each, as they are stored.
+/// Format of stored colors: eight bits per channel without sRGB conversion.
 const STORED: TextureFormat = TextureFormat::Rgba8Unorm;
 pub(super) const DEPTH: TextureFormat = TextureFormat::Depth32Float;
-/// Of the contact shadow on the ground.
+/// Format of the contact shadow.
 pub(super) const DARK: TextureFormat = TextureFormat::R8Unorm;
-/// Samples of a pixel.
+/// Samples per pixel.
 pub(super) const SAMPLES: u32 = 4;
 
 /// Textures of one size.
@@ -25,7 +25,7 @@ pub(super) struct Target {
     pub(super) samples: wgpu::TextureView,
     pub(super) depth: wgpu::TextureView,
     pub(super) resolved: wgpu::TextureView,
-    /// View of the resolved texture as it is stored, for windows that take colors as they are.
+    /// View of the resolved texture with stored colors, for windows that take them without conversion.
     pub(super) shown: wgpu::TextureView,
     texture: wgpu::Texture,
 }
@@ -72,7 +72,7 @@ impl Target {
         })
     }
 
-    /// Waits for the picture and reads it; counts that.
+    /// Waits for the image and reads it; increments `readbacks`.
     pub(super) fn read(&self, gpu: &GpuContext, readbacks: &mut u64) -> Result<Image, RenderError> {
         let [width, height] = self.size;
         let row = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
@@ -106,7 +106,7 @@ impl Target {
     }
 }
 
-/// Waits for the first bytes of a buffer; counts that.
+/// Waits for the first bytes of a buffer and reads them; increments the readback counter.
 pub(super) fn read_buffer(
     gpu: &GpuContext,
     what: &'static str,
@@ -124,7 +124,7 @@ pub(super) fn read_buffer(
     collect(gpu, encoder, &staging, readbacks)
 }
 
-/// Hands over commands that fill a buffer, waits and reads it.
+/// Submits commands that fill a buffer, waits and reads it.
 fn collect(
     gpu: &GpuContext,
     encoder: wgpu::CommandEncoder,
@@ -147,7 +147,7 @@ fn collect(
     Ok(range.to_vec())
 }
 
-/// Two textures for the contact shadow on the ground, which is blurred from one into the other and back.
+/// Two textures of the contact shadow, which is blurred from one into the other and back.
 #[derive(Debug)]
 pub(super) struct Dark {
     pub(super) views: [wgpu::TextureView; 2],

@@ -1,8 +1,8 @@
-//! [`Upload`]: what a device has to know to draw, sent only when it changed.
+//! [`Upload`]: device copies of the data to draw, uploaded only when they changed.
 //!
-//! When a cut or a jump changed the skin, all of it is sent again, and all its colors: O(triangles), also for a small cut.
-//! Positions are those of the solvers on this device or else sent each time: 16 bytes a particle. View, planes and the
-//! triangles of obstacles and blades are sent for each picture: some hundred bytes where there is no obstacle.
+//! After a cut or a reset the whole skin and all its colors are uploaded again: O(triangles), even for a small cut.
+//! Positions are read from the solvers on this device or else uploaded each time: 16 bytes per particle. View, planes
+//! and the triangles of obstacles and blades are uploaded for each image.
 
 use std::sync::Arc;
 
@@ -19,10 +19,10 @@ use crate::props::{Plane, PropCorner, Props};
 use crate::view::View;
 use crate::{RenderError, RenderScene, Style};
 
-/// Set in a vertex that a cut laid bare.
+/// Flag of a vertex on a cut face.
 const CUT: u32 = 0x8000_0000;
 
-/// The key of no skin: revisions begin with 1.
+/// Key of an empty skin: revisions start at 1.
 const NOTHING: (u64, bool) = (0, false);
 
 /// `View` in `view.wgsl`.
@@ -49,13 +49,13 @@ pub(super) struct PlaneNumbers {
     numbers: [f32; 4],
 }
 
-/// Buffers of what is drawn.
+/// Buffers of the data to draw.
 #[derive(Debug)]
 pub(super) struct Upload {
-    /// The skin that was sent last, and whether its particles are numbered as the solvers on the device do.
+    /// Revision of the uploaded skin, and whether its particles are numbered as in the device's solvers.
     skin: (u64, bool),
     coloring: u64,
-    /// Whether there is a ground.
+    /// True if there is a ground.
     pub(super) has_ground: bool,
     pub(super) view: Buffer<ViewNumbers>,
     pub(super) positions: Buffer<[f32; 4]>,
@@ -91,7 +91,7 @@ impl Upload {
         })
     }
 
-    /// Bytes sent since it was made.
+    /// Bytes uploaded since its creation.
     pub(super) fn sent(&self) -> u64 {
         let skin = self.vertices.sent() + self.triangles.sent() + self.count.sent();
         let bodies = skin + self.positions.sent() + self.parts.sent() + self.colors.sent();
@@ -99,7 +99,7 @@ impl Upload {
         bodies + self.view.sent() + self.props.sent() + planes
     }
 
-    /// Sends what is not there yet. `solvers` are those to draw from, none if positions are to be sent.
+    /// Uploads what has changed. `solvers` are the position sources; empty if positions are to be uploaded.
     pub(super) fn send(
         &mut self,
         gpu: &GpuContext,
@@ -110,7 +110,7 @@ impl Upload {
         view: &View,
     ) -> Result<(), RenderError> {
         let skin = (render_scene.topology(), !solvers.is_empty());
-        // A key stands for what has arrived: none while something is on its way and may fail.
+        // The key is set only after the upload succeeded.
         if self.skin != skin {
             self.skin = NOTHING;
             self.send_skin(gpu, render_scene, simulation, solvers)?;
@@ -140,7 +140,7 @@ impl Upload {
         Ok(())
     }
 
-    /// Sends what the skin is made of; its particles are numbered as the positions are stored.
+    /// Uploads the skin's triangles and vertices; particles are numbered as the positions are stored.
     fn send_skin(
         &mut self,
         gpu: &GpuContext,
@@ -149,7 +149,7 @@ impl Upload {
         solvers: &[&GpuSolver],
     ) -> Result<(), RenderError> {
         let skin = render_scene.skin();
-        // Where the particles of each solver begin.
+        // Index of the first particle of each solver.
         let mut first = Vec::with_capacity(solvers.len());
         let mut particles = 0;
         for solver in solvers {
@@ -174,7 +174,7 @@ impl Upload {
         Ok(())
     }
 
-    /// Says where parts are, and sends positions unless they are on the device.
+    /// Uploads the origins of parts, and positions unless they are on the device.
     fn send_positions(
         &mut self,
         gpu: &GpuContext,
@@ -185,7 +185,7 @@ impl Upload {
         let part = |origin: DVec3| view.relative(origin).extend(0.0).to_array();
         if solvers.is_empty() {
             let positions = simulation.positions();
-            // Near the bodies: far from the origin of the world single precision would not do.
+            // An origin near the bodies: single precision does not suffice far from the world origin.
             let origin = positions.first().copied().unwrap_or_default();
             let local = |x: &DVec3| (*x - origin).as_vec3().extend(0.0).to_array();
             let local: Vec<[f32; 4]> = positions.iter().map(local).collect();
@@ -204,7 +204,7 @@ impl Upload {
         Ok(())
     }
 
-    /// Puts the positions of several solvers together; those of a single one are drawn from where they are.
+    /// Concatenates the positions of several solvers; a single solver's buffer is used directly.
     pub(super) fn gather<'b>(
         &'b self,
         encoder: &mut wgpu::CommandEncoder,
@@ -223,7 +223,7 @@ impl Upload {
     }
 }
 
-/// The solvers of a simulation, if they are on this device and have taken their particles there.
+/// Solvers of a simulation, if they run on this device and their particles are there.
 pub(super) fn solvers_here<'s>(
     gpu: &Arc<GpuContext>,
     simulation: &'s Simulation,
@@ -239,7 +239,7 @@ pub(super) fn solvers_here<'s>(
     }
 }
 
-/// Bytes of the positions of all its particles.
+/// Size of a solver's positions in bytes.
 fn bytes_of(solver: &GpuSolver) -> u64 {
     (solver.cached_host().particle_count() * size_of::<[f32; 4]>()) as u64
 }

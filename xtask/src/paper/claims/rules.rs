@@ -1,6 +1,6 @@
-//! The rules by which claims are decided, in the order of the paper.
+//! Rules that decide the claims, in the order of the paper.
 //!
-//! Each looks at the rows of one table or figure, and holds for all, for some or for none of its cases.
+//! Each rule uses the rows of one table or figure, and holds for all, some or none of its cases.
 
 use super::super::convergence::{PaperMethod, Setup};
 use super::super::{fig4, fig8, table1, table2};
@@ -342,7 +342,7 @@ fn cutting(rows: &[Evidence]) -> Vec<Claim> {
     ]
 }
 
-/// Lowest and highest.
+/// Formats the lowest and highest value.
 fn spread(values: &[f64]) -> String {
     let low = values.iter().copied().fold(f64::INFINITY, f64::min);
     let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -354,7 +354,7 @@ fn spread(values: &[f64]) -> String {
     }
 }
 
-/// In how many of them.
+/// Formats the number of cases that hold.
 fn count(holds: &[bool]) -> String {
     let count = holds.iter().filter(|&&holds| holds).count();
     format!("in {count} of {} cases", holds.len())
