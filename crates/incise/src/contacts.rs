@@ -23,7 +23,7 @@ use incise_mesh::{ParticleId, closest_on_triangle};
 use incise_xpbd::{ContactLaw, FaceContact, PairContact};
 
 use crate::backend::{AnySolver, each, each_mut};
-use crate::report::milliseconds;
+use crate::report::{ContactCounts, milliseconds};
 use crate::scene::{ContactPairs, ContactSpec};
 use crate::validate::{existing, value, within};
 use crate::{Error, Scene};
@@ -95,15 +95,6 @@ pub(crate) struct TouchChange {
     /// Ascending.
     pub(crate) pieces: [u32; 2],
     pub(crate) begins: bool,
-}
-
-/// Counts and depths of the contacts of an island after a frame.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct ContactCounts {
-    pub(crate) candidates: usize,
-    pub(crate) active: usize,
-    pub(crate) colors: usize,
-    pub(crate) buried: usize,
 }
 
 /// What of an island touches.

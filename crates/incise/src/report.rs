@@ -9,7 +9,6 @@ use incise_cutting::CutDelta;
 use incise_xpbd::Softened;
 use serde::Serialize;
 
-use crate::contacts::ContactCounts;
 use crate::scene::{Method, SolverSpec};
 pub use crate::substeps::{Choice, Shortfall};
 use crate::warning::Warning;
@@ -335,6 +334,15 @@ pub struct ContactReport {
     pub depth_p99: f64,
     /// Vertices deep in another body or piece from which no way out was found. They are not pushed out.
     pub buried: usize,
+}
+
+/// Counts of the contacts of an island after a frame.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ContactCounts {
+    pub(crate) candidates: usize,
+    pub(crate) active: usize,
+    pub(crate) colors: usize,
+    pub(crate) buried: usize,
 }
 
 impl ContactReport {

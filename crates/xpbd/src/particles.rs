@@ -199,3 +199,11 @@ impl<R: Float> Particles<R> {
             .sum()
     }
 }
+
+/// The number of a particle, tet or constraint in 32 bits.
+///
+/// # Panics
+/// With 2³² of them or more.
+pub(crate) fn number(index: usize) -> u32 {
+    u32::try_from(index).expect("particles, tets and constraints are numbered in 32 bits")
+}

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::ConstraintKind;
 use crate::float::{finite, load, store, weight};
-use crate::particles::{PARALLEL_PARTICLES, Particles};
+use crate::particles::{PARALLEL_PARTICLES, Particles, number};
 use crate::substep::{Factors, Substep};
 use crate::{Float, Pose, XpbdError};
 
@@ -357,8 +357,4 @@ fn check(what: &'static str, value: f64) -> Result<(), XpbdError> {
         value,
         range: "at least 0 and finite",
     })
-}
-
-fn number(particle: usize) -> u32 {
-    u32::try_from(particle).expect("particles are numbered by 32 bits")
 }

@@ -31,7 +31,7 @@ use incise_graph::{Coloring, GraphError};
 use super::ConstraintKind;
 use crate::direction::direction;
 use crate::float::{load, store, weight};
-use crate::particles::Particles;
+use crate::particles::{Particles, number};
 use crate::substep::Substep;
 use crate::team::parallel_rounds;
 use crate::{Float, XpbdError};
@@ -648,8 +648,8 @@ fn take_colors<T, const K: usize>(
                 };
                 let other = (0..constraint).find(is_other).unwrap_or(constraint);
                 return Err(refuse(GraphError::SharedParticle {
-                    first: crate::solver::number(other),
-                    second: crate::solver::number(constraint),
+                    first: number(other),
+                    second: number(constraint),
                     color: colors.color(constraint),
                     particle,
                 }));

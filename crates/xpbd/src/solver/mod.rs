@@ -19,7 +19,7 @@ use crate::constraints::Constraints;
 use crate::degeneracy_jitter::jitter;
 use crate::float::{finite, store};
 use crate::floating_origin::{frame_of, recenter};
-use crate::particles::Particles;
+use crate::particles::{Particles, number};
 use crate::stepper::Stepper;
 use crate::tets::TetSet;
 use crate::{Changes, Float, KappaLimit, Material, StepReport, StepSettings, XpbdError};
@@ -549,8 +549,4 @@ impl<R: Float> Solver<R> {
         let repaired = stepper.frame(particles, tets, constraints, settings, part, keep);
         Ok(StepReport { repaired, jittered })
     }
-}
-
-pub(crate) fn number(index: usize) -> u32 {
-    u32::try_from(index).expect("particles and tets are numbered by 32 bits")
 }
