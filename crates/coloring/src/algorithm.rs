@@ -184,6 +184,7 @@ impl FromStr for Algorithm {
             "tabu" => count(100_000).map(Self::Tabu),
             _ => Err(ColoringError::UnknownAlgorithm {
                 name: text.to_owned(),
+                known: Self::NAMES.join(", "),
             }),
         }
     }

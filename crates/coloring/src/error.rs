@@ -1,16 +1,16 @@
 //! [`ColoringError`]: invalid requests and improper colorings.
 
-use crate::Algorithm;
-
 /// Errors of coloring: unknown names, invalid parameters, and failed checks.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ColoringError {
     /// No algorithm has this name.
-    #[error("unknown coloring algorithm '{name}'; known are: {}", Algorithm::NAMES.join(", "))]
+    #[error("unknown coloring algorithm '{name}'; known are: {known}")]
     UnknownAlgorithm {
         /// The name asked for.
         name: String,
+        /// The known names.
+        known: String,
     },
     /// The parameter of an algorithm is invalid.
     #[error("coloring algorithm '{text}': {expected} expected behind the name")]

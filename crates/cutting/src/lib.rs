@@ -40,6 +40,7 @@ mod faces;
 mod finite;
 mod index;
 mod level_set;
+mod motion;
 mod operation;
 mod options;
 mod parallel;

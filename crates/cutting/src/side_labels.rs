@@ -15,7 +15,7 @@ use incise_mesh::{DisjointSets, ParticleId, TetId, TetMesh};
 use crate::CutDelta;
 use crate::blade::Blade;
 use crate::index::index;
-use crate::stroke::Motion;
+use crate::motion::Motion;
 use crate::surface::CutSurface;
 
 /// The sides given to tets with all particles on the surface, for as long as they are not split.

@@ -26,7 +26,8 @@ use glam::{DMat3, DVec3};
 use incise_mesh::{ParticleId, TetId, TetMesh};
 
 use crate::blade::{ALIGNED, Blade, CrossedEdge, SAME_SHEET};
-use crate::ccd::{EdgeHit, MovingSegment};
+use crate::ccd::EdgeHit;
+use crate::motion::Motion;
 use crate::operation::{Crossing, Operation, SplitError};
 use crate::parallel;
 use crate::side_labels::{GivenSides, Sides, side_by_blade};
@@ -34,30 +35,6 @@ use crate::sign_split::linear;
 use crate::stroke_registry::StrokeRegistry;
 use crate::surface::{CutSurface, Tangent};
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
-
-/// The particles' positions at the beginning and the end of a frame.
-#[derive(Clone, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Motion {
-    pub(crate) before: Vec<DVec3>,
-    pub(crate) now: Vec<DVec3>,
-}
-
-impl Motion {
-    fn edge(&self, ends: [ParticleId; 2]) -> MovingSegment {
-        MovingSegment {
-            before: ends.map(|p| self.before[p.index()]),
-            now: ends.map(|p| self.now[p.index()]),
-        }
-    }
-
-    fn push(&mut self, crossing: &Crossing) {
-        for values in [&mut self.before, &mut self.now] {
-            let [a, b] = crossing.ends.map(|p| values[p.index()]);
-            values.push(a + (b - a) * crossing.parameter);
-        }
-    }
-}
 
 /// The state of a stroke.
 #[derive(Clone, Debug)]

@@ -19,7 +19,8 @@ use crate::blade::Blade;
 use crate::broad_phase::{Search, SweptSegment};
 use crate::ccd::{EdgeHit, MovingSegment, meetings};
 use crate::finite::{require_finite, require_positions};
-use crate::stroke::{Motion, Stroke};
+use crate::motion::Motion;
+use crate::stroke::Stroke;
 use crate::stroke_registry::StrokeRegistry;
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 

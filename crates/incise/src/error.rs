@@ -150,7 +150,7 @@ pub fn shape_suggestion(error: &MeshingError) -> String {
 #[must_use]
 pub fn coloring_suggestion(error: &ColoringError) -> String {
     match error {
-        ColoringError::UnknownAlgorithm { name } => suggestion(name, Algorithm::NAMES),
+        ColoringError::UnknownAlgorithm { name, .. } => suggestion(name, Algorithm::NAMES),
         _ => String::new(),
     }
 }
