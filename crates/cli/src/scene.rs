@@ -5,14 +5,14 @@
 
 use std::path::Path;
 
+use incise::Simulation;
 use incise::scene::schema;
-use incise::{Scene, Simulation};
 use serde_json::Value;
 
 use crate::args::SceneArguments;
 use crate::failure::Failure;
 use crate::print::{count, print};
-use crate::run::located;
+use crate::run::{load, located};
 
 pub(crate) fn scene(arguments: &SceneArguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.check {
@@ -30,7 +30,7 @@ pub(crate) fn scene(arguments: &SceneArguments) -> Result<(), Failure> {
 
 /// Reads a scene and sets up its simulation, which finds every error that `incise run` would find at its start.
 fn check(path: &Path) -> Result<(), Failure> {
-    let scene = Scene::load(path).map_err(|error| located(error, Some(path)))?;
+    let scene = load(Some(path))?;
     let simulation = Simulation::new(&scene).map_err(|error| located(error, Some(path)))?;
     let bodies = count(scene.body.len(), "body", "bodies");
     let tets = count(simulation.report().tets, "tet", "tets");

@@ -108,6 +108,11 @@ fn a_wrong_scene_is_refused_with_line_and_key() {
         let outcome = sandbox.incise(&["scene", "--check", "wrong.toml"]);
         assert_eq!(outcome.code, 2);
         assert!(outcome.stderr.contains(expected), "{}", outcome.stderr);
+        assert!(
+            outcome.stderr.contains("wrong.toml: line "),
+            "{}",
+            outcome.stderr
+        );
     }
     assert_eq!(sandbox.incise(&["scene"]).code, 2);
     assert_eq!(sandbox.incise(&["scene", "--schema", "--defaults"]).code, 2);
