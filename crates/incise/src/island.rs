@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 use incise_cutting::{CutDelta, CuttableMesh, PieceEvent, PieceTracker, remove_tets};
-use incise_mesh::{ParticleId, TetId, signed_volume};
+use incise_mesh::{Bounds, ParticleId, TetId, signed_volume};
 use incise_xpbd::{
     DistanceConstraint, KappaLimit, Real, Solver, StepReport, StepSettings, shortest_substep_of_f32,
 };
@@ -579,6 +579,18 @@ impl Island {
     pub(crate) fn body_of_tet(&self, tet: TetId) -> usize {
         let material = each!(&self.solver, solver => solver.material_of(tet.index()));
         self.bodies[self.body_of[usize::from(material)]]
+    }
+
+    /// The box of each body that has tets, with its number in the scene. O(tets).
+    pub(crate) fn boxes(&self) -> BTreeMap<usize, Bounds> {
+        let mut boxes = BTreeMap::new();
+        for (tet, corners) in self.cuttable.mesh().tets.iter().enumerate() {
+            let corners = Bounds::around(corners.map(|p| self.positions[p.index()]));
+            let body = self.body_of_tet(TetId::new(tet));
+            let bounds = boxes.entry(body).or_insert(Bounds::EMPTY);
+            *bounds = bounds.union(corners);
+        }
+        boxes
     }
 
     /// Removes all tets of a body from the mesh; what depends on the mesh takes the delta.

@@ -391,9 +391,14 @@ impl Simulation {
     /// Puts the warnings of all islands into the report, and looks for divergence.
     fn collect_warnings(&mut self) {
         let elapsed = self.state.report.time_s;
-        let missed = self.state.timeline.take_missed().into_iter();
-        let missed = missed.map(Warning::of_missed_stroke);
-        self.state.report.warnings.extend(missed);
+        for missed in self.state.timeline.take_missed() {
+            let bodies = self.state.islands.iter().flat_map(Island::boxes);
+            let near = bodies.map(|(body, bounds)| (missed.reach.distance(&bounds), body, bounds));
+            let nearest = near.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            let nearest = nearest.map(|(_, body, bounds)| (body, bounds));
+            let warning = Warning::of_missed_stroke(missed, nearest);
+            self.state.report.warnings.push(warning);
+        }
         for island in &mut self.state.islands {
             self.state.report.warnings.append(&mut island.warnings);
             let speed = match island.solver.backend().host_max_speed() {

@@ -9,7 +9,7 @@ use incise_cutting::{
 use crate::island::Island;
 use crate::live_blade::LiveBlade;
 use crate::scene::{StrokeSpec, pose};
-use crate::tool::{Tool, tool};
+use crate::tool::{MissedStroke, Tool, tool};
 use crate::validate::value;
 use crate::{Error, Event};
 
@@ -42,8 +42,8 @@ pub(crate) struct Timeline {
     registries: Vec<StrokeRegistry>,
     /// Strokes that began or ended to cut since the events were taken.
     events: Vec<Event>,
-    /// Strokes of the scene that ended without a cut since they were taken, by their keys in the scene.
-    missed: Vec<String>,
+    /// Strokes that ended without a cut since they were taken.
+    missed: Vec<MissedStroke>,
 }
 
 impl Timeline {
@@ -118,6 +118,7 @@ impl Timeline {
         if !blade.end() {
             let stroke = self.strokes.remove(place);
             self.events.extend(stroke.end());
+            self.missed.extend(stroke.missed());
         }
         Ok(())
     }
@@ -158,8 +159,8 @@ impl Timeline {
         std::mem::take(&mut self.events)
     }
 
-    /// The strokes of the scene that have ended without a cut since the last call, by their keys in the scene.
-    pub(crate) fn take_missed(&mut self) -> Vec<String> {
+    /// The strokes that have ended without a cut since the last call.
+    pub(crate) fn take_missed(&mut self) -> Vec<MissedStroke> {
         std::mem::take(&mut self.missed)
     }
 
@@ -223,10 +224,7 @@ impl Timeline {
             };
             if !goes_on {
                 events.extend(stroke.end());
-                // A live blade may pass by the bodies.
-                if !stroke.has_cut && !matches!(stroke.tool, Tool::Live(_)) {
-                    missed.push(std::mem::take(&mut stroke.field));
-                }
+                missed.extend(stroke.missed());
             }
             goes_on
         });
@@ -239,6 +237,13 @@ impl Stroke {
     fn end(&self) -> Option<Event> {
         let stroke = self.options.tag;
         self.has_cut.then_some(Event::CutEnded { stroke })
+    }
+
+    /// Returns the stroke as one that missed all bodies, if it has not cut. A live blade that was not moved did not miss.
+    fn missed(&self) -> Option<MissedStroke> {
+        let reach = self.tool.reach().filter(|_| !self.has_cut)?;
+        let field = self.field.clone();
+        Some(MissedStroke { field, reach })
     }
 
     /// Cuts, or moves, in the island of the given number.
@@ -268,7 +273,7 @@ impl Stroke {
                 sweep(&pose(blade.iter().copied(), path, [first, last], frame))
             }
             Tool::Live(blade) => sweep(blade.pose()),
-            Tool::Surface(surface) => {
+            Tool::Surface { surface, .. } => {
                 cut_surface_joining(cuttable, positions, surface, options, registry)
             }
             Tool::Plane(plane) => cut_plane(cuttable, positions, plane, options),
@@ -283,7 +288,7 @@ impl Stroke {
         })?;
         let joins = matches!(
             self.tool,
-            Tool::Sweep { .. } | Tool::Live(_) | Tool::Surface(_)
+            Tool::Sweep { .. } | Tool::Live(_) | Tool::Surface { .. }
         );
         if !joins && !delta.is_empty() {
             registry.apply_delta(&island.cuttable, &delta, &self.options);

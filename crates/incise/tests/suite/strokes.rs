@@ -3,7 +3,7 @@
 use incise::cutting::{FaceTag, Skin};
 use incise::mesh::glam::DVec3;
 use incise::report::PieceReport;
-use incise::{Scene, Simulation, WarningCode};
+use incise::{FrameReport, Scene, Simulation, Warning, WarningCode};
 
 use crate::support::{body, plane, simulation, sweep};
 
@@ -201,7 +201,8 @@ fn bites_that_leave_parts_hanging() {
     assert!(came_apart > 5, "{came_apart} removals separated something");
 }
 
-/// A stroke beside the body is named in the frame in which it ends, one that cuts is not, and a live blade may miss.
+/// A stroke beside the body is named in the frame in which it ends, one that cuts is not. A live blade is named if it was
+/// moved.
 #[test]
 fn strokes_that_cut_nothing_are_named() {
     let text = format!(
@@ -216,19 +217,111 @@ fn strokes_that_cut_nothing_are_named() {
         ),
     );
     let mut simulation = simulation(&Scene::from_toml(&text).unwrap());
-    let blade = [DVec3::new(5.0, 0.0, 0.0), DVec3::new(5.0, 1.0, 0.0)];
-    let live = simulation.begin_stroke(&blade, 0.1).unwrap();
+    let blade = |z: f64| [DVec3::new(5.0, 0.0, z), DVec3::new(5.0, 1.0, z)];
+    let [moved, unmoved] = [0.1, 0.1].map(|snap| simulation.begin_stroke(&blade(0.0), snap));
+    let (moved, unmoved) = (moved.unwrap(), unmoved.unwrap());
     let mut named = Vec::new();
     for frame in 0..6 {
-        if frame == 3 {
-            simulation.end_stroke(live).unwrap();
+        if frame == 2 {
+            simulation.move_blade(moved, &blade(0.5)).unwrap();
         }
-        let report = simulation.step().unwrap();
-        let missed = report.warnings().iter();
-        let missed = missed.filter(|w| w.code == WarningCode::StrokeMissed);
-        named.extend(missed.map(|w| (report.frame, w.location.clone())));
+        if frame == 4 {
+            simulation.end_stroke(moved).unwrap();
+            simulation.end_stroke(unmoved).unwrap();
+        }
+        let missed = missed(simulation.step().unwrap());
+        let frame = simulation.report().frame;
+        named.extend(missed.into_iter().map(|w| (frame, w.location)));
     }
-    assert_eq!(named, [(2, "stroke[1]".into()), (3, "stroke[2]".into())]);
+    let expected = [(2, "stroke[1]"), (3, "stroke[2]"), (4, "stroke[3]")];
+    assert_eq!(
+        named,
+        expected.map(|(frame, name)| (frame, name.to_owned()))
+    );
+}
+
+fn missed(report: &FrameReport) -> Vec<Warning> {
+    let missed = report.warnings().iter();
+    let missed = missed.filter(|w| w.code == WarningCode::StrokeMissed);
+    missed.cloned().collect()
+}
+
+/// The warning has the box that the stroke passed and that of the nearest body, in the numbers of the scene, and asks for
+/// the units where sizes differ a lot.
+#[test]
+fn a_missed_stroke_names_its_box_and_that_of_the_body() {
+    let text = |body: &str, stroke: &str| {
+        let scene = format!(
+            "{body}[[body]]\nshape = {{ kind = \"box\", tets = 300 }}\nposition = [0.0, 0.0, 40.0]\n{stroke}"
+        );
+        let mut simulation = simulation(&Scene::from_toml(&scene).unwrap());
+        let frames = (0..4).map(|_| missed(simulation.step().unwrap()));
+        let warnings: Vec<Warning> = frames.flatten().collect();
+        assert_eq!(warnings.len(), 1, "{warnings:?}");
+        warnings[0].message.clone()
+    };
+    let cube = body("box", 300, [0.0; 3]);
+    let around = "the nearest body is body 0";
+    // A path in mm.
+    let blade = [[-1000.0, 1000.0, 600.0], [1000.0, 1000.0, 600.0]];
+    let message = text(&cube, &sweep([1, 3], blade, [0.0, 500.0, -1200.0]));
+    assert!(
+        message.contains("the box from (-1000, 1000, -600) to (1000, 1500, 600) m"),
+        "{message}"
+    );
+    assert!(
+        message.contains(around)
+            && message.contains("in the box from (-0.5, -0.5, -0.5) to (0.5, 0.5, 0.5) m"),
+        "{message}"
+    );
+    assert!(
+        message.contains("the stroke is 2000 times as large as the body: check that both are in m"),
+        "{message}"
+    );
+    // A miss by a little says nothing of units.
+    let blade = [[-1.0, 0.6, 0.6], [1.0, 0.6, 0.6]];
+    let message = text(&cube, &sweep([1, 3], blade, [0.0, 0.0, -1.2]));
+    assert!(
+        message.contains("body 0 at a distance of 0.1 m"),
+        "{message}"
+    );
+    assert!(!message.contains("times"), "{message}");
+    // A body in mm.
+    let large = cube
+        .replace("young", "scale = 1000.0\nyoung")
+        .replace("position = [0.0, 0.0, 0.0]", "position = [0.0, 0.0, 600.0]");
+    let message = text(
+        &large,
+        &sweep(
+            [1, 3],
+            [[-1.0, 0.6, 38.0], [1.0, 0.6, 38.0]],
+            [0.0, 0.0, -1.2],
+        ),
+    );
+    assert!(message.contains("the nearest body is body 1"), "{message}");
+    // Planes have no box; a far one is far in sizes of the body.
+    let message = text(&cube, &plane(1, [90.0, 0.0, 0.0], [2.0, 0.0, 0.0]));
+    assert!(
+        message.contains("its plane passes (90, 0, 0) m with normal (1, 0, 0)"),
+        "{message}"
+    );
+    assert!(
+        message.contains("the distance is 89.5 times the size of the body"),
+        "{message}"
+    );
+    // Other kinds.
+    let rectangle = "[[stroke]]\nkind = \"rectangle\"\nframe = 1\ncenter = [2.0, 0.0, 0.0]\nhalf_u = [0.0, 0.6, 0.1]\nhalf_v = [0.0, -0.1, 0.6]\n";
+    let message = text(&cube, rectangle);
+    assert!(
+        message.contains("the box from (2, -0.7, -0.7) to (2, 0.7, 0.7) m"),
+        "{message}"
+    );
+    let punch = "[[stroke]]\nkind = \"punch\"\nframe = 1\nregion = { sphere = { center = [2.0, 0.0, 0.0], radius = 0.25 } }\n";
+    let message = text(&cube, punch);
+    assert!(
+        message.contains("the box from (1.75, -0.25, -0.25) to (2.25, 0.25, 0.25) m"),
+        "{message}"
+    );
 }
 
 /// Planes that cross at irregular angles leave parts below half a mean tet. By default those beside a larger part stay
