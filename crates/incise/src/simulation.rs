@@ -502,7 +502,8 @@ impl Simulation {
     ///
     /// At the start particles and tets are numbered body by body in the order of the scene. Cuts do not change numbers:
     /// the first child of a cut tet takes over its number; other new tets and new particles get the next ones, stroke
-    /// by stroke and within a stroke body by body.
+    /// by stroke and within a stroke body by body. A removal moves the last tets into the gaps and leaves particles without
+    /// tets; [`repair`](incise_mesh::repair) with `drop_unused` makes a mesh without them.
     #[must_use]
     pub fn mesh(&self) -> &TetMesh {
         match &self.state.merged {
