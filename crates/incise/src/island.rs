@@ -736,7 +736,7 @@ impl Island {
     }
 
     /// The piece of a particle, unless it has lost all its tets.
-    fn piece_of(&self, particle: usize) -> Option<u32> {
+    pub(crate) fn piece_of(&self, particle: usize) -> Option<u32> {
         let mut around = self.cuttable.around(ParticleId::new(particle));
         around.next().map(|tet| self.pieces.piece_of(tet))
     }

@@ -399,6 +399,8 @@ impl Simulation {
             let warning = Warning::of_missed_stroke(missed, nearest);
             self.state.report.warnings.push(warning);
         }
+        let of_strokes = self.state.timeline.take_warnings();
+        self.state.report.warnings.extend(of_strokes);
         for island in &mut self.state.islands {
             self.state.report.warnings.append(&mut island.warnings);
             let speed = match island.solver.backend().host_max_speed() {

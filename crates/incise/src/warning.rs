@@ -40,6 +40,8 @@ pub enum WarningCode {
     EmptyRegion,
     /// A stroke has ended without meeting a tet.
     StrokeMissed,
+    /// A stroke has cut where pinned particles keep both sides together.
+    PinnedCut,
     /// The substep is too short for single precision.
     ShortSubstepF32,
     /// Tets were softened to keep `kappa_limit`.
@@ -176,7 +178,7 @@ fn point_text(x: DVec3) -> String {
     format!("({}, {}, {})", rounded(x.x), rounded(x.y), rounded(x.z))
 }
 
-fn box_text(bounds: &Bounds) -> String {
+pub(crate) fn box_text(bounds: &Bounds) -> String {
     format!(
         "the box from {} to {} m",
         point_text(bounds.low),
