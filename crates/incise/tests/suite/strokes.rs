@@ -324,6 +324,114 @@ fn a_missed_stroke_names_its_box_and_that_of_the_body() {
     );
 }
 
+/// The warnings of planes across a body that is pinned below z = -0.2, in the frame after the cut.
+fn pinned_cuts(pinned: &str, strokes: &str, shape: &str) -> Vec<Warning> {
+    let text = format!(
+        "{}{pinned}\n{strokes}",
+        body(shape, 4000, [0.0; 3]).replace("[[body]]", "[[body]]\n")
+    );
+    let mut simulation = simulation(&Scene::from_toml(&text).unwrap());
+    let mut warnings = Vec::new();
+    for _ in 0..6 {
+        let report = simulation.step().unwrap();
+        let pinned = report.warnings().iter();
+        let pinned = pinned.filter(|w| w.code == WarningCode::PinnedCut);
+        warnings.extend(pinned.cloned());
+    }
+    simulation.check().unwrap();
+    warnings
+}
+
+const BELOW: &str = "{ half_space = { point = [0, 0, -0.2], normal = [0, 0, -1] } }";
+
+/// A plane in a pinned region, or so little inside that only a rim of particles is above it, frees nothing.
+#[test]
+fn planes_inside_a_pinned_region_are_named() {
+    let fixed = format!("fixed = [{BELOW}]");
+    for shape in ["box", "sphere"] {
+        // A mean edge is about 0.1.
+        for (depth, normal) in [
+            (0.12, [0.0, 0.0, 1.0]),
+            (0.05, [0.0, 0.05, 1.0]),
+            (0.02, [0.0, 0.0, 1.0]),
+            (0.01, [0.0, 0.05, 1.0]),
+        ] {
+            let stroke = plane(1, [0.0, 0.0, -0.2 - depth], normal);
+            let warnings = pinned_cuts(&fixed, &stroke, shape);
+            assert_eq!(warnings.len(), 1, "{shape}, depth {depth}: {warnings:?}");
+            let Warning {
+                message, location, ..
+            } = &warnings[0];
+            assert_eq!(location, "stroke[0]");
+            assert!(
+                message.contains("body[0].fixed") && message.contains("in the box from ("),
+                "{message}"
+            );
+        }
+    }
+    // An attachment pins as well, and a sweep is judged when it ends.
+    let attachment = format!(
+        "[[attachment]]\nregions = [{BELOW}]\nframes = [0, 9]\npath = [[0, 0, 0], [0, 0, 0.1]]\n"
+    );
+    let stroke = sweep(
+        [1, 3],
+        [[-1.0, -0.7, -0.25], [1.0, -0.7, -0.25]],
+        [0.0, 1.4, 0.0],
+    );
+    let warnings = pinned_cuts(&attachment, &stroke, "box");
+    assert_eq!(warnings.len(), 1, "{warnings:?}");
+    assert!(
+        warnings[0].message.contains("attachment[0] pins it"),
+        "{}",
+        warnings[0].message
+    );
+}
+
+/// A rim is told from its teeth alone where most of the cut is free.
+#[test]
+fn a_rim_of_pinned_particles_is_counted() {
+    let fixed = format!("fixed = [{BELOW}]");
+    let stroke = plane(1, [0.0, 0.0, -0.2], [0.0, 0.05, 1.0]);
+    let warnings = pinned_cuts(&fixed, &stroke, "sphere");
+    assert_eq!(warnings.len(), 1, "{warnings:?}");
+    let message = &warnings[0].message;
+    assert!(
+        message.contains("stays pinned by") && message.contains("particles along the cut"),
+        "{message}"
+    );
+}
+
+/// Cuts that free a part, or run down into a pinned base, are no reason for a warning; nor are soft attachments and grabs.
+#[test]
+fn cuts_that_can_open_are_not_named() {
+    let fixed = format!("fixed = [{BELOW}]");
+    let soft = format!(
+        "[[attachment]]\nregions = [{BELOW}]\ncompliance = 1e-3\nframes = [0, 9]\npath = [[0, 0, 0], [0, 0, 0.1]]\n"
+    );
+    let above = plane(1, [0.0, 0.0, -0.1], [0.0, 0.0, 1.0]);
+    let inside = plane(1, [0.0, 0.0, -0.25], [0.0, 0.0, 1.0]);
+    let down = plane(1, [0.02, 0.0, 0.0], [1.0, 0.0, 0.0]);
+    let slit = sweep(
+        [1, 3],
+        [[0.02, -1.0, 0.7], [0.02, 1.0, 0.7]],
+        [0.0, 0.0, -1.0],
+    );
+    // Only the lowest layer is pinned, all of it next to the cut, but the part above comes off.
+    let layer = "fixed = [{ half_space = { point = [0, 0, -0.49], normal = [0, 0, -1] } }]";
+    let near = plane(1, [0.0, 0.0, -0.45], [0.0, 0.0, 1.0]);
+    for (pinned, stroke) in [
+        (fixed.as_str(), &above),
+        (&fixed, &down),
+        (&fixed, &slit),
+        (&soft, &inside),
+        (layer, &near),
+        ("", &inside),
+    ] {
+        let warnings = pinned_cuts(pinned, stroke, "box");
+        assert!(warnings.is_empty(), "{pinned} {stroke}: {warnings:?}");
+    }
+}
+
 /// Planes that cross at irregular angles leave parts below half a mean tet. By default those beside a larger part stay
 /// with it and are counted; with `crumbs = 0` they come off. Volume is the same.
 #[test]
@@ -362,4 +470,46 @@ fn crumbs_stay_with_larger_parts_unless_the_scene_turns_that_off() {
         "{small} of {pieces}, {all_small} of {all}"
     );
     assert!((volume / same - 1.0).abs() < 1e-12);
+}
+
+/// Three planes that cross at many offsets, with the largest snap distance, on every kind of generated body: a single tet
+/// comes off by default only from a part of fewer than four mean tets, which is too small for crumbs to stay with. Without
+/// the rule for crumbs single tets come off large parts.
+#[test]
+fn planes_at_the_largest_snap_distance_leave_no_single_tets() {
+    let mut loose = 0;
+    for shape in ["box", "sphere", "liver", "torus", "beam"] {
+        for i in 0..20_u32 {
+            let along = -0.48 + 0.048 * f64::from(i) + 1e-3;
+            let tilt = 0.3 * f64::from(i % 3);
+            let normals = [
+                [1.0, tilt, 0.2 - tilt],
+                [tilt, 1.0, 0.15],
+                [0.1, -tilt, 1.0],
+            ];
+            let point = [0.5 * along, 0.3 * along, 0.2 * along];
+            let strokes = normals.map(|normal| plane(0, point, normal) + "snap = 0.25\n");
+            let run = |cutting: &str| {
+                let body = body(shape, 1500, [0.0; 3]);
+                let text = format!("{cutting}\n{body}{}", strokes.concat());
+                let mut simulation = simulation(&Scene::from_toml(&text).unwrap());
+                let mean = simulation.mesh().total_volume() / simulation.mesh().tets.len() as f64;
+                simulation.step().unwrap();
+                let pieces = simulation.pieces();
+                let parent = |single: &PieceReport| {
+                    let parent = single
+                        .parent
+                        .and_then(|id| pieces.iter().find(|piece| piece.id == id));
+                    single.volume + parent.map_or(0.0, |parent| parent.volume)
+                };
+                let singles = pieces.iter().filter(|piece| piece.tets == 1);
+                singles
+                    .filter(|single| parent(single) >= 4.0 * mean)
+                    .count()
+            };
+            assert_eq!(run(""), 0, "{shape} cut at {along}");
+            loose += run("[cutting]\ncrumbs = 0.0");
+        }
+    }
+    assert!(loose > 0, "no plane leaves a single tet to begin with");
 }
