@@ -46,6 +46,7 @@ mod method;
 mod names;
 mod partition;
 mod pieces;
+mod pinned_cut;
 mod ray;
 mod recluster;
 mod region;

@@ -391,9 +391,16 @@ impl Simulation {
     /// Puts the warnings of all islands into the report, and looks for divergence.
     fn collect_warnings(&mut self) {
         let elapsed = self.state.report.time_s;
-        let missed = self.state.timeline.take_missed().into_iter();
-        let missed = missed.map(Warning::of_missed_stroke);
-        self.state.report.warnings.extend(missed);
+        for missed in self.state.timeline.take_missed() {
+            let bodies = self.state.islands.iter().flat_map(Island::boxes);
+            let near = bodies.map(|(body, bounds)| (missed.reach.distance(&bounds), body, bounds));
+            let nearest = near.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            let nearest = nearest.map(|(_, body, bounds)| (body, bounds));
+            let warning = Warning::of_missed_stroke(missed, nearest);
+            self.state.report.warnings.push(warning);
+        }
+        let of_strokes = self.state.timeline.take_warnings();
+        self.state.report.warnings.extend(of_strokes);
         for island in &mut self.state.islands {
             self.state.report.warnings.append(&mut island.warnings);
             let speed = match island.solver.backend().host_max_speed() {
@@ -497,7 +504,8 @@ impl Simulation {
     ///
     /// At the start particles and tets are numbered body by body in the order of the scene. Cuts do not change numbers:
     /// the first child of a cut tet takes over its number; other new tets and new particles get the next ones, stroke
-    /// by stroke and within a stroke body by body.
+    /// by stroke and within a stroke body by body. A removal moves the last tets into the gaps and leaves particles without
+    /// tets; [`repair`](incise_mesh::repair) with `drop_unused` makes a mesh without them.
     #[must_use]
     pub fn mesh(&self) -> &TetMesh {
         match &self.state.merged {
