@@ -35,6 +35,7 @@ mod device;
 mod distance;
 mod error;
 mod event;
+mod forces;
 mod grab;
 mod island;
 mod island_builder;
