@@ -25,7 +25,6 @@ mod accuracy;
 pub mod advise;
 mod attachment;
 mod backend;
-mod body;
 mod budget;
 mod collider;
 mod compute_device;
@@ -52,6 +51,7 @@ mod ray;
 mod recluster;
 mod region;
 pub mod report;
+mod resolved_body;
 #[cfg(feature = "save")]
 mod saved;
 pub mod scene;

@@ -23,7 +23,6 @@ use incise_mesh::{Surface, TetMesh};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use crate::body;
 use crate::budget;
 use crate::collider::Colliders;
 use crate::compute_device::{ComputeDevice, OpenDevice};
@@ -37,6 +36,7 @@ use crate::pieces::PieceNumbers;
 use crate::report::{
     CutReport, DetachedReport, FrameReport, Milliseconds, PieceReport, SoftenedReport, milliseconds,
 };
+use crate::resolved_body::ResolvedBody;
 use crate::scene::{Precision, Quantity, StrokeSpec};
 use crate::strokes::Timeline;
 use crate::validate::value;
@@ -139,7 +139,7 @@ impl Simulation {
             return Err(value("report.every", 0, "at least 1"));
         }
         crate::scene::check(scene)?;
-        let bodies = body::Body::all(scene, meshes)?;
+        let bodies = ResolvedBody::all(scene, meshes)?;
         let mut joined = distance::pairs(scene, bodies.len())?;
         joined.extend(contacts::pairs(scene, bodies.len())?);
         let island_of = island_of_bodies(bodies.len(), &joined);
@@ -171,7 +171,7 @@ impl Simulation {
         };
         if scene.solver.precision == Precision::Auto && !compute_device.is_gpu() && short() {
             precision = Precision::F64;
-            let bodies = body::Body::all(scene, meshes)?;
+            let bodies = ResolvedBody::all(scene, meshes)?;
             islands = make_islands(precision, IslandBuilder::all(scene, bodies, &island_of)?)?;
         }
         if let Some(budget) = scene.solver.budget_ms {
@@ -359,7 +359,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Takes over what contacts of all islands took, and which began and ended.
+    /// Collects the contact times of all islands and the contacts that began and ended.
     fn collect_contacts(&mut self, ms: &mut Milliseconds) {
         let State {
             islands, pieces, ..
