@@ -17,7 +17,7 @@ pub enum ColoringError {
     BadParameter {
         /// What was written.
         text: String,
-        /// What may stand behind the colon.
+        /// The valid parameters.
         expected: &'static str,
     },
     /// A limit of rounds was reached before all vertices had a color.

@@ -32,7 +32,7 @@ pub(super) struct Flips {
     parent: Vec<u32>,
     /// Local index of a root -> surplus of the component.
     surplus: Vec<i128>,
-    /// Local index of a root -> whether the component to be flipped?
+    /// Local index of a root -> whether the component is flipped.
     chosen: Vec<bool>,
     /// By surplus.
     components: Vec<Component>,
