@@ -10,6 +10,8 @@ mod defaults;
 mod degradation;
 mod experiment;
 mod gpu;
+#[cfg(test)]
+mod links;
 mod models;
 mod overhead;
 mod paper;

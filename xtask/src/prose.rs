@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Words forbidden in all texts of the project, in two parts so that this list is not a hit itself.
-const WORDS: [(&str, &str); 7] = [
+const WORDS: [(&str, &str); 8] = [
     ("any", "body"),
     ("dear", "er"),
     ("every", "body"),
@@ -13,16 +13,20 @@ const WORDS: [(&str, &str); 7] = [
     ("some", "body"),
     ("who", "ever"),
     ("a", "new"),
+    ("there", "by"),
 ];
 
+/// Phrases forbidden in all texts of the project, in two parts as well.
+const PHRASES: [(&str, &str); 2] = [("as far", " as"), ("put", " right")];
+
 /// Forbidden beginnings of doc comments: they refer to text that a tooltip does not show.
-const BEGINNINGS: [&str; 2] = ["The same", "As "];
+const BEGINNINGS: [&str; 5] = ["The same", "As ", "Likewise", "Ditto", "Whether it is"];
 
 /// Folders without sources.
 const SKIPPED: [&str; 3] = ["target", "out", ".git"];
 
 /// Collects the text files below a folder.
-fn texts(folder: &Path, into: &mut Vec<PathBuf>) {
+pub(crate) fn texts(folder: &Path, into: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap_or_default();
@@ -42,6 +46,7 @@ fn texts(folder: &Path, into: &mut Vec<PathBuf>) {
 /// Violations in the lines of a text, each with its line number from 1.
 fn faults(text: &str) -> Vec<(usize, String)> {
     let words = WORDS.map(|(first, last)| format!("{first}{last}"));
+    let phrases = PHRASES.map(|(first, last)| format!("{first}{last}"));
     let mut faults = Vec::new();
     let mut is_inside = false;
     for (number, line) in (1..).zip(text.lines()) {
@@ -50,6 +55,10 @@ fn faults(text: &str) -> Vec<(usize, String)> {
             if words.contains(&word) {
                 faults.push((number, format!("the word `{word}`")));
             }
+        }
+        let lower = line.to_lowercase();
+        for phrase in phrases.iter().filter(|phrase| lower.contains(*phrase)) {
+            faults.push((number, format!("the phrase `{phrase}`")));
         }
         let trimmed = line.trim_start();
         let comment = ["///", "//!"]
@@ -89,11 +98,12 @@ fn sentences_keep_the_rules() {
 #[test]
 fn faults_are_found() {
     let [word, other] = [WORDS[3], WORDS[6]].map(|(first, last)| format!("{first}{last}"));
+    let phrase = format!("As far{}", PHRASES[0].1);
     let text = format!(
         "/// As before.\nfn f() {{}}\n\n/// Names the thing.\n/// As a list.\n//! The same here.\n\
-         // Made {other}.\nlet not_{word} = {word};\n"
+         // Made {other}.\nlet not_{word} = {word};\n// It goes {phrase} that.\n"
     );
     let found = faults(&text);
     let lines: Vec<usize> = found.iter().map(|(line, _)| *line).collect();
-    assert_eq!(lines, [1, 7, 8], "{found:?}");
+    assert_eq!(lines, [1, 7, 8, 9], "{found:?}");
 }

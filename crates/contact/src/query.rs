@@ -95,7 +95,7 @@ pub(crate) struct Found {
     pub(crate) inside: u32,
     /// Whether no triangle near it says how it got there.
     pub(crate) is_deep: bool,
-    /// Whether it is deep and no way out was found.
+    /// True if the vertex is deep and no way out was found.
     pub(crate) is_buried: bool,
 }
 

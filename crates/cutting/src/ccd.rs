@@ -43,7 +43,7 @@ pub(crate) struct EdgeHit {
     pub(crate) normal: DVec3,
     /// Whether the edge runs from the negative side to the positive one.
     pub(crate) upwards: bool,
-    /// On which side of the surface the two ends are, as far as this says.
+    /// The sides of the surface that the two ends are on, where this hit tells.
     pub(crate) sides: [Option<bool>; 2],
     /// The segment of the blade, from 0.
     pub(crate) segment: usize,

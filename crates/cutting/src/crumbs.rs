@@ -2,10 +2,10 @@
 //!
 //! Before a face is cut, the tets on both sides are followed through uncut faces until they are found to be more than a
 //! crumb, or to be all of one. A crumb stays with the tet behind the largest of its faces that are to be cut, on the
-//! other side of the cut, and with all others that it touches there as far as tets around it lead to them without
-//! passing the cut. Its faces to anything else are cut, so a crumb never ties parts that the cut separates. Nothing is
-//! taken away: volume, mass and momentum are kept, and the cut runs around the crumb instead. Crumbs stay only with
-//! something several times larger, so that a body of a few tets can be cut.
+//! other side of the cut, and with all others that it touches there where tets around it lead to them without passing
+//! the cut. Its faces to anything else are cut, so a crumb never ties parts that the cut separates. Nothing is taken
+//! away: volume, mass and momentum are kept, and the cut runs around the crumb instead. Crumbs stay only with something
+//! several times larger, so that a body of a few tets can be cut.
 //!
 //! Faces are asked for as they were before separation, so the answers do not depend on how far that is. Cost: a search
 //! ends as soon as it has found more than a crumb or comes to a tet known to be part of more, so along a cut it costs
@@ -39,7 +39,7 @@ struct SmallPart {
     kept: Option<Vec<Face>>,
 }
 
-/// The crumbs along a cut, as far as they are known.
+/// The known crumbs along a cut.
 #[derive(Debug)]
 pub(crate) struct Crumbs {
     /// Parts of a smaller volume at rest are crumbs, in m³; 0 if there are none.

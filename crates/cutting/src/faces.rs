@@ -224,7 +224,7 @@ impl Faces {
         self.set_links(tet, [INNER; 4]);
     }
 
-    /// Whether it is not known what lies behind a face.
+    /// True if the tet behind a face is not known.
     pub(crate) fn is_loose(&self, face: Face) -> bool {
         self.links[face.0 as usize] == INNER
     }

@@ -402,8 +402,8 @@ fn unit_normal(triangle: usize, [a, b, c]: [DVec3; 3]) -> Result<DVec3, CutError
     }
 }
 
-/// The triangles to turn around so that neighbors across a side run the same way, as far as possible: each part of
-/// the surface follows its first triangle. Sides of three and more triangles pass nothing on.
+/// The triangles to turn around so that neighbors across a side run the same way where possible: each part of the
+/// surface follows its first triangle. Sides of three and more triangles pass nothing on.
 fn turned(triangles: &[[u32; 3]]) -> Vec<usize> {
     let mut sides: Vec<([u32; 2], usize, bool)> = Vec::with_capacity(3 * triangles.len());
     for (i, &[a, b, c]) in triangles.iter().enumerate() {

@@ -37,7 +37,7 @@ impl Device {
         })
     }
 
-    /// Whether it is on a device and solves in the form that settings ask for.
+    /// Returns whether the solver is on a device and solves tets as the settings ask for.
     pub(crate) fn serves(&self, gpu: &Arc<GpuContext>, spec: &SolverSpec) -> Result<bool, Error> {
         Ok(Arc::ptr_eq(self.solver.gpu(), gpu) && self.solver.cluster_mapping() == mapping(spec)?)
     }

@@ -458,7 +458,7 @@ impl Island {
         speed.is_nan() || speed > plausible
     }
 
-    /// Whether it is not solved until it is woken.
+    /// Returns whether the island sleeps: it is not solved until it is woken.
     pub(crate) fn asleep(&self) -> bool {
         self.sleep.is_some_and(|sleep| sleep.asleep())
     }

@@ -11,8 +11,8 @@
 //! kept per particle: they are what the holder feels, together with the weight of the held particle and minus the
 //! change of its momentum.
 //!
-//! VBD has no impulses but forces: those at the end of each substep are taken for all of it, from the same balance. They
-//! are right as far as the substep has converged. With BDF2 the momentum follows them only over several substeps.
+//! VBD has no impulses but forces: those at the end of each substep are taken for all of it, from the same balance.
+//! They are as accurate as the substep has converged. With BDF2 the momentum follows them only over several substeps.
 //!
 //! Source: Newton's second law; impulses of XPBD after Macklin, Müller, Chentanez 2016. Cost while measuring: a look at
 //! the held corners of each tet, a pass over the held particles and the attachments a substep, and for VBD a pass over

@@ -60,7 +60,7 @@ struct SettingRow {
 /// Two settings of a scene that differ in one parameter.
 #[derive(Debug, Serialize, Deserialize)]
 struct ExchangeRow {
-    knob: String,
+    setting: String,
     what: String,
     from: String,
     to: String,
@@ -131,7 +131,7 @@ fn measure(kind: Kind, folder: &Path, quick: bool, gpu: bool) -> anyhow::Result<
         });
     let rows: Vec<SettingRow> = rows.collect();
     let exchanges = settings.exchanges.iter().map(|exchange| ExchangeRow {
-        knob: exchange.knob.to_owned(),
+        setting: exchange.setting.to_owned(),
         what: exchange.what.to_owned(),
         from: name(&exchange.from),
         to: name(&exchange.to),

@@ -14,7 +14,7 @@ pub(super) fn page(rows: &[SceneRow]) -> anyhow::Result<Page> {
     let mut parts = vec![Part::Text(INTRODUCTION.to_owned()), references(rows)];
     parts.push(Part::Text(format!(
         "## Effect of each setting\n\nOver all scenes: the median, and in brackets the smallest and the largest. n is the number of substeps that brings kappa to 0.5. Errors of {USELESS} % and more count as lost.\n\n{}\n",
-        knobs(rows).join("\n")
+        exchanges(rows).join("\n")
     )));
     parts.push(Part::Text("## One large step, iterated".to_owned()));
     parts.push(Part::Text(large_step(rows)));
@@ -74,16 +74,16 @@ fn references(rows: &[SceneRow]) -> Part {
 }
 
 /// One sentence for each exchange, in the order of the first scene, with a heading for each parameter.
-fn knobs(rows: &[SceneRow]) -> Vec<String> {
+fn exchanges(rows: &[SceneRow]) -> Vec<String> {
     let mut sentences: Vec<String> = Vec::new();
     let mut last = "";
     for exchange in rows.first().map_or(&[][..], |row| &row.exchanges) {
         let Some(sentence) = sentence(rows, exchange) else {
             continue;
         };
-        if last != exchange.knob {
-            sentences.push(format!("\n**{}**\n", exchange.knob));
-            last = &exchange.knob;
+        if last != exchange.setting {
+            sentences.push(format!("\n**{}**\n", exchange.setting));
+            last = &exchange.setting;
         }
         sentences.push(sentence);
     }

@@ -13,7 +13,7 @@ pub(super) struct Settings {
 
 /// Two settings that differ in one parameter.
 pub(super) struct Exchange {
-    pub(super) knob: &'static str,
+    pub(super) setting: &'static str,
     /// Description of the change, as the start of a sentence.
     pub(super) what: &'static str,
     pub(super) from: SolverSpec,
@@ -155,8 +155,8 @@ pub(super) fn settings(substeps: u32, gpu: bool) -> Settings {
         add("gpu", [4, 8, 16, 32].map(on_gpu).into());
     }
 
-    let exchange = |knob, what, from: &SolverSpec, to: &SolverSpec| Exchange {
-        knob,
+    let exchange = |setting, what, from: &SolverSpec, to: &SolverSpec| Exchange {
+        setting,
         what,
         from: from.clone(),
         to: to.clone(),

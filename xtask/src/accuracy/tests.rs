@@ -43,7 +43,7 @@ fn scene_row(settings: Vec<SettingRow>) -> SceneRow {
         settings,
         refused: Vec::new(),
         exchanges: vec![ExchangeRow {
-            knob: "substeps".to_owned(),
+            setting: "substeps".to_owned(),
             what: "Doubling".to_owned(),
             from: "a".to_owned(),
             to: "b".to_owned(),

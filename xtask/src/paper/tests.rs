@@ -55,7 +55,7 @@ fn cells(page: &str, first: &[&str]) -> Vec<Vec<String>> {
         .collect()
 }
 
-/// Ratio of the two cells before it, as far as three digits tell.
+/// Ratio of the two cells before it, to the precision of three digits.
 fn is_ratio(row: &[String], place: usize) -> bool {
     let number = |i: usize| row[i].parse::<f64>().unwrap();
     let expected = number(place - 1) / number(place - 2);

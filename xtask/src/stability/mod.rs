@@ -44,7 +44,7 @@ fn check(rows: &[Row]) -> anyhow::Result<()> {
             let is_fine = outcome.verdict(row.is_state) == Verdict::Fine;
             let is_explained = is_fine || explain::explain(row, outcome).is_some();
             ensure!(is_explained, "no explanation: {}: {outcome:?}", row.id);
-            // Constraints keep momentum but for rounding, measured: 1e-5. VBD keeps it as far as it converges.
+            // Constraints keep momentum but for rounding, measured: 1e-5. VBD keeps it to the accuracy of its solution.
             let drift = outcome.momentum_drift.unwrap_or(0.0);
             let is_kept = !outcome.column.method.is_xpbd() || drift < 1e-3;
             ensure!(is_kept, "momentum: {}: {outcome:?}", row.id);

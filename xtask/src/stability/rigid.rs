@@ -107,8 +107,8 @@ mod tests {
         assert!(distance(&small, &small) < 1e-7);
     }
 
-    /// A point is as far as the root of the mean square of the distances from the middle; a mirror image is not the
-    /// shape.
+    /// A point is at the distance of the root of the mean square of the distances from the middle; a mirror image is
+    /// not the shape.
     #[test]
     fn other_shapes_are_a_distance() {
         let rest = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];

@@ -17,13 +17,12 @@ mod forces;
 #[cfg(feature = "gpu")]
 mod gpu;
 #[cfg(feature = "gpu")]
-mod gpu_knobs;
-#[cfg(feature = "gpu")]
 mod gpu_live;
+#[cfg(feature = "gpu")]
+mod gpu_settings;
 mod grab;
 mod interaction;
 mod kappa;
-mod knobs;
 mod live;
 mod live_bodies;
 mod locality;
@@ -43,6 +42,7 @@ mod save;
 mod scenarios;
 mod schema;
 mod set_solver;
+mod settings;
 mod sleep;
 mod snapshot;
 mod strokes;

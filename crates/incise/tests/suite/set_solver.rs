@@ -1,10 +1,10 @@
-//! Knobs turned on a simulation that runs: as if it had been set up so, and nothing else changes.
+//! Settings changed on a running simulation: equal to a simulation set up with them, and nothing else changes.
 
 use incise::Simulation;
 use incise::scene::{Method, Precision, Quantity, ReclusterSpec, SleepSpec, SolverSpec, Substeps};
 use proptest::prelude::*;
 
-use crate::knobs::{settings, two_bodies, with};
+use crate::settings::{settings, two_bodies, with};
 use crate::snapshot::{everything, halving};
 use crate::support::{body, scene, simulation};
 

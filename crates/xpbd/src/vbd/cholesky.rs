@@ -47,7 +47,7 @@ impl Cholesky {
         self.factor.resize(offset, 0.0);
     }
 
-    /// The entries from a column on of a row, as far as it has any; only those up to the diagonal count.
+    /// The stored entries of a row from a column on; only those up to the diagonal count.
     #[inline]
     pub(super) fn row_mut(&mut self, row: usize, column: usize) -> &mut [f64] {
         let (columns, offset) = &self.rows[row];

@@ -1,10 +1,10 @@
 //! [`CoarseCorrection`]: a truncated Newton step for the whole body, preconditioned by aggregates.
 //!
 //! The error that sweeps leave varies slowly over the body. A correction solves `A d = f` with the semidefinite second
-//! derivatives A (`hessian`) and the residual forces f by conjugate gradients, and moves along d as far as the
-//! potential falls. The preconditioner is a symmetric Gauss-Seidel sweep over the blocks in the colors of the stars,
-//! with the affine motions of aggregates in between (`coarse`): a two-level cycle. Only the aggregates are factored,
-//! not the mesh, so a cut only needs a new pattern.
+//! derivatives A (`hessian`) and the residual forces f by conjugate gradients, and moves along d while the potential
+//! falls. The preconditioner is a symmetric Gauss-Seidel sweep over the blocks in the colors of the stars, with the
+//! affine motions of aggregates in between (`coarse`): a two-level cycle. Only the aggregates are factored, not the
+//! mesh, so a cut only needs a new pattern.
 //!
 //! With an accuracy the matrix is kept as long as steps gain the predicted energy: a body that moves smoothly needs a
 //! new one only from time to time.
@@ -216,7 +216,7 @@ impl<R: Float> Solver<R> {
 }
 
 impl<R: Float> ImplicitStep<'_, R> {
-    /// Moves the whole body along a Newton direction as far as the potential falls.
+    /// Moves the whole body along a Newton direction, by a length at which the potential has fallen.
     ///
     /// Particles that touch a collider do not move; sweeps lift them off.
     ///

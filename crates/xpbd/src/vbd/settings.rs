@@ -15,9 +15,9 @@ pub enum Guess {
     /// Each connected part of the body starts on the line from a safe start to that guess, where its potential is at
     /// most that of the safe start: its last position, or for a free part its rigid motion.
     ///
-    /// With an accuracy, held parts also start nearer to their last position as far as that lowers the potential, if
-    /// their kinetic energy is below the allowed error: an error left by a substep would otherwise come back twice as
-    /// large in the next one.
+    /// With an accuracy, held parts also start nearer to their last position where that lowers the potential, if their
+    /// kinetic energy is below the allowed error: an error left by a substep would otherwise come back twice as large
+    /// in the next one.
     ///
     /// Source: Chen et al. 2024, section 3.7, for gravity.
     Adaptive,

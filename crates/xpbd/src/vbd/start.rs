@@ -235,9 +235,8 @@ impl<R: Float> ImplicitStep<'_, R> {
         }
     }
 
-    /// Takes parts of the body that are held back toward where they were, as far as the potential falls, if the energy
-    /// of their motion is below the error that is allowed: a motion that small is mostly what the last substep left
-    /// over.
+    /// Takes parts of the body that are held back toward where they were while the potential falls, if the energy of
+    /// their motion is below the error that is allowed: a motion that small is mostly what the last substep left over.
     ///
     /// Parts that nothing holds keep their velocity: a crumb that falls beside a strained body has little energy too.
     ///

@@ -102,7 +102,7 @@ pub(super) struct Substep {
     /// From 1.
     number: u32,
     count: u32,
-    /// Whether it is one of the implicit Euler substeps that begin a history of BDF2.
+    /// True for the implicit Euler substeps that begin a history of BDF2.
     is_startup: bool,
 }
 

@@ -1,4 +1,4 @@
-//! A solver that follows edits step by step against one that rebuilds everything: the same to the bit.
+//! A solver updated edit by edit and one that is rebuilt have bit-identical layouts.
 
 use glam::{DVec3, dvec3};
 use incise_graph::{ClusterId, Clustering, ColorId, Coloring, Schedule};
@@ -13,7 +13,7 @@ const HEAVY: Material = Material {
     ..RUBBER
 };
 
-/// A body that is cut by hand, its clusters and colors, and two solvers of it.
+/// A body that is cut by hand, its clusters and colors, an updated solver and a rebuilt one.
 struct SolverPair<R: Real> {
     tets: Vec<[u32; 4]>,
     /// Positions at rest.
@@ -23,7 +23,7 @@ struct SolverPair<R: Real> {
     /// Follows.
     schedule: Schedule,
     follower: Solver<R>,
-    /// Is told everything as if nothing could be known.
+    /// Rebuilt after every edit.
     other: Solver<R>,
     /// Of the present batch of edits.
     changed_tets: Vec<u32>,

@@ -104,7 +104,7 @@ fn squeezed(compliance: Option<f64>) -> f64 {
 }
 
 /// Poisson's ratio 0.2 loses 1 - 0.75 · 1.25^0.4 = 18 % at small strains, about as much at these. Constraints of no
-/// compliance keep the volume of each tet as far as one pass a substep converges.
+/// compliance keep the volume of each tet to the accuracy of one pass a substep.
 #[test]
 fn volume_is_kept_under_pressure() {
     let free = squeezed(None);
