@@ -1,6 +1,5 @@
-//! Clustering from scratch, and its local update by what one plane through the body cuts.
+//! Clustering from scratch, and its local update after one plane has cut the body.
 
-// The same reason as in the library.
 #![expect(clippy::unwrap_used, reason = "benches stop at the first surprise")]
 
 use std::num::NonZeroUsize;

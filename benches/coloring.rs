@@ -1,4 +1,4 @@
-//! Coloring the tets and their clusters of ten: straight from particles, and from a graph that is there already.
+//! Coloring the tets and their clusters of ten: directly from particles, and from an existing graph.
 //!
 //! The parallel ones run on as many threads as `RAYON_NUM_THREADS` says, else on all cores.
 

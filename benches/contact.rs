@@ -1,8 +1,7 @@
 //! Finding contacts on a body that a plane has cut in two, whose halves have slid past each other by an edge: a frame
-//! that keeps its candidates, one that searches, the pairs of the fresh cut, and following the cut. In time per vertex of
-//! the surface, per pair and per tet cut.
+//! that keeps its candidates, one that searches, the pairs of the fresh cut, and the update by the cut. In time per
+//! vertex of the surface, per pair and per tet cut.
 
-// The same reason as in the library.
 #![expect(clippy::unwrap_used, reason = "benches stop at the first surprise")]
 
 use criterion::BatchSize;

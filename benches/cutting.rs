@@ -1,8 +1,7 @@
 //! Cutting a fresh body, in time per tet cut: by a whole plane at once, and by the frame of a stroke in which the blade
 //! is halfway through. Beside them a frame that cuts nothing (the search for tets near the blade, in tets that the next
-//! frame cuts), and what follows a cut: pieces and skin.
+//! frame cuts), and the updates after a cut: pieces and skin.
 
-// The same reason as in the library.
 #![expect(clippy::unwrap_used, reason = "benches stop at the first surprise")]
 
 use criterion::BatchSize;
@@ -74,7 +73,7 @@ fn sweep(bench: &mut Bench<'_, '_>, body: &CuttableMesh) {
     followers(bench, "sweep", [&halfway, &after.0], &delta);
 }
 
-/// What follows the cut that `delta` says.
+/// The updates after the cut of `delta`.
 fn followers(
     bench: &mut Bench<'_, '_>,
     cut: &str,

@@ -1,4 +1,4 @@
-//! The vocabulary of scheduling: incidence, the constraint graph, its quotient by clusters, the schedule.
+//! The data types of scheduling: incidence, the constraint graph, its quotient by clusters, the schedule.
 
 use std::num::NonZeroUsize;
 

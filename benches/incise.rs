@@ -1,10 +1,9 @@
-//! Whole frames of a simulation, cuts, plan and thirty substeps included: one without a cut, one in which a plane cuts
-//! the body through, and one in which a moving blade passes its middle.
+//! Whole frames of a simulation, including cuts, partition and thirty substeps: one without a cut, one in which a plane
+//! cuts the body through, and one in which a moving blade passes its middle.
 //!
 //! World, material and solver are those of the built-in scene; the threads are those of `RAYON_NUM_THREADS`, else all
 //! cores.
 
-// The same reason as in the library.
 #![expect(clippy::unwrap_used, reason = "benches stop at the first surprise")]
 
 use std::path::PathBuf;

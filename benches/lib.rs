@@ -1,4 +1,4 @@
-//! The cases that all benches share, and the frame around each bench file.
+//! The cases that all benches share, and the entry point of each bench file.
 //!
 //! A bench file is one call of [`run`] with what it measures on one case. Names are `crate/operation/case`, throughput
 //! is counted in tets of the case's mesh, so that any two lines of the output compare, or where cost follows a cut, in
@@ -29,7 +29,7 @@ pub const BLADE_STEP: f64 = 0.05;
 pub enum Source {
     /// A generated shape with about this many tets: irregular degrees, as bodies have.
     Shape(Shape, usize),
-    /// A Kuhn grid with this many cells a side: all inner degrees equal, the friendliest case there is.
+    /// A Kuhn grid with this many cells a side: all inner degrees are equal, the easiest case.
     Grid(usize),
     /// A mesh file.
     File(PathBuf),
@@ -178,7 +178,7 @@ pub fn run_with(
     criterion.final_summary();
 }
 
-/// The mesh files asked for, by name; says so if there are none.
+/// The mesh files named, by name; prints a note if there are none.
 #[expect(
     clippy::print_stderr,
     reason = "a skipped case must not look like a measured one"
@@ -201,7 +201,7 @@ fn models() -> Vec<PathBuf> {
     paths
 }
 
-/// A case, and where its measurements go.
+/// A case, and the criterion group of its measurements.
 #[expect(missing_debug_implementations, reason = "criterion's groups have none")]
 pub struct Bench<'a, 'c> {
     group: &'a mut BenchmarkGroup<'c, WallTime>,
@@ -210,7 +210,7 @@ pub struct Bench<'a, 'c> {
 }
 
 impl Bench<'_, '_> {
-    /// Measures one operation. The closure tells criterion what an iteration is.
+    /// Measures one operation. The closure defines an iteration for criterion.
     pub fn measure(
         &mut self,
         operation: &str,

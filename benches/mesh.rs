@@ -2,7 +2,6 @@
 //!
 //! Ten bodies are generated at sizes up to a million tets. Nothing else is measured on these.
 
-// The same reason as in the library.
 #![expect(clippy::unwrap_used, reason = "benches stop at the first surprise")]
 
 use incise::mesh_io;

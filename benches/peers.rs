@@ -1,8 +1,8 @@
 //! From tets to a verified coloring, beside other libraries: finding the conflicts is part of the work.
 //!
-//! All start from the same lists of particles and end with the same proof. The libraries take a graph; they get it from
-//! `ConstraintGraph`, which is faster than any of them builds one. They take seconds to minutes on meshes of 100,000
-//! tets, and every measurement runs a dozen times. The number of colors of each is printed before its time.
+//! All start from the same lists of particles and end with the same verification. The libraries take a graph; they get
+//! it from `ConstraintGraph`, which is faster than any of them builds one. They take seconds to minutes on meshes of
+//! 100,000 tets, and every measurement runs a dozen times. The number of colors of each is printed before its time.
 
 use incise::coloring::{Order, auto, greedy};
 use incise::graph::{ColorId, Coloring, ConstraintGraph};

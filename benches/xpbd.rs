@@ -1,11 +1,10 @@
 //! Ten substeps of one iteration: both precisions, with and without damping, with and without clusters of ten tets, on
-//! one and two threads; and the plain kernel that all of it is compared with. Then what a cut of twenty tets costs the
-//! schedule and the solver's layout.
+//! one and two threads; and the plain kernel for comparison. Then the cost of a cut of twenty tets for schedule and
+//! layout.
 //!
 //! The body hangs from one end and swings on from iteration to iteration, so that no step is the trivial one of a body
 //! at rest.
 
-// The same reason as in the library.
 #![expect(clippy::unwrap_used, reason = "benches stop at the first surprise")]
 
 mod plain;
@@ -127,7 +126,7 @@ const RUBBER: Material = Material {
     damping: 0.0,
 };
 
-/// The time in s of a substep in which no tet rings, whatever its shape.
+/// The time in s of a substep in which tets of any shape are stable.
 fn calm<R: Real>(solver: &Solver<R>) -> f64 {
     (0.35 / solver.kappa(1.0)).sqrt()
 }

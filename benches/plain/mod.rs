@@ -1,7 +1,7 @@
-//! The kernel that the solver's is compared with: one tet after the other, as one writes it down.
+//! The scalar kernel that the solver's kernel is compared with: one tet after the other.
 //!
 //! Solves both constraints of a tet as one system, gradients at the corners and all, with structures of plain numbers
-//! in the order of the schedule, single precision, one thread. Nothing is left out and nothing is clever.
+//! in the order of the schedule, single precision, one thread. It is complete and not optimized.
 
 use incise::graph::Schedule;
 use incise::mesh::glam::{DMat3, DVec3, Vec3};
@@ -85,7 +85,7 @@ impl Plain {
         }
     }
 
-    /// Where a particle is.
+    /// Position of a particle.
     pub(crate) fn position(&self, particle: usize) -> DVec3 {
         self.positions[particle].as_dvec3()
     }

@@ -1,6 +1,6 @@
-//! What a cut costs the schedule and the layout: twenty neighboring tets are halved, then put together again, by turns
-//! all over the body. Both turns are an edit of the same size; the body does not grow. Making the edit, its clusters,
-//! colors and masses is not counted.
+//! Cost of the updates of schedule and layout after a cut: twenty neighboring tets are halved, then joined again, in
+//! turns all over the body. Both are edits of equal size; the body does not grow. Making the edit, its clusters, colors
+//! and masses is not counted.
 
 use std::num::NonZeroUsize;
 use std::time::{Duration, Instant};
@@ -14,7 +14,7 @@ use incise_benches::Case;
 
 const CUT: usize = 20;
 
-/// What is timed.
+/// The timed stages.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Stage {
     Schedule,
@@ -90,7 +90,7 @@ impl Updated {
         }
     }
 
-    /// Halves some tets, or puts them together again; returns the tets and the clusters that changed.
+    /// Halves some tets, or joins them again; returns the tets and the clusters that changed.
     fn edit(&mut self) -> (Vec<u32>, Vec<ClusterId>) {
         let number = |t: usize| u32::try_from(t).unwrap();
         let mut touched = Vec::new();

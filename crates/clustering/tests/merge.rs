@@ -245,7 +245,7 @@ fn parts_of_a_cluster_are_handled_separately() {
     assert_eq!(clustering.occupied(), 2);
 }
 
-/// A remnant grows into loose constraints before these form clusters of their own.
+/// A small cluster grows into loose constraints before these form clusters of their own.
 #[test]
 fn small_clusters_grow_first() {
     let row = Incidence::from_constraints(11, (0u32..10).map(|i| [i, i + 1])).unwrap();

@@ -1,4 +1,4 @@
-//! Colors the constraints of a cloth by every algorithm: how many colors, how even, how long.
+//! Colors the constraints of a cloth by every algorithm; prints the number of colors, their evenness, and the time.
 //!
 //! `cargo run --release -p incise-coloring --example algorithms`
 

@@ -42,7 +42,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         stats.range,
     );
 
-    // A tear along the middle: the springs across it go, and two stitches come.
+    // A tear along the middle: the springs across it are removed, and two stitches are added.
     let middle = side / 2;
     let is_torn = |[a, b]: &[u32; 2]| a % side < middle && b % side >= middle;
     let torn: Vec<u32> = (0..)

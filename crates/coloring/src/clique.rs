@@ -77,7 +77,7 @@ mod tests {
 
     #[test]
     fn hidden_cliques_are_found() {
-        // A clique of ten that hangs on a hub with many leaves.
+        // A clique of ten, connected to a hub with many leaves.
         let mut edges: Vec<(u32, u32)> =
             (0..10).flat_map(|b| (0..b).map(move |a| (a, b))).collect();
         edges.extend((10..60).map(|leaf| (0, leaf)));

@@ -229,7 +229,7 @@ mod tests {
     use super::*;
     use crate::{Order, greedy};
 
-    /// Neither the size of the tasks nor the number of threads shows.
+    /// The result depends neither on the size of the tasks nor on the number of threads.
     #[test]
     fn chunks_change_nothing() {
         let constraints = (0u32..900).map(|i| [i % 89, 89 + i % 97, 186 + i * i % 101]);

@@ -1,5 +1,5 @@
-//! Balancing keeps a coloring proper and its colors, ends where nothing simple helps any more, and
-//! is even where that is possible.
+//! Balancing keeps a coloring proper and its colors, ends where no simple exchange helps, and is even where that is
+//! possible.
 
 use std::collections::BTreeSet;
 
@@ -163,7 +163,7 @@ fn edgeless_vertices_spread_at_once() {
     assert_eq!((stats.range, stats.chains, stats.flips), (1, 0, 0));
 }
 
-/// One color each for the members of a clique, all others crowd the first one.
+/// One color each for the members of a clique, all other vertices take the first color.
 #[test]
 fn any_number_of_colors() {
     for colors in [2, 31, 32, 33, 63, 64, 65, 127, 128, 129, 200] {
@@ -207,7 +207,7 @@ fn lattices_become_even() {
     }
 }
 
-/// Classes of 1 and n, and no even coloring: everything must give up.
+/// Classes of 1 and n, and no even coloring: every search must end without a change.
 #[test]
 fn stars_end_as_they_are() {
     for leaves in [2, 3, 64, 1000] {

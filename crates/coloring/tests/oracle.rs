@@ -1,4 +1,4 @@
-//! `scgc` equals `greedy`, both are proper and within the bounds, and threads change nothing.
+//! `scgc` equals `greedy`, both are proper and within the bounds, for any number of threads.
 
 use incise_coloring::{Algorithm, Order, Scgc, color, greedy, priority_order, scgc};
 use incise_graph::{ClusterId, Clustering, ConstraintGraph};
@@ -105,7 +105,7 @@ fn threads_change_nothing() {
     }
 }
 
-/// Colors are part of the contract: a change of hash, order or rule shows here.
+/// Colors are part of the contract: a change of hash, order or rule fails here.
 #[test]
 fn golden_hash() {
     let graph = ConstraintGraph::from_incidence(&kuhn(8));

@@ -1,5 +1,5 @@
-//! The parallel algorithms: the deterministic ones equal sequential greedy whatever their shortcuts,
-//! threads and input; the others are proper and repeat themselves.
+//! The parallel algorithms: the deterministic ones equal sequential greedy whatever their shortcuts, threads and input;
+//! the others are proper and repeatable.
 
 use std::num::NonZeroUsize;
 
@@ -197,7 +197,7 @@ fn golden_hashes() {
     );
 }
 
-/// In lock step a clique keeps one vertex a round; the chunk gives way before that takes forever.
+/// In lock step a clique keeps one vertex a round; the chunk shrinks, which bounds the number of rounds.
 #[test]
 fn speculation_on_a_clique_ends_soon() {
     let result = wlc(&clique(1500), NonZeroUsize::MAX);

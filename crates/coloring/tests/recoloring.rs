@@ -1,4 +1,4 @@
-//! A coloring that follows edits stays proper, close to a fresh one, and local.
+//! A coloring updated by edits stays proper, close to a new one, and local.
 
 use incise_coloring::{ColoringError, Recolored, Recoloring, auto};
 use incise_graph::Incidence;
@@ -24,8 +24,8 @@ fn pairs(v: u32, particles: &[u32]) -> Vec<(u32, u32)> {
     particles.iter().map(|&particle| (v, particle)).collect()
 }
 
-/// Cuts tets at random: the tet goes, and the three parts on each side come as one cluster each,
-/// with particles of their own where the cut separates.
+/// Cuts tets at random: the tet is removed, and the three parts on each side are added as one cluster each, with
+/// particles of their own where the cut separates.
 struct Script {
     recoloring: Recoloring,
     /// Vertex -> its particles, one list for each constraint in it; empty if it is gone.
@@ -121,7 +121,7 @@ fn a_thousand_cuts() {
             if cut % 50 == 0 {
                 script.recoloring.check().unwrap();
                 let fresh = auto(&incidence).coloring.color_count();
-                // What auto reaches goes up and down by one as the constraints change.
+                // The number of colors of `auto` varies by one as the constraints change.
                 assert!(report.colors <= fresh + slack.max(1));
             }
         }
@@ -132,7 +132,7 @@ fn a_thousand_cuts() {
     }
 }
 
-/// What an edit looks at does not grow with the mesh.
+/// The number of links that an edit visits does not grow with the mesh.
 #[test]
 fn work_is_local() {
     let visits = |cells: u32| {

@@ -105,8 +105,8 @@ fn compare(graph: &ConstraintGraph) {
             // Shortcut 2 makes palettes smaller, which can only help.
             assert!(run(one, true, three).rounds <= rounds);
             if !one && !three {
-                // Every edge is told twice and found decided once; every other look is that of a
-                // vertex that is stopped, one in each round before its own.
+                // Every edge is notified twice and found decided once; every other visit is that of a vertex that is
+                // stopped, one in each round before its own.
                 let waits: usize = model.rounds.iter().map(|round| round - 1).sum();
                 let visits = 3 * graph.edge_count() + waits;
                 assert_eq!(run(false, false, false).edge_visits, visits as u64);
@@ -115,7 +115,7 @@ fn compare(graph: &ConstraintGraph) {
         });
     assert_eq!(one, both, "shortcut 3 saves no round beside shortcut 1");
     assert!(one <= three && three <= plain);
-    // Beside shortcut 1, with or without shortcut 2, shortcut 3 does not even save a look.
+    // Beside shortcut 1, with or without shortcut 2, shortcut 3 does not save a visit.
     for two in [false, true] {
         let [without, with] = [false, true].map(|three| run(true, two, three));
         assert_eq!(

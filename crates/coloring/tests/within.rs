@@ -1,4 +1,4 @@
-//! Colors within clusters, held to comparing all pairs.
+//! Colors within clusters, compared with a check of all pairs.
 
 use incise_coloring::color_within_clusters;
 use incise_graph::{ClusterId, Clustering, ColorId, Incidence};

@@ -1,4 +1,4 @@
-//! A ball hangs from its upper half and sags, solved on a GPU; without one, says so.
+//! A ball hangs from its upper half and sags, solved on a GPU; prints a note if there is none.
 //!
 //! `cargo run --release -p incise-gpu --example solve`
 

@@ -133,7 +133,7 @@ proptest! {
     }
 }
 
-/// Each mistake is refused with its line and message.
+/// Each mistake is an error with its line and message.
 fn refused(read: Reader, cases: &[(&[u8], usize, &str)]) {
     for &(bytes, line, part) in cases {
         let text = String::from_utf8_lossy(bytes);

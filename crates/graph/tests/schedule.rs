@@ -16,7 +16,7 @@ fn inputs() -> impl Strategy<Value = (Clustering, Coloring)> {
     })
 }
 
-/// One random change of a plan.
+/// One random change of clusters and colors.
 #[derive(Clone, Debug)]
 enum Edit {
     /// Removes constraint (number modulo their count) from its cluster.
@@ -252,8 +252,8 @@ fn changes_since_the_last_revision_are_kept() {
     assert_eq!(schedule.changes_since(first), None);
 }
 
-/// Counts instead of timing: the edits of a cut in a large plan cost about as much as in a small
-/// one, and far less than a rebuild. 20 constraints are each replaced by four in two clusters.
+/// Counts instead of timing: the edits of a cut in a large schedule cost about as much as in a small one, and far less
+/// than a rebuild. 20 constraints are each replaced by four in two clusters.
 #[test]
 fn the_cost_of_an_update_follows_the_edit() {
     for clusters in [2_000u32, 40_000] {
@@ -287,9 +287,8 @@ fn the_cost_of_an_update_follows_the_edit() {
             total += schedule.update(&clustering, &coloring, &constraints, &changed);
         }
         schedule.check_partition(&clustering, &coloring).unwrap();
-        // 120 constraints and 60 clusters change in a cut; each moves a few others. Once in the run
-        // every color moves to get room, which is the only cost that depends on the size of the
-        // plan.
+        // 120 constraints and 60 clusters change in a cut; each moves a few others. Once in the run every color moves
+        // to get room, which is the only cost that depends on the size of the schedule.
         let once = u64::from(clusters);
         let bound = u64::from(cuts) * 20 * 40 + once;
         assert!(total < bound, "{total} of {bound} for {clusters} clusters");

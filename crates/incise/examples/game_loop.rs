@@ -37,16 +37,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         velocity: [0.0; 3],
     })?;
 
-    // What a renderer keeps: an index buffer that follows cuts, and vertices that follow the particles.
+    // What a renderer keeps: an index buffer updated by cuts, and vertices updated from the particles.
     let mut skin = Skin::new(simulation.boundary());
-    // Texture coordinates of the particles; those that cuts make lie between others.
+    // Texture coordinates of the particles; those of new particles are interpolated.
     let rest = &simulation.mesh().positions;
     let mut uv: Vec<DVec2> = rest.iter().map(|x| x.truncate()).collect();
     let blade = |y: f64| [DVec3::new(0.43, y, -1.0), DVec3::new(0.43, y, 1.0)];
     let stroke = simulation.begin_stroke(&blade(-0.1), 0.1)?;
     for frame in 1..=20 {
         let t = f64::from(frame) / 20.0;
-        // Input: the hands move on.
+        // Input: blade and ball move.
         simulation.move_blade(stroke, &blade(-0.1 + 0.4 * t))?;
         simulation.move_collider(ball, DVec3::new(0.9, 0.05, 0.4 - 0.25 * t))?;
         if frame == 20 {
@@ -72,7 +72,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             .iter()
             .map(|v| uv[v.particle.index()].as_vec2())
             .collect();
-        // Two draw calls: skin with its texture, and flesh.
+        // Two draw calls: the skin with its texture, and the cut faces.
         let (outer, cut) = (skin.outer_triangles(), skin.cut_triangles());
         println!(
             "frame {frame:2}: {ms:4.1} ms, {:3} vertices, {} normals, {} texture coordinates, {:3} outer and {:3} cut triangles, \

@@ -1,4 +1,4 @@
-//! Files of other writers are read, and what is wrong with a file is named.
+//! Files of other writers are read, and errors name what is wrong.
 
 use std::fs;
 

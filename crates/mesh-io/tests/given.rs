@@ -77,7 +77,7 @@ fn center_and_scale(positions: &mut [DVec3]) {
     }
 }
 
-/// Why a file of the list is refused, if it is.
+/// Why a file of the list is an error, if it is one.
 fn refusal(name: &str) -> Option<&'static str> {
     if name.ends_with(".face") {
         Some("use one of the endings")
@@ -100,7 +100,7 @@ fn region(name: &str) -> Option<i32> {
     }
 }
 
-/// Every file of the list is there, and reads to the mesh it was made of or is refused for its reason.
+/// Every file of the list is there, and reads to the mesh it was made of or is the error of its reason.
 #[test]
 fn the_same_mesh_from_different_programs() {
     let Some(folder) = folder() else { return };

@@ -1,4 +1,4 @@
-//! What goes into a file comes out of it, bit for bit, in every format that is written.
+//! Round trips are bit-identical in every format that is written.
 
 use std::path::Path;
 

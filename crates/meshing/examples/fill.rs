@@ -1,6 +1,6 @@
-//! Fills the boundaries of given meshes again and says how well the bodies fit: `fill MESH TETS [TETS ..]`.
+//! Fills the boundaries of given meshes and prints how well the bodies fit: `fill MESH TETS [TETS ..]`.
 //!
-//! Distances are told in spacings of the lattice, the cube root of twelve times the volume of a tet.
+//! Distances are in spacings of the lattice, the cube root of twelve times the volume of a tet.
 
 #![expect(clippy::print_stdout, reason = "prints what it measured")]
 

@@ -1,4 +1,4 @@
-//! Generates a shape and says how long that took: `generate SHAPE TETS`, such as `generate bunny 1000000`.
+//! Generates a shape and prints the time: `generate SHAPE TETS`, such as `generate bunny 1000000`.
 //!
 //! What else is done takes little, so that the peak memory of the process is that of generating.
 

@@ -40,7 +40,7 @@ fn irregularity(mesh: &TetMesh) -> (f64, usize, f64, usize) {
     (mean, largest, sum as f64 / tets, most)
 }
 
-/// Everything that is promised.
+/// Checks every documented guarantee.
 fn assert_promises(mesh: &TetMesh, shape: Shape, tets: usize) {
     let count = mesh.tets.len();
     assert!(

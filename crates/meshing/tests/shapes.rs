@@ -16,7 +16,7 @@ fn counts_topology_and_angles() {
     }
 }
 
-/// What `generate` promises.
+/// Checks the guarantees of `generate`.
 pub(crate) fn assert_sound(shape: Shape, tets: usize) {
     let mesh = generate(shape, tets).expect("the shape has a mesh of every size");
     assert!(

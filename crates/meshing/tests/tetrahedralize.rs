@@ -1,5 +1,5 @@
-//! Solids and the bodies that fill them: winding numbers against an obvious count, what is refused, and the surfaces of
-//! the given meshes filled again.
+//! Solids and the bodies that fill them: winding numbers compared with a direct count, errors, and the filled surfaces
+//! of the given meshes.
 
 #![expect(
     clippy::unwrap_used,

@@ -1,5 +1,5 @@
-//! What an iteration of Newton's method costs, as a table: a body is held where its x is smallest and falls under
-//! gravity for eight frames of 1/60 s. The time is that of the fastest frame.
+//! Prints a table of the cost of an iteration of Newton's method: a body is held where its x is smallest and falls
+//! under gravity for eight frames of 1/60 s. The time is that of the fastest frame.
 //!
 //! ```text
 //! cargo run --release -p incise-reference --example newton -- kuhn:4 kuhn:8 MESH.vtk ...

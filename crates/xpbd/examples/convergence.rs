@@ -1,4 +1,4 @@
-//! How VBD converges within one large step: residual and milliseconds, round by round.
+//! Prints the convergence of VBD within one large step: residual and milliseconds, round by round.
 //!
 //! `cargo run --release -p incise-xpbd --example convergence -- [MESH] [gravity|stretch] [f32|f64] [ROUNDS]
 //! [SWEEPS] [OMEGA] [AGGREGATE] [REDUCTION]`

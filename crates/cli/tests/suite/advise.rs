@@ -1,4 +1,4 @@
-//! `incise advise`: what it answers, what it refuses. Times are never looked at, only what they were sorted by.
+//! `incise advise`: results and errors. Tests check the order of times, never their values.
 
 use serde_json::Value;
 
@@ -76,7 +76,7 @@ fn an_unreachable_budget_is_reported() {
     assert!(text.contains("[solver]"), "{text}");
 }
 
-/// What the reference does not know is named, and the solver is measured against itself.
+/// Features that the reference does not support are named, and the solver is measured against itself.
 #[test]
 fn scenes_without_newton_are_compared_with_the_solver() {
     for (more, why) in [

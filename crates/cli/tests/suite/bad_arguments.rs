@@ -1,4 +1,4 @@
-//! Arguments that cannot be meant and sandboxes that cannot be written end like any other bad input.
+//! Senseless arguments and folders that cannot be written are handled as other bad input.
 
 use crate::bad_input::{refused, refused_in_a_sentence, sandbox};
 use crate::support::SCENE;

@@ -1,4 +1,4 @@
-//! Graph files with a mistake: one sentence that names file and line, exit code 2, nothing left behind.
+//! Graph files with a mistake: one sentence that names file and line, exit code 2, no files left.
 
 use crate::bad_input::refused_in_a_sentence;
 use crate::support::Sandbox;

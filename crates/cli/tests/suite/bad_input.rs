@@ -1,4 +1,4 @@
-//! Bad input: one clear sentence on the error stream, exit code 2, nothing printed, nothing left behind.
+//! Bad input: one sentence on stderr, exit code 2, nothing on stdout, no files left.
 
 use crate::support::{SCENE, Sandbox};
 
@@ -34,7 +34,7 @@ pub(crate) fn refused(sandbox: &Sandbox, arguments: &[&str], parts: &[&str]) -> 
     message
 }
 
-/// Runs the binary on bad input; the message must contain all of `parts` and be one line that says nothing twice.
+/// Runs the binary on bad input; the message must contain all of `parts` and be one line without repetition.
 pub(crate) fn refused_in_a_sentence(sandbox: &Sandbox, arguments: &[&str], parts: &[&str]) {
     let message = refused(sandbox, arguments, parts);
     assert!(

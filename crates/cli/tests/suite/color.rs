@@ -1,4 +1,4 @@
-//! `incise color`: the promised keys, rows in the order of the input, and a coloring proved proper by this file alone.
+//! `incise color`: the promised keys, rows in the order of the input, and a coloring verified by code of this file.
 
 use std::collections::{HashMap, HashSet};
 
@@ -163,7 +163,7 @@ fn colorings_are_proper_and_reported_truly() {
     }
 }
 
-/// What each name gives is proper by this file alone, and balancing keeps the number of colors.
+/// Every algorithm returns a proper coloring, verified by this file, and balancing keeps the number of colors.
 #[test]
 fn every_algorithm_and_clustering_can_be_named() {
     let sandbox = Sandbox::with_mesh();

@@ -1,4 +1,4 @@
-//! What the command line does with a GPU, and without one.
+//! The command line with and without a GPU.
 
 use std::io::Write;
 
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::support::Sandbox;
 
-/// Whether a GPU answers, software or not; if not, says so.
+/// True if there is a GPU or a software adapter; prints a note if not.
 fn has_gpu(test: &str, stderr: &str, code: i32) -> bool {
     if code == 0 {
         return true;

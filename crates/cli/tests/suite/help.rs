@@ -1,4 +1,4 @@
-//! Every command explains itself, with an example.
+//! The help of every command has a description and an example.
 
 use crate::support::Sandbox;
 

@@ -1,4 +1,4 @@
-//! The real binary, run in folders of its own: what it prints, what it writes, what it leaves behind.
+//! The real binary, run in folders of its own: its output, its files, and what it leaves behind.
 
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 

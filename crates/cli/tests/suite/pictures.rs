@@ -1,4 +1,4 @@
-//! What a run looks like: pictures, a sheet and films, of the sizes and frames that were asked for.
+//! Pictures, contact sheet and animations of a run, with the requested sizes and frames.
 
 use std::fs;
 
@@ -136,7 +136,7 @@ fn view_options_are_applied() {
     for (i, picture) in pictures.iter().enumerate() {
         assert!(!pictures[..i].contains(picture), "{i}");
     }
-    // The view that is there anyway.
+    // The default view.
     let usual = [
         "--frames", "2", "--size", "60x40", "--quiet", "--out", "again",
     ];
@@ -181,7 +181,7 @@ fn pictures_of_an_earlier_run_are_not_left_among_those_of_this_one() {
     for name in ["frame_1.png", "frame_0000x.png", "my_frame_00001.png"] {
         sandbox.write(&format!("out/{name}"), "of a user");
     }
-    // What is refused removes nothing.
+    // A run that ends with an error removes nothing.
     let refused = [
         &["run", "scene.toml", "--animation", "none/animation.gif"],
         &usual[..],

@@ -1,4 +1,4 @@
-//! Colorings on the device equal those of the CPU, whatever the graph.
+//! Colorings on the device equal those of the CPU, for any graph.
 
 #![expect(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
@@ -23,8 +23,8 @@ use crate::support::gpu;
 static KERNELS: Mutex<Option<ColoringKernels>> = Mutex::new(None);
 
 /// The kernels that all tests share, since compiling them is what takes time. One test at a time, too: devices run
-/// kernels one after the other anyway, and counts of traffic mean something. Work arrays are full of what the test
-/// before left, which must not matter.
+/// kernels one after the other anyway, and counts of traffic mean something. Work arrays contain data of the test
+/// before, which must not matter.
 fn kernels() -> MutexGuard<'static, Option<ColoringKernels>> {
     let mut kernels = KERNELS.lock().unwrap_or_else(PoisonError::into_inner);
     kernels.get_or_insert_default();
@@ -69,7 +69,7 @@ fn checked(
     read
 }
 
-/// Checks the algorithms whose colors do not depend on what vertices see of each other in a round.
+/// Checks the algorithms whose colors do not depend on the order of threads within a round.
 fn check_largest_first(gpu: &GpuContext, kernels: &mut ColoringKernels, graph: &ConstraintGraph) {
     let expected = [
         incise_coloring::jones_plassmann(graph).coloring,
@@ -292,7 +292,7 @@ fn grids_have_several_rows() {
     let mut kernels = kernels();
     let kernels = kernels.as_mut().unwrap();
     let vertices = 65_535 * 64 + 65;
-    // The last vertices have something to wait for.
+    // The last vertices wait for others.
     let last = u32::try_from(vertices).unwrap() - 1;
     let edges = [(last, 0), (last - 1, last), (last - 2, last), (1, 2)];
     let graph = ConstraintGraph::from_edges(vertices, &edges).unwrap();

@@ -1,4 +1,4 @@
-//! Edits of a body on the device are followed: it stays the twin of one that was edited the same way.
+//! Edits of a body on the device: it stays equal to a twin that was edited in the same way.
 
 use glam::{DVec3, dvec3};
 use incise_gpu::{ClusterMapping, GpuContext, GpuError};
@@ -28,7 +28,7 @@ enum Edit {
     Resize(Index, i8),
     /// A tet is halved through an edge.
     Halve(Index),
-    /// A tet is taken away and the last one takes its place.
+    /// A tet is removed and the last one takes its slot.
     Delete(Index),
     /// A tet becomes a cluster of its own.
     Part(Index),
@@ -234,7 +234,7 @@ proptest! {
     }
 }
 
-/// Applies the edits of each round before some frames; says how far apart the twins came.
+/// Applies the edits of each round before some frames; returns the distance of the twins.
 fn run(gpu: &'static GpuContext, form: (&str, ClusterMapping), rounds: &[Vec<Edit>]) -> f64 {
     let mesh = bar();
     let (clustering, coloring) = clusters(&mesh, form.0);
@@ -264,7 +264,7 @@ fn run(gpu: &'static GpuContext, form: (&str, ClusterMapping), rounds: &[Vec<Edi
     far
 }
 
-/// A body that has moved on gets a new origin, and what is around it is told relative to that.
+/// A body that has moved on gets a new origin, and all positions are sent relative to it.
 #[test]
 fn a_body_that_moves_on_gets_a_new_origin() {
     let Some(gpu) = gpu("a_body_that_moves_on_gets_a_new_origin") else {
@@ -305,7 +305,7 @@ fn a_body_that_moves_on_gets_a_new_origin() {
     assert!(twins.host.origin().distance(start) > 1.0);
 }
 
-/// After a step that was refused, what was edited before it is not forgotten.
+/// After a step that was an error, earlier edits are still applied.
 #[test]
 fn a_refused_step_loses_no_edits() {
     let Some(gpu) = gpu("a_refused_step_loses_no_edits") else {

@@ -1,4 +1,4 @@
-//! Whatever a body has to bear on the device: no infinity and no NaN comes out.
+//! Extreme states and settings on the device give no Inf and no NaN.
 
 use glam::{DVec3, dvec3};
 use incise_gpu::{ClusterMapping, GpuSolver};

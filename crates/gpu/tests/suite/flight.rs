@@ -1,4 +1,4 @@
-//! Frames that are not waited for, and what is read back at all.
+//! Frames in flight, and which frames read back.
 
 use std::sync::Arc;
 

@@ -25,8 +25,8 @@ fn beyond(solver: &Solver<f32>, x: f64) -> Vec<usize> {
     (0..solver.particle_count()).filter(there).collect()
 }
 
-/// The far end hangs on a moving handle, some particles before it by a compliance on that and on one at rest; some of the
-/// fixed ones are attached as well, which makes no difference.
+/// The far end is attached to a moving handle, some particles before it with a compliance to that one and to one at
+/// rest; some of the fixed ones are attached as well, which makes no difference.
 fn hang(solver: &mut Solver<f32>) {
     let moving = solver.add_handle(pose(0));
     let still = solver.add_handle(Pose::at(DVec3::ZERO));
@@ -103,7 +103,7 @@ fn hanging_particles_keep_multipliers_over_iterations() {
     );
 }
 
-/// A particle that a handle holds is fixed and freed again, which does not change what is attached.
+/// A particle attached to a handle is fixed and freed again, which does not change its attachment.
 #[test]
 fn attached_particles_can_be_fixed_and_released() {
     let Some(gpu) = gpu("attached_particles_can_be_fixed_and_released") else {
@@ -125,7 +125,7 @@ fn attached_particles_can_be_fixed_and_released() {
     }
 }
 
-/// A body that hangs on nothing but springs to handles far from the origin of their frame.
+/// A body held only by springs to handles far from the origin of their frame.
 #[test]
 fn places_far_from_the_middle_of_a_handle_are_exact() {
     let test = "places_far_from_the_middle_of_a_handle_are_exact";

@@ -1,4 +1,4 @@
-//! Tests of the kernels against their CPU twins, and of what moves between host and device.
+//! Tests of the kernels against their CPU twins, and of transfers between host and device.
 //!
 //! They need an adapter; Mesa's lavapipe, which is a processor, will do. Without one they skip with a line on stderr,
 //! unless `INCISE_REQUIRE_GPU` is set: then they fail.

@@ -132,7 +132,7 @@ fn a_body_that_turns_far_from_the_origin() {
     }
 }
 
-/// What handles carry has no inverse mass, but a mass and a speed.
+/// Rigidly attached particles have no inverse mass, but a mass and a speed.
 #[test]
 fn attached_mass_is_measured() {
     let Some(gpu) = gpu("attached_mass_is_measured") else {
@@ -196,7 +196,7 @@ fn rest_mirrored_and_flat() {
     }
 }
 
-/// What single precision cannot hold, and what no kernel sees, comes from the host.
+/// Values beyond single precision, and tets that no kernel visits, come from the host.
 #[test]
 fn the_host_measures_what_the_device_cannot() {
     let Some(gpu) = gpu("the_host_measures_what_the_device_cannot") else {

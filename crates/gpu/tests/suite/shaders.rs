@@ -1,4 +1,4 @@
-//! Every kernel is read by compilers other than the driver's, and its structs are what the host thinks they are.
+//! Every kernel is read by compilers other than the driver's, and its structs have the layout that the host assumes.
 
 use std::path::PathBuf;
 use std::process::Command;

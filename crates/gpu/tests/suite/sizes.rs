@@ -1,4 +1,4 @@
-//! Bodies of every size at which a kernel could forget a thread, a workgroup or a row of them, against the CPU twin.
+//! Bodies of all sizes at the limits of threads, workgroups and rows of them, compared with the CPU twin.
 
 use glam::DVec3;
 use incise_gpu::{ClusterMapping, GpuSolver};

@@ -298,7 +298,7 @@ fn residuals_come_from_the_device() {
     }
 }
 
-/// A frame asks for nothing and sends nothing but, once, the settings.
+/// A frame reads nothing back and sends only the settings, once.
 #[test]
 fn a_frame_reads_nothing_and_sends_nothing() {
     let Some(gpu) = gpu("a_frame_reads_nothing_and_sends_nothing") else {

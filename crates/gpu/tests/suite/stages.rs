@@ -1,4 +1,4 @@
-//! Times of stages: they are there, they fit into the time that passed, and taking them changes nothing.
+//! Times of stages exist, fit into the time that passed, and do not change results.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -12,7 +12,7 @@ use crate::solver::{SOFT, body, schedules, settings, share};
 use crate::support::{gpu, skip};
 use crate::twin::{FORMS, bar};
 
-/// A step with its times, which are held against the clock of the host. `passes` is how many the step may have.
+/// A step with its times, which are compared with the clock of the host. `passes` is how many the step may have.
 fn timed(device: &mut GpuSolver, step: impl Fn(&mut GpuSolver), passes: f64) -> StageTimes {
     let gpu = Arc::clone(device.gpu());
     gpu.wait().unwrap();

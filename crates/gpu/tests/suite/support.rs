@@ -7,7 +7,7 @@ use incise_gpu::{GpuContext, GpuError, GpuOptions};
 
 static CONTEXT: OnceLock<Result<GpuContext, GpuError>> = OnceLock::new();
 
-/// The device, or `None` on a machine without one, which is said.
+/// The device, or `None` with a note on stderr on a machine without one.
 pub(crate) fn gpu(test: &str) -> Option<&'static GpuContext> {
     match CONTEXT.get_or_init(|| GpuContext::new(&GpuOptions::from_env())) {
         Ok(gpu) => Some(gpu),
@@ -20,7 +20,7 @@ pub(crate) fn gpu(test: &str) -> Option<&'static GpuContext> {
     }
 }
 
-/// Says that a test is skipped. Not by `eprintln`, which is shown for tests that fail only.
+/// Prints that a test is skipped. Not by `eprintln`, which is shown for tests that fail only.
 pub(crate) fn skip(test: &str, why: &str) {
     let line = format!("SKIPPED {test}: {why}\n");
     stderr().write_all(line.as_bytes()).unwrap();

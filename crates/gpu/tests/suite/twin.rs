@@ -1,4 +1,4 @@
-//! A body on the device and its twin on the host, which are done the same to.
+//! A body on the device and its twin on the host, with equal edits and steps.
 
 use glam::DVec3;
 use incise_gpu::{ClusterMapping, GpuContext, GpuSolver};
@@ -55,7 +55,7 @@ impl Twins {
         }
     }
 
-    /// A frame of both.
+    /// Advances both by a frame.
     pub(crate) fn step(&mut self, settings: &StepSettings) {
         self.device.step(&self.schedule, settings).unwrap();
         self.host.step(&self.order, settings).unwrap();
@@ -67,7 +67,7 @@ impl Twins {
         edit(&mut self.host);
     }
 
-    /// How far apart they are at most, in units of the body's size of 1.
+    /// The largest distance of their particles, in units of the body's size of 1.
     pub(crate) fn apart(&mut self) -> f64 {
         let far = distance(self.device.host().unwrap(), &self.host);
         assert_eq!(self.device.repaired(), 0);

@@ -1,4 +1,4 @@
-//! Snapshots and other settings on a GPU, and the ways there and back.
+//! Snapshots and changed settings on a GPU, and moves between CPU and GPU.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! A scene with everything in it that cuts, holds and is in the way, and settings to solve it with, each in its own way.
+//! A scene with strokes, attachments and obstacles, and settings to solve it with.
 
 use incise::Scene;
 use incise::scene::{Method, ReclusterSpec, SleepSpec, SolverSpec, Substeps, TetSolve};

@@ -1,4 +1,4 @@
-//! Both forms: what goes in comes out, other writers are read, broken files are refused.
+//! Text and binary: round trips, files of other writers, and errors for broken files.
 
 use std::fs;
 

@@ -1,4 +1,4 @@
-//! Attributes, markers and regions: kept, and refused where they are wrong.
+//! Attributes, markers and regions: kept, and errors where they are wrong.
 
 use incise_mesh::kuhn_box;
 use proptest::prelude::*;
@@ -123,7 +123,7 @@ fn parts_of_either_file_are_refused() {
     write_tetgen_file(&path, &sample()).unwrap();
     let [nodes, elements] = ["node", "ele"].map(|e| std::fs::read(path.with_extension(e)).unwrap());
     let whole = parse_tetgen("a", &nodes, &elements).unwrap();
-    // A file that ends within its last word is complete for all one can see: one value is another.
+    // A file that ends within its last word cannot be told from a complete one: its last value is another.
     let last_word = |file: &[u8]| {
         let text = file.trim_ascii_end();
         1 + text.iter().rposition(u8::is_ascii_whitespace).unwrap()

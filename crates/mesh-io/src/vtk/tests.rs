@@ -175,7 +175,7 @@ fn every_prefix_is_an_error_or_the_same_mesh() {
     let [ascii, bytes] = written(&sample());
     for whole in [ascii, bytes, old_binary()] {
         let mesh = read(&whole).unwrap().mesh;
-        // A file that ends between two sections of data, or within its last number, is complete for all one can see.
+        // A file that ends between two sections of data, or within its last number, cannot be told from a complete one.
         cut(&whole, read, |_, part| part.mesh == mesh);
     }
 }

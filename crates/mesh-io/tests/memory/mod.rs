@@ -1,4 +1,4 @@
-//! No file makes a reader take more memory than its size gives reason for, whatever lengths are written in it.
+//! The memory that a reader takes is bounded by the size of the file, for any lengths written in it.
 //!
 //! Counted is what the program asks for, at its peak: where a list grows, the old and the new one together.
 

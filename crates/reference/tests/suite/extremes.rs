@@ -1,4 +1,4 @@
-//! States that no step of sane size leads to: flat, in a point, mirrored, scrambled, blown up.
+//! States beyond those of ordinary steps: flat, in a point, mirrored, scrambled, enlarged.
 
 use glam::DVec3;
 use incise_mesh::kuhn_box;
@@ -8,7 +8,7 @@ use crate::support::{Noise, RUBBER, body, largest_distance, within};
 
 const STATES: [&str; 5] = ["flat", "point", "mirrored", "scrambled", "blown up"];
 
-/// A cube that is held at one face, the rest of it in that state; and its rest positions.
+/// A cube held at one face, with the rest of it in the given state; and its rest positions.
 fn cube(cells: usize, poisson_ratio: f64, state: &str) -> (ReferenceBody, Vec<DVec3>) {
     let mesh = kuhn_box([cells; 3], DVec3::ONE);
     let mut body = body(

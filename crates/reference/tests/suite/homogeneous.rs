@@ -29,7 +29,7 @@ fn bounds(mesh: &TetMesh) -> (DVec3, DVec3) {
     )
 }
 
-/// With the boundary in the place of an affine map, and the inside anywhere, equilibrium is the affine map.
+/// With the boundary moved by an affine map and any inside, equilibrium is the affine map.
 #[test]
 fn patch_test() {
     let mesh = irregular();
@@ -84,7 +84,8 @@ fn uniaxial(material: &Material, s: f64) -> (f64, f64) {
     (t, mu * s + l * (j - gamma) * t * t)
 }
 
-/// Both ends are put where the closed form says; the sides find their place alone, and the ends feel its stress.
+/// Both ends are placed by the closed form; the sides reach their positions by themselves, and the forces at the ends
+/// are those of the stress.
 #[test]
 fn uniaxial_stretch_is_the_closed_form() {
     let mesh = irregular();

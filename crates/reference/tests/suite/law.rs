@@ -53,7 +53,7 @@ proptest! {
         }
     }
 
-    /// Turning a body, or turning it before it is deformed, costs nothing. Rounding of terms up to l |F|⁶ / 2.
+    /// Rotating a body, before or after it is deformed, changes no energy. Rounding of terms up to l |F|⁶ / 2.
     #[test]
     fn energy_sees_no_rotation(law in law(), f in matrix(2.0), r in rotation()) {
         let energy = law.energy_density(f);
@@ -129,9 +129,8 @@ fn clamping_handles_the_degenerate() {
     }
 }
 
-/// Young's modulus and Poisson's ratio come out as they went in: a small uniaxial stretch that leaves the sides free of
-/// stress has the stress E times the strain, and contracts by ν times it. Second-order terms are of the size of the
-/// strain.
+/// Young's modulus and Poisson's ratio are recovered: a small uniaxial stretch that leaves the sides free of stress has
+/// the stress E times the strain, and contracts by ν times it. Second-order terms are of the size of the strain.
 #[test]
 fn small_stretches_follow_the_engineering_constants() {
     for nu in [0.0, 0.25, 0.3, 0.45, 0.49, 0.4999] {

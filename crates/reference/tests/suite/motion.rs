@@ -21,7 +21,7 @@ fn a_body_at_rest_stays_there() {
     }
 }
 
-/// Implicit Euler falls by `g Δt² n (n + 1) / 2` in n steps, whatever the body is made of.
+/// Implicit Euler falls by `g Δt² n (n + 1) / 2` in n steps, for any material.
 #[test]
 fn free_fall_is_the_closed_form() {
     let mesh = kuhn_box([2, 1, 1], dvec3(2.0, 1.0, 1.0));
@@ -116,7 +116,7 @@ proptest! {
     }
 }
 
-/// A turned body moves as the body does, turned.
+/// The motion of a rotated body is the rotated motion of the body.
 #[test]
 fn motion_sees_no_rotation() {
     let mesh = kuhn_box([2, 1, 1], dvec3(2.0, 1.0, 1.0));

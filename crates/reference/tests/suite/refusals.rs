@@ -1,4 +1,4 @@
-//! What is refused, and that it is refused before anything has moved.
+//! Invalid input is an error, and nothing has moved then.
 
 use glam::DVec3;
 use incise_reference::{Material, ReferenceBody, ReferenceError};
@@ -182,7 +182,7 @@ fn a_body_that_can_drift_or_turn_has_no_equilibrium() {
     assert_eq!(not_held(&mut pieces), None);
 }
 
-/// A particle of no tet neither moves nor troubles the matrix; a body may consist of such only.
+/// A particle of no tet does not move and is not in the matrix; a body may consist of such particles only.
 #[test]
 fn particles_without_mass_stay() {
     let mut body = ReferenceBody::new(&REST, &[[0, 1, 2, 3]], |_tet| RUBBER).unwrap();
@@ -197,7 +197,7 @@ fn particles_without_mass_stay() {
     }
 }
 
-/// Materials by tet: masses and stiffness follow.
+/// Materials by tet determine masses and stiffness.
 #[test]
 fn each_tet_has_its_material() {
     let heavy = Material {

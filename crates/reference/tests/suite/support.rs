@@ -1,11 +1,11 @@
-//! What the tests share.
+//! Helpers shared by the tests.
 
 use glam::{DMat3, DVec3};
 use incise_mesh::{ParticleId, TetMesh};
 use incise_reference::{Material, ReferenceBody};
 use proptest::prelude::*;
 
-/// Rubber of a density that keeps numbers plain.
+/// Rubber with a round density.
 pub(crate) const RUBBER: Material = Material {
     young_modulus: 1e6,
     poisson_ratio: 0.45,

@@ -1,4 +1,4 @@
-//! Films can be played by others: decoded, they are the pictures that went in.
+//! Animations decoded by other libraries are the pictures that were encoded.
 
 use std::fs::{self, File};
 use std::io::BufReader;

@@ -1,4 +1,4 @@
-//! Cameras: what they project and where their rays go belong together; nothing makes them useless.
+//! Cameras: projection and rays agree, for any input.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -97,7 +97,7 @@ fn directions_are_as_named() {
     let mut camera = Camera::fit(DVec3::ZERO, DVec3::ONE);
     let before = camera;
     camera.orbit(0.1, 0.0);
-    // The eye goes to the right, what is seen to the left.
+    // The eye moves to the right, the picture to the left.
     assert!((camera.eye() - before.eye()).dot(before.right()) > 0.0);
     camera = before;
     camera.orbit(0.0, 0.1);

@@ -1,4 +1,4 @@
-//! Tests of pictures and of what they are made from.
+//! Tests of pictures and render scenes.
 //!
 //! Pictures are compared with stored ones, `tests/references/*.png`. `INCISE_BLESS=1 cargo test -p incise-render` draws
 //! these again by software: look at them before they are committed. What needs an adapter skips without one, with a

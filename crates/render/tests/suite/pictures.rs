@@ -1,4 +1,4 @@
-//! Pictures: sizes, threads, cameras in odd places, and that two pieces look like two.
+//! Pictures: sizes, threads, cameras at unusual positions, and two pieces that are separate in the picture.
 
 use glam::DVec3;
 use incise_render::{Camera, ColorBy, Image, RenderError, Style, software_picture};
@@ -174,7 +174,7 @@ fn styles_show() {
             ..plain
         };
         pictures.push(draw(&shown, &camera, &style, [80, 60]));
-        // A style that shows something else than there are colors for shows tissue.
+        // A style without available colors shows tissue.
         assert_eq!(draw(&shown, &camera, &plain, [80, 60]), pictures[0]);
     }
     let blade = [DVec3::new(0.0, -0.3, 0.0), DVec3::new(0.0, 0.3, 0.1)];

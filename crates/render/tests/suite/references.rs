@@ -8,7 +8,7 @@ use crate::support::{Difference, LIVER, Shown, TWO_BODIES};
 
 const SIZE: [u32; 2] = [128, 96];
 
-/// A scene as it is to be drawn.
+/// A scene and how it is drawn.
 struct Reference {
     name: &'static str,
     shown: Shown,

@@ -1,5 +1,5 @@
-//! Paintings: the skin and its colors after any strokes equal rebuilt ones; rays hit what they should.
-//! Stretch is known.
+//! Render scenes: after any strokes the skin and its colors equal rebuilt ones, rays hit the right triangles, and
+//! stretch equals a closed form.
 
 use glam::{DMat3, DQuat, DVec3};
 use incise::cutting::FaceTag;
@@ -120,7 +120,7 @@ fn pieces_keep_their_colors_and_new_ones_get_others() {
         assert!(now.windows(2).all(|pair| pair[0] != pair[1]));
         colors.push(now);
     }
-    // Cuts add pieces; those that were there are still seen. The last stroke takes some away.
+    // Cuts add pieces; earlier ones are still visible. The last stroke takes some away.
     for pair in colors[..7].windows(2) {
         assert!(pair[0].iter().all(|color| pair[1].contains(color)));
     }

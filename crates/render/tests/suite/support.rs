@@ -3,7 +3,7 @@
 use incise::{Scene, Simulation};
 use incise_render::{Camera, Image, RenderScene};
 
-/// A simulation after some frames, and what is drawn of it.
+/// A simulation after some frames, and its render scene.
 pub(crate) struct Shown {
     pub(crate) scene: Scene,
     pub(crate) simulation: Simulation,
@@ -31,7 +31,7 @@ impl Shown {
         }
     }
 
-    /// Sees the bodies as they are now, and the floor.
+    /// A view of the present bodies and the floor.
     pub(crate) fn camera(&self) -> Camera {
         let [mut low, high] = self.render_scene.bounds(&self.simulation);
         if let Some(ground) = self.scene.world.ground {
@@ -101,7 +101,7 @@ point = [0.0, 0.8, 0.0]
 normal = [0.0, -1.0, 0.0]
 "#;
 
-/// How far two pictures are apart.
+/// The difference of two pictures.
 #[derive(Debug)]
 pub(crate) struct Difference {
     /// Of a channel, from 0 to 255.
@@ -139,7 +139,7 @@ mod gpu {
 
     static CONTEXT: OnceLock<Result<Arc<GpuContext>, GpuError>> = OnceLock::new();
 
-    /// The device, or `None` on a machine without one, which is said.
+    /// The device, or `None` with a note on stderr on a machine without one.
     pub(crate) fn gpu(test: &str) -> Option<Arc<GpuContext>> {
         let open = || GpuContext::new(&GpuOptions::from_env()).map(Arc::new);
         match CONTEXT.get_or_init(open) {

@@ -205,7 +205,7 @@ fn settings_change_on_a_cut_body() {
         "Setting here to there"
     );
     assert_eq!(session.report().pieces, 2);
-    // A refused setting keeps its value.
+    // An invalid setting keeps its value.
     let impossible = SolverSpec {
         relaxation: -1.0,
         ..SolverSpec::of(Method::Jacobi)

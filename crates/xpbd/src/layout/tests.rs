@@ -1,4 +1,4 @@
-//! What updates cost, counted in tets filled in, and that blocks stay well used.
+//! Cost of updates, counted in tets filled in, and occupancy of blocks.
 
 use glam::{DQuat, DVec3};
 use incise_graph::{ClusterId, Clustering, ColorId, Coloring, Schedule};
@@ -73,7 +73,7 @@ impl Plan {
         self.clusters.push(cluster);
     }
 
-    /// Follows and checks; returns the tets filled in.
+    /// Updates and checks; returns the tets filled in.
     fn update(&mut self) -> usize {
         self.schedule.update(
             &self.clustering,
@@ -157,7 +157,7 @@ fn a_touched_tet_is_filled_in_once() {
     assert_eq!(plan.update(), 5);
 }
 
-/// Another schedule, even an equal one, is not followed but laid out.
+/// Another schedule, even an equal one, rebuilds the layout.
 #[test]
 fn another_schedule_is_laid_out() {
     let mut plan = Plan::new(50);

@@ -1,4 +1,4 @@
-//! After the first frames a step asks for no memory.
+//! After the first frames a step allocates nothing.
 
 use glam::{DVec3, dvec3};
 use incise_mesh::kuhn_box;

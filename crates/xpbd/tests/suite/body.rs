@@ -1,4 +1,4 @@
-//! What the tests share: bodies made of boxes, their schedules, seeded noise.
+//! Helpers shared by the tests: bodies made of boxes, their schedules, seeded noise.
 
 use glam::DVec3;
 use incise_clustering::cluster;
@@ -7,7 +7,7 @@ use incise_graph::{Incidence, Schedule};
 use incise_mesh::{TetId, TetMesh};
 use incise_xpbd::{Material, Real, Solver, StepReport, StepSettings, TetSolve};
 
-/// Rubber of a density that keeps numbers plain.
+/// Rubber with a round density.
 pub(crate) const RUBBER: Material = Material {
     young_modulus: 1e6,
     poisson_ratio: 0.45,
@@ -140,7 +140,7 @@ pub(crate) struct KineticDamping {
 }
 
 impl KineticDamping {
-    /// Looks at the state after a step; says whether that was past a peak.
+    /// Checks the state after a step; returns whether it is past a peak.
     pub(crate) fn apply<R: Real>(&mut self, solver: &mut Solver<R>) -> bool {
         let now = solver.energy(None).kinetic;
         let past = now < self.last;

@@ -1,4 +1,4 @@
-//! A copy of a solver continues as the original does, to the bit, and weighs what it says.
+//! A copy of a solver continues bit-identically, and reports its size in bytes.
 
 use glam::{DVec3, dvec3};
 use incise_graph::{Clustering, ColorId, Coloring, Schedule};
@@ -10,7 +10,7 @@ use incise_xpbd::{
 
 use crate::body::{GRAVITY, RUBBER, body, disturb, plain};
 
-/// A bar with all that a solver knows: held softly and rigidly, linked, with volumes, damped, fixed, softened.
+/// A bar with every feature of a solver: held softly and rigidly, linked, with volumes, damped, fixed, softened.
 fn everything<R: Real>() -> (Solver<R>, Schedule) {
     let mesh = kuhn_box([4, 2, 2], dvec3(0.4, 0.2, 0.2));
     let material = Material {
@@ -101,7 +101,7 @@ fn a_copy_and_its_original_stay_bit_identical() {
     }
 }
 
-/// A copy asks for the bytes that it says, but for schedules and a few materials.
+/// A copy allocates the reported bytes, except for schedules and a few materials.
 #[test]
 fn the_reported_size_of_a_copy_is_right() {
     fn check<R: Real>() {

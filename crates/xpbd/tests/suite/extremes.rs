@@ -1,4 +1,4 @@
-//! Whatever comes in, as long as it is finite: no infinity and no NaN comes out.
+//! Any finite input gives no Inf and no NaN.
 
 use glam::{DVec3, dvec3};
 use incise_mesh::{TetId, TetMesh, kuhn_box};

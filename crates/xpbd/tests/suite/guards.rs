@@ -1,5 +1,5 @@
-//! One test for each guard of the solver that no other test misses: what it keeps working, not only that nothing blows
-//! up.
+//! One test for each guard of the solver that other tests do not cover: checks what the guard keeps working, not only
+//! that numbers stay finite.
 
 use glam::{DQuat, DVec3};
 use incise_graph::{Clustering, ColorId, Coloring, Schedule};

@@ -20,9 +20,9 @@ struct SolverPair<R: Real> {
     rest: Vec<DVec3>,
     clustering: Clustering,
     coloring: Coloring,
-    /// Follows.
+    /// Updated after every edit.
     schedule: Schedule,
-    follower: Solver<R>,
+    updated: Solver<R>,
     /// Rebuilt after every edit.
     other: Solver<R>,
     /// Of the present batch of edits.
@@ -53,7 +53,7 @@ impl<R: Real> SolverPair<R> {
         let mut body = Self {
             rest: mesh.positions.clone(),
             schedule: Schedule::default(),
-            follower: solver(),
+            updated: solver(),
             other: solver(),
             changed_tets: (0..).take(tets.len()).collect(),
             changed_clusters: (0..clustering.cluster_count())
@@ -76,7 +76,7 @@ impl<R: Real> SolverPair<R> {
     }
 
     fn both(&mut self) -> [&mut Solver<R>; 2] {
-        [&mut self.follower, &mut self.other]
+        [&mut self.updated, &mut self.other]
     }
 
     fn push(&mut self, tet: [u32; 4], material: u16) {
@@ -115,7 +115,7 @@ impl<R: Real> SolverPair<R> {
         let m = u32::try_from(self.rest.len()).unwrap();
         self.rest
             .push((self.rest[a as usize] + self.rest[b as usize]) / 2.0);
-        let material = self.follower.material_of(t);
+        let material = self.updated.material_of(t);
         self.tets[t] = [a, m, c, d];
         let rest = self.corners(self.tets[t]);
         for solver in self.both() {
@@ -129,7 +129,7 @@ impl<R: Real> SolverPair<R> {
         self.touched.push(m);
     }
 
-    /// Hangs a tet on a copy of its last corner.
+    /// Gives a tet a copy of its last corner.
     fn relink(&mut self, t: usize) {
         let old = self.tets[t][3];
         let copy = u32::try_from(self.rest.len()).unwrap();
@@ -143,7 +143,7 @@ impl<R: Real> SolverPair<R> {
         self.touched.extend([old, copy]);
     }
 
-    /// Deletes a tet; the last one takes its place.
+    /// Deletes a tet; the last one takes its slot.
     fn delete(&mut self, t: usize) {
         let last = self.tets.len() - 1;
         self.touched.extend(self.tets[t]);
@@ -159,7 +159,7 @@ impl<R: Real> SolverPair<R> {
         }
     }
 
-    /// Takes the last halving back: the child goes, and its particle.
+    /// Undoes the last halving: removes the child and its particle.
     fn join(&mut self, t: usize, before: [u32; 4]) {
         let last = self.tets.len() - 1;
         self.touched.extend(before);
@@ -231,25 +231,25 @@ impl<R: Real> SolverPair<R> {
             });
             let (particle, mass) = (p as usize, masses.sum());
             self.other.set_mass(particle, mass);
-            self.follower.set_mass_in_star(particle, mass, star);
+            self.updated.set_mass_in_star(particle, mass, star);
         }
     }
 
     /// Steps both solvers, the other one by a new schedule.
     fn step(&mut self, settings: &StepSettings) {
-        self.follower.check_layout(&self.schedule).unwrap();
+        self.updated.check_layout(&self.schedule).unwrap();
         let new = Schedule::new(&self.clustering, &self.coloring);
-        self.follower
+        self.updated
             .step_keeping_residuals(&self.schedule, settings)
             .unwrap();
         self.other.step_keeping_residuals(&new, settings).unwrap();
-        self.follower.check_layout(&self.schedule).unwrap();
+        self.updated.check_layout(&self.schedule).unwrap();
         for p in 0..self.rest.len() {
-            assert_eq!(self.follower.position(p), self.other.position(p), "{p}");
-            assert_eq!(self.follower.velocity(p), self.other.velocity(p), "{p}");
+            assert_eq!(self.updated.position(p), self.other.position(p), "{p}");
+            assert_eq!(self.updated.velocity(p), self.other.velocity(p), "{p}");
         }
         let time = settings.substep_time();
-        assert_eq!(self.follower.residuals(time), self.other.residuals(time));
+        assert_eq!(self.updated.residuals(time), self.other.residuals(time));
     }
 }
 
@@ -271,7 +271,7 @@ fn below(noise: &mut Noise, count: usize) -> usize {
 fn edits<R: Real>(materials: &[Material], seed: u64) {
     let mesh = kuhn_box([4, 3, 2], dvec3(0.4, 0.3, 0.2));
     let mut body = SolverPair::<R>::new(&mesh, materials);
-    body.follower.set_fixed(0, true);
+    body.updated.set_fixed(0, true);
     body.other.set_fixed(0, true);
     let mut noise = Noise(seed);
     let mut undo = None;
@@ -309,7 +309,7 @@ fn updated_and_rebuilt_layouts_are_equal() {
     edits::<f64>(&[HEAVY, RUBBER], 4);
 }
 
-/// Several edits between two steps, and a follower that must rebuild because the schedule no longer knows the changes.
+/// Several edits between two steps, and a updated that must rebuild because the schedule no longer knows the changes.
 #[test]
 fn a_solver_may_fall_behind() {
     let mesh = kuhn_box([3, 2, 2], dvec3(0.3, 0.2, 0.2));
@@ -325,7 +325,7 @@ fn a_solver_may_fall_behind() {
     body.step(&settings());
 }
 
-/// All goes, then some comes back.
+/// All tets are removed, then some are added again.
 #[test]
 fn an_empty_layout_is_valid() {
     let mesh = kuhn_box([1, 1, 1], DVec3::ONE);
@@ -343,7 +343,7 @@ fn an_empty_layout_is_valid() {
     body.step(&settings());
 }
 
-/// A star that is not named in full is solved with an old mass, and found out.
+/// A star that is not named in full is solved with an old mass, which the check detects.
 #[test]
 fn a_forgotten_tet_is_found() {
     let mesh = kuhn_box([1, 1, 1], DVec3::ONE);
@@ -356,19 +356,19 @@ fn a_forgotten_tet_is_found() {
         .map(|(t, _)| t)
         .collect();
     assert!(star.len() > 1);
-    let mass = 2.0 * body.follower.mass(0);
-    body.follower
+    let mass = 2.0 * body.updated.mass(0);
+    body.updated
         .set_mass_in_star(0, mass, star[1..].iter().copied());
     let tet = XpbdError::Layout {
         what: "tet",
         number: star[0],
     };
-    assert_eq!(body.follower.check_layout(&body.schedule), Err(tet));
-    // The same mass again changes nothing; another one with the whole star puts it right.
-    body.follower.set_mass_in_star(0, mass, star.clone());
-    assert!(body.follower.check_layout(&body.schedule).is_err());
-    body.follower.set_mass_in_star(0, 2.0 * mass, star);
-    body.follower.check_layout(&body.schedule).unwrap();
+    assert_eq!(body.updated.check_layout(&body.schedule), Err(tet));
+    // The same mass again changes nothing; another one with the whole star corrects it.
+    body.updated.set_mass_in_star(0, mass, star.clone());
+    assert!(body.updated.check_layout(&body.schedule).is_err());
+    body.updated.set_mass_in_star(0, 2.0 * mass, star);
+    body.updated.check_layout(&body.schedule).unwrap();
 }
 
 /// So is a tet that a schedule still names although it is gone.
@@ -378,6 +378,6 @@ fn a_tet_that_is_gone_cannot_be_solved() {
     let mesh = kuhn_box([1, 1, 1], DVec3::ONE);
     let mut body = SolverPair::<f64>::new(&mesh, &[RUBBER]);
     body.step(&settings());
-    body.follower.truncate_tets(mesh.tets.len() - 1);
-    let _ = body.follower.step(&body.schedule, &settings());
+    body.updated.truncate_tets(mesh.tets.len() - 1);
+    let _ = body.updated.step(&body.schedule, &settings());
 }

@@ -1,4 +1,4 @@
-//! A body crushed beyond recognition comes back to its shape: substeps of one iteration at kappa 0.35, one second.
+//! A crushed body recovers its shape: substeps of one iteration at kappa 0.35, one second.
 
 use glam::{DVec3, dvec3};
 use incise_mesh::kuhn_box;
@@ -132,10 +132,9 @@ fn shrunk(part: f64) -> f64 {
     solver.volume().total / solver.volume().rest
 }
 
-/// What it cannot do. The energy `μ/2 |F|² + l/2 (det F - γ)²` has a second minimum at F = 0: shrunk to a part s, a
-/// body is pulled together by `μ s` and blown up by `l γ s²`, so below `s = μ / (l γ)`, here 9 %, it continues to
-/// shrink. On a point, up to any small noise, a free body stays there: it falls as a point. Something has to hold or
-/// hit it.
+/// A limit. The energy `μ/2 |F|² + l/2 (det F - γ)²` has a second minimum at F = 0: shrunk to a part s, a body is
+/// pulled together by `μ s` and blown up by `l γ s²`, so below `s = μ / (l γ)`, here 9 %, it continues to shrink. On a
+/// point, up to any small noise, a free body stays there: it falls as a point. Something has to hold or hit it.
 #[test]
 fn a_free_body_on_a_point_stays_there() {
     let barrier = RUBBER.mu() / (RUBBER.volume_stiffness() * RUBBER.gamma());

@@ -1,4 +1,4 @@
-//! Absurd settings and materials are refused by name, and nothing moves then.
+//! Invalid settings and materials are errors that name the value, and nothing moves then.
 
 use glam::DVec3;
 use incise_mesh::kuhn_box;
@@ -142,7 +142,7 @@ fn bad_settings_are_refused_by_name_and_nothing_moves() {
     assert!(solver.max_speed() > 0.0);
 }
 
-/// Values that fit a double but not the solver's own precision are refused at the door as well.
+/// Values that fit a double but not the solver's own precision are errors as well.
 #[test]
 #[should_panic(expected = "positions are finite")]
 fn a_position_too_large_for_single_precision_is_refused() {

@@ -1,4 +1,4 @@
-//! What a step says about how well it solved its equations.
+//! Residuals: how well a step has solved its equations.
 
 use glam::{DVec3, dvec3};
 use incise_graph::{Clustering, ColorId, Coloring, Schedule};
@@ -265,7 +265,7 @@ fn the_force_residual_of_a_substep_vanishes_with_kappa() {
     within("in the end", left[4] / left[3], 0.6);
 }
 
-/// The root mean square, the sum and the number of constraints belong together.
+/// Root mean square, sum and number of constraints are consistent.
 #[test]
 fn the_mean_of_the_dual_residual_counts_constraints() {
     let (solver, time) = kept::<f64>(0.3, 1);

@@ -1,4 +1,4 @@
-//! A body at rest stays there, up to the kappa for which that is promised; above, it is said what happens instead.
+//! A body at rest stays there up to the documented kappa; above it, the documented behavior is checked.
 
 use glam::{DVec3, dvec3};
 use incise_graph::{Clustering, ColorId, Coloring, Schedule};

@@ -363,8 +363,7 @@ fn held_particles_stay_and_the_ground_holds() {
     }
 }
 
-/// A body cut in two falls apart: after `rebuild` the halves know nothing of each other, and the stars equal rebuilt
-/// ones.
+/// A body cut in two falls apart: after `rebuild` the halves do not affect each other, and the stars equal new ones.
 #[test]
 fn stars_follow_a_cut() {
     let mesh: TetMesh = kuhn_box([4, 2, 2], dvec3(0.4, 0.2, 0.2));

@@ -1,4 +1,4 @@
-//! What is written reads the same, and no bytes make the reader panic.
+//! Written files read back equal, and no bytes make the reader panic.
 
 use glam::DVec3;
 use incise_mesh::{ParticleId, TetMesh};

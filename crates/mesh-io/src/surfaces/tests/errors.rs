@@ -1,4 +1,4 @@
-//! What is wrong with a file, and where.
+//! Errors name the mistake and its place.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! All formats: what goes in comes out, other writers are read, broken files are refused.
+//! All formats: round trips, files of other writers, and errors for broken files.
 
 mod errors;
 
