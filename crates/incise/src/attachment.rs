@@ -52,7 +52,7 @@ pub(crate) struct Attachment {
     particles: Vec<usize>,
     /// Center of these particles when they were attached, in m.
     middle: DVec3,
-    /// The same center in its frame, in m.
+    /// Center of these particles in the frame, in m.
     center: DVec3,
     /// The number of its frame in the solver.
     pub(crate) number: u32,
