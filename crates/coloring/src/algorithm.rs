@@ -116,7 +116,7 @@ impl Algorithm {
 }
 
 impl Algorithm {
-    /// The names that [`from_str`](Self::from_str) knows, without parameters.
+    /// The names that [`from_str`](Self::from_str) accepts, without parameters.
     pub const NAMES: [&str; 11] = [
         "auto",
         "scgc",

@@ -75,7 +75,7 @@ pub fn auto(conflicts: &impl Conflicts) -> Auto {
     if result.is_best(conflicts) {
         return result;
     }
-    // From here on every step walks neighbors: with the edges at hand that is faster.
+    // From here on every step walks neighbors: with explicit edges that is faster.
     let graph = conflicts.graph();
     for order in [Order::SmallestLast, Order::MaximumCardinality] {
         let other = greedy(&*graph, order);

@@ -5,7 +5,7 @@
 
 use incise_graph::ColorId;
 
-/// Colors that are taken around the vertex at hand.
+/// Colors that are taken around the current vertex.
 #[derive(Debug, Default)]
 pub(crate) struct FirstFit {
     taken: Vec<u64>,

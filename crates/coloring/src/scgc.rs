@@ -26,14 +26,13 @@
 //! task reads what another writes. So the result and the statistics are the same for any number of
 //! threads.
 //!
-//! **Work.** Only undecided vertices are visited. A vertex remembers the neighbor that stopped it
-//! and looks there first: as long as that neighbor is in the way, a round costs it one test. Each
-//! new color is told to each neighbor once. Together: every edge twice for the telling, once for
-//! each best color that its lower vertex gets past, plus the number of undecided vertices summed
-//! over the rounds. Memory: a number per edge and 36 bytes per vertex, and palettes beyond 64
-//! colors. Shortcut 2 is tested on the edges a search passes, not on all of them; it takes part in
-//! few decisions. A sequential pass touches every edge twice in all, so on few cores
-//! [`greedy`](crate::greedy()) is the faster of the two.
+//! **Work.** Only undecided vertices are visited. A vertex remembers the neighbor that stopped it and looks there
+//! first: as long as that neighbor is in the way, a round costs it one test. Each new color is sent to each neighbor
+//! once. Together: every edge twice for the notification, once for each best color that its lower vertex gets past,
+//! plus the number of undecided vertices summed over the rounds. Memory: a number per edge and 36 bytes per vertex, and
+//! palettes beyond 64 colors. Shortcut 2 is tested on the edges a search passes, not on all of them; it takes part in
+//! few decisions. A sequential pass touches every edge twice in all, so on few cores [`greedy`](crate::greedy()) is the
+//! faster of the two.
 
 use incise_graph::{ColorId, Coloring};
 use rayon::prelude::*;

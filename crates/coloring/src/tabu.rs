@@ -83,7 +83,7 @@ struct Search<'a, C> {
     row: Vec<u32>,
     /// Rows of `count` entries: the step until which the vertex keeps away from the color.
     until: Vec<usize>,
-    /// For each color the number of neighbors of the vertex at hand that have it.
+    /// For each color the number of neighbors of the current vertex that have it.
     taken: Vec<u32>,
     /// Vertex -> the step at which it was last counted.
     stamp: Vec<usize>,

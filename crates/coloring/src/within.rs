@@ -6,7 +6,7 @@
 //! keeps those apart.
 //!
 //! First fit in ascending order, cluster after cluster, with one word per particle for the colors
-//! taken there by the cluster at hand. Colors from 64 on work by windows, as in the
+//! taken there by the current cluster. Colors from 64 on work by windows, as in the
 //! [`first_fit`](crate::Conflicts::first_fit) of incidence: a constraint that finds no color in
 //! one window tries the next, with all words cleared. Cost: O(entries) per window of 64 colors, over
 //! the constraints that reach it.

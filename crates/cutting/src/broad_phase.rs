@@ -309,7 +309,7 @@ impl<O: Fn(ParticleId) -> u8> Flood<'_, O> {
     }
 }
 
-/// What a flood knows of the particles it came by: the number of the flood and eight bits.
+/// State of a flood at the particles that it has visited: the number of the flood and eight bits.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Marks {

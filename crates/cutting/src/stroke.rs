@@ -45,7 +45,7 @@ pub(crate) struct Stroke {
     given: GivenSides,
     /// Sides of tets split in this call.
     forgotten: Vec<(TetId, bool)>,
-    /// The number that the registry knows it by.
+    /// The number of the stroke in the registry.
     number: Option<u32>,
     /// Whether the positive side is where the blade's own normal does not point to: the blade goes back over what it
     /// has cut, and the surface keeps its orientation.

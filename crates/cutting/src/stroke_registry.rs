@@ -47,8 +47,7 @@ use crate::{CutDelta, CutOptions, CuttableMesh};
 pub struct StrokeRegistry {
     /// Strokes so far.
     strokes: u32,
-    /// For each particle and 0, 1, .. a stroke it is known to with what that knows of it. Never iterated in a way that
-    /// could be seen.
+    /// For each particle and 0, 1, .. a stroke that has marked it, with the mark. Its order never affects results.
     known: HashMap<(ParticleId, u32), (u32, Mark), FixedState>,
 }
 
@@ -100,7 +99,7 @@ impl StrokeRegistry {
         adopted: &mut Vec<ParticleId>,
     ) -> bool {
         let before = adopted.len();
-        // A first stroke knows no other.
+        // A first stroke has no earlier one to join.
         if self.known.is_empty() || (stroke == 0 && self.strokes == 1) {
             return false;
         }

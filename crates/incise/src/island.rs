@@ -153,7 +153,7 @@ pub(crate) fn adopt(settings: &mut StepSettings, spec: &SolverSpec) {
     }
 }
 
-/// The part of a body's volume outside the accuracy wanted from which a user is told.
+/// The part of a body's volume outside the accuracy wanted from which a warning is given.
 const OUTSIDE_FRACTION: f64 = 0.01;
 
 /// Cuts raise a chosen number of substeps to at most so many times what it was before them: a live scene must not become

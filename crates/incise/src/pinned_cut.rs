@@ -1,7 +1,7 @@
 //! [`PinnedCut`]: whether a stroke has cut where pinned particles keep both sides together.
 //!
 //! A copy of a particle is fixed, or attached to the frame of an attachment, if the particle is. Cut faces inside a
-//! pinned region therefore cannot open. Two cases are told from all others:
+//! pinned region therefore cannot open. Two cases are reported:
 //!
 //! - *Closed*: more than half of the area that the stroke has opened, at rest, is in faces with at least two pinned
 //!   corners, which can at most turn about an edge.

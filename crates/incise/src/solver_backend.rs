@@ -26,7 +26,7 @@ pub(crate) struct Measures {
 /// A solver on the CPU in one precision, by XPBD or VBD, or one on a device. Functions that only one kind needs do
 /// nothing in the others.
 pub(crate) trait SolverBackend {
-    /// Advances by one frame, keeping what [`SolverBackend::last_substep`] needs if told to.
+    /// Advances by one frame, keeping what [`SolverBackend::last_substep`] needs on request.
     fn step(
         &mut self,
         schedule: &Schedule,

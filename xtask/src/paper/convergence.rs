@@ -51,9 +51,9 @@ impl Setup {
 
     pub(super) fn words(self) -> &'static str {
         match self {
-            Self::Organ => "0.2 m long, as an organ, let go at twice its size",
-            Self::Large => "so large that kappa is 1/2, let go at twice its size",
-            Self::Gentle => "so large that kappa is 1/2, let go at 1.1 times its size",
+            Self::Organ => "0.2 m long, as an organ, released at twice its size",
+            Self::Large => "so large that kappa is 1/2, released at twice its size",
+            Self::Gentle => "so large that kappa is 1/2, released at 1.1 times its size",
         }
     }
 

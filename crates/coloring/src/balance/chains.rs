@@ -58,11 +58,11 @@ pub(super) struct Chains {
     closed: Vec<u64>,
     /// Those from which direct moves lead nowhere in this round.
     dead: Vec<u64>,
-    /// Those light enough for the source at hand.
+    /// Those light enough for the current source.
     targets: Vec<u64>,
-    /// Those that the vertex at hand cannot or need not enter.
+    /// Those that the current vertex cannot or need not enter.
     taken: Vec<u64>,
-    /// Neighbors of the vertex at hand that may push it away.
+    /// Neighbors of the current vertex that may push it away.
     pushers: Vec<u32>,
     /// Neighbors of a vertex that moved.
     neighbors: Vec<u32>,

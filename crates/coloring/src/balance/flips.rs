@@ -26,7 +26,7 @@ struct Component {
 pub(super) struct Flips {
     /// The members of the heavy class, then those of the light one.
     vertices: Vec<u32>,
-    /// Vertex -> its local index in `vertices`, for members of the two classes at hand.
+    /// Vertex -> its local index in `vertices`, for members of the two current classes.
     local: Vec<u32>,
     /// Local index -> an earlier one in the same component, or itself.
     parent: Vec<u32>,

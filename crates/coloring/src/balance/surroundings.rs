@@ -85,7 +85,7 @@ pub(super) struct Bits<'a> {
     /// Words per particle.
     stride: usize,
     words: Vec<u64>,
-    /// Particle -> its constraint of the class at hand, if it has one; work of `join`.
+    /// Particle -> its constraint of the current class, if it has one; work of `join`.
     owner: Vec<u32>,
 }
 

@@ -1,4 +1,4 @@
-//! Tetrahedral mesh for local changes: each tet knows its neighbors, and a few tets at a time are replaced by others
+//! Tetrahedral mesh for local changes: each tet stores its neighbors, and a few tets at a time are replaced by others
 //! that fill the same volume.
 //!
 //! Cost: constant time per change.

@@ -549,7 +549,7 @@ impl<R: Float> Contacts<R> {
         let residual = gap.residual;
         let multiplier = self.multipliers.get(index);
         let [hx, hy, hz, before] = multiplier.map_or([R::ZERO; 4], R::read);
-        // Apart, and not to be let go of either.
+        // Open, and no impulse to take back.
         if !(residual < R::ZERO || before > R::ZERO) {
             return;
         }
