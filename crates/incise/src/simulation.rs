@@ -5,6 +5,7 @@
 
 mod builder;
 mod edit;
+mod forces;
 mod interaction;
 mod readback;
 mod set_solver;
@@ -22,7 +23,6 @@ use incise_mesh::{Surface, TetMesh};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use crate::body;
 use crate::budget;
 use crate::collider::Colliders;
 use crate::compute_device::{ComputeDevice, OpenDevice};
@@ -36,6 +36,7 @@ use crate::pieces::PieceNumbers;
 use crate::report::{
     CutReport, DetachedReport, FrameReport, Milliseconds, PieceReport, SoftenedReport, milliseconds,
 };
+use crate::resolved_body::ResolvedBody;
 use crate::scene::{Precision, Quantity, StrokeSpec};
 use crate::strokes::Timeline;
 use crate::validate::value;
@@ -138,7 +139,7 @@ impl Simulation {
             return Err(value("report.every", 0, "at least 1"));
         }
         crate::scene::check(scene)?;
-        let bodies = body::Body::all(scene, meshes)?;
+        let bodies = ResolvedBody::all(scene, meshes)?;
         let mut joined = distance::pairs(scene, bodies.len())?;
         joined.extend(contacts::pairs(scene, bodies.len())?);
         let island_of = island_of_bodies(bodies.len(), &joined);
@@ -170,7 +171,7 @@ impl Simulation {
         };
         if scene.solver.precision == Precision::Auto && !compute_device.is_gpu() && short() {
             precision = Precision::F64;
-            let bodies = body::Body::all(scene, meshes)?;
+            let bodies = ResolvedBody::all(scene, meshes)?;
             islands = make_islands(precision, IslandBuilder::all(scene, bodies, &island_of)?)?;
         }
         if let Some(budget) = scene.solver.budget_ms {
@@ -207,6 +208,7 @@ impl Simulation {
                 timeline,
                 report: FrameReport::default(),
                 residuals_kept: false,
+                forces_measured: false,
             },
             open_device: OpenDevice::default(),
             deltas: Vec::new(),
@@ -295,6 +297,9 @@ impl Simulation {
 
         let before_solve = Instant::now();
         let (frame, residual) = (self.state.clock.next_frame, self.wants(Quantity::Residual));
+        let force = self.wants(Quantity::Force);
+        // What falls asleep keeps the forces that it sleeps with.
+        let measures = force || (self.sleeps() && self.reports(Quantity::Force));
         let moves = self.state.colliders.take_moves();
         for island in &mut self.state.islands {
             for &(place, to) in &moves {
@@ -307,7 +312,10 @@ impl Simulation {
         }
         let islands = self.state.islands.par_iter_mut();
         let solved = islands
-            .map(|island| island.step(frame, residual).map(|step| step.repaired))
+            .map(|island| {
+                let step = island.step(frame, residual, measures);
+                step.map(|step| step.repaired)
+            })
             .try_reduce(|| 0, |a, b| Ok(a + b));
         for island in &mut self.state.islands {
             for &(place, to) in &moves {
@@ -318,6 +326,7 @@ impl Simulation {
         ms.solve = milliseconds(before_solve.elapsed());
         self.collect_contacts(&mut ms);
         self.state.residuals_kept = residual;
+        self.state.forces_measured = force;
 
         // A device measures what it has; residuals need positions and multipliers of all.
         if !self.state.compute_device.is_gpu() || residual {
@@ -350,7 +359,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Takes over what contacts of all islands took, and which began and ended.
+    /// Collects the contact times of all islands and the contacts that began and ended.
     fn collect_contacts(&mut self, ms: &mut Milliseconds) {
         let State {
             islands, pieces, ..
@@ -437,7 +446,12 @@ impl Simulation {
             .clock
             .next_frame
             .is_multiple_of(self.state.reporting.every)
-            && self.state.reporting.quantities.contains(&quantity)
+            && self.reports(quantity)
+    }
+
+    /// Whether some frames report a quantity.
+    fn reports(&self, quantity: Quantity) -> bool {
+        self.state.reporting.quantities.contains(&quantity)
     }
 
     /// Whether substeps are chosen for a body.

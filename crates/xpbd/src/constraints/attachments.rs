@@ -96,6 +96,20 @@ impl<R: Float> Attachments<R> {
             .binary_search_by_key(&particle, |a| a.particle as usize)
     }
 
+    /// Number of handles.
+    pub(crate) fn handle_count(&self) -> usize {
+        self.handles.len()
+    }
+
+    /// Of each particle on a spring: its handle, mass times the motion that the spring gave it in the substep, and
+    /// where the spring is fastened, relative to the origin.
+    pub(crate) fn pulls(&self) -> impl Iterator<Item = (u32, DVec3, DVec3)> + '_ {
+        self.soft().map(|attachment| {
+            let [impulse, target] = [attachment.multiplier, attachment.target].map(R::to_dvec3);
+            (attachment.handle, impulse, target)
+        })
+    }
+
     pub(crate) fn get(&self, particle: usize) -> Option<&Attachment<R>> {
         self.find(particle).ok().map(|i| &self.list[i])
     }
@@ -245,9 +259,13 @@ impl<R: Float> Attachments<R> {
         index.is_ok()
     }
 
-    /// Moves handles, and the particles that are attached rigidly, to where they are at a fraction of the frame;
-    /// returns how many particles could not be moved because their target is out of the range of numbers.
-    pub(crate) fn move_held(&mut self, particles: &Particles<R>, fraction: f64) -> usize {
+    /// Moves handles and rigidly attached particles to their poses at a fraction of the frame; returns how many
+    /// particles could not be moved because their target is out of the range of numbers.
+    pub(crate) fn move_rigid_attachments(
+        &mut self,
+        particles: &Particles<R>,
+        fraction: f64,
+    ) -> usize {
         let Self { handles, list } = self;
         for handle in handles.iter_mut() {
             handle.now = handle.from.toward(&handle.to, fraction);
@@ -272,7 +290,7 @@ impl<R: Float> Attachments<R> {
     }
 
     /// Gives particles that are attached rigidly the velocity of their motion in a substep.
-    pub(crate) fn update_held(&self, particles: &mut Particles<R>, per_time: R) {
+    pub(crate) fn update_rigid_attachments(&self, particles: &mut Particles<R>, per_time: R) {
         for attachment in &self.list {
             let p = attachment.particle as usize;
             if attachment.compliance == 0.0 && !particles.fixed[p] {
@@ -287,7 +305,7 @@ impl<R: Float> Attachments<R> {
 
 impl<R: Float> ConstraintKind<R> for Attachments<R> {
     fn begin(&mut self, particles: &Particles<R>, substep: &Substep<'_, R>) -> usize {
-        self.move_held(particles, substep.fraction)
+        self.move_rigid_attachments(particles, substep.fraction)
     }
 
     /// Pulls particles to their handles that are attached with a compliance. Each moves only its own particle.
@@ -302,7 +320,7 @@ impl<R: Float> ConstraintKind<R> for Attachments<R> {
     }
 
     fn end(&mut self, particles: &mut Particles<R>, substep: &Substep<'_, R>) {
-        self.update_held(particles, substep.factors.per_time);
+        self.update_rigid_attachments(particles, substep.factors.per_time);
     }
 
     /// The handles have arrived.

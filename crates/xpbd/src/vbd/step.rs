@@ -50,6 +50,13 @@ impl<R: Float> Solver<R> {
             return Err(XpbdError::ContactMethod { method: "vbd" });
         }
         self.recenter();
+        let mut meter = self.stepper.meter.take();
+        if let Some(meter) = &mut meter {
+            let (attachments, colliders) =
+                (&self.constraints.attachments, settings.step.colliders.len());
+            let frame_time = settings.step.time_step;
+            meter.start(&self.particles, attachments, colliders, frame_time);
+        }
         let mut report = VbdReport::default();
         let (count, time) = (settings.step.substeps, settings.step.substep_time());
         for number in 1..=count {
@@ -65,15 +72,26 @@ impl<R: Float> Solver<R> {
                     count: count * parts,
                     is_startup: startup.is_some(),
                 };
+                if let Some(meter) = &mut meter {
+                    meter.begin(&self.particles);
+                }
                 let mut step = ImplicitStep::predicted(self, stars, settings, penalty, substep);
                 step.run(settings, &mut report, &mut iterate);
                 report.error = match (report.error, step.error) {
                     (Some(a), Some(b)) => Some(a.max(b)),
                     (a, b) => a.or(b),
                 };
+                let own_time = step.settings.substep_time();
+                if let Some(meter) = &mut meter {
+                    step.measure(meter);
+                }
                 report.repaired += step.finish().repaired;
+                if let Some(meter) = &mut meter {
+                    meter.end(&self.particles, settings.step.gravity, own_time);
+                }
             }
         }
+        self.stepper.meter = meter;
         Ok(report)
     }
 }
@@ -180,7 +198,7 @@ impl<'a, R: Float> ImplicitStep<'a, R> {
             colliders,
             ..
         } = &mut solver.constraints;
-        let lost = attachments.move_held(&solver.particles, ended);
+        let lost = attachments.move_rigid_attachments(&solver.particles, ended);
         colliders.place(&own, ended * own.time_step, solver.particles.origin);
         stars.begin(solver, implicit_time, penalty);
         let mut step = Self {
@@ -249,7 +267,9 @@ impl<'a, R: Float> ImplicitStep<'a, R> {
             ..
         } = self.solver;
         let repaired = particles.update_velocities(self.time, per_time);
-        constraints.attachments.update_held(particles, per_time);
+        constraints
+            .attachments
+            .update_rigid_attachments(particles, per_time);
         if self.integrator == Integrator::Bdf2 {
             let touches = |x| constraints.colliders.touches(x);
             self.stars.history.end(particles, touches);
