@@ -180,7 +180,7 @@ impl Links {
     }
 
     /// The vertex of each link at a particle.
-    fn at(&self, particle: u32) -> impl Iterator<Item = u32> {
+    pub(super) fn at(&self, particle: u32) -> impl Iterator<Item = u32> {
         let links = self.links_at(particle);
         links.map(|link| link.vertex)
     }

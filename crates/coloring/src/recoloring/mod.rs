@@ -3,19 +3,23 @@
 //! Removing constraints never makes a coloring improper, so every vertex keeps its color. A vertex
 //! that got new particles keeps its color unless a neighbor has it. A vertex left without a color
 //! takes the smallest free color if the number of colors need not grow for it; else the first color
-//! whose holders around can all move to another one; else a new color. If that makes more colors
-//! than the limit, all vertices are recolored with [`auto`].
+//! whose holders around can all move to another one; else what a short search makes room for (see
+//! the module `search`); else a new color. Vertices with a new color are noted, and later edits
+//! search for another color for them. So the work of a full coloring is spread over edits, near the
+//! vertices that need it.
 //!
 //! The limit is the larger of two numbers, the colors of the last full coloring and the present
 //! clique bound, plus the slack. So colors grow only where the constraints themselves grow denser,
-//! or by the slack. The last full coloring may be one of a denser scene, though: after removing
-//! many constraints, call [`recolor`](Recoloring::recolor) at a quiet moment.
+//! or by the slack. Where even a longer search finds no color below the limit, all vertices are
+//! recolored with [`auto`]. The last full coloring may be one of a denser scene, though: after
+//! removing many constraints, call [`recolor`](Recoloring::recolor) at a quiet moment.
 //!
 //! Cost of an edit: the links of the edited vertices and of those at their particles, counted in
-//! [`Recolored::visited`]; moving neighbors costs their neighborhoods in turn. None of it depends
-//! on the size of the rest.
+//! [`Recolored::visited`]; moving neighbors costs their neighborhoods in turn, and searches a fixed
+//! number of steps. None of it depends on the size of the rest.
 
 mod links;
+mod search;
 mod taken;
 
 use std::borrow::Borrow;
@@ -27,7 +31,17 @@ use incise_graph::{Classes, ColorId, Coloring, Incidence};
 use crate::conflicts::UNCOLORED;
 use crate::{ColoringError, auto};
 use links::Links;
+use search::LocalSearch;
 use taken::Taken;
+
+/// Steps of a search for a color below the accepted ones.
+const SEARCH: usize = 100;
+
+/// Steps of such searches in an edit.
+const STEPS: usize = 300;
+
+/// Steps of a search that saves a full coloring, where more colors are allowed: tens of steps are mostly enough.
+const LAST_SEARCH: usize = 1000;
 
 /// Statistics of an edit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -38,6 +52,8 @@ pub struct Recolored {
     pub colored: usize,
     /// Number of vertices outside the edit that changed their color.
     pub displaced: usize,
+    /// Number of steps of searches for a color.
+    pub steps: usize,
     /// Number of links visited, the work of the edit, without a full coloring.
     pub visited: u64,
     /// Whether all vertices were recolored.
@@ -91,6 +107,12 @@ pub struct Recoloring {
     waiting: Vec<(u32, ColorId)>,
     /// Those that cannot keep it, by the valences of their particles.
     by_bound: Vec<(Reverse<u64>, u32)>,
+    /// Vertices that got a color beyond the accepted ones.
+    excess: Vec<u32>,
+    /// Number of searches, which seeds the next one.
+    searches: u64,
+    #[cfg_attr(feature = "serde", serde(skip))]
+    search: LocalSearch,
 }
 
 impl Recoloring {
@@ -163,6 +185,9 @@ impl Recoloring {
             vacant: BTreeSet::new(),
             waiting: Vec::new(),
             by_bound: Vec::new(),
+            excess: Vec::new(),
+            searches: 0,
+            search: LocalSearch::default(),
         };
         let all = (0..).take(recoloring.links.vertex_count());
         let vacant = all.filter(|&v| !recoloring.links.has(v));
@@ -202,7 +227,7 @@ impl Recoloring {
     /// Returns the largest number of colors that an edit may leave without recoloring all vertices.
     #[must_use]
     pub fn limit(&self) -> usize {
-        self.reference.max(self.bound()).saturating_add(self.slack)
+        self.accepted().saturating_add(self.slack)
     }
 
     /// Returns the present particles of all vertices. O(links log links).
@@ -344,6 +369,7 @@ impl Recoloring {
             self.place(self.by_bound[i].1, &mut report);
         }
         self.waiting = waiting;
+        self.retry(&mut report);
         while self.sizes.last() == Some(&0) {
             self.sizes.pop();
         }
@@ -365,6 +391,7 @@ impl Recoloring {
     pub fn recolor(&mut self) {
         let incidence = self.links.incidence();
         self.coloring = auto(&incidence).coloring;
+        self.excess.clear();
         self.count();
         self.changed.clear();
         self.changed.extend((0..).take(self.links.vertex_count()));
@@ -480,10 +507,16 @@ impl Recoloring {
         report.colored += 1;
         self.changed.push(v);
         let color = self.smallest_free(v, report);
-        // Below this, more colors cost nothing that a full coloring would not cost, too.
-        let accepted = self.reference.max(self.bound());
-        if color.index() >= accepted && self.displace(v, accepted, report) {
-            return;
+        let (accepted, limit) = (self.accepted(), self.limit());
+        if color.index() >= accepted {
+            let steps = SEARCH.min(STEPS.saturating_sub(report.steps));
+            if self.displace(v, accepted, report)
+                || self.search(v, accepted, steps, report)
+                || color.index() >= limit && self.search(v, limit, LAST_SEARCH, report)
+            {
+                return;
+            }
+            self.excess.push(v);
         }
         self.set(v, color);
     }
@@ -531,6 +564,55 @@ impl Recoloring {
             }
         }
         false
+    }
+
+    /// Gives an uncolored `v` a color below `allowed` by moving others around it, in up to `steps` steps of a search.
+    fn search(&mut self, v: u32, allowed: usize, steps: usize, report: &mut Recolored) -> bool {
+        let mut search = std::mem::take(&mut self.search);
+        let found = self.search_color(&mut search, v, allowed, steps, report);
+        if found {
+            report.displaced += search.moved().len().saturating_sub(1);
+            self.changed.extend(search.moved());
+        }
+        self.search = search;
+        found
+    }
+
+    /// Tries vertices again that got a color beyond the accepted ones: those first that have waited longest, and all that
+    /// are beyond the limit, which may have fallen.
+    fn retry(&mut self, report: &mut Recolored) {
+        let (accepted, limit) = (self.accepted(), self.limit());
+        let mut excess = std::mem::take(&mut self.excess);
+        excess.retain(|&v| self.color_of(v).index() >= accepted);
+        let mut tried = 0;
+        for (i, &v) in excess.iter().enumerate() {
+            let (color, steps) = (self.color_of(v), STEPS.saturating_sub(report.steps));
+            // Others may have moved away from it since.
+            if color.index() < accepted || (steps == 0 && color.index() < limit) {
+                continue;
+            }
+            tried = i + 1;
+            self.taken.give_back(self.links.of(v), color);
+            self.set(v, UNCOLORED);
+            let found = self.search(v, accepted, SEARCH.min(steps), report)
+                || color.index() >= limit && self.search(v, limit, LAST_SEARCH, report);
+            if !found {
+                self.set(v, color);
+            }
+        }
+        excess.rotate_left(tried);
+        excess.retain(|&v| self.color_of(v).index() >= accepted);
+        self.excess = excess;
+    }
+
+    /// The number of colors from which on a vertex gets no new one while others can make room: below this, more colors
+    /// cost nothing that a full coloring would not cost, too.
+    fn accepted(&self) -> usize {
+        self.reference.max(self.bound())
+    }
+
+    fn color_of(&self, v: u32) -> ColorId {
+        self.coloring.color(v as usize)
     }
 
     /// Gives a vertex that holds no color at its particles a color, or none, and counts it.

@@ -75,6 +75,22 @@ impl Taken {
         ColorId::new(64 * self.stride)
     }
 
+    /// Adds to `counts` for each of its colors at how many of some particles it is taken.
+    pub(super) fn count(&self, particles: impl Iterator<Item = u32>, counts: &mut [u32]) {
+        for p in particles {
+            let words = &self.words[p as usize * self.stride..][..self.stride];
+            for (counts, word) in counts.chunks_mut(64).zip(words) {
+                let mut word = *word;
+                while word != 0 {
+                    if let Some(count) = counts.get_mut(word.trailing_zeros() as usize) {
+                        *count += 1;
+                    }
+                    word &= word - 1;
+                }
+            }
+        }
+    }
+
     /// Whether the same colors are taken, whatever the number of words.
     pub(super) fn agrees_with(&self, other: &Self) -> bool {
         let (mut a, mut b) = (self.clone(), other.clone());

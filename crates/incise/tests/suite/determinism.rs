@@ -79,8 +79,8 @@ fn results_are_those_of_the_last_version() {
          {body}damping = 0.001\n{strokes}"
     ));
     for (precision, golden) in [
-        (Precision::F32, 0x0407_7d70_8837_f692),
-        (Precision::F64, 0x7d2e_5944_7220_1652),
+        (Precision::F32, 0x22fd_0a33_5779_e50a),
+        (Precision::F64, 0xbaba_0eca_5e0f_0f18),
     ] {
         scene.solver.precision = precision;
         for threads in 1..=3 {
