@@ -45,6 +45,7 @@ mod schema;
 mod set_solver;
 mod sleep;
 mod snapshot;
+mod solid_blade;
 mod strokes;
 mod substeps;
 mod support;
