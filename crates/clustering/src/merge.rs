@@ -40,15 +40,15 @@ pub struct Moved {
 #[derive(Clone, Debug, Default)]
 pub struct MergeLists {
     /// Candidates for the growing cluster.
-    front: Vec<Candidate>,
+    frontier: Vec<Candidate>,
     /// One member of each cluster that grew or could not grow; these clusters may be small.
     grown: Vec<u32>,
     /// The members of the connected part found last.
     part: Vec<u32>,
     /// Other clusters with room, and the number of links to each.
     near: Vec<(ClusterId, u32)>,
-    placed: Vec<u32>,
-    /// `placed` in ascending order.
+    assigned: Vec<u32>,
+    /// `assigned` in ascending order.
     sorted: Vec<u32>,
     moved: Vec<Moved>,
 }
@@ -98,7 +98,7 @@ struct Candidate {
 /// );
 /// // The cluster of spring 6 has grown to four, so 7 does not fit.
 /// assert_eq!(clustering.labels(), [a, a, a, b, b, b, b, c]);
-/// assert_eq!((lists.placed(), lists.moved()), (&[5, 4, 3][..], &[][..]));
+/// assert_eq!((lists.assigned(), lists.moved()), (&[5, 4, 3][..], &[][..]));
 /// # Ok::<(), incise_graph::GraphError>(())
 /// ```
 pub fn merge_small<N: IntoIterator<Item = u32>>(
@@ -111,7 +111,7 @@ pub fn merge_small<N: IntoIterator<Item = u32>>(
 ) {
     let max_size = max_size.get();
     lists.grown.clear();
-    lists.placed.clear();
+    lists.assigned.clear();
     lists.moved.clear();
     let mut merging = Merging {
         lists: &mut *lists,
@@ -134,7 +134,7 @@ pub fn merge_small<N: IntoIterator<Item = u32>>(
         let mut next = Some(c).filter(|&c| merging.label(c) == ClusterId::NONE);
         while let Some(start) = next {
             merging.clustering.new_cluster(start as usize);
-            merging.lists.placed.push(start);
+            merging.lists.assigned.push(start);
             merging.grow(start);
             next = merging.pick().map(|candidate| candidate.constraint);
         }
@@ -172,7 +172,7 @@ impl<N: IntoIterator<Item = u32>, F: Fn(u32) -> N> Merging<'_, F> {
     fn grow(&mut self, seed: u32) {
         let cluster = self.label(seed);
         self.lists.grown.push(seed);
-        self.lists.front.clear();
+        self.lists.frontier.clear();
         self.find_part(seed);
         for i in 0..self.lists.part.len() {
             self.look_around(self.lists.part[i], cluster);
@@ -181,14 +181,14 @@ impl<N: IntoIterator<Item = u32>, F: Fn(u32) -> N> Merging<'_, F> {
             && let Some(next) = self.pick()
         {
             self.clustering.assign(next.constraint as usize, cluster);
-            self.lists.placed.push(next.constraint);
+            self.lists.assigned.push(next.constraint);
             self.look_around(next.constraint, cluster);
         }
     }
 
-    /// Removes and returns the best candidate of the front.
+    /// Removes and returns the best candidate of the frontier.
     fn pick(&mut self) -> Option<Candidate> {
-        let front = &mut self.lists.front;
+        let frontier = &mut self.lists.frontier;
         let rank = |candidate: &Candidate| {
             let Candidate {
                 constraint,
@@ -197,19 +197,19 @@ impl<N: IntoIterator<Item = u32>, F: Fn(u32) -> N> Merging<'_, F> {
             } = *candidate;
             (loose, Reverse(links), constraint)
         };
-        let indices = 0..front.len();
-        let best = indices.min_by_key(|&index| rank(&front[index]))?;
-        Some(front.swap_remove(best))
+        let indices = 0..frontier.len();
+        let best = indices.min_by_key(|&index| rank(&frontier[index]))?;
+        Some(frontier.swap_remove(best))
     }
 
-    /// Adds the loose neighbors of a new member to the front.
+    /// Adds the loose neighbors of a new member to the frontier.
     fn look_around(&mut self, member: u32, cluster: ClusterId) {
         for c in (self.neighbors_of)(member) {
             if self.label(c) != ClusterId::NONE {
                 continue;
             }
-            let front = &mut self.lists.front;
-            if let Some(candidate) = front.iter_mut().find(|known| known.constraint == c) {
+            let frontier = &mut self.lists.frontier;
+            if let Some(candidate) = frontier.iter_mut().find(|known| known.constraint == c) {
                 candidate.links += 1;
                 candidate.loose = candidate.loose.saturating_sub(1);
                 continue;
@@ -220,7 +220,7 @@ impl<N: IntoIterator<Item = u32>, F: Fn(u32) -> N> Merging<'_, F> {
                 loose += u32::from(label == ClusterId::NONE);
                 links += u32::from(label == cluster);
             }
-            self.lists.front.push(Candidate {
+            self.lists.frontier.push(Candidate {
                 constraint: c,
                 loose,
                 links,
@@ -311,8 +311,8 @@ impl MergeLists {
     /// The loose constraints of the last call, in the order of their assignment; members of one cluster are mostly
     /// consecutive.
     #[must_use]
-    pub fn placed(&self) -> &[u32] {
-        &self.placed
+    pub fn assigned(&self) -> &[u32] {
+        &self.assigned
     }
 
     /// The constraints whose cluster was changed by the last call, ascending.
@@ -325,7 +325,7 @@ impl MergeLists {
     fn finish(&mut self, clustering: &Clustering) {
         let Self {
             moved,
-            placed,
+            assigned,
             sorted,
             ..
         } = self;
@@ -335,7 +335,7 @@ impl MergeLists {
         // The sort is stable: of several moves the first is kept.
         moved.sort_by_key(|moved| moved.constraint);
         moved.dedup_by_key(|moved| moved.constraint);
-        sorted.clone_from(placed);
+        sorted.clone_from(assigned);
         sorted.sort_unstable();
         moved.retain(|moved| {
             let now = clustering.labels()[moved.constraint as usize];

@@ -204,13 +204,13 @@ impl Growth<'_> {
         loop {
             let before = left.len();
             left.retain(|&c| {
-                let host = self.host(c, max_size);
-                if let Some(host) = host {
-                    self.parts.open(host);
-                    self.parts.join(c, host);
-                    moved.push(host);
+                let target = self.best_neighbor(c, max_size);
+                if let Some(target) = target {
+                    self.parts.open(target);
+                    self.parts.join(c, target);
+                    moved.push(target);
                 }
-                host.is_none()
+                target.is_none()
             });
             if left.is_empty() {
                 return;
@@ -219,14 +219,14 @@ impl Growth<'_> {
                 break;
             }
         }
-        for host in moved.into_iter().rev() {
-            self.parts.free_last(host);
+        for target in moved.into_iter().rev() {
+            self.parts.free_last(target);
         }
         self.restore(&members);
     }
 
     /// The cluster with room that shares the highest pressure with the free constraint `c`.
-    fn host(&mut self, c: u32, max_size: usize) -> Option<u32> {
+    fn best_neighbor(&mut self, c: u32, max_size: usize) -> Option<u32> {
         let incidence = self.parts.incidence;
         let mut near = Vec::new();
         for &p in incidence.particles_of(c as usize) {

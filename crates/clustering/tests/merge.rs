@@ -99,9 +99,9 @@ proptest! {
             .map(|(constraint, from, _)| Moved { constraint, from })
             .collect();
         prop_assert_eq!(lists.moved(), &expected);
-        let mut placed = lists.placed().to_vec();
-        placed.sort_unstable();
-        prop_assert_eq!(&placed, &loose);
+        let mut assigned = lists.assigned().to_vec();
+        assigned.sort_unstable();
+        prop_assert_eq!(&assigned, &loose);
 
         // Reused lists give the result of new ones.
         let (mut again, mut lists) = (before.clone(), lists);

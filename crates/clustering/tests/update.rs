@@ -41,15 +41,15 @@ proptest! {
             prop_assert_eq!(clustering.cluster_of(c as usize), before.cluster_of(c as usize));
         }
         let members = clustering.members();
-        let placed: Vec<Vec<u32>> = new.iter().map(|k| members.members(k.index()).to_vec()).collect();
-        prop_assert_eq!(placed.iter().map(Vec::len).sum::<usize>(), values.len());
+        let clusters: Vec<Vec<u32>> = new.iter().map(|k| members.members(k.index()).to_vec()).collect();
+        prop_assert_eq!(clusters.iter().map(Vec::len).sum::<usize>(), values.len());
         let parts = |&count: &u32| (count as usize).div_ceil(ks);
         let expected: usize = pieces.iter().take(removed.len()).map(parts).sum();
         prop_assert_eq!(new.len(), expected);
         for (group, &c) in offsets.windows(2).zip(&removed) {
             // No new cluster mixes two groups.
             let group = &values[group[0] as usize..group[1] as usize];
-            for members in &placed {
+            for members in &clusters {
                 let inside = members.iter().filter(|m| group.contains(m)).count();
                 prop_assert!(inside == 0 || inside == members.len(), "group of {}", c);
             }

@@ -72,7 +72,7 @@ pub struct Colored {
     pub coloring: Coloring,
     /// Parallel rounds; 1 for the sequential algorithms.
     pub rounds: usize,
-    /// Number of looks at neighbors, for algorithms that count them; defined by their statistics.
+    /// Number of visits of neighbors, for algorithms that count them; defined by their statistics.
     pub edge_visits: Option<u64>,
 }
 
@@ -83,7 +83,7 @@ const fn number(value: usize) -> NonZeroUsize {
     }
 }
 
-/// What stands behind `greedy:`, and the order.
+/// The names of the orders of `greedy:`.
 const ORDERS: [(&str, Order); 5] = [
     ("natural", Order::Natural),
     ("random", Order::Random(0)),
@@ -136,7 +136,7 @@ impl FromStr for Algorithm {
     type Err = ColoringError;
 
     /// # Errors
-    /// No algorithm has this name, or it has no such parameter; the message says what there is.
+    /// No algorithm has this name, or it has no such parameter; the message lists the valid ones.
     fn from_str(text: &str) -> Result<Self, ColoringError> {
         let (name, parameter) = match text.split_once(':') {
             Some((name, parameter)) => (name, Some(parameter)),
@@ -240,7 +240,7 @@ impl fmt::Display for Algorithm {
 /// Searching algorithms stop at [`Conflicts::clique_bound`].
 ///
 /// # Errors
-/// Returns an error if an algorithm fails. None of the present ones does with these settings.
+/// Returns an error if an algorithm fails. No algorithm fails with the settings that a name can state.
 pub fn color(
     algorithm: Algorithm,
     conflicts: &impl Conflicts,

@@ -38,7 +38,7 @@ const PASSES: usize = 5;
 /// Steps of the search for a color on small graphs.
 const MIN_STEPS: usize = 5000;
 
-/// Any fixed number will do.
+/// Seed of the search; its value does not matter.
 const SEED: u64 = 1;
 
 /// Finds a coloring with few colors; stops early if it meets the lower bound.

@@ -42,7 +42,7 @@ use crate::first_fit::FirstFit;
 /// # Ok::<(), incise_graph::GraphError>(())
 /// ```
 pub trait Conflicts: Sync {
-    /// The number of vertices.
+    /// Returns the number of vertices.
     fn vertex_count(&self) -> usize;
 
     /// Calls `visit` for every neighbor of `v`, for some of them perhaps several times, in a fixed
@@ -52,29 +52,29 @@ pub trait Conflicts: Sync {
     /// If there is no vertex `v`.
     fn visit_neighbors(&self, v: u32, visit: impl FnMut(u32));
 
-    /// The number of neighbors of every vertex, each counted once.
+    /// Returns the number of distinct neighbors of every vertex.
     fn degrees(&self) -> Vec<u32>;
 
-    /// An upper bound of the degree of every vertex that is cheap to compute.
+    /// Returns an upper bound of the degree of every vertex, which is cheap to compute.
     ///
     /// A graph has its degrees; incidence counts a neighbor once for every particle shared with it.
     fn degree_bound(&self) -> Vec<u32>;
 
-    /// All edges, in flat arrays: borrowed from a graph, built from incidence.
+    /// Returns all edges as a graph: borrowed if this is a graph, built from incidence otherwise.
     fn graph(&self) -> Cow<'_, ConstraintGraph>;
 
-    /// The incidence itself, if this is one: some questions are cheaper asked of particles.
+    /// Returns the incidence, if this is one: some queries are cheaper by particle.
     fn incidence(&self) -> Option<&Incidence>;
 
-    /// A number of vertices known to be all in each other's way, so that no coloring has fewer
-    /// colors.
+    /// Returns a lower bound on the number of colors: the size of a known clique, a set of vertices that all conflict
+    /// with each other.
     ///
-    /// From incidence, the largest number of constraints on one particle. A graph does not show its
-    /// cliques: the largest one that a greedy search finds.
+    /// From incidence, the largest number of constraints on one particle. From a graph, the size of the largest clique
+    /// that a greedy search finds.
     fn clique_bound(&self) -> usize;
 
-    /// Gives each vertex, in the given order, the smallest color that no neighbor has got before.
-    /// Vertices not in `order` get none, which is written `ColorId(u32::MAX)`.
+    /// Gives each vertex, in the given order, the smallest color that no neighbor has been given yet. Vertices not in
+    /// `order` get none, which is written `ColorId(u32::MAX)`.
     ///
     /// # Panics
     /// If `order` names a vertex that does not exist.

@@ -16,10 +16,9 @@ use crate::{Conflicts, priorities};
 
 /// Colors the most constrained vertex first.
 ///
-/// Proper, deterministic, labels without gaps, at most one color more than the largest degree; two
-/// colors whenever two are enough. A graph and the incidence it came from give the same. O((n + m)
-/// log n) for n vertices and m edges: usually fewer colors than [`greedy`](crate::greedy()) in any
-/// order on lattices, at many times its cost.
+/// Proper, deterministic, labels without gaps, at most one color more than the largest degree; two colors whenever two
+/// are enough. A graph and the incidence it came from give equal colorings. O((n + m) log n) for n vertices and m
+/// edges: usually fewer colors than [`greedy`](crate::greedy()) in any order on lattices, at many times its cost.
 ///
 /// ```
 /// use incise_coloring::dsatur;

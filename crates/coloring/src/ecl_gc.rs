@@ -48,7 +48,7 @@ pub struct EclGcStats {
     pub shortcut1: usize,
     /// Number of edges dropped by shortcut 2.
     pub shortcut2: usize,
-    /// Number of looks of undecided vertices at neighbors of higher priority.
+    /// Number of visits of neighbors of higher priority by undecided vertices.
     pub edge_visits: u64,
 }
 

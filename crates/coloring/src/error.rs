@@ -17,7 +17,7 @@ pub enum ColoringError {
     BadParameter {
         /// What was written.
         text: String,
-        /// What may stand behind the colon.
+        /// The valid parameters.
         expected: &'static str,
     },
     /// A limit of rounds was reached before all vertices had a color.
@@ -35,6 +35,12 @@ pub enum ColoringError {
         vertex: u32,
         /// The particle.
         particle: u32,
+    },
+    /// A constraint that is to be removed does not exist, or a constraint that is to be added has no particle.
+    #[error("constraint {vertex} has no particles")]
+    NoParticles {
+        /// The number of the constraint to remove, or the position of the constraint in the list of those to add.
+        vertex: u32,
     },
     /// The coloring is not proper or has another number of vertices.
     #[error(transparent)]

@@ -12,10 +12,9 @@ use crate::{Conflicts, Order, order};
 
 /// Colors sequentially in the given order.
 ///
-/// Proper, labels without gaps, at most one color more than the largest degree. Deterministic; a
-/// graph and the incidence it came from give the same. O(vertices + edges) beside the cost of
-/// [`order`]; from incidence O(entries), for every 64 colors over those constraints that need so
-/// many.
+/// Proper, labels without gaps, at most one color more than the largest degree. Deterministic; a graph and the
+/// incidence it came from give equal colorings. O(vertices + edges) beside the cost of [`order`]; from incidence
+/// O(entries), for every 64 colors over those constraints that need so many.
 ///
 /// ```
 /// use incise_coloring::{Order, greedy};

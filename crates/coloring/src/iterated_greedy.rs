@@ -19,7 +19,7 @@ use crate::random::Random;
 /// edges)), from incidence O(passes * entries) per 64 colors.
 ///
 /// # Panics
-/// If the number of colors differs from that of vertices.
+/// If the coloring has another number of vertices than `conflicts`.
 ///
 /// ```
 /// use incise_coloring::iterated_greedy;

@@ -59,8 +59,8 @@ pub struct Scgc {
 pub struct ScgcStats {
     /// Number of parallel rounds until every vertex had a color.
     pub rounds: usize,
-    /// Number of looks of vertices at neighbors of higher priority, plus two for every edge to
-    /// notify the neighbors. An incidence gives the same number: repeated neighbors do not count.
+    /// Number of visits of neighbors of higher priority, plus two for every edge to notify the neighbors. An incidence
+    /// gives the same number: repeated neighbors do not count.
     pub edge_visits: u64,
     /// Number of vertices that waited for all their neighbors of higher priority (line 4).
     pub dependency_free: usize,

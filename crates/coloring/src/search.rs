@@ -117,7 +117,7 @@ impl<'c, C: Conflicts> State<'c, C> {
         Some(self.rule(&list[..search.left as usize], best, search.removed > 0))
     }
 
-    /// What `v`, which would take `best`, has to mind about its higher neighbor `u`.
+    /// How the neighbor `u` of higher priority affects `v`, whose best color is `best`.
     fn look(&self, u: u32, v: u32, best: u32) -> Look {
         let Some(other) = self.palettes.pending(u) else {
             return Look::Decided;

@@ -24,7 +24,7 @@ use crate::random::Random;
 /// degree counts shared particles.
 ///
 /// # Panics
-/// If the number of colors differs from that of vertices.
+/// If the coloring has another number of vertices than `conflicts`.
 ///
 /// ```
 /// use incise_coloring::tabu;
@@ -135,7 +135,7 @@ impl<'a, C: Conflicts> Search<'a, C> {
         self.uncolored.is_empty()
     }
 
-    /// How many neighbors of `v` have each color.
+    /// Counts the neighbors of `v` with each color.
     fn count_taken(&mut self, v: u32) {
         self.taken.fill(0);
         let (stamp, colors, taken) = (&mut self.stamp, &self.colors, &mut self.taken);

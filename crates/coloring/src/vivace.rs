@@ -91,14 +91,14 @@ const NONE: u32 = u32::MAX;
 
 /// Colors at random in parallel, in the current rayon thread pool.
 ///
-/// Proper, at most one color more than the largest degree. The same for a seed on any machine, with
-/// any number of threads, from a graph or the incidence it came from. O(edges of uncolored
-/// vertices) a round; the number of rounds is random, tens at most on meshes.
+/// Proper, at most one color more than the largest degree. Deterministic for a seed: equal results on any machine, with
+/// any number of threads, from a graph or the incidence it came from. O(edges of uncolored vertices) a round; the
+/// number of rounds is random, tens at most on meshes.
 ///
 /// # Errors
-/// [`ColoringError::TooManyRounds`] if vertices are left without a color after the rounds allowed.
-/// It never stalls: a vertex that is out of colors is fed before the next round, and in it the
-/// highest of the uncolored vertices keeps what it picks.
+/// [`ColoringError::TooManyRounds`] if vertices are left without a color after the rounds allowed. It never stalls: a
+/// vertex without colors left gets new ones before the next round, in which the highest of the uncolored vertices keeps
+/// what it picks.
 ///
 /// # Panics
 /// If the shrinking factor is 0.
@@ -194,7 +194,7 @@ impl<'g> State<'g> {
         }
     }
 
-    /// Does `v` keep what it picked?
+    /// True if `v` keeps the color that it picked.
     fn keeps(&self, v: u32) -> bool {
         let own = self.picked[v as usize];
         if own == NONE {

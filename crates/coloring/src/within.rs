@@ -21,7 +21,7 @@ use incise_graph::{Clustering, ColorId, Coloring, Incidence};
 /// Deterministic; O(entries) for every 64 colors over those constraints that need so many.
 ///
 /// # Panics
-/// If `clustering` has another number of constraints.
+/// If `clustering` and `incidence` have different numbers of constraints.
 ///
 /// ```
 /// use incise_coloring::color_within_clusters;

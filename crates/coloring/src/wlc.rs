@@ -53,9 +53,9 @@ const GRAIN: usize = 64;
 /// Colors speculatively in parallel, in the current rayon thread pool. `chunk` vertices choose at
 /// the same time, fewer after rounds with many conflicts.
 ///
-/// Proper, labels without gaps, at most one color more than the largest degree. The result depends
-/// on the chunk, but not on the number of threads, nor on whether a graph is given or the incidence
-/// it came from. O(edges of the worklist) a round.
+/// Proper, labels without gaps, at most one color more than the largest degree. The result depends on the chunk, but
+/// not on the number of threads; a graph and the incidence it came from give equal results. O(edges of the worklist) a
+/// round.
 ///
 /// ```
 /// use std::num::NonZeroUsize;

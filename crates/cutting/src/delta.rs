@@ -147,7 +147,7 @@ pub struct CutDelta {
 }
 
 impl CutDelta {
-    /// Whether the cut changed nothing.
+    /// Returns whether the cut changed nothing.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.points.is_empty()

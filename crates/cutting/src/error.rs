@@ -130,9 +130,9 @@ pub enum CutError {
          follow cuts and removals, and go on with an earlier clone after an undo"
     )]
     NotFollowed {
-        /// Particles the stroke knows.
+        /// Number of particles at the last call.
         particles: usize,
-        /// Tets the stroke knows.
+        /// Number of tets at the last call.
         tets: usize,
     },
     /// The tracked pieces differ from those of the mesh: a defect of this crate.

@@ -56,7 +56,7 @@ struct Original {
     corners: [ParticleId; 4],
     /// What was on the boundary.
     tags: [Option<FaceTag>; 4],
-    /// Whether it was split; otherwise it hangs on other particles now.
+    /// Whether it was split; otherwise its corners have changed.
     split: bool,
 }
 

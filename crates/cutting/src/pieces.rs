@@ -198,7 +198,7 @@ impl PieceTracker {
         events
     }
 
-    /// Lets the numbers and counts of tets follow; returns the pieces that lost tets.
+    /// Updates the numbers and counts of tets; returns the pieces that lost tets.
     fn renumber(&mut self, cuttable: &CuttableMesh, delta: &CutDelta) -> Vec<u32> {
         let Self {
             piece_of, pieces, ..
@@ -313,8 +313,8 @@ impl PieceTracker {
         self.piece_of[tet.index()]
     }
 
-    /// Returns how often the last [`PieceTracker::apply_delta`] looked at a tet, a measure of its cost. A search looks
-    /// at a tet once for each of its corners, and once more for each if it was detached; a count looks once at each.
+    /// Returns the number of tets that the last [`PieceTracker::apply_delta`] visited, a measure of its cost. A search
+    /// visits a tet once for each of its corners, and twice if it was detached; a count visits each tet once.
     #[must_use]
     pub fn looks(&self) -> usize {
         self.parts.looks

@@ -133,7 +133,7 @@ impl Skin {
     /// Applies the delta of a cut or a removal.
     ///
     /// # Panics
-    /// If the delta does not follow the last one.
+    /// If deltas were left out or applied in another order.
     pub fn apply_delta(&mut self, delta: &CutDelta) -> SkinChange {
         let mut change = SkinChange::default();
         for triangle in &delta.surface_removed {

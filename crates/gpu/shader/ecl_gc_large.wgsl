@@ -20,13 +20,13 @@ fn decides(v: u32) -> bool {
     var shortcut = true;
     for (var i = begin; i < end; i++) {
         let u = higher[i];
-        let held = atomicLoad(&colors[u]);
-        if held < PENDING {
-            palette_remove(v, held);
+        let color = atomicLoad(&colors[u]);
+        if color < PENDING {
+            palette_remove(v, color);
         } else {
             done = false;
             // A palette ends where its vertex's list of higher neighbors does.
-            shortcut = shortcut && (own < (held & ~PENDING) || searches[u].left < own);
+            shortcut = shortcut && (own < (color & ~PENDING) || searches[u].left < own);
         }
     }
     let best = palette_first(v, own);

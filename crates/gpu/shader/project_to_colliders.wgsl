@@ -4,7 +4,7 @@
 @group(0) @binding(0) var<uniform> settings: Settings;
 @group(0) @binding(2) var<storage, read_write> particles: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read> previous: array<vec4<f32>>;
-// The colliders of all substeps, one substep after the other; `Solver::obstacle_data` documents the numbers.
+// The colliders of all substeps, one substep after the other; `Solver::collider_data` documents the numbers.
 @group(0) @binding(4) var<storage, read> colliders: array<f32>;
 
 // Numbers of a collider.

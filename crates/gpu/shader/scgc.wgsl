@@ -38,16 +38,16 @@ fn keep_smallest(v: u32, size: u32) {
     var left = size;
     for (var word = palette_begin(v); word < palette_begin(v + 1u); word++) {
         let bits = atomicLoad(&palettes[word]);
-        let held = countOneBits(bits);
+        let count = countOneBits(bits);
         var dropped = 0u;
-        for (var i = left; i < held; i++) {
+        for (var i = left; i < count; i++) {
             dropped |= 1u << (31u - countLeadingZeros(bits & ~dropped));
         }
         if dropped != 0u {
             // An atomic operation, because other threads may remove colors at the same time.
             atomicAnd(&palettes[word], ~dropped);
         }
-        left -= min(left, held);
+        left -= min(left, count);
     }
 }
 
@@ -74,18 +74,18 @@ fn decides(v: u32) -> bool {
     var dropped = false;
     while search.passed < search.left {
         let u = higher[begin + search.passed];
-        let held = atomicLoad(&colors[u]);
-        if held < PENDING {
+        let color = atomicLoad(&colors[u]);
+        if color < PENDING {
             // A decided neighbor is no longer pending.
-            palette_remove(v, held);
+            palette_remove(v, color);
             search.left -= 1u;
             exchange(begin + search.passed, begin + search.left);
-            if held == best {
+            if color == best {
                 best = palette_first(v, best);
                 search.passed = 0u;
                 search.passed_for = best;
             }
-        } else if best < (held & ~PENDING) || !palette_contains(u, best) {
+        } else if best < (color & ~PENDING) || !palette_contains(u, best) {
             if disjoint(u, v) {
                 search.left -= 1u;
                 exchange(begin + search.passed, begin + search.left);

@@ -30,12 +30,12 @@ fn taken_around(v: u32) -> vec2<u32> {
 
 // True if u prevents a constraint of lower priority from taking `best`, color `bit` of the window.
 fn stops(u: u32, best: u32, bit: u32) -> bool {
-    let held = atomicLoad(&colors[u]);
-    if held < PENDING {
+    let color = atomicLoad(&colors[u]);
+    if color < PENDING {
         // An equal color of u was marked after v read the marks.
-        return held == best;
+        return color == best;
     }
-    if best < (held & ~PENDING) {
+    if best < (color & ~PENDING) {
         return false;
     }
     return ((atomicLoad(&waits[u].taken[bit >> 5u]) >> (bit & 31u)) & 1u) == 0u;

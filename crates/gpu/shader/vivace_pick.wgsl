@@ -15,14 +15,14 @@ fn nth(v: u32, rank: u32) -> u32 {
     let words = palette_begin(v + 1u) - begin;
     for (var word = 0u; word < words; word++) {
         var bits = atomicLoad(&palettes[begin + word]);
-        let held = countOneBits(bits);
-        if left < held {
+        let count = countOneBits(bits);
+        if left < count {
             for (; left > 0u; left--) {
                 bits &= bits - 1u;
             }
             return word * 32u + countTrailingZeros(bits);
         }
-        left -= held;
+        left -= count;
     }
     return NONE;
 }

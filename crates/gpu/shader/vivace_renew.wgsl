@@ -27,11 +27,11 @@ fn renew(v: u32) -> bool {
             palette_remove(v, picked[u]);
         }
     }
-    var held = 0u;
+    var remaining = 0u;
     for (var word = palette_begin(v); word < palette_begin(v + 1u); word++) {
-        held |= atomicLoad(&palettes[word]);
+        remaining |= atomicLoad(&palettes[word]);
     }
-    if held == 0u {
+    if remaining == 0u {
         let color = first_fit(offsets[v], offsets[v + 1u]);
         atomicOr(&palettes[palette_begin(v) + (color >> 5u)], 1u << (color & 31u));
     }

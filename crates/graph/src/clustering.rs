@@ -174,7 +174,7 @@ impl Clustering {
     /// # Panics
     /// If `c` is in a cluster already ([`remove`](Self::remove) it first), or if no number is left.
     pub fn new_cluster(&mut self, c: usize) -> ClusterId {
-        self.place(c);
+        self.ensure_unassigned(c);
         let cluster = self.vacant.pop().unwrap_or_else(|| {
             self.sizes.push(0);
             ClusterId::new(self.sizes.len() - 1)
@@ -197,7 +197,7 @@ impl Clustering {
             .get(cluster.index())
             .is_some_and(|&size| size > 0);
         assert!(occupied, "cluster {cluster} has no member to join");
-        self.place(c);
+        self.ensure_unassigned(c);
         self.labels[c] = cluster;
         self.sizes[cluster.index()] += 1;
     }
@@ -222,7 +222,7 @@ impl Clustering {
     /// # Ok::<(), incise_graph::GraphError>(())
     /// ```
     pub fn renumber(&mut self, from: usize, to: usize) {
-        self.place(to);
+        self.ensure_unassigned(to);
         self.labels[to] = std::mem::replace(&mut self.labels[from], ClusterId::NONE);
     }
 
@@ -242,7 +242,7 @@ impl Clustering {
     }
 
     /// Makes sure that constraint `c` exists and is in no cluster.
-    fn place(&mut self, c: usize) {
+    fn ensure_unassigned(&mut self, c: usize) {
         if c >= self.labels.len() {
             self.labels.resize(c + 1, ClusterId::NONE);
         }

@@ -282,13 +282,13 @@ mod tests {
             let mut lanes = Lanes::new(width);
             lanes.set_color_count(4);
             let mut expected = BTreeMap::new();
-            for (cluster, place) in edits as Vec<Edit> {
+            for (cluster, target) in edits as Vec<Edit> {
                 let id = ClusterId(cluster);
                 let before: Vec<_> = expected.keys().map(|&k| (k, lanes.slot(ClusterId(k)))).collect();
                 if expected.remove(&cluster).is_some() {
                     lanes.release(id);
                 }
-                if let Some((color, depth)) = place {
+                if let Some((color, depth)) = target {
                     let roomy = lanes.groups().row(color).iter().map(|&g| g as usize).find(|&g| {
                         lanes.group(g).depth == index(depth) && lanes.has_room(g)
                     });

@@ -115,7 +115,7 @@ impl Schedule {
     /// the number of values read or moved.
     ///
     /// `constraints` must list every constraint whose cluster has changed since the last call, `clusters` every cluster
-    /// whose color has changed; unchanged and repeated items are allowed. [`check_plan`](Self::check_plan) finds
+    /// whose color has changed; unchanged and repeated items are allowed. [`check_partition`](Self::check_partition) finds
     /// missing ones.
     ///
     /// Cost: amortized O(members of the changed clusters): the arrays are occasionally compacted.
@@ -165,7 +165,7 @@ impl Schedule {
         changed.sort_unstable();
         changed.dedup();
         for &cluster in &changed {
-            visited += 1 + self.reseat(cluster, self.color_of(cluster, coloring));
+            visited += 1 + self.set_color(cluster, self.color_of(cluster, coloring));
         }
         while self.colors.rows().last().is_some_and(<[_]>::is_empty) {
             self.colors.set_row_count(self.colors.row_count() - 1);
@@ -217,7 +217,7 @@ impl Schedule {
     }
 
     /// Moves a cluster to a color.
-    fn reseat(&mut self, cluster: ClusterId, color: u32) -> usize {
+    fn set_color(&mut self, cluster: ClusterId, color: u32) -> usize {
         let old = self.slots[cluster.index()];
         if old.color == color {
             return 0;

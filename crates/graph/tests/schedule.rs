@@ -143,7 +143,7 @@ proptest! {
         let mut schedule = Schedule::new(&first, &colors);
         schedule.rebuild(&second, &others);
         prop_assert_eq!(&schedule, &Schedule::new(&second, &others));
-        schedule.check_plan(&second, &others).unwrap();
+        schedule.check_partition(&second, &others).unwrap();
     }
 
     /// After every batch of edits the schedule equals a new one up to the order within a color, and
@@ -162,7 +162,7 @@ proptest! {
             batch.iter().for_each(|edit| plan.apply(edit));
             plan.clustering.check().unwrap();
             schedule.update(&plan.clustering, &plan.coloring, &plan.constraints, &plan.clusters);
-            schedule.check_plan(&plan.clustering, &plan.coloring).unwrap();
+            schedule.check_partition(&plan.clustering, &plan.coloring).unwrap();
             let new = Schedule::new(&plan.clustering, &plan.coloring);
             prop_assert_eq!(contents(&schedule), contents(&new));
             prop_assert_eq!(schedule.cluster_count(), plan.clustering.occupied());
@@ -195,11 +195,17 @@ fn a_forgotten_edit_is_found() {
             cluster: ClusterId(k),
         })
     };
-    assert_eq!(schedule.check_plan(&clustering, &coloring), misplaced(1));
+    assert_eq!(
+        schedule.check_partition(&clustering, &coloring),
+        misplaced(1)
+    );
     schedule.update(&clustering, &coloring, &[], &[ClusterId(1)]);
-    schedule.check_plan(&clustering, &coloring).unwrap();
+    schedule.check_partition(&clustering, &coloring).unwrap();
     clustering.remove(0);
-    assert_eq!(schedule.check_plan(&clustering, &coloring), misplaced(0));
+    assert_eq!(
+        schedule.check_partition(&clustering, &coloring),
+        misplaced(0)
+    );
 }
 
 /// Copies that have diverged share no changes.
@@ -280,7 +286,7 @@ fn the_cost_of_an_update_follows_the_edit() {
             }
             total += schedule.update(&clustering, &coloring, &constraints, &changed);
         }
-        schedule.check_plan(&clustering, &coloring).unwrap();
+        schedule.check_partition(&clustering, &coloring).unwrap();
         // 120 constraints and 60 clusters change in a cut; each moves a few others. Once in the run
         // every color moves to get room, which is the only cost that depends on the size of the
         // plan.
@@ -307,7 +313,7 @@ fn memory_stays_in_proportion() {
         coloring.set(k.index(), ColorId(round % 9));
         visited += schedule.update(&clustering, &coloring, &[c], &[k]);
     }
-    schedule.check_plan(&clustering, &coloring).unwrap();
+    schedule.check_partition(&clustering, &coloring).unwrap();
     // A round changes two numbers; clusters here grow to a few dozen members.
     assert!(visited < 5_000 * 120, "{visited}");
 }

@@ -113,6 +113,11 @@ impl Attachment {
         })
     }
 
+    /// Its key in the scene; `attachment` if a program added it.
+    pub(crate) fn field(&self) -> &str {
+        &self.field
+    }
+
     /// Whether it holds no particle.
     pub(crate) fn is_empty(&self) -> bool {
         self.particles.is_empty()

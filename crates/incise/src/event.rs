@@ -27,7 +27,7 @@ pub enum Event {
         /// The numbers of their bodies in the scene.
         bodies: [usize; 2],
     },
-    /// Two pieces that touched press no more and have parted by 2% of a mean edge.
+    /// Two pieces that touched no longer press and are at least 2% of a mean edge apart.
     ContactEnded {
         /// Their numbers, as in [`Simulation::pieces`](crate::Simulation::pieces).
         pieces: [u32; 2],

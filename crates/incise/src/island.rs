@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 use incise_cutting::{CutDelta, CuttableMesh, PieceEvent, PieceTracker, remove_tets};
-use incise_mesh::{ParticleId, TetId, signed_volume};
+use incise_mesh::{Bounds, ParticleId, TetId, signed_volume};
 use incise_xpbd::{
     DistanceConstraint, KappaLimit, Real, SolidBlade, Solver, StepReport, StepSettings,
     shortest_substep_of_f32,
@@ -609,6 +609,18 @@ impl Island {
         self.bodies[self.body_of[usize::from(material)]]
     }
 
+    /// The box of each body that has tets, with its number in the scene. O(tets).
+    pub(crate) fn boxes(&self) -> BTreeMap<usize, Bounds> {
+        let mut boxes = BTreeMap::new();
+        for (tet, corners) in self.cuttable.mesh().tets.iter().enumerate() {
+            let corners = Bounds::around(corners.map(|p| self.positions[p.index()]));
+            let body = self.body_of_tet(TetId::new(tet));
+            let bounds = boxes.entry(body).or_insert(Bounds::EMPTY);
+            *bounds = bounds.union(corners);
+        }
+        boxes
+    }
+
     /// Removes all tets of a body from the mesh; what depends on the mesh takes the delta.
     pub(crate) fn remove_tets_of(&mut self, body: usize) -> Result<CutDelta, Error> {
         let all = (0..self.cuttable.mesh().tets.len()).map(TetId::new);
@@ -759,7 +771,7 @@ impl Island {
     }
 
     /// The piece of a particle, unless it has lost all its tets.
-    fn piece_of(&self, particle: usize) -> Option<u32> {
+    pub(crate) fn piece_of(&self, particle: usize) -> Option<u32> {
         let mut around = self.cuttable.around(ParticleId::new(particle));
         around.next().map(|tet| self.pieces.piece_of(tet))
     }

@@ -12,9 +12,9 @@ use incise_xpbd::Material;
 use crate::accuracy::{DEFAULT_ACCURACY, largest_kappas};
 use crate::attachment::{Attachment, AttachmentHandle};
 use crate::backend::{AnySolver, each, each_mut, mass};
-use crate::body::Body;
 use crate::distance::{DistanceHandle, Distances};
 use crate::method::tet_solve;
+use crate::resolved_body::ResolvedBody;
 use crate::scene::{Precision, SolverSpec, Substeps};
 use crate::substeps::{Choice, TetDemand, choose};
 use crate::validate::{existing, value};
@@ -39,7 +39,7 @@ pub(crate) struct IslandBuilder {
     pub(crate) fixed: Vec<bool>,
     /// For each particle the number of its body in the scene.
     pub(crate) body_of_particle: Vec<u32>,
-    /// See [`Body::empty_regions`].
+    /// See [`ResolvedBody::empty_regions`].
     pub(crate) empty_regions: Vec<String>,
     pub(crate) attachments: Vec<Attachment>,
     pub(crate) distances: Distances,
@@ -53,7 +53,7 @@ impl IslandBuilder {
     /// links exist.
     pub(crate) fn all(
         scene: &Scene,
-        bodies: Vec<Body>,
+        bodies: Vec<ResolvedBody>,
         island_of: &[usize],
     ) -> Result<Vec<Self>, Error> {
         let islands = island_of.iter().max().map_or(0, |last| last + 1);
@@ -100,14 +100,14 @@ impl IslandBuilder {
     }
 
     /// A body alone.
-    pub(crate) fn of_one(number: usize, body: Body) -> Result<Self, Error> {
+    pub(crate) fn of_one(number: usize, body: ResolvedBody) -> Result<Self, Error> {
         let mut joined = Self::default();
         joined.add(number, body)?;
         Ok(joined)
     }
 
     /// Appends a body of the scene.
-    fn add(&mut self, number: usize, body: Body) -> Result<(), Error> {
+    fn add(&mut self, number: usize, body: ResolvedBody) -> Result<(), Error> {
         let first = self.mesh.positions.len();
         let shifted = |p: ParticleId| ParticleId::new(first + p.index());
         self.mesh.positions.extend(body.mesh.positions);

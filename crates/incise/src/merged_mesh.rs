@@ -15,8 +15,8 @@ use incise_graph::{ClusterId, Clustering, Coloring};
 use incise_mesh::{ParticleId, TetId, TetMesh};
 
 use crate::Error;
-use crate::body::Body;
 use crate::island::Island;
+use crate::resolved_body::ResolvedBody;
 
 /// The numbers in the merged mesh of an island's particles and tets.
 #[derive(Clone, Debug, Default)]
@@ -55,7 +55,7 @@ pub(crate) struct MergedMesh {
 
 impl MergedMesh {
     /// The bodies as one mesh, before they go to their islands; `island_of` says to which.
-    pub(crate) fn new(bodies: &[Body], island_of: &[usize]) -> Self {
+    pub(crate) fn new(bodies: &[ResolvedBody], island_of: &[usize]) -> Self {
         let mut mesh = TetMesh::default();
         let islands = island_of.iter().max().map_or(0, |last| last + 1);
         let mut numbers: Vec<Numbers> = (0..islands).map(|_| Numbers::default()).collect();

@@ -8,7 +8,8 @@ pub fn nearest<'a>(unknown: &str, known: impl IntoIterator<Item = &'a str>) -> O
         .max_by(|a, b| similarity(unknown, a).total_cmp(&similarity(unknown, b)))
 }
 
-/// The end of a message about an unknown name: `; did you mean 'liver'?`, or nothing if no known name is similar.
+/// Returns the end of a message about an unknown name: `; did you mean 'liver'?`, or nothing if no known name is
+/// similar.
 ///
 /// A parameter after a colon, as in `serial:10`, does not count.
 ///

@@ -328,7 +328,7 @@ impl Partition {
                 added.extend(corners.map(|p| (labels[tet.index()].0, p.0)));
             }
         }
-        for &tet in merging.placed() {
+        for &tet in merging.assigned() {
             let cluster = labels[tet as usize].0;
             added.extend(tets[tet as usize].map(|p| (cluster, p.0)));
         }
@@ -394,7 +394,7 @@ impl Partition {
             .verify_incidence(&incidence.quotient(&self.clustering))?;
         self.schedule.check(&incidence)?;
         self.schedule
-            .check_plan(&self.clustering, self.coloring())?;
+            .check_partition(&self.clustering, self.coloring())?;
         Ok(())
     }
 }

@@ -285,7 +285,7 @@ pub struct Milliseconds {
     /// Solving. On a device: submitting the frame, after waiting for the frame before the last one; the device
     /// continues asynchronously.
     pub solve: f64,
-    /// Finding contacts and coloring them, where contact is declared: that of the island of bodies which took longest.
+    /// Finding and coloring contacts, where contact is declared: the time of the slowest island.
     #[serde(skip_serializing_if = "is_none")]
     pub contact: f64,
     /// Waiting for a device and reading back, if a blade or a reported quantity needs it.
@@ -322,19 +322,19 @@ pub struct ResidualReport {
     pub potential: f64,
 }
 
-/// What is made of tets and touches. Depths are in mean edges of the surface at rest.
+/// Counts and depths of the contacts of a frame. Depths are in mean edge lengths of the surface at rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct ContactReport {
     /// Contacts that could press in the frame: vertices near triangles, and pairs across fresh cuts.
     pub candidates: usize,
-    /// Those that pressed, in a frame that was divided those that did in its last part.
+    /// Contacts that pressed; in a frame that was solved in parts, those of its last part.
     pub active: usize,
-    /// Colors that they are solved in: of pairs and of vertices together, those of the island of bodies with the most.
+    /// Number of colors of the contacts, pairs and vertices together, in the island with the most.
     pub colors: usize,
-    /// How deep the deepest is at the end of the frame; 0 if none overlaps.
+    /// Largest depth of an overlap at the end of the frame; 0 if there is none.
     pub max_depth: f64,
-    /// What 99% of those that press or overlap do not exceed.
+    /// 99th percentile of the depths of contacts that press or overlap.
     pub depth_p99: f64,
     /// Vertices deep in another body or piece from which no way out was found. They are not pushed out.
     pub buried: usize,

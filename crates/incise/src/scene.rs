@@ -76,7 +76,7 @@ pub struct Scene {
     /// The bodies.
     #[serde(default)]
     pub body: Vec<BodySpec>,
-    /// Contact of what is made of tets; absent: none.
+    /// Contact between bodies and their pieces; absent: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("optional" = true))]
     pub contact: Option<ContactSpec>,
@@ -284,7 +284,7 @@ impl Scene {
         Self::from_toml(include_str!("../scenes/liver.toml")).expect("the built-in scene is valid")
     }
 
-    /// Reads a scene from a file; mesh files named in it are relative to it.
+    /// Reads a scene from a file; paths of mesh files are relative to the file.
     ///
     /// # Errors
     /// If the file cannot be read or is not a valid scene.

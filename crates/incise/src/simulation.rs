@@ -23,7 +23,6 @@ use incise_mesh::{Surface, TetMesh};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use crate::body;
 use crate::budget;
 use crate::collider::Colliders;
 use crate::compute_device::{ComputeDevice, OpenDevice};
@@ -37,6 +36,7 @@ use crate::pieces::PieceNumbers;
 use crate::report::{
     CutReport, DetachedReport, FrameReport, Milliseconds, PieceReport, SoftenedReport, milliseconds,
 };
+use crate::resolved_body::ResolvedBody;
 use crate::scene::{Precision, Quantity, StrokeSpec};
 use crate::strokes::Timeline;
 use crate::validate::value;
@@ -139,7 +139,7 @@ impl Simulation {
             return Err(value("report.every", 0, "at least 1"));
         }
         crate::scene::check(scene)?;
-        let bodies = body::Body::all(scene, meshes)?;
+        let bodies = ResolvedBody::all(scene, meshes)?;
         let mut joined = distance::pairs(scene, bodies.len())?;
         joined.extend(contacts::pairs(scene, bodies.len())?);
         let island_of = island_of_bodies(bodies.len(), &joined);
@@ -171,7 +171,7 @@ impl Simulation {
         };
         if scene.solver.precision == Precision::Auto && !compute_device.is_gpu() && short() {
             precision = Precision::F64;
-            let bodies = body::Body::all(scene, meshes)?;
+            let bodies = ResolvedBody::all(scene, meshes)?;
             islands = make_islands(precision, IslandBuilder::all(scene, bodies, &island_of)?)?;
         }
         if let Some(budget) = scene.solver.budget_ms {
@@ -362,7 +362,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Takes over what contacts of all islands took, and which began and ended.
+    /// Collects the contact times of all islands and the contacts that began and ended.
     fn collect_contacts(&mut self, ms: &mut Milliseconds) {
         let State {
             islands, pieces, ..
@@ -403,9 +403,16 @@ impl Simulation {
     /// Puts the warnings of all islands into the report, and looks for divergence.
     fn collect_warnings(&mut self) {
         let elapsed = self.state.report.time_s;
-        let missed = self.state.timeline.take_missed().into_iter();
-        let missed = missed.map(Warning::of_missed_stroke);
-        self.state.report.warnings.extend(missed);
+        for missed in self.state.timeline.take_missed() {
+            let bodies = self.state.islands.iter().flat_map(Island::boxes);
+            let near = bodies.map(|(body, bounds)| (missed.reach.distance(&bounds), body, bounds));
+            let nearest = near.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            let nearest = nearest.map(|(_, body, bounds)| (body, bounds));
+            let warning = Warning::of_missed_stroke(missed, nearest);
+            self.state.report.warnings.push(warning);
+        }
+        let of_strokes = self.state.timeline.take_warnings();
+        self.state.report.warnings.extend(of_strokes);
         for island in &mut self.state.islands {
             self.state.report.warnings.append(&mut island.warnings);
             let speed = match island.solver.backend().host_max_speed() {
@@ -514,7 +521,8 @@ impl Simulation {
     ///
     /// At the start particles and tets are numbered body by body in the order of the scene. Cuts do not change numbers:
     /// the first child of a cut tet takes over its number; other new tets and new particles get the next ones, stroke
-    /// by stroke and within a stroke body by body.
+    /// by stroke and within a stroke body by body. A removal moves the last tets into the gaps and leaves particles without
+    /// tets; [`repair`](incise_mesh::repair) with `drop_unused` makes a mesh without them.
     #[must_use]
     pub fn mesh(&self) -> &TetMesh {
         match &self.state.merged {

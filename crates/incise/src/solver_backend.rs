@@ -45,7 +45,7 @@ pub(crate) trait SolverBackend {
     /// The residuals of the last substep, if they were kept.
     fn last_substep(&self, substep_time: f64) -> Option<LastSubstep>;
 
-    /// Measures forces in the frames to come, or ends that. A device measures none.
+    /// Turns the measurement of forces on or off from the next frame on. A device measures none.
     fn measure_forces(&mut self, measuring: bool);
 
     /// The mean forces of the last frame, if they were measured.

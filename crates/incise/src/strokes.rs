@@ -8,10 +8,12 @@ use incise_cutting::{
 
 use crate::island::Island;
 use crate::live_blade::LiveBlade;
+use crate::pinned_cut::{find, meets_pinned};
 use crate::scene::{SolidBladeSpec, StrokeSpec, pose};
 use crate::solid_blade::{FrameBlade, SolidBlade};
-use crate::tool::{Tool, tool};
+use crate::tool::{MissedStroke, Tool, tool};
 use crate::validate::value;
+use crate::warning::Warning;
 use crate::{Error, Event};
 
 /// A stroke and its progress.
@@ -29,6 +31,8 @@ struct Stroke {
     has_cut: bool,
     /// The body of its blade, if it has one.
     solid: Option<SolidBlade>,
+    /// Whether it has opened a face with a pinned corner.
+    meets_pinned: bool,
 }
 
 /// The strokes that are not finished.
@@ -45,8 +49,10 @@ pub(crate) struct Timeline {
     registries: Vec<StrokeRegistry>,
     /// Strokes that began or ended to cut since the events were taken.
     events: Vec<Event>,
-    /// Strokes of the scene that ended without a cut since they were taken, by their keys in the scene.
-    missed: Vec<String>,
+    /// Strokes that ended without a cut since they were taken.
+    missed: Vec<MissedStroke>,
+    /// Warnings about other strokes that ended since they were taken.
+    warnings: Vec<Warning>,
     /// The blades with a body in the last frame.
     #[cfg_attr(feature = "save", serde(skip))]
     solids: Vec<FrameBlade>,
@@ -114,6 +120,7 @@ impl Timeline {
             sweeps: Vec::new(),
             has_cut: false,
             solid,
+            meets_pinned: false,
         });
         self.added += 1;
         Ok(())
@@ -158,11 +165,13 @@ impl Timeline {
     }
 
     /// Ends a live stroke: after the next frame if that has a pose to carry out, or else at once.
-    pub(crate) fn end(&mut self, stroke: u32) -> Result<(), Error> {
+    pub(crate) fn end(&mut self, stroke: u32, islands: &[Island]) -> Result<(), Error> {
         let (place, _, blade) = self.live(stroke)?;
         if !blade.end() {
             let stroke = self.strokes.remove(place);
             self.events.extend(stroke.end());
+            self.missed.extend(stroke.missed());
+            self.warnings.extend(stroke.pinned(islands));
         }
         Ok(())
     }
@@ -203,9 +212,14 @@ impl Timeline {
         std::mem::take(&mut self.events)
     }
 
-    /// The strokes of the scene that have ended without a cut since the last call, by their keys in the scene.
-    pub(crate) fn take_missed(&mut self) -> Vec<String> {
+    /// The strokes that have ended without a cut since the last call.
+    pub(crate) fn take_missed(&mut self) -> Vec<MissedStroke> {
         std::mem::take(&mut self.missed)
+    }
+
+    /// The warnings about strokes that have ended since the last call, other than about missed ones.
+    pub(crate) fn take_warnings(&mut self) -> Vec<Warning> {
+        std::mem::take(&mut self.warnings)
     }
 
     /// Whether a stroke begins or continues in a frame.
@@ -259,6 +273,8 @@ impl Timeline {
                     }
                 }
                 apply_delta(g, island, &delta)?;
+                let stroke = &mut self.strokes[i];
+                stroke.meets_pinned |= meets_pinned(island, &delta, stroke.options.tag);
             }
         }
         for stroke in self.strokes.iter_mut().filter(|s| s.frames[0] <= frame) {
@@ -268,6 +284,7 @@ impl Timeline {
             }
         }
         let (events, missed) = (&mut self.events, &mut self.missed);
+        let warnings = &mut self.warnings;
         self.strokes.retain_mut(|stroke| {
             let goes_on = match &mut stroke.tool {
                 Tool::Live(blade) => blade.arrive(),
@@ -275,10 +292,8 @@ impl Timeline {
             };
             if !goes_on {
                 events.extend(stroke.end());
-                // A live blade may pass by the bodies.
-                if !stroke.has_cut && !matches!(stroke.tool, Tool::Live(_)) {
-                    missed.push(std::mem::take(&mut stroke.field));
-                }
+                missed.extend(stroke.missed());
+                warnings.extend(stroke.pinned(islands));
             }
             goes_on
         });
@@ -302,6 +317,24 @@ impl Stroke {
             Tool::Live(blade) => Some(blade.pose().to_vec()),
             _ => None,
         }
+    }
+
+    /// Returns warnings about cuts that pinned particles keep closed.
+    fn pinned(&self, islands: &[Island]) -> Vec<Warning> {
+        if !self.meets_pinned {
+            return Vec::new();
+        }
+        let cuts = islands
+            .iter()
+            .filter_map(|island| find(island, self.options.tag));
+        cuts.map(|cut| cut.warning(&self.field)).collect()
+    }
+
+    /// Returns the stroke as one that missed all bodies, if it has not cut. A live blade that was not moved did not miss.
+    fn missed(&self) -> Option<MissedStroke> {
+        let reach = self.tool.reach().filter(|_| !self.has_cut)?;
+        let field = self.field.clone();
+        Some(MissedStroke { field, reach })
     }
 
     /// Cuts, or moves, in the island of the given number.
@@ -331,7 +364,7 @@ impl Stroke {
                 sweep(&pose(blade.iter().copied(), path, [first, last], frame))
             }
             Tool::Live(blade) => sweep(blade.pose()),
-            Tool::Surface(surface) => {
+            Tool::Surface { surface, .. } => {
                 cut_surface_joining(cuttable, positions, surface, options, registry)
             }
             Tool::Plane(plane) => cut_plane(cuttable, positions, plane, options),
@@ -346,7 +379,7 @@ impl Stroke {
         })?;
         let joins = matches!(
             self.tool,
-            Tool::Sweep { .. } | Tool::Live(_) | Tool::Surface(_)
+            Tool::Sweep { .. } | Tool::Live(_) | Tool::Surface { .. }
         );
         if !joins && !delta.is_empty() {
             registry.apply_delta(&island.cuttable, &delta, &self.options);

@@ -6,7 +6,7 @@ use crate::MeshIoError;
 
 /// The error for an unsupported ending of `path`: unknown, with the `known` ones, or of a format
 /// left out of this build.
-pub(crate) fn refused(path: &Path, known: &'static str) -> MeshIoError {
+pub(crate) fn unsupported_format(path: &Path, known: &'static str) -> MeshIoError {
     let path = path.to_owned();
     match feature(&ending(&path)) {
         Some(feature) if is_among(&path, known) => MeshIoError::FormatLeftOut { path, feature },

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use incise_mesh::TetMesh;
 
-use crate::endings::{ending, refused};
+use crate::endings::{ending, unsupported_format};
 #[cfg(feature = "medit")]
 use crate::medit::{read_medit, write_medit};
 #[cfg(feature = "msh")]
@@ -46,7 +46,7 @@ pub fn read_file(path: impl AsRef<Path>) -> Result<MeshFile, MeshIoError> {
         "node" | "ele" => read_tetgen_file(path),
         #[cfg(feature = "medit")]
         "mesh" | "meshb" => read_medit(path),
-        _ => Err(refused(path, KNOWN)),
+        _ => Err(unsupported_format(path, KNOWN)),
     }
 }
 
@@ -75,7 +75,7 @@ pub fn parse_file(path: impl AsRef<Path>, bytes: &[u8]) -> Result<MeshFile, Mesh
         "msh" => crate::msh::parse_msh(bytes, path),
         #[cfg(feature = "medit")]
         "mesh" | "meshb" => crate::medit::parse_medit(bytes, path),
-        _ => Err(refused(path, ".vtk, .vtu, .msh, .mesh, .meshb")),
+        _ => Err(unsupported_format(path, ".vtk, .vtu, .msh, .mesh, .meshb")),
     }
 }
 
@@ -130,7 +130,7 @@ pub fn write_file(path: impl AsRef<Path>, file: &MeshFile) -> Result<(), MeshIoE
         "node" | "ele" => write_tetgen_file(path, file),
         #[cfg(feature = "medit")]
         "mesh" | "meshb" => write_medit(path, file),
-        _ => Err(refused(path, KNOWN)),
+        _ => Err(unsupported_format(path, KNOWN)),
     }
 }
 
@@ -159,15 +159,15 @@ mod tests {
     #[test]
     fn formats_that_are_left_out_name_their_feature() {
         for known in KNOWN.split(", ") {
-            let error = refused(Path::new(&format!("a{known}")), KNOWN);
+            let error = unsupported_format(Path::new(&format!("a{known}")), KNOWN);
             assert!(
                 matches!(error, MeshIoError::FormatLeftOut { .. }),
                 "{error}"
             );
         }
-        let error = refused(Path::new("a.meshb"), KNOWN);
+        let error = unsupported_format(Path::new("a.meshb"), KNOWN);
         assert!(error.to_string().contains("\"medit\""), "{error}");
-        let error = refused(Path::new("a.obj"), KNOWN);
+        let error = unsupported_format(Path::new("a.obj"), KNOWN);
         assert!(matches!(error, MeshIoError::UnknownFormat { .. }));
     }
 }

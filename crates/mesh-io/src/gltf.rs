@@ -14,7 +14,7 @@ use glam::{DVec3, Vec3};
 use incise_mesh::TriangleSurface;
 
 use crate::base64::base64;
-use crate::used::Used;
+use crate::used_particles::UsedParticles;
 
 /// The numbers that mark a binary file and its two parts.
 const MAGIC: &[u8; 4] = b"glTF";
@@ -65,7 +65,7 @@ impl Numbers {
         if surface.triangles.is_empty() {
             return Err(invalid("the surface has no triangles, which glTF needs"));
         }
-        let used = Used::new(&surface.triangles, surface.positions.len());
+        let used = UsedParticles::new(&surface.triangles, surface.positions.len());
         let mut positions = Vec::with_capacity(used.particles.len());
         for &particle in &used.particles {
             let position = surface.positions[particle];

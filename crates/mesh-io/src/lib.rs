@@ -97,7 +97,7 @@ mod test_files;
 #[cfg(feature = "tetgen")]
 mod tetgen;
 mod text;
-mod used;
+mod used_particles;
 #[cfg(feature = "vtk")]
 mod vtk;
 #[cfg(any(feature = "vtk", feature = "vtu"))]

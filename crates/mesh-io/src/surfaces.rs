@@ -13,7 +13,7 @@ use std::path::Path;
 
 use incise_mesh::TriangleSurface;
 
-use crate::endings::{ending, is_among, refused};
+use crate::endings::{ending, is_among, unsupported_format};
 #[cfg(feature = "gltf")]
 use crate::gltf;
 #[cfg(feature = "obj")]
@@ -89,7 +89,7 @@ fn parser(path: &Path) -> Result<Parser, MeshIoError> {
         "off" => Some(off::parse_off),
         _ => None,
     };
-    parser.ok_or_else(|| refused(path, KNOWN))
+    parser.ok_or_else(|| unsupported_format(path, KNOWN))
 }
 
 /// True if [`write_surface`] supports the ending of the file name.
@@ -128,7 +128,7 @@ pub fn write_surface(path: impl AsRef<Path>, surface: &TriangleSurface) -> Resul
         "gltf" => Some(gltf::write_gltf),
         _ => None,
     };
-    let write = write.ok_or_else(|| refused(path, KNOWN_TO_WRITERS))?;
+    let write = write.ok_or_else(|| unsupported_format(path, KNOWN_TO_WRITERS))?;
     write_atomically(path, |out| write(out, surface))
 }
 

@@ -8,7 +8,7 @@ use std::path::Path;
 use glam::DVec3;
 use incise_mesh::Surface;
 
-use crate::used::Used;
+use crate::used_particles::UsedParticles;
 use crate::{Fields, MeshIoError, write_atomically, xml};
 
 /// Writes a surface at the given (rest or deformed) positions of all particles in meters, with fields.
@@ -39,10 +39,10 @@ pub fn write_vtp(
 ) -> Result<(), MeshIoError> {
     let triangles = &surface.triangles;
     fields.check(positions.len(), triangles.len())?;
-    let Used {
+    let UsedParticles {
         particles: used,
         indices,
-    } = Used::new(triangles, positions.len());
+    } = UsedParticles::new(triangles, positions.len());
     write_atomically(path, |out| {
         xml::open(out, "PolyData")?;
         writeln!(out, "<PolyData>")?;

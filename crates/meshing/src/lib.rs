@@ -29,12 +29,12 @@
 
 mod delaunay;
 mod distance;
-mod doubled;
 mod error;
 mod fans;
 mod index;
 mod irregular;
 mod lattice;
+mod merged_cells;
 mod neighbors;
 mod random;
 mod search;

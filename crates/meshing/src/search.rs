@@ -93,7 +93,7 @@ pub(super) struct Wanted {
     pub(super) tets: usize,
     /// Volume of the region in m³.
     pub(super) volume: f64,
-    /// Largest number of doublings of inner cells.
+    /// Largest number of times inner cells are merged into larger ones.
     pub(super) levels: u32,
 }
 

@@ -19,9 +19,9 @@ use incise_mesh::{ParticleId, TetMesh, signed_volume};
 use rayon::prelude::*;
 
 use crate::MeshingError;
-use crate::doubled::Doubled;
 use crate::index::index;
 use crate::lattice::{Lattice, root};
+use crate::merged_cells::MergedCells;
 use crate::neighbors::{NEIGHBORS, add, backward, direction, directions, steps};
 use crate::stencil::{Corner, Node, Side, fill};
 
@@ -65,11 +65,11 @@ pub fn stuff(
     stuff_graded(lattice, 0, distance)
 }
 
-/// Fills the region where `distance` is negative with tets, with inner cells doubled up to `levels` times: a cube of
+/// Fills the region where `distance` is negative with tets, with inner cells merged up to `levels` times: a cube of
 /// eight cells becomes one if it and all cells around it lie inside. Neighbors, also at edges and corners, differ by
 /// one doubling at most.
 ///
-/// The surface is that of [`stuff`], with tets of equal size there. Tets inside doubled cells have dihedral angles of
+/// The surface is that of [`stuff`], with tets of equal size there. Tets inside merged cells have dihedral angles of
 /// 45 to 120 degrees. A thick body of n tets keeps some n^(2/3).
 ///
 /// # Errors
@@ -123,7 +123,7 @@ pub(super) struct Grid {
     near: Vec<Near>,
     cuts: Vec<DVec3>,
     /// Merged cells.
-    doubled: Doubled,
+    merged_cells: MergedCells,
 }
 
 /// A vertex with cuts at its edges.
@@ -152,7 +152,7 @@ impl Grid {
             near_indices: Vec::new(),
             near: Vec::new(),
             cuts: Vec::new(),
-            doubled: Doubled::default(),
+            merged_cells: MergedCells::default(),
         };
         let values = grid.sample(slope, distance)?;
         grid.cut(&values, distance);
@@ -339,10 +339,10 @@ impl Grid {
         vertex.wrapping_add_signed(self.steps[vertex % 2][direction])
     }
 
-    /// Doubles cells inside, up to `levels` times. All lattice tets at them are uncut and have no moved vertices.
+    /// Merges cells inside, up to `levels` times. All lattice tets at them are uncut and have no moved vertices.
     pub(super) fn coarsen(&mut self, levels: u32) {
         let cells = self.lattice.cells;
-        self.doubled = Doubled::new(cells, levels, |cell| {
+        self.merged_cells = MergedCells::new(cells, levels, |cell| {
             [2 * cell, 2 * cell + 1].map(|vertex| self.sides[vertex] == Side::Inside) == [true; 2]
         });
     }
@@ -392,7 +392,7 @@ impl Grid {
             let center = 2 * cell + 1;
             for (next, corners) in ways {
                 let above = self.neighbor(center, next);
-                if self.doubled.is_doubled(cell) || self.doubled.is_doubled(above / 2) {
+                if self.merged_cells.is_merged(cell) || self.merged_cells.is_merged(above / 2) {
                     continue;
                 }
                 let ring = corners.map(|way| self.neighbor(center, way));
@@ -409,7 +409,7 @@ impl Grid {
                 }
             }
         }
-        self.doubled.fill(|tet| {
+        self.merged_cells.fill(|tet| {
             emit(tet.map(|at| Node::Vertex(self.corner(at, self.vertex(at)))));
         });
     }

@@ -26,8 +26,8 @@ const TETS: std::ops::RangeInclusive<usize> = 100..=4_000_000;
 
 /// Fills a solid with `tets` tets to within 2 %.
 ///
-/// `levels` is the largest number of doublings of inner cells: 0 gives tets of one size; each further level moves tets
-/// from the inside to a finer surface, see [`stuff_graded`](crate::stuff_graded).
+/// `levels` is the largest number of times that inner cells are merged into larger ones: 0 gives tets of one size;
+/// each further level moves tets from the inside to a finer surface, see [`stuff_graded`](crate::stuff_graded).
 ///
 /// The mesh is valid ([`TetMesh::check`]) and its boundary a closed manifold. All dihedral angles lie between 9.3 and
 /// 161.7 degrees, see [`stuff`](crate::stuff). Pieces and handles match the solid where the spacing resolves them.
@@ -63,23 +63,26 @@ pub fn tetrahedralize(solid: &Solid, tets: usize, levels: u32) -> Result<TetMesh
     let mut touching = false;
     for turn in [DMat3::IDENTITY, turned()] {
         // Thin parts tear on some lattice shifts and not on others; the first result with the fewest pieces is kept.
-        let mut torn: Option<(usize, TetMesh)> = None;
+        let mut disconnected: Option<(usize, TetMesh)> = None;
         for n in 0..SHIFTS {
             match search(solid, tets, levels, turn, shift(n))? {
-                Found::Body(mesh) => {
+                Found::Mesh(mesh) => {
                     let pieces = mesh.pieces().count;
                     if pieces <= solid.prepared().shells {
                         return Ok(mesh);
                     }
-                    if torn.as_ref().is_none_or(|(fewest, _)| pieces < *fewest) {
-                        torn = Some((pieces, mesh));
+                    if disconnected
+                        .as_ref()
+                        .is_none_or(|(fewest, _)| pieces < *fewest)
+                    {
+                        disconnected = Some((pieces, mesh));
                     }
                 }
                 Found::TouchesItself => touching = true,
                 Found::Nothing => {}
             }
         }
-        if let Some((_, mesh)) = torn {
+        if let Some((_, mesh)) = disconnected {
             return Ok(mesh);
         }
     }
@@ -91,7 +94,7 @@ pub fn tetrahedralize(solid: &Solid, tets: usize, levels: u32) -> Result<TetMesh
 }
 
 enum Found {
-    Body(TetMesh),
+    Mesh(TetMesh),
     TouchesItself,
     Nothing,
 }
@@ -124,7 +127,7 @@ fn search(
     mesh.positions.iter_mut().for_each(|p| *p = place(*p));
     mesh.split_pinches();
     Ok(if mesh.surface().is_manifold() {
-        Found::Body(mesh)
+        Found::Mesh(mesh)
     } else {
         Found::TouchesItself
     })

@@ -12,7 +12,7 @@ use std::time::Instant;
 
 use glam::{DVec3, dvec3};
 use incise_mesh::{ParticleId, TetMesh, kuhn_box};
-use incise_reference::{Body, Material};
+use incise_reference::{Material, ReferenceBody};
 
 const FRAMES: usize = 8;
 
@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mesh = read(&name)?;
         let tets: Vec<[u32; 4]> = mesh.tets.iter().map(|t| t.map(|ParticleId(p)| p)).collect();
         let start = Instant::now();
-        let mut body = Body::new(&mesh.positions, &tets, |_tet| Material {
+        let mut body = ReferenceBody::new(&mesh.positions, &tets, |_tet| Material {
             young_modulus: 1e6,
             poisson_ratio: 0.45,
             density: 1000.0,

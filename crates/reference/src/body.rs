@@ -1,4 +1,4 @@
-//! [`Body`]: particles, tets and the state that steps update.
+//! [`ReferenceBody`]: particles, tets and the state that steps update.
 
 use glam::{DMat3, DVec3};
 
@@ -15,12 +15,12 @@ use crate::{Material, ReferenceError, Report};
 ///
 /// ```
 /// use glam::DVec3;
-/// use incise_reference::{Body, Material};
+/// use incise_reference::{ReferenceBody, Material};
 ///
 /// // A tet stands on three corners; the fourth begins to sink.
 /// let rest = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
 /// let rubber = Material { young_modulus: 1e5, poisson_ratio: 0.45, density: 1000.0 };
-/// let mut body = Body::new(&rest, &[[0, 1, 2, 3]], |_tet| rubber)?;
+/// let mut body = ReferenceBody::new(&rest, &[[0, 1, 2, 3]], |_tet| rubber)?;
 /// body.fixed[..3].fill(true);
 /// let report = body.step(0.01, DVec3::NEG_Z * 9.81)?;
 /// assert!(report.residual() <= 1e-10 * report.scale);
@@ -28,7 +28,7 @@ use crate::{Material, ReferenceError, Report};
 /// # Ok::<(), incise_reference::ReferenceError>(())
 /// ```
 #[derive(Debug)]
-pub struct Body {
+pub struct ReferenceBody {
     /// Position of each particle in m.
     pub positions: Vec<DVec3>,
     /// Velocity of each particle in m/s. The velocity of a fixed particle is neither read nor written.
@@ -49,7 +49,7 @@ pub struct Energy {
     pub elastic: f64,
 }
 
-impl Body {
+impl ReferenceBody {
     /// Creates a body at rest in the shape of `positions`; `material` gives the material of each tet.
     ///
     /// Each corner of a tet gets a quarter of its mass. O(tets), and the symbolic factorization.
@@ -191,7 +191,7 @@ impl Body {
     /// become zero.
     ///
     /// # Errors
-    /// [`ReferenceError::NotHeld`] if a piece can translate or rotate freely, and the errors of [`Body::step`]. The
+    /// [`ReferenceError::NotHeld`] if a piece can translate or rotate freely, and the errors of [`ReferenceBody::step`]. The
     /// body is unchanged on an error.
     ///
     /// # Panics

@@ -2,16 +2,16 @@
 //!
 //! Stable Neo-Hookean tets by implicit Euler in double precision. Each step is solved by Newton's method, with an exact
 //! Hessian and a sparse Cholesky factorization, until the unbalanced force is 1e-10 of the acting forces; a step that
-//! does not reach this returns an error. [`Body::settle`] finds static equilibria in the same way.
+//! does not reach this returns an error. [`ReferenceBody::settle`] finds static equilibria in the same way.
 //!
 //! ```
 //! use glam::DVec3;
-//! use incise_reference::{Body, Material};
+//! use incise_reference::{ReferenceBody, Material};
 //!
 //! // A row of two tets, held at three particles, sinks under its weight.
 //! let rest = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE];
 //! let rubber = Material { young_modulus: 1e5, poisson_ratio: 0.45, density: 1000.0 };
-//! let mut body = Body::new(&rest, &[[0, 1, 2, 3], [1, 4, 2, 3]], |_tet| rubber)?;
+//! let mut body = ReferenceBody::new(&rest, &[[0, 1, 2, 3], [1, 4, 2, 3]], |_tet| rubber)?;
 //! body.fixed[..3].fill(true);
 //! let gravity = DVec3::NEG_Z * 9.81;
 //! body.settle(gravity)?;
@@ -38,7 +38,7 @@ mod stable_neo_hookean;
 mod symmetric;
 mod system;
 
-pub use body::{Body, Energy};
+pub use body::{Energy, ReferenceBody};
 pub use error::ReferenceError;
 pub use material::Material;
 pub use newton::Report;

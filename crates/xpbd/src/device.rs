@@ -110,8 +110,8 @@ impl<R: Float> Solver<R> {
         (data, R::components(self.particles.velocities[particle]))
     }
 
-    /// Prepares the state as a step does first: moves the origin with a body that has moved far, and adds a little
-    /// width to a body on an exact line. Returns the number of particles that the latter moved.
+    /// Prepares the state as a step does first: moves the origin if the body has moved far, and displaces particles of
+    /// a body that lies on an exact line. Returns the number of displaced particles.
     pub fn prepare_state(&mut self) -> usize {
         let origin = self.particles.origin;
         let jittered = self.prepare();
@@ -147,8 +147,8 @@ impl<R: Float> Solver<R> {
     }
 
     /// Loads the data of a last substep computed elsewhere, for [`Solver::residuals`]: the positions before the
-    /// constraints were solved (the fourth number is ignored), the two multipliers of each tet, and the form that
-    /// solved the tets.
+    /// constraints were solved (the fourth number is ignored), the two multipliers of each tet, and how the tets were
+    /// solved.
     ///
     /// # Panics
     /// If the number of positions differs from that of particles, or the number of multipliers from that of tets.
@@ -183,11 +183,11 @@ impl Solver<f32> {
     /// as 20 numbers each.
     ///
     /// The first number is the kind: 0 plane, 1 capsule or sphere, 2 box; the second the friction; the fifth to seventh
-    /// the motion in the substep. Of a plane follow the offset along the normal in the third place and the unit normal
-    /// from the ninth on; of a capsule the radius in the third, one over the squared length of the axis in the fourth
-    /// (0 for a sphere), and from the ninth on its start, its axis and the normal of points on the axis; of a box half
-    /// its edges in the third, fourth and eighth, and from the ninth on its center and its three axes.
-    pub fn obstacle_data<'a>(
+    /// the motion in the substep. A plane has its offset along the normal third and the unit normal from the ninth on.
+    /// A capsule has its radius third, one over the squared length of its axis fourth (0 for a sphere), and from the
+    /// ninth on its start, its axis and the normal of points on the axis. A box has half its edges third, fourth and
+    /// eighth, and from the ninth on its center and its three axes.
+    pub fn collider_data<'a>(
         &self,
         settings: &'a StepSettings,
         elapsed: f64,

@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use fearless_simd::{Simd, SimdFloat, SimdFloatElement};
 use glam::{DVec3, Vec3};
 
-/// What can be written and read, with the feature `serde`; everything without it.
+/// Types that can be serialized, with the feature `serde`; all types without it.
 #[cfg(feature = "serde")]
 pub trait Saved: serde::Serialize + serde::de::DeserializeOwned {}
 #[cfg(feature = "serde")]

@@ -178,8 +178,6 @@ impl<R: Float> Solver<R> {
 
     /// Returns `‖M g‖` over the free particles in N, the scale to judge residuals by. The sum of squares shrinks with
     /// the size of the particles as that of [`Residuals::force`] does.
-    ///
-    /// The sum of squares shrinks with the size of the particles as that of [`Residuals::force`] does.
     #[must_use]
     pub fn load(&self, gravity: DVec3) -> f64 {
         let particles = (0..self.particle_count()).filter(|&p| self.is_free(p));

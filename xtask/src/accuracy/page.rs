@@ -13,7 +13,7 @@ const USELESS: f64 = 100.0;
 pub(super) fn page(rows: &[SceneRow]) -> anyhow::Result<Page> {
     let mut parts = vec![Part::Text(INTRODUCTION.to_owned()), references(rows)];
     parts.push(Part::Text(format!(
-        "## What each knob buys\n\nBy all scenes: the median, and in brackets the smallest and the largest. n is the number of substeps that brings kappa to 0.5. Errors of {USELESS} % and more count as lost.\n\n{}\n",
+        "## Effect of each setting\n\nOver all scenes: the median, and in brackets the smallest and the largest. n is the number of substeps that brings kappa to 0.5. Errors of {USELESS} % and more count as lost.\n\n{}\n",
         knobs(rows).join("\n")
     )));
     parts.push(Part::Text("## One large step, iterated".to_owned()));
@@ -30,21 +30,22 @@ pub(super) fn page(rows: &[SceneRow]) -> anyhow::Result<Page> {
     })
 }
 
-const INTRODUCTION: &str = "Errors of positions are root mean square distances of all particles from where they should \
-be, in % of the longest side of the body; *largest* is the largest of all frames, *at the end* that of the last one; *of the motion*, \
+const INTRODUCTION: &str = "Errors of positions are root mean square distances of all particles from the reference, \
+in % of the longest side of the body; *largest* is the largest of all frames, *at the end* that of the last one; *of \
+the motion*, \
 which is what `accuracy` bounds, is that of all frames together, in % of the distance of the particles from their start. \
-The error of the volume is the largest of all frames, in % of the volume at rest. Where particles should be is the solution \
-of the same tets (what the mesh does wrong does not count) by Newton's method with sparse Cholesky factorizations in \
-double precision, implicit Euler at three step sizes, extrapolated to small steps. Times are of whole frames of 1/60 s on \
-one thread, or on a GPU with the way back of the positions; settings take turns for three rounds, and each frame counts \
-with its fastest time. A press is a prescribed motion of held particles and a cut is made before anything moves, as the \
-reference knows no contacts and no later cuts; the layers are two bodies stitched together by links, for the reference \
-one body.";
+The error of the volume is the largest of all frames, in % of the volume at rest. The reference is computed for the \
+same tets, so errors of the mesh do not count: implicit Euler by Newton's method with sparse Cholesky factorizations \
+in double precision, at three step sizes, extrapolated to small steps. Times are of whole frames of 1/60 s on \
+one thread, or on a GPU, including the readback of the positions. Settings are measured in turns for three rounds, \
+and the fastest time of each frame counts. A press is a prescribed motion of held particles and a cut is made before \
+anything moves, because the reference supports neither contacts nor later cuts. The layers are two bodies joined by \
+distances; in the reference they are one body.";
 
 /// Accuracy of the references.
 fn references(rows: &[SceneRow]) -> Part {
     let mut table = Table::new(
-        "The references: what may be left of their own error, and the order at which implicit Euler converges to them",
+        "The references: estimate of their own error, and order of convergence of implicit Euler",
         [
             "scene",
             "tets",

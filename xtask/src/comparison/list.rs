@@ -90,9 +90,9 @@ pub(super) const PEERS: &[Peer] = &[
     },
     Peer {
         id: "newton-vbd",
-        what: "vertex block vbd, stable neo-Hookean (Newton on Warp)",
-        caveat: "another method: a sweep solves each particle's 3 x 3 system, and visits each tet four times; what an \
-            iteration is worth differs",
+        what: "vertex block descent, stable neo-Hookean (Newton on Warp)",
+        caveat: "another method: a sweep solves each particle's 3 x 3 system, and visits each tet four times; the \
+        gain of an iteration differs",
         precision: Precision::F32,
         compiles: true,
         program: Program::Python {
@@ -104,8 +104,8 @@ pub(super) const PEERS: &[Peer] = &[
     Peer {
         id: "newton-xpbd",
         what: "XPBD, Jacobi with atomic additions (Newton on Warp)",
-        caveat: "not Gauss-Seidel: corrections are averaged, and more iterations are needed; watch whether its tip is \
-            anywhere near the others'",
+        caveat: "not Gauss-Seidel: corrections are averaged, and more iterations are needed; compare its tip with \
+        those of the others",
         precision: Precision::F32,
         compiles: true,
         program: Program::Python {

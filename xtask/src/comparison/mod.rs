@@ -81,7 +81,7 @@ const QUICK: Extent = Extent {
 };
 
 /// Runs this experiment as part of `all`, if the scripts are in the default folder.
-#[expect(clippy::print_stderr, reason = "says what is left out")]
+#[expect(clippy::print_stderr, reason = "lists what is left out")]
 pub(crate) fn usual(arguments: &ExperimentArguments) -> anyhow::Result<()> {
     let peers = PathBuf::from(FOLDER);
     if !peers.join("scene.py").is_file() {

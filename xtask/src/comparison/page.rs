@@ -12,9 +12,9 @@ block form.
 
 An iteration is a third of what a substep of four iterations takes more than one of one, a frame is 20 substeps of one. \
 **Iterations of different methods are not worth the same**: energies, constraints and stopping rules differ, and no system \
-here stops by a tolerance. What an iteration of ours is worth stands on the page of the trade between time and error. \
-The tip is where the end of the beam is after whatever the script ran, which is another time for each: it tells whether \
-a run is sane, not how accurate it is.";
+here stops by a tolerance. The accuracy page has the error of our iterations. *Tip* is the position of the end of the \
+beam after the run of each script, whose durations differ: it shows whether a run is plausible, not how accurate it \
+is.";
 
 pub(super) fn page(rows: &[Row]) -> anyhow::Result<Page> {
     let mut times = Table::new(
@@ -70,7 +70,7 @@ fn note(row: &Row) -> String {
     let said = last.and_then(|peer| peer.note.clone());
     let lost = last
         .is_some_and(|peer| peer.finite == Some(false) || peer.max_abs.is_some_and(|x| x > 2.0));
-    let lost = lost.then(|| "the beam has left its place: unstable at this substep".to_owned());
+    let lost = lost.then(|| "the beam diverged: unstable at this substep".to_owned());
     let missing = row.missing.as_ref().map(|why| format!("not run: {why}"));
     let all = [missing, said, lost].into_iter().flatten();
     all.collect::<Vec<_>>().join("; ")

@@ -15,7 +15,7 @@ use incise::meshing::{Shape, generate};
 use incise::report::ChosenMethod;
 use incise::scene::{AttachmentSpec, BodySpec, Region, ShapeSpec};
 use incise::{Scene, Simulation};
-use incise_reference::Body;
+use incise_reference::ReferenceBody;
 use serde::{Deserialize, Serialize};
 
 use super::{Warned, warnings};
@@ -272,7 +272,7 @@ impl Setup {
     }
 
     /// Body of the reference, with handled particles fixed.
-    fn body(&self, case: Case) -> anyhow::Result<Body> {
+    fn body(&self, case: Case) -> anyhow::Result<ReferenceBody> {
         let material = incise_reference::Material {
             young_modulus: case.young_modulus,
             poisson_ratio: case.poisson_ratio,
@@ -280,7 +280,7 @@ impl Setup {
         };
         let tets = self.mesh.tets.iter();
         let tets: Vec<[u32; 4]> = tets.map(|t| t.map(|ParticleId(p)| p)).collect();
-        let mut body = Body::new(&self.mesh.positions, &tets, |_tet| material)?;
+        let mut body = ReferenceBody::new(&self.mesh.positions, &tets, |_tet| material)?;
         for (p, fixed) in body.fixed.iter_mut().enumerate() {
             *fixed = self.fixed[p] || self.held[p];
         }
@@ -364,7 +364,7 @@ impl Setup {
         Ok(motion)
     }
 
-    fn press_to(&self, body: &mut Body, part: f64) {
+    fn press_to(&self, body: &mut ReferenceBody, part: f64) {
         for p in (0..self.held.len()).filter(|&p| self.held[p]) {
             body.positions[p] = self.mesh.positions[p] + self.press * part;
         }

@@ -56,7 +56,7 @@ impl FromStr for Shard {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let wrong = || format!("{text:?} is no share, give one like 2/5");
+        let wrong = || format!("{text:?} is not a share: write one as in 2/5");
         let (index, count) = text.split_once('/').ok_or_else(wrong)?;
         let index: usize = index.parse().map_err(|_| wrong())?;
         let count: usize = count.parse().map_err(|_| wrong())?;
@@ -93,7 +93,7 @@ impl ExperimentArguments {
                     serde_json::from_str(&text).with_context(|| file.display().to_string())?;
                 ensure!(
                     before == setup,
-                    "{} holds cells measured with {before:?}, not with {setup:?}: give another --out",
+                    "{} holds cells measured with {before:?}, not with {setup:?}: choose another --out",
                     self.out.display()
                 );
                 Ok(())

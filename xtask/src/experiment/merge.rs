@@ -64,7 +64,7 @@ pub(crate) fn merge(
                 if target.exists() {
                     ensure!(
                         target.ends_with("setup.json") || fs::read(&file)? == fs::read(&target)?,
-                        "{} and {} are two results of one cell, remove one",
+                        "{} and {} are two results of one cell: remove one",
                         file.display(),
                         target.display()
                     );

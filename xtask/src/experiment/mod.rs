@@ -113,14 +113,14 @@ impl<R: Serialize + DeserializeOwned> Cell<R> {
         let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || ".-".contains(c);
         ensure!(
             !self.id.is_empty() && self.id.chars().all(plain),
-            "{:?} is no name of a cell",
+            "{:?} is not the name of a cell",
             self.id
         );
         let path = folder.join(format!("{}.json", self.id));
         if let Ok(text) = fs::read_to_string(&path) {
             return serde_json::from_str(&text).with_context(|| {
                 format!(
-                    "{} holds no such cell, remove it or give another --out",
+                    "{} is not a result of this cell: remove it or choose another --out",
                     path.display()
                 )
             });

@@ -31,7 +31,7 @@ pub(crate) fn page(report: &Report) -> anyhow::Result<String> {
         compared(report),
     )?;
     let words = format!(
-        "A kernel sees at most {} of one buffer here. Without multipliers, which take 8 bytes a place with several \
+        "A kernel sees at most {} of one buffer here. Without multipliers, which take 8 bytes a slot with several \
          iterations a substep.",
         mebibytes(report.facts.buffer_limit)
     );
@@ -39,8 +39,8 @@ pub(crate) fn page(report: &Report) -> anyhow::Result<String> {
     section(
         "Frames",
         "The built-in scene on each mesh, 20 substeps of one iteration. *in a row*: many frames before a wait; *waited \
-         for*: each. The rest are medians of the frames that cut, each waited for: the state is read back, cut, followed \
-         and sent.",
+         for*: each. The rest are medians of the frames that cut, each waited for: the state is read back, cut, \
+         updated and sent.",
         frames(report),
     )?;
     let words = format!(

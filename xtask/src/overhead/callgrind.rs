@@ -65,7 +65,7 @@ pub(crate) fn count(arguments: &[&str], folder: &Path) -> anyhow::Result<Counts>
     let counts = parse(&text)?;
     ensure!(
         counts.instructions > 0,
-        "Callgrind has not seen the function {COUNTED}: was the program stripped?"
+        "Callgrind's output lacks the function {COUNTED}: was the program stripped?"
     );
     Ok(counts)
 }
@@ -110,7 +110,7 @@ fn parse(text: &str) -> anyhow::Result<Counts> {
     }
     ensure!(
         events.contains(&"Ir"),
-        "Callgrind's file says no instructions"
+        "Callgrind's file has no instruction counts"
     );
     Ok(counts)
 }
@@ -132,12 +132,12 @@ fn=incise_xpbd::step::substep
 fi=real.rs
 3 20
 fe=step.rs
-cfn=incise_xpbd::attachment::move_held
+cfn=incise_xpbd::attachment::move_rigid_attachments
 calls=4 30
 14 48 4
 15 5 1
 
-fn=incise_xpbd::attachment::move_held
+fn=incise_xpbd::attachment::move_rigid_attachments
 30 48 4
 
 totals: 173 15 1

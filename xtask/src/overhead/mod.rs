@@ -50,7 +50,7 @@ const BY_HAND: [(Way, &str); 2] = [
 
 #[expect(
     clippy::print_stderr,
-    reason = "a user who waits for a page wants to know at once what will be missing from it"
+    reason = "missing measurements are announced before the run"
 )]
 pub(crate) fn overhead(arguments: &OverheadArguments) -> anyhow::Result<()> {
     let valgrind = match arguments.no_valgrind {
@@ -60,7 +60,7 @@ pub(crate) fn overhead(arguments: &OverheadArguments) -> anyhow::Result<()> {
     if valgrind.is_none() && !arguments.no_valgrind {
         eprintln!(
             "valgrind is not installed (Debian: apt-get install valgrind): instructions are not counted, only bytes, \
-             allocations and what a GPU is told"
+            allocations and data sent to a GPU"
         );
     }
     experiment(arguments.experiment.quick, &valgrind).run(&arguments.experiment)

@@ -58,37 +58,38 @@ const MODULES: [(&str, &[&str]); 12] = [
 const POSITIONS: &str = "AnySolver::positions";
 
 const INTRODUCTION: &str = "\
-What a scene pays for what it does not use, what it declares without use, and what is at work. The scene is a beam that \
+Costs of features that a scene does not declare, declares without using, and uses. The scene is a beam that \
 floats at rest, in 2 substeps of 1 iteration; nothing acts on it, nothing is held, reported or limited.
 
 *Undeclared* cannot be measured by leaving a key out: that is the bare scene itself. Three things are measured instead. \
-The bare scene is held against a loop by hand over the same mesh and schedule: `incise_xpbd::Solver::step` and a copy of \
-the positions. That loop has never heard of scenes, strokes, pieces, reports, sleep, handles as a scene has them. What \
-the scene takes more must be a constant, the same for every size of mesh: then no undeclared feature has a pass over \
-particles or tets. This holds for branches to the digit; for instructions the compiler blurs it, since it makes one copy \
-of the solver for the facade and another for the loop by hand, which differ by some instructions a particle. Second, \
-the solver's own step without a body: all that it asks about undeclared constraints, which is once a substep or a frame, \
-is in there, and it is an upper bound. Third, the instructions of a bare frame by function, summed over the modules that \
+The bare scene is compared with a hand-written loop over the same mesh and schedule: `incise_xpbd::Solver::step` and a copy of \
+the positions. That loop has no scenes, strokes, pieces, reports, sleep or attachments. The additional cost of the \
+scene must be a constant, equal for every size of mesh: then no undeclared feature has a pass over particles or tets. \
+This holds for branches to the digit; for instructions the compiler blurs it, since it makes one copy of the solver \
+for the facade and another for the hand-written loop, which differ by some instructions a particle. Second, \
+the solver's own step without a body: it contains all checks for undeclared constraints, which run once a substep or \
+once a frame, so it is an upper bound. Third, the instructions of a bare frame by function, summed over the modules \
+that \
 belong to one feature alone; what the compiler has inlined elsewhere is in the first two only.
 
-What these miss: a branch within the loops over particles and tets, which both loops share. By reading: three for each \
+Not covered: a branch within the loops over particles and tets, which both loops share. By reading: three for each \
 block of 4 to 16 tets, the same every time (whether multipliers are kept, whether corrections are collected as Jacobi \
 does, whether materials differ); for each particle, whether it is held, and whether there is gravity. And bytes that the \
 solver holds whatever a scene declares: a byte a particle for being fixed, two a tet for its material, eight a tet for \
 its volume at rest. One pass a frame is for what no scene declares: the bounding box, by which a body that moves far away \
-keeps its precision. Any simulation can be cut at any time, so each keeps neighbors, boundary and pieces of its mesh, and \
-clusters and colors that can follow.
+keeps its precision. Any simulation can be cut at any time, so each keeps neighbors, boundary and pieces of its mesh, \
+and clusters and colors that can be updated.
 
 Instructions are Callgrind's, on one thread, mean of 4 frames after the first 3; on a processor as valgrind \
-shows it, with AVX 2 at most. Bytes are those held on the heap, capacity included. They are no times: a pass over memory \
-costs more than its instructions.";
+shows it, with AVX 2 at most. Bytes are those held on the heap, capacity included. They are not times: a pass over \
+memory costs more than its instructions.";
 
 pub(crate) fn page(rows: &[Row]) -> anyhow::Result<Page> {
     let mut parts = vec![Part::Text(INTRODUCTION.to_owned())];
     let valgrind = rows.iter().find_map(|row| row.valgrind.as_deref());
     parts.push(Part::Text(match valgrind {
         Some(version) => format!("Instructions counted by {version}."),
-        None => "Valgrind was not there, so no instructions were counted.".to_owned(),
+        None => "Valgrind was not installed, so no instructions were counted.".to_owned(),
     }));
     let find = |feature: &str| {
         let row = rows.iter().find(|row| row.feature == feature);
@@ -109,7 +110,7 @@ pub(crate) fn page(rows: &[Row]) -> anyhow::Result<Page> {
     );
     parts.push(Part::Table(device_table(rows)?));
     Ok(Page {
-        title: "What a scene pays for what it does not use".to_owned(),
+        title: "Cost of features that a scene does not use".to_owned(),
         parts,
     })
 }
@@ -153,7 +154,7 @@ fn undeclared(bare: &Row, hand: &Row, empty: &Row) -> Table {
         push(hand, "by hand", all(hand));
         push(
             bare,
-            "scene, more than by hand",
+            "scene, beyond the hand-written loop",
             [
                 show(minus(instructions(bare), instructions(hand))),
                 show(minus(branches(bare), branches(hand))),
@@ -222,7 +223,7 @@ fn pairs<'a>(
 
 pub(super) fn declared_table(caption: &str, rows: &[Row], state: State) -> anyhow::Result<Table> {
     let mut table = Table::new(
-        format!("{caption}: what a frame takes more than its base's, at the larger size"),
+        format!("{caption}: additional cost of a frame over its base, at the larger size"),
         [
             "feature",
             "what",
@@ -276,7 +277,7 @@ pub(super) fn declared_table(caption: &str, rows: &[Row], state: State) -> anyho
 /// Table of device traffic.
 fn device_table(rows: &[Row]) -> anyhow::Result<Table> {
     let mut table = Table::new(
-        "On a GPU: a bare frame, and what a frame of others is told more, at the larger size",
+        "On a GPU: data sent for a bare frame, and additional data of other scenes, at the larger size",
         [
             "feature",
             "state",

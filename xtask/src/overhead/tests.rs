@@ -151,7 +151,7 @@ fn the_page_distinguishes_constants_from_passes() {
             .find(|line| line.iter().any(|cell| cell == name))
             .unwrap()
     };
-    assert_eq!(cells(&rows, "scene, more than by hand")[3], "30");
+    assert_eq!(cells(&rows, "scene, beyond the hand-written loop")[3], "30");
     let idle = page::declared_table("", &rows, State::Idle).unwrap();
     assert_eq!(idle.rows[0][2..6], ["12", "0.012", "0", "0.00"]);
     let used = page::declared_table("", &rows, State::Used).unwrap();
@@ -160,5 +160,5 @@ fn the_page_distinguishes_constants_from_passes() {
         row.valgrind = None;
         row.sizes.iter_mut().for_each(|size| size.counts = None);
     }
-    assert_eq!(cells(&rows, "scene, more than by hand")[3], "-");
+    assert_eq!(cells(&rows, "scene, beyond the hand-written loop")[3], "-");
 }

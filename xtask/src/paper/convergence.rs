@@ -15,8 +15,8 @@ use incise::mesh::glam::DVec3;
 use incise::xpbd::{Material, Method, Solver, StepSettings, TetSolve};
 use serde::{Deserialize, Serialize};
 
-use super::body::Body;
 use super::colorings::one_thread;
+use super::paper_mesh::PaperMesh;
 use crate::experiment::ExperimentArguments;
 use crate::solver::body::{body, scaled, schedule};
 
@@ -177,7 +177,7 @@ impl Trial {
         solving: PaperMethod,
         arguments: &ExperimentArguments,
     ) -> anyhow::Result<Self> {
-        let mesh = Body::named("liver_11k")?.mesh(arguments)?;
+        let mesh = PaperMesh::named("liver_11k")?.mesh(arguments)?;
         let size = match setup {
             Setup::Organ => 0.2,
             // Kappa is proportional to the square of step over size.
@@ -250,7 +250,8 @@ impl Trial {
             poisson_ratio: MATERIAL.poisson_ratio,
             density: MATERIAL.density,
         };
-        let mut reference = incise_reference::Body::new(&self.mesh.positions, &tets, |_| material)?;
+        let mut reference =
+            incise_reference::ReferenceBody::new(&self.mesh.positions, &tets, |_| material)?;
         solver.positions(&mut reference.positions);
         let elastic = reference.elastic_forces();
         let forces = elastic.iter().enumerate().map(|(p, &elastic)| {

@@ -7,9 +7,9 @@ use incise::coloring::scgc;
 use incise::graph::{ConstraintGraph, Schedule};
 use serde::{Deserialize, Serialize};
 
-use super::body::{Body, incidence};
 use super::colorings::{ITERATIONS, occupied, one_thread, solve_ms};
 use super::compared::{mean, number};
+use super::paper_mesh::{PaperMesh, incidence};
 use super::scene::cut_at_rest;
 use crate::experiment::{Cell, Experiment, ExperimentArguments, Page, Part, Table};
 
@@ -38,7 +38,7 @@ pub(super) fn experiment(arguments: &ExperimentArguments) -> Experiment<Row> {
 }
 
 fn measure(arguments: &ExperimentArguments) -> anyhow::Result<Row> {
-    let body = Body::named("liver_11k")?;
+    let body = PaperMesh::named("liver_11k")?;
     let mesh = body.mesh(arguments)?;
     let frames = if arguments.quick { FRAMES / 5 } else { FRAMES };
     let scene = cut_at_rest(body, &mesh, arguments, "serial:10", frames, BLADES)?;

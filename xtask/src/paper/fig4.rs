@@ -3,8 +3,8 @@
 use incise::clustering::{Method, cluster};
 use serde::{Deserialize, Serialize};
 
-use super::body::{Body, incidence};
 use super::colorings::Problem;
+use super::paper_mesh::{PaperMesh, incidence};
 use super::printed;
 use crate::experiment::{
     Axis, Cell, Experiment, ExperimentArguments, Page, Part, Plot, Series, Style, Table,
@@ -64,7 +64,7 @@ fn measure(
     clustering: &str,
     arguments: &ExperimentArguments,
 ) -> anyhow::Result<Row> {
-    let mesh = Body::named(name)?.mesh(arguments)?;
+    let mesh = PaperMesh::named(name)?.mesh(arguments)?;
     let incidence = incidence(&mesh)?;
     let problem = Problem::new(
         &incidence,
@@ -94,8 +94,9 @@ type Quantity = fn(&Colored) -> f64;
 
 fn page(rows: &[Row]) -> anyhow::Result<Page> {
     let mut parts = vec![Part::Text(
-        "Figure 4 prints no numbers, only curves; here are ours in its plots. One thread, the shortest of up to three times in \
-         turns, from a graph that is there; `auto` from lists of particles. The paper's MCS and greedy ran on a processor, \
+        "Figure 4 has curves without numbers; ours are drawn in its plots. One thread, the shortest of up to three \
+        times in turns, from an existing graph; `auto` from lists of particles. The paper's MCS and greedy ran on a \
+        processor, \
          its other four on a GPU: on one thread, the parallel algorithms pay for rounds that gain them nothing."
             .to_owned(),
     )];

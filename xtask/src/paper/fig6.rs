@@ -7,8 +7,8 @@ use incise::cutting::FaceTag;
 use incise::{Scene, Simulation};
 use serde::{Deserialize, Serialize};
 
-use super::body::Body;
 use super::painter::{Triangle, picture};
+use super::paper_mesh::PaperMesh;
 use crate::experiment::{Cell, Experiment, ExperimentArguments, Page, Part};
 
 const BODIES: [&str; 3] = ["liver_11k", "bunny_19k", "armadillo_55k"];
@@ -38,7 +38,7 @@ pub(super) fn experiment(arguments: &ExperimentArguments) -> Experiment<Row> {
 
 fn measure(name: &str, arguments: &ExperimentArguments) -> anyhow::Result<Row> {
     let mut scene = Scene::built_in();
-    let file = Body::named(name)?.file(arguments)?;
+    let file = PaperMesh::named(name)?.file(arguments)?;
     (scene.body[0].mesh, scene.body[0].shape) = (Some(file), None);
     let mut simulation = Simulation::with_threads(&scene, 1)?;
     let mut pictures = Vec::new();

@@ -9,8 +9,8 @@
 use incise::Simulation;
 use serde::{Deserialize, Serialize};
 
-use super::body::{Body, incidence};
 use super::colorings::{ITERATIONS, Problem, occupied};
+use super::paper_mesh::{PaperMesh, incidence};
 use super::scene::cut_at_rest;
 use crate::experiment::{
     Axis, Cell, Experiment, ExperimentArguments, Page, Part, Plot, Series, Style, Table,
@@ -75,7 +75,7 @@ pub(super) fn experiment(arguments: &ExperimentArguments) -> Experiment<Row> {
 }
 
 fn measure(name: &str, frames: u64, arguments: &ExperimentArguments) -> anyhow::Result<Row> {
-    let body = Body::named(name)?;
+    let body = PaperMesh::named(name)?;
     let mesh = body.mesh(arguments)?;
     let frames = if arguments.quick { frames / 5 } else { frames };
     let samples = if arguments.quick { 6 } else { SAMPLES };
@@ -122,8 +122,8 @@ fn measure(name: &str, frames: u64, arguments: &ExperimentArguments) -> anyhow::
 fn page(rows: &[Row]) -> anyhow::Result<Page> {
     let mut parts = vec![Part::Text(format!(
         "Three blades through bodies at rest, clusters of 10 that are never merged, as in the paper. By algorithm: the clusters \
-         of that frame recolored, with the time of cutting (the mean of the frames that cut since the last point), coloring \
-         from a graph that is there, and {ITERATIONS} iterations. `kept`: what the simulation does by itself, which colors \
+         of that frame recolored, with the time of cutting (the mean of the frames that cut since the last point), \
+         coloring from an existing graph, and {ITERATIONS} iterations. `kept`: what the simulation does, which colors \
          only what was cut; its time is that of all its stages. One thread.\n\n\
          The paper gives 220, 180 and 280 frames for its rows from top to bottom. Figure 6, of which they are said to be, has \
          liver, bunny, armadillo by its caption; the text lists liver, armadillo, bunny. So both are run in 180 and in 280."

@@ -9,10 +9,10 @@ use incise::graph::Coloring;
 use incise::mesh::TetMesh;
 use serde::{Deserialize, Serialize};
 
-use super::body::{Body, incidence};
 use super::colorings::Problem;
 use super::compared::{compared, header};
 use super::painter::{Triangle, hue, picture};
+use super::paper_mesh::{PaperMesh, incidence};
 use super::printed;
 use crate::experiment::{Cell, Experiment, ExperimentArguments, Page, Part, Table};
 
@@ -64,7 +64,7 @@ pub(super) fn experiment(arguments: &ExperimentArguments) -> Experiment<Row> {
 }
 
 fn measure(name: &str, clustering: &str, arguments: &ExperimentArguments) -> anyhow::Result<Row> {
-    let mesh = Body::named(name)?.mesh(arguments)?;
+    let mesh = PaperMesh::named(name)?.mesh(arguments)?;
     let incidence = incidence(&mesh)?;
     let problem = Problem::new(
         &incidence,

@@ -3,7 +3,6 @@
 //! One module per table or figure, each an experiment. The paper's values are data in `printed`, its bodies are in
 //! `body`. Where the paper is ambiguous, every reading is run and the page says so.
 
-mod body;
 mod claims;
 mod colorings;
 mod compared;
@@ -16,6 +15,7 @@ mod fig7;
 mod fig8;
 mod fig9;
 mod painter;
+mod paper_mesh;
 mod printed;
 mod scene;
 mod table1;

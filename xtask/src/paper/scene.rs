@@ -4,13 +4,13 @@ use incise::mesh::TetMesh;
 use incise::mesh::glam::DVec3;
 use incise::scene::{Scene, StrokeSpec, WorldSpec};
 
-use super::body::Body;
 use super::colorings::ITERATIONS;
+use super::paper_mesh::PaperMesh;
 use crate::experiment::ExperimentArguments;
 
 /// A body at rest without gravity, a large step of a few iterations, blades through it one after the other.
 pub(super) fn cut_at_rest(
-    body: Body,
+    body: PaperMesh,
     mesh: &TetMesh,
     arguments: &ExperimentArguments,
     clustering: &str,

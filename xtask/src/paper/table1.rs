@@ -10,9 +10,9 @@ use incise::clustering::{Method, cluster, serial_neighbor};
 use incise::graph::{Clustering, ConstraintGraph, Schedule};
 use serde::{Deserialize, Serialize};
 
-use super::body::{Body, incidence};
 use super::colorings::{ITERATIONS, Problem, one_thread, solve_ms};
 use super::compared::{compared, header};
+use super::paper_mesh::{PaperMesh, incidence};
 use super::printed;
 use crate::experiment::{Cell, Experiment, ExperimentArguments, Page, Part, Table};
 
@@ -75,7 +75,7 @@ pub(super) fn experiment(arguments: &ExperimentArguments) -> Experiment<Row> {
 }
 
 fn measure(size: u32, arguments: &ExperimentArguments) -> anyhow::Result<Row> {
-    let mesh = Body::named("liver_11k")?.mesh(arguments)?;
+    let mesh = PaperMesh::named("liver_11k")?.mesh(arguments)?;
     let incidence = incidence(&mesh)?;
     let mut best: Vec<Option<(Clustering, f64)>> = vec![None; METHODS.len()];
     one_thread(|| {

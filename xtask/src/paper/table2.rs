@@ -9,9 +9,9 @@ use incise::Simulation;
 use incise::clustering::{Method, cluster};
 use serde::{Deserialize, Serialize};
 
-use super::body::{Body, incidence};
 use super::colorings::{ALGORITHMS, Colored, ITERATIONS, Problem, occupied};
 use super::compared::{compared, header, mean, number};
+use super::paper_mesh::{PaperMesh, incidence};
 use super::printed;
 use super::scene::cut_at_rest;
 use crate::experiment::{Cell, Experiment, ExperimentArguments, Page, Part, Table};
@@ -92,7 +92,7 @@ pub(super) fn experiment(arguments: &ExperimentArguments) -> Experiment<Row> {
 }
 
 fn measure(name: &str, reading: Reading, arguments: &ExperimentArguments) -> anyhow::Result<Row> {
-    let body = Body::named(name)?;
+    let body = PaperMesh::named(name)?;
     let mut mesh = body.mesh(arguments)?;
     let clustering = reading.clustering();
     let scene = cut_at_rest(body, &mesh, arguments, clustering, FRAMES, 1)?;

@@ -122,7 +122,7 @@ fn page(rows: &[Row]) -> anyhow::Result<Page> {
          its own, at powers of two up to 4096 and at the cap, then by bisection to 5 percent; a cell says \"not in N\" \
          where the cap N did not suffice, and \"diverged\" where a residual passed 1e100. Residuals of iterated XPBD do not \
          fall monotonically, so a count is the first that was found. XPBD drops a part of the equations, so its \
-         force does not go to zero; and what is stretched far is softened by the solver, while residuals go by the material, so \
+         force does not go to zero; and what is stretched far is softened by the solver, while residuals use the stiffness of the material, so \
          at twice its size the dual residual does not go to zero either."
     ))];
     for setup in Setup::ALL {

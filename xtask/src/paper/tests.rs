@@ -7,10 +7,10 @@ use incise::coloring::{Order, greedy};
 use incise::graph::Clustering;
 use serde::de::DeserializeOwned;
 
-use super::body::{Body, incidence};
 use super::claims::{Evidence, Verdict};
 use super::colorings::{ALGORITHMS, Problem, occupied};
 use super::convergence::{PaperMethod, Setup, TIME_STEP, Trial, norm};
+use super::paper_mesh::{PaperMesh, incidence};
 use super::{What, printed, run};
 use crate::experiment::{Backend, ExperimentArguments};
 
@@ -76,7 +76,10 @@ fn table_1_has_the_papers_rows() {
         assert_eq!(row[6], paper.colors.to_string());
         assert!(is_ratio(row, 5) && is_ratio(row, 8), "{row:?}");
     }
-    let mesh = Body::named("liver_11k").unwrap().mesh(&folder.0).unwrap();
+    let mesh = PaperMesh::named("liver_11k")
+        .unwrap()
+        .mesh(&folder.0)
+        .unwrap();
     let incidence = incidence(&mesh).unwrap();
     for row in folder.rows::<super::table1::Row>("paper-table1") {
         for method in ["greedy-k", "serial", "pressure"] {

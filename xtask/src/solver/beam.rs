@@ -3,7 +3,7 @@
 use incise::mesh::glam::DVec3;
 use incise::mesh::{ParticleId, TetMesh, kuhn_box};
 use incise::xpbd::{Material, Real, Solver};
-use incise_reference::Body;
+use incise_reference::ReferenceBody;
 
 use super::body::body;
 
@@ -44,7 +44,7 @@ impl Beam {
         body(&self.mesh, self.material, |x| x.x == 0.0)
     }
 
-    pub(crate) fn reference(&self) -> anyhow::Result<Body> {
+    pub(crate) fn reference(&self) -> anyhow::Result<ReferenceBody> {
         let material = incise_reference::Material {
             young_modulus: self.material.young_modulus,
             poisson_ratio: self.material.poisson_ratio,
@@ -56,7 +56,7 @@ impl Beam {
             .iter()
             .map(|t| t.map(|ParticleId(p)| p))
             .collect();
-        let mut body = Body::new(&self.mesh.positions, &tets, |_tet| material)?;
+        let mut body = ReferenceBody::new(&self.mesh.positions, &tets, |_tet| material)?;
         for (fixed, x) in body.fixed.iter_mut().zip(&self.mesh.positions) {
             *fixed = x.x == 0.0;
         }

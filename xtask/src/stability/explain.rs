@@ -46,7 +46,7 @@ const TABLE: &[Explanation] = &[
         verdicts: &[Collapsed, Inverted, FewInverted, Off, Gains],
         kappa: 0.0,
         text: "The blade cuts a strip off a body in free fall at up to 100 m/s²; slivers at the strip turn over, softened \
-            to the limit of kappa, so that they do not throw what is around them.",
+            to the limit of kappa, so that they do not accelerate the particles around them.",
     },
     Explanation {
         extremes: &["sliver"],
@@ -99,8 +99,9 @@ const TABLE: &[Explanation] = &[
         methods: &[Vbd, Corrected],
         verdicts: &[Collapsed, Inverted, FewInverted, Gains, Off, Repaired],
         kappa: 1e12,
-        text: "A body of a micrometer in a frame of 1/60 s has a kappa of 1e14 (it is not the size: with time in \
-            proportion all is well). Its particles' inertia is then below the last digit of the stiffness around them, in \
+        text: "A body of a micrometer in a frame of 1/60 s has a kappa of 1e14 (size alone is not the cause: with \
+        time in proportion the run is stable). Its particles' inertia is then below the last digit of the stiffness \
+        around them, in \
             single precision by far, so where tets have become flat nothing but rounding says where a particle is. It \
             stays finite. Take a time step that fits the body.",
     },
@@ -117,14 +118,14 @@ const TABLE: &[Explanation] = &[
         verdicts: &[Collapsed, Inverted, FewInverted, Gains, Off, Bent],
         kappa: 0.6,
         text: "More than 200 substeps would be needed. At 200 the split form is softer than its material, and so are the \
-            tets that the other column softens to kappa 1, so the body gives way more.",
+            tets that the other column softens to kappa 1, so the body deforms more.",
     },
     Explanation {
         extremes: &["poisson-0.49", "poisson-0.499", "poisson-0.4999"],
         methods: &[Split, Softened],
         verdicts: &[Gains, Off],
         kappa: 0.0,
-        text: "Kappa speaks of E and not of how stiff a nearly incompressible body is against changes of volume: its error \
+        text: "Kappa is computed from E and ignores how stiff a nearly incompressible body is against changes of volume: its error \
             grows about as `l / μ`, and so does the energy in errors of volume that are not visible. Take a smaller kappa or \
             four iterations a substep.",
     },
@@ -157,8 +158,8 @@ const TABLE: &[Explanation] = &[
         verdicts: &[Inverted, FewInverted, Off, Bent],
         kappa: 1.0,
         text: "From so violent a start the potential of a step has many minima: vbd goes to the next one, where single \
-            tets may stay inverted, above all at the held end; and with 20 sweeps a frame it is slow to spread what it \
-            knows, so the body is long in straightening.",
+            tets may stay inverted, above all at the held end; and with 20 sweeps a frame corrections spread slowly, \
+            so the body straightens slowly.",
     },
     Explanation {
         extremes: &[""],

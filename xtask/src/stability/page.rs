@@ -18,12 +18,12 @@ All others take a frame in one step of 20 iterations: *block*, XPBD in \
 block form; *paper*, one constraint of a tet after the other, relaxation 0.8, clusters of 10; *Jacobi* and *Chebyshev* \
 (spectral radius 0.9) with relaxation 0.1; *vbd*, 20 sweeps; *corrected*, 5 sweeps, a correction of the whole body after each.
 
-After every frame positions, velocities, energies and volumes are looked at. Green: in shape. Yellow: `3 inverted`, tets \
-that are, at most 2 %; `volume 1.07`, over that at rest; `energy 3e1`, it rose so many times above what there was to \
-begin with (elastic energy, and the work of gravity over the length of the body); `bent 20 %`, root of the mean squared \
+After every frame positions, velocities, energies and volumes are checked. Green: in shape. Yellow: `3 inverted`, tets \
+that are, at most 2 %; `volume 1.07`, over that at rest; `energy 3e1`, its ratio to the energy at the start (elastic \
+energy, and the work of gravity over the length of the body); `bent 20 %`, root of the mean squared \
 distance from the shape at rest, up to a rigid motion, over the length of the body; `7 repaired`, particles that would \
 not have been finite and were put back. Red: more tets inverted; `collapsed 0.2`, less than half the volume or more than \
-twice; `frozen`, nothing moved; yellow too: `refused`, a value is out of its range; `NOT FINITE`. Nothing here speaks of accuracy.";
+twice; `frozen`, nothing moved; yellow too: `refused`, a value is out of its range; `NOT FINITE`. The table does not measure accuracy.";
 
 pub(super) fn page(rows: &[Row]) -> anyhow::Result<Page> {
     let mut parts = vec![
@@ -117,7 +117,7 @@ fn reasons(rows: &[Row]) -> String {
         .iter()
         .map(|(text, cells)| format!("- {text}\n  *Seen in:* {}.\n", cells.join("; ")));
     format!(
-        "## Why what is not green is not\n\n{}",
+        "## Reasons for results that are not green\n\n{}",
         list.collect::<String>()
     )
 }

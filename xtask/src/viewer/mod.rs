@@ -174,19 +174,19 @@ fn use_it(screen: &Screen, out: &Path) -> anyhow::Result<()> {
     until("two pieces", || Ok(hues(&body(&screen.picture()?)) == 2))?;
     look("3-two-pieces.png")?;
 
-    step("taken back, it has one again");
+    step("after Undo it has one again");
     screen.key('u')?;
     until("one piece again", || {
         Ok(hues(&body(&screen.picture()?)) == 1)
     })?;
 
-    step("the hand pulls it, and the view turns");
+    step("the grab pulls it, and the view orbits");
     screen.key('g')?;
     let before = look("4-taken-back.png")?;
     let middle = [x, i16::try_from(SIZE[1] / 2)?];
     screen.hold(Button::Left, middle, [x + 120, middle[1] - 160], 30)?;
     let moved = || Ok(differ(&body(&screen.picture()?), &body(&before)) > 0.02);
-    until("the body follows the hand", moved)?;
+    until("the body follows the pointer", moved)?;
     look("5-pulled.png")?;
     screen.release(Button::Left)?;
     screen.drag(Button::Right, middle, [x + 200, middle[1] + 40], 10)?;

@@ -13,13 +13,13 @@ use incise_meshing::{Shape, generate};
 use crate::bodies::check_cut;
 
 /// A body at rest whose mesh and pieces are checked after every cut.
-struct Body {
+struct TrackedMesh {
     cuttable: CuttableMesh,
     pieces: PieceTracker,
     snap: f64,
 }
 
-impl Body {
+impl TrackedMesh {
     fn new(mesh: TetMesh, snap: f64) -> Self {
         let cuttable = CuttableMesh::new(mesh).unwrap();
         Self {
@@ -108,7 +108,7 @@ fn a_sphere_in_two() {
     for tets in [1000, 8000] {
         for height in [0.0, 0.13, -0.31] {
             let mesh = generate(Shape::Sphere, tets).unwrap();
-            let mut body = Body::new(mesh, 0.0);
+            let mut body = TrackedMesh::new(mesh, 0.0);
             body.plane(DVec3::Z * height, DVec3::Z);
             assert_eq!(body.topology(), (2, 4));
             let cap = |h: f64| PI * h * h * (0.5 - h / 3.0);
@@ -129,7 +129,7 @@ fn a_sphere_in_two() {
 #[test]
 fn a_torus_once_and_twice() {
     for snap in [0.0, 0.1] {
-        let mut body = Body::new(generate(Shape::Torus, 2000).unwrap(), snap);
+        let mut body = TrackedMesh::new(generate(Shape::Torus, 2000).unwrap(), snap);
         assert_eq!(body.topology(), (1, 0));
         let radial = |angle: f64| {
             move |t: f64| {
@@ -153,7 +153,7 @@ fn a_torus_once_and_twice() {
 #[test]
 fn a_box_in_slices() {
     for slices in [1_usize, 4, 9] {
-        let mut body = Body::new(kuhn_box([12, 3, 3], dvec3(4.0, 1.0, 1.0)), 0.0);
+        let mut body = TrackedMesh::new(kuhn_box([12, 3, 3], dvec3(4.0, 1.0, 1.0)), 0.0);
         for i in 1..=slices {
             body.plane(DVec3::X * 4.0 * i as f64 / (slices + 1) as f64, DVec3::X);
         }
@@ -171,7 +171,7 @@ fn a_box_in_slices() {
 /// Along layers of particles nothing is split: a thousand cubes of six tets.
 #[test]
 fn a_cube_into_a_thousand_cubes() {
-    let mut body = Body::new(kuhn_box([10; 3], DVec3::ONE), 0.1);
+    let mut body = TrackedMesh::new(kuhn_box([10; 3], DVec3::ONE), 0.1);
     for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
         for i in 1..10 {
             body.plane(DVec3::ONE * (0.1 * f64::from(i)), axis);
@@ -194,7 +194,7 @@ fn a_flap() {
     for (n, snap) in [(10, 0.0), (10, 0.1), (12, 0.1)] {
         let mesh = kuhn_box([n; 3], DVec3::ONE);
         let tets = mesh.tets.len();
-        let mut body = Body::new(mesh, snap);
+        let mut body = TrackedMesh::new(mesh, snap);
         let blade = [(0.23, 1.2), (0.31, 0.65), (0.71, 0.64), (0.78, 1.2)];
         let pose = |t: f64| blade.map(|(x, z)| dvec3(x, 0.75 * t - 0.1, z)).to_vec();
         body.sweep(pose, 30);
@@ -224,7 +224,7 @@ fn a_flap() {
 #[test]
 fn a_spiral() {
     let mesh = kuhn_box([26, 26, 2], dvec3(1.0, 1.0, 0.08));
-    let mut body = Body::new(mesh, 0.1);
+    let mut body = TrackedMesh::new(mesh, 0.1);
     let pose = |t: f64| {
         let (angle, radius) = (3.0 * TAU * t, 0.06 + 0.38 * t);
         same_orientation(0.5 + radius * angle.cos(), 0.5 + radius * angle.sin())
@@ -240,12 +240,12 @@ fn a_spiral() {
 #[test]
 fn a_tube() {
     for snap in [0.0, 0.1] {
-        let mut body = Body::new(tube(3), snap);
+        let mut body = TrackedMesh::new(tube(3), snap);
         assert_eq!(body.topology(), (1, 0));
         body.plane(dvec3(0.0, 0.0, 0.7), DVec3::Z);
         assert_eq!(body.topology(), (2, 0));
 
-        let mut body = Body::new(tube(3), snap);
+        let mut body = TrackedMesh::new(tube(3), snap);
         let across = |t: f64| {
             vec![
                 dvec3(-1.0, 1.1 - 1.2 * t, 0.61),
@@ -256,7 +256,7 @@ fn a_tube() {
         // A window in the wall: a ring with one more hole.
         assert_eq!(body.topology(), (1, -2));
 
-        let mut body = Body::new(tube(3), snap);
+        let mut body = TrackedMesh::new(tube(3), snap);
         let around = |turns: f64| {
             move |t: f64| {
                 let (sin, cos) = (turns * t * TAU + 0.2).sin_cos();
@@ -267,7 +267,7 @@ fn a_tube() {
         };
         body.sweep(around(0.9), 40);
         assert_eq!(body.topology(), (1, -2));
-        let mut body = Body::new(tube(3), snap);
+        let mut body = TrackedMesh::new(tube(3), snap);
         body.sweep(around(1.1), 50);
         assert_eq!(body.topology(), (2, 0));
         let lower = 0.61 / (4.0 / 3.0);
@@ -288,7 +288,7 @@ fn the_same_stroke_again() {
         ] {
             let mesh = generate(shape, tets).unwrap();
             let whole = mesh.tets.len();
-            let mut body = Body::new(mesh, snap);
+            let mut body = TrackedMesh::new(mesh, snap);
             let pose = |t: f64| {
                 [(0.04, -1.0), (0.07, 1.0)]
                     .map(|(x, y)| dvec3(x, y, 0.7 - depth * t))

@@ -13,7 +13,10 @@ use glam::{DMat3, DVec3, Vec3};
 use incise_xpbd::{AttachmentData, Changes, Solver, StepSettings};
 
 use super::gpu_types::Attachment;
-use super::kernels::{BoundKernel, Kernels, MOVE_HELD, SOLVE_ATTACHMENTS, UPDATE_HELD, Variant};
+use super::kernels::{
+    BoundKernel, Kernels, MOVE_RIGID_ATTACHMENTS, SOLVE_ATTACHMENTS, UPDATE_RIGID_ATTACHMENTS,
+    Variant,
+};
 use super::layout::THREADS;
 use super::shared::Shared;
 use crate::array::Array;
@@ -176,7 +179,7 @@ impl Attachments {
                 poses,
                 shared.repaired,
             ];
-            let moving = kernels.bind(gpu, &MOVE_HELD, plain, &buffers)?;
+            let moving = kernels.bind(gpu, &MOVE_RIGID_ATTACHMENTS, plain, &buffers)?;
             let buffers = [
                 shared.settings,
                 shared.particles,
@@ -184,7 +187,7 @@ impl Attachments {
                 shared.velocities,
                 rigid,
             ];
-            let update = kernels.bind(gpu, &UPDATE_HELD, plain, &buffers)?;
+            let update = kernels.bind(gpu, &UPDATE_RIGID_ATTACHMENTS, plain, &buffers)?;
             passes.rigid = Some((moving, update, groups));
         }
         if self.soft_count() > 0 {
@@ -228,7 +231,7 @@ pub(crate) struct AttachmentKernels {
 
 impl AttachmentKernels {
     /// Moves rigidly attached particles at the start of a substep; `uniform` is the offset of its uniform.
-    pub(crate) fn move_held(&self, pass: &mut Recorder<'_>, uniform: u32) {
+    pub(crate) fn move_rigid_attachments(&self, pass: &mut Recorder<'_>, uniform: u32) {
         if let Some((moving, _, groups)) = &self.rigid {
             moving.run(pass, &[uniform], *groups);
         }
@@ -242,7 +245,7 @@ impl AttachmentKernels {
     }
 
     /// Updates rigidly attached particles at the end of a substep.
-    pub(crate) fn update_held(&self, pass: &mut Recorder<'_>) {
+    pub(crate) fn update_rigid_attachments(&self, pass: &mut Recorder<'_>) {
         if let Some((_, update, groups)) = &self.rigid {
             update.run(pass, &[], *groups);
         }

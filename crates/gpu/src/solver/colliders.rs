@@ -43,7 +43,7 @@ impl Colliders {
         colliders.next.clear();
         for substep in 1..=settings.substeps {
             let elapsed = f64::from(substep) * settings.substep_time();
-            let data = host.obstacle_data(settings, elapsed);
+            let data = host.collider_data(settings, elapsed);
             colliders.next.extend(data);
         }
         if colliders.next != colliders.sent {

@@ -8,7 +8,7 @@ use incise_xpbd::{Solver, StepSettings, TetSolve};
 use wgpu::{Buffer, BufferUsages, SubmissionIndex};
 
 use super::attachments::{AttachmentKernels, Attachments};
-use super::body::Body;
+use super::body_buffers::BodyBuffers;
 use super::colliders::Colliders;
 use super::gpu_types::Settings;
 use super::iterations::{self, IterationUniforms};
@@ -47,7 +47,7 @@ pub(crate) struct Frame {
 pub(crate) struct Scene<'a> {
     pub(crate) gpu: &'a GpuContext,
     pub(crate) kernels: &'a mut Kernels,
-    pub(crate) body: &'a mut Body,
+    pub(crate) body: &'a mut BodyBuffers,
     pub(crate) host: &'a Solver<f32>,
     pub(crate) repaired: &'a Array<u32>,
 }
@@ -96,7 +96,7 @@ impl Frame {
             let start = iterations::offset(settings, substep, 0);
             passes.predict.run(track.at(Predict), &[], particles);
             if let Some(handles) = &passes.handles {
-                handles.move_held(track.at(Other), start);
+                handles.move_rigid_attachments(track.at(Other), start);
             }
             if let Some(clear) = &passes.clear {
                 let words = 2 * body.layout.tet_slot_count();
@@ -130,7 +130,7 @@ impl Frame {
             }
             passes.update.run(track.at(Update), &[], particles);
             if let Some(handles) = &passes.handles {
-                handles.update_held(track.at(Other));
+                handles.update_rigid_attachments(track.at(Other));
             }
             if let Some([one, several]) = &passes.damp {
                 body.colors.run(track.at(Damp), one, several);
@@ -143,7 +143,7 @@ impl Frame {
     fn prepare(
         &mut self,
         gpu: &GpuContext,
-        body: &mut Body,
+        body: &mut BodyBuffers,
         host: &Solver<f32>,
         settings: &StepSettings,
         keeps: bool,
@@ -170,7 +170,7 @@ impl Frame {
     fn send_settings(
         &mut self,
         gpu: &GpuContext,
-        body: &Body,
+        body: &BodyBuffers,
         host: &Solver<f32>,
         settings: &StepSettings,
     ) {
@@ -247,7 +247,7 @@ impl Frame {
         &self,
         gpu: &GpuContext,
         encoder: &mut wgpu::CommandEncoder,
-        body: &Body,
+        body: &BodyBuffers,
     ) -> Result<Option<LastSubstep>, GpuError> {
         let Some(tet_solve) = self.kept else {
             return Ok(None);
@@ -297,7 +297,7 @@ impl Frame {
         &self,
         gpu: &GpuContext,
         kernels: &mut Kernels,
-        body: &'a Body,
+        body: &'a BodyBuffers,
         host: &Solver<f32>,
         repaired: &Array<u32>,
         settings: &StepSettings,

@@ -12,7 +12,7 @@
 use incise_xpbd::{Method, StepSettings};
 use wgpu::Buffer;
 
-use super::body::Body;
+use super::body_buffers::BodyBuffers;
 use super::kernels::{APPLY_CORRECTIONS, BoundKernel, EXTRAPOLATE_MULTIPLIERS, Kernels, Variant};
 use super::layout::{ClusterMapping, THREADS};
 use super::shared::Shared;
@@ -35,7 +35,7 @@ impl Jacobi {
     pub(crate) fn prepare(
         this: &mut Option<Self>,
         gpu: &GpuContext,
-        body: &mut Body,
+        body: &mut BodyBuffers,
         particles: usize,
         settings: &StepSettings,
     ) -> Result<(), GpuError> {
@@ -69,7 +69,7 @@ impl Jacobi {
         &self,
         gpu: &GpuContext,
         kernels: &mut Kernels,
-        body: &Body,
+        body: &BodyBuffers,
         shared: &Shared<'_>,
         keeps: bool,
     ) -> Result<JacobiKernels, GpuError> {

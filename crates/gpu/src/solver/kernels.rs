@@ -321,14 +321,14 @@ pub(crate) const PROJECT_TO_COLLIDERS: Source = Source {
     flags: &[],
 };
 
-pub(crate) const MOVE_HELD: Source = Source {
-    name: "move_held",
+pub(crate) const MOVE_RIGID_ATTACHMENTS: Source = Source {
+    name: "move_rigid_attachments",
     parts: text!(
         "common",
         "settings",
         "iteration",
         "attachments",
-        "move_held"
+        "move_rigid_attachments"
     ),
     uses: &[
         BindingKind::Uniform,
@@ -362,9 +362,14 @@ pub(crate) const SOLVE_ATTACHMENTS: Source = Source {
     flags: &[Flag::Keeps],
 };
 
-pub(crate) const UPDATE_HELD: Source = Source {
-    name: "update_held",
-    parts: text!("common", "settings", "attachments", "update_held"),
+pub(crate) const UPDATE_RIGID_ATTACHMENTS: Source = Source {
+    name: "update_rigid_attachments",
+    parts: text!(
+        "common",
+        "settings",
+        "attachments",
+        "update_rigid_attachments"
+    ),
     uses: &[
         BindingKind::Uniform,
         BindingKind::Read,
@@ -505,9 +510,9 @@ pub(crate) const SOURCES: &[Source] = &[
     PATCH_PARTICLES,
     CLEAR,
     PROJECT_TO_COLLIDERS,
-    MOVE_HELD,
+    MOVE_RIGID_ATTACHMENTS,
     SOLVE_ATTACHMENTS,
-    UPDATE_HELD,
+    UPDATE_RIGID_ATTACHMENTS,
     SOLVE_DISTANCES,
     SOLVE_DISTANCES_TAIL,
     SOLVE_VOLUMES,

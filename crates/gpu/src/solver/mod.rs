@@ -12,7 +12,7 @@
 //! and for handles and colliders that move.
 
 mod attachments;
-mod body;
+mod body_buffers;
 mod check;
 mod colliders;
 mod colors;
@@ -50,7 +50,7 @@ pub(crate) use gpu_types::{
 
 use crate::array::Array;
 use crate::{GpuContext, GpuError};
-use body::Body;
+use body_buffers::BodyBuffers;
 use frame::{Frame, Scene};
 use kernels::Kernels;
 use measure::Measuring;
@@ -102,7 +102,7 @@ pub struct GpuSolver {
     /// True if the device has advanced since the host last had its state.
     ahead: bool,
     kernels: Kernels,
-    body: Body,
+    body: BodyBuffers,
     frame: Frame,
     repaired: Array<u32>,
     /// Particles reset by the device, as last reported to the host.
@@ -125,7 +125,7 @@ impl GpuSolver {
     ) -> Result<Self, GpuError> {
         solver.track_changes();
         Ok(Self {
-            body: Body::new(&gpu, mapping)?,
+            body: BodyBuffers::new(&gpu, mapping)?,
             frame: Frame::new(&gpu)?,
             repaired: Array::zeros(&gpu, "count of repairs", 1)?,
             known_repaired: 0,

@@ -110,8 +110,8 @@ impl<'a> Line<'a> {
         let mut words = self.words();
         let mut result = [&[][..]; N];
         let mut found = 0;
-        for (place, word) in result.iter_mut().zip(words.by_ref()) {
-            *place = word;
+        for (slot, word) in result.iter_mut().zip(words.by_ref()) {
+            *slot = word;
             found += 1;
         }
         found += words.count();

@@ -44,7 +44,7 @@ impl Schedule {
     /// # Errors
     ///
     /// A cluster whose members or color differ.
-    pub fn check_plan(
+    pub fn check_partition(
         &self,
         clustering: &Clustering,
         coloring: &Coloring,
@@ -55,12 +55,12 @@ impl Schedule {
             let cluster = ClusterId::new(k);
             let color = (!members.is_empty()).then(|| coloring.color(k));
             occupied += usize::from(color.is_some());
-            let seated = color.is_none_or(|color| {
+            let is_listed = color.is_none_or(|color| {
                 let position = self.slots[k].position as usize;
                 let clusters = self.colors.rows().nth(color.index()).unwrap_or(&[]);
                 clusters.get(position) == Some(&cluster)
             });
-            if self.constraints(cluster) != members || self.color(cluster) != color || !seated {
+            if self.constraints(cluster) != members || self.color(cluster) != color || !is_listed {
                 return Err(GraphError::Misplaced { cluster });
             }
         }

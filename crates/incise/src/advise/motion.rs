@@ -50,7 +50,7 @@ impl Motion {
     /// reading the positions back.
     ///
     /// # Errors
-    /// If the scene or one of its strokes is refused.
+    /// If the scene or one of its strokes is invalid.
     pub fn of(scene: &Scene, frames: u32, threads: Option<usize>) -> Result<Self, Error> {
         let mut simulation = match threads {
             Some(threads) => Simulation::with_threads(scene, threads)?,

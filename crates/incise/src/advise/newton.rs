@@ -8,7 +8,7 @@
 //! Source: `incise-reference`. Cost: some sparse factorizations a step.
 
 use glam::DVec3;
-use incise_reference::{Body, Material, ReferenceError};
+use incise_reference::{Material, ReferenceBody, ReferenceError};
 use incise_xpbd::Pose;
 
 use super::motion::{Motion, volume};
@@ -179,8 +179,8 @@ impl Part {
         })
     }
 
-    fn body(&self) -> Result<Body, ReferenceError> {
-        let mut body = Body::new(&self.mesh_at_rest, &self.tets, |t| self.materials[t])?;
+    fn body(&self) -> Result<ReferenceBody, ReferenceError> {
+        let mut body = ReferenceBody::new(&self.mesh_at_rest, &self.tets, |t| self.materials[t])?;
         body.fixed.clone_from(&self.fixed);
         Ok(body)
     }

@@ -6,8 +6,8 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// Contact between bodies, between their pieces, and of a body with itself. Absent: nothing made of tets touches anything
-/// made of tets. Bodies that may touch are solved together, with the largest number of substeps that one of them asks for.
+/// Contact between bodies, between their pieces, and of a body with itself. Absent: bodies and pieces pass through each
+/// other. Bodies that may touch are solved together, with the largest of their numbers of substeps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ContactSpec {
@@ -22,12 +22,12 @@ pub struct ContactSpec {
     /// Which bodies touch each other: `"all"`, or pairs of their numbers, counted from 0.
     #[serde(default)]
     pub pairs: ContactPairs,
-    /// Time in which an overlap that is already there parts. An overlap that is about to arise is stopped at once.
+    /// Time in which an existing overlap is resolved. New overlaps are prevented at once.
     #[serde(default = "quick")]
     #[schemars(extend("unit" = "s"), range(min = 0.0, max = 1e3))]
     pub recovery_time: f64,
-    /// Distance that surfaces keep. Parts of a body that are closer at rest keep that, and the two sides of a cut none
-    /// until they have slid apart.
+    /// Distance kept between surfaces. Parts of a body that are closer at rest keep their distance at rest; the two
+    /// sides of a cut keep none until they have slid apart.
     #[serde(default)]
     #[schemars(extend("unit" = "m"), range(min = 0.0, max = 1e9))]
     pub thickness: f64,
@@ -68,7 +68,7 @@ fn quick() -> f64 {
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum ContactPairs {
-    /// Each body touches each other one.
+    /// All pairs of bodies.
     #[default]
     All,
     /// These pairs of different bodies; the order within a pair does not matter.

@@ -181,7 +181,7 @@ impl SimulationBuilder {
         self
     }
 
-    /// Lets what is made of tets touch: bodies, their pieces, the sides of cuts, a body and itself.
+    /// Enables contact between bodies, between their pieces, between the sides of cuts, and of a body with itself.
     pub fn contact(&mut self, contact: ContactSpec) -> &mut Self {
         self.scene.contact = Some(contact);
         self

@@ -20,9 +20,10 @@ use crate::island_builder::IslandBuilder;
 use crate::merged_mesh::MergedMesh;
 use crate::method::settings;
 use crate::ray::{RayHit, first_hit};
+use crate::resolved_body::ResolvedBody;
 use crate::scene::{AttachmentSpec, ColliderSpec, ContactPairs, ContactSpec, DistanceSpec};
 use crate::validate::{LARGEST_COORDINATE, coordinates, value, within};
-use crate::{Error, Scene, body, budget, contacts};
+use crate::{Error, Scene, budget, contacts};
 
 impl Simulation {
     /// Sets the acceleration of gravity in m/s² from the next frame on; `None` is no gravity. Wakes all bodies.
@@ -150,8 +151,8 @@ impl Simulation {
         index.ok_or_else(|| removed("collider", handle))
     }
 
-    /// Changes friction, thickness, recovery time and self-contact of what is made of tets from the next frame on, and
-    /// wakes what sleeps. O(bodies); the next frame searches for contacts.
+    /// Changes friction, thickness, recovery time and self-contact of all contacts from the next frame on, and wakes
+    /// sleeping bodies. O(bodies); the next frame searches for contacts.
     ///
     /// # Errors
     /// If a value lies outside its range, the scene was set up without contact or with other pairs of bodies, which are
@@ -401,7 +402,7 @@ impl Simulation {
             return Err(value("contact.pairs", "all", range));
         }
         let field = format!("body[{number}]");
-        let made = body::Body::new(&field, &body.spec, Some(&body.mesh), state.solver.substeps)?;
+        let made = ResolvedBody::new(&field, &body.spec, Some(&body.mesh), state.solver.substeps)?;
         let joined = IslandBuilder::of_one(number, made)?;
         let mut scene = (*state.scene).clone();
         scene.body.push(body.spec);

@@ -2,7 +2,7 @@
 //!
 //! A cut splits tets of constant deformation gradient and interpolates along edges, so what is linear in the particles
 //! is kept to rounding. What is quadratic in the velocities is lumped to particles and is not, see
-//! [`Moment::compare`].
+//! [`Conserved::compare`].
 
 use incise::cutting::{CutDelta, CutOptions, CuttableMesh, Plane, Sweep, cut_plane};
 use incise::mesh::glam::{DVec3, dvec3};
@@ -15,14 +15,14 @@ use crate::support::noise;
 const DENSITY: f64 = 1100.0;
 
 /// A body with its solver, between two steps.
-struct Body {
+struct CutBody {
     cuttable: CuttableMesh,
     solver: Solver<f64>,
 }
 
 /// All that is compared.
 #[derive(Clone, Copy, Debug)]
-struct Moment {
+struct Conserved {
     rest_volume: f64,
     mass: f64,
     momentum: DVec3,
@@ -44,7 +44,7 @@ struct Lost {
     angular: f64,
 }
 
-impl Body {
+impl CutBody {
     /// The mesh twisted, stretched and sheared, with velocities.
     fn new(mesh: TetMesh, velocity: impl Fn(usize, DVec3) -> DVec3) -> Self {
         let cuttable = CuttableMesh::new(mesh).unwrap();
@@ -118,7 +118,7 @@ impl Body {
         positions
     }
 
-    fn moment(&self) -> Moment {
+    fn conserved(&self) -> Conserved {
         let solver = &self.solver;
         let particles = || (0..solver.particle_count()).map(|p| (solver.mass(p), p));
         let mass: f64 = particles().map(|(m, _)| m).sum();
@@ -129,7 +129,7 @@ impl Body {
         let turn =
             |(m, p): (f64, usize)| (solver.position(p) - center).cross(solver.velocity(p)) * m;
         let energy = solver.energy(None);
-        Moment {
+        Conserved {
             rest_volume: solver.volume().rest,
             mass,
             momentum: particles().map(|(m, p)| m * solver.velocity(p)).sum(),
@@ -145,7 +145,7 @@ impl Body {
     }
 }
 
-impl Moment {
+impl Conserved {
     /// Compares with the moment after a cut.
     ///
     /// Kinetic energy never rises. With masses lumped to the corners it is the integral over the body of the linear
@@ -185,35 +185,35 @@ impl Moment {
 
 /// Cuts a body along planes and by a blade that stops half-way, each compared with the moment before; returns the most
 /// that was lost in one cut.
-fn cut(mut body: Body, snap: f64) -> Lost {
+fn cut(mut body: CutBody, snap: f64) -> Lost {
     let options = CutOptions {
         snap,
         ..CutOptions::default()
     };
     let mut most = Lost::default();
     let mut cuts = 0;
-    let mut note = |before: &Moment, body: &Body, delta: &CutDelta| {
+    let mut note = |before: &Conserved, body: &CutBody, delta: &CutDelta| {
         cuts += usize::from(!delta.is_empty());
-        let lost = before.compare(&body.moment());
+        let lost = before.compare(&body.conserved());
         most.kinetic = most.kinetic.max(lost.kinetic);
         most.angular = most.angular.max(lost.angular);
     };
     for seed in 0..2 {
         let plane = Plane {
-            point: body.moment().center + 0.05 * vector(seed, 0),
+            point: body.conserved().center + 0.05 * vector(seed, 0),
             normal: vector(seed, 1),
         };
-        let (before, positions) = (body.moment(), body.positions());
+        let (before, positions) = (body.conserved(), body.positions());
         let delta = cut_plane(&mut body.cuttable, &positions, &plane, &options).unwrap();
         body.apply_delta(&delta);
         note(&before, &body, &delta);
     }
-    let center = body.moment().center;
+    let center = body.conserved().center;
     let pose = |z: f64| [dvec3(0.03, -3.0, z), dvec3(0.06, 3.0, z + 0.1)].map(|x| x + center);
     let positions = body.positions();
     let mut stroke = Sweep::new(&body.cuttable, &positions, &pose(1.0), options).unwrap();
     for frame in 1..=4 {
-        let (before, positions) = (body.moment(), body.positions());
+        let (before, positions) = (body.conserved(), body.positions());
         let blade = pose(1.0 - 0.25 * f64::from(frame));
         let delta = stroke
             .advance(&mut body.cuttable, &positions, &blade)
@@ -248,7 +248,7 @@ fn smooth(_: usize, x: DVec3) -> DVec3 {
 fn a_cut_of_a_smoothly_moving_body() {
     for mesh in meshes() {
         for snap in [0.0, 0.1] {
-            let lost = cut(Body::new(mesh.clone(), smooth), snap);
+            let lost = cut(CutBody::new(mesh.clone(), smooth), snap);
             // Measured: at most 5e-4 of the energy and 1.8e-3 of the angular momentum.
             assert!(lost.kinetic < 0.002 && lost.angular < 0.005, "{lost:?}");
         }
@@ -259,7 +259,7 @@ fn a_cut_of_a_smoothly_moving_body() {
 fn a_cut_of_a_body_in_white_noise() {
     for mesh in meshes() {
         for snap in [0.0, 0.1] {
-            let lost = cut(Body::new(mesh.clone(), |p, _| vector(7, p)), snap);
+            let lost = cut(CutBody::new(mesh.clone(), |p, _| vector(7, p)), snap);
             // Each particle moves by itself: part of what the tets cut carry is averaged away. Measured: at most 4 % of
             // the energy and 1.2e-3 of the angular momentum, in one cut.
             assert!(lost.kinetic > 0.001 && lost.kinetic < 0.1, "{lost:?}");
@@ -272,7 +272,7 @@ fn a_cut_of_a_body_in_white_noise() {
 #[test]
 fn the_loss_goes_with_the_cube_of_the_size() {
     let lost = [3, 6, 12].map(|n| {
-        let body = Body::new(kuhn_box([n; 3], DVec3::ONE), smooth);
+        let body = CutBody::new(kuhn_box([n; 3], DVec3::ONE), smooth);
         cut(body, 0.1)
     });
     for pair in lost.windows(2) {

@@ -4,8 +4,8 @@
 //! others skipped. All types have at most 32 bits or are `f64`, so reading a value as `f64` is exact. Text keeps the
 //! digits of doubles even where `float` is declared. Source: G. Turk, "The PLY Polygon File Format" (1994). Linear.
 
-mod body;
 mod header;
+mod payload;
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -16,8 +16,8 @@ use incise_mesh::{ParticleId, TriangleSurface};
 use crate::polygon::fan;
 use crate::text::Text;
 use crate::{MeshIoError, write_atomically};
-use body::Body;
 use header::{axis, header, is_corners};
+use payload::Payload;
 
 /// The encoding of the elements of a `.ply` file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -91,15 +91,15 @@ pub(super) fn write(
 pub(crate) fn parse_ply(bytes: &[u8], path: &Path) -> Result<TriangleSurface, MeshIoError> {
     let text = Text::new(path, bytes);
     let (encoding, elements, header_lines) = header(&text)?;
-    let mut body = if encoding == PlyEncoding::Ascii {
-        Body::Ascii {
+    let mut payload = if encoding == PlyEncoding::Ascii {
+        Payload::Ascii {
             text: &text,
             words: text.words(header_lines + 1),
             line: header_lines,
         }
     } else {
         let mut line_ends = (0..bytes.len()).filter(|&i| bytes[i] == b'\n');
-        Body::Binary {
+        Payload::Binary {
             path,
             bytes,
             last: 0,
@@ -118,7 +118,7 @@ pub(crate) fn parse_ply(bytes: &[u8], path: &Path) -> Result<TriangleSurface, Me
             continue;
         }
         if element.name == b"vertex" {
-            let room = body.room_for(element);
+            let room = payload.room_for(element);
             surface.positions.reserve_exact(room);
         }
         if element.name == b"face"
@@ -127,7 +127,7 @@ pub(crate) fn parse_ply(bytes: &[u8], path: &Path) -> Result<TriangleSurface, Me
             // Polygons may need 12 bytes for each byte of the file. A growing list has two copies for a while, which
             // would exceed the limit.
             if encoding != PlyEncoding::Ascii && property.value.bytes() < 4 {
-                let room = body.most_values(property.value);
+                let room = payload.most_values(property.value);
                 surface.triangles.reserve_exact(room);
             }
         }
@@ -136,31 +136,31 @@ pub(crate) fn parse_ply(bytes: &[u8], path: &Path) -> Result<TriangleSurface, Me
             for property in &element.properties {
                 list.clear();
                 let count = match property.count {
-                    Some(kind) => body.natural(kind, "the length of a list")?,
+                    Some(kind) => payload.natural(kind, "the length of a list")?,
                     None => 1,
                 };
                 let corners = element.name == b"face" && is_corners(property);
                 if corners {
-                    let most = body.most_values(property.value);
+                    let most = payload.most_values(property.value);
                     list.reserve(most.min(count as usize));
                 }
                 for _ in 0..count {
                     if corners {
-                        let corner = ParticleId(body.natural(property.value, "a corner")?);
-                        let offset = body.offset();
+                        let corner = ParticleId(payload.natural(property.value, "a corner")?);
+                        let offset = payload.offset();
                         if largest.is_none_or(|(largest, _)| corner > largest) {
                             largest = Some((corner, offset));
                         }
                         list.push(corner);
                     } else {
-                        let value = body.number(property.value, "a value")?;
+                        let value = payload.number(property.value, "a value")?;
                         if element.name == b"vertex"
                             && let Some(axis) = axis(property)
                         {
                             if !value.is_finite() {
                                 let message =
                                     format!("the coordinate {value} is not finite, correct it");
-                                return Err(body.error(body.offset(), message));
+                                return Err(payload.error(payload.offset(), message));
                             }
                             position[axis] = value;
                         }
@@ -178,7 +178,7 @@ pub(crate) fn parse_ply(bytes: &[u8], path: &Path) -> Result<TriangleSurface, Me
         Some((corner, offset)) if corner.index() >= particles => {
             let message =
                 format!("a face has the point {corner} but there are {particles}, from 0");
-            Err(body.error(offset, message))
+            Err(payload.error(offset, message))
         }
         _ if surface.triangles.is_empty() => Err(text.error(1, "the file has no faces")),
         _ => Ok(surface),

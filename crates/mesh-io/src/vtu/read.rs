@@ -410,13 +410,13 @@ fn storage(element: &Element<'_>) -> Result<Storage, MeshIoError> {
         let text = element.text(name)?;
         Ok::<_, MeshIoError>(text.unwrap_or_else(|| default.to_owned()))
     };
-    let refused = |name, found: &str, expected| {
+    let unsupported = |name, found: &str, expected| {
         let found = show(found.as_bytes());
         Err(element.error(format!("{name} is {found:?}: {expected} expected")))
     };
     let kind = attribute("type", "")?;
     if kind != "UnstructuredGrid" {
-        return refused("the type of the file", &kind, "UnstructuredGrid");
+        return unsupported("the type of the file", &kind, "UnstructuredGrid");
     }
     let order = attribute("byte_order", "LittleEndian")?;
     let header = attribute("header_type", "UInt32")?;
@@ -425,17 +425,17 @@ fn storage(element: &Element<'_>) -> Result<Storage, MeshIoError> {
         big_endian: match order.as_str() {
             "LittleEndian" => false,
             "BigEndian" => true,
-            _ => return refused("byte_order", &order, "LittleEndian or BigEndian"),
+            _ => return unsupported("byte_order", &order, "LittleEndian or BigEndian"),
         },
         header: match header.as_str() {
             "UInt32" => 4,
             "UInt64" => 8,
-            _ => return refused("header_type", &header, "UInt32 or UInt64"),
+            _ => return unsupported("header_type", &header, "UInt32 or UInt64"),
         },
         compressed: match compressor.as_str() {
             "" => false,
             "vtkZLibDataCompressor" => true,
-            _ => return refused("compressor", &compressor, "none or vtkZLibDataCompressor"),
+            _ => return unsupported("compressor", &compressor, "none or vtkZLibDataCompressor"),
         },
     })
 }

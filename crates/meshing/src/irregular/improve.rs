@@ -13,7 +13,7 @@
 use glam::DVec3;
 use incise_mesh::{outward_normals, signed_volume};
 
-use super::body::{Body, NONE, Ring, other_two};
+use super::adjacency_mesh::{AdjacencyMesh, NONE, Ring, other_two};
 use super::sample::project;
 use crate::Shape;
 use crate::random::in_cube;
@@ -59,11 +59,17 @@ fn radius_ratio([a, b, c, d]: [DVec3; 4], volume: f64, normals: [DVec3; 4]) -> f
 }
 
 /// Improves all tets with a quality below `target`, in up to `passes` passes.
-pub(super) fn improve(body: &mut Body, shape: Shape, spacing: f64, target: f64, passes: u64) {
+pub(super) fn improve(
+    mesh: &mut AdjacencyMesh,
+    shape: Shape,
+    spacing: f64,
+    target: f64,
+    passes: u64,
+) {
     let mut work = Work::default();
     for pass in 0..passes {
-        let mut bad: Vec<(f64, u32)> = (0..body.end())
-            .filter_map(|t| body.tet(t).map(|tet| (quality(body.corners(tet)), t)))
+        let mut bad: Vec<(f64, u32)> = (0..mesh.end())
+            .filter_map(|t| mesh.tet(t).map(|tet| (quality(mesh.corners(tet)), t)))
             .filter(|&(q, _)| q < target)
             .collect();
         if bad.is_empty() {
@@ -73,19 +79,19 @@ pub(super) fn improve(body: &mut Body, shape: Shape, spacing: f64, target: f64, 
         let mut changed = false;
         for (_, t) in bad {
             // An earlier change may have fixed or removed it.
-            let Some(tet) = body
+            let Some(tet) = mesh
                 .tet(t)
-                .filter(|&tet| quality(body.corners(tet)) < target)
+                .filter(|&tet| quality(mesh.corners(tet)) < target)
             else {
                 continue;
             };
-            let mut done = work.reconnect(body, t);
+            let mut done = work.reconnect(mesh, t);
             if !done {
                 for p in tet {
-                    done |= work.relocate(body, shape, spacing, p, pass);
+                    done |= work.relocate(mesh, shape, spacing, p, pass);
                 }
             }
-            done = done || peel(body, t, &mut work.ring);
+            done = done || peel(mesh, t, &mut work.ring);
             changed |= done;
         }
         if !changed {
@@ -106,22 +112,22 @@ struct Work {
 
 impl Work {
     /// Applies the best edge or face removal at a tet, if any raises the worst quality.
-    fn reconnect(&mut self, body: &mut Body, t: u32) -> bool {
-        let Some(tet) = body.tet(t) else {
+    fn reconnect(&mut self, mesh: &mut AdjacencyMesh, t: u32) -> bool {
+        let Some(tet) = mesh.tet(t) else {
             return false;
         };
         self.best.clear();
         let mut gain = 0.0;
         for i in 0..4 {
             for j in 0..i {
-                if !body.ring(t, [i, j], &mut self.ring) {
+                if !mesh.ring(t, [i, j], &mut self.ring) {
                     continue;
                 }
                 let n = self.ring.tets.len();
                 if n > LARGEST_RING {
                     continue;
                 }
-                let before = worst_of(body, &self.ring.tets);
+                let before = worst_of(mesh, &self.ring.tets);
                 for hub in 0..n {
                     self.new.clear();
                     for k in 1..n - 1 {
@@ -130,13 +136,13 @@ impl Work {
                         self.new.push([p, q, r, tet[j]]);
                         self.new.push([p, r, q, tet[i]]);
                     }
-                    self.keep_better(body, before, &mut gain, None);
+                    self.keep_better(mesh, before, &mut gain, None);
                 }
             }
         }
         for (i, &a) in tet.iter().enumerate() {
-            let across = body.neighbor(t, i);
-            let Some(other) = (across != NONE).then(|| body.tet(across / 4)).flatten() else {
+            let across = mesh.neighbor(t, i);
+            let Some(other) = (across != NONE).then(|| mesh.tet(across / 4)).flatten() else {
                 continue;
             };
             let b = other[across as usize % 4];
@@ -150,20 +156,26 @@ impl Work {
             let pair = [t, across / 4];
             self.new.clear();
             self.new.extend([[a, b, p, q], [a, b, q, r], [a, b, r, p]]);
-            self.keep_better(body, worst_of(body, &pair), &mut gain, Some(&pair));
+            self.keep_better(mesh, worst_of(mesh, &pair), &mut gain, Some(&pair));
         }
         if self.best.is_empty() {
             return false;
         }
-        body.replace(&self.old, &self.best);
+        mesh.replace(&self.old, &self.best);
         true
     }
 
     /// Keeps the new tets as the best candidate if they gain more than the best so far.
-    fn keep_better(&mut self, body: &Body, before: f64, gain: &mut f64, pair: Option<&[u32]>) {
+    fn keep_better(
+        &mut self,
+        mesh: &AdjacencyMesh,
+        before: f64,
+        gain: &mut f64,
+        pair: Option<&[u32]>,
+    ) {
         let bound = before + *gain;
         let after = self.new.iter().try_fold(f64::INFINITY, |worst, &tet| {
-            let worst = quality(body.corners(tet)).min(worst);
+            let worst = quality(mesh.corners(tet)).min(worst);
             (worst > bound && worst > 0.0).then_some(worst)
         });
         if let Some(after) = after {
@@ -175,57 +187,64 @@ impl Work {
     }
 
     /// Moves a particle at random if that raises the worst quality around it; surface particles stay on the surface.
-    fn relocate(&mut self, body: &mut Body, shape: Shape, spacing: f64, p: u32, pass: u64) -> bool {
-        body.star(p, &mut self.star);
-        let start = body.positions[p as usize];
-        let (mut best, mut place) = (worst_of(body, &self.star), start);
+    fn relocate(
+        &mut self,
+        mesh: &mut AdjacencyMesh,
+        shape: Shape,
+        spacing: f64,
+        p: u32,
+        pass: u64,
+    ) -> bool {
+        mesh.star(p, &mut self.star);
+        let start = mesh.positions[p as usize];
+        let (mut best, mut place) = (worst_of(mesh, &self.star), start);
         let before = best;
         for (size, length) in MOVES.into_iter().enumerate() {
             for attempt in 0..TRIES {
                 let counter = (pass * 4 + size as u64) * TRIES + attempt;
                 let mut to = place + length * spacing * in_cube(u64::from(p), counter);
-                if body.on_surface[p as usize] {
+                if mesh.on_surface[p as usize] {
                     let Some(on) = project(shape, to, spacing) else {
                         continue;
                     };
                     to = on;
                 }
-                body.positions[p as usize] = to;
-                let after = worst_of(body, &self.star);
+                mesh.positions[p as usize] = to;
+                let after = worst_of(mesh, &self.star);
                 if after > best {
                     (best, place) = (after, to);
                 }
             }
         }
-        body.positions[p as usize] = place;
+        mesh.positions[p as usize] = place;
         // A minimum gain prevents long runs of tiny improvements.
         best > before + 1e-3
     }
 }
 
 /// Worst quality of the given tets.
-fn worst_of(body: &Body, tets: &[u32]) -> f64 {
+fn worst_of(mesh: &AdjacencyMesh, tets: &[u32]) -> f64 {
     tets.iter()
-        .filter_map(|&t| body.tet(t))
-        .map(|tet| quality(body.corners(tet)))
+        .filter_map(|&t| mesh.tet(t))
+        .map(|tet| quality(mesh.corners(tet)))
         .fold(f64::INFINITY, f64::min)
 }
 
 /// Removes a tet at the surface if the body and its surface stay manifolds of unchanged topology: with one boundary
 /// face if the opposite corner is inside, with two if the opposite edge is, with three always.
-fn peel(body: &mut Body, t: u32, ring: &mut Ring) -> bool {
-    let Some(tet) = body.tet(t) else {
+fn peel(mesh: &mut AdjacencyMesh, t: u32, ring: &mut Ring) -> bool {
+    let Some(tet) = mesh.tet(t) else {
         return false;
     };
-    let bare: Vec<usize> = (0..4).filter(|&k| body.neighbor(t, k) == NONE).collect();
+    let bare: Vec<usize> = (0..4).filter(|&k| mesh.neighbor(t, k) == NONE).collect();
     let simple = match *bare {
-        [i] => !body.on_surface[tet[i] as usize],
-        [i, j] => body.ring(t, [i, j], ring),
+        [i] => !mesh.on_surface[tet[i] as usize],
+        [i, j] => mesh.ring(t, [i, j], ring),
         [_, _, _] => true,
         _ => false,
     };
     if simple {
-        body.remove(t);
+        mesh.remove(t);
     }
     simple
 }
@@ -272,9 +291,9 @@ mod tests {
         }
         mesh.check().expect("not so much that tets turn over");
         let before = worst(&mesh);
-        let mut body = Body::new(mesh);
-        improve(&mut body, Shape::Box, spacing, 0.3, 30);
-        let mesh = body.into_mesh();
+        let mut adjacent = AdjacencyMesh::new(mesh);
+        improve(&mut adjacent, Shape::Box, spacing, 0.3, 30);
+        let mesh = adjacent.into_mesh();
         assert!(
             before < 0.25 && worst(&mesh) >= 0.3,
             "{before}, {}",
@@ -294,13 +313,13 @@ mod tests {
 
     #[test]
     fn peeling_keeps_the_topology() {
-        let mut body = Body::new(kuhn_box([4, 4, 4], DVec3::ONE));
+        let mut mesh = AdjacencyMesh::new(kuhn_box([4, 4, 4], DVec3::ONE));
         let mut ring = Ring::default();
         let mut peeled = 0;
-        for t in (0..body.end()).rev() {
-            peeled += usize::from(peel(&mut body, t, &mut ring));
+        for t in (0..mesh.end()).rev() {
+            peeled += usize::from(peel(&mut mesh, t, &mut ring));
         }
-        let mesh = body.into_mesh();
+        let mesh = mesh.into_mesh();
         assert!(peeled > 100);
         assert_eq!(mesh.tets.len(), 6 * 64 - peeled);
         mesh.check().expect("sound");

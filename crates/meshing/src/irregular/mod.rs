@@ -3,7 +3,7 @@
 //!
 //! Lattice meshes have nearly constant numbers (24 in stuffed ones), which hides the hard cases of coloring and
 //! clustering. Here random points on the surface and inside a solid (module `sample`) are connected ([`delaunay`]), the
-//! tets inside are kept (`carve`), and slivers are removed by local changes (`improve`). Further attempts with other
+//! tets inside are kept (`interior`), and slivers are removed by local changes (`improve`). Further attempts with other
 //! spacings and points bring the number of tets into its range.
 //!
 //! Measured with seed 1 by the tests `as_irregular_as_other_meshes` and, for the last rows, the ignored
@@ -25,17 +25,17 @@
 //!
 //! Cost: linear in the number of tets, times the logarithm of sorting; usually two attempts.
 
-mod body;
-mod carve;
+mod adjacency_mesh;
 mod improve;
+mod interior;
 mod sample;
 
 use glam::DVec3;
 use incise_mesh::{TetId, TetMesh};
 
-use self::body::Body;
-use self::carve::carve;
+use self::adjacency_mesh::AdjacencyMesh;
 use self::improve::{improve, quality};
+use self::interior::keep_interior;
 use self::sample::sample;
 use crate::delaunay::{delaunay, morton_keys};
 use crate::random::hash;
@@ -103,18 +103,18 @@ pub fn irregular(shape: Shape, tets: usize, seed: u64) -> Result<TetMesh, Meshin
     Err(out_of_range)
 }
 
-/// Makes a mesh with about the given spacing; `None` if the carved surface has not the topology of the shape.
+/// Makes a mesh with about the given spacing; `None` if the surface does not have the topology of the shape.
 fn attempt_at(shape: Shape, spacing: f64, seed: u64) -> Result<Option<TetMesh>, MeshingError> {
     let points = sample(shape, spacing, seed)?;
     let mut order: Vec<(u64, usize)> = morton_keys(&points).zip(0..).collect();
     order.sort_unstable();
     let points: Vec<DVec3> = order.into_iter().map(|(_, p)| points[p]).collect();
-    let Some(mesh) = carve(delaunay(&points)?, shape, spacing) else {
+    let Some(mesh) = keep_interior(delaunay(&points)?, shape, spacing) else {
         return Ok(None);
     };
-    let mut body = Body::new(mesh);
-    improve(&mut body, shape, spacing, QUALITY, PASSES);
-    Ok(Some(body.into_mesh()))
+    let mut mesh = AdjacencyMesh::new(mesh);
+    improve(&mut mesh, shape, spacing, QUALITY, PASSES);
+    Ok(Some(mesh.into_mesh()))
 }
 
 /// True if a mesh has the topology of the shape and the guaranteed quality.

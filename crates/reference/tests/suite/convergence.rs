@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{DQuat, DVec3, dvec3};
 use incise_mesh::kuhn_box;
-use incise_reference::{Body, Material, Report};
+use incise_reference::{Material, ReferenceBody, Report};
 
 use crate::support::{RUBBER, body, largest_distance, within};
 
@@ -30,7 +30,7 @@ fn assert_quadratic(report: &Report, material: Material) {
 }
 
 /// A bar that is held at both ends, and the particles of its far end.
-fn bar(material: Material) -> (Body, Vec<usize>) {
+fn bar(material: Material) -> (ReferenceBody, Vec<usize>) {
     let mesh = kuhn_box([8, 2, 2], dvec3(4.0, 1.0, 1.0));
     let mut body = body(&mesh, material);
     let place = |p: usize| mesh.positions[p].x;

@@ -2,14 +2,14 @@
 
 use glam::DVec3;
 use incise_mesh::kuhn_box;
-use incise_reference::{Body, Material, ReferenceError};
+use incise_reference::{Material, ReferenceBody, ReferenceError};
 
 use crate::support::{Noise, RUBBER, body, largest_distance, within};
 
 const STATES: [&str; 5] = ["flat", "point", "mirrored", "scrambled", "blown up"];
 
 /// A cube that is held at one face, the rest of it in that state; and its rest positions.
-fn cube(cells: usize, poisson_ratio: f64, state: &str) -> (Body, Vec<DVec3>) {
+fn cube(cells: usize, poisson_ratio: f64, state: &str) -> (ReferenceBody, Vec<DVec3>) {
     let mesh = kuhn_box([cells; 3], DVec3::ONE);
     let mut body = body(
         &mesh,
@@ -66,7 +66,7 @@ fn motion_recovers() {
     for nu in [0.3, 0.45, 0.49] {
         for state in STATES {
             let (mut body, _) = cube(2, nu, state);
-            let energy = |body: &Body| body.energy().kinetic + body.energy().elastic;
+            let energy = |body: &ReferenceBody| body.energy().kinetic + body.energy().elastic;
             let start = energy(&body);
             let mut last = start;
             for _ in 0..50 {

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3, dvec3};
 use incise_mesh::{TetMesh, kuhn_box};
-use incise_reference::{Body, Material};
+use incise_reference::{Material, ReferenceBody};
 
 use crate::support::{Noise, RUBBER, body, largest_distance, within};
 
@@ -97,7 +97,7 @@ fn uniaxial_stretch_is_the_closed_form() {
             };
             let (t, stress) = uniaxial(&material, s);
             let expected: Vec<DVec3> = mesh.positions.iter().map(|x| *x * dvec3(s, t, t)).collect();
-            let mut body: Body = body(&mesh, material);
+            let mut body: ReferenceBody = body(&mesh, material);
             for (p, x) in mesh.positions.iter().enumerate() {
                 body.fixed[p] = x.x == low.x || x.x == high.x;
                 if body.fixed[p] {

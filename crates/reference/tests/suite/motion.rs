@@ -83,7 +83,7 @@ proptest! {
         for v in &mut body.velocities {
             *v = drift + noise.vector();
         }
-        let momentum = |body: &incise_reference::Body| -> DVec3 {
+        let momentum = |body: &incise_reference::ReferenceBody| -> DVec3 {
             let each = body.masses().iter().zip(&body.velocities);
             each.map(|(m, v)| v * m).sum()
         };
@@ -105,7 +105,7 @@ proptest! {
         for x in &mut body.positions {
             *x += noise.vector() * 0.1;
         }
-        let sum = |body: &incise_reference::Body| body.energy().kinetic + body.energy().elastic;
+        let sum = |body: &incise_reference::ReferenceBody| body.energy().kinetic + body.energy().elastic;
         let mut last = sum(&body);
         for _ in 0..5 {
             body.step(time, DVec3::ZERO).unwrap();

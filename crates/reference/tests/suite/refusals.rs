@@ -1,18 +1,18 @@
 //! What is refused, and that it is refused before anything has moved.
 
 use glam::DVec3;
-use incise_reference::{Body, Material, ReferenceError};
+use incise_reference::{Material, ReferenceBody, ReferenceError};
 
 use crate::support::RUBBER;
 
 const REST: [DVec3; 5] = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE];
 
-fn two_tets() -> Body {
-    Body::new(&REST, &[[0, 1, 2, 3], [1, 4, 2, 3]], |_tet| RUBBER).unwrap()
+fn two_tets() -> ReferenceBody {
+    ReferenceBody::new(&REST, &[[0, 1, 2, 3], [1, 4, 2, 3]], |_tet| RUBBER).unwrap()
 }
 
 fn refused(material: Material) -> bool {
-    let made = Body::new(&REST, &[[0, 1, 2, 3]], |_tet| material);
+    let made = ReferenceBody::new(&REST, &[[0, 1, 2, 3]], |_tet| material);
     matches!(made, Err(ReferenceError::Material { .. }))
 }
 
@@ -46,7 +46,7 @@ fn materials_have_ranges() {
 
 #[test]
 fn tets_have_particles_and_a_volume() {
-    let make = |tets: &[[u32; 4]]| Body::new(&REST, tets, |_tet| RUBBER).unwrap_err();
+    let make = |tets: &[[u32; 4]]| ReferenceBody::new(&REST, tets, |_tet| RUBBER).unwrap_err();
     let missing = ReferenceError::NoParticle {
         tet: 1,
         particle: 5,
@@ -66,7 +66,7 @@ fn tets_have_particles_and_a_volume() {
         }
     );
     let far = [DVec3::NAN, DVec3::X, DVec3::Y, DVec3::Z];
-    let made = Body::new(&far, &[[0, 1, 2, 3]], |_tet| RUBBER);
+    let made = ReferenceBody::new(&far, &[[0, 1, 2, 3]], |_tet| RUBBER);
     assert_eq!(
         made.unwrap_err(),
         ReferenceError::NotFinite {
@@ -143,7 +143,7 @@ fn states_beyond_double_precision_are_refused() {
 #[test]
 fn a_body_that_can_drift_or_turn_has_no_equilibrium() {
     let mut body = two_tets();
-    let not_held = |body: &mut Body| match body.settle(DVec3::ZERO) {
+    let not_held = |body: &mut ReferenceBody| match body.settle(DVec3::ZERO) {
         Err(ReferenceError::NotHeld { particle }) => Some(particle),
         other => {
             assert!(other.is_ok(), "{other:?}");
@@ -159,7 +159,8 @@ fn a_body_that_can_drift_or_turn_has_no_equilibrium() {
     assert_eq!(not_held(&mut body), None);
     // A hinge: the third on the line of the other two.
     let rest = [REST[0], REST[1], REST[2], REST[3], DVec3::X * 2.0];
-    let mut hinge = Body::new(&rest, &[[0, 1, 2, 3], [1, 4, 2, 3]], |_tet| RUBBER).unwrap();
+    let mut hinge =
+        ReferenceBody::new(&rest, &[[0, 1, 2, 3], [1, 4, 2, 3]], |_tet| RUBBER).unwrap();
     for p in [0, 1, 4] {
         hinge.fixed[p] = true;
     }
@@ -169,7 +170,8 @@ fn a_body_that_can_drift_or_turn_has_no_equilibrium() {
         .iter()
         .flat_map(|&x| [x, x + DVec3::X * 5.0])
         .collect();
-    let mut pieces = Body::new(&rest, &[[0, 2, 4, 6], [1, 3, 5, 7]], |_tet| RUBBER).unwrap();
+    let mut pieces =
+        ReferenceBody::new(&rest, &[[0, 2, 4, 6], [1, 3, 5, 7]], |_tet| RUBBER).unwrap();
     for p in [0, 2, 4] {
         pieces.fixed[p] = true;
     }
@@ -183,13 +185,13 @@ fn a_body_that_can_drift_or_turn_has_no_equilibrium() {
 /// A particle of no tet neither moves nor troubles the matrix; a body may consist of such only.
 #[test]
 fn particles_without_mass_stay() {
-    let mut body = Body::new(&REST, &[[0, 1, 2, 3]], |_tet| RUBBER).unwrap();
+    let mut body = ReferenceBody::new(&REST, &[[0, 1, 2, 3]], |_tet| RUBBER).unwrap();
     body.velocities[4] = DVec3::X;
     body.step(0.1, DVec3::NEG_Z).unwrap();
     assert_eq!(body.positions[4], REST[4]);
     assert_eq!(body.masses()[4], 0.0);
     for rest in [&REST[..], &[]] {
-        let mut dust = Body::new(rest, &[], |_tet| RUBBER).unwrap();
+        let mut dust = ReferenceBody::new(rest, &[], |_tet| RUBBER).unwrap();
         assert_eq!(dust.step(0.1, DVec3::NEG_Z).unwrap().iterations(), 0);
         assert_eq!(dust.positions, rest);
     }
@@ -202,7 +204,7 @@ fn each_tet_has_its_material() {
         density: 3000.0,
         ..RUBBER
     };
-    let body = Body::new(&REST, &[[0, 1, 2, 3], [1, 4, 2, 3]], |tet| {
+    let body = ReferenceBody::new(&REST, &[[0, 1, 2, 3], [1, 4, 2, 3]], |tet| {
         [RUBBER, heavy][tet]
     })
     .unwrap();

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 use incise_mesh::{ParticleId, TetMesh};
-use incise_reference::{Body, Material};
+use incise_reference::{Material, ReferenceBody};
 use proptest::prelude::*;
 
 /// Rubber of a density that keeps numbers plain.
@@ -13,9 +13,9 @@ pub(crate) const RUBBER: Material = Material {
 };
 
 /// A mesh as a body of one material.
-pub(crate) fn body(mesh: &TetMesh, material: Material) -> Body {
+pub(crate) fn body(mesh: &TetMesh, material: Material) -> ReferenceBody {
     let tets: Vec<[u32; 4]> = mesh.tets.iter().map(|t| t.map(|ParticleId(p)| p)).collect();
-    Body::new(&mesh.positions, &tets, |_tet| material).unwrap()
+    ReferenceBody::new(&mesh.positions, &tets, |_tet| material).unwrap()
 }
 
 /// Fails unless `value` is a number of at most `tolerance`.

@@ -29,11 +29,11 @@ pub(super) struct Line {
     /// Poses that have not been cut yet.
     waiting: VecDeque<BladePose>,
     /// Pointer position of the last pose that was cut.
-    met: Option<[f64; 2]>,
+    last_cut: Option<[f64; 2]>,
     /// Distance in m from the eye to the body where the view ray last hit it.
     surface: Option<f64>,
     /// True if the button is up: the line ends with its last pose.
-    lifted: bool,
+    is_finished: bool,
     /// Number of the stroke, once it has begun.
     pub(super) stroke: Option<u32>,
     /// The undo point before the stroke, until it has cut something.
@@ -45,7 +45,7 @@ impl Line {
     fn push(&mut self, pose: BladePose) {
         let from = match self.waiting.len() {
             0 => None,
-            1 => self.met,
+            1 => self.last_cut,
             more => Some(self.waiting[more - 2].pixel),
         };
         if let (Some(from), Some(last)) = (from, self.waiting.back_mut())
@@ -59,7 +59,7 @@ impl Line {
 
     /// The last pointer position of the line.
     fn last(&self) -> Option<[f64; 2]> {
-        self.waiting.back().map(|pose| pose.pixel).or(self.met)
+        self.waiting.back().map(|pose| pose.pixel).or(self.last_cut)
     }
 }
 
@@ -90,9 +90,9 @@ impl Session {
         let ends = self.blade_under(pixel, size, surface);
         self.lines.push_back(Line {
             waiting: VecDeque::from([BladePose { pixel, ends }]),
-            met: None,
+            last_cut: None,
             surface,
-            lifted: false,
+            is_finished: false,
             stroke: None,
             before: None,
         });
@@ -102,7 +102,7 @@ impl Session {
 
     /// Continues the line to a pixel; does nothing if none is being drawn.
     pub(crate) fn draw_blade(&mut self, pixel: [f64; 2], size: [f64; 2]) -> anyhow::Result<()> {
-        let Some(line) = self.lines.back().filter(|line| !line.lifted) else {
+        let Some(line) = self.lines.back().filter(|line| !line.is_finished) else {
             return Ok(());
         };
         if line
@@ -125,7 +125,7 @@ impl Session {
     /// Ends the line that is being drawn.
     pub(crate) fn lift_blade(&mut self) {
         if let Some(line) = self.lines.back_mut() {
-            line.lifted = true;
+            line.is_finished = true;
         }
         self.render_scene.set_blade(None);
     }
@@ -152,7 +152,7 @@ impl Session {
             return Ok(());
         };
         if let Some(pose) = line.waiting.pop_front() {
-            line.met = Some(pose.pixel);
+            line.last_cut = Some(pose.pixel);
             match line.stroke {
                 Some(stroke) => self.simulation.move_blade(stroke, &pose.ends)?,
                 None => {
@@ -165,7 +165,7 @@ impl Session {
                     }
                 }
             }
-        } else if line.lifted {
+        } else if line.is_finished {
             let stroke = line.stroke;
             self.lines.pop_front();
             if let Some(stroke) = stroke {
@@ -255,9 +255,9 @@ mod tests {
     fn line(pixels: &[[f64; 2]]) -> Line {
         let mut line = Line {
             waiting: VecDeque::new(),
-            met: Some([0.0, 0.0]),
+            last_cut: Some([0.0, 0.0]),
             surface: None,
-            lifted: false,
+            is_finished: false,
             stroke: None,
             before: None,
         };

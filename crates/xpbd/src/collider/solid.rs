@@ -169,7 +169,7 @@ fn unit(v: DVec3) -> DVec3 {
 }
 
 impl Solid<f32> {
-    /// The kind and the numbers, at the places that `Solver::obstacle_data` names.
+    /// The kind and the numbers of the solid, in the order of `Solver::collider_data`.
     pub(crate) fn numbers(&self) -> [f32; 20] {
         let mut numbers = [0.0; 20];
         let mut put = |at: usize, vectors: &[glam::Vec3]| {

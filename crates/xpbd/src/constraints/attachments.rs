@@ -259,9 +259,13 @@ impl<R: Float> Attachments<R> {
         index.is_ok()
     }
 
-    /// Moves handles, and the particles that are attached rigidly, to where they are at a fraction of the frame;
-    /// returns how many particles could not be moved because their target is out of the range of numbers.
-    pub(crate) fn move_held(&mut self, particles: &Particles<R>, fraction: f64) -> usize {
+    /// Moves handles and rigidly attached particles to their poses at a fraction of the frame; returns how many
+    /// particles could not be moved because their target is out of the range of numbers.
+    pub(crate) fn move_rigid_attachments(
+        &mut self,
+        particles: &Particles<R>,
+        fraction: f64,
+    ) -> usize {
         let Self { handles, list } = self;
         for handle in handles.iter_mut() {
             handle.now = handle.from.toward(&handle.to, fraction);
@@ -286,7 +290,7 @@ impl<R: Float> Attachments<R> {
     }
 
     /// Gives particles that are attached rigidly the velocity of their motion in a substep.
-    pub(crate) fn update_held(&self, particles: &mut Particles<R>, per_time: R) {
+    pub(crate) fn update_rigid_attachments(&self, particles: &mut Particles<R>, per_time: R) {
         for attachment in &self.list {
             let p = attachment.particle as usize;
             if attachment.compliance == 0.0 && !particles.fixed[p] {
@@ -301,7 +305,7 @@ impl<R: Float> Attachments<R> {
 
 impl<R: Float> ConstraintKind<R> for Attachments<R> {
     fn begin(&mut self, particles: &Particles<R>, substep: &Substep<'_, R>) -> usize {
-        self.move_held(particles, substep.fraction)
+        self.move_rigid_attachments(particles, substep.fraction)
     }
 
     /// Pulls particles to their handles that are attached with a compliance. Each moves only its own particle.
@@ -316,7 +320,7 @@ impl<R: Float> ConstraintKind<R> for Attachments<R> {
     }
 
     fn end(&mut self, particles: &mut Particles<R>, substep: &Substep<'_, R>) {
-        self.update_held(particles, substep.factors.per_time);
+        self.update_rigid_attachments(particles, substep.factors.per_time);
     }
 
     /// The handles have arrived.

@@ -25,7 +25,7 @@ use crate::{Collider, Float, StepSettings};
 
 /// How far a particle may be pushed, in depths.
 const LONGEST_PUSH: f64 = 10.0;
-/// How often a particle inside several colliders is handed around among them.
+/// Largest number of times that a particle inside several colliders is pushed from one into another.
 const ROUNDS: usize = 32;
 
 /// The colliders of the settings, where they are at the end of the present substep.
@@ -277,7 +277,7 @@ impl<R: Float> Obstacle<R> {
 }
 
 impl Obstacle<f32> {
-    /// All there is to know, at the places that `Solver::obstacle_data` names.
+    /// The numbers of the obstacle, in the order of `Solver::collider_data`.
     pub(crate) fn numbers(&self) -> [f32; 20] {
         let mut numbers = self.solid.numbers();
         numbers[1] = self.friction;

@@ -386,26 +386,26 @@ impl<R: Float> Solver<R> {
         self.constraints.contacts.clear();
     }
 
-    /// Whether contacts were set, even if there are none at present.
+    /// Returns whether contacts were set, even if there are none at present.
     #[must_use]
     pub fn has_contacts(&self) -> bool {
         self.constraints.contacts.is_declared()
     }
 
-    /// Number of pairs and number of faces.
+    /// Returns the number of pairs and the number of faces.
     #[must_use]
     pub fn contact_counts(&self) -> [usize; 2] {
         self.constraints.contacts.counts()
     }
 
-    /// Number of colors of pairs and of faces together.
+    /// Returns the number of colors of pairs and faces together.
     #[must_use]
     pub fn contact_color_count(&self) -> usize {
         self.constraints.contacts.color_count()
     }
 
-    /// All contacts at the present positions with the forces of the last step since they were set, in solving order,
-    /// pairs first. O(contacts).
+    /// Returns all contacts at the present positions with the forces of the last step since they were set, in solving
+    /// order, pairs first. O(contacts).
     pub fn contacts(&self) -> impl Iterator<Item = ContactState> + '_ {
         self.constraints.contacts.states(&self.particles)
     }

@@ -198,7 +198,7 @@ impl<'a, R: Float> ImplicitStep<'a, R> {
             colliders,
             ..
         } = &mut solver.constraints;
-        let lost = attachments.move_held(&solver.particles, ended);
+        let lost = attachments.move_rigid_attachments(&solver.particles, ended);
         colliders.place(&own, ended * own.time_step, solver.particles.origin);
         stars.begin(solver, implicit_time, penalty);
         let mut step = Self {
@@ -267,7 +267,9 @@ impl<'a, R: Float> ImplicitStep<'a, R> {
             ..
         } = self.solver;
         let repaired = particles.update_velocities(self.time, per_time);
-        constraints.attachments.update_held(particles, per_time);
+        constraints
+            .attachments
+            .update_rigid_attachments(particles, per_time);
         if self.integrator == Integrator::Bdf2 {
             let touches = |x| constraints.colliders.touches(x);
             self.stars.history.end(particles, touches);

@@ -14,7 +14,7 @@ const HEAVY: Material = Material {
 };
 
 /// A body that is cut by hand, its clusters and colors, and two solvers of it.
-struct Body<R: Real> {
+struct SolverPair<R: Real> {
     tets: Vec<[u32; 4]>,
     /// Positions at rest.
     rest: Vec<DVec3>,
@@ -36,7 +36,7 @@ fn quarter(rest: [DVec3; 4], density: f64) -> f64 {
     density * (b - a).cross(c - a).dot(d - a) / 24.0
 }
 
-impl<R: Real> Body<R> {
+impl<R: Real> SolverPair<R> {
     /// Clusters of up to three tets, in the order of the mesh.
     fn new(mesh: &TetMesh, materials: &[Material]) -> Self {
         let tets: Vec<_> = mesh.tets.iter().map(|tet| tet.map(|p| p.0)).collect();
@@ -217,7 +217,7 @@ impl<R: Real> Body<R> {
             &changed,
         );
         self.schedule
-            .check_plan(&self.clustering, &self.coloring)
+            .check_partition(&self.clustering, &self.coloring)
             .unwrap();
         let mut touched = std::mem::take(&mut self.touched);
         touched.sort_unstable();
@@ -270,7 +270,7 @@ fn below(noise: &mut Noise, count: usize) -> usize {
 /// Batches of random edits with a step after each. Sums of the stars are taken in the order of the tets for both.
 fn edits<R: Real>(materials: &[Material], seed: u64) {
     let mesh = kuhn_box([4, 3, 2], dvec3(0.4, 0.3, 0.2));
-    let mut body = Body::<R>::new(&mesh, materials);
+    let mut body = SolverPair::<R>::new(&mesh, materials);
     body.follower.set_fixed(0, true);
     body.other.set_fixed(0, true);
     let mut noise = Noise(seed);
@@ -313,7 +313,7 @@ fn updated_and_rebuilt_layouts_are_equal() {
 #[test]
 fn a_solver_may_fall_behind() {
     let mesh = kuhn_box([3, 2, 2], dvec3(0.3, 0.2, 0.2));
-    let mut body = Body::<f64>::new(&mesh, &[RUBBER]);
+    let mut body = SolverPair::<f64>::new(&mesh, &[RUBBER]);
     body.step(&settings());
     for round in 0..200 {
         body.recolor(round % body.tets.len());
@@ -329,7 +329,7 @@ fn a_solver_may_fall_behind() {
 #[test]
 fn an_empty_layout_is_valid() {
     let mesh = kuhn_box([1, 1, 1], DVec3::ONE);
-    let mut body = Body::<f32>::new(&mesh, &[RUBBER]);
+    let mut body = SolverPair::<f32>::new(&mesh, &[RUBBER]);
     body.step(&settings());
     while !body.tets.is_empty() {
         body.delete(0);
@@ -347,7 +347,7 @@ fn an_empty_layout_is_valid() {
 #[test]
 fn a_forgotten_tet_is_found() {
     let mesh = kuhn_box([1, 1, 1], DVec3::ONE);
-    let mut body = Body::<f64>::new(&mesh, &[RUBBER]);
+    let mut body = SolverPair::<f64>::new(&mesh, &[RUBBER]);
     body.step(&settings());
     let star = |tet: &&[u32; 4]| tet.contains(&0);
     let star: Vec<usize> = (0..)
@@ -376,7 +376,7 @@ fn a_forgotten_tet_is_found() {
 #[should_panic(expected = "the schedule belongs to these tets")]
 fn a_tet_that_is_gone_cannot_be_solved() {
     let mesh = kuhn_box([1, 1, 1], DVec3::ONE);
-    let mut body = Body::<f64>::new(&mesh, &[RUBBER]);
+    let mut body = SolverPair::<f64>::new(&mesh, &[RUBBER]);
     body.step(&settings());
     body.follower.truncate_tets(mesh.tets.len() - 1);
     let _ = body.follower.step(&body.schedule, &settings());

@@ -9,7 +9,7 @@
 
 use glam::{DQuat, DVec3, dvec3};
 use incise_mesh::{ParticleId, TetMesh, kuhn_box};
-use incise_reference::Body;
+use incise_reference::ReferenceBody;
 use incise_xpbd::{
     CoarseCorrection, CoarseCorrectionSettings, Material, Solver, StepSettings, VbdSettings,
 };
@@ -175,7 +175,7 @@ impl Scene {
         })
     }
 
-    fn body(&self) -> Body {
+    fn body(&self) -> ReferenceBody {
         let material = incise_reference::Material {
             young_modulus: self.material.young_modulus,
             poisson_ratio: self.material.poisson_ratio,
@@ -187,7 +187,7 @@ impl Scene {
             .iter()
             .map(|t| t.map(|ParticleId(p)| p))
             .collect();
-        let mut body = Body::new(&self.mesh.positions, &tets, |_tet| material).unwrap();
+        let mut body = ReferenceBody::new(&self.mesh.positions, &tets, |_tet| material).unwrap();
         for (p, &x) in self.mesh.positions.iter().enumerate() {
             body.fixed[p] = (self.handle)(x, 0.0).is_some();
         }
@@ -462,7 +462,7 @@ fn vbd_of_two_materials_is_backward_euler() {
         .iter()
         .map(|tet| tet.map(|ParticleId(p)| p))
         .collect();
-    let mut newton = Body::new(&scene.mesh.positions, &tets, |t| {
+    let mut newton = ReferenceBody::new(&scene.mesh.positions, &tets, |t| {
         incise_reference::Material {
             young_modulus: of(t).young_modulus,
             poisson_ratio: of(t).poisson_ratio,

@@ -1,4 +1,4 @@
-//! Bodies of the paper: meshes of a folder, or generated stand-ins with similar shapes and sizes.
+//! Meshes of the paper: files of a folder, or generated stand-ins with similar shapes and sizes.
 //!
 //! A stand-in is irregular, with a valence distribution like that of TetGen meshes: colorings and clusterings behave
 //! differently on a lattice. It is written to a file once, so that scenes can refer to it.
@@ -13,17 +13,17 @@ use incise::meshing::{Shape, irregular};
 
 use crate::experiment::ExperimentArguments;
 
-/// A body by the name of its file, the shape that stands for it and its number of tets in the paper.
+/// A mesh of the paper: the name of its file, the shape that stands for it and its number of tets in the paper.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Body {
+pub(super) struct PaperMesh {
     pub(super) name: &'static str,
     shape: Shape,
     tets: usize,
     quick_tets: usize,
 }
 
-const fn body(name: &'static str, shape: Shape, tets: usize, quick_tets: usize) -> Body {
-    Body {
+const fn mesh(name: &'static str, shape: Shape, tets: usize, quick_tets: usize) -> PaperMesh {
+    PaperMesh {
         name,
         shape,
         tets,
@@ -32,23 +32,23 @@ const fn body(name: &'static str, shape: Shape, tets: usize, quick_tets: usize) 
 }
 
 /// By name. Those of `--quick` differ in size as little as the shapes allow.
-const BODIES: [Body; 10] = [
-    body("liver_5k", Shape::Liver, 4705, 1000),
-    body("liver_11k", Shape::Liver, 11_367, 1500),
-    body("liver_89k", Shape::Liver, 88_958, 3000),
-    body("bunny_19k", Shape::Bunny, 19_379, 2000),
-    body("armadillo_55k", Shape::Armadillo, 54_985, 3000),
-    body("armadillo_121k", Shape::Armadillo, 121_190, 4000),
-    body("armadillo_227k", Shape::Armadillo, 226_840, 5000),
-    body("sphere_7k", Shape::Sphere, 6851, 1000),
-    body("sphere_28k", Shape::Sphere, 27_792, 1500),
-    body("sphere_118k", Shape::Sphere, 118_202, 2000),
+const MESHES: [PaperMesh; 10] = [
+    mesh("liver_5k", Shape::Liver, 4705, 1000),
+    mesh("liver_11k", Shape::Liver, 11_367, 1500),
+    mesh("liver_89k", Shape::Liver, 88_958, 3000),
+    mesh("bunny_19k", Shape::Bunny, 19_379, 2000),
+    mesh("armadillo_55k", Shape::Armadillo, 54_985, 3000),
+    mesh("armadillo_121k", Shape::Armadillo, 121_190, 4000),
+    mesh("armadillo_227k", Shape::Armadillo, 226_840, 5000),
+    mesh("sphere_7k", Shape::Sphere, 6851, 1000),
+    mesh("sphere_28k", Shape::Sphere, 27_792, 1500),
+    mesh("sphere_118k", Shape::Sphere, 118_202, 2000),
 ];
 
-impl Body {
+impl PaperMesh {
     pub(super) fn named(name: &str) -> anyhow::Result<Self> {
-        let body = BODIES.into_iter().find(|body| body.name == name);
-        body.with_context(|| format!("the paper has no body {name}"))
+        let mesh = MESHES.into_iter().find(|mesh| mesh.name == name);
+        mesh.with_context(|| format!("the paper has no mesh {name}"))
     }
 
     /// Mesh file: from the folder of models, or generated under `--out`.

@@ -20,7 +20,7 @@ const SHALLOW: f64 = 0.2;
 const ROUNDS: usize = 12;
 
 /// Keeps the tets of a Delaunay mesh that lie inside; `None` if the topology of their surface is not that of the shape.
-pub(super) fn carve(mut mesh: TetMesh, shape: Shape, spacing: f64) -> Option<TetMesh> {
+pub(super) fn keep_interior(mut mesh: TetMesh, shape: Shape, spacing: f64) -> Option<TetMesh> {
     let distances: Vec<f64> = (0..mesh.tets.len())
         .map(|t| shape.signed_distance(0.25 * mesh.corners(TetId::new(t)).iter().sum::<DVec3>()))
         .collect();

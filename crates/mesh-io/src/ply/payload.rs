@@ -7,7 +7,7 @@ use crate::MeshIoError;
 use crate::text::{Text, Word, show};
 
 /// The content after the header.
-pub(super) enum Body<'b, 't, I> {
+pub(super) enum Payload<'b, 't, I> {
     Ascii {
         text: &'b Text<'b>,
         words: I,
@@ -24,11 +24,11 @@ pub(super) enum Body<'b, 't, I> {
     },
 }
 
-impl<'b, I: Iterator<Item = Word<'b>>> Body<'b, '_, I> {
+impl<'b, I: Iterator<Item = Word<'b>>> Payload<'b, '_, I> {
     /// The next value; in text, any number.
     pub(super) fn number(&mut self, kind: Type, what: &str) -> Result<f64, MeshIoError> {
         match self {
-            Body::Ascii { text, words, line } => {
+            Payload::Ascii { text, words, line } => {
                 let word = words.next().ok_or_else(|| text.ends_early(what))?;
                 *line = word.line;
                 let number = str::from_utf8(word.text).ok().and_then(|w| w.parse().ok());
@@ -37,7 +37,7 @@ impl<'b, I: Iterator<Item = Word<'b>>> Body<'b, '_, I> {
                     text.error(word.line, message)
                 })
             }
-            Body::Binary { .. } => Ok(match kind {
+            Payload::Binary { .. } => Ok(match kind {
                 Type::I8 => i8::from_le_bytes(self.take(what)?).into(),
                 Type::U8 => u8::from_le_bytes(self.take(what)?).into(),
                 Type::I16 => i16::from_le_bytes(self.take(what)?).into(),
@@ -60,8 +60,12 @@ impl<'b, I: Iterator<Item = Word<'b>>> Body<'b, '_, I> {
                 .map(|p| p.count.unwrap_or(p.value))
         };
         let (left, least) = match self {
-            Body::Ascii { text, .. } => return text.room_for(element.count, 2 * numbers().count()),
-            Body::Binary { bytes, at, .. } => (bytes.len() - at, numbers().map(Type::bytes).sum()),
+            Payload::Ascii { text, .. } => {
+                return text.room_for(element.count, 2 * numbers().count());
+            }
+            Payload::Binary { bytes, at, .. } => {
+                (bytes.len() - at, numbers().map(Type::bytes).sum())
+            }
         };
         element.count.min(left.checked_div(least).unwrap_or(0))
     }
@@ -69,8 +73,8 @@ impl<'b, I: Iterator<Item = Word<'b>>> Body<'b, '_, I> {
     /// The largest number of values of a type that the rest of the file can hold.
     pub(super) fn most_values(&self, kind: Type) -> usize {
         match self {
-            Body::Ascii { text, .. } => text.room_for(usize::MAX, 2),
-            Body::Binary { bytes, at, .. } => (bytes.len() - at) / kind.bytes(),
+            Payload::Ascii { text, .. } => text.room_for(usize::MAX, 2),
+            Payload::Binary { bytes, at, .. } => (bytes.len() - at) / kind.bytes(),
         }
     }
 
@@ -91,7 +95,7 @@ impl<'b, I: Iterator<Item = Word<'b>>> Body<'b, '_, I> {
 
     /// The next bytes in little-endian order.
     fn take<const N: usize>(&mut self, what: &str) -> Result<[u8; N], MeshIoError> {
-        if let Body::Binary {
+        if let Payload::Binary {
             bytes,
             last,
             at,
@@ -115,15 +119,15 @@ impl<'b, I: Iterator<Item = Word<'b>>> Body<'b, '_, I> {
     /// The line or byte of the last value.
     pub(super) fn offset(&self) -> usize {
         match self {
-            Body::Ascii { line, .. } => *line,
-            Body::Binary { last, .. } => *last,
+            Payload::Ascii { line, .. } => *line,
+            Payload::Binary { last, .. } => *last,
         }
     }
 
     pub(super) fn error(&self, offset: usize, message: String) -> MeshIoError {
         match self {
-            Body::Ascii { text, .. } => text.error(offset, message),
-            Body::Binary { path, .. } => MeshIoError::ParseBytes {
+            Payload::Ascii { text, .. } => text.error(offset, message),
+            Payload::Binary { path, .. } => MeshIoError::ParseBytes {
                 path: path.to_path_buf(),
                 byte: offset,
                 message,

@@ -3,12 +3,12 @@
 use incise_mesh::ParticleId;
 
 /// The used particles in ascending order, and the index of each among them (0 for unused ones).
-pub(super) struct Used {
+pub(super) struct UsedParticles {
     pub(super) particles: Vec<usize>,
     pub(super) indices: Vec<u32>,
 }
 
-impl Used {
+impl UsedParticles {
     pub(super) fn new(triangles: &[[ParticleId; 3]], count: usize) -> Self {
         let mut particles: Vec<usize> = triangles.iter().flatten().map(|p| p.index()).collect();
         particles.sort_unstable();

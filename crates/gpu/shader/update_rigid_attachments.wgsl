@@ -1,5 +1,5 @@
 // Sets the velocity of rigidly attached particles to that of their handle in a substep. Twin:
-// `Solver::update_held` of incise-xpbd.
+// `Solver::update_rigid_attachments` of incise-xpbd.
 
 @group(0) @binding(0) var<uniform> settings: Settings;
 @group(0) @binding(1) var<storage, read> particles: array<vec4<f32>>;

@@ -1,4 +1,4 @@
-//! [`Body`]: the arrays of a body on the device, and their synchronization with a solver on the host.
+//! [`BodyBuffers`]: the arrays of a body on the device, and their synchronization with a solver on the host.
 //!
 //! Changes by a cut arrive as patches, which a kernel scatters: the numbers of a tet slot are in 16 parts of an array.
 //! Nothing else is sent. Memory: 96 bytes per slot and 48 per particle; 16 per slot more with several materials, 8
@@ -23,7 +23,7 @@ const PATCHES: usize = 1 << 16;
 
 /// A body on the device.
 #[derive(Debug)]
-pub(crate) struct Body {
+pub(crate) struct BodyBuffers {
     pub(crate) layout: Layout,
     pub(crate) colors: Colors,
     /// Position relative to the host's origin, and inverse mass.
@@ -49,7 +49,7 @@ pub(crate) struct Body {
     range: Array<DispatchRange>,
 }
 
-impl Body {
+impl BodyBuffers {
     pub(crate) fn new(gpu: &GpuContext, mapping: ClusterMapping) -> Result<Self, GpuError> {
         Ok(Self {
             layout: Layout::new(mapping),

@@ -1,4 +1,4 @@
-//! [`Doubled`]: merges interior lattice cells into larger cells, and fills these with tets.
+//! [`MergedCells`]: merges interior lattice cells into larger cells, and fills these with tets.
 //!
 //! Cubes of 2, 4, 8 .. cells a side become one cell each, so that cells form the leaves of octrees whose neighbors,
 //! also at edges and corners, differ by a factor of two at most. A face between cells of one size is filled as in the
@@ -15,20 +15,20 @@ type At = [i32; 3];
 
 /// Levels of merged cells; see the module.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Doubled {
+pub(super) struct MergedCells {
     cells: [usize; 3],
     /// Level of the merged cell that contains each cell; empty if there are none.
     levels: Vec<u8>,
 }
 
-impl Doubled {
-    /// Doubles cells up to `most` times where the corner and center of all cells within one layer are inside.
+impl MergedCells {
+    /// Merges cells up to `most` times where the corner and center of all cells within one layer are inside.
     pub(super) fn new(cells: [usize; 3], most: u32, inside: impl Fn(usize) -> bool) -> Self {
         if most == 0 {
             return Self::default();
         }
         let [nx, ny, nz] = cells;
-        let mut doubled = Self {
+        let mut merged = Self {
             cells,
             levels: vec![0; nx * ny * nz],
         };
@@ -36,19 +36,19 @@ impl Doubled {
         let fits = nx.min(ny).min(nz).max(1).ilog2();
         let most = u8::try_from(most.min(fits)).unwrap_or(u8::MAX);
         for level in 1..=most {
-            doubled.double(level, &inside);
+            merged.merge(level, &inside);
         }
-        while doubled.halve_beside_small() {}
-        doubled
+        while merged.split_beside_small() {}
+        merged
     }
 
     /// True if a cell is part of a larger one.
-    pub(super) fn is_doubled(&self, cell: usize) -> bool {
+    pub(super) fn is_merged(&self, cell: usize) -> bool {
         self.levels.get(cell).is_some_and(|&level| level > 0)
     }
 
     /// Merges eight cells of the level below wherever possible.
-    fn double(&mut self, level: u8, inside: &impl Fn(usize) -> bool) {
+    fn merge(&mut self, level: u8, inside: &impl Fn(usize) -> bool) {
         let side = 1 << level;
         for low in self.blocks(level) {
             let ready = if level == 1 {
@@ -65,7 +65,7 @@ impl Doubled {
     }
 
     /// Undoes the last merge for cells that touch a cell less than half as large; returns true if there were any.
-    fn halve_beside_small(&mut self) -> bool {
+    fn split_beside_small(&mut self) -> bool {
         let mut changed = false;
         for level in 2..=self.levels.iter().copied().max().unwrap_or(0) {
             let side = 1 << level;
@@ -118,7 +118,7 @@ impl Doubled {
     }
 
     /// Level of the cell that contains a point, which must not lie on a face between cells.
-    #[expect(clippy::cast_sign_loss, reason = "doubled cells are not at the rim")]
+    #[expect(clippy::cast_sign_loss, reason = "merged cells are not at the rim")]
     fn level_at(&self, at: At) -> u8 {
         self.levels[self.cell(at.map(|c| (c >> 1) as usize))]
     }
@@ -285,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn tets_of_doubled_cells_have_angles_of_45_to_120_degrees() {
+    fn tets_of_merged_cells_have_angles_of_45_to_120_degrees() {
         let graded = mesh(4, 40.0, |p| p.length() - 0.95);
         // Tets without a corner near the surface.
         let deep = graded.tets.iter().filter(|tet| {

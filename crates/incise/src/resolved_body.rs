@@ -1,4 +1,4 @@
-//! [`Body`]: a body of a scene with mesh, materials and fixed particles, all values checked.
+//! [`ResolvedBody`]: a body of a scene with mesh, materials and fixed particles, all values checked.
 
 use incise_mesh::TetMesh;
 use incise_meshing::{Shape, generate};
@@ -11,7 +11,7 @@ use crate::{Error, Scene};
 
 /// A body in the world.
 #[derive(Debug)]
-pub(crate) struct Body {
+pub(crate) struct ResolvedBody {
     pub(crate) mesh: TetMesh,
     /// The first is that of all tets that no other one claims.
     pub(crate) materials: Vec<Material>,
@@ -26,7 +26,7 @@ pub(crate) struct Body {
     pub(crate) substeps: Substeps,
 }
 
-impl Body {
+impl ResolvedBody {
     /// The bodies of a scene, whose meshes are in memory or named by the scene.
     pub(crate) fn all(scene: &Scene, meshes: &[Option<TetMesh>]) -> Result<Vec<Self>, Error> {
         if scene.body.is_empty() {

@@ -1,5 +1,5 @@
 // Moves rigidly attached particles to their handles at the end of a substep. Twin:
-// `Solver::move_held` of incise-xpbd.
+// `Solver::move_rigid_attachments` of incise-xpbd.
 
 @group(0) @binding(0) var<uniform> settings: Settings;
 @group(0) @binding(2) var<storage, read_write> particles: array<vec4<f32>>;

@@ -14,7 +14,7 @@ pub(super) const NONE: u32 = u32::MAX;
 const DEAD: u32 = u32::MAX;
 
 /// Tets with their neighbors.
-pub(super) struct Body {
+pub(super) struct AdjacencyMesh {
     pub(super) positions: Vec<DVec3>,
     /// Marks the particles on the surface.
     pub(super) on_surface: Vec<bool>,
@@ -29,12 +29,12 @@ pub(super) struct Body {
     faces: Vec<([u32; 3], u32, bool)>,
 }
 
-impl Body {
+impl AdjacencyMesh {
     /// Takes a valid mesh with a manifold surface.
     pub(super) fn new(mesh: TetMesh) -> Self {
         let particles = mesh.positions.len();
         let faces = mesh.faces();
-        let mut body = Self {
+        let mut mesh = Self {
             positions: mesh.positions,
             on_surface: vec![false; particles],
             neighbors: vec![[NONE; 4]; mesh.tets.len()],
@@ -48,19 +48,19 @@ impl Body {
         for face in faces.iter() {
             if let [a, b] = face {
                 let [a, b] = [a, b].map(|s| code(s.tet().0, OPPOSITE[s.local()]));
-                body.join(a, b);
+                mesh.join(a, b);
             } else {
                 for p in face[0].face() {
-                    body.on_surface[p.index()] = true;
+                    mesh.on_surface[p.index()] = true;
                 }
             }
         }
-        for (t, tet) in (0..).zip(&body.tets) {
+        for (t, tet) in (0..).zip(&mesh.tets) {
             for &p in tet {
-                body.at[p as usize] = t;
+                mesh.at[p as usize] = t;
             }
         }
-        body
+        mesh
     }
 
     /// Returns the mesh without unused particles; tets ascend by their lowest particles.
@@ -271,33 +271,33 @@ mod tests {
 
     #[test]
     fn rings_and_stars_are_complete() {
-        let body = Body::new(fan(7));
+        let mesh = AdjacencyMesh::new(fan(7));
         let (mut ring, mut star) = (Ring::default(), Vec::new());
-        assert!(body.ring(3, [0, 1], &mut ring));
+        assert!(mesh.ring(3, [0, 1], &mut ring));
         assert_eq!(ring.tets, [3, 4, 5, 6, 0, 1, 2]);
         assert_eq!(ring.particles, [5, 6, 7, 8, 2, 3, 4]);
-        assert!(body.ring(3, [1, 0], &mut ring));
+        assert!(mesh.ring(3, [1, 0], &mut ring));
         assert_eq!(ring.tets, [3, 2, 1, 0, 6, 5, 4]);
-        assert!(!body.ring(3, [0, 2], &mut ring));
-        body.star(1, &mut star);
+        assert!(!mesh.ring(3, [0, 2], &mut ring));
+        mesh.star(1, &mut star);
         star.sort_unstable();
         assert_eq!(star, [0, 1, 2, 3, 4, 5, 6]);
-        assert!(body.on_surface.iter().all(|&on| on));
+        assert!(mesh.on_surface.iter().all(|&on| on));
     }
 
     #[test]
     fn edges_are_removed_and_faces_put_back() {
         // Three tets around an edge are two on a face.
-        let mut body = Body::new(fan(3));
-        body.replace(&[0, 1, 2], &[[2, 3, 4, 1], [2, 4, 3, 0]]);
+        let mut mesh = AdjacencyMesh::new(fan(3));
+        mesh.replace(&[0, 1, 2], &[[2, 3, 4, 1], [2, 4, 3, 0]]);
         assert!(
-            (0..body.end())
-                .filter_map(|t| body.tet(t))
-                .all(|t| signed_volume(body.corners(t)) > 0.0)
+            (0..mesh.end())
+                .filter_map(|t| mesh.tet(t))
+                .all(|t| signed_volume(mesh.corners(t)) > 0.0)
         );
-        let live: Vec<u32> = (0..body.end()).filter(|&t| body.tet(t).is_some()).collect();
-        body.replace(&live, &[[0, 1, 2, 3], [0, 1, 3, 4], [0, 1, 4, 2]]);
-        let mut mesh = body.into_mesh();
+        let live: Vec<u32> = (0..mesh.end()).filter(|&t| mesh.tet(t).is_some()).collect();
+        mesh.replace(&live, &[[0, 1, 2, 3], [0, 1, 3, 4], [0, 1, 4, 2]]);
+        let mut mesh = mesh.into_mesh();
         mesh.tets[1..].sort_unstable();
         assert_eq!(mesh.positions, fan(3).positions);
         assert_eq!(mesh.tets.len(), 3);
@@ -307,7 +307,7 @@ mod tests {
     #[test]
     fn a_mesh_comes_out_as_it_went_in() {
         let mesh = kuhn_box([3, 2, 2], DVec3::ONE);
-        let out = Body::new(mesh.clone()).into_mesh();
+        let out = AdjacencyMesh::new(mesh.clone()).into_mesh();
         assert_eq!(out.positions, mesh.positions);
         let sorted = |mesh: &TetMesh| {
             let mut tets = mesh.tets.clone();
