@@ -72,8 +72,8 @@ pub struct FrameReport {
     /// Contacts, in a scene that declares contact.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contact: Option<ContactReport>,
-    /// Forces: on attachments, on the ground, on colliders, on grabs, on solid blades, on what fixed particles are fixed to, then between
-    /// bodies.
+    /// Forces: on attachments, on the ground, on colliders, on grabs, on solid blades, on what fixed particles are fixed to,
+    /// then between bodies.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub forces: Vec<ForceReport>,
     /// Number of particles that were put back because they would have become Inf or NaN; absent if none. From a device
