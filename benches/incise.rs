@@ -86,5 +86,6 @@ fn sweep(case: &Case) -> StrokeSpec {
         blade: start.map(|x| (x * scale).to_array()).to_vec(),
         path: vec![[0.0; 3], ((end[0] - start[0]) * scale).to_array()],
         snap: 0.1,
+        solid: None,
     }
 }

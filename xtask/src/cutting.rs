@@ -150,6 +150,7 @@ impl Cost {
             blade: blade.map(|x| (x * scale).to_array()).to_vec(),
             path: vec![[0.0; 3], (way * scale).to_array()],
             snap: 0.1,
+            solid: None,
         }];
         let mut simulation = Simulation::with_threads(&scene, 1)?;
         let (mut sums, mut cut_tets) = ([0.0; 4], 0);

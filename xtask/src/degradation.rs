@@ -156,6 +156,7 @@ fn small_strokes(mesh: &TetMesh, scale: f64, strokes: u64) -> Vec<StrokeSpec> {
             blade: blade.map(|x| (x * scale).to_array()).to_vec(),
             path: vec![[0.0; 3], (along * scale).to_array()],
             snap: 0.1,
+            solid: None,
         }
     };
     (0..strokes).map(stroke).collect()

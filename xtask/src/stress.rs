@@ -263,6 +263,7 @@ fn random_stroke(simulation: &Simulation, random: &mut Random) -> StrokeSpec {
                 blade: vec![array(&(middle - u)), array(&(middle + u))],
                 path: vec![array(&-v), array(&(normal * size * 0.2)), array(&v)],
                 snap,
+                solid: None,
             }
         }
     }

@@ -10,9 +10,9 @@ use std::sync::Arc;
 #[cfg(feature = "gpu")]
 use incise_gpu::{GpuContext, GpuOptions};
 
-use crate::scene::{Backend, Method, Precision};
+use crate::scene::{Backend, Method, Precision, StrokeSpec};
 use crate::validate::value;
-use crate::{Error, Scene, forces};
+use crate::{Error, Scene, forces, solid_blade};
 
 /// A device that is open, if one is.
 #[derive(Clone, Debug, Default)]
@@ -119,6 +119,9 @@ impl ComputeDevice {
 pub(crate) fn check(scene: &Scene) -> Result<(), Error> {
     let solver = &scene.solver;
     forces::check(&scene.report, solver.method, true)?;
+    if let Some(stroke) = scene.stroke.iter().position(StrokeSpec::is_solid) {
+        solid_blade::check(&format!("stroke[{stroke}]"), solver.method, true)?;
+    }
     if scene.contact.is_some() {
         return Err(value("contact", "declared", "absent on a GPU"));
     }

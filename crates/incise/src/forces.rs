@@ -22,6 +22,8 @@ pub(crate) struct Measured {
     handles: Vec<Option<incise_xpbd::Force>>,
     /// In the order of the settings.
     pub(crate) colliders: Vec<incise_xpbd::Force>,
+    /// On each solid blade that touches, by the number of its stroke.
+    pub(crate) blades: BTreeMap<u32, incise_xpbd::Force>,
     /// By body, with the center of the fixed particles.
     pub(crate) fixed: BTreeMap<usize, (incise_xpbd::Force, DVec3)>,
 }
@@ -47,6 +49,10 @@ impl Measured {
         Some(Box::new(Self {
             handles: forces.handles.into_iter().map(Some).collect(),
             colliders: forces.colliders,
+            blades: {
+                let strokes = island.blades.iter().map(|(stroke, _)| *stroke);
+                strokes.zip(forces.blades).collect()
+            },
             fixed: fixed
                 .map(|(body, (sum, center, count))| (body, (sum, center / count)))
                 .collect(),

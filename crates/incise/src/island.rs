@@ -10,7 +10,8 @@ use glam::DVec3;
 use incise_cutting::{CutDelta, CuttableMesh, PieceEvent, PieceTracker, remove_tets};
 use incise_mesh::{Bounds, ParticleId, TetId, signed_volume};
 use incise_xpbd::{
-    DistanceConstraint, KappaLimit, Real, Solver, StepReport, StepSettings, shortest_substep_of_f32,
+    DistanceConstraint, KappaLimit, Real, SolidBlade, Solver, StepReport, StepSettings,
+    shortest_substep_of_f32,
 };
 
 use crate::accuracy::{DEFAULT_ACCURACY, OutsideVolume, largest_kappas};
@@ -60,6 +61,9 @@ pub(crate) struct Island {
     /// Frames of removed attachments in the solver, for new ones.
     spare_frames: Vec<u32>,
     pub(crate) distances: Distances,
+    /// The solid blades of the frame that touch its cuts, with the numbers of their strokes.
+    #[cfg_attr(feature = "save", serde(skip))]
+    pub(crate) blades: Vec<(u32, SolidBlade)>,
     /// The forces of the last frame that measured them.
     pub(crate) forces: Option<Box<Measured>>,
     /// In a scene with contact.
@@ -238,6 +242,7 @@ impl Island {
             attachments: joined.attachments,
             spare_frames: Vec::new(),
             distances: joined.distances,
+            blades: Vec::new(),
             forces: None,
             contacts,
             grabs: Grabs::default(),
@@ -497,6 +502,10 @@ impl Island {
             attachment.advance(frame, &mut self.solver);
         }
         self.solver.backend_mut().measure_forces(measuring_forces);
+        if !self.blades.is_empty() {
+            let blades = self.blades.iter().map(|(_, blade)| blade.clone());
+            self.set_blades(blades.collect())?;
+        }
         let step = if self.contacts.is_some() {
             self.step_with_contact(keeping_residuals)?
         } else {
@@ -505,6 +514,9 @@ impl Island {
             backend.step(schedule, settings, keeping_residuals)?
         };
         self.forces = measuring_forces.then(|| Measured::of(self)).flatten();
+        if !self.blades.is_empty() {
+            self.set_blades(Vec::new())?;
+        }
         self.judge_step();
         collider::advance(&mut self.settings);
         self.grabs.arrive();
@@ -524,6 +536,14 @@ impl Island {
             }
         }
         Ok(step)
+    }
+
+    /// Hands solid blades to the solver.
+    fn set_blades(&mut self, blades: Vec<SolidBlade>) -> Result<(), Error> {
+        each_mut!(&mut self.solver, solver => {
+            let set = solver.set_blades(blades);
+            set.map_err(|source| Error::Xpbd { field: "stroke.solid".into(), source })
+        })
     }
 
     /// A frame in parts, before each of which contacts are found.
@@ -741,6 +761,10 @@ impl Island {
                 .iter()
                 .any(|attachment| attachment.moves(frame))
             || self.grabs.moves()
+            || self
+                .blades
+                .iter()
+                .any(|(_, blade)| blade.edge[0] != blade.edge[1])
     }
 
     /// The nearest particle to a point within a radius that can be held, and its squared distance.

@@ -57,6 +57,7 @@ mod saved;
 pub mod scene;
 mod simulation;
 mod sleep;
+mod solid_blade;
 mod solver_backend;
 mod strokes;
 mod substeps;

@@ -9,10 +9,10 @@
 use incise_xpbd::{StepSettings, VbdSettings};
 
 use crate::accuracy::DEFAULT_ACCURACY;
-use crate::scene::{Integrator, Method, SolverSpec, Substeps, TetSolve};
+use crate::scene::{Integrator, Method, SolverSpec, StrokeSpec, Substeps, TetSolve};
 use crate::substeps::{Choice, Shortfall};
 use crate::validate::{coordinates, value, within};
-use crate::{Error, Scene, collider, forces};
+use crate::{Error, Scene, collider, forces, solid_blade};
 
 /// Rounds of two-level VBD in a frame, at most: what has not converged then is reported.
 const MOST_ROUNDS: u32 = 20;
@@ -75,6 +75,9 @@ pub(crate) fn settings(scene: &Scene) -> Result<StepSettings, Error> {
         source,
     })?;
     forces::check(&scene.report, solver.method, false)?;
+    if let Some(stroke) = scene.stroke.iter().position(StrokeSpec::is_solid) {
+        solid_blade::check(&format!("stroke[{stroke}]"), solver.method, false)?;
+    }
     within("solver.time_step", settings.time_step, 1e-9, 1e3)?;
     Ok(settings)
 }
@@ -134,6 +137,7 @@ pub(crate) fn leaves_open(
         && settings.colliders.is_empty()
         && !on_device
         && scene.contact.is_none()
+        && !scene.stroke.iter().any(StrokeSpec::is_solid)
         && (spec.iterations, spec.relaxation, spec.tet_solve)
             == (defaults.iterations, defaults.relaxation, defaults.tet_solve)
         && !spec.kappa_limit.is_finite()

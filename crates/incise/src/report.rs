@@ -72,8 +72,8 @@ pub struct FrameReport {
     /// Contacts, in a scene that declares contact.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contact: Option<ContactReport>,
-    /// Forces: on attachments, on the ground, on colliders, on grabs, on what fixed particles are fixed to, then between
-    /// bodies.
+    /// Forces: on attachments, on the ground, on colliders, on grabs, on solid blades, on what fixed particles are fixed to,
+    /// then between bodies.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub forces: Vec<ForceReport>,
     /// Number of particles that were put back because they would have become Inf or NaN; absent if none. From a device
@@ -429,6 +429,8 @@ pub enum ForceKind {
     Collider,
     /// A grab.
     Grab,
+    /// The solid blade of a stroke.
+    Blade,
     /// What the fixed particles of a body are fixed to.
     Fixed,
     /// A body, from another one that touches it.
@@ -442,7 +444,7 @@ pub struct ForceReport {
     /// What the force acts on.
     pub kind: ForceKind,
     /// Its number: attachments and colliders in the order of the scene and then of addition, grabs in the order of their
-    /// bodies, bodies in the order of the scene; 0 for the ground.
+    /// bodies, blades by stroke, bodies in the order of the scene; 0 for the ground.
     pub index: usize,
     /// The body that a contact force comes from.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -38,7 +38,7 @@ pub use preset::Preset;
 pub use region::Region;
 pub use schema::schema;
 pub use solver::{Backend, Precision, ReclusterSpec, SleepSpec, SolverSpec};
-pub use stroke::StrokeSpec;
+pub use stroke::{SolidBladeSpec, StrokeSpec};
 pub(crate) use stroke::{along, pose};
 pub use substeps::Substeps;
 

@@ -244,8 +244,11 @@ impl Simulation {
     /// Adds a stroke. A stroke whose frame has passed cuts at the start of the next step.
     ///
     /// # Errors
-    /// If a value of the stroke lies outside its range.
+    /// If a value of the stroke lies outside its range, or its blade is solid on a GPU or where a body is solved by VBD.
     pub fn cut(&mut self, stroke: StrokeSpec) -> Result<(), Error> {
+        if stroke.is_solid() {
+            self.check_solid()?;
+        }
         self.state.timeline.add(&stroke)
     }
 

@@ -9,7 +9,8 @@ use incise_cutting::{
 use crate::island::Island;
 use crate::live_blade::LiveBlade;
 use crate::pinned_cut::{find, meets_pinned};
-use crate::scene::{StrokeSpec, pose};
+use crate::scene::{SolidBladeSpec, StrokeSpec, pose};
+use crate::solid_blade::{FrameBlade, SolidBlade};
 use crate::tool::{MissedStroke, Tool, tool};
 use crate::validate::value;
 use crate::warning::Warning;
@@ -28,6 +29,8 @@ struct Stroke {
     sweeps: Vec<Sweep>,
     /// Whether it has changed a mesh.
     has_cut: bool,
+    /// The body of its blade, if it has one.
+    solid: Option<SolidBlade>,
     /// Whether it has opened a face with a pinned corner.
     meets_pinned: bool,
 }
@@ -50,6 +53,9 @@ pub(crate) struct Timeline {
     missed: Vec<MissedStroke>,
     /// Warnings about other strokes that ended since they were taken.
     warnings: Vec<Warning>,
+    /// The blades with a body in the last frame.
+    #[cfg_attr(feature = "save", serde(skip))]
+    solids: Vec<FrameBlade>,
 }
 
 impl Timeline {
@@ -66,7 +72,21 @@ impl Timeline {
     pub(crate) fn add(&mut self, spec: &StrokeSpec) -> Result<(), Error> {
         let field = self.next_field();
         let (tool, snap) = tool(&field, spec)?;
-        self.push(field, tool, snap, [spec.first_frame(), spec.last_frame()])
+        let solid = match spec {
+            StrokeSpec::Sweep {
+                solid: Some(solid),
+                blade,
+                ..
+            } => Some(SolidBlade::new(&field, solid, blade.len())?),
+            _ => None,
+        };
+        self.push(
+            field,
+            tool,
+            snap,
+            solid,
+            [spec.first_frame(), spec.last_frame()],
+        )
     }
 
     fn next_field(&self) -> String {
@@ -78,6 +98,7 @@ impl Timeline {
         field: String,
         tool: Tool,
         snap: f64,
+        solid: Option<SolidBlade>,
         frames: [u64; 2],
     ) -> Result<(), Error> {
         let options = CutOptions {
@@ -98,6 +119,7 @@ impl Timeline {
             frames,
             sweeps: Vec::new(),
             has_cut: false,
+            solid,
             meets_pinned: false,
         });
         self.added += 1;
@@ -105,12 +127,35 @@ impl Timeline {
     }
 
     /// Adds a stroke whose blade is moved by [`Timeline::move_blade`]; returns its number.
-    pub(crate) fn begin(&mut self, pose: &[DVec3], snap: f64) -> Result<u32, Error> {
+    pub(crate) fn begin(
+        &mut self,
+        pose: &[DVec3],
+        snap: f64,
+        solid: Option<&SolidBladeSpec>,
+    ) -> Result<u32, Error> {
         let field = self.next_field();
         let blade = LiveBlade::new(&field, pose)?;
+        let solid = solid.map(|spec| SolidBlade::new(&field, spec, pose.len()));
         let number = self.added;
-        self.push(field, Tool::Live(blade), snap, [0, u64::MAX])?;
+        self.push(
+            field,
+            Tool::Live(blade),
+            snap,
+            solid.transpose()?,
+            [0, u64::MAX],
+        )?;
         Ok(number)
+    }
+
+    /// The key of a stroke with a solid blade that has not ended, if there is one.
+    pub(crate) fn solid_field(&self) -> Option<&str> {
+        let mut solid = self.strokes.iter().filter(|stroke| stroke.solid.is_some());
+        solid.next().map(|stroke| stroke.field.as_str())
+    }
+
+    /// The blades with a body in the last frame.
+    pub(crate) fn solids(&self) -> &[FrameBlade] {
+        &self.solids
     }
 
     /// Sets the blade of a live stroke for the start of the next frame.
@@ -202,6 +247,7 @@ impl Timeline {
         islands: &mut [Island],
         mut apply_delta: impl FnMut(usize, &mut Island, &CutDelta) -> Result<(), Error>,
     ) -> Result<(), Error> {
+        self.solids.clear();
         if self.strokes.is_empty() {
             return Ok(());
         }
@@ -231,6 +277,12 @@ impl Timeline {
                 stroke.meets_pinned |= meets_pinned(island, &delta, stroke.options.tag);
             }
         }
+        for stroke in self.strokes.iter_mut().filter(|s| s.frames[0] <= frame) {
+            let pose = stroke.pose(frame);
+            if let (Some(solid), Some(pose)) = (&mut stroke.solid, pose) {
+                self.solids.extend(solid.advance(stroke.options.tag, &pose));
+            }
+        }
         let (events, missed) = (&mut self.events, &mut self.missed);
         let warnings = &mut self.warnings;
         self.strokes.retain_mut(|stroke| {
@@ -254,6 +306,17 @@ impl Stroke {
     fn end(&self) -> Option<Event> {
         let stroke = self.options.tag;
         self.has_cut.then_some(Event::CutEnded { stroke })
+    }
+
+    /// The pose of its blade in a frame, if it has a blade and has begun.
+    fn pose(&self, frame: u64) -> Option<Vec<DVec3>> {
+        match &self.tool {
+            Tool::Sweep { blade, path } => {
+                Some(pose(blade.iter().copied(), path, self.frames, frame))
+            }
+            Tool::Live(blade) => Some(blade.pose().to_vec()),
+            _ => None,
+        }
     }
 
     /// Returns warnings about cuts that pinned particles keep closed.

@@ -159,6 +159,8 @@ pub(crate) fn tool(field: &str, spec: &StrokeSpec) -> Result<(Tool, f64), Error>
             blade,
             path,
             snap,
+            // Checked beside the tool.
+            solid: _,
         } => {
             if frames[0] >= frames[1] {
                 let range = "two frames, the second after the first";

@@ -54,6 +54,14 @@ pub enum XpbdError {
         /// The name of the method.
         method: &'static str,
     },
+    /// Solid blades were set and the method does not know them.
+    #[error(
+        "method {method} has no solid blades: use a method of XPBD, or blades without thickness"
+    )]
+    BladeMethod {
+        /// The name of the method.
+        method: &'static str,
+    },
     /// Forces are measured and the method has none.
     #[error(
         "forces cannot be measured with method {method}, whose extrapolation moves particles by no force: use another method, or do not measure forces"

@@ -20,9 +20,9 @@
 
 use glam::DVec3;
 
-use crate::constraints::{Attachments, Colliders};
+use crate::constraints::Constraints;
 use crate::particles::{Particles, number};
-use crate::{Float, Solver};
+use crate::{Float, Solver, StepSettings};
 
 /// A force and its torque about the origin of the world.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -71,6 +71,8 @@ pub struct Forces {
     pub handles: Vec<Force>,
     /// On each collider, in the order of the settings.
     pub colliders: Vec<Force>,
+    /// On each solid blade, in the order in which they were set.
+    pub blades: Vec<Force>,
     /// On each fixed particle in N, ascending by particle. Each acts where its particle is.
     pub fixed: Vec<(u32, DVec3)>,
 }
@@ -94,6 +96,8 @@ pub(crate) struct ForceMeter {
     handles: Vec<Force>,
     /// In N·s.
     colliders: Vec<Force>,
+    /// In N·s.
+    blades: Vec<Force>,
     held: Vec<Held>,
     frame_time: f64,
 }
@@ -103,16 +107,21 @@ impl ForceMeter {
     pub(crate) fn start<R: Float>(
         &mut self,
         particles: &Particles<R>,
-        attachments: &Attachments<R>,
-        colliders: usize,
-        frame_time: f64,
+        constraints: &Constraints<R>,
+        settings: &StepSettings,
     ) {
-        self.frame_time = frame_time;
-        self.handles.clear();
-        self.handles
-            .resize(attachments.handle_count(), Force::default());
-        self.colliders.clear();
-        self.colliders.resize(colliders, Force::default());
+        let attachments = &constraints.attachments;
+        let counts = [
+            attachments.handle_count(),
+            settings.colliders.len(),
+            constraints.blades.count(),
+        ];
+        let lists = [&mut self.handles, &mut self.colliders, &mut self.blades];
+        for (list, count) in lists.into_iter().zip(counts) {
+            list.clear();
+            list.resize(count, Force::default());
+        }
+        self.frame_time = settings.time_step;
         self.held.clear();
         for p in 0..particles.len() {
             let handle = if particles.fixed[p] {
@@ -163,18 +172,20 @@ impl ForceMeter {
         }
     }
 
-    /// Adds the impulses of springs and colliders of a substep of XPBD.
+    /// Adds the impulses of springs, blades and colliders of a substep of XPBD.
     pub(crate) fn take_moved<R: Float>(
         &mut self,
         particles: &Particles<R>,
-        attachments: &Attachments<R>,
-        colliders: &mut Colliders<R>,
+        constraints: &mut Constraints<R>,
         per_time: f64,
     ) {
-        for (handle, impulse, target) in attachments.pulls() {
+        for (handle, impulse, target) in constraints.attachments.pulls() {
             self.add_handle(handle, impulse * -per_time, particles.origin + target);
         }
-        colliders.take_pushes(&mut self.colliders, per_time);
+        constraints.blades.take_pushes(&mut self.blades, per_time);
+        constraints
+            .colliders
+            .take_pushes(&mut self.colliders, per_time);
     }
 
     /// Adds an impulse in N·s on a handle.
@@ -225,6 +236,7 @@ impl ForceMeter {
         Forces {
             handles: mean(&self.handles),
             colliders: mean(&self.colliders),
+            blades: mean(&self.blades),
             fixed: fixed
                 .map(|held| (held.particle, held.impulse * per_time))
                 .collect(),

@@ -73,7 +73,7 @@ pub use changes::Changes;
 pub use collider::{Collider, ColliderShape};
 pub use constraints::{
     AttachmentData, ContactLaw, ContactState, DistanceConstraint, DistanceData, FaceContact,
-    PairContact, VolumeConstraint, VolumeData,
+    PairContact, SolidBlade, VolumeConstraint, VolumeData,
 };
 pub use device::TetData;
 pub use error::XpbdError;

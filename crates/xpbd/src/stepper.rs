@@ -128,8 +128,7 @@ impl<R: Float> Stepper<R> {
         let mut meter = self.meter.take();
         if let Some(meter) = &mut meter {
             if part.start == 0 {
-                let (attachments, colliders) = (&constraints.attachments, settings.colliders.len());
-                meter.start(particles, attachments, colliders, settings.time_step);
+                meter.start(particles, constraints, settings);
             }
             particles.keep_refused();
         }
@@ -191,12 +190,7 @@ impl<R: Float> Stepper<R> {
             self.last.tet_solve = settings.tet_solve;
         }
         if let Some(meter) = meter.as_deref_mut() {
-            let Constraints {
-                attachments,
-                colliders,
-                ..
-            } = constraints;
-            meter.take_moved(particles, attachments, colliders, 1.0 / time);
+            meter.take_moved(particles, constraints, 1.0 / time);
             meter.take_refused(particles, 1.0 / time);
         }
         let repaired = particles.update_velocities(R::from_f64(time), substep.factors.per_time);

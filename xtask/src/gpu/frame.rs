@@ -98,6 +98,7 @@ fn scene(model: &Model, clustering: &str, stroke_frames: u32) -> Scene {
             blade: blade.map(|x| (x * scale).to_array()).to_vec(),
             path: vec![[0.0; 3], (way * scale).to_array()],
             snap: 0.1,
+            solid: None,
         }],
     };
     scene

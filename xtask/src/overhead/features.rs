@@ -169,6 +169,7 @@ fn blade(frames: [u64; 2]) -> StrokeSpec {
         blade: vec![[0.0, 2.0, -1.0], [0.0, 2.0, 1.0]],
         path: vec![[0.0; 3], [0.0, 1.0, 0.0]],
         snap: 0.1,
+        solid: None,
     }
 }
 

@@ -45,6 +45,7 @@ pub(super) fn strokes(mesh: &TetMesh, scale: f64, frames: u64, blades: u64) -> V
             blade: ends.map(|end| end.to_array()).to_vec(),
             path: vec![[0.0; 3], way.to_array()],
             snap: 0.1,
+            solid: None,
         }
     };
     (0..blades).map(stroke).collect()

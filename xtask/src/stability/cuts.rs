@@ -132,6 +132,7 @@ impl Cut {
             blade,
             path: vec![[0.0; 3], [0.0, 0.0, way]],
             snap: 0.0,
+            solid: None,
         };
         let edge = if quick { 0.1 } else { 0.06 };
         let plane = |frame, x: f64| StrokeSpec::Plane {

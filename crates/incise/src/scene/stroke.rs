@@ -41,6 +41,9 @@ pub enum StrokeSpec {
         #[serde(default = "tenth")]
         #[schemars(range(min = 0.0, max = 0.25))]
         snap: f64,
+        /// Body of the blade, which pushes the sides of its cut apart; absent: it has no thickness and no force.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        solid: Option<SolidBladeSpec>,
     },
     /// A rectangle, cut at once.
     Rectangle {
@@ -94,7 +97,33 @@ pub enum StrokeSpec {
     },
 }
 
+/// The body of a straight blade: a wedge behind the edge that ends in two parallel faces. It pushes the sides of its cut
+/// apart and bears the force. Not on a GPU, nor with method `vbd`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SolidBladeSpec {
+    /// Thickness behind the wedge.
+    #[schemars(extend("unit" = "m"), range(min = 1e-9, max = 1e3))]
+    pub thickness: f64,
+    /// Angle between the two faces of the wedge.
+    #[schemars(extend("unit" = "degrees"), range(min = 1.0, max = 170.0))]
+    pub wedge_angle_degrees: f64,
+    /// How far the blade reaches behind its edge, against the direction of its motion.
+    #[schemars(extend("unit" = "m"), range(min = 1e-9, max = 1e6))]
+    pub height: f64,
+    /// Coefficient of friction on its faces.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1e3))]
+    pub friction: f64,
+}
+
 impl StrokeSpec {
+    /// Returns whether the stroke has a solid blade.
+    #[must_use]
+    pub fn is_solid(&self) -> bool {
+        matches!(self, Self::Sweep { solid: Some(_), .. })
+    }
+
     /// The first frame in which the stroke cuts or, for a moved blade, has its first pose.
     #[must_use]
     pub fn first_frame(&self) -> u64 {
@@ -187,6 +216,7 @@ mod tests {
             blade: vec![[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]],
             path: path.to_vec(),
             snap: 0.1,
+            solid: None,
         };
         let path = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 4.0, 0.0]];
         let stroke = sweep([3, 7], &path);

@@ -152,6 +152,28 @@ impl Simulation {
             .ok_or_else(|| too_new("grab", grab))
     }
 
+    /// Returns the mean force of the last frame from all bodies on the solid blade of a stroke, with the torque about the
+    /// middle of its edge: what presses it from both sides, and friction. O(bodies).
+    ///
+    /// # Errors
+    /// If the stroke has no solid blade or had none in the last frame, or that frame has not reported
+    /// [`Quantity::Force`](crate::scene::Quantity).
+    pub fn blade_force(&self, stroke: u32) -> Result<Force, Error> {
+        self.check_measured()?;
+        let mut solids = self.state.timeline.solids().iter();
+        let Some(blade) = solids.find(|blade| blade.stroke == stroke) else {
+            let range = "the number of a stroke whose blade was solid in the last frame";
+            return Err(value("stroke", stroke, range));
+        };
+        let mut sum = incise_xpbd::Force::default();
+        let measured = self.state.islands.iter().filter_map(|i| i.forces.as_ref());
+        for force in measured.filter_map(|measured| measured.blades.get(&stroke)) {
+            sum.force += force.force;
+            sum.torque += force.torque;
+        }
+        Ok(Force::new(sum, blade.point))
+    }
+
     /// Returns the mean force of the last frame from a body on what its fixed particles are fixed to, with the torque
     /// about the center of these particles. It includes their weight. Zero for a body without fixed particles. O(log
     /// bodies).
@@ -261,6 +283,10 @@ impl Simulation {
             .flat_map(|(g, island)| island.grabs.all_held(g));
         for (index, grab) in grabs.enumerate() {
             add(ForceKind::Grab, index, None, self.grab_force(grab));
+        }
+        for blade in self.state.timeline.solids() {
+            let force = self.blade_force(blade.stroke);
+            add(ForceKind::Blade, blade.stroke as usize, None, force);
         }
         let fixed = islands.iter().filter_map(|island| island.forces.as_ref());
         let mut fixed: Vec<_> = fixed.flat_map(|measured| measured.fixed.keys()).collect();

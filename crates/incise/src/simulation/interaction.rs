@@ -9,8 +9,9 @@ use glam::DVec3;
 
 use super::Simulation;
 use crate::backend::{each, each_mut};
+use crate::scene::SolidBladeSpec;
 use crate::validate::{coordinates, value, within};
-use crate::{Error, Grab};
+use crate::{Error, Grab, solid_blade};
 
 impl Simulation {
     /// Begins a stroke whose blade is moved frame by frame, and returns its number. Faces that it opens are tagged with
@@ -50,7 +51,34 @@ impl Simulation {
     /// # Ok::<(), incise::Error>(())
     /// ```
     pub fn begin_stroke(&mut self, blade: &[DVec3], snap: f64) -> Result<u32, Error> {
-        self.state.timeline.begin(blade, snap)
+        self.state.timeline.begin(blade, snap, None)
+    }
+
+    /// Begins a stroke as [`Simulation::begin_stroke`] does, with a blade that has a body: it pushes the sides of its cut
+    /// apart, and [`Simulation::blade_force`] is what it feels. The blade is straight. Its body lies behind the edge, against
+    /// the direction in which the blade moves first; a blade that is drawn back keeps its direction.
+    ///
+    /// The body follows the cut: in a frame it moves from the blade's last pose to its present one. The cut itself takes no
+    /// force.
+    ///
+    /// # Errors
+    /// Those of [`Simulation::begin_stroke`]; if the blade has more than two points or a value of its body lies outside its
+    /// range; on a GPU; and if a body is solved by VBD.
+    pub fn begin_solid_stroke(
+        &mut self,
+        blade: &[DVec3],
+        snap: f64,
+        solid: &SolidBladeSpec,
+    ) -> Result<u32, Error> {
+        self.check_solid()?;
+        self.state.timeline.begin(blade, snap, Some(solid))
+    }
+
+    /// Refuses solid blades where a body or the device knows none.
+    pub(super) fn check_solid(&self) -> Result<(), Error> {
+        let is_gpu = self.state.compute_device.is_gpu();
+        let mut islands = self.state.islands.iter();
+        islands.try_for_each(|island| solid_blade::check("stroke", island.spec.method, is_gpu))
     }
 
     /// Sets the blade of a stroke for the start of the next frame. Of several calls before a frame the last one counts.

@@ -26,7 +26,7 @@ use crate::scene::{Method, Precision, SolverSpec, Substeps};
 use crate::sleep::SleepState;
 use crate::substeps::Choice;
 use crate::validate::value;
-use crate::{Error, Scene};
+use crate::{Error, Scene, solid_blade};
 
 /// Changes of an island by other settings; `None` is unchanged.
 #[derive(Debug)]
@@ -115,6 +115,9 @@ impl Simulation {
         let settings = settings(&scene)?;
         crate::scene::check(&scene)?;
         let compute_device = self.compute_device_for(&scene)?;
+        if let Some(stroke) = self.state.timeline.solid_field() {
+            solid_blade::check(stroke, solver.method, compute_device.is_gpu())?;
+        }
         if !is_light(&self.state.solver, solver) {
             self.read_back()?;
         }

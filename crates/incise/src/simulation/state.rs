@@ -18,6 +18,7 @@ use crate::merged_mesh::MergedMesh;
 use crate::pieces::PieceNumbers;
 use crate::report::{CutReport, DetachedReport, FrameReport, Milliseconds, milliseconds};
 use crate::scene::{Precision, ReportSpec, SolverSpec};
+use crate::solid_blade::touching;
 use crate::strokes::Timeline;
 use crate::{Error, Scene};
 
@@ -165,7 +166,11 @@ impl State {
         }
         timeline.advance(cut.number, islands, |number, island, delta| {
             dependents.apply_delta(number, island, delta, cut, ms)
-        })
+        })?;
+        for island in islands {
+            island.blades = touching(island, timeline.solids());
+        }
+        Ok(())
     }
 }
 

@@ -45,6 +45,7 @@ mod set_solver;
 mod settings;
 mod sleep;
 mod snapshot;
+mod solid_blade;
 mod strokes;
 mod substeps;
 mod support;

@@ -67,6 +67,7 @@ pub(crate) fn sweep(scene: &mut Scene) -> SweepParts<'_> {
             blade,
             path,
             snap,
+            solid: None,
         } => (frames, blade, path, snap),
         _ => panic!("the second stroke is a sweep"),
     }

@@ -5,6 +5,7 @@
 //! constraints takes no memory and no pass.
 
 mod attachments;
+mod blades;
 mod colliders;
 mod contacts;
 mod distances;
@@ -17,6 +18,8 @@ use crate::substep::Substep;
 
 pub use attachments::AttachmentData;
 pub(crate) use attachments::Attachments;
+pub(crate) use blades::Blades;
+pub use blades::SolidBlade;
 pub(crate) use colliders::{Colliders, Obstacle, outside};
 pub(crate) use contacts::Contacts;
 pub use contacts::{ContactLaw, ContactState, FaceContact, PairContact};
@@ -78,6 +81,7 @@ kinds! {
     distances: Distances,
     volumes: Volumes,
     contacts: Contacts,
+    blades: Blades,
     colliders: Colliders,
 }
 

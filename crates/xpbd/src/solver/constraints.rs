@@ -1,12 +1,12 @@
 //! The constraints of a [`Solver`] besides its tets: attachments to handles, distances, volumes and contacts.
 
-use incise_graph::{Coloring, Schedule};
+use incise_graph::{Coloring, GraphError, Schedule};
 
 use super::Solver;
 use crate::constraints::{Distance, Distances, TetVolume, Volumes};
 use crate::{
     AttachmentData, ContactLaw, ContactState, DistanceConstraint, DistanceData, FaceContact, Float,
-    PairContact, Pose, VolumeConstraint, VolumeData, XpbdError,
+    PairContact, Pose, SolidBlade, VolumeConstraint, VolumeData, XpbdError,
 };
 
 impl<R: Float> Solver<R> {
@@ -65,7 +65,7 @@ impl<R: Float> Solver<R> {
     /// # Example
     /// ```
     /// use glam::{DQuat, DVec3};
-    /// use incise_graph::{Coloring, Schedule};
+    /// use incise_graph::{Coloring, GraphError, Schedule};
     /// use incise_xpbd::{Pose, Solver, StepSettings};
     ///
     /// let mut solver = Solver::<f64>::new(&[DVec3::X]);
@@ -408,5 +408,61 @@ impl<R: Float> Solver<R> {
     /// order, pairs first. O(contacts).
     pub fn contacts(&self) -> impl Iterator<Item = ContactState> + '_ {
         self.constraints.contacts.states(&self.particles)
+    }
+
+    /// Replaces all solid blades: set them before each frame that has some. An empty list costs no memory and no pass. They
+    /// are solved after contacts and before colliders. Only methods of XPBD know them. O(listed particles).
+    ///
+    /// # Errors
+    /// A value outside its range, or a particle that does not exist; nothing has changed then.
+    ///
+    /// # Determinism
+    /// Bit-identical for any number of threads.
+    ///
+    /// # Example
+    /// A blade moves between two particles at one place and pushes them 2 mm apart.
+    /// ```
+    /// use glam::DVec3;
+    /// use incise_graph::Schedule;
+    /// use incise_xpbd::{Solver, SolidBlade, StepSettings};
+    ///
+    /// let mut solver = Solver::<f64>::new(&[DVec3::ZERO; 2]);
+    /// (0..2).for_each(|p| solver.set_mass(p, 0.001));
+    /// let edge = |x: f64| [DVec3::new(x, -0.1, 0.0), DVec3::new(x, 0.1, 0.0)];
+    /// let blade = SolidBlade {
+    ///     edge: [edge(-0.01), edge(0.02)],
+    ///     front: DVec3::X,
+    ///     thickness: 0.002,
+    ///     wedge_angle: 0.5,
+    ///     height: 0.1,
+    ///     friction: 0.0,
+    ///     sides: vec![(0, true), (1, false)],
+    /// };
+    /// solver.set_blades(vec![blade])?;
+    /// solver.step(&Schedule::default(), &StepSettings { substeps: 30, ..StepSettings::new(0.016) })?;
+    /// // `edge × front` is -z.
+    /// assert!(solver.position(0).z <= -0.001 && solver.position(1).z >= 0.001);
+    /// # Ok::<(), incise_xpbd::XpbdError>(())
+    /// ```
+    pub fn set_blades(&mut self, blades: Vec<SolidBlade>) -> Result<(), XpbdError> {
+        for blade in &blades {
+            blade.check()?;
+            for (constraint, &(particle, _)) in blade.sides.iter().enumerate() {
+                let particles = self.particle_count();
+                if particle as usize >= particles {
+                    let source = GraphError::ParticleOutOfRange {
+                        constraint,
+                        particle,
+                        particles,
+                    };
+                    return Err(XpbdError::Schedule {
+                        what: "blade",
+                        source,
+                    });
+                }
+            }
+        }
+        self.constraints.blades.set(blades);
+        Ok(())
     }
 }

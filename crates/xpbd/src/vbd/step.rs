@@ -49,13 +49,13 @@ impl<R: Float> Solver<R> {
         if self.constraints.contacts.is_declared() {
             return Err(XpbdError::ContactMethod { method: "vbd" });
         }
+        if self.constraints.blades.count() > 0 {
+            return Err(XpbdError::BladeMethod { method: "vbd" });
+        }
         self.recenter();
         let mut meter = self.stepper.meter.take();
         if let Some(meter) = &mut meter {
-            let (attachments, colliders) =
-                (&self.constraints.attachments, settings.step.colliders.len());
-            let frame_time = settings.step.time_step;
-            meter.start(&self.particles, attachments, colliders, frame_time);
+            meter.start(&self.particles, &self.constraints, &settings.step);
         }
         let mut report = VbdReport::default();
         let (count, time) = (settings.step.substeps, settings.step.substep_time());

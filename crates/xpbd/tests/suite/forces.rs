@@ -6,7 +6,8 @@ use incise_mesh::{TetMesh, kuhn_box};
 use incise_xpbd::{
     CoarseCorrection, CoarseCorrectionSettings, Collider, ColliderShape, ContactLaw,
     DistanceConstraint, FaceContact, Force, Forces, Integrator, Material, Method, Pose, Real,
-    Solver, StepSettings, TetSolve, VbdSettings, VertexStars, VolumeConstraint, XpbdError,
+    SolidBlade, Solver, StepSettings, TetSolve, VbdSettings, VertexStars, VolumeConstraint,
+    XpbdError,
 };
 
 use crate::body::{
@@ -571,4 +572,159 @@ fn chebyshev_does_not_measure_forces() {
     );
     solver.measure_forces(false);
     step(&mut solver).unwrap();
+}
+
+/// Two particles on springs at one place and a wedge of half angle α between them, the place a way s behind its edge:
+/// without friction each goes straight onto its plane, by `s sin α`, and the blade is pressed back by `2 k s sin² α`.
+#[test]
+fn a_wedge_is_pressed_back_by_what_it_pushes_apart() {
+    let (stiffness, angle, behind) = (50.0, 0.4_f64, 0.01);
+    let mut solver = Solver::<f64>::new(&[DVec3::ZERO; 2]);
+    let handle = solver.add_handle(Pose::at(DVec3::ZERO));
+    for p in 0..2 {
+        solver.set_mass(p, 0.01);
+        solver.attach(p, handle, 1.0 / stiffness, 0.05).unwrap();
+    }
+    let edge = |x: f64| [dvec3(x, -0.1, 0.0), dvec3(x, 0.1, 0.0)];
+    // Spring and blade are one after the other in an iteration; several agree.
+    let settings = StepSettings {
+        substeps: 10,
+        iterations: 30,
+        ..StepSettings::new(0.01)
+    };
+    solver.measure_forces(true);
+    let mut x = -0.001;
+    for _ in 0..400 {
+        let next = (x + 0.001_f64).min(behind);
+        let blade = SolidBlade {
+            edge: [edge(x), edge(next)],
+            front: dvec3(1.0, 0.5, 0.0),
+            thickness: 0.1,
+            wedge_angle: 2.0 * angle,
+            height: 0.05,
+            friction: 0.0,
+            sides: vec![(0, true), (1, false)],
+        };
+        x = next;
+        solver.set_blades(vec![blade]).unwrap();
+        solver.step(&Schedule::default(), &settings).unwrap();
+    }
+    let away = behind * angle.sin();
+    let place = |sign: f64| dvec3(angle.sin(), 0.0, sign * angle.cos()) * away;
+    // `edge × front` is -z.
+    within(
+        "positive",
+        (solver.position(0) - place(-1.0)).length(),
+        1e-9,
+    );
+    within("negative", (solver.position(1) - place(1.0)).length(), 1e-9);
+    let forces = solver.forces().unwrap();
+    let expected = DVec3::NEG_X * (2.0 * stiffness * away * angle.sin());
+    within("blade", (forces.blades[0].force - expected).length(), 1e-9);
+    within(
+        "handle",
+        (forces.handles[0].force + expected).length(),
+        1e-9,
+    );
+    // Beside the edge, and farther behind it than the blade is high, particles are free.
+    for shift in [dvec3(0.0, 0.3, 0.0), dvec3(0.1, 0.0, 0.0)] {
+        let moved = edge(x).map(|end| end + shift);
+        let blade = SolidBlade {
+            edge: [moved; 2],
+            front: DVec3::X,
+            thickness: 0.1,
+            wedge_angle: 2.0 * angle,
+            height: 0.05,
+            friction: 0.0,
+            sides: vec![(0, true), (1, false)],
+        };
+        solver.set_blades(vec![blade]).unwrap();
+        solver.step(&Schedule::default(), &settings).unwrap();
+        assert_eq!(solver.forces().unwrap().blades, [Force::default()]);
+    }
+}
+
+/// A blade that slides past a pressed particle drags it along by the coefficient of friction times the pressure.
+#[test]
+fn a_sliding_blade_drags_by_friction() {
+    let mut solver = Solver::<f64>::new(&[DVec3::ZERO]);
+    let handle = solver.add_handle(Pose::at(DVec3::ZERO));
+    solver.set_mass(0, 0.01);
+    solver.attach(0, handle, 1.0 / 50.0, 0.05).unwrap();
+    let edge = |x: f64| [dvec3(x, -0.1, 0.0), dvec3(x, 0.1, 0.0)];
+    // Spring and blade are one after the other in an iteration; several agree.
+    let settings = StepSettings {
+        substeps: 10,
+        iterations: 30,
+        ..StepSettings::new(0.01)
+    };
+    solver.measure_forces(true);
+    for frame in 0..100 {
+        let x = 0.1 + 1e-3 * f64::from(frame);
+        let blade = SolidBlade {
+            edge: [edge(x), edge(x + 1e-3)],
+            front: DVec3::X,
+            thickness: 0.02,
+            wedge_angle: 1.0,
+            height: 1.0,
+            friction: 0.3,
+            sides: vec![(0, true)],
+        };
+        solver.set_blades(vec![blade]).unwrap();
+        solver.step(&Schedule::default(), &settings).unwrap();
+    }
+    let force = solver.forces().unwrap().blades[0].force;
+    // Half the thickness stretches the spring.
+    within("pressure", (force.z - 50.0 * 0.01).abs(), 1e-6);
+    within("friction", (force.x + 0.3 * force.z).abs(), 1e-6);
+}
+
+#[test]
+fn blades_are_refused_by_what_is_wrong_and_by_vbd() {
+    let mut solver = body::<f64>(&rubber_block(), RUBBER);
+    let good = SolidBlade {
+        edge: [[DVec3::ZERO, DVec3::Y]; 2],
+        front: DVec3::X,
+        thickness: 0.01,
+        wedge_angle: 0.5,
+        height: 0.1,
+        friction: 0.0,
+        sides: vec![(0, true)],
+    };
+    solver.set_blades(vec![good.clone()]).unwrap();
+    let mut settings = VbdSettings::new(0.01, 1);
+    settings.step.gravity = Some(GRAVITY);
+    let mut of_solver = stars(&solver);
+    let refused = solver.step_vbd(&mut of_solver, &settings);
+    assert!(matches!(refused, Err(XpbdError::BladeMethod { .. })));
+    for bad in [
+        SolidBlade {
+            thickness: 0.0,
+            ..good.clone()
+        },
+        SolidBlade {
+            height: f64::NAN,
+            ..good.clone()
+        },
+        SolidBlade {
+            wedge_angle: 3.2,
+            ..good.clone()
+        },
+        SolidBlade {
+            friction: -0.1,
+            ..good.clone()
+        },
+        SolidBlade {
+            front: DVec3::Y,
+            ..good.clone()
+        },
+        SolidBlade {
+            sides: vec![(9999, true)],
+            ..good.clone()
+        },
+    ] {
+        assert!(solver.set_blades(vec![bad.clone()]).is_err(), "{bad:?}");
+    }
+    solver.set_blades(Vec::new()).unwrap();
+    solver.step_vbd(&mut of_solver, &settings).unwrap();
 }
