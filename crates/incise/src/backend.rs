@@ -5,7 +5,7 @@
 
 use std::time::Instant;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use incise_cutting::{CutDelta, CuttableMesh};
 use incise_graph::Schedule;
 use incise_mesh::{ParticleId, TetId, TetMesh};
@@ -162,9 +162,19 @@ impl AnySolver {
             }
             solver.truncate_tets(delta.tets_after());
             let mut star = Vec::new();
-            for p in touched(delta) {
+            let touched = touched(delta);
+            let regions = if delta.collapsed > 0 {
+                regions(delta, &touched)
+            } else {
+                Vec::new()
+            };
+            let momenta: Vec<Momentum> = regions.iter().map(|region| Momentum::of(solver, region)).collect();
+            for &p in &touched {
                 let mass = mass(solver, cuttable, p, &mut star);
                 solver.set_mass_in_star(p.index(), mass, star.iter().map(|tet| tet.index()));
+            }
+            for (region, before) in regions.iter().zip(momenta) {
+                before.restore(solver, region);
             }
             // Particles that lost all their tets stay where they are.
             for p in delta.deleted.iter().flat_map(|tet| tet.corners) {
@@ -442,4 +452,94 @@ fn touched(delta: &CutDelta) -> Vec<ParticleId> {
     touched.sort_unstable();
     touched.dedup();
     touched
+}
+
+/// Splits particles, ascending, into regions that are connected by the tets that an improvement reshaped or deleted. Each
+/// region ascends.
+fn regions(delta: &CutDelta, particles: &[ParticleId]) -> Vec<Vec<ParticleId>> {
+    let mut root: Vec<usize> = (0..particles.len()).collect();
+    let find = |root: &mut Vec<usize>, mut i: usize| {
+        while root[i] != i {
+            root[i] = root[root[i]];
+            i = root[i];
+        }
+        i
+    };
+    let removed = delta.removed.iter().chain(&delta.deleted);
+    let tets = removed.map(|tet| tet.corners);
+    for corners in tets.chain(delta.added.iter().map(|tet| tet.corners)) {
+        let indices = corners.map(|p| particles.partition_point(|q| *q < p));
+        for index in indices {
+            let [one, other] = [indices[0], index].map(|i| find(&mut root, i));
+            root[one.max(other)] = one.min(other);
+        }
+    }
+    let mut by_root: Vec<(usize, ParticleId)> = Vec::with_capacity(particles.len());
+    for (i, &particle) in particles.iter().enumerate() {
+        by_root.push((find(&mut root, i), particle));
+    }
+    by_root.sort_unstable();
+    let regions = by_root.chunk_by(|a, b| a.0 == b.0);
+    regions
+        .map(|region| region.iter().map(|&(_, p)| p).collect())
+        .collect()
+}
+
+/// Linear and angular momentum of particles, the latter about the origin.
+#[derive(Clone, Copy)]
+struct Momentum {
+    linear: DVec3,
+    angular: DVec3,
+}
+
+impl Momentum {
+    fn of<R: Real>(solver: &Solver<R>, particles: &[ParticleId]) -> Self {
+        let (mut linear, mut angular) = (DVec3::ZERO, DVec3::ZERO);
+        for p in particles.iter().map(|p| p.index()) {
+            let momentum = solver.mass(p) * solver.velocity(p);
+            linear += momentum;
+            angular += solver.position(p).cross(momentum);
+        }
+        Self { linear, angular }
+    }
+
+    /// Gives particles that have other masses now this momentum again, with the rigid motion that makes up for the
+    /// difference. A region where the solver holds a particle still keeps its velocities.
+    fn restore<R: Real>(self, solver: &mut Solver<R>, particles: &[ParticleId]) {
+        let with_mass = particles.iter().map(|p| p.index());
+        let with_mass: Vec<usize> = with_mass.filter(|&p| solver.mass(p) > 0.0).collect();
+        if with_mass.iter().any(|&p| !solver.is_free(p)) {
+            return;
+        }
+        let total: f64 = with_mass.iter().map(|&p| solver.mass(p)).sum();
+        if total <= 0.0 {
+            return;
+        }
+        let sum = with_mass
+            .iter()
+            .map(|&p| solver.mass(p) * solver.position(p));
+        let center = sum.sum::<DVec3>() / total;
+        let now = Self::of(solver, particles);
+        let missing = self.linear - now.linear;
+        let turn = self.angular - now.angular - center.cross(missing);
+        // Sum of m (r² 1 - r rᵀ).
+        let mut inertia = DMat3::ZERO;
+        for &p in &with_mass {
+            let r = solver.position(p) - center;
+            let outer = DMat3::from_cols(r * r.x, r * r.y, r * r.z);
+            inertia +=
+                (DMat3::from_diagonal(DVec3::splat(r.length_squared())) - outer) * solver.mass(p);
+        }
+        let rotation = inertia.inverse() * turn;
+        let rotation = if rotation.is_finite() {
+            rotation
+        } else {
+            DVec3::ZERO
+        };
+        for p in with_mass {
+            let r = solver.position(p) - center;
+            let change = missing / total + rotation.cross(r);
+            solver.set_velocity(p, solver.velocity(p) + change);
+        }
+    }
 }

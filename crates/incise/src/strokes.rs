@@ -5,10 +5,11 @@ use incise_cutting::{
     CutDelta, CutOptions, StrokeRegistry, Sweep, carve, cut_level_set, cut_plane,
     cut_surface_joining,
 };
+use incise_mesh::ParticleId;
 
 use crate::island::Island;
 use crate::live_blade::LiveBlade;
-use crate::scene::{StrokeSpec, pose};
+use crate::scene::{CuttingSpec, StrokeSpec, pose};
 use crate::tool::{Tool, tool};
 use crate::validate::value;
 use crate::{Error, Event};
@@ -38,6 +39,10 @@ pub(crate) struct Timeline {
     tolerance: f64,
     /// Largest volume of a crumb, as in [`CutOptions::crumbs`].
     crumbs: f64,
+    /// Whether meshes are improved after strokes.
+    improves: bool,
+    /// For each island the particles around the tets that strokes created since its mesh was improved.
+    created: Vec<Vec<ParticleId>>,
     /// For each island what its strokes leave for later ones to join; empty before the first stroke.
     registries: Vec<StrokeRegistry>,
     /// Strokes that began or ended to cut since the events were taken.
@@ -47,10 +52,11 @@ pub(crate) struct Timeline {
 }
 
 impl Timeline {
-    pub(crate) fn new(tolerance: f64, crumbs: f64) -> Self {
+    pub(crate) fn new(tolerance: f64, cutting: &CuttingSpec) -> Self {
         Self {
             tolerance,
-            crumbs,
+            crumbs: cutting.crumbs,
+            improves: cutting.improve,
             ..Self::default()
         }
     }
@@ -193,6 +199,7 @@ impl Timeline {
         }
         self.registries
             .resize_with(islands.len(), StrokeRegistry::default);
+        let islands_len = islands.len();
         for i in 0..self.strokes.len() {
             for (g, island) in islands.iter_mut().enumerate() {
                 let stroke = &mut self.strokes[i];
@@ -207,6 +214,10 @@ impl Timeline {
                     self.events.push(Event::CutBegan { stroke });
                 }
                 delta.extend_particles(&mut island.positions);
+                if self.improves {
+                    self.created.resize_with(islands_len, Vec::new);
+                    self.created[g].extend(delta.created_particles());
+                }
                 for other in self.strokes.iter_mut().enumerate().filter(|(j, _)| *j != i) {
                     if let Some(sweep) = other.1.sweeps.get_mut(g) {
                         sweep.apply_delta(&island.cuttable, &delta);
@@ -230,6 +241,23 @@ impl Timeline {
             }
             goes_on
         });
+        // A blade on its way relies on the particles around its front.
+        if self.strokes.iter().any(|stroke| !stroke.sweeps.is_empty()) {
+            return Ok(());
+        }
+        for (g, created) in self.created.iter_mut().enumerate() {
+            let mut created = std::mem::take(created);
+            if created.is_empty() {
+                continue;
+            }
+            created.sort_unstable();
+            created.dedup();
+            let island = &mut islands[g];
+            let delta = island.improve(&created)?;
+            if !delta.is_empty() {
+                apply_delta(g, island, &delta)?;
+            }
+        }
         Ok(())
     }
 }
