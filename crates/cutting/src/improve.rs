@@ -450,8 +450,7 @@ impl Improvement<'_> {
             before = before.min(least_sine(rest(corners)));
             scale_before = scale_before.min(scale(corners));
         }
-        // Also if not a number.
-        if !(scale_before > 0.0) {
+        if scale_before <= 0.0 {
             return None;
         }
         let scale_limit = PRESENT.min(0.5 * scale_before);
@@ -469,7 +468,7 @@ impl Improvement<'_> {
             }
             after = after.min(least_sine(rest(corners)));
             let is_better = after >= GOOD || after > before;
-            if !is_better || is_thin(rest(corners)) || !(scale(corners) >= scale_limit) {
+            if !is_better || is_thin(rest(corners)) || scale(corners) < scale_limit {
                 return None;
             }
         }

@@ -171,7 +171,12 @@ impl Timeline {
 
     /// Whether a stroke begins or continues in a frame.
     pub(crate) fn is_due(&self, frame: u64) -> bool {
-        self.strokes.iter().any(|stroke| stroke.frames[0] <= frame)
+        self.strokes.iter().any(|stroke| stroke.frames[0] <= frame) || self.has_created()
+    }
+
+    /// Whether an island waits for its improvement.
+    fn has_created(&self) -> bool {
+        self.created.iter().any(|created| !created.is_empty())
     }
 
     /// Applies a delta of an island that no stroke made to what strokes keep of its mesh.
@@ -194,12 +199,13 @@ impl Timeline {
         islands: &mut [Island],
         mut apply_delta: impl FnMut(usize, &mut Island, &CutDelta) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        if self.strokes.is_empty() {
+        // A live stroke may have ended since the last frame and left its improvement.
+        if self.strokes.is_empty() && !self.has_created() {
             return Ok(());
         }
         self.registries
             .resize_with(islands.len(), StrokeRegistry::default);
-        let islands_len = islands.len();
+        let island_count = islands.len();
         for i in 0..self.strokes.len() {
             for (g, island) in islands.iter_mut().enumerate() {
                 let stroke = &mut self.strokes[i];
@@ -215,7 +221,7 @@ impl Timeline {
                 }
                 delta.extend_particles(&mut island.positions);
                 if self.improves {
-                    self.created.resize_with(islands_len, Vec::new);
+                    self.created.resize_with(island_count, Vec::new);
                     self.created[g].extend(delta.created_particles());
                 }
                 for other in self.strokes.iter_mut().enumerate().filter(|(j, _)| *j != i) {
