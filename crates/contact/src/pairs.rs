@@ -535,8 +535,11 @@ struct Parts {
 
 impl Parts {
     fn new(surface: &ContactSurface, delta: &CutDelta, change: &SurfaceChange) -> Self {
-        let mut parents: Vec<(TetId, TetId)> =
-            delta.added.iter().map(|a| (a.tet, a.parent)).collect();
+        let mut parents: Vec<(TetId, TetId)> = delta
+            .added
+            .iter()
+            .map(|a| (delta.slot_after(a.tet), a.parent))
+            .collect();
         parents.sort_unstable();
         let mut by_parent: Vec<(TetId, u32)> = Vec::new();
         for slot in change.first_added..index(surface.slot_count()) {

@@ -23,6 +23,8 @@ pub struct CuttableMesh {
     pub(crate) bent: HashMap<ParticleId, f64, FixedState>,
     /// The mean volume of the tets that the mesh was made of, in m³.
     pub(crate) mean_volume: f64,
+    /// Number of particles that the mesh was made of.
+    pub(crate) original: usize,
 }
 
 impl CuttableMesh {
@@ -37,6 +39,7 @@ impl CuttableMesh {
         let mean_volume = mesh.total_volume() / mesh.tets.len().max(1) as f64;
         Ok(Self {
             mean_volume,
+            original: mesh.positions.len(),
             mesh,
             stars,
             faces,

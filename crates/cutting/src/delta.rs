@@ -43,7 +43,7 @@ pub struct RemovedTet {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AddedTet {
-    /// Its slot.
+    /// Its slot, before any moves.
     pub tet: TetId,
     /// Index of the cut tet that the child is a part of.
     pub parent: TetId,
@@ -103,7 +103,8 @@ pub struct BoundaryTriangle {
 
 /// All changes of one cut: new particles, removed and added tets, tets with other corners, and boundary triangles.
 ///
-/// A cut splits and separates tets; a removal deletes and moves tets. A delta describes one or the other.
+/// A cut splits and separates tets; a removal deletes and moves tets; an improvement ([`crate::improve`]) gives tets
+/// other corners, as their own and only children, and deletes and moves tets. A delta describes one of these.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CutDelta {
@@ -138,6 +139,8 @@ pub struct CutDelta {
     pub crumbs: usize,
     /// Rest volume of the crumbs in m³.
     pub crumb_volume: f64,
+    /// Particles that an improvement took out; 0 for cuts and removals.
+    pub collapsed: usize,
     /// Snapped particles of a plane or level set that no earlier cut had snapped to, kept for undo.
     pub bent: Vec<ParticleId>,
     /// The smallest volume of a child as a fraction of its parent's (1 if none was cut).
@@ -174,6 +177,16 @@ impl CutDelta {
         // Both ends of the moves ascend.
         let moved = self.moved.binary_search_by_key(&tet, |moved| moved.from);
         moved.map_or(tet, |i| self.moved[i].to)
+    }
+
+    /// Returns the corners of the new tets, ascending, each once.
+    #[must_use]
+    pub fn created_particles(&self) -> Vec<ParticleId> {
+        let corners = self.added.iter().flat_map(|tet| tet.corners);
+        let mut particles: Vec<ParticleId> = corners.collect();
+        particles.sort_unstable();
+        particles.dedup();
+        particles
     }
 
     /// Extends a quantity of particles to the new ones: interpolated on edges, repeated for copies.

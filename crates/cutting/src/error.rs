@@ -67,6 +67,12 @@ pub enum CutError {
         /// The value given.
         value: f64,
     },
+    /// Tolerance of an improvement outside its range.
+    #[error("the tolerance is {value}: it must lie between 0 and 0.25 edges")]
+    Improve {
+        /// The value given.
+        value: f64,
+    },
     /// A cut would make too many tets.
     #[error(
         "the cut would leave {tets} tets and {limit} are allowed: cut less at once, use a coarser mesh or raise the limit"

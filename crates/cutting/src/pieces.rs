@@ -183,6 +183,10 @@ impl PieceTracker {
         self.parts.looks = 0;
         let reduced = self.renumber(cuttable, delta);
         let mut events = Vec::new();
+        if delta.collapsed > 0 {
+            // An improvement keeps the topology.
+            return events;
+        }
         let places = self.places(cuttable, delta, &reduced);
         for of_piece in places.chunk_by(|a, b| a.0 == b.0) {
             let piece = of_piece[0].0;
@@ -214,6 +218,19 @@ impl PieceTracker {
             pieces[piece as usize].tets += 1;
         }
         let positions = &cuttable.mesh().positions;
+        if delta.collapsed > 0 {
+            // The tets that keep their slots have another volume.
+            for removed in &delta.removed {
+                let piece = piece_of[removed.tet.index()];
+                let volume = signed_volume(removed.corners.map(|p| positions[p.index()]));
+                pieces[piece as usize].volume.add(-volume);
+            }
+            for added in &delta.added {
+                let piece = piece_of[added.tet.index()];
+                let volume = signed_volume(added.corners.map(|p| positions[p.index()]));
+                pieces[piece as usize].volume.add(volume);
+            }
+        }
         let mut reduced = Vec::new();
         for deleted in &delta.deleted {
             let piece = piece_of[deleted.tet.index()];

@@ -55,6 +55,27 @@ impl Dihedrals {
     }
 }
 
+/// The smallest sine of a dihedral angle of a tet; negative if it is inverted, not a number or 0 if it is flat.
+pub(crate) fn least_sine([a, b, c, d]: [DVec3; 4]) -> f64 {
+    let (u, v, w) = (b - a, c - a, d - a);
+    let determinant = u.cross(v).dot(w);
+    // Twice the areas of the faces opposite to each corner.
+    let areas = [(v - u).cross(w - u), w.cross(v), u.cross(w), v.cross(u)].map(DVec3::length);
+    // The edge between the corners i and j lies on the faces opposite to the other two.
+    let sine =
+        |edge: DVec3, i: usize, j: usize| determinant * edge.length() / (areas[i] * areas[j]);
+    let sines = [
+        sine(u, 2, 3),
+        sine(v, 1, 3),
+        sine(w, 1, 2),
+        sine(v - u, 0, 3),
+        sine(w - u, 0, 2),
+        sine(w - v, 0, 1),
+    ];
+    let least = sines.into_iter().min_by(f64::total_cmp);
+    least.unwrap_or(f64::NAN)
+}
+
 /// How many units of the last digit of its coordinates a tet must be thick.
 const THICKNESS: f64 = 8.0;
 
@@ -89,6 +110,31 @@ mod tests {
             [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z * height].map(|x| x + DVec3::X * 10.0)
         };
         assert!(is_thin(away(1e-14)) && !is_thin(away(1e-13)));
+    }
+
+    #[test]
+    fn sines_agree_with_the_angles() {
+        let tets = [
+            [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z],
+            [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::new(0.3, 0.2, 0.05)],
+            [
+                DVec3::ZERO,
+                DVec3::X,
+                DVec3::new(0.5, 2.0, 0.1),
+                DVec3::new(0.5, 0.9, 0.4),
+            ],
+        ];
+        for tet in tets {
+            let mut dihedrals = Dihedrals::default();
+            dihedrals.add(tet);
+            let sines = dihedrals
+                .range()
+                .unwrap()
+                .map(|angle| angle.to_radians().sin());
+            assert!((least_sine(tet) - sines[0].min(sines[1])).abs() < 1e-12);
+            let [a, b, c, d] = tet;
+            assert!(least_sine([b, a, c, d]) < 0.0);
+        }
     }
 
     #[test]

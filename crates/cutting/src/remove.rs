@@ -142,7 +142,11 @@ impl Operation<'_> {
 }
 
 /// Moves the last tets into the slots that have become free.
-fn fill_gaps(cuttable: &mut CuttableMesh, doomed: &BTreeSet<TetId>, delta: &mut CutDelta) {
+pub(crate) fn fill_gaps(
+    cuttable: &mut CuttableMesh,
+    doomed: &BTreeSet<TetId>,
+    delta: &mut CutDelta,
+) {
     let CuttableMesh {
         mesh, stars, faces, ..
     } = cuttable;

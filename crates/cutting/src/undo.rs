@@ -61,6 +61,7 @@ impl CutDelta {
             faces,
             bent,
             mean_volume: _,
+            original: _,
         } = cuttable;
         let new = (self.particles_before..self.particles_after()).map(ParticleId::new);
         for particle in new.chain(self.bent.iter().copied()) {

@@ -5,6 +5,7 @@
 use glam::DVec3;
 use incise_coloring::{Order, greedy};
 use incise_graph::{Clustering, Incidence, Schedule};
+use incise_mesh::ParticleId;
 use incise_xpbd::DistanceConstraint;
 
 use crate::backend::{AnySolver, each_mut};
@@ -100,6 +101,12 @@ pub(crate) struct Distances {
 }
 
 impl Distances {
+    /// Whether a constraint ends at a particle. Linear in the constraints.
+    pub(crate) fn holds(&self, particle: ParticleId) -> bool {
+        let mut ends = self.list.iter().flat_map(|constraint| constraint.particles);
+        ends.any(|end| end == particle.0)
+    }
+
     pub(crate) fn is_empty(&self) -> bool {
         self.list.is_empty()
     }

@@ -7,7 +7,9 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use glam::DVec3;
-use incise_cutting::{CutDelta, CuttableMesh, PieceEvent, PieceTracker, remove_tets};
+use incise_cutting::{
+    CutDelta, CuttableMesh, ImproveOptions, PieceEvent, PieceTracker, improve, remove_tets,
+};
 use incise_mesh::{Bounds, ParticleId, TetId, signed_volume};
 use incise_xpbd::{
     DistanceConstraint, KappaLimit, Real, SolidBlade, Solver, StepReport, StepSettings,
@@ -834,6 +836,42 @@ impl Island {
         Ok(is_held)
     }
 
+    /// Improves the mesh around particles that strokes created. Particles stay that a constraint names, beside which one
+    /// is held, or where materials meet; and all of the boundary in a scene with contact.
+    pub(crate) fn improve(&mut self, near: &[ParticleId]) -> Result<CutDelta, Error> {
+        let Self {
+            cuttable,
+            positions,
+            solver,
+            distances,
+            contacts,
+            ..
+        } = self;
+        let options = ImproveOptions {
+            keeps_boundary: contacts.is_some(),
+            ..ImproveOptions::default()
+        };
+        let improved = each!(solver, solver => {
+            let is_locked = |mesh: &CuttableMesh, particle: ParticleId| {
+                let mut around = mesh.around(particle);
+                let Some(first) = around.next() else {
+                    return true;
+                };
+                let material = solver.material_of(first.index());
+                let corners = mesh.around(particle).flat_map(|tet| mesh.mesh().tets[tet.index()]);
+                distances.holds(particle)
+                    || solver.handle_of(particle.index()).is_some()
+                    || around.any(|tet| solver.material_of(tet.index()) != material)
+                    || corners.into_iter().any(|p| !solver.is_free(p.index()))
+            };
+            improve(cuttable, positions, near, &options, is_locked)
+        });
+        improved.map_err(|source| Error::Cut {
+            field: "cutting.improve".into(),
+            source,
+        })
+    }
+
     /// Applies a delta to solver, pieces, clusters, colors, schedule and volume constraints, and wakes the island.
     /// Returns the events of its pieces.
     pub(crate) fn apply_delta(
@@ -846,6 +884,14 @@ impl Island {
         for tet in &delta.deleted {
             self.removed_volume += signed_volume(tet.corners.map(|p| positions[p.index()]));
         }
+        if delta.collapsed > 0 {
+            // An improvement keeps the volume but for rounding.
+            let volume =
+                |corners: [ParticleId; 4]| signed_volume(corners.map(|p| positions[p.index()]));
+            let before = delta.removed.iter().map(|tet| volume(tet.corners));
+            let after = delta.added.iter().map(|tet| volume(tet.corners));
+            self.removed_volume += before.sum::<f64>() - after.sum::<f64>();
+        }
         let settings = &self.settings;
         for tet in delta.removed.iter().chain(&delta.deleted) {
             let data =
@@ -855,8 +901,8 @@ impl Island {
         self.solver.apply_delta(delta, &self.cuttable)?;
         let mut stiffest = 0.0_f64;
         for tet in &delta.added {
-            let data =
-                each!(&self.solver, solver => accuracy_data(solver, tet.tet.index(), settings));
+            let slot = delta.slot_after(tet.tet).index();
+            let data = each!(&self.solver, solver => accuracy_data(solver, slot, settings));
             stiffest = stiffest.max(data.1);
             self.outside.add(data);
         }

@@ -169,6 +169,7 @@ impl MergedMesh {
             snapped: delta.snapped,
             crumbs: delta.crumbs,
             crumb_volume: delta.crumb_volume,
+            collapsed: delta.collapsed,
             bent: delta.bent.iter().map(|&p| particle(p)).collect(),
             worst_volume_ratio: delta.worst_volume_ratio,
             dihedral: delta.dihedral,
@@ -210,6 +211,9 @@ impl MergedMesh {
         let last = (after..merged.tets_before).map(TetId::new);
         let movers = last.filter(|&tet| !deleted(tet));
         let moves: Vec<(TetId, TetId)> = movers.zip(gaps).collect();
+        let reshaped = merged.added.iter().map(|added| (added.tet, added.corners));
+        let mut reshaped: Vec<(TetId, [ParticleId; 4])> = reshaped.collect();
+        reshaped.sort_unstable_by_key(|(tet, _)| *tet);
         for numbers in &mut self.numbers {
             for number in &mut numbers.tets {
                 if let Ok(i) = moves.binary_search_by_key(number, |(from, _)| *from) {
@@ -218,6 +222,8 @@ impl MergedMesh {
                     let corners = self.mesh.tets[from.index()];
                     let relinked = merged.relinked.iter().find(|relinked| relinked.tet == from);
                     let corners = relinked.map_or(corners, |relinked| relinked.after);
+                    let added = reshaped.binary_search_by_key(&from, |(tet, _)| *tet);
+                    let corners = added.map_or(corners, |i| reshaped[i].1);
                     merged.moved.push(MovedTet { from, to, corners });
                 }
             }

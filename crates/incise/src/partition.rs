@@ -148,7 +148,7 @@ impl Partition {
         if self.settings.merges {
             let Lists { loose, seeds, .. } = &mut self.lists;
             loose.clear();
-            loose.extend(delta.added.iter().map(|tet| tet.tet.0));
+            loose.extend(delta.added.iter().map(|tet| delta.slot_after(tet.tet).0));
             // What is left of a cluster has a face at a child of what was cut, or in the new boundary.
             seeds.clear();
             seeds.extend(delta.surface_added.iter().map(|triangle| triangle.tet.0));
@@ -254,7 +254,7 @@ impl Partition {
         let mut children: Vec<_> = delta
             .added
             .iter()
-            .map(|tet| (tet.parent, tet.positive, tet.tet.0))
+            .map(|tet| (tet.parent, tet.positive, delta.slot_after(tet.tet).0))
             .collect();
         children.sort_unstable();
         let mut offsets = vec![0];
@@ -338,7 +338,7 @@ impl Partition {
     fn link_groups(&mut self, delta: &CutDelta) {
         let labels = self.clustering.labels();
         for tet in &delta.added {
-            let cluster = labels[tet.tet.index()].0;
+            let cluster = labels[delta.slot_after(tet.tet).index()].0;
             let pairs = tet.corners.map(|p| (cluster, p.0));
             self.lists.added.extend(pairs);
         }

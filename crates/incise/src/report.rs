@@ -190,6 +190,12 @@ pub struct CutReport {
     /// one in several frames.
     #[serde(skip_serializing_if = "is_zero")]
     pub crumbs: usize,
+    /// Particles of earlier cuts that the improvement after a stroke took out; absent if none.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub collapsed: usize,
+    /// Tets that these took with them, whose volume others have now; absent if none.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub tets_merged: usize,
     /// The smallest volume of a new tet as a fraction of the one it was cut from.
     pub worst_volume_ratio: f64,
     /// Number of removed tets; absent if none.
@@ -203,6 +209,11 @@ pub struct CutReport {
 impl CutReport {
     /// Adds what a stroke changed.
     pub(crate) fn add(&mut self, delta: &CutDelta) {
+        if delta.collapsed > 0 {
+            self.collapsed += delta.collapsed;
+            self.tets_merged += delta.deleted.len();
+            return;
+        }
         self.tets_cut += delta.removed.len();
         self.tets_created += delta.added.len();
         self.particles_created += delta.points.len() + delta.copies.len();
@@ -226,6 +237,8 @@ impl Default for CutReport {
             particles_created: 0,
             snapped: 0,
             crumbs: 0,
+            collapsed: 0,
+            tets_merged: 0,
             tets_removed: 0,
             worst_volume_ratio: 1.0,
             dihedral: None,

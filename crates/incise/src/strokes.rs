@@ -5,11 +5,12 @@ use incise_cutting::{
     CutDelta, CutOptions, StrokeRegistry, Sweep, carve, cut_level_set, cut_plane,
     cut_surface_joining,
 };
+use incise_mesh::ParticleId;
 
 use crate::island::Island;
 use crate::live_blade::LiveBlade;
 use crate::pinned_cut::{find, meets_pinned};
-use crate::scene::{SolidBladeSpec, StrokeSpec, pose};
+use crate::scene::{CuttingSpec, SolidBladeSpec, StrokeSpec, pose};
 use crate::solid_blade::{FrameBlade, SolidBlade};
 use crate::tool::{MissedStroke, Tool, tool};
 use crate::validate::value;
@@ -45,6 +46,10 @@ pub(crate) struct Timeline {
     tolerance: f64,
     /// Largest volume of a crumb, as in [`CutOptions::crumbs`].
     crumbs: f64,
+    /// Whether meshes are improved after strokes.
+    improves: bool,
+    /// For each island the particles around the tets that strokes created since its mesh was improved.
+    created: Vec<Vec<ParticleId>>,
     /// For each island what its strokes leave for later ones to join; empty before the first stroke.
     registries: Vec<StrokeRegistry>,
     /// Strokes that began or ended to cut since the events were taken.
@@ -59,10 +64,11 @@ pub(crate) struct Timeline {
 }
 
 impl Timeline {
-    pub(crate) fn new(tolerance: f64, crumbs: f64) -> Self {
+    pub(crate) fn new(tolerance: f64, cutting: &CuttingSpec) -> Self {
         Self {
             tolerance,
-            crumbs,
+            crumbs: cutting.crumbs,
+            improves: cutting.improve,
             ..Self::default()
         }
     }
@@ -224,7 +230,12 @@ impl Timeline {
 
     /// Whether a stroke begins or continues in a frame.
     pub(crate) fn is_due(&self, frame: u64) -> bool {
-        self.strokes.iter().any(|stroke| stroke.frames[0] <= frame)
+        self.strokes.iter().any(|stroke| stroke.frames[0] <= frame) || self.has_created()
+    }
+
+    /// Whether an island waits for its improvement.
+    fn has_created(&self) -> bool {
+        self.created.iter().any(|created| !created.is_empty())
     }
 
     /// Applies a delta of an island that no stroke made to what strokes keep of its mesh.
@@ -248,11 +259,13 @@ impl Timeline {
         mut apply_delta: impl FnMut(usize, &mut Island, &CutDelta) -> Result<(), Error>,
     ) -> Result<(), Error> {
         self.solids.clear();
-        if self.strokes.is_empty() {
+        // A live stroke may have ended since the last frame and left its improvement.
+        if self.strokes.is_empty() && !self.has_created() {
             return Ok(());
         }
         self.registries
             .resize_with(islands.len(), StrokeRegistry::default);
+        let island_count = islands.len();
         for i in 0..self.strokes.len() {
             for (g, island) in islands.iter_mut().enumerate() {
                 let stroke = &mut self.strokes[i];
@@ -267,6 +280,10 @@ impl Timeline {
                     self.events.push(Event::CutBegan { stroke });
                 }
                 delta.extend_particles(&mut island.positions);
+                if self.improves {
+                    self.created.resize_with(island_count, Vec::new);
+                    self.created[g].extend(delta.created_particles());
+                }
                 for other in self.strokes.iter_mut().enumerate().filter(|(j, _)| *j != i) {
                     if let Some(sweep) = other.1.sweeps.get_mut(g) {
                         sweep.apply_delta(&island.cuttable, &delta);
@@ -297,6 +314,23 @@ impl Timeline {
             }
             goes_on
         });
+        // A blade on its way relies on the particles around its front.
+        if self.strokes.iter().any(|stroke| !stroke.sweeps.is_empty()) {
+            return Ok(());
+        }
+        for (g, created) in self.created.iter_mut().enumerate() {
+            let mut created = std::mem::take(created);
+            if created.is_empty() {
+                continue;
+            }
+            created.sort_unstable();
+            created.dedup();
+            let island = &mut islands[g];
+            let delta = island.improve(&created)?;
+            if !delta.is_empty() {
+                apply_delta(g, island, &delta)?;
+            }
+        }
         Ok(())
     }
 }

@@ -58,9 +58,10 @@ impl Volumes {
         added.sort_unstable_by_key(|tet| tet.tet);
         each_mut!(solver, solver => {
             for tet in added {
-                let material = solver.material_of(tet.tet.index());
-                let constraint = self.constraint(material, tet.corners, mesh.corners(tet.tet));
-                solver.put_volume(tet.tet.index(), constraint).map_err(refused)?;
+                let slot = delta.slot_after(tet.tet);
+                let material = solver.material_of(slot.index());
+                let constraint = self.constraint(material, tet.corners, mesh.corners(slot));
+                solver.put_volume(slot.index(), constraint).map_err(refused)?;
             }
             for tet in &delta.relinked {
                 solver.relink_volume(tet.tet.index(), tet.after.map(|p| p.0));

@@ -6,6 +6,7 @@ mod bends;
 mod bodies;
 mod crumbs;
 mod deltas;
+mod improve;
 mod joins;
 mod level_sets;
 mod passes;

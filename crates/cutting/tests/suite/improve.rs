@@ -1,0 +1,320 @@
+//! Improvement: what must hold after it, and how far it brings a much cut body back.
+
+use glam::DVec3;
+use incise_cutting::{
+    CutDelta, CutError, CutOptions, CuttableMesh, FaceTag, ImproveOptions, PieceTracker, Plane,
+    Skin, Sweep, cut_plane, cut_surface, improve, remove_tets,
+};
+use incise_mesh::{ParticleId, TetId, TetMesh, kuhn_box};
+use proptest::prelude::*;
+
+use crate::bodies::{bend, body, check_cut, jittered_box, noise, options, strip, volumes};
+
+/// A body with its pieces and skin.
+struct Patient {
+    body: CuttableMesh,
+    positions: Vec<DVec3>,
+    pieces: PieceTracker,
+    skin: Skin,
+    near: Vec<ParticleId>,
+}
+
+impl Patient {
+    fn new(mesh: &TetMesh, positions: Vec<DVec3>) -> Self {
+        let body = CuttableMesh::new(mesh.clone()).unwrap();
+        Self {
+            positions,
+            pieces: PieceTracker::new(&body),
+            skin: Skin::new(body.boundary()),
+            body,
+            near: Vec::new(),
+        }
+    }
+
+    fn apply(&mut self, before: &TetMesh, delta: &CutDelta) {
+        check_cut(before, &self.body, delta);
+        delta.extend_particles(&mut self.positions);
+        self.pieces.apply_delta(&self.body, delta);
+        self.pieces.check(&self.body).unwrap();
+        self.skin.apply_delta(delta);
+        self.near.extend(delta.created_particles());
+    }
+
+    fn plane(&mut self, point: DVec3, normal: DVec3, options: &CutOptions) {
+        let before = self.body.mesh().clone();
+        let plane = Plane { point, normal };
+        let delta = cut_plane(&mut self.body, &self.positions, &plane, options).unwrap();
+        self.apply(&before, &delta);
+    }
+
+    /// Improves and checks what must hold.
+    fn improve(
+        &mut self,
+        options: &ImproveOptions,
+        locked: impl Fn(ParticleId) -> bool,
+    ) -> CutDelta {
+        let before = self.body.mesh().clone();
+        let sizes = volumes(&self.body);
+        let outer_before = outer_area(&self.body);
+        let count = self.pieces.count();
+        let worst = sines(&before).fold(1.0, f64::min);
+        let boundary = triangles(&self.body);
+        let near = std::mem::take(&mut self.near);
+        let delta = improve(&mut self.body, &self.positions, &near, options, |_, p| {
+            locked(p)
+        })
+        .unwrap();
+        self.apply(&before, &delta);
+        self.near.clear();
+        assert_eq!(self.pieces.count(), count);
+        let now = sines(self.body.mesh()).fold(1.0, f64::min);
+        assert!(
+            now >= worst.min(0.2),
+            "the worst angle does not become worse"
+        );
+        let inverted = |mesh: &TetMesh, positions: &[DVec3]| {
+            let moved = TetMesh {
+                positions: positions.to_vec(),
+                tets: mesh.tets.clone(),
+            };
+            let count = (0..moved.tets.len()).filter(|&t| moved.volume(TetId::new(t)) <= 0.0);
+            count.count()
+        };
+        let left = inverted(self.body.mesh(), &self.positions);
+        assert!(
+            left <= inverted(&before, &self.positions),
+            "no tet is inverted"
+        );
+        // Two sides of a cut trade what they lose and gain.
+        let total: f64 = sizes.iter().sum();
+        let now: f64 = volumes(&self.body).iter().sum();
+        assert!(
+            (now - total).abs() <= 1e-12 * total,
+            "volume {total} became {now}"
+        );
+        for (old, new) in sizes.iter().zip(volumes(&self.body)) {
+            assert!((old - new).abs() <= 0.05 * total);
+        }
+        let outer = outer_area(&self.body);
+        assert!((outer - outer_before).abs() <= 1e-9 * outer);
+        if options.keeps_boundary {
+            assert_eq!(triangles(&self.body), boundary);
+        }
+        for particle in (0..before.positions.len()).map(ParticleId::new) {
+            if locked(particle) && before.tets.iter().flatten().any(|p| *p == particle) {
+                assert!(
+                    self.body.around(particle).next().is_some(),
+                    "a locked particle stays"
+                );
+            }
+        }
+        let drawn = self.skin.triangles().len();
+        assert_eq!(drawn, self.body.boundary_count());
+        delta
+    }
+}
+
+/// The corner positions and the kind of each boundary triangle, sorted.
+fn triangles(body: &CuttableMesh) -> Vec<([ParticleId; 3], FaceTag)> {
+    let mut list: Vec<_> = body
+        .boundary()
+        .map(|t| {
+            let mut particles = t.particles;
+            particles.sort_unstable();
+            (particles, t.tag)
+        })
+        .collect();
+    list.sort_unstable();
+    list
+}
+
+fn outer_area(body: &CuttableMesh) -> f64 {
+    let outer = body.boundary().filter(|t| t.tag == FaceTag::Outer);
+    let area = |particles: [ParticleId; 3]| {
+        let [a, b, c] = particles.map(|p| body.mesh().positions[p.index()]);
+        (b - a).cross(c - a).length() / 2.0
+    };
+    outer.map(|t| area(t.particles)).sum()
+}
+
+/// The smallest sine of a dihedral angle of each tet.
+fn sines(mesh: &TetMesh) -> impl Iterator<Item = f64> + '_ {
+    mesh.tets.iter().map(|tet| {
+        let x = tet.map(|p| mesh.positions[p.index()]);
+        let mut least = f64::INFINITY;
+        for (i, j) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
+            let mut rest = (0..4).filter(|&k| k != i && k != j);
+            let (k, l) = (rest.next().unwrap(), rest.next().unwrap());
+            let along = (x[j] - x[i]).normalize();
+            let across = |y: DVec3| (y - x[i] - along * along.dot(y - x[i])).normalize();
+            least = least.min(across(x[k]).cross(across(x[l])).length());
+        }
+        least
+    })
+}
+
+/// Tets with a dihedral angle below 5 or above 175 degrees.
+fn slivers(mesh: &TetMesh) -> usize {
+    let limit = 5.0_f64.to_radians().sin();
+    sines(mesh).filter(|sine| *sine < limit).count()
+}
+
+/// A single plane through a grid: most of what the cut added goes again, and calls end with one that changes nothing.
+#[test]
+fn a_plane_through_a_grid() {
+    for snap in [0.0, 0.1, 0.25] {
+        let mesh = kuhn_box([5; 3], DVec3::ONE);
+        let mut patient = Patient::new(&mesh, mesh.positions.clone());
+        patient.plane(
+            DVec3::splat(0.43),
+            DVec3::new(1.0, 0.2, 0.1),
+            &options(snap),
+        );
+        let added = patient.body.mesh().tets.len() - mesh.tets.len();
+        let mut calls = 0;
+        loop {
+            let delta = patient.improve(&ImproveOptions::default(), |_| false);
+            if delta.is_empty() {
+                break;
+            }
+            calls += 1;
+            patient.near = (0..delta.particles_after()).map(ParticleId::new).collect();
+        }
+        assert!((1..10).contains(&calls));
+        let left = patient.body.mesh().tets.len() - mesh.tets.len();
+        println!("snap {snap}: {added} tets added, {left} left after {calls} calls");
+        assert!(10 * left < 6 * added);
+    }
+}
+
+#[test]
+fn bad_tolerances_are_refused() {
+    let mesh = kuhn_box([1; 3], DVec3::ONE);
+    let mut body = CuttableMesh::new(mesh.clone()).unwrap();
+    for tolerance in [-0.1, 0.3, f64::NAN] {
+        let options = ImproveOptions {
+            tolerance,
+            ..ImproveOptions::default()
+        };
+        let refused = improve(&mut body, &mesh.positions, &[], &options, |_, _| false);
+        assert!(matches!(refused, Err(CutError::Improve { .. })));
+    }
+    let refused = improve(&mut body, &[], &[], &ImproveOptions::default(), |_, _| {
+        false
+    });
+    assert!(refused.is_err());
+    assert_eq!(body.mesh(), &mesh);
+}
+
+/// Ten slices a tenth of an edge apart: with improvement the body has less than a quarter of the tets, and as many pieces.
+#[test]
+fn ten_thin_slices() {
+    for snap in [0.0, 0.1] {
+        let mesh = jittered_box(6, 0.1, 3);
+        let run = |improves: bool| {
+            let mut patient = Patient::new(&mesh, mesh.positions.clone());
+            for i in 0..10 {
+                let point = DVec3::new(0.4 + 0.1 / 6.0 * f64::from(i), 0.0, 0.0);
+                patient.plane(point, DVec3::new(1.0, 0.1, 0.05), &options(snap));
+                if improves {
+                    patient.improve(&ImproveOptions::default(), |_| false);
+                }
+            }
+            patient
+        };
+        let [plain, improved] = [false, true].map(run);
+        let counts = [&plain, &improved].map(|patient| {
+            let mesh = patient.body.mesh();
+            (mesh.tets.len(), slivers(mesh), patient.pieces.count())
+        });
+        println!("slices, snap {snap}: {} -> {counts:?}", mesh.tets.len());
+        let [(grown, bad, count), (tets, slivers, same)] = counts;
+        assert_eq!(count, same);
+        assert!(4 * tets < grown);
+        assert!(2 * slivers < bad);
+    }
+}
+
+/// Short strokes beside and across each other.
+fn short_strokes(mesh: &TetMesh, count: usize, snap: f64, improves: bool) -> Patient {
+    let mut patient = Patient::new(mesh, mesh.positions.clone());
+    let edge = (mesh.total_volume() / mesh.tets.len() as f64 * 8.0).cbrt();
+    for i in 0..count {
+        let direction =
+            |k: usize| DVec3::from_array([0, 1, 2].map(|j| noise(3, 20 * i + 3 * k + j)));
+        let center = DVec3::splat(0.5) + 0.3 * direction(0);
+        let along = direction(1).normalize_or(DVec3::X) * 3.0 * edge;
+        let path = direction(2).normalize_or(DVec3::Y) * 3.0 * edge;
+        let pose = |t: f64| [center - along + path * t, center + along + path * t];
+        let rest = patient.positions.clone();
+        let mut stroke = Sweep::new(&patient.body, &rest, &pose(-1.0), options(snap)).unwrap();
+        for t in [0.0, 1.0] {
+            let positions = patient.positions.clone();
+            let delta = stroke
+                .advance(&mut patient.body, &positions, &pose(t))
+                .unwrap();
+            delta.extend_particles(&mut patient.positions);
+            patient.pieces.apply_delta(&patient.body, &delta);
+            patient.skin.apply_delta(&delta);
+            patient.near.extend(delta.created_particles());
+        }
+        if improves {
+            patient.improve(&ImproveOptions::default(), |_| false);
+        }
+    }
+    patient
+}
+
+/// Strokes across each other: the body grows to a fraction of what it would.
+#[test]
+fn many_short_strokes() {
+    for snap in [0.0, 0.1] {
+        let mesh = jittered_box(5, 0.1, 5);
+        let counts = [false, true].map(|improves| {
+            let patient = short_strokes(&mesh, 20, snap, improves);
+            let mesh = patient.body.mesh();
+            (mesh.tets.len(), slivers(mesh), patient.pieces.count())
+        });
+        println!("strokes, snap {snap}: {} -> {counts:?}", mesh.tets.len());
+        let [(grown, bad, _), (tets, slivers, _)] = counts;
+        assert!(2 * tets < grown && 2 * slivers < bad);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// Cuts of all kinds in bent bodies, improved after each, with locked particles and without boundary changes too.
+    #[test]
+    fn random_cuts(
+        kind in 1_usize..6, seed in any::<u64>(), snap in prop::sample::select(vec![0.0, 0.1, 0.25]),
+        tolerance in prop::sample::select(vec![0.0, 0.05, 0.25]), keeps_boundary in any::<bool>(),
+        locked in 1_usize..5,
+    ) {
+        let mesh = body(kind, seed);
+        let mut patient = Patient::new(&mesh, bend(&mesh, 0.2));
+        let center = patient.positions.iter().sum::<DVec3>() / mesh.positions.len() as f64;
+        let size = patient.positions.iter().map(|x| x.distance(center)).fold(0.0, f64::max);
+        for i in 0..4 {
+            let direction = |k: usize| DVec3::from_array([0, 1, 2].map(|j| noise(seed, 30 * i + 3 * k + j)));
+            let point = center + 0.3 * size * direction(0);
+            let before = patient.body.mesh().clone();
+            if i % 2 == 0 {
+                patient.plane(point, direction(1) + DVec3::splat(1e-3), &options(snap));
+            } else {
+                let bend = [direction(1), direction(2), direction(3)].map(|x| point + size * x);
+                let further = bend.map(|x| x + 2.0 * size * direction(4));
+                let Ok(surface) = strip(&bend, &further) else { continue };
+                let positions = patient.positions.clone();
+                let delta = cut_surface(&mut patient.body, &positions, &surface, &options(snap)).unwrap();
+                patient.apply(&before, &delta);
+            }
+            let options = ImproveOptions { tolerance, keeps_boundary };
+            patient.improve(&options, |p| p.index() % 5 >= locked);
+        }
+        // What follows works on the mesh as it is.
+        let before = patient.body.mesh().clone();
+        let delta = remove_tets(&mut patient.body, &[TetId(0)], 9).unwrap();
+        patient.apply(&before, &delta);
+    }
+}
