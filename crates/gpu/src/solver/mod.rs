@@ -158,8 +158,8 @@ impl GpuSolver {
     ///
     /// # Errors
     /// If the settings do not pass [`StepSettings::check`]; if they ask for Jacobi or Chebyshev iterations in
-    /// [`ClusterMapping::Workgroups`]; if a cluster is larger than the mapping allows; if the device is lost or out of
-    /// memory.
+    /// [`ClusterMapping::Workgroups`]; if the solver has contacts ([`GpuError::Unsupported`]); if a cluster is larger than
+    /// the mapping allows; if the device is lost or out of memory.
     ///
     /// # Panics
     /// If the schedule names a tet that does not exist.
@@ -194,6 +194,9 @@ impl GpuSolver {
     ) -> Result<(), GpuError> {
         let _span = tracing::debug_span!("gpu::step").entered();
         settings.check()?;
+        if self.host.has_contacts() {
+            return Err(GpuError::Unsupported { what: "contacts" });
+        }
         // A caller that is faster than the device waits here; otherwise memory runs out.
         while self.in_flight.len() >= FRAMES_IN_FLIGHT {
             let oldest = self.in_flight.pop_front();
